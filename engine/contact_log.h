@@ -1,0 +1,33 @@
+#pragma once
+// A collision as observers see it.
+
+#include <compare>
+
+#include "engine/vec.h"
+
+namespace carom {
+
+enum class EventKind : std::uint8_t { pair = 0, wall = 1 };
+
+/// Total order of events: the same on every machine and for every decomposition. `generation` orders what happens at one
+/// instant: 1 + the larger generation of the partners' records where these are of the same time, else 0.
+template <int D>
+struct EventKey {
+  double time = 0;  ///< since the start of the slab or epoch
+  std::uint32_t generation = 0;
+  EventKind kind = EventKind::pair;
+  Id lo = 0;  ///< the lower id; at a wall: the particle
+  Id hi = 0;  ///< the higher id; at a wall: 2·axis + (0 lower, 1 upper)
+  Image<D> image{};
+  auto operator<=>(const EventKey&) const = default;
+};
+
+/// One executed collision.
+template <int D>
+struct Contact {
+  EventKey<D> key;
+  Vec<D> x_lo, x_hi;  ///< centres at contact [length]; x_hi is shifted to the image that is touched; at a wall: the point touched
+  Vec<D> impulse;     ///< given to `lo`, taken from `hi` [mass·length/time]
+};
+
+}  // namespace carom

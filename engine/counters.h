@@ -1,0 +1,39 @@
+#pragma once
+// What an integrator counts while it works, and where its time went. None of it reaches the physics.
+
+#include <chrono>
+#include <cstdint>
+
+#include "engine/exact_sum.h"
+
+namespace carom {
+
+struct Counters {
+  std::uint64_t sphere_sphere = 0;     ///< executed pair collisions
+  std::uint64_t sphere_wall = 0;       ///< executed wall collisions
+  std::uint64_t pair_evaluations = 0;  ///< of forces, mean forces and Hessian products; energies not counted
+  std::uint64_t sweeps = 0;            ///< iterations of implicit solves
+  std::uint64_t slabs_halved = 0;
+  std::uint64_t fallbacks = 0;   ///< mcva: plain elastic impulses; cdda: Newton–Krylov solves
+  double max_overlap = 0;        ///< deepest overlap met, relative to the contact distance
+  ExactSum collision_virial;     ///< Σ d·impulse over pair collisions [mass·length²/time]
+
+  struct Seconds {
+    double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;
+  } seconds;
+};
+
+/// Adds the time of its own life to a total.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& total) : total_(total), start_(std::chrono::steady_clock::now()) {}
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+  ~Stopwatch() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  double& total_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+}  // namespace carom

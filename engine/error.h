@@ -1,0 +1,23 @@
+#pragma once
+// Errors that reach the user. Each knows which exit code the command ends with.
+
+#include <stdexcept>
+#include <string>
+
+namespace carom {
+
+/// What went wrong; the value is the exit code of the `carom` command.
+enum class Failure { deck = 2, initial_state = 3, numerical = 4, file = 5 };
+
+/// An error with what happened, where, and what to do about it, all in its message.
+class Error : public std::runtime_error {
+ public:
+  Error(Failure failure, const std::string& message) : std::runtime_error(message), failure_(failure) {}
+  Failure failure() const { return failure_; }
+  int exit_code() const { return static_cast<int>(failure_); }
+
+ private:
+  Failure failure_;
+};
+
+}  // namespace carom

@@ -1,0 +1,95 @@
+#pragma once
+// What acts between and on the particles besides their hard cores: the smooth part V of H = ½ vᵀMv + V(x).
+//
+// An Interaction is one term of V: a pair potential over a list of bonds or over all pairs within a cutoff, or an
+// external field. It offers V, its gradient, its discrete gradient and its second derivative, each as a whole loop over
+// the particles. Positions are passed in as arrays in id order; contributions to one particle are summed in the order of
+// the partner's id, so that the sum does not depend on how the pairs were found.
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/box.h"
+#include "engine/exact_sum.h"
+#include "engine/parameters.h"
+#include "engine/particles.h"
+
+namespace carom {
+
+template <int D>
+using Positions = std::span<const Vec<D>>;
+template <int D>
+using Vectors = std::span<Vec<D>>;
+
+/// Sums over one evaluation of V; exact, so that they do not depend on the order of summation.
+struct PotentialSums {
+  ExactSum energy;     ///< V [energy]
+  ExactSum magnitude;  ///< Σ|V| over pairs and particles [energy]
+  ExactSum virial;     ///< Σ d·F over pairs, d = x_i − x_j, F the force on i [energy]; external fields add nothing
+};
+
+template <int D>
+class Interaction {
+ public:
+  virtual ~Interaction() = default;
+
+  /// V and its companions at positions x.
+  virtual void add_energy(Positions<D> x, PotentialSums& sums) const = 0;
+
+  /// force[i] −= ∂V/∂x_i.
+  virtual void add_forces(Positions<D> x, Vectors<D> force) const = 0;
+
+  /// force[i] −= ∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996;
+  /// for pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x.
+  virtual void add_mean_forces(Positions<D> x, Positions<D> x_new, Vectors<D> force) const = 0;
+
+  /// out += V″(x) w.
+  virtual void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const = 0;
+
+  /// How many pairs (or particles, for a field) one evaluation visits within reach: the unit of `force_passes`.
+  virtual std::uint64_t interacting_pairs(Positions<D> x) const = 0;
+
+  /// The constant acceleration, the same for every particle, that this term gives; null where it gives anything else.
+  /// Free flight can carry such a field exactly.
+  virtual const Vec<D>* common_acceleration() const { return nullptr; }
+
+  /// Whether the term is invariant under translation, so that it keeps the total momentum.
+  virtual bool keeps_momentum() const { return true; }
+};
+
+/// What an interaction is made from, besides its own parameters. The box and particles outlive the interaction.
+template <int D>
+struct InteractionContext {
+  const Box<D>& box;
+  const Particles<D>& particles;
+  const std::vector<std::string>& species;  ///< names, in the order of Particles::species
+};
+
+/// The declaration of one type of interaction; engine/potentials/registry.cc lists them all.
+struct InteractionInfo {
+  enum class Kind { bonded, pair, field };
+  std::string_view name;  ///< as in the deck: `type = "…"`
+  Kind kind;
+  std::vector<Parameter> parameters;
+  std::string_view formula;        ///< V in the notation of the docs
+  std::string_view documentation;  ///< a paragraph for the manual
+  std::string_view source;         ///< paper or book
+  std::unique_ptr<Interaction<2>> (*in_2d)(const Parameters&, const InteractionContext<2>&);
+  std::unique_ptr<Interaction<3>> (*in_3d)(const Parameters&, const InteractionContext<3>&);
+
+  template <int D>
+  std::unique_ptr<Interaction<D>> make(const Parameters& parameters, const InteractionContext<D>& context) const {
+    if constexpr (D == 2)
+      return in_2d(parameters, context);
+    else
+      return in_3d(parameters, context);
+  }
+};
+
+/// Every type of interaction there is, in the order of the manual.
+const std::vector<InteractionInfo>& interactions();
+
+}  // namespace carom

@@ -1,0 +1,53 @@
+#pragma once
+// A Verlet list: the pairs that come within reach while nobody moves far.
+//
+// The list is built from a cell grid with a skin and rebuilt when a particle has moved more than half of it. Pairs are
+// held in the order (lower id, higher id, image), so that loops over the list sum in id order whatever the skin: a wider
+// list only adds pairs that are out of reach. A pair may stand there with several images where a periodic box is small.
+// (Verlet, Phys. Rev. 159 (1967) 98.)
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "engine/box.h"
+#include "engine/vec.h"
+
+namespace carom {
+
+/// Particles i < j; x[i] − x[j] + shift(image) is the pair's separation.
+template <int D>
+struct NeighbourPair {
+  Id i, j;
+  Image<D> image;
+  auto operator<=>(const NeighbourPair&) const = default;
+};
+
+template <int D>
+class NeighbourList {
+ public:
+  /// Lists pairs (i, j) whose distance can fall to reach(i) + reach(j).
+  /// Pairs for which `wanted` says no are left out; an empty function wants all.
+  NeighbourList(const Box<D>& box, std::vector<double> reach, std::function<bool(Id, Id)> wanted = {});
+
+  /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them
+  /// (arcs that stray no farther from x than `margin` besides the straight displacement). Rebuilds where needed.
+  std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new, double margin = 0);
+  std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, double margin = 0) { return cover(x, x, margin); }
+
+  std::uint64_t rebuilds() const { return rebuilds_; }
+
+ private:
+  void build(std::span<const Vec<D>> x);
+  void follow_wraps(std::span<const Vec<D>> x);
+
+  const Box<D>& box_;
+  std::vector<double> reach_;
+  std::function<bool(Id, Id)> wanted_;
+  double skin_;
+  std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
+  std::vector<NeighbourPair<D>> pairs_;
+  std::uint64_t rebuilds_ = 0;
+};
+
+}  // namespace carom

@@ -1,0 +1,24 @@
+#pragma once
+// The particles of a run, in the order of their ids, as integrators and observers see them: everybody at the same time.
+
+#include <string>
+#include <vector>
+
+#include "engine/vec.h"
+
+namespace carom {
+
+template <int D>
+struct Particles {
+  std::vector<Vec<D>> x;               ///< position of the centre [length]
+  std::vector<Vec<D>> v;               ///< velocity [length/time]
+  std::vector<double> mass;            ///< [mass], positive
+  std::vector<double> radius;          ///< of the hard core [length], positive
+  std::vector<double> charge;          ///< [charge]
+  std::vector<std::uint16_t> species;  ///< index into System::species
+  std::vector<Image<D>> image;         ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
+
+  std::size_t size() const { return x.size(); }
+};
+
+}  // namespace carom

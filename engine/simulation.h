@@ -1,0 +1,106 @@
+#pragma once
+// A run: slab after slab, with energies kept in view and observers told at their due times.
+//
+//   Simulation<2> run(std::move(system), info, info.make<2>(parameters), plan);
+//   run.add(writer);
+//   run.run();
+//
+// Observing changes nothing: observers get copies, and no due time cuts a slab.
+
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/integrator.h"
+#include "engine/system.h"
+
+namespace carom {
+
+/// When a run ends and what it shows on the way. Of several ends the first reached counts; at least one is given.
+struct Plan {
+  double step = 0;                          ///< length of a slab [time], > 0
+  std::optional<std::int64_t> steps;        ///< number of slabs
+  std::optional<double> end_time;           ///< the last slab is shortened to meet it
+  std::optional<std::uint64_t> collisions;  ///< pair collisions; free flight stops exactly there, the others at the slab's end
+  double frame_interval = 0;                ///< simulated time between frames; 0: first and last only
+  double thermo_interval = 0;               ///< simulated time between thermo rows; 0: first and last only
+  bool events = false;                      ///< pass every contact on to the observers
+};
+
+/// What an observer is shown: a state and its observables, all at `time`.
+template <int D>
+struct Snapshot {
+  double time = 0;
+  std::int64_t step = 0;         ///< slabs completed (free flight: epochs begun or completed)
+  std::uint64_t collisions = 0;  ///< pair collisions so far
+  const Particles<D>* particles = nullptr;
+  double kinetic = 0, potential = 0;  ///< [energy]
+  double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN where the method has none
+  double max_energy_error = 0;        ///< largest |H − H₁| so far [energy]
+  Vec<D> momentum = Vec<D>::Zero();
+  double temperature = 0;  ///< 2K/(D N), in units of energy (k_B = 1); total momentum is not subtracted
+  double pressure = 0;     ///< virial: (2K + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
+  double total() const { return kinetic + potential; }
+};
+
+template <int D>
+class Observer {
+ public:
+  virtual ~Observer() = default;
+  virtual void frame(const Snapshot<D>&) {}
+  virtual void thermo(const Snapshot<D>&) {}
+  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`.
+  virtual void contacts(double /*slab_start*/, std::span<const Contact<D>>) {}
+  /// After every slab: how far the run has come. Cheap; called often.
+  virtual void progress(const struct Statistics&) {}
+};
+
+/// The run's account of itself; final once run() has returned, current while it runs.
+struct Statistics {
+  std::int64_t steps = 0;
+  double end_time = 0;       ///< simulated time reached
+  double fraction_done = 0;  ///< of the plan, 0…1
+  Counters counters;
+  double force_passes = 0;  ///< pair evaluations / interacting pairs
+
+  double energy_initial = 0, energy_after_first_step = 0, energy_final = 0;
+  double energy_reference = 0;      ///< max(|H₁|, K₁ + Σ|V|): what to divide energy errors by
+  double max_energy_error = 0;      ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the start)
+  std::optional<double> max_shadow_energy_error;  ///< Verlet types
+  std::optional<double> max_momentum_error;       ///< where nothing takes momentum (no walls, no fields): max |P − P₀|
+  double mean_pressure = 0;     ///< over the whole run
+  double collision_rate = 0;    ///< pair collisions a unit time and particle, times two: what one sphere suffers
+  double wall_seconds = 0;      ///< of the run's loop
+  bool stopped_early = false;   ///< should_stop said so
+};
+
+template <int D>
+class Simulation {
+ public:
+  /// The integrator and its info must belong together.
+  Simulation(System<D> system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator, Plan plan);
+  ~Simulation();
+
+  /// Observers outlive the run.
+  void add(Observer<D>& observer) { observers_.push_back(&observer); }
+
+  /// Runs to the end of the plan, or until should_stop() says so at the end of a slab. Throws Error.
+  void run(const std::function<bool()>& should_stop = {});
+
+  const Statistics& statistics() const { return statistics_; }
+  const System<D>& system() const { return *system_; }
+
+ private:
+  struct Monitor;
+  std::unique_ptr<System<D>> system_;  // on the heap: interactions refer to its box and particles
+  const IntegratorInfo& info_;
+  std::unique_ptr<Integrator<D>> integrator_;
+  Plan plan_;
+  std::vector<Observer<D>*> observers_;
+  Statistics statistics_;
+};
+
+}  // namespace carom

@@ -1,0 +1,30 @@
+#pragma once
+// Everything that moves and what it feels: the state an integrator advances.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/box.h"
+#include "engine/interaction.h"
+#include "engine/particles.h"
+
+namespace carom {
+
+template <int D>
+struct System {
+  Box<D> box;
+  Particles<D> particles;
+  std::vector<std::string> species;
+  std::vector<std::unique_ptr<Interaction<D>>> interactions;
+
+  /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
+  void wrap();
+};
+
+template <int D>
+void System<D>::wrap() {
+  for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i]);
+}
+
+}  // namespace carom

@@ -1,0 +1,21 @@
+#pragma once
+// The vector type of the whole engine.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+namespace carom {
+
+/// A point, displacement, velocity or force in D dimensions.
+template <int D>
+using Vec = Eigen::Matrix<double, D, 1>;
+
+/// A particle's number, given by its place in the deck, for ever.
+using Id = std::uint32_t;
+
+/// How many times a particle or a pair has been carried round each periodic axis.
+template <int D>
+using Image = std::array<std::int32_t, D>;
+
+}  // namespace carom
