@@ -81,7 +81,7 @@ template <int D>
 class Simulation {
  public:
   /// The integrator and its info must belong together.
-  Simulation(System<D> system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator, Plan plan);
+  Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator, Plan plan);
   ~Simulation();
 
   /// Observers outlive the run.
@@ -95,7 +95,7 @@ class Simulation {
 
  private:
   struct Monitor;
-  std::unique_ptr<System<D>> system_;  // on the heap: interactions refer to its box and particles
+  std::unique_ptr<System<D>> system_;
   const IntegratorInfo& info_;
   std::unique_ptr<Integrator<D>> integrator_;
   Plan plan_;

@@ -11,8 +11,13 @@
 
 namespace carom {
 
+/// Lives on the heap and is never moved: interactions refer to its box and particles.
 template <int D>
 struct System {
+  System() = default;
+  System(const System&) = delete;
+  System& operator=(const System&) = delete;
+
   Box<D> box;
   Particles<D> particles;
   std::vector<std::string> species;

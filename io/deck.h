@@ -1,0 +1,55 @@
+#pragma once
+// A deck, read, checked and resolved: everything a run needs, with defaults filled in.
+//
+//   Deck deck = read_deck("inputs/five-springs.toml", {"integrator.step=0.02"});   // throws DeckError with all problems
+//   auto system = build_system<2>(deck);                                            // throws Error(initial_state)
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/error.h"
+#include "engine/integrator.h"
+#include "engine/simulation.h"
+#include "engine/system.h"
+
+namespace carom {
+
+struct OutputConfig {
+  std::filesystem::path directory;
+  std::string checkpoint_wall;  ///< hh:mm:ss of wall time between checkpoints, or empty
+};
+
+/// The deck as a value; `toml_text` is the resolved deck, which gives the same run when it is run again.
+struct Deck {
+  std::filesystem::path file;
+  std::string title, description;
+  int dimension = 2;
+  std::string integrator;
+  Parameters integrator_parameters;
+  Plan plan;  ///< plan.step: the slab length (free flight: the epoch)
+  OutputConfig output;
+  std::vector<std::string> warnings;  ///< printed before the run
+  std::string toml_text;
+
+  struct Source;                   ///< the parsed tables, known to io/deck*.cc only
+  std::shared_ptr<Source> source;
+};
+
+/// All problems of a deck, one a line: `file:line:column: error: what; what to do`.
+class DeckError : public Error {
+ public:
+  explicit DeckError(const std::string& all) : Error(Failure::deck, all) {}
+};
+
+/// Reads, applies `table.key=value` overrides, validates against the schema, resolves defaults.
+Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides);
+
+/// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
+/// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards.
+template <int D>
+std::unique_ptr<System<D>> build_system(Deck& deck);
+
+}  // namespace carom
