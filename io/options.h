@@ -1,0 +1,20 @@
+#pragma once
+// What the command line of `carom run` says.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace carom {
+
+struct RunOptions {
+  std::filesystem::path deck;
+  std::vector<std::string> set;                  ///< `table.key=value`, in the order given
+  std::optional<std::filesystem::path> output;   ///< instead of output.directory; relative to the working directory
+  std::optional<std::filesystem::path> restart;  ///< a checkpoint to go on from
+  std::optional<double> max_wall_seconds;        ///< stop early after this much wall time
+  bool quiet = false;                            ///< no progress line, no banner
+};
+
+}  // namespace carom
