@@ -1,0 +1,155 @@
+"""Reads what a run of Carom leaves in its directory, and starts runs.
+
+    from carom_files import Trajectory, read_summary, read_thermo, run_carom
+    run_carom(find_carom(), "deck.toml", "runs/here")
+    with Trajectory("runs/here") as trajectory:
+        trajectory.position(-1)        # [particles, dimension]
+
+Needs Debian's python3-h5py and python3-numpy. Everything is in the reduced units of the deck.
+"""
+
+import csv
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tomllib
+
+import h5py
+import numpy as np
+
+TRAJECTORY = "trajectory.h5md"
+
+
+class RunFailed(Exception):
+    """`carom run` ended with an exit code other than 0; carries its code and its last words."""
+
+    def __init__(self, code, message):
+        super().__init__(f"carom run ended with exit code {code}: {message}")
+        self.code = code
+
+
+def find_carom(given=None):
+    """The carom command: the one given, $CAROM, the build of tools/run, or what is on the PATH."""
+    if given or os.environ.get("CAROM"):
+        return pathlib.Path(given or os.environ["CAROM"]).resolve()
+    built = pathlib.Path(__file__).resolve().parent.parent / "build" / "release" / "io" / "carom"
+    if built.exists():
+        return built
+    installed = shutil.which("carom")
+    if not installed:
+        raise SystemExit("There is no carom command: build it with tools/run, or name it with --carom.")
+    return pathlib.Path(installed)
+
+
+def run_carom(carom, deck, directory, overrides=()):
+    """Runs a deck and returns its summary. Raises RunFailed."""
+    command = [str(carom), "run", str(deck), "-o", str(directory), "--quiet"]
+    for override in overrides:
+        command += ["--set", override]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RunFailed(done.returncode, (done.stderr or done.stdout).strip())
+    return read_summary(directory)
+
+
+def read_summary(directory):
+    """summary.json as nested dictionaries: read_summary(d)["energy"]["final"]."""
+    return json.loads((pathlib.Path(directory) / "summary.json").read_text())
+
+
+def read_thermo(directory):
+    """thermo.csv as a dictionary of columns; an empty cell becomes NaN."""
+    with open(pathlib.Path(directory) / "thermo.csv", newline="") as file:
+        rows = list(csv.reader(file))
+    values = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows[1:]])
+    values = values.reshape(len(rows) - 1, len(rows[0]))
+    return {name: values[:, column] for column, name in enumerate(rows[0])}
+
+
+class Trajectory:
+    """A trajectory.h5md, opened for reading; takes the file or the directory of its run.
+
+    Frames are numbered from 0; -1 is the last. Arrays have as many columns as the run had dimensions.
+    """
+
+    def __init__(self, path):
+        path = pathlib.Path(path)
+        self._file = h5py.File(path / TRAJECTORY if path.is_dir() else path, "r")
+        self._group = self._file["particles/trajectory"]
+        self.dimension = int(self._file["parameters/dimension"][()])
+        self.time = self._group["position/time"][:]
+        self.step = self._group["position/step"][:]
+        self.radius = self._group["radius"][:]
+        self.mass = self._group["mass"][:]
+        self.species = self._group["species"][:]
+        deck = tomllib.loads(as_text(self._file["parameters/deck"][()]))
+        self.title = deck.get("title", "")
+        self.boundary = deck["system"]["boundary"]  # per axis: "wall", "periodic" or "open"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._file.close()
+
+    def __len__(self):
+        return len(self.time)
+
+    @property
+    def periodic(self):
+        return np.array([rule == "periodic" for rule in self.boundary])
+
+    def position(self, frame):
+        """Centres, wrapped into the box along its periodic axes [length]."""
+        return self._read("position", frame)
+
+    def velocity(self, frame):
+        return self._read("velocity", frame)
+
+    def unwrapped(self, frame):
+        """Centres, followed through the periodic boundaries [length]."""
+        return self.position(frame) + self._read("image", frame) * self.edges(frame)
+
+    def edges(self, frame=0):
+        """Edge lengths of the box [length]."""
+        return np.diag(self._group["box/edges/value"][self._index(frame)])[: self.dimension].copy()
+
+    def _index(self, frame):
+        return frame if frame >= 0 else len(self) + frame
+
+    def _read(self, name, frame):
+        return self._group[name]["value"][self._index(frame)][:, : self.dimension]
+
+
+def as_text(value):
+    """The text of an HDF5 string, stored as one or as an array of one."""
+    value = np.asarray(value).reshape(-1)[0]
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def toml_text(deck):
+    """A deck given as a dictionary (as tomllib reads it) in TOML."""
+    lines = [f"{key} = {_toml_value(value)}" for key, value in deck.items() if not _is_table(value)]
+    for key, value in deck.items():
+        if not _is_table(value):
+            continue
+        header = f"[[{key}]]" if isinstance(value, list) else f"[{key}]"
+        for table in value if isinstance(value, list) else [value]:
+            lines += ["", header] + [f"{name} = {_toml_value(entry)}" for name, entry in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _is_table(value):
+    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
+
+
+def _toml_value(value):
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml_value, value)) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml_value(entry)}" for key, entry in value.items()) + "}"
+    if isinstance(value, (bool, str)):
+        return json.dumps(value, ensure_ascii=False)  # a JSON string or boolean is one of TOML
+    return repr(value)

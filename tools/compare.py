@@ -1,0 +1,92 @@
+#!/usr/bin/python3
+"""Are two runs the same? Bit for bit, or within a tolerance.
+
+    tools/compare.py runs/a runs/b                      # every frame and every thermo row, bit for bit
+    tools/compare.py runs/a runs/b --tolerance 1e-9     # largest absolute difference of positions, velocities, thermo
+    tools/compare.py runs/a runs/b --last               # only the final records: for runs with other output intervals
+
+Compared are all data sets of /particles and /observables of the trajectory, thermo.csv, and events.h5 where both have one;
+the resolved deck is not, nor are times of the wall clock. Exit code 0: the same; 1: they differ.
+"""
+
+import argparse
+import pathlib
+import sys
+
+import h5py
+import numpy as np
+
+from carom_files import TRAJECTORY, read_thermo
+
+
+def data_sets(file, groups=None):
+    """All data sets of an HDF5 file below the given groups, by their full names."""
+    found = {}
+    for group in groups or file:
+        if group in file:
+            file[group].visititems(
+                lambda name, item: found.update({f"/{group}/{name}": item[()]}) if isinstance(item, h5py.Dataset) else None)
+            if isinstance(file[group], h5py.Dataset):
+                found[f"/{group}"] = file[group][()]
+    return found
+
+
+def last_frame(sets):
+    """What a trajectory says about its final records: step, time and the last frame of each value."""
+    frames = {name: value[-1] for name, value in sets.items()
+              if name.startswith("/particles") and name.rsplit("/", 1)[-1] in ("value", "step", "time")}
+    fixed = {name: value for name, value in sets.items() if name.startswith("/particles") and name not in frames}
+    return frames | fixed
+
+
+def differences(a, b, tolerance):
+    """One line for each array that differs (tolerance None: in any bit)."""
+    lines = [f"only in one: {name}" for name in sorted(a.keys() ^ b.keys())]
+    for name in sorted(a.keys() & b.keys()):
+        left, right = np.asarray(a[name]), np.asarray(b[name])
+        if left.shape != right.shape:
+            lines.append(f"{name}: shape {left.shape} against {right.shape}")
+        elif left.dtype != right.dtype:
+            lines.append(f"{name}: type {left.dtype} against {right.dtype}")
+        elif left.tobytes() == right.tobytes():
+            continue
+        elif not np.issubdtype(left.dtype, np.floating):
+            if tolerance is None or not np.array_equal(left, right):
+                lines.append(f"{name}: {np.count_nonzero(left != right)} of {left.size} differ")
+        else:
+            distance = np.where(np.isnan(left) & np.isnan(right), 0.0, np.abs(left - right))
+            worst = np.max(np.nan_to_num(distance, nan=np.inf))
+            if tolerance is None or worst > tolerance:
+                lines.append(f"{name}: differ by up to {worst:.3e}")
+    return lines
+
+
+def compare(a, b, tolerance=None, last=False):
+    """What is different between two runs, one line each; empty: nothing."""
+    a, b = pathlib.Path(a), pathlib.Path(b)
+    with h5py.File(a / TRAJECTORY, "r") as left, h5py.File(b / TRAJECTORY, "r") as right:
+        sets = [data_sets(file, ("particles", "observables")) for file in (left, right)]
+    if last:
+        return differences(*map(last_frame, sets), tolerance)
+    lines = differences(*sets, tolerance)
+    lines += [f"thermo.csv, {line}" for line in differences(read_thermo(a), read_thermo(b), tolerance)]
+    if (a / "events.h5").exists() and (b / "events.h5").exists():
+        with h5py.File(a / "events.h5", "r") as left, h5py.File(b / "events.h5", "r") as right:
+            lines += [f"events.h5, {line}" for line in differences(data_sets(left), data_sets(right), tolerance)]
+    return lines
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("a", type=pathlib.Path, help="directory of a run")
+    parser.add_argument("b", type=pathlib.Path, help="directory of another")
+    parser.add_argument("--tolerance", type=float, help="allowed absolute difference; default: none, bit for bit")
+    parser.add_argument("--last", action="store_true", help="compare the final records only")
+    options = parser.parse_args(arguments)
+    lines = compare(options.a, options.b, options.tolerance, options.last)
+    print("\n".join(lines) if lines else "the same")
+    return 1 if lines else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,172 @@
+#!/usr/bin/python3
+"""How well methods keep the energy, against the step: runs the sweep and draws the thesis figure.
+
+    tools/energy_study.py inputs/five-springs.toml --methods psa,cva,mcva,cdda --steps 0.3,0.1,0.03,0.01,0.003,0.001
+    tools/energy_study.py inputs/nine-gravity.toml --methods cva,mcva:variant=restart,cdda:order=4
+    tools/energy_study.py inputs/five-springs.toml --methods psa,cva --end-time 6 --starts 16 --steps 0.03,0.01,0.003,0.001
+
+Every run makes 5000 steps (--count), or, for a clean order, goes to a fixed --end-time, from --starts perturbed copies of
+the deck's initial state (seeded; start 0 is the deck's own). Drawn is the largest |H - H1|, H1 the energy after the first
+step, as a geometric mean over the starts; the CSV also has it relative to E_ref = max(|H1|, K1 + sum |V|). The order is the
+slope over the steps not above --fit-below; errors at rounding level have none. Runs that fail are reported, kept as
+rows without an error, and left out of the figure. The decks of all runs are left beside the CSV.
+"""
+
+import argparse
+import concurrent.futures
+import csv
+import os
+import pathlib
+import sys
+import tempfile
+import tomllib
+
+import numpy as np
+
+from carom_files import RunFailed, find_carom, run_carom, toml_text
+from carom_plot import picture
+
+ROUNDING = 1e-11  # relative to E_ref: below, an error is called rounding and given no order
+COLUMNS = ["method", "step", "start", "max_abs_energy_error", "energy_reference", "relative_energy_error",
+           "max_abs_shadow_energy_error", "max_overlap", "sphere_sphere", "sphere_wall", "steps", "wall_seconds",
+           "status"]
+
+
+def parse_arguments(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("deck", type=pathlib.Path)
+    parser.add_argument("--methods", default="psa,cva,mcva,cdda", help="names, each with keys: cdda:order=4")
+    parser.add_argument("--steps", default="0.3,0.1,0.03,0.01,0.003,0.001")
+    parser.add_argument("--count", type=int, default=5000, help="steps a run")
+    parser.add_argument("--end-time", type=float, help="go to this time instead of making --count steps")
+    parser.add_argument("--starts", type=int, default=1, help="how many initial states to average over")
+    parser.add_argument("--perturbation", type=float, default=0.01,
+                        help="half-width of the uniform perturbation of each coordinate and velocity")
+    parser.add_argument("--seed", type=int, default=20070101)
+    parser.add_argument("--fit-below", type=float, default=0.1, help="largest step that enters the order")
+    parser.add_argument("--carom", help="the command; default: $CAROM or the build of tools/run")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="runs at a time")
+    parser.add_argument("-o", "--output", type=pathlib.Path, help="directory; default: runs/energy-study-<deck>")
+    options = parser.parse_args(arguments)
+    options.methods = options.methods.split(",")
+    options.steps = sorted((float(step) for step in options.steps.split(",")), reverse=True)
+    options.output = options.output or pathlib.Path("runs") / f"energy-study-{options.deck.stem}"
+    if options.starts < 1 or min(options.steps) <= 0:
+        parser.error("--starts must be at least 1 and every step positive")
+    return options
+
+
+def integrator_table(method, step):
+    """The deck's [integrator] for a method given as name[:key=value…]."""
+    name, *keys = method.split(":")
+    table = {"type": name, "step": step}
+    for key in keys:
+        key, _, value = key.partition("=")
+        try:
+            table |= tomllib.loads(f"{key} = {value}")
+        except tomllib.TOMLDecodeError:  # a word without quotes
+            table[key] = value
+    return table
+
+
+def perturbed(deck, start, amplitude, seed):
+    """A copy of the deck with every coordinate and velocity moved by up to `amplitude`; the deck itself for start 0."""
+    if start == 0:
+        return deck
+    random = np.random.default_rng([seed, start])
+    tables = []
+    for table in deck["particles"]:
+        if "position" not in table:
+            raise SystemExit("Perturbed starts need a deck with explicit positions.")
+        moved = dict(table)
+        for key in ("position", "velocity"):
+            values = np.array(table.get(key, np.zeros_like(table["position"], dtype=float)), dtype=float)
+            moved[key] = (values + random.uniform(-amplitude, amplitude, values.shape)).tolist()
+        tables.append(moved)
+    return deck | {"particles": tables}
+
+
+def run_one(options, carom, deck, method, step, start):
+    """Runs one method at one step from one start; returns its row of the CSV."""
+    name = f"{method.replace(':', '-').replace('=', '-')}-{step:g}-{start:02d}"
+    plan = {"end_time": options.end_time} if options.end_time else {"steps": options.count}
+    deck = perturbed(deck, start, options.perturbation, options.seed) | {
+        "integrator": integrator_table(method, step), "run": plan,
+        "output": {"frame_interval": 0.0, "thermo_interval": 0.0}}
+    file = options.output / "decks" / f"{name}.toml"
+    file.write_text(toml_text(deck))
+    row = dict.fromkeys(COLUMNS, "") | {"method": method, "step": step, "start": start}
+    try:
+        with tempfile.TemporaryDirectory() as directory:
+            summary = run_carom(carom, file, directory)
+    except RunFailed as failure:
+        if failure.code == 2:  # not a numerical failure: the question was wrong
+            raise SystemExit(str(failure)) from failure
+        print(f"{name}: {failure}", file=sys.stderr)
+        return row | {"status": f"failed ({failure.code})"}
+    error, reference = summary["energy"]["max_abs_error"], summary["energy"]["reference"]
+    return row | {
+        "max_abs_energy_error": error, "energy_reference": reference, "relative_energy_error": error / reference,
+        "max_abs_shadow_energy_error": summary.get("shadow_energy", {}).get("max_abs_error", ""),
+        "max_overlap": summary["max_overlap"], "sphere_sphere": summary["events"]["sphere_sphere"],
+        "sphere_wall": summary["events"]["sphere_wall"], "steps": summary["steps"],
+        "wall_seconds": summary["wall_seconds"], "status": summary["status"]}
+
+
+def curve(rows, method, column="max_abs_energy_error"):
+    """Steps, and the geometric means over the starts of an error, of one method's successful runs."""
+    errors = {}
+    for row in rows:
+        if row["method"] == method and row[column] not in ("", None) and float(row[column]) > 0:
+            errors.setdefault(float(row["step"]), []).append(float(row[column]))
+    steps = np.array(sorted(errors))
+    return steps, np.array([np.exp(np.mean(np.log(errors[step]))) for step in steps])
+
+
+def fitted_order(steps, errors, below):
+    """Slope of log error against log step over the steps not above `below`; NaN with fewer than two of them."""
+    use = steps <= below * (1 + 1e-9)
+    return np.polyfit(np.log(steps[use]), np.log(errors[use]), 1)[0] if use.sum() > 1 else np.nan
+
+
+def describe(rows, method, below):
+    """The method's line in the legend: its order, or how close to rounding it stays."""
+    worst = max((float(row["relative_energy_error"]) for row in rows
+                 if row["method"] == method and row["relative_energy_error"] != ""), default=np.nan)
+    if worst < ROUNDING:
+        return rf"{method}: at most {worst:.1e} $E_{{\mathrm{{ref}}}}$"
+    order = fitted_order(*curve(rows, method), below)
+    return f"{method}: order {order:.2f}" if np.isfinite(order) else method
+
+
+def draw(rows, options, title, file):
+    length = f"to t = {options.end_time:g}" if options.end_time else f"{options.count} steps"
+    starts = f", {options.starts} starts" if options.starts > 1 else ""
+    with picture(file, xlabel="step", ylabel=r"largest $|H - H_1|$", title=f"{title}\n{length}{starts}") as axes:
+        for method, marker in zip(options.methods, "osD^vPX*" * len(options.methods)):
+            steps, errors = curve(rows, method)
+            axes.loglog(steps, errors, marker=marker, label=describe(rows, method, options.fit_below))
+
+
+def main(arguments=None):
+    options = parse_arguments(arguments)
+    carom = find_carom(options.carom)
+    deck = tomllib.loads(options.deck.read_text())
+    (options.output / "decks").mkdir(parents=True, exist_ok=True)
+    cases = [(method, step, start) for method in options.methods for step in options.steps
+             for start in range(options.starts)]
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        rows = list(pool.map(lambda case: run_one(options, carom, deck, *case), cases))
+    table, figure = options.output / "energy.csv", options.output / "energy.png"
+    with open(table, "w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    draw(rows, options, deck.get("title", options.deck.stem), figure)
+    for method in options.methods:
+        print(describe(rows, method, options.fit_below).replace(r"$E_{\mathrm{ref}}$", "E_ref"))
+    print(f"Results: {table}, {figure}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+#!/usr/bin/python3
+"""The radial distribution function g(r) of a trajectory, in 2-D and 3-D, in periodic and walled boxes.
+
+    tools/plot_rdf.py runs/hard-sphere-fluid
+    tools/plot_rdf.py runs/primitive-electrolyte --species 0,1 --bins 200 --first-frame 20 -o rdf.png
+
+Periodic axes use the nearest image, so r ends at half the shortest periodic edge. Along walls the count expected of an
+ideal gas is the exact one of the region the centres can reach (the average over directions of prod_k (1 - r |u_k| / L_k)), so
+that g = 1 without correlations up to the walls. A CSV with r, g stands beside the picture. (Allen, Tildesley, Computer
+Simulation of Liquids, 2nd ed., section 2.6 and 6.2.)
+"""
+
+import argparse
+import pathlib
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from carom_files import Trajectory
+from carom_plot import picture
+
+
+def directions(dimension):
+    """Unit vectors of equal weight in the positive quadrant or octant."""
+    n = 64
+    if dimension == 2:
+        angle = (np.arange(n * n) + 0.5) / (n * n) * np.pi / 2
+        return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    z, angle = np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n * np.pi / 2)
+    rho = np.sqrt(1 - z**2)
+    return np.stack([rho * np.cos(angle), rho * np.sin(angle), z], axis=-1).reshape(-1, 3)
+
+
+def ideal_fraction(radii, edges, periodic):
+    """For each shell [radii[k], radii[k+1]): the share of the region's volume that an ideal gas has there."""
+    dimension = len(edges)
+    shell = {2: np.pi, 3: 4 / 3 * np.pi}[dimension] * np.diff(radii**dimension) / np.prod(edges)
+    middle = 0.5 * (radii[1:] + radii[:-1])
+    inside = np.ones((len(middle), len(directions(dimension))))
+    for axis in np.flatnonzero(~periodic):
+        reach = middle[:, None] * directions(dimension)[None, :, axis]
+        inside *= np.clip(1 - reach / edges[axis], 0, None)
+    return shell * inside.mean(axis=1)
+
+
+def pair_counts(a, b, radii, edges, periodic):
+    """Ordered pairs (one of a, one of b) with a distance in each shell; a particle and itself are at distance 0."""
+    size = np.where(periodic, edges, 0.0)  # 0: no images along this axis
+    tree_a, tree_b = (cKDTree(x, boxsize=size) for x in (a, b))
+    return np.diff(tree_a.count_neighbors(tree_b, np.nextafter(radii, 0)).astype(float))
+
+
+def radial_distribution(trajectory, bins=150, largest=None, species=None, first_frame=0):
+    """Middles of the shells, and g there, averaged over the frames from first_frame on."""
+    if "open" in trajectory.boundary:
+        raise SystemExit("g(r) needs a density: there is none in a box with an open boundary.")
+    chosen = [np.flatnonzero(trajectory.species == s) if species else np.arange(len(trajectory.species))
+              for s in (species or (0, 0))]
+    if not all(map(len, chosen)):
+        raise SystemExit(f"There are no particles of species {species}.")
+    walled = ~trajectory.periodic
+    # Centres keep a radius away from a wall.
+    margin = np.where(walled, min(trajectory.radius[np.concatenate(chosen)]), 0.0)
+    edges = trajectory.edges() - 2 * margin
+    largest = largest or min(np.where(trajectory.periodic, edges / 2, edges))
+    if any(trajectory.periodic) and largest > min(edges[trajectory.periodic]) / 2 * (1 + 1e-12):
+        raise SystemExit("r can't go beyond half the shortest periodic edge.")
+    radii = np.linspace(0, largest, bins + 1)
+    frames = range(first_frame, len(trajectory))
+    counts = sum(pair_counts(*(_into(trajectory.position(frame)[who] - margin, edges, trajectory.periodic)
+                               for who in chosen), radii, edges, trajectory.periodic) for frame in frames)
+    pairs = len(chosen[0]) * len(chosen[1]) - len(np.intersect1d(*chosen))
+    if pairs == 0:
+        raise SystemExit("g(r) needs two particles.")
+    if len(np.intersect1d(*chosen)):
+        counts[0] -= len(frames) * len(chosen[0])  # each particle's distance 0 from itself
+    expected = len(frames) * pairs * ideal_fraction(radii, edges, trajectory.periodic)
+    return 0.5 * (radii[1:] + radii[:-1]), counts / expected
+
+
+def _into(x, edges, periodic):
+    """Rounding may put a wrapped coordinate on the edge itself, which the tree refuses."""
+    return np.where(periodic & (x >= edges), x - edges, x)
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run", type=pathlib.Path, help="directory of a run, or its trajectory")
+    parser.add_argument("--bins", type=int, default=150)
+    parser.add_argument("--largest", type=float, help="largest r; default: half the shortest edge")
+    parser.add_argument("--species", help="two species numbers, as 0,1; default: all particles")
+    parser.add_argument("--first-frame", type=int, default=0, help="skip what comes before (equilibration)")
+    parser.add_argument("-o", "--output", type=pathlib.Path, help="default: rdf.png in the run's directory")
+    options = parser.parse_args(arguments)
+    species = [int(s) for s in options.species.split(",")] if options.species else None
+    if species and len(species) != 2:
+        parser.error("--species takes two numbers")
+    with Trajectory(options.run) as trajectory:
+        if options.first_frame >= len(trajectory):
+            parser.error(f"there are {len(trajectory)} frames")
+        r, g = radial_distribution(trajectory, options.bins, options.largest, species, options.first_frame)
+        title = trajectory.title
+    folder = options.run if options.run.is_dir() else options.run.parent
+    file = options.output or folder / "rdf.png"
+    table = file.with_suffix(".csv")
+    np.savetxt(table, np.stack([r, g], axis=1), delimiter=",", header="r,g", comments="")
+    with picture(file, xlabel="r", ylabel="g(r)", title=title) as axes:
+        axes.plot(r, g)
+        axes.axhline(1, color="grey", linewidth=0.8)
+    print(f"Results: {table}, {file}")
+
+
+if __name__ == "__main__":
+    main()
