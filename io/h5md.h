@@ -1,0 +1,42 @@
+#pragma once
+// The trajectory: an H5MD 1.1 file with one frame an output time (de Buyl, Colberg, Höfling, Comput. Phys. Commun. 185
+// (2014) 1546).
+//
+//   /particles/trajectory   position, velocity, image (value, step, time); id, species, mass, radius, charge; box
+//   /observables            kinetic_energy, …: one value a frame
+//   /parameters             deck, title, integrator, dimension, boundary, species
+//
+// Written so that MDAnalysis 2.4 can read it: three columns also in two dimensions (z = 0, a box edge of 1 and no
+// boundary along z; the true dimension and boundaries stand in /parameters), box edges at every frame, every `step` and
+// `time` explicit and shared by hard links, texts of fixed length, observables without subgroups. Units are reduced:
+// there are no `unit` attributes, so readers must be told not to convert. Positions are wrapped; unwrapped position =
+// position + image · edge. Every frame is flushed: it survives the end of the process.
+
+#include <filesystem>
+#include <memory>
+
+#include "engine/simulation.h"
+#include "io/deck.h"
+
+namespace carom {
+
+template <int D>
+class TrajectoryWriter : public Observer<D> {
+ public:
+  /// Creates the file. `system` is read for what does not change: box, masses, radii, charges, species.
+  /// Throws Error(Failure::file).
+  TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system);
+  ~TrajectoryWriter() override;
+
+  /// Appends a frame and flushes. Throws Error(Failure::file).
+  void frame(const Snapshot<D>& snapshot) override;
+
+  /// Flushes and closes. Throws Error(Failure::file).
+  void close();
+
+ private:
+  struct Contents;
+  std::unique_ptr<Contents> contents_;
+};
+
+}  // namespace carom

@@ -1,0 +1,155 @@
+#pragma once
+// A thin layer over the HDF5 C library: identifiers that close themselves, errors that say what happened, data sets
+// that grow row by row.
+//
+//   hdf5::File file = hdf5::File::create("a.h5");
+//   hdf5::Handle group = file.group("observables");
+//   hdf5::Series<double> energy(file, group, "energy");
+//   energy.append(std::array{1.5});
+//   file.flush();
+//
+// Every failure throws Error(Failure::file) that names the file and holds the reason from HDF5's error stack.
+//
+// A file must stay readable up to its last flush when the disk fills up. HDF5 cannot promise that: a write that fails
+// in the middle of a flush leaves metadata half written. So reserve() has the file system set the room aside first
+// (fallocate beyond the end of the file): a full disk is met before HDF5 writes anything. Where the file system cannot
+// reserve, the failure is met in the flush.
+
+#include <hdf5.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace carom::hdf5 {
+
+/// Owns one identifier, closed by the function that belongs to its kind.
+class Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+  Handle() = default;
+  Handle(hid_t id, Close close) : id_(id), close_(close) {}
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
+  Handle& operator=(Handle&& other) noexcept {
+    std::swap(id_, other.id_);
+    std::swap(close_, other.close_);
+    return *this;
+  }
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  hid_t id() const { return id_; }
+
+ private:
+  hid_t id_ = H5I_INVALID_HID;
+  Close close_ = nullptr;
+};
+
+/// The HDF5 type of a C++ number.
+template <class T>
+hid_t native_type();
+
+/// A file of HDF5, written by this process alone.
+class File {
+ public:
+  /// A new, empty file; an old one of that name is replaced.
+  static File create(const std::filesystem::path& path);
+  /// An existing file, to be read.
+  static File open(const std::filesystem::path& path);
+  File(File&&) = default;
+  ~File();
+
+  const std::filesystem::path& path() const { return path_; }
+  hid_t id() const { return file_.id(); }
+
+  /// Creates a group, and those on the way to it.
+  Handle group(const std::string& name);
+  /// Throws Error(Failure::file) with the reason from HDF5 if `result` (an identifier or status) tells of a failure;
+  /// else returns it.
+  template <class R>
+  R check(R result, const std::string& action) const {
+    if (result < 0) fail(action);
+    return result;
+  }
+  /// Makes sure that `bytes` more will fit on the disk.
+  void reserve(std::uint64_t bytes);
+  /// Hands everything to the operating system: from now on it survives the end of this process.
+  void flush();
+  /// Flushes and closes. The destructor does so too, but cannot tell of errors.
+  void close();
+
+  /// Attributes and small data sets of a group or of the file; texts are stored with fixed length.
+  void write_attribute(const Handle& where, const std::string& name, const std::string& text);
+  void write_attribute(const Handle& where, const std::string& name, const std::vector<std::string>& texts);
+  void write_attribute(const Handle& where, const std::string& name, const std::vector<std::int32_t>& numbers);
+  void write_attribute(const Handle& where, const std::string& name, std::int32_t number);
+  void write_text(const Handle& where, const std::string& name, const std::string& text);
+  void write_texts(const Handle& where, const std::string& name, const std::vector<std::string>& texts);
+  template <class T>
+  void write_numbers(const Handle& where, const std::string& name, std::span<const T> numbers) {
+    write_array(where, name, native_type<T>(), numbers.data(), {numbers.size()});
+  }
+  template <class T>
+  void write_number(const Handle& where, const std::string& name, T number) {
+    write_array(where, name, native_type<T>(), &number, {});
+  }
+  /// Makes `alias` a second name of the data set `name`.
+  void link(const Handle& from, const std::string& name, const Handle& to, const std::string& alias);
+
+ private:
+  File(std::filesystem::path path, hid_t id) : path_(std::move(path)), file_(id, H5Fclose) {}
+  [[noreturn]] void fail(const std::string& action) const;
+  void write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
+                   const std::vector<hsize_t>& shape);
+  void write_attribute(const Handle& where, const std::string& name, hid_t type, const void* data,
+                       const std::vector<hsize_t>& shape);
+  void give_back_reserve();
+
+  std::filesystem::path path_;
+  Handle file_;
+  std::uint64_t reserved_until_ = 0;  // file size up to which the disk has room set aside; 0: nothing reserved
+};
+
+/// The untyped part of Series.
+class SeriesBase {
+ public:
+  std::uint64_t row_bytes() const { return row_bytes_; }
+  std::uint64_t rows() const { return rows_; }
+
+ protected:
+  SeriesBase(const File& file, const Handle& where, const std::string& name, hid_t type,
+             std::vector<hsize_t> row_shape);
+  void append(hid_t type, const void* data, std::size_t elements);
+
+ private:
+  std::string label_;  // file and name, for messages
+  const File* file_;
+  Handle dataset_;
+  std::vector<hsize_t> shape_;  // of one row, with a leading axis for the rows
+  std::uint64_t row_elements_ = 1, row_bytes_ = 0, rows_ = 0;
+};
+
+/// A data set whose first axis grows: one row an append, or several. The file must outlive it and not move.
+template <class T>
+class Series : public SeriesBase {
+ public:
+  Series(const File& file, const Handle& where, const std::string& name, std::vector<hsize_t> row_shape = {})
+      : SeriesBase(file, where, name, native_type<T>(), std::move(row_shape)) {}
+  /// `values`: whole rows, the last axis fastest.
+  void append(std::span<const T> values) { SeriesBase::append(native_type<T>(), values.data(), values.size()); }
+  void append(T value) { SeriesBase::append(native_type<T>(), &value, 1); }
+};
+
+/// Reading, for `carom info`; throws Error(Failure::file) where the name is missing or of another kind.
+bool exists(const File& file, const std::string& path);
+std::vector<hsize_t> shape(const File& file, const std::string& dataset);
+/// Element `index` of a data set with one axis (of a scalar one: 0), as a double.
+double number_at(const File& file, const std::string& dataset, hsize_t index);
+std::string text(const File& file, const std::string& dataset);
+std::vector<std::string> attribute_texts(const File& file, const std::string& object, const std::string& name);
+std::vector<std::int32_t> attribute_numbers(const File& file, const std::string& object, const std::string& name);
+
+}  // namespace carom::hdf5

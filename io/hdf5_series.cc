@@ -1,0 +1,54 @@
+#include <algorithm>
+#include <numeric>
+
+#include "engine/error.h"
+#include "io/hdf5.h"
+
+namespace carom::hdf5 {
+
+namespace {
+
+/// Chunks of about 8 kB for small rows, and of at most 43,000 entries (about 1 MiB of positions) of large ones.
+std::vector<hsize_t> chunk_of(const std::vector<hsize_t>& shape, std::uint64_t row_bytes) {
+  constexpr hsize_t kMostEntries = 43000, kSmallChunk = 8192;
+  std::vector<hsize_t> chunk = shape;
+  chunk[0] = std::max<hsize_t>(1, kSmallChunk / std::max<hsize_t>(1, row_bytes));
+  for (std::size_t k = 1; k < chunk.size(); ++k) chunk[k] = std::clamp<hsize_t>(chunk[k], 1, kMostEntries);
+  return chunk;
+}
+
+}  // namespace
+
+SeriesBase::SeriesBase(const File& file, const Handle& where, const std::string& name, hid_t type,
+                       std::vector<hsize_t> row_shape)
+    : label_("write to data set " + name), file_(&file), shape_(std::move(row_shape)) {
+  row_elements_ = std::accumulate(shape_.begin(), shape_.end(), hsize_t{1}, std::multiplies<>());
+  row_bytes_ = row_elements_ * H5Tget_size(type);
+  shape_.insert(shape_.begin(), 0);
+  std::vector<hsize_t> limit = shape_;
+  limit[0] = H5S_UNLIMITED;
+  const int rank = static_cast<int>(shape_.size());
+  const Handle space(H5Screate_simple(rank, shape_.data(), limit.data()), H5Sclose);
+  const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_chunk(layout.id(), rank, chunk_of(shape_, row_bytes_).data());
+  dataset_ =
+      Handle(file.check(H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, layout.id(), H5P_DEFAULT),
+                        "create data set " + name),
+             H5Dclose);
+}
+
+void SeriesBase::append(hid_t type, const void* data, std::size_t elements) {
+  if (elements == 0) return;
+  std::vector<hsize_t> start(shape_.size(), 0), count = shape_, size = shape_;
+  start[0] = rows_;
+  count[0] = elements / row_elements_;
+  size[0] = rows_ + count[0];
+  file_->check(H5Dset_extent(dataset_.id(), size.data()), label_);
+  const Handle in_file(H5Dget_space(dataset_.id()), H5Sclose);
+  const Handle in_memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
+  H5Sselect_hyperslab(in_file.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+  file_->check(H5Dwrite(dataset_.id(), type, in_memory.id(), in_file.id(), H5P_DEFAULT, data), label_);
+  rows_ = size[0];
+}
+
+}  // namespace carom::hdf5
