@@ -9,8 +9,8 @@ namespace carom {
 
 enum class EventKind : std::uint8_t { pair = 0, wall = 1 };
 
-/// Total order of events: the same on every machine and for every decomposition. `generation` orders what happens at one
-/// instant: 1 + the larger generation of the partners' records where these are of the same time, else 0.
+/// Total order of events: the same on every machine and for every decomposition. `generation` orders what happens at
+/// one instant: 1 + the larger generation of the partners' records where these are of the same time, else 0.
 template <int D>
 struct EventKey {
   double time = 0;  ///< since the start of the slab or epoch
@@ -26,7 +26,8 @@ struct EventKey {
 template <int D>
 struct Contact {
   EventKey<D> key;
-  Vec<D> x_lo, x_hi;  ///< centres at contact [length]; x_hi is shifted to the image that is touched; at a wall: the point touched
+  Vec<D> x_lo, x_hi;  ///< centres at contact [length]; x_hi is shifted to the image that is touched; at a wall: the
+                      ///< point touched
   Vec<D> impulse;     ///< given to `lo`, taken from `hi` [mass·length/time]
 };
 

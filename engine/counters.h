@@ -9,14 +9,14 @@
 namespace carom {
 
 struct Counters {
-  std::uint64_t sphere_sphere = 0;     ///< executed pair collisions
-  std::uint64_t sphere_wall = 0;       ///< executed wall collisions
-  std::uint64_t pair_evaluations = 0;  ///< of forces, mean forces and Hessian products; energies not counted
-  std::uint64_t sweeps = 0;            ///< iterations of implicit solves
+  std::uint64_t sphere_sphere = 0;  ///< executed pair collisions
+  std::uint64_t sphere_wall = 0;    ///< executed wall collisions
+  double force_passes = 0;   ///< pair evaluations of forces and their kin / interacting pairs; energies not counted
+  std::uint64_t sweeps = 0;  ///< iterations of implicit solves
   std::uint64_t slabs_halved = 0;
-  std::uint64_t fallbacks = 0;   ///< mcva: plain elastic impulses; cdda: Newton–Krylov solves
-  double max_overlap = 0;        ///< deepest overlap met, relative to the contact distance
-  ExactSum collision_virial;     ///< Σ d·impulse over pair collisions [mass·length²/time]
+  std::uint64_t fallbacks = 0;  ///< mcva: plain elastic impulses; cdda: Newton–Krylov solves
+  double max_overlap = 0;       ///< deepest overlap met, relative to the contact distance
+  ExactSum collision_virial;    ///< Σ d·impulse over pair collisions [mass·length²/time]
 
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;

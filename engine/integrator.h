@@ -28,10 +28,11 @@ struct Slab {
 template <int D>
 struct SlabReport {
   Counters& counters;
-  std::vector<Contact<D>>* contacts = nullptr;   ///< where to put the executed contacts, in key order; null: nobody asks
-  std::span<const double> observe{};             ///< ascending times within the slab at which to observe (free flight only)
+  std::vector<Contact<D>>* contacts = nullptr;  ///< where to put the executed contacts, in key order; null: nobody asks
+  std::span<const double> observe{};  ///< ascending times within the slab at which to observe (free flight only)
   std::function<void(double, const Particles<D>&)> observer{};  ///< given copies flown to each of these times
-  double reached = 0;  ///< set by the integrator: the time within the slab it came to; less than its length only at collision_limit
+  double reached =
+      0;  ///< set by the integrator: the time within the slab it came to; less than its length only at collision_limit
 };
 
 template <int D>
@@ -60,9 +61,9 @@ struct IntegratorInfo {
   std::string_view documentation;  ///< a paragraph for the manual
   std::string_view source;         ///< papers
   bool hard_cores = true;          ///< spheres collide; false: points
-  bool stepping = true;            ///< advances by steps of fixed length and observes at their ends; false: exact at any time
-  bool smooth_forces = true;       ///< knows any interaction; false: none but a common acceleration
-  bool shadow = false;             ///< a Verlet type: report the shadow energy S_h
+  bool stepping = true;  ///< advances by steps of fixed length and observes at their ends; false: exact at any time
+  bool smooth_forces = true;  ///< knows any interaction; false: none but a common acceleration
+  bool shadow = false;        ///< a Verlet type: report the shadow energy S_h
   std::unique_ptr<Integrator<2>> (*in_2d)(const Parameters&) = nullptr;
   std::unique_ptr<Integrator<3>> (*in_3d)(const Parameters&) = nullptr;
 

@@ -3,8 +3,8 @@
 //
 // An Interaction is one term of V: a pair potential over a list of bonds or over all pairs within a cutoff, or an
 // external field. It offers V, its gradient, its discrete gradient and its second derivative, each as a whole loop over
-// the particles. Positions are passed in as arrays in id order; contributions to one particle are summed in the order of
-// the partner's id, so that the sum does not depend on how the pairs were found.
+// the particles. Positions are passed in as arrays in id order; contributions to one particle are summed in the order
+// of the partner's id, so that the sum does not depend on how the pairs were found.
 
 #include <memory>
 #include <span>
@@ -81,11 +81,11 @@ struct InteractionInfo {
   std::unique_ptr<Interaction<3>> (*in_3d)(const Parameters&, const InteractionContext<3>&);
 
   template <int D>
-  std::unique_ptr<Interaction<D>> make(const Parameters& parameters, const InteractionContext<D>& context) const {
+  std::unique_ptr<Interaction<D>> make(const Parameters& values, const InteractionContext<D>& context) const {
     if constexpr (D == 2)
-      return in_2d(parameters, context);
+      return in_2d(values, context);
     else
-      return in_3d(parameters, context);
+      return in_3d(values, context);
   }
 };
 

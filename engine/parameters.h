@@ -21,10 +21,10 @@ struct Parameter {
 
   std::string_view name;
   Type type = Type::real;
-  std::string_view fallback;       ///< the default as TOML text; "" = must be given; "none" = may be left out
-  std::string_view unit;           ///< dimension, for instance "length", "energy/length^2", "-" for a pure number
-  std::string_view meaning;        ///< one sentence for the manual
-  Range range = Range::any;        ///< for integer and real (and each of real_list)
+  std::string_view fallback;  ///< the default as TOML text; "" = must be given; "none" = may be left out
+  std::string_view unit;      ///< dimension, for instance "length", "energy/length^2", "-" for a pure number
+  std::string_view meaning;   ///< one sentence for the manual
+  Range range = Range::any;   ///< for integer and real (and each of real_list)
   std::vector<std::string_view> choices{};  ///< for text: what it may be; empty = anything
 };
 

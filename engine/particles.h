@@ -16,7 +16,7 @@ struct Particles {
   std::vector<double> radius;          ///< of the hard core [length], positive
   std::vector<double> charge;          ///< [charge]
   std::vector<std::uint16_t> species;  ///< index into System::species
-  std::vector<Image<D>> image;         ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
+  std::vector<Image<D>> image;  ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
 
   std::size_t size() const { return x.size(); }
 };

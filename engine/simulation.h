@@ -21,13 +21,14 @@ namespace carom {
 
 /// When a run ends and what it shows on the way. Of several ends the first reached counts; at least one is given.
 struct Plan {
-  double step = 0;                          ///< length of a slab [time], > 0
-  std::optional<std::int64_t> steps;        ///< number of slabs
-  std::optional<double> end_time;           ///< the last slab is shortened to meet it
-  std::optional<std::uint64_t> collisions;  ///< pair collisions; free flight stops exactly there, the others at the slab's end
-  double frame_interval = 0;                ///< simulated time between frames; 0: first and last only
-  double thermo_interval = 0;               ///< simulated time between thermo rows; 0: first and last only
-  bool events = false;                      ///< pass every contact on to the observers
+  double step = 0;                    ///< length of a slab [time], > 0
+  std::optional<std::int64_t> steps;  ///< number of slabs
+  std::optional<double> end_time;     ///< the last slab is shortened to meet it
+  std::optional<std::uint64_t>
+      collisions;              ///< pair collisions; free flight stops exactly there, the others at the slab's end
+  double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
+  double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
+  bool events = false;         ///< pass every contact on to the observers
 };
 
 /// What an observer is shown: a state and its observables, all at `time`.
@@ -37,9 +38,9 @@ struct Snapshot {
   std::int64_t step = 0;         ///< slabs completed (free flight: epochs begun or completed)
   std::uint64_t collisions = 0;  ///< pair collisions so far
   const Particles<D>* particles = nullptr;
-  double kinetic = 0, potential = 0;  ///< [energy]
+  double kinetic = 0, potential = 0;                         ///< [energy]
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN where the method has none
-  double max_energy_error = 0;        ///< largest |H − H₁| so far [energy]
+  double max_energy_error = 0;                               ///< largest |H − H₁| so far [energy]
   Vec<D> momentum = Vec<D>::Zero();
   double temperature = 0;  ///< 2K/(D N), in units of energy (k_B = 1); total momentum is not subtracted
   double pressure = 0;     ///< virial: (2K + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
@@ -67,21 +68,22 @@ struct Statistics {
   double force_passes = 0;  ///< pair evaluations / interacting pairs
 
   double energy_initial = 0, energy_after_first_step = 0, energy_final = 0;
-  double energy_reference = 0;      ///< max(|H₁|, K₁ + Σ|V|): what to divide energy errors by
-  double max_energy_error = 0;      ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the start)
+  double energy_reference = 0;  ///< max(|H₁|, K₁ + Σ|V|): what to divide energy errors by
+  double max_energy_error = 0;  ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the start)
   std::optional<double> max_shadow_energy_error;  ///< Verlet types
-  std::optional<double> max_momentum_error;       ///< where nothing takes momentum (no walls, no fields): max |P − P₀|
-  double mean_pressure = 0;     ///< over the whole run
-  double collision_rate = 0;    ///< pair collisions a unit time and particle, times two: what one sphere suffers
-  double wall_seconds = 0;      ///< of the run's loop
-  bool stopped_early = false;   ///< should_stop said so
+  std::optional<double> max_momentum_error;  ///< where nothing takes momentum (no walls, no fields): max |P − P₀|
+  double mean_pressure = 0;                  ///< over the whole run
+  double collision_rate = 0;   ///< pair collisions a unit time and particle, times two: what one sphere suffers
+  double wall_seconds = 0;     ///< of the run's loop
+  bool stopped_early = false;  ///< should_stop said so
 };
 
 template <int D>
 class Simulation {
  public:
   /// The integrator and its info must belong together.
-  Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator, Plan plan);
+  Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator,
+             Plan plan);
   ~Simulation();
 
   /// Observers outlive the run.

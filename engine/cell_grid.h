@@ -1,0 +1,151 @@
+#pragma once
+// A regular grid of search cells over the box, and a table of who is in which.
+//
+// Positions are mapped to *unwrapped* integer cells: a particle outside a periodic box, or an image of one, has its own
+// cell numbers there, and the difference of two unwrapped cells tells which image of a neighbour is meant. (The nearest
+// image of two positions is wrong where the box is dilute or small.) Along open and walled axes the outermost cells
+// reach to infinity. Which cells there are is nobody's business but the search's: results never depend on them.
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "engine/box.h"
+
+namespace carom {
+
+template <int D>
+using Cell = std::array<std::int32_t, D>;
+
+template <int D>
+class CellGrid {
+ public:
+  /// A grid with cells of edge at least `smallest` over the box (open axes: over the positions), with no more cells
+  /// than about two a particle.
+  CellGrid(const Box<D>& box, double smallest, std::span<const Vec<D>> x) : box_(box) {
+    const double most = std::max(1.0, std::floor(std::pow(2.0 * static_cast<double>(x.size()), 1.0 / D)));
+    for (int k = 0; k < D; ++k) {
+      double low = 0, high = box.edges[k];
+      if (box.boundary[k] == Boundary::open && !x.empty()) {
+        low = high = x[0][k];
+        for (const auto& p : x) low = std::min(low, p[k]), high = std::max(high, p[k]);
+      }
+      const double length = box.periodic(k) ? high - low : std::max(high - low, smallest);
+      // Not quite full: rounding must never make a cell smaller than what it is to hold.
+      count_[k] = static_cast<std::int32_t>(std::clamp(std::floor(length / (smallest * (1 + 1e-9))), 1.0, most));
+      origin_[k] = low;
+      edge_[k] = length / count_[k];
+    }
+  }
+
+  std::size_t cells() const {
+    std::size_t n = 1;
+    for (auto c : count_) n *= static_cast<std::size_t>(c);
+    return n;
+  }
+  int count(int axis) const { return count_[axis]; }
+  double edge(int axis) const { return edge_[axis]; }
+  const Box<D>& box() const { return box_; }
+
+  /// The unwrapped cell of a position.
+  Cell<D> cell(const Vec<D>& x) const {
+    Cell<D> c;
+    for (int k = 0; k < D; ++k) {
+      c[k] = static_cast<std::int32_t>(std::floor((x[k] - origin_[k]) / edge_[k]));
+      if (!box_.periodic(k)) c[k] = std::clamp(c[k], 0, count_[k] - 1);
+    }
+    return c;
+  }
+
+  /// The coordinate of the lower face of unwrapped cell number c on an axis.
+  double face(int axis, std::int32_t c) const { return origin_[axis] + c * edge_[axis]; }
+
+  /// Where an unwrapped cell is stored.
+  std::size_t index(const Cell<D>& c) const {
+    std::size_t at = 0;
+    for (int k = 0; k < D; ++k)
+      at = at * static_cast<std::size_t>(count_[k]) + static_cast<std::size_t>(wrapped(k, c[k]));
+    return at;
+  }
+
+  /// How many boxes an unwrapped cell number lies away.
+  std::int32_t boxes(int axis, std::int32_t c) const { return (c - wrapped(axis, c)) / count_[axis]; }
+
+  /// Calls visit(index, boxes) for every stored cell within `range` cells of `centre`, each image for itself; `boxes`
+  /// is how many boxes away the visited cell lies. Cells beyond walls and open ends do not exist.
+  template <class Visit>
+  void for_each_around(const Cell<D>& centre, const Cell<D>& range, Visit&& visit) const {
+    Cell<D> low, high, c;
+    for (int k = 0; k < D; ++k) {
+      low[k] = centre[k] - range[k];
+      high[k] = centre[k] + range[k];
+      if (!box_.periodic(k)) low[k] = std::max(low[k], 0), high[k] = std::min(high[k], count_[k] - 1);
+      c[k] = low[k];
+    }
+    for (;;) {
+      Image<D> away;
+      for (int k = 0; k < D; ++k) away[k] = boxes(k, c[k]);
+      visit(index(c), away);
+      int k = D - 1;
+      while (k >= 0 && c[k] == high[k]) c[k] = low[k], --k;
+      if (k < 0) return;
+      ++c[k];
+    }
+  }
+
+ private:
+  std::int32_t wrapped(int axis, std::int32_t c) const {
+    if (!box_.periodic(axis)) return c;
+    const std::int32_t r = c % count_[axis];
+    return r < 0 ? r + count_[axis] : r;
+  }
+
+  Box<D> box_;
+  Cell<D> count_;
+  Vec<D> origin_, edge_;
+};
+
+/// Who is in which cell, for one set of positions: built once, by counting, and read.
+template <int D>
+class CellTable {
+ public:
+  CellTable(const CellGrid<D>& grid, std::span<const Vec<D>> x)
+      : grid_(grid), start_(grid.cells() + 1), who_(x.size()), boxes_(x.size()) {
+    std::vector<std::size_t> at(x.size());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const Cell<D> c = grid.cell(x[i]);
+      at[i] = grid.index(c);
+      for (int k = 0; k < D; ++k) boxes_[i][k] = grid.boxes(k, c[k]);
+      ++start_[at[i] + 1];
+    }
+    for (std::size_t c = 0; c + 1 < start_.size(); ++c) start_[c + 1] += start_[c];
+    auto fill = start_;
+    for (std::size_t i = 0; i < x.size(); ++i) who_[fill[at[i]]++] = static_cast<Id>(i);
+  }
+
+  /// Calls visit(j, image) for every particle j (the one at `x` among them) whose image may lie within `reach` of x:
+  /// that image stands at x_j − shift(image).
+  template <class Visit>
+  void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
+    Cell<D> range;
+    for (int k = 0; k < D; ++k)
+      range[k] = std::max(1, static_cast<std::int32_t>(std::ceil(reach / grid_.edge(k) - 1e-9)));
+    grid_.for_each_around(grid_.cell(x), range, [&](std::size_t cell, const Image<D>& away) {
+      for (std::size_t q = start_[cell]; q < start_[cell + 1]; ++q) {
+        const Id j = who_[q];
+        Image<D> image;
+        for (int k = 0; k < D; ++k) image[k] = boxes_[j][k] - away[k];
+        visit(j, image);
+      }
+    });
+  }
+
+ private:
+  const CellGrid<D>& grid_;
+  std::vector<std::size_t> start_;
+  std::vector<Id> who_;
+  std::vector<Image<D>> boxes_;
+};
+
+}  // namespace carom

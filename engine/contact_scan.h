@@ -1,0 +1,83 @@
+#pragma once
+// Contacts for the integrators that move everybody at once (cva, mcva, cdda): who touches now, who touches first.
+//
+// Pairs come from a Verlet list with the radii as reach, walls from the box. Keys are those of the event core, so the
+// order of simultaneous impulses is the same everywhere.
+
+#include <functional>
+#include <vector>
+
+#include "engine/contact.h"
+#include "engine/contact_log.h"
+#include "engine/counters.h"
+#include "engine/neighbour_list.h"
+#include "engine/system.h"
+
+namespace carom {
+
+/// A contact met or to come, and its normal: the gradient of the gap, up to a positive factor.
+template <int D>
+struct Touch {
+  EventKey<D> key;  ///< key.time: since now for a contact to come
+  Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
+  bool pair() const { return key.kind == EventKind::pair; }
+};
+
+template <int D>
+class ContactScan {
+ public:
+  /// `max_events` limits the contacts of one slab.
+  ContactScan(const System<D>& system, std::uint64_t max_events);
+
+  /// Starts a slab: counts from zero and logs to `contacts` (may be null).
+  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts);
+
+  /// Applies `impulse` to every contact that touches and approaches at (x, v), in key order, again until none
+  /// approaches. `impulse` changes the velocities of the particles of the touch, which is what `v` views. Returns
+  /// whether there was any. Throws Error(Failure::numerical) beyond max_events.
+  bool resolve(double time, Positions<D> x, std::span<const Vec<D>> v,
+               const std::function<void(const Touch<D>&)>& impulse);
+
+  /// The first contact on the parabolas x + v s + a s²/2 within [0, rest); key.time is kNever when there is none.
+  /// Call resolve() before. Throws Error(Failure::numerical) for a pair that rests in contact, pressed together.
+  Touch<D> earliest(Positions<D> x, Positions<D> v, Positions<D> a, double rest);
+
+  /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
+  std::span<const NeighbourPair<D>> candidates(Positions<D> x, Positions<D> x_new) { return list_.cover(x, x_new); }
+
+  double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
+  double tolerance(double sigma) const { return gap_tolerance(sigma, largest_edge_); }
+  /// The gap of particle i to a wall (2·axis + side), and the wall's inward normal component along its axis.
+  double wall_gap(const Vec<D>& x, Id i, int wall) const;
+  static double inward(int wall) { return wall % 2 == 0 ? 1.0 : -1.0; }
+
+  /// Counts one more contact or empty piece; throws when the slab needs more than max_events.
+  void count_event(const EventKey<D>& key);
+
+  /// The error for a pair that rests in contact under pressure.
+  [[noreturn]] void fail_resting(const EventKey<D>& key) const;
+
+ private:
+  void collect(double time, Positions<D> x, std::span<const Vec<D>> v);
+  bool approaches(const Touch<D>& touch, std::span<const Vec<D>> v) const;
+
+  const Box<D>& box_;
+  const Particles<D>& particles_;
+  double largest_edge_;
+  NeighbourList<D> list_;
+  std::uint64_t max_events_;
+  std::uint64_t events_ = 0;
+  Counters* counters_ = nullptr;
+  std::vector<Contact<D>>* contacts_ = nullptr;
+  std::vector<Touch<D>> touching_;
+};
+
+/// The elastic impulse: kinetic energy and momentum are kept.
+template <int D>
+void collide_elastically(const Touch<D>& touch, Particles<D>& particles);
+
+/// Names the partners of a contact for messages: "particles 3 and 7", "particle 3 and the upper wall of axis 1".
+template <int D>
+std::string partners(const EventKey<D>& key);
+
+}  // namespace carom

@@ -1,0 +1,316 @@
+#include "engine/event_core.h"
+
+#include <string>
+
+#include "engine/collision.h"
+#include "engine/contact.h"
+#include "engine/error.h"
+
+namespace carom {
+
+template <int D>
+EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles)
+    : box_(box), particles_(particles), calendar_(Earlier{this}) {
+  for (double r : particles.radius) largest_radius_ = std::max(largest_radius_, r);
+}
+
+template <int D>
+EventCore<D>::~EventCore() = default;
+
+template <int D>
+bool EventCore<D>::Earlier::operator()(const CalendarEntry& a, const CalendarEntry& b) const {
+  if (a.time != b.time) return a.time < b.time;
+  // Equal times: stale entries first, to be dropped; then in the order of the keys; crossings last.
+  const Pending &p = core->pending_[a.slot], &q = core->pending_[b.slot];
+  const bool p_stale = p.stamp != a.stamp, q_stale = q.stamp != b.stamp;
+  if (p_stale != q_stale) return p_stale;
+  if (p_stale) return a.slot < b.slot;
+  if (p.crossing != q.crossing) return q.crossing;
+  if (p.crossing) return a.slot < b.slot;
+  return p.key < q.key;
+}
+
+template <int D>
+void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon) {
+  const std::size_t n = particles.size();
+  g_ = g;
+  field_ = g != Vec<D>::Zero();
+  horizon_ = horizon;
+  events_ = 0;
+  expected_ = scheduled_;
+  scheduled_ = 0;
+  records_.resize(n);
+  version_.resize(n, 0);
+  pending_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    records_[i] = {particles.x[i], particles.v[i], 0.0, static_cast<Id>(i), 0, particles.species[i]};
+    ++version_[i];
+  }
+  grid_ = std::make_unique<CellGrid<D>>(box_, 2 * largest_radius_, particles.x);
+  first_.assign(grid_->cells(), kNobody);
+  next_.assign(n, kNobody);
+  previous_.assign(n, kNobody);
+  cell_.resize(n);
+  for (std::size_t i = n; i-- > 0;) {
+    cell_[i] = grid_->cell(particles.x[i]);
+    insert(static_cast<Id>(i), grid_->index(cell_[i]));
+  }
+  calendar_.reset(horizon, std::max(expected_, n));
+  for (std::size_t i = 0; i < n; ++i) predict(static_cast<Id>(i), 0.0);
+}
+
+template <int D>
+double EventCore<D>::run(double end, const Report& report) {
+  while (const CalendarEntry* entry = calendar_.top()) {
+    const double event_time = entry->time;
+    if (event_time >= end) break;
+    const Id i = entry->slot;
+    const Pending& pending = pending_[i];
+    const bool stale = pending.stamp != entry->stamp;
+    if (stale) {
+      calendar_.pop();
+      continue;
+    }
+    if (!pending.crossing && pending.key.kind == EventKind::pair) {
+      const Id j = pending.key.lo == i ? pending.key.hi : pending.key.lo;
+      if (version_[j] != pending.partner_version) {
+        calendar_.pop();
+        predict(i, event_time);
+        continue;
+      }
+    }
+    calendar_.pop();
+    const Pending event = pending;
+    if (event.crossing) {
+      cross(i, event);
+      predict(i, event_time);
+      continue;
+    }
+    if (++events_ > report.max_events) {
+      const std::string partner = event.key.kind == EventKind::pair ? "particle " + std::to_string(event.key.hi)
+                                                                    : "wall " + std::to_string(event.key.hi);
+      throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
+                                          " collisions in one step, the last between particle " +
+                                          std::to_string(event.key.lo) + " and " + partner +
+                                          "; use a smaller step or raise integrator.max_events_per_step");
+    }
+    if (event.key.kind == EventKind::pair) {
+      collide_pair(event.key, report);
+      predict(event.key.lo, event_time);
+      predict(event.key.hi, event_time);
+      if (report.counters.sphere_sphere >= report.collision_limit) return event_time;
+    } else {
+      collide_wall(event.key, report);
+      predict(event.key.lo, event_time);
+    }
+  }
+  return end;
+}
+
+template <int D>
+void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    Record<D> r = records_[i];
+    advance(r, time);
+    copies.x[i] = r.x;
+    copies.v[i] = r.v;
+  }
+}
+
+template <int D>
+void EventCore<D>::advance(Record<D>& r, double t) const {
+  const double s = t - r.t;
+  if (s != 0) {
+    r.x += s * r.v;
+    if (field_) {
+      r.x += (0.5 * s * s) * g_;
+      r.v += s * g_;
+    }
+  }
+  r.t = t;
+}
+
+template <int D>
+std::uint32_t EventCore<D>::generation_at(const Record<D>& r, double t) const {
+  return r.t == t ? r.generation + 1u : 0u;
+}
+
+template <int D>
+void EventCore<D>::predict(Id i, double now) {
+  Pending best;
+  best.key.time = kNever;
+  Cell<D> range;
+  range.fill(1);
+  grid_->for_each_around(cell_[i], range, [&](std::size_t cell, const Image<D>& away) {
+    for (Id j = first_[cell]; j != kNobody; j = next_[j]) {
+      if (j == i) continue;
+      Image<D> image;
+      for (int k = 0; k < D; ++k) image[k] = grid_->boxes(k, cell_[j][k]) - away[k];
+      predict_pair(i, j, image, best);
+    }
+  });
+  predict_walls(i, best);
+  predict_crossing(i, now, best);
+  best.stamp = pending_[i].stamp + 1;
+  pending_[i] = best;
+  if (best.key.time < horizon_) {
+    calendar_.push({best.key.time, i, best.stamp});
+    ++scheduled_;
+  }
+}
+
+template <int D>
+void EventCore<D>::predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending& best) const {
+  EventKey<D> key;
+  key.kind = EventKind::pair;
+  key.lo = std::min(i, j);
+  key.hi = std::max(i, j);
+  for (int k = 0; k < D; ++k) key.image[k] = i < j ? image_of_j[k] : -image_of_j[k];
+  // A pure function of the two records: taken in id order, synchronised to the later of their times.
+  const Record<D>&a = records_[key.lo], &b = records_[key.hi];
+  const double now = std::max(a.t, b.t);
+  const double s_a = now - a.t, s_b = now - b.t;
+  Vec<D> d = (a.x + s_a * a.v) - (b.x + s_b * b.v);
+  Vec<D> v = a.v - b.v;
+  if (field_) {
+    d += (0.5 * (s_a * s_a - s_b * s_b)) * g_;
+    v += (s_a - s_b) * g_;
+  }
+  d += box_.shift(key.image);
+  const double sigma = particles_.radius[key.lo] + particles_.radius[key.hi];
+  const double s = contact_time<D>(d, v, sigma, approach_slack(sigma, a.v.norm(), b.v.norm()));
+  key.time = now + s;
+  if (!(key.time <= best.key.time)) return;
+  key.generation = std::max(generation_at(a, key.time), generation_at(b, key.time));
+  if (key < best.key) {
+    best.key = key;
+    best.partner_version = version_[j];
+  }
+}
+
+template <int D>
+void EventCore<D>::predict_walls(Id i, Pending& best) const {
+  const Record<D>& r = records_[i];
+  for (int k = 0; k < D; ++k) {
+    if (!box_.walled(k)) continue;
+    for (int side = 0; side < 2; ++side) {
+      const double inward = side == 0 ? 1.0 : -1.0;
+      const double gap = side == 0 ? r.x[k] - particles_.radius[i] : box_.edges[k] - particles_.radius[i] - r.x[k];
+      const double tolerance = gap_tolerance(2 * particles_.radius[i], box_.edges[k]);
+      const double slack = approach_slack(1.0, r.v.norm(), 0.0);
+      const bool touching = gap <= tolerance;
+      const double s = wall_contact_time(gap, inward * r.v[k], inward * g_[k], horizon_ - r.t, touching, slack);
+      if (s == 0 && !(inward * r.v[k] < -slack))
+        throw Error(Failure::numerical,
+                    "particle " + std::to_string(i) + " rests on the " + (side == 0 ? "lower" : "upper") +
+                        " wall of axis " + std::to_string(k) +
+                        " under the uniform field and would bounce without end; give it a height or a velocity");
+      EventKey<D> key;
+      key.time = r.t + s;
+      if (!(key.time <= best.key.time)) continue;
+      key.kind = EventKind::wall;
+      key.lo = i;
+      key.hi = static_cast<Id>(2 * k + side);
+      key.generation = generation_at(r, key.time);
+      if (key < best.key) {
+        best.key = key;
+      }
+    }
+  }
+}
+
+template <int D>
+void EventCore<D>::predict_crossing(Id i, double now, Pending& best) const {
+  Record<D> r = records_[i];
+  advance(r, now);
+  for (int k = 0; k < D; ++k) {
+    for (int side = 0; side < 2; ++side) {
+      const std::int32_t c = cell_[i][k] + side;
+      if (!box_.periodic(k) && (c <= 0 || c >= grid_->count(k))) continue;  // the outermost cells have no outer face
+      const double outward = side == 1 ? 1.0 : -1.0;
+      const double gap = outward * (grid_->face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
+      const double s =
+          wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * g_[k], horizon_ - now, false, 0.0);
+      const double t = now + s;
+      if (t < best.key.time) {
+        best.key = EventKey<D>{};
+        best.key.time = t;
+        best.crossing = true;
+        best.face = static_cast<std::uint8_t>(2 * k + side);
+      }
+    }
+  }
+}
+
+template <int D>
+void EventCore<D>::cross(Id i, const Pending& crossing) {
+  remove(i);
+  cell_[i][crossing.face / 2] += crossing.face % 2 == 1 ? 1 : -1;
+  insert(i, grid_->index(cell_[i]));
+}
+
+template <int D>
+void EventCore<D>::collide_pair(const EventKey<D>& key, const Report& report) {
+  Record<D>&a = records_[key.lo], &b = records_[key.hi];
+  advance(a, key.time);
+  advance(b, key.time);
+  const Vec<D> shift = box_.shift(key.image);
+  const Vec<D> d = a.x - b.x + shift;
+  const double mass_a = particles_.mass[key.lo], mass_b = particles_.mass[key.hi];
+  const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, mass_a, mass_b) * d;
+  a.v += impulse / mass_a;
+  b.v -= impulse / mass_b;
+  if (key.generation > std::numeric_limits<std::uint16_t>::max())
+    throw Error(Failure::numerical, "particles " + std::to_string(key.lo) + " and " + std::to_string(key.hi) +
+                                        " collide without end at one instant; separate the spheres that touch there");
+  a.generation = b.generation = static_cast<std::uint16_t>(key.generation);
+  ++version_[key.lo];
+  ++version_[key.hi];
+  ++report.counters.sphere_sphere;
+  report.counters.collision_virial.add(d.dot(impulse));
+  const double sigma = particles_.radius[key.lo] + particles_.radius[key.hi];
+  report.counters.max_overlap = std::max(report.counters.max_overlap, 1 - d.norm() / sigma);
+  if (report.contacts) report.contacts->push_back({key, a.x, b.x - shift, impulse});
+}
+
+template <int D>
+void EventCore<D>::collide_wall(const EventKey<D>& key, const Report& report) {
+  Record<D>& r = records_[key.lo];
+  advance(r, key.time);
+  const int axis = static_cast<int>(key.hi / 2);
+  const double mass = particles_.mass[key.lo], radius = particles_.radius[key.lo];
+  if (report.contacts) {
+    Contact<D> contact{key, r.x, r.x, Vec<D>::Zero()};
+    contact.x_hi[axis] = key.hi % 2 == 0 ? 0.0 : box_.edges[axis];
+    contact.impulse[axis] = -2 * mass * r.v[axis];
+    report.contacts->push_back(contact);
+  }
+  const double gap = key.hi % 2 == 0 ? r.x[axis] - radius : box_.edges[axis] - radius - r.x[axis];
+  report.counters.max_overlap = std::max(report.counters.max_overlap, -gap / radius);
+  r.v[axis] = -r.v[axis];
+  r.generation = static_cast<std::uint16_t>(key.generation);
+  ++version_[key.lo];
+  ++report.counters.sphere_wall;
+}
+
+template <int D>
+void EventCore<D>::insert(Id i, std::size_t cell) {
+  previous_[i] = kNobody;
+  next_[i] = first_[cell];
+  if (next_[i] != kNobody) previous_[next_[i]] = i;
+  first_[cell] = i;
+}
+
+template <int D>
+void EventCore<D>::remove(Id i) {
+  if (previous_[i] != kNobody)
+    next_[previous_[i]] = next_[i];
+  else
+    first_[grid_->index(cell_[i])] = next_[i];
+  if (next_[i] != kNobody) previous_[next_[i]] = previous_[i];
+}
+
+template class EventCore<2>;
+template class EventCore<3>;
+
+}  // namespace carom

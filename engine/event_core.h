@@ -1,0 +1,113 @@
+#pragma once
+// The event core: runs flights through their contacts, in the order of their keys, to a given time.
+//
+// Every sphere is on a flight x + v s + g s²/2 (g the same for all: 0, or a uniform field) that is known from its
+// record; an event changes the records of the spheres that take part in it and of nobody else. One pending event a
+// particle is kept, with the particle that was scanned last; it is stale when its partner has had an event since, and
+// the particle is scanned again when a stale event comes up (Lubachevsky, J. Comput. Phys. 94 (1991) 255). Cells prune
+// the candidates; a crossing into another cell changes no record. Nothing that the search does can therefore reach the
+// physics.
+//
+//   EventCore<3> core(box, particles);
+//   core.load(particles, g, horizon);             // everybody at time 0
+//   core.run(end, report);                        // events with time < end
+//   core.fly_to(end, particles);                  // copies at `end`
+
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "engine/box.h"
+#include "engine/calendar.h"
+#include "engine/cell_grid.h"
+#include "engine/contact_log.h"
+#include "engine/counters.h"
+#include "engine/particles.h"
+
+namespace carom {
+
+/// What the core knows of one sphere: its state right after its last event. One cache line in three dimensions.
+template <int D>
+struct alignas(64) Record {
+  Vec<D> x;  ///< not wrapped within a slab
+  Vec<D> v;
+  double t;  ///< of the last event, since the start of the slab
+  Id id;
+  std::uint16_t generation;
+  std::uint16_t species;
+};
+
+template <int D>
+class EventCore {
+ public:
+  /// Limits of one run(), and where its results go.
+  struct Report {
+    Counters& counters;
+    std::vector<Contact<D>>* contacts = nullptr;
+    std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();  ///< of counters.sphere_sphere
+    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();       ///< contacts since load()
+  };
+
+  /// Masses and radii are read from `particles`, which outlives the core.
+  EventCore(const Box<D>& box, const Particles<D>& particles);
+  ~EventCore();
+  EventCore(const EventCore&) = delete;
+  EventCore& operator=(const EventCore&) = delete;
+
+  /// Starts a slab: everybody at time 0 at particles.x with particles.v, under the acceleration g. No event at or after
+  /// `horizon` will be asked for.
+  void load(const Particles<D>& particles, const Vec<D>& g, double horizon);
+
+  /// Executes every event before `end`, or up to the collision limit; returns the time reached: `end`, or that of the
+  /// last collision. Throws Error(Failure::numerical) when more than max_events contacts are needed.
+  double run(double end, const Report& report);
+
+  /// Copies of all spheres flown to `time`, which no event precedes any more.
+  void fly_to(double time, Particles<D>& copies) const;
+
+ private:
+  struct Pending {
+    EventKey<D> key;          // key.time is kNever when nothing will happen
+    bool crossing = false;    // into the next cell: no contact
+    std::uint8_t face = 0;    // crossing: 2·axis + (0 downwards, 1 upwards)
+    std::uint32_t stamp = 0;  // of the calendar entry that stands for it
+    std::uint32_t partner_version = 0;
+  };
+  struct Earlier {
+    const EventCore* core;
+    bool operator()(const CalendarEntry& a, const CalendarEntry& b) const;
+  };
+
+  void predict(Id i, double now);
+  void predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending& best) const;
+  void predict_walls(Id i, Pending& best) const;
+  void predict_crossing(Id i, double now, Pending& best) const;
+  std::uint32_t generation_at(const Record<D>& r, double t) const;
+  void advance(Record<D>& r, double t) const;
+  void cross(Id i, const Pending& crossing);
+  void collide_pair(const EventKey<D>& key, const Report& report);
+  void collide_wall(const EventKey<D>& key, const Report& report);
+  void insert(Id i, std::size_t cell);
+  void remove(Id i);
+
+  const Box<D>& box_;
+  const Particles<D>& particles_;
+  double largest_radius_ = 0;
+  Vec<D> g_ = Vec<D>::Zero();
+  bool field_ = false;
+  double horizon_ = 0;
+
+  std::vector<Record<D>> records_;
+  std::vector<std::uint32_t> version_;  // grows with every event of the particle
+  std::vector<Pending> pending_;
+  Calendar<Earlier> calendar_;
+
+  std::unique_ptr<CellGrid<D>> grid_;
+  std::vector<Cell<D>> cell_;  // unwrapped
+  static constexpr Id kNobody = std::numeric_limits<Id>::max();
+  std::vector<Id> first_, next_, previous_;   // who is in a cell: a list through the particles
+  std::uint64_t events_ = 0;                  // contacts since load()
+  std::size_t scheduled_ = 0, expected_ = 0;  // entries of this slab, and of the last
+};
+
+}  // namespace carom

@@ -1,0 +1,82 @@
+#pragma once
+// Sums over all interactions of a system.
+
+#include <span>
+
+#include "engine/counters.h"
+#include "engine/system.h"
+
+namespace carom {
+
+/// out[i] = force on particle i at positions x. One force pass.
+template <int D>
+void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Counters& counters) {
+  const Stopwatch watch(counters.seconds.force);
+  for (auto& f : out) f.setZero();
+  for (const auto& term : system.interactions) term->add_forces(x, out);
+  counters.force_passes += 1;
+}
+
+/// out[i] = −∇̄_i V(x, x_new), the mean force of a discrete-gradient step. One force pass.
+template <int D>
+void evaluate_mean_forces(const System<D>& system, Positions<D> x, Positions<D> x_new, Vectors<D> out,
+                          Counters& counters) {
+  const Stopwatch watch(counters.seconds.force);
+  for (auto& f : out) f.setZero();
+  for (const auto& term : system.interactions) term->add_mean_forces(x, x_new, out);
+  counters.force_passes += 1;
+}
+
+/// out = V″(x) w. One force pass.
+template <int D>
+void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions<D> w, Vectors<D> out,
+                              Counters& counters) {
+  const Stopwatch watch(counters.seconds.force);
+  for (auto& f : out) f.setZero();
+  for (const auto& term : system.interactions) term->add_hessian_product(x, w, out);
+  counters.force_passes += 1;
+}
+
+/// V, Σ|V| and the virial at x; exact sums, not counted as a pass.
+template <int D>
+PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
+  PotentialSums sums;
+  for (const auto& term : system.interactions) term->add_energy(x, sums);
+  return sums;
+}
+
+/// Σ ½ m v²; an exact sum.
+template <int D>
+double kinetic_energy(const Particles<D>& particles) {
+  ExactSum sum;
+  for (std::size_t i = 0; i < particles.size(); ++i) sum.add(0.5 * particles.mass[i] * particles.v[i].squaredNorm());
+  return sum.value();
+}
+
+/// Σ m v; exact sums.
+template <int D>
+Vec<D> total_momentum(const Particles<D>& particles) {
+  std::array<ExactSum, D> sum;
+  for (std::size_t i = 0; i < particles.size(); ++i)
+    for (int k = 0; k < D; ++k) sum[k].add(particles.mass[i] * particles.v[i][k]);
+  Vec<D> momentum;
+  for (int k = 0; k < D; ++k) momentum[k] = sum[k].value();
+  return momentum;
+}
+
+/// G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet follows to second order:
+/// G = (1/12) vᵀ V″ v − (1/24) ∇Vᵀ M⁻¹ ∇V (Hairer, Lubich, Wanner, Geometric Numerical Integration, IX.3).
+/// `force` = −∇V(x) is given; `scratch` is overwritten. One force pass.
+template <int D>
+double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D> force, Vectors<D> scratch,
+                   Counters& counters) {
+  evaluate_hessian_product<D>(system, at.x, at.v, scratch, counters);
+  ExactSum sum;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    sum.add(at.v[i].dot(scratch[i]) / 12);
+    sum.add(-force[i].squaredNorm() / (24 * at.mass[i]));
+  }
+  return sum.value();
+}
+
+}  // namespace carom

@@ -1,0 +1,117 @@
+#pragma once
+// Contacts of discrete-gradient pieces: how does the piece of size τ end, and where might the first contact be?
+//
+// A piece of size τ is judged by its chord, the straight line from x to x'. c(τ) is the time of the first contact on
+// the chords, beyond τ on their prolongation: the piece that ends in contact is a fixed point of c. A pair that touches
+// at the start has the trivial contact τ = 0; it is divided out by looking at gap(τ)/τ ≈ (2 d·v̄ + τ v̄²)/2σ instead,
+// which starts at the departing velocity and falls through zero where the pair meets again.
+
+#include <cmath>
+
+#include "engine/contact_scan.h"
+#include "engine/integrators/discrete_gradient.h"
+
+namespace carom::integrator {
+
+/// How a piece of size τ ends.
+template <int D>
+struct PieceEnd {
+  bool converged = true;    ///< the solver's word; nothing else is set if it failed
+  bool violates = false;    ///< some sphere has gone into another or a wall, or through it
+  bool touches = false;     ///< some gap is closed to tolerance
+  double contact = kNever;  ///< c(τ)
+  EventKey<D> key{};        ///< whose contact that is
+};
+
+template <int D>
+class ChordContacts {
+ public:
+  ChordContacts(const System<D>& system, ContactScan<D>& scan) : system_(system), scan_(scan) {}
+
+  /// Judges the last solve of `piece`, which went from (x, v) over tau.
+  PieceEnd<D> judge(Positions<D> x, Positions<D> v, const DiscreteGradient<D>& piece, double tau) const {
+    PieceEnd<D> end;
+    EventKey<D> key;
+    const auto &chord = piece.chord(), &v_end = piece.v();
+    for (const auto& pair : scan_.candidates(x, piece.x())) {
+      const Id i = pair.i, j = pair.j;
+      key.lo = i;
+      key.hi = j;
+      key.image = pair.image;
+      const Vec<D> d = x[i] - x[j] + system_.box.shift(pair.image), u = chord[i] - chord[j];
+      const double sigma = scan_.contact_distance(i, j);
+      const double reach = sigma + tau * u.norm() + scan_.tolerance(sigma);
+      if (d.squaredNorm() > reach * reach * kProlongation) continue;
+      const double slack = approach_slack(sigma, v_end[i].norm(), v_end[j].norm());
+      judge_pair(key, d, u, v[i] - v[j], v_end[i] - v_end[j], sigma, tau, slack, end);
+    }
+    key.kind = EventKind::wall;
+    key.image = {};
+    for (Id i = 0; i < x.size(); ++i)
+      for (int wall = 0; wall < 2 * D; ++wall) {
+        const int axis = wall / 2;
+        if (!system_.box.walled(axis)) continue;
+        key.lo = i;
+        key.hi = static_cast<Id>(wall);
+        const double inward = ContactScan<D>::inward(wall);
+        judge_wall(key, scan_.wall_gap(x[i], i, wall), inward * chord[i][axis], inward * v[i][axis],
+                   inward * v_end[i][axis], system_.particles.radius[i], tau, end);
+      }
+    return end;
+  }
+
+ private:
+  static constexpr double kProlongation = 4;  // contacts are still told this far beyond the end of the chord (squared)
+
+  static void offer(double contact, const EventKey<D>& key, PieceEnd<D>& end) {
+    if (!(contact < end.contact)) return;
+    end.contact = contact;
+    end.key = key;
+  }
+
+  void judge_pair(const EventKey<D>& key, const Vec<D>& d, const Vec<D>& u, const Vec<D>& v, const Vec<D>& v_end,
+                  double sigma, double tau, double slack, PieceEnd<D>& end) const {
+    const double tolerance = scan_.tolerance(sigma);
+    const Vec<D> d_end = d + tau * u;
+    const double gap_end = d_end.norm() - sigma;
+    if (d.norm() - sigma > tolerance) {
+      const double c = contact_time<D>(d, u, sigma, 0.0);
+      if (std::abs(gap_end) <= tolerance)
+        end.touches = true;
+      else if (c < tau)
+        end.violates = true;
+      offer(c, key, end);
+      return;
+    }
+    const double departing = 2 * d.dot(v), quotient = 2 * d.dot(u) + tau * u.squaredNorm();
+    const bool through = d.dot(u) < 0 && d.dot(d_end) < 0.5 * sigma * sigma;
+    if (gap_end < -tolerance || through)
+      end.violates = true;
+    else if (gap_end <= tolerance && d_end.dot(v_end) < -slack)
+      end.touches = true;
+    if (quotient < departing) offer(std::max(0.0, departing) * tau / (departing - quotient), key, end);
+  }
+
+  void judge_wall(const EventKey<D>& key, double gap, double u, double v, double v_end, double radius, double tau,
+                  PieceEnd<D>& end) const {
+    const double tolerance = scan_.tolerance(radius), gap_end = gap + tau * u;
+    if (gap > tolerance) {
+      if (std::abs(gap_end) <= tolerance)
+        end.touches = true;
+      else if (gap_end < 0)
+        end.violates = true;
+      if (u < 0) offer(gap / -u, key, end);
+      return;
+    }
+    if (gap_end < -tolerance)
+      end.violates = true;
+    else if (gap_end <= tolerance && v_end < 0)
+      end.touches = true;
+    if (u < v) offer(std::max(0.0, v) * tau / (v - u), key, end);
+  }
+
+  const System<D>& system_;
+  ContactScan<D>& scan_;
+};
+
+}  // namespace carom::integrator

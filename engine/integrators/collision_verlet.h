@@ -1,0 +1,56 @@
+#pragma once
+// Kick-drift-kick pieces that end at contacts: what cva and mcva share.
+//
+// A piece that starts at (x, v) with a = −M⁻¹∇V(x) carries every particle along x + v s + ½ a s² and ends exactly
+// there, whatever its length; so the first contact on the parabolas tells how long the piece may be.
+
+#include <algorithm>
+
+#include "engine/contact_scan.h"
+#include "engine/integrators/kicks.h"
+
+namespace carom::integrator {
+
+template <int D>
+class VerletPieces {
+ public:
+  VerletPieces(System<D>& system, std::uint64_t max_events) : system_(system), scan_(system, max_events) {}
+
+  void start(Counters& counters) { accelerations_.update(system_, counters); }
+
+  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts) {
+    counters_ = &counters;
+    scan_.begin_slab(counters, contacts);
+  }
+
+  /// Applies the impulse to whatever touches and approaches; see ContactScan::resolve.
+  bool collide(double time, const std::function<void(const Touch<D>&)>& impulse) {
+    return scan_.resolve(time, system_.particles.x, system_.particles.v, impulse);
+  }
+
+  /// How long until the first contact, at most `rest`.
+  double next_contact(double rest) {
+    return std::min(rest, scan_.earliest(system_.particles.x, system_.particles.v, accelerations_.a, rest).key.time);
+  }
+
+  /// K(τ/2) D(τ) K(τ/2).
+  void advance(double tau) {
+    auto& p = system_.particles;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      p.v[i] += (0.5 * tau) * accelerations_.a[i];
+      p.x[i] += tau * p.v[i];
+    }
+    accelerations_.update(system_, *counters_);
+    kick(p, accelerations_.a, 0.5 * tau);
+  }
+
+  const std::vector<Vec<D>>& a() const { return accelerations_.a; }
+
+ private:
+  System<D>& system_;
+  ContactScan<D> scan_;
+  Accelerations<D> accelerations_;
+  Counters* counters_ = nullptr;
+};
+
+}  // namespace carom::integrator

@@ -1,0 +1,82 @@
+#include "engine/integrators/discrete_gradient.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace carom::integrator {
+
+namespace {
+constexpr int kMostIterations = 60;
+constexpr double kWorstContraction = 0.5;
+}  // namespace
+
+template <int D>
+DiscreteGradient<D>::DiscreteGradient(const System<D>& system, int order) : system_(system) {
+  if (order == 4) {
+    const double gamma = 1 / (4 - std::cbrt(4.0));
+    fractions_ = {gamma, gamma, 1 - 4 * gamma, gamma, gamma};
+  } else {
+    fractions_ = {1.0};
+  }
+  const std::size_t n = system.particles.size();
+  mean_acceleration_.assign(fractions_.size(), std::vector<Vec<D>>(n, Vec<D>::Zero()));
+  for (auto* field : {&x_, &v_, &chord_, &trial_, &force_, &mean_}) field->assign(n, Vec<D>::Zero());
+}
+
+template <int D>
+bool DiscreteGradient<D>::solve(Positions<D> x, Positions<D> v, double tau, Counters& counters) {
+  std::ranges::copy(x, x_.begin());
+  std::ranges::copy(v, v_.begin());
+  for (std::size_t stage = 0; stage < fractions_.size(); ++stage)
+    if (!substep(fractions_[stage] * tau, stage, counters)) return false;
+  if (fractions_.size() == 1)
+    std::ranges::copy(mean_, chord_.begin());
+  else
+    for (std::size_t i = 0; i < x_.size(); ++i) chord_[i] = (x_[i] - x[i]) / tau;
+  return true;
+}
+
+template <int D>
+bool DiscreteGradient<D>::substep(double tau, std::size_t stage, Counters& counters) {
+  const std::size_t n = x_.size();
+  const auto& mass = system_.particles.mass;
+  auto& a = mean_acceleration_[stage];
+  double speed = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    mean_[i] = v_[i] + (0.5 * tau) * a[i];
+    speed = std::max(speed, mean_[i].squaredNorm());
+  }
+  // Below this increments are rounding and their ratios mean nothing.
+  const double floor = 16 * std::numeric_limits<double>::epsilon() * std::sqrt(speed);
+  double last = std::numeric_limits<double>::infinity();
+  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    for (std::size_t i = 0; i < n; ++i) trial_[i] = x_[i] + tau * mean_[i];
+    evaluate_mean_forces<D>(system_, x_, trial_, force_, counters);
+    ++counters.sweeps;
+    double change = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      a[i] = force_[i] / mass[i];
+      const Vec<D> next = v_[i] + (0.5 * tau) * a[i];
+      change = std::max(change, (next - mean_[i]).squaredNorm());
+      mean_[i] = next;
+    }
+    change = std::sqrt(change);
+    if (!std::isfinite(change)) break;
+    if (change == 0 || (change >= last && change <= floor)) {
+      for (std::size_t i = 0; i < n; ++i) {
+        x_[i] += tau * mean_[i];
+        v_[i] += tau * a[i];
+      }
+      return true;
+    }
+    if (iteration > 2 && change > floor && change > kWorstContraction * last) break;
+    last = change;
+  }
+  for (auto& stage_guess : mean_acceleration_) std::ranges::fill(stage_guess, Vec<D>::Zero());
+  return false;
+}
+
+template class DiscreteGradient<2>;
+template class DiscreteGradient<3>;
+
+}  // namespace carom::integrator

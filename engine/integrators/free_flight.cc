@@ -1,0 +1,92 @@
+// free-flight: no forces but a uniform field, exact from event to event.
+//
+// The slab is an epoch: at its end all records are flown to one time and wrapped, so that times stay small and their
+// last digits fine. Between events x(t) = x + v s + ½ g s² holds exactly; there is no step and no truncation error.
+
+#include <optional>
+
+#include "engine/error.h"
+#include "engine/event_core.h"
+#include "engine/integrators/registry.h"
+
+namespace carom::integrator {
+namespace {
+
+template <int D>
+class FreeFlight : public Integrator<D> {
+ public:
+  explicit FreeFlight(const Parameters& parameters)
+      : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
+
+  void start(System<D>& system, Counters&) override {
+    core_.emplace(system.box, system.particles);
+    for (const auto& term : system.interactions) {
+      if (!term->common_acceleration())
+        throw Error(Failure::deck, "free-flight knows no forces but a uniform-field; use psa, cva, mcva or cdda");
+      g_ += *term->common_acceleration();
+    }
+  }
+
+  void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
+    const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
+                                               max_events_ * system.particles.size()};
+    {
+      const Stopwatch watch(report.counters.seconds.predict);
+      core_->load(system.particles, g_, slab.length);
+    }
+    report.reached = slab.length;
+    for (double due : report.observe) {
+      report.reached = run(due, events);
+      if (report.reached < due) break;
+      if (copies_.size() == 0) copies_ = system.particles;
+      core_->fly_to(due, copies_);
+      copies_.image = system.particles.image;
+      for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
+      report.observer(due, copies_);
+    }
+    if (report.observe.empty() || report.reached == report.observe.back()) report.reached = run(slab.length, events);
+    core_->fly_to(report.reached, system.particles);
+    system.wrap();
+  }
+
+ private:
+  double run(double end, const typename EventCore<D>::Report& events) {
+    const Stopwatch watch(events.counters.seconds.queue);
+    return core_->run(end, events);
+  }
+
+  std::uint64_t max_events_;
+  Vec<D> g_ = Vec<D>::Zero();
+  std::optional<EventCore<D>> core_;
+  Particles<D> copies_;
+};
+
+}  // namespace
+
+IntegratorInfo free_flight() {
+  Parameter epoch = parameter::step();
+  epoch.fallback = "none";
+  epoch.meaning =
+      "length of an epoch, after which all particles are brought to one time; about ten mean free times where it is "
+      "absent";
+  Parameter limit = parameter::max_events_per_step();
+  limit.meaning = "collisions that one epoch may need, per particle, before the run ends with an error";
+  return {
+      .name = "free-flight",
+      .title = "Event-driven hard spheres",
+      .order = "exact",
+      .conserves = "energy and linear momentum, to rounding",
+      .parameters = {epoch, limit},
+      .documentation =
+          "Exact flight between elastic collisions, for hard spheres without forces or in a uniform field. There is "
+          "no time step: the trajectory is exact but for rounding. `step` is only the length of an epoch.",
+      .source =
+          "Alder, Wainwright, J. Chem. Phys. 31 (1959) 459; Rapaport, J. Comput. Phys. 34 (1980) 184; "
+          "Lubachevsky, J. Comput. Phys. 94 (1991) 255",
+      .stepping = false,
+      .smooth_forces = false,
+      .in_2d = make<FreeFlight, 2>,
+      .in_3d = make<FreeFlight, 3>};
+}
+
+}  // namespace carom::integrator

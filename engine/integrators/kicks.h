@@ -1,0 +1,25 @@
+#pragma once
+// What the kick methods share: accelerations a = −M⁻¹∇V at the present positions, and the kick v += s a.
+
+#include "engine/forces.h"
+
+namespace carom::integrator {
+
+template <int D>
+struct Accelerations {
+  std::vector<Vec<D>> a;  ///< [length/time²]
+
+  /// Evaluates a at the system's positions: one force pass.
+  void update(const System<D>& system, Counters& counters) {
+    a.resize(system.particles.size());
+    evaluate_forces<D>(system, system.particles.x, a, counters);
+    for (std::size_t i = 0; i < a.size(); ++i) a[i] /= system.particles.mass[i];
+  }
+};
+
+template <int D>
+void kick(Particles<D>& particles, const std::vector<Vec<D>>& a, double time) {
+  for (std::size_t i = 0; i < particles.size(); ++i) particles.v[i] += time * a[i];
+}
+
+}  // namespace carom::integrator

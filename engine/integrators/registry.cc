@@ -1,0 +1,34 @@
+#include "engine/integrators/registry.h"
+
+namespace carom {
+
+const std::vector<IntegratorInfo>& integrators() {
+  static const std::vector<IntegratorInfo> all = {
+      integrator::free_flight(), integrator::verlet(), integrator::psa(),
+      integrator::cva(),         integrator::mcva(),   integrator::cdda(),
+  };
+  return all;
+}
+
+namespace parameter {
+
+Parameter step() {
+  return {.name = "step",
+          .type = Parameter::Type::real,
+          .fallback = "",
+          .unit = "time",
+          .meaning = "length of one step",
+          .range = Parameter::Range::positive};
+}
+
+Parameter max_events_per_step() {
+  return {.name = "max_events_per_step",
+          .type = Parameter::Type::integer,
+          .fallback = "100000",
+          .unit = "-",
+          .meaning = "collisions that one step may need before the run ends with an error",
+          .range = Parameter::Range::positive};
+}
+
+}  // namespace parameter
+}  // namespace carom

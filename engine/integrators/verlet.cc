@@ -1,0 +1,49 @@
+// verlet: kick-drift-kick, K(h/2) D(h) K(h/2), for points without hard cores.
+
+#include "engine/forces.h"
+#include "engine/integrators/kicks.h"
+#include "engine/integrators/registry.h"
+
+namespace carom::integrator {
+namespace {
+
+template <int D>
+class Verlet : public Integrator<D> {
+ public:
+  explicit Verlet(const Parameters&) {}
+
+  void start(System<D>& system, Counters& counters) override { accelerations_.update(system, counters); }
+
+  void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
+    auto& p = system.particles;
+    kick(p, accelerations_.a, 0.5 * slab.length);
+    for (std::size_t i = 0; i < p.size(); ++i) p.x[i] += slab.length * p.v[i];
+    accelerations_.update(system, report.counters);
+    kick(p, accelerations_.a, 0.5 * slab.length);
+    system.wrap();
+    report.reached = slab.length;
+  }
+
+ private:
+  Accelerations<D> accelerations_;
+};
+
+}  // namespace
+
+IntegratorInfo verlet() {
+  return {.name = "verlet",
+          .title = "Störmer–Verlet",
+          .order = "2",
+          .conserves = "linear and angular momentum to rounding; the shadow energy S_h to order 4",
+          .parameters = {parameter::step()},
+          .documentation =
+              "The velocity Verlet method (kick-drift-kick) for particles without hard cores: spheres are "
+              "points, their radii are not looked at.",
+          .source = "Verlet, Phys. Rev. 159 (1967) 98; Swope, Andersen, Berens, Wilson, J. Chem. Phys. 76 (1982) 637",
+          .hard_cores = false,
+          .shadow = true,
+          .in_2d = make<Verlet, 2>,
+          .in_3d = make<Verlet, 3>};
+}
+
+}  // namespace carom::integrator

@@ -1,0 +1,85 @@
+#include "engine/neighbour_list.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "engine/cell_grid.h"
+
+namespace carom {
+
+template <int D>
+NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::function<bool(Id, Id)> wanted)
+    : box_(box), reach_(std::move(reach)), wanted_(std::move(wanted)) {
+  const double mean =
+      std::accumulate(reach_.begin(), reach_.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, reach_.size()));
+  skin_ = 0.3 * mean;  // 15 % of a mean pair reach
+}
+
+template <int D>
+std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new,
+                                                          double margin) {
+  follow_wraps(x);
+  const bool same = x.data() == x_new.data();
+  // The largest distances from where the list was built, and within this step: two bounds for everybody.
+  double from_build = 0, step = 0;
+  if (built_at_.size() == x.size())
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      from_build = std::max(from_build, (x[i] - built_at_[i]).squaredNorm());
+      if (!same) {
+        from_build = std::max(from_build, (x_new[i] - built_at_[i]).squaredNorm());
+        step = std::max(step, (x_new[i] - x[i]).squaredNorm());
+      }
+    }
+  const bool usable = built_at_.size() == x.size() && std::sqrt(from_build) + margin <= 0.5 * skin_;
+  if (!usable) {
+    if (built_at_.size() != x.size() && !same)
+      for (std::size_t i = 0; i < x.size(); ++i) step = std::max(step, (x_new[i] - x[i]).squaredNorm());
+    // A step that eats more than half the skin by itself asks for a wider one, with room for several such steps.
+    skin_ = std::max(skin_, 4.0 * (std::sqrt(step) + margin));
+    build(x);
+  }
+  return pairs_;
+}
+
+template <int D>
+void NeighbourList<D>::follow_wraps(std::span<const Vec<D>> x) {
+  if (built_at_.size() != x.size()) return;
+  std::vector<Image<D>> crossed;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const Image<D> jump = box_.nearest_image(x[i] - built_at_[i]);
+    if (jump == Image<D>{}) continue;
+    if (crossed.empty()) crossed.resize(x.size());
+    crossed[i] = jump;
+    built_at_[i] -= box_.shift(jump);
+  }
+  if (crossed.empty()) return;
+  for (auto& pair : pairs_)
+    for (int k = 0; k < D; ++k) pair.image[k] += crossed[pair.i][k] - crossed[pair.j][k];
+  std::ranges::sort(pairs_);  // the order names images, and these have changed
+}
+
+template <int D>
+void NeighbourList<D>::build(std::span<const Vec<D>> x) {
+  ++rebuilds_;
+  built_at_.assign(x.begin(), x.end());
+  pairs_.clear();
+  const double largest = reach_.empty() ? 0 : *std::ranges::max_element(reach_);
+  const CellGrid<D> grid(box_, 2 * largest + skin_, x);
+  const CellTable<D> table(grid, x);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const std::size_t first = pairs_.size();
+    table.for_each_near(x[i], 2 * largest + skin_, [&](Id j, const Image<D>& image) {
+      if (j <= i) return;
+      const Vec<D> d = x[i] - x[j] + box_.shift(image);
+      const double reach = reach_[i] + reach_[j] + skin_;
+      if (d.squaredNorm() <= reach * reach && (!wanted_ || wanted_(static_cast<Id>(i), j)))
+        pairs_.push_back({static_cast<Id>(i), j, image});
+    });
+    std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
+  }
+}
+
+template class NeighbourList<2>;
+template class NeighbourList<3>;
+
+}  // namespace carom
