@@ -1,0 +1,91 @@
+#include "engine/potentials/options.h"
+
+#include <algorithm>
+
+#include "engine/error.h"
+
+namespace carom::options {
+
+Parameter species() {
+  return {"species", Parameter::Type::text_list, "none", "-",
+          "two species names: the term acts only between these; absent: between all particles"};
+}
+
+Parameter cutoff() {
+  return {"cutoff",
+          Parameter::Type::real,
+          "none",
+          "length",
+          "distance at which the potential ends; absent: never, which a periodic box does not allow",
+          Parameter::Range::positive};
+}
+
+Parameter cut() {
+  return {"cut",
+          Parameter::Type::text,
+          "\"smooth\"",
+          "-",
+          "how it ends: 'smooth' subtracts a polynomial in r^2 so that V, V' and V'' go to zero; 'shifted' subtracts a "
+          "constant, so that the force jumps at the cutoff and time steps lose their order there",
+          Parameter::Range::any,
+          {"smooth", "shifted"}};
+}
+
+std::vector<Parameter> with_pair_options(std::vector<Parameter> own) {
+  own.push_back(species());
+  own.push_back(cutoff());
+  own.push_back(cut());
+  return own;
+}
+
+void refuse(std::string_view type, const std::string& problem) {
+  throw Error(Failure::deck, std::string(type) + ": " + problem);
+}
+
+std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters& parameters,
+                                        const std::vector<std::string>& known) {
+  if (!parameters.has("species")) return {};
+  const auto& names = parameters.get<std::vector<std::string>>("species");
+  if (names.size() != 2)
+    refuse(type, "'species' has " + std::to_string(names.size()) + " entries; give the two species it acts between");
+  std::vector<std::uint16_t> pair;
+  for (const std::string& name : names) {
+    const auto at = std::ranges::find(known, name);
+    if (at == known.end()) {
+      std::string list;
+      for (const std::string& other : known) list += (list.empty() ? "'" : ", '") + other + "'";
+      refuse(type, "'species' names '" + name + "', which is not there; known species: " + list);
+    }
+    pair.push_back(static_cast<std::uint16_t>(at - known.begin()));
+  }
+  return pair;
+}
+
+PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles) {
+  const bool chain = parameters.has("chain") && parameters.flag("chain");
+  if (chain == parameters.has("pairs"))
+    refuse(type, chain ? "both 'pairs' and 'chain = true' are given; give one of them"
+                       : "no bonds are given; give 'pairs = [[0, 1], …]' or 'chain = true'");
+  PairList list;
+  if (chain) {
+    for (Id i = 1; i < particles; ++i) list.push_back({i - 1, i});
+    return list;
+  }
+  list = parameters.get<PairList>("pairs");
+  for (auto& [i, j] : list) {
+    const std::string name = "pair [" + std::to_string(i) + ", " + std::to_string(j) + "]";
+    if (std::max(i, j) >= particles)
+      refuse(type, name + " names particle " + std::to_string(std::max(i, j)) + ", but there are only " +
+                       std::to_string(particles) + " particles, counted from 0; correct 'pairs'");
+    if (i == j) refuse(type, name + " bonds a particle to itself; correct 'pairs'");
+    if (i > j) std::swap(i, j);
+  }
+  std::ranges::sort(list);
+  const auto twice = std::ranges::adjacent_find(list);
+  if (twice != list.end())
+    refuse(type, "pair [" + std::to_string((*twice)[0]) + ", " + std::to_string((*twice)[1]) +
+                     "] is given twice; for a stiffer bond give a larger stiffness");
+  return list;
+}
+
+}  // namespace carom::options

@@ -1,0 +1,88 @@
+#pragma once
+// What the types of interaction have in common in a deck: shared parameters, and how they are read.
+//
+// All functions throw Error(Failure::deck) whose message begins with the type's name and says what to do.
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/interaction.h"
+#include "engine/potentials/cut.h"
+#include "engine/potentials/pair_term.h"
+
+namespace carom::options {
+
+/// Shared declarations.
+Parameter species();
+Parameter cutoff();
+Parameter cut();
+
+/// `own` followed by species, cutoff and cut.
+std::vector<Parameter> with_pair_options(std::vector<Parameter> own);
+
+[[noreturn]] void refuse(std::string_view type, const std::string& problem);
+
+/// The two species `species` names, as indices into `known`; empty if the key is absent.
+std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters& parameters,
+                                        const std::vector<std::string>& known);
+
+/// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending.
+PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
+
+/// A vector given as a list of D numbers.
+template <int D>
+Vec<D> vector(std::string_view type, const Parameters& parameters, std::string_view key) {
+  const auto& given = parameters.get<std::vector<double>>(key);
+  if (given.size() != D)
+    refuse(type, "'" + std::string(key) + "' has " + std::to_string(given.size()) + " components; give " +
+                     std::to_string(D) + ", as the system has " + std::to_string(D) + " dimensions");
+  return Eigen::Map<const Vec<D>>(given.data());
+}
+
+template <int D>
+SpeciesPair species_filter(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
+  const auto pair = species_pair(type, parameters, context.species);
+  return pair.empty() ? SpeciesPair() : SpeciesPair(context.particles.species, pair[0], pair[1]);
+}
+
+template <int D>
+bool any_periodic(const Box<D>& box) {
+  for (int k = 0; k < D; ++k)
+    if (box.periodic(k)) return true;
+  return false;
+}
+
+/// A term over all pairs; `remedy` says what to write instead in a periodic box, where there is no such sum.
+template <int D, Potential P, class Weight>
+std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, Weight weight,
+                                          const Parameters& parameters, const InteractionContext<D>& context,
+                                          const std::string& remedy) {
+  const SpeciesPair species = species_filter(type, parameters, context);
+  if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
+  AllPairs<D> pairs(context.particles.size(), species);
+  return std::make_unique<PairTerm<D, P, Weight, AllPairs<D>>>(potential, weight, std::move(pairs));
+}
+
+/// A term over the pairs within the reach of a potential that ends by itself.
+template <int D, ShortRanged P, class Weight>
+std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, Weight weight,
+                                             const Parameters& parameters, const InteractionContext<D>& context) {
+  const SpeciesPair species = species_filter(type, parameters, context);
+  const double reach = std::sqrt(potential.cutoff_squared()) * (1 + 1e-15);
+  PairsWithinCutoff<D> pairs(context.box, context.particles.size(), reach, species);
+  return std::make_unique<PairTerm<D, P, Weight, PairsWithinCutoff<D>>>(potential, weight, std::move(pairs));
+}
+
+/// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.
+template <int D, Potential P, class Weight>
+std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, Weight weight,
+                                          const Parameters& parameters, const InteractionContext<D>& context) {
+  if (!parameters.has("cutoff"))
+    return all_pairs<D>(type, potential, weight, parameters, context, "give 'cutoff', at most half the shortest edge");
+  const CutKind kind = parameters.text("cut") == "shifted" ? CutKind::shifted : CutKind::smooth;
+  return within_reach<D>(type, Cut<P>(potential, parameters.real("cutoff"), kind), weight, parameters, context);
+}
+
+}  // namespace carom::options

@@ -1,0 +1,109 @@
+#pragma once
+// The loop over pairs, written once for all pair potentials.
+//
+//   V = Σ_{i<j} w_ij U(ρ_ij),   ρ_ij = d·d,   d = x_i − x_j (+ the image's shift)
+//   force on i, minus that on j:   −2 w U′ d;    mean force: −w Q(ρ, ρ′) (d + d′)
+//   Hessian product, on i, minus that on j:   w [2 U′ u + 4 U″ (d·u) d],   u = w_i − w_j
+//
+// Q is the divided difference of U; since ρ′ − ρ = (d + d′)·(d′ − d), the mean forces are a discrete gradient.
+
+#include <utility>
+
+#include "engine/potentials/pairs.h"
+#include "engine/potentials/potential.h"
+
+namespace carom {
+
+/// w_ij = 1.
+struct UnitWeight {
+  double operator()(Id, Id) const { return 1; }
+};
+
+/// w_ij = m_i m_j or q_i q_j. The vector outlives the term.
+class ProductWeight {
+ public:
+  explicit ProductWeight(const std::vector<double>& factor) : factor_(&factor) {}
+  double operator()(Id i, Id j) const { return (*factor_)[i] * (*factor_)[j]; }
+
+ private:
+  const std::vector<double>* factor_;
+};
+
+template <int D, Potential P, class Weight, class Pairs>
+class PairTerm final : public Interaction<D> {
+ public:
+  PairTerm(P potential, Weight weight, Pairs pairs)
+      : potential_(std::move(potential)), weight_(weight), pairs_(std::move(pairs)) {}
+
+  void add_energy(Positions<D> x, PotentialSums& sums) const override {
+    for_each_within_reach(x, [&](Id i, Id j, const Vec<D>&, double rho) {
+      const double weight = weight_(i, j);
+      const double v = weight * potential_.value(rho);
+      sums.energy.add(v);
+      sums.magnitude.add(std::abs(v));
+      sums.virial.add(-2 * weight * potential_.derivative(rho) * rho);
+    });
+  }
+
+  void add_forces(Positions<D> x, Vectors<D> force) const override {
+    for_each_within_reach(x, [&](Id i, Id j, const Vec<D>& d, double rho) {
+      const Vec<D> f = (2 * weight_(i, j) * potential_.derivative(rho)) * d;
+      force[i] -= f;
+      force[j] += f;
+    });
+  }
+
+  void add_mean_forces(Positions<D> x, Positions<D> x_new, Vectors<D> force) const override {
+    pairs_.for_each(x, x_new, [&](Id i, Id j, const auto& shift) {
+      const Vec<D> d = separation<D>(x[i], x[j], shift), d_new = separation<D>(x_new[i], x_new[j], shift);
+      const double rho = d.squaredNorm(), rho_new = d_new.squaredNorm();
+      if (out_of_reach(rho) && out_of_reach(rho_new)) return;
+      const Vec<D> f = (weight_(i, j) * potential_.quotient(rho, rho_new)) * (d + d_new);
+      force[i] -= f;
+      force[j] += f;
+    });
+  }
+
+  void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
+    for_each_within_reach(x, [&](Id i, Id j, const Vec<D>& d, double rho) {
+      const Vec<D> u = w[i] - w[j];
+      const Vec<D> product =
+          weight_(i, j) * (2 * potential_.derivative(rho) * u + 4 * potential_.second_derivative(rho) * d.dot(u) * d);
+      out[i] += product;
+      out[j] -= product;
+    });
+  }
+
+  std::uint64_t interacting_pairs(Positions<D> x) const override {
+    if constexpr (requires { pairs_.count(); }) {
+      return pairs_.count();
+    } else {
+      std::uint64_t within = 0;
+      for_each_within_reach(x, [&](Id, Id, const Vec<D>&, double) { ++within; });
+      return within;
+    }
+  }
+
+ private:
+  bool out_of_reach(double rho) const {
+    if constexpr (ShortRanged<P>)
+      return rho >= potential_.cutoff_squared();
+    else
+      return false;
+  }
+
+  template <class Visit>
+  void for_each_within_reach(Positions<D> x, Visit&& visit) const {
+    pairs_.for_each(x, x, [&](Id i, Id j, const auto& shift) {
+      const Vec<D> d = separation<D>(x[i], x[j], shift);
+      const double rho = d.squaredNorm();
+      if (!out_of_reach(rho)) visit(i, j, d, rho);
+    });
+  }
+
+  P potential_;
+  Weight weight_;
+  Pairs pairs_;
+};
+
+}  // namespace carom

@@ -1,0 +1,109 @@
+#pragma once
+// Which pairs a term of V is summed over: a list of bonds, all pairs, or the pairs within a cutoff.
+//
+// Each source offers
+//   for_each(x, x_new, visit)   calls visit(i, j, shift) for its pairs in the order (i, j, image), i < j; the pair's
+//                               separation is separation(x[i], x[j], shift), at x_new with the same shift
+//   count()                     how many pairs there are, where that does not depend on positions
+
+#include <vector>
+
+#include "engine/interaction.h"
+#include "engine/neighbour_list.h"
+
+namespace carom {
+
+/// The shift of a pair in a box without periodic axes.
+struct NoShift {};
+
+template <int D>
+Vec<D> separation(const Vec<D>& x_i, const Vec<D>& x_j, const Vec<D>& shift) {
+  return x_i - x_j + shift;
+}
+template <int D>
+Vec<D> separation(const Vec<D>& x_i, const Vec<D>& x_j, NoShift) {
+  return x_i - x_j;
+}
+
+/// The two species, in either order, that a term is restricted to; or no restriction.
+class SpeciesPair {
+ public:
+  SpeciesPair() = default;
+  SpeciesPair(const std::vector<std::uint16_t>& species_of, std::uint16_t a, std::uint16_t b)
+      : species_of_(&species_of), a_(a), b_(b) {}
+
+  bool all() const { return species_of_ == nullptr; }
+  bool contains(Id i, Id j) const {
+    if (all()) return true;
+    const std::uint16_t p = (*species_of_)[i], q = (*species_of_)[j];
+    return (p == a_ && q == b_) || (p == b_ && q == a_);
+  }
+
+ private:
+  const std::vector<std::uint16_t>* species_of_ = nullptr;
+  std::uint16_t a_ = 0, b_ = 0;
+};
+
+/// Bonds, given with i < j in ascending order. A bond spans the image that is nearest at x.
+template <int D>
+class Bonds {
+ public:
+  Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {}
+
+  template <class Visit>
+  void for_each(Positions<D> x, Positions<D> /*x_new*/, Visit&& visit) const {
+    for (const auto& [i, j] : pairs_) visit(i, j, box_.shift(box_.nearest_image(x[i] - x[j])));
+  }
+  std::uint64_t count() const { return pairs_.size(); }
+
+ private:
+  const Box<D>& box_;
+  PairList pairs_;
+};
+
+/// All pairs of `particles` particles, in a box without periodic axes; nothing is stored.
+template <int D>
+class AllPairs {
+ public:
+  AllPairs(std::size_t particles, SpeciesPair species) : particles_(static_cast<Id>(particles)), species_(species) {
+    for (Id i = 0; i < particles_; ++i)
+      for (Id j = i + 1; j < particles_; ++j) count_ += species_.contains(i, j) ? 1 : 0;
+  }
+
+  template <class Visit>
+  void for_each(Positions<D> /*x*/, Positions<D> /*x_new*/, Visit&& visit) const {
+    for (Id i = 0; i < particles_; ++i)
+      for (Id j = i + 1; j < particles_; ++j)
+        if (species_.contains(i, j)) visit(i, j, NoShift{});
+  }
+  std::uint64_t count() const { return count_; }
+
+ private:
+  Id particles_;
+  SpeciesPair species_;
+  std::uint64_t count_ = 0;
+};
+
+/// The pairs within a cutoff, and some beyond: whoever visits them looks at the distance.
+template <int D>
+class PairsWithinCutoff {
+ public:
+  PairsWithinCutoff(const Box<D>& box, std::size_t particles, double cutoff, SpeciesPair species)
+      : box_(box), list_(box, std::vector<double>(particles, 0.5 * cutoff), wanted(species)) {}
+
+  template <class Visit>
+  void for_each(Positions<D> x, Positions<D> x_new, Visit&& visit) const {
+    for (const NeighbourPair<D>& pair : list_.cover(x, x_new)) visit(pair.i, pair.j, box_.shift(pair.image));
+  }
+
+ private:
+  static std::function<bool(Id, Id)> wanted(SpeciesPair species) {
+    if (species.all()) return {};
+    return [species](Id i, Id j) { return species.contains(i, j); };
+  }
+
+  const Box<D>& box_;
+  mutable NeighbourList<D> list_;  // a cache: its state never shows in the sums
+};
+
+}  // namespace carom

@@ -1,0 +1,18 @@
+#pragma once
+// The declarations of all types of interaction. Each is defined in the file of its name; registry.cc lists them.
+
+#include "engine/interaction.h"
+
+namespace carom::types {
+
+InteractionInfo harmonic_bond();
+InteractionInfo gravity();
+InteractionInfo coulomb();
+InteractionInfo yukawa();
+InteractionInfo lennard_jones();
+InteractionInfo wca();
+InteractionInfo inverse_power();
+InteractionInfo uniform_field();
+InteractionInfo harmonic_trap();
+
+}  // namespace carom::types

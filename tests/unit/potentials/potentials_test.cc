@@ -1,0 +1,124 @@
+// Every pair potential against 50-digit arithmetic; the stated number of ε is what its header promises.
+
+#include <boost/math/special_functions/erf.hpp>
+
+#include "engine/potentials/damped_coulomb.h"
+#include "engine/potentials/harmonic_bond.h"
+#include "engine/potentials/inverse_distance.h"
+#include "engine/potentials/inverse_power.h"
+#include "engine/potentials/lennard_jones.h"
+#include "engine/potentials/wca.h"
+#include "engine/potentials/yukawa.h"
+#include "tests/unit/potentials/accuracy.h"
+
+namespace carom {
+namespace {
+
+using test::expect_within;
+using test::measure;
+using test::Precise;
+
+TEST(Accuracy, HarmonicBond) {
+  const double k = 1.7, length = 2.1;
+  const auto exact = [&](const Precise& rho) {
+    const Precise stretch = sqrt(rho) - Precise(length);
+    return Precise(Precise(k) / 2 * stretch * stretch);
+  };
+  const auto scale = [&](const Precise& rho) {
+    return Precise(Precise(k) / 2 * (rho + 2 * Precise(length) * sqrt(rho)));
+  };
+  // The value is of order L² near r = 0, where the scale of its derivative goes to zero: measured from r = 0.1 L on.
+  expect_within(measure(HarmonicBond(k, length), exact, scale, 0.04, 1e6), 4);
+}
+
+TEST(Accuracy, HarmonicBondNearItsRestLength) {
+  const double k = 1.7, length = 2.1;
+  const auto exact = [&](const Precise& rho) {
+    const Precise stretch = sqrt(rho) - Precise(length);
+    return Precise(Precise(k) / 2 * stretch * stretch);
+  };
+  const auto scale = [&](const Precise& rho) {
+    return Precise(Precise(k) / 2 * (rho + 2 * Precise(length) * sqrt(rho)));
+  };
+  expect_within(measure(HarmonicBond(k, length), exact, scale, 4.40999, 4.41001), 4);
+}
+
+TEST(Accuracy, SpringOfZeroLengthIsFiniteWhereItsEndsMeet) {
+  const HarmonicBond spring(3.0, 0.0);
+  EXPECT_EQ(spring.value(0), 0);
+  EXPECT_EQ(spring.derivative(0), 1.5);
+  EXPECT_EQ(spring.second_derivative(0), 0);
+  EXPECT_EQ(spring.quotient(0, 0), 1.5);
+}
+
+TEST(Accuracy, InverseDistance) {
+  const auto exact = [](const Precise& rho) { return Precise(Precise(-1.3) / sqrt(rho)); };
+  expect_within(measure(InverseDistance(-1.3), exact, exact, 1e-12, 1e12), 4);
+}
+
+TEST(Accuracy, DampedCoulomb) {
+  const double c = 1.9;
+  for (const double alpha : {0.0, 0.2, 1.1, 3.0}) {
+    const auto exact = [&](const Precise& rho) {
+      const Precise r = sqrt(rho);
+      return Precise(Precise(c) * boost::math::erfc(Precise(alpha) * r) / r);
+    };
+    const auto rounding = [&](double rho, double) { return 1 + alpha * alpha * rho; };
+    expect_within(measure(DampedCoulomb(c, alpha), exact, exact, 1e-6, 30, rounding, 600), 6);
+  }
+}
+
+TEST(Accuracy, Yukawa) {
+  const double amplitude = -2.3;
+  for (const double kappa : {0.0, 0.4, 1.8, 12.0}) {
+    const auto exact = [&](const Precise& rho) {
+      const Precise r = sqrt(rho);
+      return Precise(Precise(amplitude) * exp(-Precise(kappa) * r) / r);
+    };
+    const auto rounding = [&](double rho, double) { return 1 + kappa * std::sqrt(rho); };
+    expect_within(measure(Yukawa(amplitude, kappa), exact, exact, 1e-8, 1e3, rounding), 5);
+  }
+}
+
+TEST(Accuracy, LennardJones) {
+  const double epsilon = 1.4, sigma = 0.9;
+  const auto terms = [&](const Precise& rho, int sign) {
+    const Precise u = pow(Precise(sigma * sigma) / rho, 3);
+    return Precise(4 * Precise(epsilon) * (u * u + sign * u));
+  };
+  expect_within(measure(
+                    LennardJones(epsilon, sigma), [&](const Precise& rho) { return terms(rho, -1); },
+                    [&](const Precise& rho) { return terms(rho, 1); }, 0.01, 1e4),
+                9);
+}
+
+TEST(Accuracy, WcaAlsoAcrossItsCutoff) {
+  const double epsilon = 1.4, sigma = 0.9;
+  const Wca wca(epsilon, sigma);
+  const auto exact = [&](const Precise& rho) {
+    if (rho >= wca.cutoff_squared()) return Precise(0);
+    const Precise u = pow(Precise(sigma * sigma) / rho, 3);
+    return Precise(Precise(epsilon) * (2 * u - 1) * (2 * u - 1));
+  };
+  const auto scale = [&](const Precise& rho) {
+    const Precise u = pow(Precise(sigma * sigma) / rho, 3);
+    return Precise(4 * Precise(epsilon) * (u * u + u));
+  };
+  expect_within(measure(wca, exact, scale, 0.01, 3), 9);
+  EXPECT_EQ(wca.value(wca.cutoff_squared()), 0);
+  EXPECT_EQ(wca.quotient(1.1 * wca.cutoff_squared(), 2 * wca.cutoff_squared()), 0);
+}
+
+TEST(Accuracy, InversePower) {
+  const double epsilon = 0.8, sigma = 1.3;
+  for (const double exponent : {1.0, 4.5, 12.0, 36.0}) {
+    const auto exact = [&](const Precise& rho) {
+      return Precise(Precise(epsilon) * pow(Precise(sigma * sigma) / rho, Precise(exponent) / 2));
+    };
+    const auto rounding = [&](double, double) { return 1 + 0.25 * exponent; };
+    expect_within(measure(InversePower(epsilon, sigma, exponent), exact, exact, 0.01, 1e4, rounding), 5);
+  }
+}
+
+}  // namespace
+}  // namespace carom
