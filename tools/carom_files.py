@@ -14,7 +14,6 @@ import os
 import pathlib
 import shutil
 import subprocess
-import tomllib
 
 import h5py
 import numpy as np
@@ -83,10 +82,11 @@ class Trajectory:
         self.step = self._group["position/step"][:]
         self.radius = self._group["radius"][:]
         self.mass = self._group["mass"][:]
-        self.species = self._group["species"][:]
-        deck = tomllib.loads(as_text(self._file["parameters/deck"][()]))
-        self.title = deck.get("title", "")
-        self.boundary = deck["system"]["boundary"]  # per axis: "wall", "periodic" or "open"
+        self.species = self._group["species"][:]  # indices into species_names
+        self.title = as_text(self._file["parameters/title"][()])
+        self.species_names = [as_text(name) for name in self._file["parameters/species"][:]]
+        # Per axis: "wall", "periodic" or "open".
+        self.boundary = [as_text(rule) for rule in self._file["parameters/boundary"][:]]
 
     def __enter__(self):
         return self
@@ -124,8 +124,7 @@ class Trajectory:
 
 
 def as_text(value):
-    """The text of an HDF5 string, stored as one or as an array of one."""
-    value = np.asarray(value).reshape(-1)[0]
+    """The text of a string of HDF5."""
     return value.decode() if isinstance(value, bytes) else str(value)
 
 

@@ -2,11 +2,11 @@
 """The radial distribution function g(r) of a trajectory, in 2-D and 3-D, in periodic and walled boxes.
 
     tools/plot_rdf.py runs/hard-sphere-fluid
-    tools/plot_rdf.py runs/primitive-electrolyte --species 0,1 --bins 200 --first-frame 20 -o rdf.png
+    tools/plot_rdf.py runs/primitive-electrolyte --species cation,anion --bins 200 --first-frame 20 -o rdf.png
 
 Periodic axes use the nearest image, so r ends at half the shortest periodic edge. Along walls the count expected of an
 ideal gas is the exact one of the region the centres can reach (the average over directions of prod_k (1 - r |u_k| / L_k)), so
-that g = 1 without correlations up to the walls. A CSV with r, g stands beside the picture. (Allen, Tildesley, Computer
+that g = 1 without correlations up to the walls (of species with unequal radii: nearly). A CSV with r, g stands beside the picture. (Allen, Tildesley, Computer
 Simulation of Liquids, 2nd ed., section 2.6 and 6.2.)
 """
 
@@ -44,7 +44,7 @@ def ideal_fraction(radii, edges, periodic):
 
 
 def pair_counts(a, b, radii, edges, periodic):
-    """Ordered pairs (one of a, one of b) with a distance in each shell; a particle and itself are at distance 0."""
+    """Ordered pairs (one of a, one of b) with a distance in each shell, 0 (a particle and itself) excepted."""
     size = np.where(periodic, edges, 0.0)  # 0: no images along this axis
     tree_a, tree_b = (cKDTree(x, boxsize=size) for x in (a, b))
     return np.diff(tree_a.count_neighbors(tree_b, np.nextafter(radii, 0)).astype(float))
@@ -54,10 +54,11 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
     """Middles of the shells, and g there, averaged over the frames from first_frame on."""
     if "open" in trajectory.boundary:
         raise SystemExit("g(r) needs a density: there is none in a box with an open boundary.")
-    chosen = [np.flatnonzero(trajectory.species == s) if species else np.arange(len(trajectory.species))
-              for s in (species or (0, 0))]
-    if not all(map(len, chosen)):
-        raise SystemExit(f"There are no particles of species {species}.")
+    if unknown := set(species or []) - set(trajectory.species_names):
+        raise SystemExit(f"There is no species {', '.join(unknown)}, only {', '.join(trajectory.species_names)}.")
+    everybody = np.arange(len(trajectory.species))
+    chosen = [everybody[trajectory.species == trajectory.species_names.index(name)] for name in species or []]
+    chosen = chosen or [everybody, everybody]
     walled = ~trajectory.periodic
     # Centres keep a radius away from a wall.
     margin = np.where(walled, min(trajectory.radius[np.concatenate(chosen)]), 0.0)
@@ -72,8 +73,6 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
     pairs = len(chosen[0]) * len(chosen[1]) - len(np.intersect1d(*chosen))
     if pairs == 0:
         raise SystemExit("g(r) needs two particles.")
-    if len(np.intersect1d(*chosen)):
-        counts[0] -= len(frames) * len(chosen[0])  # each particle's distance 0 from itself
     expected = len(frames) * pairs * ideal_fraction(radii, edges, trajectory.periodic)
     return 0.5 * (radii[1:] + radii[:-1]), counts / expected
 
@@ -88,13 +87,13 @@ def main(arguments=None):
     parser.add_argument("run", type=pathlib.Path, help="directory of a run, or its trajectory")
     parser.add_argument("--bins", type=int, default=150)
     parser.add_argument("--largest", type=float, help="largest r; default: half the shortest edge")
-    parser.add_argument("--species", help="two species numbers, as 0,1; default: all particles")
+    parser.add_argument("--species", help="names of two species, as cation,anion; default: all particles")
     parser.add_argument("--first-frame", type=int, default=0, help="skip what comes before (equilibration)")
     parser.add_argument("-o", "--output", type=pathlib.Path, help="default: rdf.png in the run's directory")
     options = parser.parse_args(arguments)
-    species = [int(s) for s in options.species.split(",")] if options.species else None
+    species = options.species.split(",") if options.species else None
     if species and len(species) != 2:
-        parser.error("--species takes two numbers")
+        parser.error("--species takes two names")
     with Trajectory(options.run) as trajectory:
         if options.first_frame >= len(trajectory):
             parser.error(f"there are {len(trajectory)} frames")

@@ -1,0 +1,241 @@
+"""The Python tools against files whose contents are known, and energy_study.py against the command itself ($CAROM)."""
+
+import csv
+import os
+import pathlib
+import sys
+import tomllib
+
+import h5py
+import numpy as np
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+import check_h5md
+import compare
+import energy_study
+import movie
+import plot_energy
+import plot_msd
+import plot_rdf
+from carom_files import Trajectory, find_carom, read_thermo, toml_text
+from synthetic_run import write_run
+
+
+def make_run(directory, dimension=2, boundary="periodic", particles=20, frames=12, **more):
+    """Straight flights of points from random places in a box of unequal edges."""
+    random = np.random.default_rng(7)
+    edges = np.array([4.0, 5.0, 6.0])[:dimension]
+    v = np.tile(random.normal(size=(particles, dimension)), (frames, 1, 1))
+    x = random.uniform(size=(particles, dimension)) * edges + 0.5 * np.arange(frames)[:, None, None] * v
+    if boundary == "periodic":
+        more["image"] = np.floor(x / edges).astype("i4")
+        x = x - more["image"] * edges
+    else:
+        x = np.clip(x, 0.1, edges - 0.1)
+    total = 1.0 + 1e-3 * np.sin(np.arange(frames))
+    write_run(directory, total, x=x, v=v, edges=edges, boundary=[boundary] * dimension, **more)
+    return directory
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("boundary", ["periodic", "wall", "open"])
+def test_a_sound_file_conforms(tmp_path, dimension, boundary):
+    assert check_h5md.violations(make_run(tmp_path / "run", dimension, boundary)) == []
+
+
+def replace(file, name, value):
+    del file[name]
+    file[name] = value
+
+
+P = "particles/trajectory"
+DEFECTS = {
+    "version": lambda f: f["h5md"].attrs.modify("version", np.array([1, 0], dtype="i4")),
+    "/h5md/author": lambda f: f.__delitem__("h5md/author"),
+    "variable length": lambda f: f["parameters"].attrs.__setitem__("note", "hello"),
+    "'unit'": lambda f: f[f"{P}/position/value"].attrs.__setitem__("unit", np.bytes_("nm")),
+    "one group": lambda f: f.create_group("particles/other"),
+    "[3]": lambda f: replace(f, f"{P}/position/value", f[f"{P}/position/value"][:, :, :2]),
+    "double precision": lambda f: replace(f, f"{P}/position/value", f[f"{P}/position/value"][:].astype("f4")),
+    "velocity: shape": lambda f: replace(f, f"{P}/velocity/value", f[f"{P}/velocity/value"][:, :5]),
+    "/particles/trajectory/image": lambda f: f.__delitem__(f"{P}/image"),
+    "radius: must be": lambda f: replace(f, f"{P}/radius", np.ones(3)),
+    "order of ids": lambda f: replace(f, f"{P}/id", np.arange(20)[::-1]),
+    "hard link": lambda f: replace(f, f"{P}/box/edges/time", f[f"{P}/position/time"][:]),
+    "[3][3]": lambda f: replace(f, f"{P}/box/edges/value", f[f"{P}/box/edges/value"][:, 0]),
+    "'periodic' or 'none'": lambda f: f[f"{P}/box"].attrs.modify("boundary", np.array([b"wall"] * 3)),
+    "dimension must be 3": lambda f: f[f"{P}/box"].attrs.modify("dimension", np.int32(2)),
+    "must rise": lambda f: f[f"{P}/position/time"].write_direct(np.zeros(12)),
+    "explicit": lambda f: replace(f, f"{P}/velocity/step", np.int64(1)),
+    "differ in length": lambda f: replace(f, f"{P}/velocity/step", np.arange(5)),
+    "not finite": lambda f: f[f"{P}/position/value"].__setitem__((3, 2, 1), np.nan),
+    "outside [0, edge)": lambda f: f[f"{P}/position/value"].__setitem__((3, 2, 1), 5.0),
+    "position along z must be 0": lambda f: f[f"{P}/position/value"].__setitem__((3, 2, 2), 0.5),
+    "edge along z must be 1": lambda f: f[f"{P}/box/edges/value"].__setitem__((0, 2, 2), 2.0),
+    "diagonal": lambda f: f[f"{P}/box/edges/value"].__setitem__((0, 0, 1), 2.0),
+    "flat": lambda f: f["observables/kinetic_energy"].create_group("more"),
+    "one value a frame": lambda f: replace(f, "observables/kinetic_energy/step", np.arange(12) + 1),
+    "/parameters/dimension": lambda f: f.__delitem__("parameters/dimension"),
+    "not a deck": lambda f: replace(f, "parameters/deck", np.bytes_("nothing")),
+}
+
+
+@pytest.mark.parametrize("symptom", DEFECTS)
+def test_each_defect_is_found(tmp_path, symptom):
+    run = make_run(tmp_path / "run")
+    with h5py.File(run / "trajectory.h5md", "r+") as file:
+        DEFECTS[symptom](file)
+    found = check_h5md.violations(run, with_mdanalysis=False)
+    assert any(symptom in line for line in found), found
+
+
+def test_a_sphere_over_a_wall_is_found(tmp_path):
+    run = make_run(tmp_path / "run", boundary="wall")
+    with h5py.File(run / "trajectory.h5md", "r+") as file:
+        file[f"{P}/position/value"][4, 3, 0] = 0.1 - 1e-9
+    assert any("over the wall along x" in line for line in check_h5md.violations(run, with_mdanalysis=False))
+
+
+def test_every_missing_object_is_found(tmp_path):
+    run = make_run(tmp_path / "run", boundary="wall", frames=2)
+    sound, names = (run / "trajectory.h5md").read_bytes(), []
+    with h5py.File(run / "trajectory.h5md", "r") as file:
+        file.visit(names.append)
+    assert len(names) > 30
+    names.remove("observables/kinetic_energy")  # which observables there are is nowhere prescribed
+    for name in names:
+        (run / "trajectory.h5md").write_bytes(sound)
+        with h5py.File(run / "trajectory.h5md", "r+") as file:
+            # visit() tells one name of a linked data set; whichever it is, the others remain.
+            del file[name]
+        assert check_h5md.violations(run, with_mdanalysis=False), name
+
+
+def test_check_h5md_exit_codes(tmp_path, capsys):
+    run = make_run(tmp_path / "run")
+    assert check_h5md.main([str(run)]) == 0
+    with h5py.File(run / "trajectory.h5md", "r+") as file:
+        del file["observables"]
+    assert check_h5md.main([str(run), "--no-mdanalysis"]) == 1
+    assert "/observables" in capsys.readouterr().out
+    (tmp_path / "text").write_text("no HDF5")
+    assert check_h5md.main([str(tmp_path / "text")]) == 2
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("boundary", ["periodic", "wall"])
+def test_g_of_r_of_an_ideal_gas_is_one(tmp_path, dimension, boundary):
+    random = np.random.default_rng(11)
+    edges = np.array([3.0, 4.0, 5.0])[:dimension]
+    inside = (0.0, edges) if boundary == "periodic" else (0.1, edges - 0.1)
+    x = random.uniform(*inside, size=(40, 400, dimension))
+    names, species = ("a", "b"), np.repeat([0, 1], 200).astype("i4")
+    write_run(tmp_path, np.ones(40), x=x, v=x, edges=edges, boundary=[boundary] * dimension, species=species, names=names)
+    with Trajectory(tmp_path) as trajectory:
+        for pair in (None, ["a", "b"], ["b", "b"]):
+            r, g = plot_rdf.radial_distribution(trajectory, bins=10, species=pair)
+            assert r[-1] > (1.3 if boundary == "periodic" else 2.5)
+            assert g[2:] == pytest.approx(1.0, abs=0.03)
+
+
+def test_g_of_r_finds_a_lattice(tmp_path):
+    square = np.stack(np.meshgrid(np.arange(8.0), np.arange(8.0)), axis=-1).reshape(1, -1, 2)
+    write_run(tmp_path, [1.0], x=square, v=square, edges=np.array([8.0, 8.0]), boundary=["periodic"] * 2)
+    with Trajectory(tmp_path) as trajectory:
+        r, g = plot_rdf.radial_distribution(trajectory, bins=40)
+    # 4 neighbours at 1, 4 at √2: g = 4 / (63/64 · 2πr·dr), r the middle of their bins.
+    peak = {k: 4 / (63 / 64 * np.pi * (((k + 1) * 0.1) ** 2 - (k * 0.1) ** 2)) for k in (10, 14)}
+    assert np.flatnonzero(g)[0] == 10
+    assert g[[10, 14]] == pytest.approx(list(peak.values()))
+    assert not g[[11, 12, 13]].any()
+
+
+def test_msd_of_straight_flight(tmp_path):
+    run = make_run(tmp_path / "run", dimension=3, frames=30)
+    with Trajectory(run) as trajectory:
+        lag, msd = plot_msd.mean_squared_displacement(trajectory)
+        v2 = np.mean(np.sum(trajectory.velocity(0) ** 2, axis=1))
+    assert len(lag) == 15
+    assert msd == pytest.approx(v2 * lag**2)
+    assert plot_msd.diffusion_coefficient(lag, 6 * lag, 3) == pytest.approx(1.0)
+
+
+def test_compare(tmp_path):
+    a, b = make_run(tmp_path / "a"), make_run(tmp_path / "b")
+    assert compare.compare(a, b) == []
+    with h5py.File(b / "trajectory.h5md", "r+") as file:
+        file[f"{P}/position/value"][5, 2, 0] += 1e-9
+    assert len(compare.compare(a, b)) == 1
+    assert compare.compare(a, b, tolerance=1e-8) == []
+    assert compare.compare(a, b, tolerance=1e-10) != []
+    assert compare.compare(a, b, last=True) == []
+    with h5py.File(b / "trajectory.h5md", "r+") as file:
+        file[f"{P}/velocity/value"][-1, 2, 0] *= 1 + 2.3e-16
+    assert compare.main([str(a), str(b), "--last"]) == 1
+    (b / "thermo.csv").write_text((b / "thermo.csv").read_text().replace("1.0,", "1.5,", 1))
+    assert any("thermo.csv" in line for line in compare.compare(a, b))
+
+
+def test_energy_errors_and_pictures(tmp_path, capsys):
+    run = make_run(tmp_path / "run")
+    time, error, shadow = plot_energy.energy_errors(run, relative=True)
+    assert error == pytest.approx(0.5e-3 * np.sin(np.arange(12)), abs=1e-15)
+    assert shadow is None
+    for tool, name in ((plot_energy, "energy.png"), (plot_rdf, "rdf.png"), (plot_msd, "msd.png"), (movie, "movie.gif")):
+        tool.main([str(run)])
+        assert (run / name).stat().st_size > 1000
+    movie.main([str(make_run(tmp_path / "deep", dimension=3, boundary="open", frames=3)), "--along", "x"])
+    assert (tmp_path / "deep" / "movie.gif").stat().st_size > 1000
+
+
+def test_discs_over_a_periodic_edge_are_drawn_twice():
+    x = np.array([[0.05, 0.05], [5.0, 9.95], [5.0, 5.0]])
+    index, drawn = movie.with_images(x, np.full(3, 0.1), np.array([10.0, 10.0]), np.array([True, True]))
+    assert sorted(index) == [0, 0, 0, 0, 1, 1, 2]
+    assert any(np.allclose(centre, [10.05, 10.05]) for centre in drawn)
+    assert any(np.allclose(centre, [5.0, -0.05]) for centre in drawn)
+
+
+def test_decks_survive_being_written():
+    for file in sorted((ROOT / "inputs").glob("*.toml")):
+        deck = tomllib.loads(file.read_text())
+        assert tomllib.loads(toml_text(deck)) == deck
+
+
+def test_orders_are_slopes():
+    rows = [{"method": "m", "step": step, "max_abs_energy_error": 3 * step**2 * factor, "relative_energy_error": 1.0}
+            for step in (0.3, 0.1, 0.01, 0.001) for factor in (0.1, 10)]
+    steps, errors = energy_study.curve(rows, "m")
+    assert errors == pytest.approx(3 * steps**2)
+    assert energy_study.fitted_order(steps, errors * np.where(steps > 0.1, 1e6, 1), 0.1) == pytest.approx(2.0)
+    assert energy_study.describe(rows, "m", 0.1) == "m: order 2.00"
+
+
+def test_perturbed_starts_are_seeded_and_bounded():
+    deck = tomllib.loads((ROOT / "inputs" / "five-springs.toml").read_text())
+    moved = [energy_study.perturbed(deck, start, 0.01, 1)["particles"][0]["position"] for start in (0, 1, 1, 2)]
+    assert moved[0] == deck["particles"][0]["position"]
+    assert moved[1] == moved[2] != moved[3]
+    assert 0.005 < np.max(np.abs(np.subtract(moved[0], moved[1]))) <= 0.01
+
+
+def test_integrator_tables():
+    assert energy_study.integrator_table("cdda:order=4", 0.1) == {"type": "cdda", "step": 0.1, "order": 4}
+    assert energy_study.integrator_table("mcva:variant=restart", 1.0)["variant"] == "restart"
+
+
+@pytest.mark.skipif("CAROM" not in os.environ, reason="needs the command: CAROM=build/release/io/carom")
+def test_energy_study(tmp_path, capsys):
+    energy_study.main([str(ROOT / "inputs" / "five-springs.toml"), "--methods", "psa,cva,cdda", "--steps", "0.1,0.05,0.025",
+                       "--end-time", "6", "--starts", "4", "-o", str(tmp_path)])
+    with open(tmp_path / "energy.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 3 * 3 * 4 and {row["status"] for row in rows} == {"done"}
+    assert (tmp_path / "energy.png").stat().st_size > 1000
+    orders = {method: energy_study.fitted_order(*energy_study.curve(rows, method), 0.1) for method in ("psa", "cva")}
+    assert orders["psa"] == pytest.approx(1.0, abs=0.5)
+    assert orders["cva"] == pytest.approx(2.0, abs=0.5)
+    assert max(float(row["relative_energy_error"]) for row in rows if row["method"] == "cdda") < 1e-12
