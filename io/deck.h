@@ -1,8 +1,9 @@
 #pragma once
 // A deck, read, checked and resolved: everything a run needs, with defaults filled in.
 //
-//   Deck deck = read_deck("inputs/five-springs.toml", {"integrator.step=0.02"});   // throws DeckError with all problems
-//   auto system = build_system<2>(deck);                                            // throws Error(initial_state)
+//   Deck deck = read_deck("inputs/five-springs.toml", {"integrator.step=0.02"});   // throws DeckError with all
+//   problems auto system = build_system<2>(deck);                                            // throws
+//   Error(initial_state)
 
 #include <filesystem>
 #include <memory>
@@ -34,7 +35,7 @@ struct Deck {
   std::vector<std::string> warnings;  ///< printed before the run
   std::string toml_text;
 
-  struct Source;                   ///< the parsed tables, known to io/deck*.cc only
+  struct Source;  ///< the parsed tables, known to io/deck*.cc only
   std::shared_ptr<Source> source;
 };
 

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace carom {
@@ -16,5 +17,8 @@ struct RunOptions {
   std::optional<double> max_wall_seconds;        ///< stop early after this much wall time
   bool quiet = false;                            ///< no progress line, no banner
 };
+
+/// Seconds of wall time written hh:mm:ss, mm:ss or ss, fractions allowed; nothing if it is not such a text.
+std::optional<double> wall_seconds(std::string_view text);
 
 }  // namespace carom

@@ -107,7 +107,7 @@ def run_one(options, carom, deck, method, step, start):
     error, reference = summary["energy"]["max_abs_error"], summary["energy"]["reference"]
     return row | {
         "max_abs_energy_error": error, "energy_reference": reference, "relative_energy_error": error / reference,
-        "max_abs_shadow_energy_error": summary.get("shadow_energy", {}).get("max_abs_error", ""),
+        "max_abs_shadow_energy_error": summary["shadow_energy"]["max_abs_error"],
         "max_overlap": summary["max_overlap"], "sphere_sphere": summary["events"]["sphere_sphere"],
         "sphere_wall": summary["events"]["sphere_wall"], "steps": summary["steps"],
         "wall_seconds": summary["wall_seconds"], "status": summary["status"]}

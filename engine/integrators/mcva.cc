@@ -13,6 +13,9 @@
 namespace carom::integrator {
 namespace {
 
+/// Where the shadow impulse would leave less than this share of the approach velocity the elastic one is taken.
+constexpr double kLeastRestitution = 0.5;
+
 template <int D>
 class ModifiedCollisionVerlet : public Integrator<D> {
  public:
@@ -120,7 +123,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     const double a = nw + sixth * wKw, b = nv + sixth * wKv;
     const double discriminant = b * b - 2 * a * debt_;
     double lambda = a > 0 && b < 0 && discriminant >= 0 ? (std::sqrt(discriminant) - b) / a : -2 * b / a;
-    if (!(a > 0) || !(nv + lambda * nw > 0)) {
+    // An impulse that takes most of a slow pair's normal velocity, contact after contact, would bring it to rest in contact.
+    if (!(a > 0) || !(nv + lambda * nw > -kLeastRestitution * nv)) {
       lambda = -2 * nv / nw;
       ++counters_->fallbacks;
     }
@@ -164,7 +168,7 @@ IntegratorInfo mcva() {
                      parameter::max_events_per_step()},
       .documentation =
           "CVA with an impulse that keeps the second-order shadow Hamiltonian of Verlet, so that the "
-          "energy does not wander from collision to collision. An impulse that would not part the spheres "
+          "energy does not wander from collision to collision. An impulse that would hardly part the spheres "
           "is replaced by the elastic one and counted as a fallback.",
       .source = "Bond, Leimkuhler, SIAM J. Sci. Comput. 30 (2007) 134",
       .shadow = true,

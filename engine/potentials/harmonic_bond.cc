@@ -29,7 +29,7 @@ InteractionInfo harmonic_bond() {
       .formula = "sum over bonds of k/2 (r - L)^2",
       .documentation =
           "Springs between given pairs of particles. In a periodic box a bond spans the nearest image, so it must stay "
-          " shorter than half an edge.",
+          "shorter than half an edge.",
       .source = "the springs of Enomoto, thesis, 2011, experiment 1",
       .in_2d = make<2>,
       .in_3d = make<3>};
