@@ -1,0 +1,175 @@
+// Which pairs a term sums over, in which order, and what a deck may not ask for.
+
+#include <gtest/gtest.h>
+
+#include "engine/error.h"
+#include "engine/potentials/lennard_jones.h"
+#include "tests/unit/potentials/scene.h"
+
+namespace carom {
+namespace {
+
+using namespace std::string_literals;
+using test::energy;
+using test::forces;
+using test::Scene;
+
+using Given = std::vector<std::pair<std::string, ParameterValue>>;
+using Names = std::vector<std::string>;
+
+/// The message of the Error(Failure::deck) that making this interaction throws.
+template <int D>
+std::string refusal(const Scene<D>& scene, const std::string& type, const Given& given) {
+  try {
+    scene.make(type, given);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.failure(), Failure::deck);
+    return error.what();
+  }
+  return "accepted";
+}
+
+void expect_contains(const std::string& message, const std::string& part) {
+  EXPECT_NE(message.find(part), std::string::npos) << "'" << message << "' does not say '" << part << "'";
+}
+
+const Given kLennardJones = {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "shifted"s}};
+
+TEST(Pairs, WithinACutoffAreThoseOfTheDoubleLoop) {
+  Scene<3> scene(300, 8, Boundary::periodic, 0.7);
+  const auto term = scene.make("lennard-jones", kLennardJones);
+  const LennardJones potential(1.0, 0.8);
+  const auto& x = scene.particles.x;
+  double expected = 0;
+  std::uint64_t pairs = 0;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t j = i + 1; j < x.size(); ++j) {
+      const double rho = scene.nearest(x[i] - x[j]).squaredNorm();
+      if (rho >= 4) continue;
+      expected += potential.value(rho) - potential.value(4);
+      ++pairs;
+    }
+  EXPECT_NEAR(energy(*term, x), expected, 1e-11 * std::abs(expected));
+  EXPECT_EQ(term->interacting_pairs(x), pairs);
+}
+
+TEST(Pairs, ForcesDoNotDependOnTheHistoryOfTheNeighbourList) {
+  Scene<2> scene(200, 14, Boundary::periodic, 0.7);
+  const auto travelled = scene.make("lennard-jones", kLennardJones);
+  auto x = scene.particles.x;
+  const auto drift = scene.random_vectors(0.02);
+  for (int step = 0; step < 40; ++step) {
+    x = test::displaced(x, drift, 1);
+    if (step % 10 == 9)
+      for (auto& each : x) {
+        Image<2> image{};
+        scene.box.wrap(each, image);
+      }
+    const auto f = forces(*travelled, x);
+    const auto fresh = forces(*scene.make("lennard-jones", kLennardJones), x);
+    for (std::size_t i = 0; i < x.size(); ++i) ASSERT_EQ(f[i], fresh[i]) << "particle " << i << ", step " << step;
+  }
+}
+
+TEST(Pairs, AreCounted) {
+  const Scene<2> scene(12, 6, Boundary::wall, 0.5);
+  const auto& x = scene.particles.x;  // species: every third is B, that is 4 B and 8 A
+  EXPECT_EQ(scene.make("gravity", {{"constant", 1.0}})->interacting_pairs(x), 66u);
+  EXPECT_EQ(scene.make("gravity", {{"constant", 1.0}, {"species", Names{"B", "A"}}})->interacting_pairs(x), 32u);
+  EXPECT_EQ(scene.make("gravity", {{"constant", 1.0}, {"species", Names{"B", "B"}}})->interacting_pairs(x), 6u);
+  EXPECT_EQ(
+      scene.make("harmonic-bond", {{"chain", true}, {"stiffness", 1.0}, {"rest_length", 1.0}})->interacting_pairs(x),
+      11u);
+  EXPECT_EQ(scene.make("harmonic-trap", {{"stiffness", 1.0}})->interacting_pairs(x), 12u);
+}
+
+TEST(Pairs, ABondReachesAcrossThePeriodicEdge) {
+  Scene<2> scene(2, 10, Boundary::periodic, 0.5);
+  scene.particles.x = {Vec<2>(0.5, 5), Vec<2>(9.5, 5)};
+  const auto bond = scene.make("harmonic-bond", {{"chain", true}, {"stiffness", 2.0}, {"rest_length", 0.0}});
+  EXPECT_EQ(energy(*bond, scene.particles.x), 1.0);
+  EXPECT_EQ(forces(*bond, scene.particles.x)[0], Vec<2>(-2, 0));
+}
+
+TEST(Pairs, SpeciesSelectWhoFeelsATerm) {
+  Scene<2> scene(3, 10, Boundary::open, 0.5);
+  scene.particles.x = {Vec<2>(0, 0), Vec<2>(1, 0), Vec<2>(0, 1)};
+  scene.particles.species = {0, 1, 1};
+  scene.particles.charge = {1, 1, 1};
+  const Given plain = {{"constant", 1.0}, {"form", "plain"s}};
+  auto between = [&](const Names& names) {
+    Given given = plain;
+    given.emplace_back("species", names);
+    return energy(*scene.make("coulomb", given), scene.particles.x);
+  };
+  EXPECT_DOUBLE_EQ(between({"A", "B"}), 2);
+  EXPECT_DOUBLE_EQ(between({"B", "A"}), 2);
+  EXPECT_DOUBLE_EQ(between({"B", "B"}), std::sqrt(0.5));
+  EXPECT_DOUBLE_EQ(between({"A", "A"}), 0);
+}
+
+TEST(Refused, BondsThatCannotBe) {
+  const Scene<2> scene(5, 10, Boundary::wall, 0.5);
+  const auto message = [&](const PairList& pairs) {
+    return refusal(scene, "harmonic-bond", {{"pairs", pairs}, {"stiffness", 1.0}, {"rest_length", 1.0}});
+  };
+  expect_contains(message({{0, 1}, {3, 5}}), "pair [3, 5] names particle 5, but there are only 5 particles");
+  expect_contains(message({{9, 1}}), "names particle 9");
+  expect_contains(message({{2, 2}}), "pair [2, 2] bonds a particle to itself");
+  expect_contains(message({{0, 1}, {1, 0}}), "pair [0, 1] is given twice");
+  const Given spring = {{"stiffness", 1.0}, {"rest_length", 1.0}};
+  expect_contains(refusal(scene, "harmonic-bond", spring), "no bonds are given");
+  Given both = spring;
+  both.emplace_back("pairs", PairList{{0, 1}});
+  both.emplace_back("chain", true);
+  expect_contains(refusal(scene, "harmonic-bond", both), "give one of them");
+}
+
+TEST(Refused, UnknownSpecies) {
+  const Scene<3> scene(5, 10, Boundary::wall, 0.5);
+  const auto message = [&](const Names& names) {
+    return refusal(scene, "gravity", {{"constant", 1.0}, {"species", names}});
+  };
+  expect_contains(message({"A", "C"}), "'C', which is not there; known species: 'A', 'B'");
+  expect_contains(message({"A"}), "'species' has 1 entries");
+}
+
+TEST(Refused, WhatAPeriodicBoxDoesNotAllow) {
+  const Scene<2> scene(5, 10, Boundary::periodic, 0.5);
+  expect_contains(refusal(scene, "gravity", {{"constant", 1.0}}), "a periodic box does not allow");
+  expect_contains(refusal(scene, "coulomb", {{"constant", 1.0}, {"form", "plain"s}}), "damped-shifted");
+  expect_contains(refusal(scene, "lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}, {"cut", "smooth"s}}),
+                  "give 'cutoff'");
+  expect_contains(refusal(scene, "harmonic-trap", {{"stiffness", 1.0}}), "periodic");
+  expect_contains(refusal(scene, "uniform-field", {{"acceleration", std::vector<double>{0, 1}}}), "axis 1");
+}
+
+TEST(Refused, HalfACoulombForm) {
+  const Scene<2> scene(5, 10, Boundary::wall, 0.5);
+  expect_contains(refusal(scene, "coulomb", {{"constant", 1.0}, {"form", "damped-shifted"s}, {"cutoff", 3.0}}),
+                  "needs 'damping' and 'cutoff'");
+  expect_contains(refusal(scene, "coulomb", {{"constant", 1.0}, {"form", "plain"s}, {"cutoff", 3.0}}),
+                  "belong to form = \"damped-shifted\"");
+}
+
+TEST(Refused, VectorsOfTheWrongLength) {
+  const Scene<3> scene(5, 10, Boundary::wall, 0.5);
+  expect_contains(refusal(scene, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}}),
+                  "'acceleration' has 2 components; give 3");
+  expect_contains(refusal(scene, "harmonic-trap", {{"stiffness", 1.0}, {"centre", std::vector<double>{1}}}),
+                  "'centre' has 1 components; give 3");
+}
+
+TEST(Registry, NamesEveryTypeOnceAndDocumentsIt) {
+  std::vector<std::string_view> names;
+  for (const InteractionInfo& info : interactions()) {
+    EXPECT_EQ(std::ranges::count(names, info.name), 0) << info.name;
+    names.push_back(info.name);
+    EXPECT_FALSE(info.formula.empty() || info.documentation.empty() || info.source.empty()) << info.name;
+    for (const Parameter& parameter : info.parameters) EXPECT_FALSE(parameter.meaning.empty()) << parameter.name;
+  }
+  EXPECT_EQ(names.size(), 9u);
+}
+
+}  // namespace
+}  // namespace carom

@@ -1,0 +1,209 @@
+// Every type of interaction in two and three dimensions: its loops must agree with its own energy.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/potentials/scene.h"
+
+namespace carom {
+namespace {
+
+using namespace std::string_literals;
+using test::displaced;
+using test::energy;
+using test::forces;
+using test::mean_forces;
+using test::Scene;
+
+struct Case {
+  std::string type;
+  Boundary boundary;
+  std::vector<std::pair<std::string, ParameterValue>> parameters;
+};
+
+const PairList kPeriodicBonds = {{7, 2}, {0, 1}, {3, 5}, {0, 9}};
+
+const std::vector<Case>& cases() {
+  using Names = std::vector<std::string>;
+  static const std::vector<Case> all = {
+      {"harmonic-bond", Boundary::wall, {{"chain", true}, {"stiffness", 1.5}, {"rest_length", 1.2}}},
+      {"harmonic-bond", Boundary::periodic, {{"pairs", kPeriodicBonds}, {"stiffness", 1.5}, {"rest_length", 1.2}}},
+      {"gravity", Boundary::wall, {{"constant", 0.8}}},
+      {"gravity", Boundary::open, {{"constant", 0.8}, {"species", Names{"A", "B"}}}},
+      {"coulomb", Boundary::wall, {{"constant", 1.3}, {"form", "plain"s}}},
+      {"coulomb",
+       Boundary::periodic,
+       {{"constant", 1.3}, {"form", "damped-shifted"s}, {"damping", 0.9}, {"cutoff", 2.4}}},
+      {"yukawa", Boundary::wall, {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", true}}},
+      {"yukawa",
+       Boundary::periodic,
+       {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", false}, {"cutoff", 2.2}, {"cut", "smooth"s}}},
+      {"lennard-jones", Boundary::open, {{"epsilon", 1.0}, {"sigma", 0.8}}},
+      {"lennard-jones",
+       Boundary::periodic,
+       {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "smooth"s}, {"species", Names{"B", "B"}}}},
+      {"wca", Boundary::periodic, {{"epsilon", 1.0}, {"sigma", 1.1}}},
+      {"inverse-power",
+       Boundary::periodic,
+       {{"epsilon", 1.0}, {"sigma", 0.8}, {"exponent", 9.5}, {"cutoff", 2.0}, {"cut", "smooth"s}}},
+      {"uniform-field", Boundary::wall, {}},
+      {"harmonic-trap", Boundary::wall, {{"stiffness", 0.7}}},
+  };
+  return all;
+}
+
+template <int D>
+class Terms : public ::testing::Test {
+ protected:
+  static constexpr int kParticles = D == 2 ? 24 : 40;
+  static constexpr double kEdge = 5;
+
+  /// Calls check(scene, term) for every case.
+  template <class Check>
+  void for_each_case(Check check) {
+    for (const Case& each : cases()) {
+      SCOPED_TRACE(each.type + " in " + std::to_string(D) + " dimensions");
+      Scene<D> scene(kParticles, kEdge, each.boundary, 0.75);
+      auto parameters = each.parameters;
+      if (each.type == "harmonic-bond" &&
+          each.boundary == Boundary::periodic)  // shorter than half the box, across edges
+        for (const auto& [i, j] : kPeriodicBonds) {
+          scene.particles.x[j] = scene.particles.x[i] + Vec<D>::Constant(0.9);
+          scene.box.wrap(scene.particles.x[j], scene.particles.image[j]);
+        }
+      if (each.type == "uniform-field") parameters.emplace_back("acceleration", std::vector<double>(D, -0.6));
+      const auto term = scene.make(each.type, parameters);
+      check(scene, *term);
+    }
+  }
+};
+
+template <class Dimension>
+class InDimension : public Terms<Dimension::value> {};
+using Dimensions = ::testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
+TYPED_TEST_SUITE(InDimension, Dimensions);
+
+TYPED_TEST(InDimension, ForcesAreMinusTheGradientOfTheEnergy) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const auto& x = scene.particles.x;
+    const auto f = forces(term, x);
+    double largest = 0;
+    for (const auto& each : f) largest = std::max(largest, each.norm());
+    ASSERT_GT(largest, 0.1);
+    for (int n = 0; n < 5; ++n) {  // along random directions: four-point differences, error O(h⁴)
+      const auto w = scene.random_vectors(1);
+      const double h = 1e-3;
+      const double slope = (8 * (energy(term, displaced(x, w, h)) - energy(term, displaced(x, w, -h))) -
+                            (energy(term, displaced(x, w, 2 * h)) - energy(term, displaced(x, w, -2 * h)))) /
+                           (12 * h);
+      double expected = 0;
+      for (std::size_t i = 0; i < x.size(); ++i) expected -= f[i].dot(w[i]);
+      EXPECT_NEAR(slope, expected, 1e-6 * largest * static_cast<double>(x.size()));
+    }
+  });
+}
+
+TYPED_TEST(InDimension, HessianProductsAreTheDerivativeOfTheForces) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const auto& x = scene.particles.x;
+    const auto w = scene.random_vectors(1);
+    std::vector<Vec<D>> product(x.size(), Vec<D>::Zero());
+    term.add_hessian_product(x, w, product);
+    const double h = 1e-5;
+    const auto ahead = forces(term, displaced(x, w, h)), behind = forces(term, displaced(x, w, -h));
+    double largest = 1;
+    for (const auto& each : product) largest = std::max(largest, each.norm());
+    for (std::size_t i = 0; i < x.size(); ++i)
+      EXPECT_LE((product[i] + (ahead[i] - behind[i]) / (2 * h)).norm(), 3e-6 * largest) << "particle " << i;
+  });
+}
+
+TYPED_TEST(InDimension, MeanForcesDoExactlyTheWorkOfTheEnergyDifference) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const auto& x = scene.particles.x;
+    for (const double size : {1e-12, 1e-8, 1e-3, 0.1, 0.35}) {
+      const auto w = scene.random_vectors(size);
+      const auto x_new = displaced(x, w, 1);
+      const auto f = mean_forces(term, x, x_new);
+      const auto before = test::sums(term, x), after = test::sums(term, x_new);
+      ExactSum work;
+      double scale = before.magnitude.value() + after.magnitude.value();
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        const Vec<D> step = x_new[i] - x[i];
+        for (int k = 0; k < D; ++k) work.add(f[i][k] * step[k]);
+        scale += f[i].norm() * scene.box.edges.norm();  // positions themselves are rounded
+      }
+      EXPECT_NEAR(work.value(), before.energy.value() - after.energy.value(), 1e-15 * scale) << "step " << size;
+    }
+  });
+}
+
+TYPED_TEST(InDimension, MeanForcesOfNoStepAreTheForces) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const auto& x = scene.particles.x;
+    const auto f = forces(term, x), mean = mean_forces(term, x, x);
+    double largest = 0;
+    for (const auto& each : f) largest = std::max(largest, each.norm());
+    for (std::size_t i = 0; i < x.size(); ++i) EXPECT_LE((f[i] - mean[i]).norm(), 2e-14 * largest);
+  });
+}
+
+TYPED_TEST(InDimension, PairForcesCancelInTheirSum) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    if (!term.keeps_momentum()) return;
+    const auto& x = scene.particles.x;
+    const auto x_new = displaced(x, scene.random_vectors(0.2), 1);
+    for (const auto& f : {forces(term, x), mean_forces(term, x, x_new)}) {
+      Vec<D> sum = Vec<D>::Zero();
+      double scale = 0;
+      for (const auto& each : f) {
+        sum += each;
+        scale += each.norm();
+      }
+      EXPECT_LE(sum.norm(), 1e-14 * scale);
+    }
+  });
+}
+
+TYPED_TEST(InDimension, WrappingAParticleChangesNothingInAPeriodicBox) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    if (!scene.box.periodic(0)) return;
+    const auto& x = scene.particles.x;
+    auto carried = x;
+    carried[3][0] += scene.box.edges[0];
+    carried[5][1] -= scene.box.edges[1];
+    const auto before = test::sums(term, x);
+    EXPECT_NEAR(energy(term, carried), before.energy.value(), 1e-12 * before.magnitude.value());
+    const auto f = forces(term, x), f_carried = forces(term, carried);
+    for (std::size_t i = 0; i < x.size(); ++i)
+      EXPECT_LE((f[i] - f_carried[i]).norm(), 1e-11 * (1 + f[i].norm())) << "particle " << i;
+    // A pair keeps its image during a step: across the edge it is the same step as inside.
+    const auto w = scene.random_vectors(0.3);
+    const auto mean = mean_forces(term, x, displaced(x, w, 1));
+    const auto mean_carried = mean_forces(term, carried, displaced(carried, w, 1));
+    for (std::size_t i = 0; i < x.size(); ++i)
+      EXPECT_LE((mean[i] - mean_carried[i]).norm(), 1e-10 * (1 + mean[i].norm())) << "particle " << i;
+  });
+}
+
+TYPED_TEST(InDimension, OnlyTheUniformFieldAcceleratesEverybodyAlike) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const Vec<D>* acceleration = term.common_acceleration();
+    if (acceleration == nullptr) return;
+    EXPECT_FALSE(term.keeps_momentum());
+    const auto f = forces(term, scene.particles.x);
+    for (std::size_t i = 0; i < f.size(); ++i)
+      EXPECT_LE((f[i] - scene.particles.mass[i] * *acceleration).norm(), 1e-15);
+  });
+}
+
+}  // namespace
+}  // namespace carom
