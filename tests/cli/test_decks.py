@@ -1,0 +1,54 @@
+"""Every deck of inputs/, shortened, through the command itself ($CAROM): ends well, keeps its energy, leaves a sound file."""
+
+import os
+import pathlib
+import sys
+import tomllib
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+import check_h5md
+from carom_files import Trajectory, find_carom, read_thermo, run_carom
+
+DECKS = sorted((ROOT / "inputs").glob("*.toml"))
+# Largest |H − H₁| / E_ref allowed over the shortened run: rounding for the exact methods; what is left are methods of
+# first and second order, at steps their decks chose well.
+EXACT, APPROXIMATE = 1e-12, 1e-2
+EXACT_METHODS = {"free-flight", "cdda"}
+
+pytestmark = pytest.mark.skipif("CAROM" not in os.environ, reason="needs the command: CAROM=build/release/io/carom")
+
+
+def shortened(deck):
+    """Overrides that leave about a second's work, and several frames in it."""
+    if deck["integrator"]["type"] == "free-flight":
+        return ["run.end_time=1.0", "output.frame_interval=0.25", "output.thermo_interval=0.25"]
+    steps = 50 if deck["particles"][0].get("count") else 1000
+    interval = steps * deck["integrator"]["step"] / 5
+    plan = f"run.end_time={steps * deck['integrator']['step']}" if "end_time" in deck["run"] else f"run.steps={steps}"
+    return [plan, f"output.frame_interval={interval}", f"output.thermo_interval={interval}"]
+
+
+def test_there_are_decks():
+    assert len(DECKS) >= 9
+
+
+@pytest.mark.parametrize("file", DECKS, ids=lambda file: file.stem)
+def test_deck(file, tmp_path):
+    deck = tomllib.loads(file.read_text())
+    assert deck["title"] and len(deck["description"]) > 60
+    summary = run_carom(find_carom(), file, tmp_path, shortened(deck))
+    assert summary["status"] == "done"
+    method, energy = deck["integrator"]["type"], summary["energy"]
+    assert energy["reference"] > 0
+    assert energy["max_abs_error"] <= (EXACT if method in EXACT_METHODS else APPROXIMATE) * energy["reference"]
+    assert summary["max_overlap"] <= 1e-12
+    assert method == "verlet" or summary["events"]["sphere_sphere"] > 0
+    assert check_h5md.violations(tmp_path) == []
+    assert len(read_thermo(tmp_path)["time"]) >= 4
+    with Trajectory(tmp_path) as trajectory:
+        assert len(trajectory) >= 4
+        assert trajectory.title == deck["title"]
