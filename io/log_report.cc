@@ -1,0 +1,105 @@
+#include "io/log_report.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "io/progress.h"
+#include "io/version.h"
+
+namespace carom {
+
+namespace {
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown host";
+}
+
+std::string ends_at(const Plan& plan) {
+  std::string text;
+  auto add = [&](const std::string& end) { text += (text.empty() ? "" : " or ") + end; };
+  if (plan.steps) add(fmt::format("{} steps", *plan.steps));
+  if (plan.end_time) add(fmt::format("time {:g}", *plan.end_time));
+  if (plan.collisions) add(fmt::format("{} pair collisions", *plan.collisions));
+  return text;
+}
+
+std::string breakdown_text(const Statistics& s) {
+  const Counters::Seconds& t = s.counters.seconds;
+  const std::array<std::pair<const char*, double>, 7> parts = {{{"predict", t.predict},
+                                                                {"queue", t.queue},
+                                                                {"collide", t.collide},
+                                                                {"force", t.force},
+                                                                {"sweep", t.sweep},
+                                                                {"communicate", t.communicate},
+                                                                {"output", t.output}}};
+  const double whole = std::max(s.wall_seconds, 1e-9);
+  double rest = s.wall_seconds;
+  std::string text = fmt::format("{:<12}{:>12}{:>9}", "part", "seconds", "share");
+  auto line = [&](const char* name, double seconds) {
+    text += fmt::format("\n{:<12}{:>12.3f}{:>8.1f}%", name, seconds, 100 * seconds / whole);
+  };
+  for (const auto& [name, seconds] : parts) {
+    line(name, seconds);
+    rest -= seconds;
+  }
+  line("other", std::max(0.0, rest));
+  line("total", s.wall_seconds);
+  return text;
+}
+
+}  // namespace
+
+std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
+  return fmt::format(
+      "carom {}\n"
+      "built with {}\n"
+      "{}\n"
+      "host {}, process {}, {}\n"
+      "deck {}{}\n"
+      "{} particles in {}-D, integrator {}, step {:g}, until {}\n"
+      "output in {}",
+      version_string(), compiler_string(), library_versions(), host_name(), getpid(),
+      ranks == 1 ? "1 rank" : fmt::format("{} ranks", ranks), deck.file.string(),
+      deck.title.empty() ? "" : ": " + deck.title, particles, deck.dimension, deck.integrator, deck.plan.step,
+      ends_at(deck.plan), deck.output.directory.string());
+}
+
+std::string report_text(const Deck& deck, const Statistics& s) {
+  const Counters& c = s.counters;
+  const double scale = s.energy_reference > 0 ? s.energy_reference : 1;
+  std::string text = fmt::format(
+      "{} at time {:g} after {} steps: {} pair and {} wall collisions in {}, {:.3g} pair collisions/s\n"
+      "energy {:.10g}, largest error {:.2e} (relative {:.2e})",
+      s.stopped_early ? "stopped" : "done", s.end_time, s.steps, c.sphere_sphere, c.sphere_wall,
+      clock_text(s.wall_seconds), s.wall_seconds > 0 ? static_cast<double>(c.sphere_sphere) / s.wall_seconds : 0.0,
+      s.energy_final, s.max_energy_error, s.max_energy_error / scale);
+  if (s.max_shadow_energy_error)
+    text += fmt::format("\nshadow energy, largest error {:.2e}", *s.max_shadow_energy_error);
+  if (s.max_momentum_error) text += fmt::format("\nmomentum, largest error {:.2e}", *s.max_momentum_error);
+  text += fmt::format("\npressure {:.6g}, collision rate of a sphere {:.6g}, deepest overlap {:.1e}", s.mean_pressure,
+                      s.collision_rate, c.max_overlap);
+  if (c.pair_evaluations > 0)
+    text += fmt::format("\n{:.6g} force passes, {} sweeps, {} steps halved, {} fallbacks", s.force_passes, c.sweeps,
+                        c.slabs_halved, c.fallbacks);
+  return text + "\n" + breakdown_text(s) + "\nfiles in " + deck.output.directory.string();
+}
+
+template <int D>
+void ThermoTable<D>::thermo(const Snapshot<D>& s) {
+  if (!std::exchange(header_written_, true))
+    log_.note(fmt::format("{:>12} {:>10} {:>12} {:>14} {:>14} {:>16} {:>10} {:>12} {:>12}", "time", "step",
+                          "collisions", "kinetic", "potential", "total", "max |ΔE|", "temperature", "pressure"));
+  log_.note(fmt::format("{:>12.6g} {:>10} {:>12} {:>14.8g} {:>14.8g} {:>16.10g} {:>10.2e} {:>12.6g} {:>12.6g}", s.time,
+                        s.step, s.collisions, s.kinetic, s.potential, s.total(), s.max_energy_error, s.temperature,
+                        s.pressure));
+}
+
+template class ThermoTable<2>;
+template class ThermoTable<3>;
+
+}  // namespace carom

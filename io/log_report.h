@@ -1,0 +1,30 @@
+#pragma once
+// What stands in run.log beside the warnings: the banner, the thermo table, the final report with the timing breakdown.
+
+#include <string>
+
+#include "engine/simulation.h"
+#include "io/deck.h"
+#include "io/log.h"
+
+namespace carom {
+
+/// Who runs what, where and with which libraries. `particles`: their number; `ranks`: of MPI.
+std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
+
+/// How the run ended, what it found and where its time went.
+std::string report_text(const Deck& deck, const Statistics& statistics);
+
+/// Writes thermo rows into the log as a table for human eyes.
+template <int D>
+class ThermoTable : public Observer<D> {
+ public:
+  explicit ThermoTable(RunLog& log) : log_(log) {}
+  void thermo(const Snapshot<D>& snapshot) override;
+
+ private:
+  RunLog& log_;
+  bool header_written_ = false;
+};
+
+}  // namespace carom

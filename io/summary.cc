@@ -1,0 +1,63 @@
+#include "io/summary.h"
+
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+
+#include "io/version.h"
+
+namespace carom {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+}  // namespace
+
+std::uint64_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Statistics& s) {
+  const Counters& c = s.counters;
+  const double rate = s.wall_seconds > 0 ? static_cast<double>(c.sphere_sphere) / s.wall_seconds : 0;
+  Json json = {
+      {"status", outcome.status},
+      {"deck", deck.file.string()},
+      {"title", deck.title},
+      {"version", version_string()},
+      {"integrator", deck.integrator},
+      {"dimension", deck.dimension},
+      {"particles", outcome.particles},
+      {"ranks", outcome.ranks},
+      {"steps", s.steps},
+      {"end_time", s.end_time},
+      {"events", {{"sphere_sphere", c.sphere_sphere}, {"sphere_wall", c.sphere_wall}}},
+      {"energy",
+       {{"initial", s.energy_initial},
+        {"after_first_step", s.energy_after_first_step},
+        {"final", s.energy_final},
+        {"reference", s.energy_reference},
+        {"max_abs_error", s.max_energy_error}}},
+      {"shadow_energy", {{"max_abs_error", number_or_null(s.max_shadow_energy_error)}}},
+      {"momentum", {{"max_abs_error", number_or_null(s.max_momentum_error)}}},
+      {"max_overlap", c.max_overlap},
+      {"pressure", s.mean_pressure},
+      {"collision_rate", s.collision_rate},
+      {"force_passes", s.force_passes},
+      {"sweeps", c.sweeps},
+      {"slabs_halved", c.slabs_halved},
+      {"fallbacks", c.fallbacks},
+      {"wall_seconds", s.wall_seconds},
+      {"collisions_per_second", rate},
+      {"peak_memory_bytes", peak_memory_bytes()},
+  };
+  if (!outcome.error.empty()) json["error"] = outcome.error;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace carom
