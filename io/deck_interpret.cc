@@ -1,0 +1,343 @@
+#include "io/deck_interpret.h"
+
+#include <algorithm>
+
+#include "io/options.h"
+
+namespace carom {
+namespace {
+
+std::string count_of(std::size_t n, const std::string& what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+/// The parts of a deck in the order in which they build on each other.
+class Interpreter {
+ public:
+  Interpreter(Deck& deck, Problems& problems)
+      : deck_(deck), source_(*deck.source), values_(source_.values), problems_(problems) {}
+
+  void all() {
+    top();
+    system();
+    particles();
+    placement();
+    interactions_();
+    integrator();
+    run();
+    output();
+  }
+
+ private:
+  void top() {
+    const ValueTable& table = *values_.find("");
+    if (const auto* format = table.find<std::int64_t>("format"); format != nullptr && *format != 1)
+      problems_.error(table.place("format"), "unknown deck format " + std::to_string(*format),
+                      "this version reads format 1");
+    if (const auto* title = table.find<std::string>("title")) deck_.title = *title;
+    if (const auto* description = table.find<std::string>("description")) deck_.description = *description;
+  }
+
+  void system() {
+    const ValueTable* table = values_.find("system");
+    if (table == nullptr) return;
+    source_.system = table->at;
+    source_.box = table->place("box");
+    if (const auto* dimension = table->find<std::int64_t>("dimension")) {
+      if (*dimension == 2 || *dimension == 3)
+        dimension_ = static_cast<std::size_t>(*dimension);
+      else
+        problems_.error(table->place("dimension"), "'dimension' must be 2 or 3 (is " + std::to_string(*dimension) + ")",
+                        "give one of the two");
+    }
+    deck_.dimension = static_cast<int>(dimension_);
+    if (const auto* box = table->find<std::vector<double>>("box")) {
+      source_.edges = *box;
+      one_an_axis(*table, "box", box->size());
+    }
+    if (const auto* boundary = table->find<std::vector<std::string>>("boundary")) {
+      one_an_axis(*table, "boundary", boundary->size());
+      for (const std::string& b : *boundary)
+        source_.boundary.push_back(b == "wall"       ? Boundary::wall
+                                   : b == "periodic" ? Boundary::periodic
+                                                     : Boundary::open);
+    }
+  }
+
+  void one_an_axis(const ValueTable& table, const std::string& key, std::size_t size) {
+    if (dimension_ != 0 && size != dimension_)
+      problems_.error(table.place(key), "'" + key + "' has the wrong length (" + std::to_string(size) + ")",
+                      "give " + std::to_string(dimension_) + ", one for each axis");
+  }
+
+  void particles() {
+    std::vector<std::string> names;
+    for (const ValueTable& table : values_.list("particles")) {
+      SpeciesConfig species;
+      species.at = table.at;
+      if (const auto* name = table.find<std::string>("name")) {
+        if (std::find(names.begin(), names.end(), *name) != names.end())
+          problems_.error(table.place("name"), "two species are called '" + *name + "'", "give each its own name");
+        species.name = *name;
+        names.push_back(*name);
+      }
+      positions(table, species);
+      velocities(table, species);
+      if (species.count > 0) {
+        species.radius = one_a_particle(table, "radius", species.count);
+        species.mass = one_a_particle(table, "mass", species.count);
+        species.charge = one_a_particle(table, "charge", species.count);
+      }
+      source_.species.push_back(std::move(species));
+    }
+    if (source_.particles() > std::numeric_limits<std::uint32_t>::max() / 2)
+      problems_.error(values_.list("particles").front().at, "too many particles", "give at most 2^31");
+  }
+
+  void positions(const ValueTable& table, SpeciesConfig& species) {
+    const auto* position = table.find<std::vector<std::vector<double>>>("position");
+    const auto* count = table.find<std::int64_t>("count");
+    if (!table.given("position") && !table.given("count"))
+      problems_.error(table.at, "missing key 'position' or 'count' in [[particles]]",
+                      "give explicit positions, or a count for [placement] to place");
+    if (table.given("position") && table.given("count"))
+      problems_.error(table.place("count"), "'position' and 'count' exclude each other", "leave one of them out");
+    if (position != nullptr) {
+      species.position = *position;
+      species.count = position->size();
+      if (position->empty())
+        problems_.error(table.place("position"), "'position' is empty", "give at least one vector");
+      vectors(table, "position", *position);
+    } else if (count != nullptr) {
+      species.count = static_cast<std::size_t>(*count);
+      species.placed = true;
+    }
+  }
+
+  void velocities(const ValueTable& table, SpeciesConfig& species) {
+    if (const auto* temperature = table.find<double>("temperature")) species.temperature = *temperature;
+    if (const auto* velocity = table.find<std::vector<std::vector<double>>>("velocity")) {
+      species.velocity = *velocity;
+      if (species.count > 0 && velocity->size() != species.count && !species.placed)
+        problems_.error(
+            table.place("velocity"),
+            "'velocity' has " + count_of(velocity->size(), "vector") + " for " + count_of(species.count, "particle"),
+            "give one for each");
+      vectors(table, "velocity", *velocity);
+    }
+    if (table.given("velocity") && table.given("temperature"))
+      problems_.error(table.place("temperature"), "'velocity' and 'temperature' exclude each other",
+                      "leave one of them out");
+    else if (table.given("count") && table.given("velocity"))
+      problems_.error(table.place("velocity"), "'velocity' goes with explicit positions only",
+                      "give a temperature with a count");
+    else if (table.given("count") && !table.given("temperature"))
+      problems_.error(table.at, "missing key 'temperature' in [[particles]]",
+                      "a species given by count needs it; 0 leaves the particles at rest");
+  }
+
+  void vectors(const ValueTable& table, const std::string& key, const std::vector<std::vector<double>>& list) {
+    for (std::size_t n = 0; n < list.size() && dimension_ != 0; ++n)
+      if (list[n].size() != dimension_)
+        problems_.error(
+            table.place(key),
+            "vector " + std::to_string(n) + " (from 0) of '" + key + "' has " + count_of(list[n].size(), "number"),
+            "system.dimension asks for " + std::to_string(dimension_));
+  }
+
+  std::vector<double> one_a_particle(const ValueTable& table, const std::string& key, std::size_t count) {
+    if (const auto* number = table.find<double>(key)) return std::vector<double>(count, *number);
+    const auto* list = table.find<std::vector<double>>(key);
+    if (list == nullptr) return {};
+    if (list->size() != count)
+      problems_.error(table.place(key),
+                      "'" + key + "' has " + count_of(list->size(), "number") + " for " + count_of(count, "particle"),
+                      "give one number for all, or one for each");
+    return *list;
+  }
+
+  void placement() {
+    PlacementConfig& placement = source_.placement;
+    const auto& all = source_.species;
+    const auto placed = [](const SpeciesConfig& s) { return s.placed; };
+    const bool some = std::any_of(all.begin(), all.end(), placed), every = std::all_of(all.begin(), all.end(), placed);
+    const ValueTable* table = values_.find("placement");
+    const ValueTable* system = values_.find("system");
+    if (table == nullptr) {
+      if (some)
+        problems_.error(std::find_if(all.begin(), all.end(), placed)->at,
+                        "particles given by count, but no [placement]", "add the table with a type: " + join(types()));
+    } else {
+      placement.at = table->at;
+      if (const auto* seed = table->find<std::int64_t>("seed")) placement.seed = static_cast<std::uint64_t>(*seed);
+      if (const auto* fraction = table->find<double>("packing_fraction")) packing(*table, *fraction);
+      if (table->variant != nullptr) placement.type = table->variant->name;
+      if (!some && !all.empty() && placement.type != "")
+        problems_.warning(table->at, "[placement] places nobody: all positions are explicit",
+                          "leave it out, or give a species by count");
+      const bool flat = placement.type == "hexagonal" || placement.type == "square";
+      const bool deep = placement.type == "fcc" || placement.type == "simple-cubic";
+      if ((flat && dimension_ == 3) || (deep && dimension_ == 2))
+        problems_.error(table->place("type"),
+                        "'" + placement.type + "' is a lattice of " + (flat ? "2" : "3") + " dimensions",
+                        flat ? "take fcc or simple-cubic" : "take hexagonal or square");
+      if ((flat || deep) && some && !every)
+        problems_.error(table->place("type"), "a lattice cannot make room for explicit positions",
+                        "take type = \"random\", or give all species by count");
+      if (const auto* file = table->find<std::string>("file"))
+        placement.file = std::filesystem::absolute(deck_.file.parent_path() / *file).lexically_normal();
+    }
+    if (system != nullptr && !system->given("box") && (table == nullptr || !table->given("packing_fraction")))
+      problems_.error(system->at, "missing key 'box' in [system]",
+                      "give the edges, or placement.packing_fraction to set them");
+  }
+
+  void packing(const ValueTable& table, double fraction) {
+    source_.placement.packing_fraction = fraction;
+    if (fraction >= 1)
+      problems_.error(table.place("packing_fraction"), "'packing_fraction' must be below 1",
+                      "spheres cannot fill a box");
+    if (const ValueTable* system = values_.find("system"); system != nullptr && system->given("box"))
+      problems_.error(table.place("packing_fraction"), "'packing_fraction' and system.box exclude each other",
+                      "leave one of them out");
+  }
+
+  static std::vector<std::string> types() {
+    std::vector<std::string> names;
+    for (const Variant& variant : table_schema("placement").variants) names.push_back(variant.name);
+    return names;
+  }
+
+  void interactions_() {
+    for (const ValueTable& table : values_.list("interaction")) {
+      if (table.variant == nullptr) continue;
+      InteractionConfig config;
+      config.at = table.at;
+      config.parameters = parameters_of(table);
+      for (const InteractionInfo& info : interactions())
+        if (info.name == table.variant->name) config.info = &info;
+      ids_exist(table);
+      species_exist(table);
+      const bool periodic =
+          std::find(source_.boundary.begin(), source_.boundary.end(), Boundary::periodic) != source_.boundary.end();
+      if (config.info->kind == InteractionInfo::Kind::pair && periodic && !config.parameters.has("cutoff"))
+        problems_.error(table.place("type"),
+                        "'" + table.variant->name + "' between all pairs has no end in a periodic box",
+                        "give it a cutoff, or make the box walled or open");
+      source_.interactions.push_back(std::move(config));
+    }
+  }
+
+  void ids_exist(const ValueTable& table) {
+    const std::size_t n = source_.particles();
+    table.each_key([&](const Key& key) {
+      const auto* pairs = table.find<PairList>(key.name);
+      if (pairs == nullptr) return;
+      for (const auto& pair : *pairs) {
+        const std::string text = "[" + std::to_string(pair[0]) + ", " + std::to_string(pair[1]) + "]";
+        for (const std::uint32_t id : pair)
+          if (id >= n)
+            problems_.error(table.place(key.name),
+                            "pair " + text + " names particle " + std::to_string(id) + ", which is not there",
+                            "there are " + count_of(n, "particle") + ", with ids from 0");
+        if (pair[0] == pair[1])
+          problems_.error(table.place(key.name), "pair " + text + " joins a particle to itself", "name two particles");
+      }
+    });
+  }
+
+  void species_exist(const ValueTable& table) {
+    const auto* named = table.find<std::vector<std::string>>("species");
+    if (named == nullptr) return;
+    std::vector<std::string> known;
+    for (const SpeciesConfig& species : source_.species) known.push_back(species.name);
+    for (const std::string& name : *named)
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        problems_.error(table.place("species"), "unknown species '" + name + "'", suggestion(name, known));
+  }
+
+  void integrator() {
+    const ValueTable* table = values_.find("integrator");
+    if (table == nullptr || table->variant == nullptr) return;
+    deck_.integrator = table->variant->name;
+    deck_.integrator_parameters = parameters_of(*table);
+    source_.step = table->place("step");
+    for (const IntegratorInfo& info : integrators())
+      if (info.name == deck_.integrator) source_.integrator = &info;
+    if (const auto* step = table->find<double>("step")) deck_.plan.step = *step;
+  }
+
+  void run() {
+    const ValueTable* table = values_.find("run");
+    if (table == nullptr) return;
+    const auto* steps = table->find<std::int64_t>("steps");
+    const auto* collisions = table->find<std::int64_t>("collisions");
+    const auto* end_time = table->find<double>("end_time");
+    if (steps != nullptr) deck_.plan.steps = *steps;
+    if (end_time != nullptr) deck_.plan.end_time = *end_time;
+    if (collisions != nullptr) deck_.plan.collisions = static_cast<std::uint64_t>(*collisions);
+    if (!table->given("steps") && !table->given("end_time") && !table->given("collisions"))
+      problems_.error(table->at, "[run] has no end", "give steps, end_time or collisions");
+    if (source_.integrator != nullptr && !source_.integrator->hard_cores && table->given("collisions") &&
+        !table->given("steps") && !table->given("end_time"))
+      problems_.error(table->place("collisions"),
+                      "'" + deck_.integrator + "' has no collisions, the run would never end",
+                      "give steps or end_time");
+  }
+
+  void output() {
+    ValueTable* table = values_.find("output");
+    if (table == nullptr) return;
+    if (!table->given("directory"))
+      table->values.insert_or_assign("directory", (std::filesystem::path("runs") / deck_.file.stem()).string());
+    if (const auto* directory = table->find<std::string>("directory")) {
+      deck_.output.directory = *directory;
+      if (directory->empty()) problems_.error(table->place("directory"), "'directory' is empty", "name a folder");
+    }
+    if (const auto* interval = table->find<double>("frame_interval")) deck_.plan.frame_interval = *interval;
+    if (const auto* interval = table->find<double>("thermo_interval")) deck_.plan.thermo_interval = *interval;
+    if (const auto* events = table->find<bool>("events")) deck_.plan.events = *events;
+    if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {
+      deck_.output.checkpoint_wall = *wall;
+      if (!wall_seconds(*wall))
+        problems_.error(table->place("checkpoint_wall"), "'" + *wall + "' is not a time",
+                        "write hh:mm:ss, for instance 00:05:00");
+    }
+  }
+
+  Deck& deck_;
+  Deck::Source& source_;
+  DeckValues& values_;
+  Problems& problems_;
+  std::size_t dimension_ = 0;  // 0: unknown
+};
+
+}  // namespace
+
+std::size_t Deck::Source::particles() const {
+  std::size_t n = 0;
+  for (const SpeciesConfig& s : species) n += s.count;
+  return n;
+}
+
+Parameters parameters_of(const ValueTable& table) {
+  Parameters parameters;
+  for (const Key& key : table.variant->keys) {
+    const auto at = table.values.find(key.name);
+    if (at == table.values.end()) continue;
+    std::visit(
+        [&](const auto& value) {
+          if constexpr (std::is_constructible_v<ParameterValue, decltype(value)>) parameters.set(key.name, value);
+        },
+        at->second);
+  }
+  return parameters;
+}
+
+void interpret(DeckValues values, Deck& deck, Problems& problems) {
+  deck.source = std::make_shared<Deck::Source>();
+  deck.source->values = std::move(values);
+  Interpreter(deck, problems).all();
+}
+
+}  // namespace carom

@@ -1,0 +1,29 @@
+#pragma once
+// A deck as TOML: the file parsed, `--set` values put in, and the place of every node known for messages.
+
+#include <toml++/toml.h>
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <unordered_map>
+
+#include "io/deck_problems.h"
+
+namespace carom {
+
+struct DeckToml {
+  std::string file;  ///< as the user wrote it
+  toml::table root;
+  std::unordered_map<const toml::node*, std::string> set;  ///< what came by `--set`, with the key it came by
+
+  Place place(const toml::node& node) const;
+  /// Of the key that names `node`.
+  Place place(const toml::key& key, const toml::node& node) const;
+};
+
+/// Reads and parses. Throws Error(Failure::file) for an unreadable file and DeckError for malformed TOML; what is wrong
+/// with the overrides (`table.key=value`, `list.0.key=value`) goes to `problems`.
+DeckToml load_deck(const std::filesystem::path& file, std::span<const std::string> overrides, Problems& problems);
+
+}  // namespace carom
