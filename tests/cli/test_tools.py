@@ -211,7 +211,8 @@ def test_orders_are_slopes():
     steps, errors = energy_study.curve(rows, "m")
     assert errors == pytest.approx(3 * steps**2)
     assert energy_study.fitted_order(steps, errors * np.where(steps > 0.1, 1e6, 1), 0.1) == pytest.approx(2.0)
-    assert energy_study.describe(rows, "m", 0.1) == "m: order 2.00"
+    options = energy_study.parse_arguments(["deck.toml", "--end-time", "6"])
+    assert energy_study.describe(rows, "m", options) == "m: order 2.00"
 
 
 def test_perturbed_starts_are_seeded_and_bounded():
