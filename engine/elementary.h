@@ -4,7 +4,7 @@
 // The C library picks its exp, log, … by the processor it finds (with or without fused multiply-add), so their last
 // bits differ from machine to machine; a chaotic run would follow. These are plain double arithmetic, compiled like the
 // rest of the engine. Errors, against 50-digit arithmetic over the whole range: below 1 ulp (exp, expm1, log,
-// log1p), 1.5 ulp (pow up to |y| = 50), 1.5 ulp (erfc). They neither set errno nor promise floating-point exceptions.
+// log1p), 1.5 ulp (pow up to |y| = 50), 1.2 ulp (erfc). They neither set errno nor promise floating-point exceptions.
 
 namespace carom::elementary {
 

@@ -50,8 +50,8 @@ TEST(Cut, LennardJonesIsAccurateAlsoAcrossTheCutoff) {
     const auto exact = [&](const Precise& rho) { return cut.value(rho); };
     const auto scale = [&](const Precise& rho) { return cut.magnitude(rho, lennard_jones(rho, 1)); };
     const Cut potential(LennardJones(1, 1), cutoff, kind);
-    expect_within(measure(potential, exact, scale, 0.3, cutoff * cutoff * (1 - 1e-10)), 10);
-    expect_within(measure(potential, exact, scale, 0.9 * cutoff * cutoff, cutoff * cutoff * (1 - 1e-10)), 10);
+    expect_within(measure(potential, exact, scale, 0.3, cutoff * cutoff * (1 - 1e-10)), 6);
+    expect_within(measure(potential, exact, scale, 0.9 * cutoff * cutoff, cutoff * cutoff * (1 - 1e-10)), 6);
   }
 }
 
@@ -66,7 +66,7 @@ TEST(Cut, DampedShiftedCoulombIsAccurateAlsoAcrossTheCutoff) {
   const auto scale = [&](const Precise& rho) { return cut.magnitude(rho, v(rho)); };
   const auto rounding = [&](double rho, double) { return 1 + alpha * alpha * rho; };
   const Cut potential(DampedCoulomb(1, alpha), cutoff, CutKind::smooth);
-  expect_within(measure(potential, exact, scale, 0.01, cutoff * cutoff * (1 - 1e-10), rounding, 400), 6);
+  expect_within(measure(potential, exact, scale, 0.01, cutoff * cutoff * (1 - 1e-10), rounding, 400), 4);
 }
 
 TEST(Cut, IsTwiceContinuouslyDifferentiableAtTheCutoff) {
