@@ -44,7 +44,8 @@ std::string reason() {
   return innermost.empty() ? "unknown reason" : innermost;
 }
 
-[[noreturn]] void throw_error(const std::filesystem::path& path, const std::string& action, const std::string& why) {
+[[noreturn]] void throw_write_error(const std::filesystem::path& path, const std::string& action,
+                                    const std::string& why) {
   throw Error(Failure::file,
               path.string() + ": cannot " + action + ": " + why +
                   "; check free space, quota and permissions there, or choose another directory with -o");
@@ -101,20 +102,23 @@ hid_t native_type<std::uint64_t>() {
 File File::create(const std::filesystem::path& path) {
   quiet_library();
   const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-  if (id < 0) throw_error(path, "create the file", reason());
-  return {path, id};
+  if (id < 0) throw_write_error(path, "create the file", reason());
+  return {path, id, true};
 }
 
 File File::open(const std::filesystem::path& path) {
   quiet_library();
   const hid_t id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   if (id < 0) throw Error(Failure::file, path.string() + ": cannot read it as an HDF5 file: " + reason());
-  return {path, id};
+  return {path, id, false};
 }
 
 File::~File() { give_back_reserve(); }
 
-void File::fail(const std::string& action) const { throw_error(path_, action, reason()); }
+void File::fail(const std::string& action) const {
+  if (writable_) throw_write_error(path_, action, reason());
+  throw Error(Failure::file, path_.string() + ": cannot " + action + ": " + reason());
+}
 
 Handle File::group(const std::string& name) {
   const Handle link(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
@@ -135,7 +139,7 @@ void File::reserve(std::uint64_t bytes) {
                 static_cast<off_t>(length)) == 0)
     reserved_until_ = size + length;
   else if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG || errno == EIO)
-    throw_error(path_, "write the next frame", std::strerror(errno));
+    throw_write_error(path_, "write the next frame", std::strerror(errno));
 }
 
 void File::flush() { check(H5Fflush(file_.id(), H5F_SCOPE_LOCAL), "flush the file"); }

@@ -100,7 +100,8 @@ class File {
   void link(const Handle& from, const std::string& name, const Handle& to, const std::string& alias);
 
  private:
-  File(std::filesystem::path path, hid_t id) : path_(std::move(path)), file_(id, H5Fclose) {}
+  File(std::filesystem::path path, hid_t id, bool writable)
+      : path_(std::move(path)), file_(id, H5Fclose), writable_(writable) {}
   [[noreturn]] void fail(const std::string& action) const;
   void write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
                    const std::vector<hsize_t>& shape);
@@ -110,6 +111,7 @@ class File {
 
   std::filesystem::path path_;
   Handle file_;
+  bool writable_;
   std::uint64_t reserved_until_ = 0;  // file size up to which the disk has room set aside; 0: nothing reserved
 };
 
@@ -148,7 +150,10 @@ bool exists(const File& file, const std::string& path);
 std::vector<hsize_t> shape(const File& file, const std::string& dataset);
 /// Element `index` of a data set with one axis (of a scalar one: 0), as a double.
 double number_at(const File& file, const std::string& dataset, hsize_t index);
+/// Element [row][k][k] of a data set with three axes.
+double diagonal_at(const File& file, const std::string& dataset, hsize_t row, int k);
 std::string text(const File& file, const std::string& dataset);
+std::vector<std::string> texts(const File& file, const std::string& dataset);
 std::vector<std::string> attribute_texts(const File& file, const std::string& object, const std::string& name);
 std::vector<std::int32_t> attribute_numbers(const File& file, const std::string& object, const std::string& name);
 

@@ -1,0 +1,36 @@
+#pragma once
+// The files that grow while a run goes on, opened and closed together.
+
+#include <filesystem>
+#include <memory>
+
+#include "engine/simulation.h"
+#include "io/deck.h"
+#include "io/events.h"
+#include "io/h5md.h"
+#include "io/thermo.h"
+
+namespace carom {
+
+template <int D>
+class RunFiles {
+ public:
+  /// Creates them in deck.output.directory. Throws Error(Failure::file).
+  RunFiles(const Deck& deck, const System<D>& system);
+
+  /// Lets the run tell them what happens. They must outlive it.
+  void add_to(Simulation<D>& simulation);
+
+  /// Writes what is left and closes. Throws Error(Failure::file).
+  void close();
+
+  /// The same for a run that has failed: each file is closed as well as it can be.
+  void close_after_failure();
+
+ private:
+  TrajectoryWriter<D> trajectory_;
+  ThermoWriter<D> thermo_;
+  std::unique_ptr<EventWriter<D>> events_;  // null: not asked for
+};
+
+}  // namespace carom

@@ -1,0 +1,112 @@
+#include "io/h5md.h"
+
+#include <cstdint>
+
+#include "io/hdf5.h"
+#include "sample_run.h"
+
+namespace carom {
+namespace {
+
+using test::fresh_directory;
+
+template <class Dimension>
+class Trajectory : public testing::Test {};
+using Dimensions = testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
+TYPED_TEST_SUITE(Trajectory, Dimensions);
+
+std::vector<double> all_numbers(const hdf5::File& file, const std::string& name) {
+  std::vector<double> values(1);
+  for (const hsize_t n : hdf5::shape(file, name)) values.resize(values.size() * n);
+  const hdf5::Handle set(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  EXPECT_GE(H5Dread(set.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0) << name;
+  return values;
+}
+
+TYPED_TEST(Trajectory, HoldsThreeColumnsInAnyDimension) {
+  constexpr int D = TypeParam::value;
+  const auto path = fresh_directory() / "t.h5md";
+  const auto system = test::sample_system<D>();
+  TrajectoryWriter<D> writer(path, test::sample_deck(D), *system);
+  for (int f = 0; f < 3; ++f) writer.frame(test::sample_snapshot<D>(system->particles, 0.5 * f, f));
+  writer.close();
+
+  const hdf5::File file = hdf5::File::open(path);
+  const std::string p = "/particles/trajectory/";
+  EXPECT_EQ(hdf5::shape(file, p + "position/value"), (std::vector<hsize_t>{3, 3, 3}));
+  const auto x = all_numbers(file, p + "position/value"), v = all_numbers(file, p + "velocity/value"),
+             image = all_numbers(file, p + "image/value"), edges = all_numbers(file, p + "box/edges/value");
+  for (std::size_t f = 0; f < 3; ++f)
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const bool there = static_cast<int>(k) < D;
+        const std::size_t at = 9 * f + 3 * i + k;
+        EXPECT_EQ(x[at], there ? static_cast<double>(i) + 0.25 * static_cast<double>(k) : 0.0);
+        EXPECT_EQ(v[at], -x[at]);
+        EXPECT_EQ(image[at], there ? static_cast<double>(i) : 0.0);
+        EXPECT_EQ(edges[at], i != k ? 0.0 : there ? 4.0 + static_cast<double>(k) : 1.0);
+      }
+  EXPECT_EQ(all_numbers(file, p + "position/time"), (std::vector<double>{0, 0.5, 1}));
+  EXPECT_EQ(all_numbers(file, p + "box/edges/step"), (std::vector<double>{0, 1, 2}));
+  EXPECT_EQ(all_numbers(file, p + "mass"), (std::vector<double>{1.5, 2.5, 3.5}));
+  EXPECT_EQ(all_numbers(file, p + "id"), (std::vector<double>{0, 1, 2}));
+  EXPECT_EQ(all_numbers(file, p + "species"), (std::vector<double>{0, 0, 1}));
+  EXPECT_EQ(all_numbers(file, "/observables/total_energy/value"), (std::vector<double>{1.25, 1.25, 1.25}));
+  EXPECT_EQ(all_numbers(file, "/observables/collisions/value"), (std::vector<double>{0, 3, 6}));
+  EXPECT_EQ(hdf5::attribute_texts(file, p + "box", "boundary"), (std::vector<std::string>{"periodic", "none", "none"}));
+  EXPECT_EQ(hdf5::texts(file, "/parameters/species"), (std::vector<std::string>{"small", "large"}));
+  EXPECT_EQ(hdf5::text(file, "/parameters/deck"), "format = 1\n");
+  EXPECT_EQ(hdf5::number_at(file, "/parameters/dimension", 0), D);
+}
+
+TYPED_TEST(Trajectory, SharesItsClockByHardLinks) {
+  constexpr int D = TypeParam::value;
+  const auto path = fresh_directory() / "t.h5md";
+  const auto system = test::sample_system<D>();
+  TrajectoryWriter<D>(path, test::sample_deck(D), *system).frame(test::sample_snapshot<D>(system->particles, 0, 0));
+  const hdf5::File file = hdf5::File::open(path);
+  const auto address = [&](const std::string& name) {
+    H5O_info_t info;
+    EXPECT_GE(H5Oget_info_by_name(file.id(), name.c_str(), &info, H5P_DEFAULT), 0) << name;
+    return info.addr;
+  };
+  const std::string p = "/particles/trajectory/";
+  for (const std::string& element : {p + "velocity", p + "image", p + "box/edges", std::string("/observables/pressure"),
+                                     std::string("/observables/momentum")})
+    for (const char* clock : {"/step", "/time"})
+      EXPECT_EQ(address(element + clock), address(p + "position" + clock)) << element;
+}
+
+// A flushed frame can be read while the writer is still at work: what a kill leaves.
+TYPED_TEST(Trajectory, IsReadableAfterEveryFrame) {
+  constexpr int D = TypeParam::value;
+  const auto path = fresh_directory() / "t.h5md";
+  const auto system = test::sample_system<D>();
+  TrajectoryWriter<D> writer(path, test::sample_deck(D), *system);
+  for (int f = 0; f < 200; ++f) {  // more than fit in one chunk of `time` and of the positions
+    writer.frame(test::sample_snapshot<D>(system->particles, f, f));
+    if (f % 50 != 0) continue;
+    const auto copy = path.parent_path() / "copy.h5md";
+    std::filesystem::copy_file(path, copy, std::filesystem::copy_options::overwrite_existing);
+    const hdf5::File file = hdf5::File::open(copy);
+    EXPECT_EQ(hdf5::shape(file, "/particles/trajectory/position/value").at(0), static_cast<hsize_t>(f + 1));
+    EXPECT_EQ(all_numbers(file, "/particles/trajectory/position/time").back(), f);
+    EXPECT_EQ(all_numbers(file, "/particles/trajectory/position/value").back(), D == 3 ? 2.5 : 0.0);
+  }
+}
+
+TEST(TrajectoryFile, NamesTheFileThatCannotBeCreated) {
+  const auto path = fresh_directory() / "missing" / "t.h5md";
+  const auto system = test::sample_system<2>();
+  try {
+    TrajectoryWriter<2> writer(path, test::sample_deck(2), *system);
+    FAIL() << "created a file in a directory that does not exist";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.exit_code(), 5);
+    EXPECT_NE(std::string(e.what()).find(path.string()), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("No such file"), std::string::npos) << e.what();
+  }
+}
+
+}  // namespace
+}  // namespace carom

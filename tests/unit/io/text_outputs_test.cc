@@ -1,0 +1,157 @@
+// thermo.csv, summary.json, run.log, progress, the output directory.
+
+#include <sys/resource.h>
+
+#include <csignal>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "io/log.h"
+#include "io/output_directory.h"
+#include "io/progress.h"
+#include "io/summary.h"
+#include "io/text_file.h"
+#include "io/thermo.h"
+#include "sample_run.h"
+
+namespace carom {
+namespace {
+
+namespace fs = std::filesystem;
+using test::fresh_directory;
+
+std::string contents(const fs::path& path) {
+  std::ifstream in(path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(Thermo, RowsHoldExactDoublesAtOnce) {
+  const auto path = fresh_directory() / "thermo.csv";
+  const auto system = test::sample_system<3>();
+  ThermoWriter<3> writer(path);
+  writer.thermo(test::sample_snapshot<3>(system->particles, 0.1, 7));
+  std::istringstream in(contents(path));  // before the file is closed
+  std::string header, row, cell;
+  std::getline(in, header);
+  std::getline(in, row);
+  EXPECT_EQ(header,
+            "time,step,collisions,kinetic,potential,total,shadow,max_energy_error,momentum_x,momentum_y,momentum_z,"
+            "temperature,pressure");
+  std::vector<double> values;
+  for (std::istringstream cells(row); std::getline(cells, cell, ',');)
+    values.push_back(std::strtod(cell.c_str(), nullptr));
+  ASSERT_EQ(values.size(), 13U);
+  EXPECT_EQ(values[0], 0.1);
+  EXPECT_EQ(values[2], 21);
+  EXPECT_EQ(values[5], 1.25);
+  EXPECT_TRUE(std::isnan(values[6]));
+  EXPECT_EQ(values[11], 1.0 / 3);
+}
+
+// A piece that does not fit is taken back, so that the file ends with a whole line, and the message names the file.
+TEST(TextFile, TakesBackWhatDoesNotFit) {
+  const auto path = fresh_directory() / "limited.txt";
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  TextFile file(path);
+  file.append("first line\n");
+  rlimit limit = before;
+  limit.rlim_cur = 20;
+  setrlimit(RLIMIT_FSIZE, &limit);
+  try {
+    file.append("a second line that is too long\n");
+    ADD_FAILURE() << "wrote beyond the limit";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.exit_code(), 5);
+    EXPECT_NE(std::string(e.what()).find(path.string()), std::string::npos);
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(contents(path), "first line\n");
+}
+
+TEST(Log, AFullDiskIsAnError) {
+  EXPECT_THROW(RunLog("/dev/full", true).note("lost"), Error);  // spdlog alone would only print a message
+}
+
+TEST(Summary, HasEveryPromisedName) {
+  Statistics s;
+  s.energy_reference = std::numeric_limits<double>::quiet_NaN();
+  s.max_shadow_energy_error = 0.5;
+  const RunOutcome outcome{.status = "failed", .error = "disk \xff full", .particles = 3, .ranks = 2};
+  const auto json = nlohmann::json::parse(summary_text(test::sample_deck(2), outcome, s));
+  for (const char* name : {"/status",
+                           "/deck",
+                           "/integrator",
+                           "/dimension",
+                           "/particles",
+                           "/ranks",
+                           "/steps",
+                           "/end_time",
+                           "/events/sphere_sphere",
+                           "/events/sphere_wall",
+                           "/energy/initial",
+                           "/energy/after_first_step",
+                           "/energy/final",
+                           "/energy/reference",
+                           "/energy/max_abs_error",
+                           "/shadow_energy/max_abs_error",
+                           "/momentum/max_abs_error",
+                           "/max_overlap",
+                           "/pressure",
+                           "/collision_rate",
+                           "/force_passes",
+                           "/sweeps",
+                           "/slabs_halved",
+                           "/fallbacks",
+                           "/wall_seconds",
+                           "/collisions_per_second",
+                           "/peak_memory_bytes",
+                           "/error"})
+    EXPECT_TRUE(json.contains(nlohmann::json::json_pointer(name))) << name;
+  EXPECT_TRUE(json["energy"]["reference"].is_null());
+  EXPECT_TRUE(json["momentum"]["max_abs_error"].is_null());
+  EXPECT_EQ(json["shadow_energy"]["max_abs_error"], 0.5);
+  EXPECT_GT(json["peak_memory_bytes"], 1000000);
+}
+
+TEST(OutputDirectory, KeepsEarlierRunsInBackups) {
+  const auto directory = fresh_directory() / "a" / "b";
+  EXPECT_FALSE(prepare_output_directory(directory));
+  for (int run = 1; run <= 2; ++run) {
+    std::ofstream(directory / run_file::thermo) << run;
+    std::ofstream(directory / "notes.txt") << "mine";
+    EXPECT_EQ(prepare_output_directory(directory), directory / ("backup." + std::to_string(run)));
+    EXPECT_FALSE(fs::exists(directory / run_file::thermo));
+  }
+  EXPECT_EQ(contents(directory / "backup.1" / run_file::thermo), "1");
+  EXPECT_EQ(contents(directory / "backup.2" / run_file::thermo), "2");
+  EXPECT_EQ(contents(directory / "notes.txt"), "mine");
+}
+
+TEST(OutputDirectory, BelowAFileIsAnError) {
+  const auto file = fresh_directory() / "file";
+  std::ofstream(file) << "x";
+  EXPECT_THROW(prepare_output_directory(file / "run"), Error);
+}
+
+// The estimate follows the recent pace, not the mean since the start.
+TEST(RecentRates, FollowAChangeOfPace) {
+  RecentRates rates(10);
+  EXPECT_FALSE(rates.seconds_left());
+  for (int t = 0; t <= 100; ++t) rates.add(t, 0.001 * t, 0);  // slow
+  for (int t = 1; t <= 40; ++t) rates.add(100 + t, 0.1 + 0.01 * t, static_cast<std::uint64_t>(500 * t));
+  EXPECT_NEAR(*rates.seconds_left(), 50, 1e-6);
+  EXPECT_NEAR(rates.collisions_per_second(), 500, 1e-6);
+}
+
+TEST(Progress, ClockText) {
+  EXPECT_EQ(clock_text(0.2), "00:00:01");
+  EXPECT_EQ(clock_text(3725), "01:02:05");
+  EXPECT_EQ(clock_text(360000), "100:00:00");
+}
+
+}  // namespace
+}  // namespace carom
