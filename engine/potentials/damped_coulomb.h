@@ -51,16 +51,31 @@ class DampedCoulomb {
 
   /// Mean of d erfc(αt)/dt over [middle − half, middle + half].
   double mean_slope(double middle, double half) const {
+    const double m = alpha_ * middle, d = alpha_ * half;
+    const double mean = d < 0.02 && m * d < 0.025 ? mean_by_series(m, d) : mean_by_gauss(m, d);
+    return -kTwoOverRootPi * alpha_ * mean;
+  }
+
+  /// Mean of e^(−t²) over [m − d, m + d]: Σ f⁽²ᵏ⁾(m) d²ᵏ/(2k + 1)!, to d⁶.
+  static double mean_by_series(double m, double d) {
+    const double m2 = m * m, d2 = d * d;
+    const double second = 4 * m2 - 2;
+    const double fourth = (16 * m2 - 48) * m2 + 12;
+    const double sixth = ((64 * m2 - 480) * m2 + 720) * m2 - 120;
+    return elementary::exp(-m2) * (1 + d2 * (second / 6 + d2 * (fourth / 120 + d2 * sixth / 5040)));
+  }
+
+  static double mean_by_gauss(double m, double d) {
     constexpr std::array<double, 4> node = {0.18343464249564980494, 0.52553240991632898582, 0.79666647741362673959,
                                             0.96028985649753623168};
     constexpr std::array<double, 4> weight = {0.18134189168918099148, 0.15685332293894364367, 0.11119051722668723527,
                                               0.050614268145188129576};
     double mean = 0;
     for (int n = 3; n >= 0; --n) {
-      const double below = alpha_ * (middle - node[n] * half), above = alpha_ * (middle + node[n] * half);
+      const double below = m - node[n] * d, above = m + node[n] * d;
       mean += weight[n] * (elementary::exp(-below * below) + elementary::exp(-above * above));
     }
-    return -kTwoOverRootPi * alpha_ * mean;
+    return mean;
   }
 
   double c_;      ///< [energy·length] for unit charges
