@@ -52,7 +52,7 @@ class DampedCoulomb {
   /// Mean of d erfc(αt)/dt over [middle − half, middle + half].
   double mean_slope(double middle, double half) const {
     const double m = alpha_ * middle, d = alpha_ * half;
-    const double mean = d < 0.02 && m * d < 0.025 ? mean_by_series(m, d) : mean_by_gauss(m, d);
+    const double mean = d < 0.015 && m * d < 0.02 ? mean_by_series(m, d) : mean_by_gauss(m, d);
     return -kTwoOverRootPi * alpha_ * mean;
   }
 
