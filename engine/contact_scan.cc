@@ -17,10 +17,14 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
       max_events_(max_events) {}
 
 template <int D>
-void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* contacts) {
+void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length) {
   counters_ = &counters;
   contacts_ = contacts;
   events_ = 0;
+  double fastest = 0, strongest = 0;
+  for (const auto& v : particles_.v) fastest = std::max(fastest, v.squaredNorm());
+  for (const auto& each : a) strongest = std::max(strongest, each.squaredNorm());
+  resting_speed_ = kRestingSpeed * (std::sqrt(fastest) + length * std::sqrt(strongest));
 }
 
 template <int D>
@@ -30,12 +34,17 @@ double ContactScan<D>::wall_gap(const Vec<D>& x, Id i, int wall) const {
 }
 
 template <int D>
-void ContactScan<D>::collect(double time, Positions<D> x, std::span<const Vec<D>> v) {
-  touching_.clear();
+void ContactScan<D>::collect(double time, Positions<D> x, Positions<D> v) {
+  approaching_.clear();
+  resting_.clear();
   auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma) {
     counters_->max_overlap = std::max(counters_->max_overlap, -gap / sigma);
     const Touch<D> touch{key, normal};
-    if (approaches(touch, v)) touching_.push_back(touch);
+    const double speed = normal_speed(touch, v);
+    if (speed < -resting_speed_)
+      approaching_.push_back(touch);
+    else if (speed <= resting_speed_)
+      resting_.push_back({key, normal});
   };
   EventKey<D> key;
   key.time = time;
@@ -62,11 +71,9 @@ void ContactScan<D>::collect(double time, Positions<D> x, std::span<const Vec<D>
 }
 
 template <int D>
-bool ContactScan<D>::approaches(const Touch<D>& touch, std::span<const Vec<D>> v) const {
-  const Vec<D>& v_lo = v[touch.key.lo];
-  if (!touch.pair()) return touch.normal.dot(v_lo) < -approach_slack(1.0, v_lo.norm(), 0.0);
-  const Vec<D>& v_hi = v[touch.key.hi];
-  return touch.normal.dot(v_lo - v_hi) < -approach_slack(touch.normal.norm(), v_lo.norm(), v_hi.norm());
+double ContactScan<D>::normal_speed(const Touch<D>& touch, Positions<D> v) const {
+  if (!touch.pair()) return touch.normal.dot(v[touch.key.lo]);
+  return touch.normal.dot(v[touch.key.lo] - v[touch.key.hi]) / touch.normal.norm();
 }
 
 template <int D>
@@ -78,21 +85,13 @@ void ContactScan<D>::count_event(const EventKey<D>& key) {
 }
 
 template <int D>
-void ContactScan<D>::fail_resting(const EventKey<D>& key) const {
-  throw Error(Failure::numerical, partners(key) +
-                                      " rest in contact, pressed together, and would bounce without end; "
-                                      "separate them or give them a relative velocity");
-}
-
-template <int D>
-bool ContactScan<D>::resolve(double time, Positions<D> x, std::span<const Vec<D>> v,
+void ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
                              const std::function<void(const Touch<D>&)>& impulse) {
   collect(time, x, v);
-  std::uint32_t generation = 0;
-  for (; !touching_.empty(); ++generation) {
-    std::ranges::sort(touching_, {}, &Touch<D>::key);
-    for (Touch<D>& touch : touching_) {
-      if (!approaches(touch, v)) continue;  // an earlier impulse of this round has parted them
+  for (std::uint32_t generation = 0; !approaching_.empty(); ++generation) {
+    std::ranges::sort(approaching_, {}, &Touch<D>::key);
+    for (Touch<D>& touch : approaching_) {
+      if (!(normal_speed(touch, v) < -resting_speed_)) continue;  // an earlier impulse of this round has parted them
       touch.key.generation = generation;
       count_event(touch.key);
       const Id lo = touch.key.lo, hi = touch.key.hi;
@@ -112,7 +111,34 @@ bool ContactScan<D>::resolve(double time, Positions<D> x, std::span<const Vec<D>
     }
     collect(time, x, v);
   }
-  return generation > 0;
+  if (!resting_.empty()) stop_approach(x, v);
+}
+
+template <int D>
+bool ContactScan<D>::rests(const EventKey<D>& key) const {
+  return std::ranges::any_of(resting_, [&](const auto& contact) {
+    return contact.key.kind == key.kind && contact.key.lo == key.lo && contact.key.hi == key.hi &&
+           contact.key.image == key.image;
+  });
+}
+
+template <int D>
+void ContactScan<D>::hold(Positions<D> v, Vectors<D> a) {
+  for (auto& contact : resting_) {  // the gap's second derivative, u² + d·a, must not be negative
+    contact.lambda = 0;
+    contact.bound = contact.key.kind == EventKind::pair ? -(v[contact.key.lo] - v[contact.key.hi]).squaredNorm() : 0.0;
+  }
+  press_apart<D>(resting_, particles_.mass, a);
+}
+
+template <int D>
+void ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v) {
+  for (auto& contact : resting_) {
+    if (contact.key.kind == EventKind::pair)
+      contact.normal = x[contact.key.lo] - x[contact.key.hi] + box_.shift(contact.key.image);
+    contact.lambda = contact.bound = 0;
+  }
+  press_apart<D>(resting_, particles_.mass, v);
 }
 
 template <int D>
@@ -128,7 +154,8 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   const double path = rest * (std::sqrt(fastest) + 0.5 * rest * std::sqrt(strongest));
   EventKey<D> key;
   auto offer = [&](const Vec<D>& normal) {
-    if (key < first.key) first = {key, normal};
+    // At time 0 only resting contacts are left; hold() has seen to those that are pressed together.
+    if (key.time > 0 && key < first.key) first = {key, normal};
   };
   for (const auto& pair : list_.cover(x, path)) {
     const Vec<D> d = x[pair.i] - x[pair.j] + box_.shift(pair.image);
@@ -138,8 +165,8 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
     key.lo = pair.i;
     key.hi = pair.j;
     key.image = pair.image;
-    key.time = contact_time<D>(d, v[pair.i] - v[pair.j], a[pair.i] - a[pair.j], sigma, rest, touching,
-                               approach_slack(sigma, v[pair.i].norm(), v[pair.j].norm()));
+    key.time =
+        contact_time<D>(d, v[pair.i] - v[pair.j], a[pair.i] - a[pair.j], sigma, rest, touching, sigma * resting_speed_);
     if (key.time < kNever) offer(d);
   }
   key.kind = EventKind::wall;
@@ -152,10 +179,9 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
       key.lo = i;
       key.hi = static_cast<Id>(wall);
       key.time = wall_contact_time(gap, inward(wall) * v[i][axis], inward(wall) * a[i][axis], rest,
-                                   gap <= tolerance(particles_.radius[i]), approach_slack(1.0, v[i].norm(), 0.0));
+                                   gap <= tolerance(particles_.radius[i]), resting_speed_);
       if (key.time < kNever) offer(inward(wall) * Vec<D>::Unit(axis));
     }
-  if (first.key.time == 0) fail_resting(first.key);
   return first;
 }
 

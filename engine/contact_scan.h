@@ -11,6 +11,7 @@
 #include "engine/contact_log.h"
 #include "engine/counters.h"
 #include "engine/neighbour_list.h"
+#include "engine/resting.h"
 #include "engine/system.h"
 
 namespace carom {
@@ -29,17 +30,27 @@ class ContactScan {
   /// `max_events` limits the contacts of one slab.
   ContactScan(const System<D>& system, std::uint64_t max_events);
 
-  /// Starts a slab: counts from zero and logs to `contacts` (may be null).
-  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts);
+  /// Starts a slab of this length: counts from zero, logs to `contacts` (may be null), and takes what speeds are
+  /// rounding from the velocities and accelerations (length × acceleration) of the whole system.
+  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length);
 
-  /// Applies `impulse` to every contact that touches and approaches at (x, v), in key order, again until none
-  /// approaches. `impulse` changes the velocities of the particles of the touch, which is what `v` views. Returns
-  /// whether there was any. Throws Error(Failure::numerical) beyond max_events.
-  bool resolve(double time, Positions<D> x, std::span<const Vec<D>> v,
-               const std::function<void(const Touch<D>&)>& impulse);
+  /// Applies `impulse` to every contact that touches and approaches at x, in key order, again until none approaches,
+  /// and notes who is left resting in contact. `impulse` changes the velocities in `v`. Throws
+  /// Error(Failure::numerical) beyond max_events.
+  void resolve(double time, Positions<D> x, Vectors<D> v, const std::function<void(const Touch<D>&)>& impulse);
+
+  /// The contacts that the last resolve() found at rest, without any approach left.
+  std::span<RestingContact<D>> resting() { return resting_; }
+  bool rests(const EventKey<D>& key) const;
+
+  /// Keeps resting contacts from approaching: accelerations a become those of the held system.
+  void hold(Positions<D> v, Vectors<D> a);
+
+  /// Takes the approach out of resting contacts at new positions.
+  void stop_approach(Positions<D> x, Vectors<D> v);
 
   /// The first contact on the parabolas x + v s + a s²/2 within [0, rest); key.time is kNever when there is none.
-  /// Call resolve() before. Throws Error(Failure::numerical) for a pair that rests in contact, pressed together.
+  /// Call resolve() before; contacts held at rest are not looked for.
   Touch<D> earliest(Positions<D> x, Positions<D> v, Positions<D> a, double rest);
 
   /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
@@ -54,12 +65,12 @@ class ContactScan {
   /// Counts one more contact or empty piece; throws when the slab needs more than max_events.
   void count_event(const EventKey<D>& key);
 
-  /// The error for a pair that rests in contact under pressure.
-  [[noreturn]] void fail_resting(const EventKey<D>& key) const;
+  /// Approach of a contact slower than this is rounding [length/time].
+  double resting_speed() const { return resting_speed_; }
 
  private:
-  void collect(double time, Positions<D> x, std::span<const Vec<D>> v);
-  bool approaches(const Touch<D>& touch, std::span<const Vec<D>> v) const;
+  void collect(double time, Positions<D> x, Positions<D> v);
+  double normal_speed(const Touch<D>& touch, Positions<D> v) const;
 
   const Box<D>& box_;
   const Particles<D>& particles_;
@@ -69,7 +80,9 @@ class ContactScan {
   std::uint64_t events_ = 0;
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* contacts_ = nullptr;
-  std::vector<Touch<D>> touching_;
+  double resting_speed_ = 0;
+  std::vector<Touch<D>> approaching_;
+  std::vector<RestingContact<D>> resting_;
 };
 
 /// The elastic impulse: kinetic energy and momentum are kept.

@@ -33,7 +33,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
-    scan_->begin_slab(report.counters, report.contacts);
+    scan_->begin_slab(report.counters, report.contacts, piece_->a(), slab.length);
     auto& p = system.particles;
     auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, p); };
     double done = 0, longest = slab.length;
@@ -95,7 +95,10 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       }
     }
     // The bracket has closed on a jump: a grazing contact that comes and goes with τ. The piece before it stands.
-    if (lo == 0) scan_->fail_resting(end.key);
+    if (lo == 0)
+      throw Error(Failure::numerical, partners(end.key) +
+                                          " meet at once, however short the step; "
+                                          "separate them or give them a relative velocity");
     scan_->count_event(end.key);
     end = solve(p, lo);
     return end.converged ? lo : 0;
@@ -104,7 +107,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   PieceEnd<D> solve(const Particles<D>& p, double tau) {
     {
       const Stopwatch watch(counters_->seconds.sweep);
-      if (!piece_->solve(p.x, p.v, tau, *counters_)) return {.converged = false};
+      if (!piece_->solve(p.x, p.v, tau, scan_->resting(), *counters_)) return {.converged = false};
     }
     const Stopwatch watch(counters_->seconds.predict);
     return contacts_->judge(p.x, p.v, *piece_, tau);

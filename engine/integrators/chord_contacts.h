@@ -41,8 +41,8 @@ class ChordContacts {
       const Vec<D> d = x[i] - x[j] + system_.box.shift(pair.image), u = chord[i] - chord[j];
       const double sigma = scan_.contact_distance(i, j);
       const double reach = sigma + tau * u.norm() + scan_.tolerance(sigma);
-      if (d.squaredNorm() > reach * reach * kProlongation) continue;
-      const double slack = approach_slack(sigma, v_end[i].norm(), v_end[j].norm());
+      if (d.squaredNorm() > reach * reach * kProlongation || scan_.rests(key)) continue;
+      const double slack = sigma * scan_.resting_speed();
       judge_pair(key, d, u, v[i] - v[j], v_end[i] - v_end[j], sigma, tau, slack, end);
     }
     key.kind = EventKind::wall;
@@ -53,6 +53,7 @@ class ChordContacts {
         if (!system_.box.walled(axis)) continue;
         key.lo = i;
         key.hi = static_cast<Id>(wall);
+        if (scan_.rests(key)) continue;
         const double inward = ContactScan<D>::inward(wall);
         judge_wall(key, scan_.wall_gap(x[i], i, wall), inward * chord[i][axis], inward * v[i][axis],
                    inward * v_end[i][axis], system_.particles.radius[i], tau, end);
@@ -105,7 +106,7 @@ class ChordContacts {
     }
     if (gap_end < -tolerance)
       end.violates = true;
-    else if (gap_end <= tolerance && v_end < 0)
+    else if (gap_end <= tolerance && v_end < -scan_.resting_speed())
       end.touches = true;
     if (u < v) offer(std::max(0.0, v) * tau / (v - u), key, end);
   }

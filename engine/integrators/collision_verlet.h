@@ -18,38 +18,46 @@ class VerletPieces {
 
   void start(Counters& counters) { accelerations_.update(system_, counters); }
 
-  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts) {
+  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, double length) {
     counters_ = &counters;
-    scan_.begin_slab(counters, contacts);
+    scan_.begin_slab(counters, contacts, accelerations_.a, length);
   }
 
   /// Applies the impulse to whatever touches and approaches; see ContactScan::resolve.
-  bool collide(double time, const std::function<void(const Touch<D>&)>& impulse) {
-    return scan_.resolve(time, system_.particles.x, system_.particles.v, impulse);
+  void collide(double time, const std::function<void(const Touch<D>&)>& impulse) {
+    scan_.resolve(time, system_.particles.x, system_.particles.v, impulse);
   }
 
-  /// How long until the first contact, at most `rest`.
+  /// How long until the first contact, at most `rest`. Fixes the accelerations of the piece: a, without what presses
+  /// resting contacts together.
   double next_contact(double rest) {
-    return std::min(rest, scan_.earliest(system_.particles.x, system_.particles.v, accelerations_.a, rest).key.time);
+    flight_ = accelerations_.a;
+    if (!scan_.resting().empty()) scan_.hold(system_.particles.v, flight_);
+    return std::min(rest, scan_.earliest(system_.particles.x, system_.particles.v, flight_, rest).key.time);
   }
 
-  /// K(τ/2) D(τ) K(τ/2).
+  /// K(τ/2) D(τ) K(τ/2). Call next_contact() before.
   void advance(double tau) {
     auto& p = system_.particles;
     for (std::size_t i = 0; i < p.size(); ++i) {
-      p.v[i] += (0.5 * tau) * accelerations_.a[i];
+      p.v[i] += (0.5 * tau) * flight_[i];
       p.x[i] += tau * p.v[i];
     }
     accelerations_.update(system_, *counters_);
     kick(p, accelerations_.a, 0.5 * tau);
+    if (!scan_.resting().empty()) scan_.stop_approach(p.x, p.v);
   }
 
+  /// −M⁻¹∇V at the present positions.
   const std::vector<Vec<D>>& a() const { return accelerations_.a; }
+  /// The accelerations on which the spheres fly from here, fixed by next_contact().
+  const std::vector<Vec<D>>& flight() const { return flight_; }
 
  private:
   System<D>& system_;
   ContactScan<D> scan_;
   Accelerations<D> accelerations_;
+  std::vector<Vec<D>> flight_;
   Counters* counters_ = nullptr;
 };
 

@@ -20,15 +20,16 @@ DiscreteGradient<D>::DiscreteGradient(const System<D>& system, int order) : syst
   }
   const std::size_t n = system.particles.size();
   mean_acceleration_.assign(fractions_.size(), std::vector<Vec<D>>(n, Vec<D>::Zero()));
-  for (auto* field : {&x_, &v_, &chord_, &trial_, &force_, &mean_}) field->assign(n, Vec<D>::Zero());
+  for (auto* field : {&x_, &v_, &chord_, &trial_, &force_, &mean_, &next_}) field->assign(n, Vec<D>::Zero());
 }
 
 template <int D>
-bool DiscreteGradient<D>::solve(Positions<D> x, Positions<D> v, double tau, Counters& counters) {
+bool DiscreteGradient<D>::solve(Positions<D> x, Positions<D> v, double tau, std::span<RestingContact<D>> resting,
+                                Counters& counters) {
   std::ranges::copy(x, x_.begin());
   std::ranges::copy(v, v_.begin());
   for (std::size_t stage = 0; stage < fractions_.size(); ++stage)
-    if (!substep(fractions_[stage] * tau, stage, counters)) return false;
+    if (!substep(fractions_[stage] * tau, stage, resting, counters)) return false;
   if (fractions_.size() == 1)
     std::ranges::copy(mean_, chord_.begin());
   else
@@ -37,7 +38,8 @@ bool DiscreteGradient<D>::solve(Positions<D> x, Positions<D> v, double tau, Coun
 }
 
 template <int D>
-bool DiscreteGradient<D>::substep(double tau, std::size_t stage, Counters& counters) {
+bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<RestingContact<D>> resting,
+                                  Counters& counters) {
   const std::size_t n = x_.size();
   const auto& mass = system_.particles.mass;
   auto& a = mean_acceleration_[stage];
@@ -53,19 +55,20 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, Counters& count
     for (std::size_t i = 0; i < n; ++i) trial_[i] = x_[i] + tau * mean_[i];
     evaluate_mean_forces<D>(system_, x_, trial_, force_, counters);
     ++counters.sweeps;
-    double change = 0;
     for (std::size_t i = 0; i < n; ++i) {
       a[i] = force_[i] / mass[i];
-      const Vec<D> next = v_[i] + (0.5 * tau) * a[i];
-      change = std::max(change, (next - mean_[i]).squaredNorm());
-      mean_[i] = next;
+      next_[i] = v_[i] + (0.5 * tau) * a[i];
     }
+    if (!resting.empty()) hold(tau, resting);
+    double change = 0;
+    for (std::size_t i = 0; i < n; ++i) change = std::max(change, (next_[i] - mean_[i]).squaredNorm());
     change = std::sqrt(change);
+    std::swap(mean_, next_);
     if (!std::isfinite(change)) break;
     if (change == 0 || (change >= last && change <= floor)) {
       for (std::size_t i = 0; i < n; ++i) {
         x_[i] += tau * mean_[i];
-        v_[i] += tau * a[i];
+        v_[i] = resting.empty() ? Vec<D>(v_[i] + tau * a[i]) : Vec<D>(2 * mean_[i] - v_[i]);
       }
       return true;
     }
@@ -74,6 +77,24 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, Counters& count
   }
   for (auto& stage_guess : mean_acceleration_) std::ranges::fill(stage_guess, Vec<D>::Zero());
   return false;
+}
+
+/// Keeps resting contacts from closing: |d'|² − |d|² = τ n·u ≥ 0 with n = d + d', u the relative mean velocity.
+template <int D>
+void DiscreteGradient<D>::hold(double tau, std::span<RestingContact<D>> resting) {
+  const auto& box = system_.box;
+  for (auto& contact : resting) {
+    if (contact.key.kind == EventKind::pair) {
+      const Id lo = contact.key.lo, hi = contact.key.hi;
+      contact.normal = 2 * (x_[lo] - x_[hi] + box.shift(contact.key.image)) + tau * (mean_[lo] - mean_[hi]);
+    } else {
+      const int axis = static_cast<int>(contact.key.hi / 2);
+      contact.normal = (contact.key.hi % 2 == 0 ? 1.0 : -1.0) * Vec<D>::Unit(axis);
+    }
+    if (tau < 0) contact.normal = -contact.normal;
+    contact.lambda = contact.bound = 0;
+  }
+  press_apart<D>(resting, system_.particles.mass, next_);
 }
 
 template class DiscreteGradient<2>;

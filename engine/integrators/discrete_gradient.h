@@ -11,6 +11,7 @@
 #include <span>
 
 #include "engine/forces.h"
+#include "engine/resting.h"
 
 namespace carom::integrator {
 
@@ -20,21 +21,24 @@ class DiscreteGradient {
   /// order: 2 or 4.
   DiscreteGradient(const System<D>& system, int order);
 
-  /// Computes end() from (x, v) over `tau`. False where the iteration does not contract well: take a shorter piece.
-  bool solve(Positions<D> x, Positions<D> v, double tau, Counters& counters);
+  /// Computes x() and v() from (x, v) over `tau`. Resting contacts are held by reactions λ(d + d'), λ ≥ 0, that do no
+  /// work because |d'| = |d|. False where the iteration does not contract well: take a shorter piece.
+  bool solve(Positions<D> x, Positions<D> v, double tau, std::span<RestingContact<D>> resting, Counters& counters);
 
-  const std::vector<Vec<D>>& x() const { return x_; }          ///< x' of the last solve
-  const std::vector<Vec<D>>& v() const { return v_; }          ///< v' of the last solve
-  const std::vector<Vec<D>>& chord() const { return chord_; }  ///< (x' − x)/τ of the last solve
+  const std::vector<Vec<D>>& x() const { return x_; }                          ///< x' of the last solve
+  const std::vector<Vec<D>>& v() const { return v_; }                          ///< v' of the last solve
+  const std::vector<Vec<D>>& chord() const { return chord_; }                  ///< (x' − x)/τ of the last solve
+  const std::vector<Vec<D>>& a() const { return mean_acceleration_.front(); }  ///< mean accelerations of the last solve
 
  private:
-  bool substep(double tau, std::size_t stage, Counters& counters);
+  bool substep(double tau, std::size_t stage, std::span<RestingContact<D>> resting, Counters& counters);
+  void hold(double tau, std::span<RestingContact<D>> resting);
 
   const System<D>& system_;
   std::vector<double> fractions_;
   std::vector<std::vector<Vec<D>>>
       mean_acceleration_;  // of each stage of the last solve: where the next one starts from
-  std::vector<Vec<D>> x_, v_, chord_, trial_, force_, mean_;
+  std::vector<Vec<D>> x_, v_, chord_, trial_, force_, mean_, next_;
 };
 
 }  // namespace carom::integrator

@@ -36,7 +36,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
-    pieces_->begin_slab(report.counters, report.contacts);
+    pieces_->begin_slab(report.counters, report.contacts, slab.length);
     if (restart_)
       restart_slab(system, slab.length);
     else
@@ -80,7 +80,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     node_ = p;
     if (lag_ <= 0) return;
     for (std::size_t i = 0; i < p.size(); ++i) {
-      p.v[i] += (0.5 * lag_) * pieces_->a()[i];
+      p.v[i] += (0.5 * lag_) * pieces_->flight()[i];
       p.x[i] += lag_ * p.v[i];
     }
     evaluate_forces<D>(system, p.x, force_, *counters_);
@@ -123,7 +123,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     const double a = nw + sixth * wKw, b = nv + sixth * wKv;
     const double discriminant = b * b - 2 * a * debt_;
     double lambda = a > 0 && b < 0 && discriminant >= 0 ? (std::sqrt(discriminant) - b) / a : -2 * b / a;
-    // An impulse that takes most of a slow pair's normal velocity, contact after contact, would bring it to rest in contact.
+    // An impulse that takes most of a slow pair's normal velocity, contact after contact, would bring it to rest in
+    // contact.
     if (!(a > 0) || !(nv + lambda * nw > -kLeastRestitution * nv)) {
       lambda = -2 * nv / nw;
       ++counters_->fallbacks;

@@ -1,0 +1,63 @@
+#pragma once
+// The systems that several tests run, and one call that runs them.
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/simulation.h"
+
+namespace carom::test {
+
+using Given = std::vector<std::pair<std::string, ParameterValue>>;
+
+/// A system in a box with the same boundary on all axes; particles of one species.
+template <int D>
+std::unique_ptr<System<D>> make_system(const Vec<D>& edges, Boundary boundary, std::vector<Vec<D>> x,
+                                       std::vector<Vec<D>> v, std::vector<double> radius = {},
+                                       std::vector<double> mass = {});
+
+/// Adds an interaction by its name in the deck.
+template <int D>
+void add_interaction(System<D>& system, const std::string& type, const Given& given);
+
+/// First experiment of the thesis: five discs in a box joined by springs. A start other than 0 moves the moving discs'
+/// velocities by up to a percent, at random.
+std::unique_ptr<System<2>> five_springs(unsigned start = 0);
+
+/// Second experiment: nine gravitating discs in a box.
+std::unique_ptr<System<2>> nine_gravity(unsigned start = 0);
+
+/// Their relatives in three dimensions, with unequal radii and masses: a bonded ring of six, and eight that gravitate.
+std::unique_ptr<System<3>> bonded_cluster(unsigned start = 0);
+std::unique_ptr<System<3>> gravity_cluster(unsigned start = 0);
+
+/// Hard spheres (discs) of diameter 1 and mass 1 on an fcc (hexagonal) lattice, `cells` unit cells an edge, at this
+/// packing fraction and temperature 1, periodic.
+template <int D>
+std::unique_ptr<System<D>> hard_spheres(int cells, double packing_fraction, unsigned seed = 1);
+
+/// An integrator made by its name, with defaults for what is not given, and a run with it.
+template <int D>
+std::unique_ptr<Simulation<D>> make_run(std::unique_ptr<System<D>> system, const std::string& integrator, Plan plan,
+                                        const Given& given = {});
+
+/// make_run, and run() for so many steps of length h.
+template <int D>
+std::unique_ptr<Simulation<D>> run_steps(std::unique_ptr<System<D>> system, const std::string& integrator, double h,
+                                         std::int64_t steps, const Given& given = {});
+
+/// make_run, and run() to a time.
+template <int D>
+std::unique_ptr<Simulation<D>> run_until(std::unique_ptr<System<D>> system, const std::string& integrator, double h,
+                                         double end_time, const Given& given = {});
+
+/// The largest difference of any coordinate.
+template <int D>
+double largest_difference(const std::vector<Vec<D>>& a, const std::vector<Vec<D>>& b);
+
+/// Least-squares slope of log y against log x.
+double fitted_order(const std::vector<double>& x, const std::vector<double>& y);
+
+}  // namespace carom::test

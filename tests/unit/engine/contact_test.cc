@@ -1,0 +1,188 @@
+#include "engine/contact.h"
+
+#include <gtest/gtest.h>
+
+#include <boost/multiprecision/cpp_bin_float.hpp>
+#include <random>
+
+#include "engine/collision.h"
+
+namespace carom {
+namespace {
+
+using Precise = boost::multiprecision::cpp_bin_float_50;
+
+template <int D>
+Vec<D> random_vector(std::mt19937_64& random, double size) {
+  std::uniform_real_distribution<double> uniform(-size, size);
+  Vec<D> x;
+  for (int k = 0; k < D; ++k) x[k] = uniform(random);
+  return x;
+}
+
+/// |d + v s + a s²/2|² − sigma² in 50 digits.
+template <int D>
+Precise gap_squared(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double s) {
+  Precise sum = -Precise(sigma) * sigma;
+  for (int k = 0; k < D; ++k) {
+    const Precise x = Precise(d[k]) + Precise(v[k]) * s + Precise(a[k]) * s * s / 2;
+    sum += x * x;
+  }
+  return sum;
+}
+
+/// The first contact by walking along the path in small steps: slow, and blind only to dips shorter than a step.
+template <int D>
+double walked_contact(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double rest, int steps) {
+  auto gap = [&](double s) { return (d + s * v + (0.5 * s * s) * a).squaredNorm() - sigma * sigma; };
+  for (int k = 0; k < steps; ++k) {
+    double lo = rest * k / steps, hi = rest * (k + 1) / steps;
+    if (!(gap(lo) > 0 && gap(hi) <= 0)) continue;
+    for (int bisection = 0; bisection < 80; ++bisection) (gap(0.5 * (lo + hi)) > 0 ? lo : hi) = 0.5 * (lo + hi);
+    return hi;
+  }
+  return kNever;
+}
+
+template <class T>
+class Contact : public testing::Test {};
+struct Two {
+  static constexpr int kD = 2;
+};
+struct Three {
+  static constexpr int kD = 3;
+};
+using Dimensions = testing::Types<Two, Three>;
+TYPED_TEST_SUITE(Contact, Dimensions);
+
+TYPED_TEST(Contact, StraightFlightsEndAtTheContactDistance) {
+  constexpr int D = TypeParam::kD;
+  std::mt19937_64 random(1);
+  int hits = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    const double reach = trial % 2 ? 3 : 200;  // far away too: the discriminant must not cancel
+    const Vec<D> d = random_vector<D>(random, reach), aim = random_vector<D>(random, 0.99 / std::sqrt(D));
+    const Vec<D> v = (aim - d) * (0.1 + 0.001 * (trial % 1000));
+    if (d.norm() < 1.001) continue;
+    const double s = contact_time<D>(d, v, 1.0, 0.0);
+    ASSERT_LT(s, kNever) << "d " << d.transpose() << " v " << v.transpose();
+    ++hits;
+    // The gap left is what an ulp of s makes of it, and of d.
+    const double gap = static_cast<double>(gap_squared<D>(d, v, Vec<D>::Zero(), 1.0, s)) / 2;
+    EXPECT_LE(std::abs(gap), 1e-15 * (reach + 4)) << "d " << d.transpose();
+    EXPECT_LE((d + s * v).dot(v), 0);  // the earlier of the two roots
+  }
+  EXPECT_GT(hits, 15000);
+}
+
+TYPED_TEST(Contact, StraightFlightsThatPassOrPartNeverTouch) {
+  constexpr int D = TypeParam::kD;
+  Vec<D> d = Vec<D>::Zero(), v = Vec<D>::Zero();
+  d[0] = 5;
+  v[0] = -1;
+  d[1] = 1.0 + 1e-15;
+  EXPECT_EQ(contact_time<D>(d, v, 1.0, 0.0), kNever);  // grazes
+  d[1] = 0;
+  EXPECT_DOUBLE_EQ(contact_time<D>(d, v, 1.0, 0.0), 4.0);
+  EXPECT_EQ(contact_time<D>(d, -v, 1.0, 0.0), kNever);
+  d[0] = 1.0;  // touching: at once when approaching, never when parting
+  EXPECT_EQ(contact_time<D>(d, v, 1.0, 0.0), 0.0);
+  EXPECT_EQ(contact_time<D>(d, -v, 1.0, 0.0), kNever);
+  EXPECT_EQ(contact_time<D>(d, 1e-17 * v, 1.0, 1e-15), kNever);  // approach below rounding
+}
+
+TYPED_TEST(Contact, ParabolasMissNoContactAndInventNone) {
+  constexpr int D = TypeParam::kD;
+  std::mt19937_64 random(2);
+  int hits = 0, misses = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    const Vec<D> d = random_vector<D>(random, 3), v = random_vector<D>(random, 4), a = random_vector<D>(random, 8);
+    if (d.norm() < 1.01) continue;
+    const double rest = 0.2 + 0.001 * (trial % 2000);
+    const double s = contact_time<D>(d, v, a, 1.0, rest, false, 0.0);
+    const double walked = walked_contact<D>(d, v, a, 1.0, rest, 4000);
+    if (walked == kNever) {
+      // A dip between two steps of the walk, or none: if there is a contact, it is a shallow one.
+      if (s < kNever) {
+        const double depth = (d + (s + rest / 8000) * v + (0.5 * (s + rest / 8000) * (s + rest / 8000)) * a).norm() - 1;
+        EXPECT_GT(depth, -1e-4);
+      }
+      ++misses;
+      continue;
+    }
+    ++hits;
+    ASSERT_LE(s, walked * (1 + 1e-9)) << "d " << d.transpose() << " v " << v.transpose() << " a " << a.transpose();
+    EXPECT_LT(std::abs(static_cast<double>(gap_squared<D>(d, v, a, 1.0, s))), 1e-13);
+    EXPECT_LT((d + s * v + 0.5 * s * s * a).dot(v + s * a), 0);
+  }
+  EXPECT_GT(hits, 500);
+  EXPECT_GT(misses, 500);
+}
+
+TYPED_TEST(Contact, ParabolasWithoutAccelerationAreStraight) {
+  constexpr int D = TypeParam::kD;
+  std::mt19937_64 random(4);
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Vec<D> d = random_vector<D>(random, 4), v = random_vector<D>(random, 4);
+    if (d.norm() < 1.01) continue;
+    const double straight = contact_time<D>(d, v, 1.0, 0.0);
+    const double parabola = contact_time<D>(d, v, Vec<D>::Zero(), 1.0, 1e3, false, 0.0);
+    if (straight == kNever)
+      EXPECT_EQ(parabola, kNever);
+    else
+      EXPECT_NEAR(parabola, straight, 1e-12 * (1 + straight));
+  }
+}
+
+TYPED_TEST(Contact, ABounceUnderAttractionReturnsAfterTwiceSpeedOverAcceleration) {
+  constexpr int D = TypeParam::kD;
+  Vec<D> d = Vec<D>::Unit(0), v = 1e-3 * Vec<D>::Unit(0), a = -Vec<D>::Unit(0);
+  for (double gap : {0.0, 1e-16, -1e-16, 5e-14, -5e-14}) {
+    d[0] = 1 + gap;
+    EXPECT_NEAR(contact_time<D>(d, v, a, 1.0, 1.0, true, 1e-15), 2e-3, 1e-9) << "gap " << gap;
+  }
+  EXPECT_EQ(contact_time<D>(d, v, a, 1.0, 1e-3, true, 1e-15), kNever);            // not within the time left
+  EXPECT_EQ(contact_time<D>(d, Vec<D>::Zero(), a, 1.0, 1.0, true, 1e-15), 0.0);   // rests, pressed
+  EXPECT_EQ(contact_time<D>(d, Vec<D>::Zero(), -a, 1.0, 1.0, true, 1e-15), kNever);  // drawn apart
+}
+
+TEST(WallContact, MatchesTheQuadratic) {
+  EXPECT_DOUBLE_EQ(wall_contact_time(2, -1, 0, 10, false, 0), 2);
+  EXPECT_EQ(wall_contact_time(2, -1, 0, 2, false, 0), kNever);  // [0, rest) is half open
+  EXPECT_EQ(wall_contact_time(2, 1, 0, 10, false, 0), kNever);
+  EXPECT_NEAR(wall_contact_time(1, 1, -1, 10, false, 0), 1 + std::sqrt(3.0), 1e-15);
+  EXPECT_EQ(wall_contact_time(1, -1, 1, 10, false, 0), kNever);  // turns back before the wall
+  EXPECT_DOUBLE_EQ(wall_contact_time(0, 1, -2, 10, true, 0), 1);
+  EXPECT_EQ(wall_contact_time(0, 0, -2, 10, true, 1e-16), 0);
+}
+
+TYPED_TEST(Contact, CollisionKeepsEnergyAndMomentum) {
+  constexpr int D = TypeParam::kD;
+  std::mt19937_64 random(5);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Vec<D> d = random_vector<D>(random, 1), v_i = random_vector<D>(random, 2), v_j = random_vector<D>(random, 2);
+    const double m_i = 0.1 + trial % 7, m_j = 0.3 + trial % 5;
+    const Vec<D> impulse = collision_factor<D>(d, v_i - v_j, m_i, m_j) * d;
+    const Vec<D> w_i = v_i + impulse / m_i, w_j = v_j - impulse / m_j;
+    EXPECT_NEAR(d.dot(w_i - w_j), -d.dot(v_i - v_j), 1e-13);
+    EXPECT_NEAR(m_i * w_i.squaredNorm() + m_j * w_j.squaredNorm(), m_i * v_i.squaredNorm() + m_j * v_j.squaredNorm(),
+                1e-12);
+    EXPECT_LT((m_i * w_i + m_j * w_j - m_i * v_i - m_j * v_j).norm(), 1e-13);
+  }
+}
+
+TEST(Polynomial, FindsTheFirstFallAmongClusteredRoots) {
+  // (s − 1)(s − 1.001)(s − 2)(s − 3): positive, falls at 1, rises at 1.001, falls at 2.
+  auto from_roots = [](double a, double b, double c, double d) {
+    return Polynomial<4>{{a * b * c * d, -(a * b * c + a * b * d + a * c * d + b * c * d),
+                          a * b + a * c + a * d + b * c + b * d + c * d, -(a + b + c + d), 1}};
+  };
+  EXPECT_NEAR(first_fall(from_roots(1, 1.001, 2, 3), 10.0), 1, 1e-11);
+  EXPECT_NEAR(first_fall(from_roots(-1, 1.001, 2, 3), 10.0), 2, 1e-12);  // rises at −1 … it is negative at 0, falls at 2
+  EXPECT_EQ(first_fall(from_roots(5, 6, 7, 8), 4.0), kNever);
+  EXPECT_EQ(first_fall(Polynomial<4>{{1, 0, 0, 0, 1}}, 100.0), kNever);
+  EXPECT_EQ(first_fall(Polynomial<4>{{0, -1, 0, 0, 0}}, 1.0), 0.0);
+}
+
+}  // namespace
+}  // namespace carom

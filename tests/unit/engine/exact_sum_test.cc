@@ -1,0 +1,85 @@
+#include "engine/exact_sum.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <boost/multiprecision/cpp_bin_float.hpp>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace carom {
+namespace {
+
+using Wide = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<2400>>;
+
+std::vector<double> terms_of_all_sizes(std::size_t n, int exponents) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> mantissa(-1, 1);
+  std::uniform_int_distribution<int> exponent(-exponents, exponents);
+  std::vector<double> terms(n);
+  for (auto& t : terms) t = std::ldexp(mantissa(random), exponent(random));
+  return terms;
+}
+
+double sum_of(const std::vector<double>& terms) {
+  ExactSum sum;
+  for (double t : terms) sum.add(t);
+  return sum.value();
+}
+
+TEST(ExactSum, IsTheCorrectlyRoundedSum) {
+  for (int exponents : {0, 10, 60, 500}) {
+    const auto terms = terms_of_all_sizes(2000, exponents);
+    Wide exact = 0;
+    for (double t : terms) exact += t;
+    EXPECT_EQ(sum_of(terms), static_cast<double>(exact)) << "exponents up to " << exponents;
+  }
+}
+
+TEST(ExactSum, DoesNotDependOnTheOrder) {
+  auto terms = terms_of_all_sizes(1000, 300);
+  const double sum = sum_of(terms);
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 5; ++trial) {
+    std::shuffle(terms.begin(), terms.end(), random);
+    EXPECT_EQ(sum_of(terms), sum);
+  }
+}
+
+TEST(ExactSum, JoinsPartsExactly) {
+  const auto terms = terms_of_all_sizes(999, 200);
+  ExactSum parts[3], all;
+  for (std::size_t k = 0; k < terms.size(); ++k) parts[k % 3].add(terms[k]);
+  for (const auto& part : parts) all.add(part);
+  EXPECT_EQ(all.value(), sum_of(terms));
+}
+
+TEST(ExactSum, CancelsCompletely) {
+  EXPECT_EQ(sum_of({1e300, 1.0, -1e300, 1e-300, -1.0}), 1e-300);
+  EXPECT_EQ(sum_of({0.1, -0.1}), 0.0);
+  EXPECT_EQ(sum_of({}), 0.0);
+}
+
+TEST(ExactSum, HoldsTheExtremes) {
+  const double tiny = std::numeric_limits<double>::denorm_min(), huge = std::numeric_limits<double>::max();
+  EXPECT_EQ(sum_of({tiny, tiny}), 2 * tiny);
+  EXPECT_EQ(sum_of({huge, huge, -huge}), huge);
+  EXPECT_EQ(sum_of({-huge}), -huge);
+}
+
+TEST(ExactSum, RoundsHalfwayCasesToEven) {
+  const double ulp = std::numeric_limits<double>::epsilon();
+  EXPECT_EQ(sum_of({1.0, ulp / 2}), 1.0);
+  EXPECT_EQ(sum_of({1.0 + ulp, ulp / 2}), 1.0 + 2 * ulp);
+  EXPECT_EQ(sum_of({1.0, ulp / 2, 1e-300}), 1.0 + ulp);
+}
+
+TEST(ExactSum, IsNotANumberWhenATermIsNot) {
+  EXPECT_TRUE(std::isnan(sum_of({1.0, std::numeric_limits<double>::infinity()})));
+  EXPECT_TRUE(std::isnan(sum_of({std::nan(""), 1.0})));
+}
+
+}  // namespace
+}  // namespace carom

@@ -1,0 +1,98 @@
+#include "engine/neighbour_list.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+namespace carom {
+namespace {
+
+/// Every pair and image within reach, by trying all of them.
+template <int D>
+std::set<NeighbourPair<D>> brute_force(const Box<D>& box, const std::vector<Vec<D>>& x, double reach) {
+  std::set<NeighbourPair<D>> pairs;
+  Image<D> image;
+  const int images = 27;  // offsets −1…1 per axis, as digits of base 3; boxes here are wider than half the reach
+  for (Id i = 0; i < x.size(); ++i)
+    for (Id j = i + 1; j < x.size(); ++j)
+      for (int code = 0; code < images; ++code) {
+        int digits = code;
+        bool allowed = true;
+        for (int k = 0; k < D; ++k, digits /= 3) {
+          image[k] = digits % 3 - 1;
+          allowed = allowed && (image[k] == 0 || box.periodic(k));
+        }
+        if (digits != 0 || !allowed) continue;
+        if ((x[i] - x[j] + box.shift(image)).norm() <= reach) pairs.insert({i, j, image});
+      }
+  return pairs;
+}
+
+template <int D>
+void expect_covered(const Box<D>& box, const std::vector<Vec<D>>& x, double reach,
+                    std::span<const NeighbourPair<D>> pairs) {
+  const std::set<NeighbourPair<D>> listed(pairs.begin(), pairs.end());
+  ASSERT_EQ(listed.size(), pairs.size()) << "a pair is listed twice";
+  ASSERT_TRUE(std::ranges::is_sorted(pairs));
+  for (const auto& pair : brute_force<D>(box, x, reach))
+    EXPECT_TRUE(listed.contains(pair)) << pair.i << " " << pair.j << " image " << pair.image[0];
+}
+
+template <int D>
+void walk(Boundary boundary, double edge, double reach) {
+  Box<D> box;
+  box.edges = Vec<D>::Constant(edge);
+  box.boundary.fill(boundary);
+  box.boundary[0] = Boundary::periodic;
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform(0, edge), step(-0.06, 0.06);
+  std::vector<Vec<D>> x(60);
+  std::vector<Image<D>> image(x.size());
+  for (auto& p : x)
+    for (int k = 0; k < D; ++k) p[k] = uniform(random);
+  NeighbourList<D> list(box, std::vector<double>(x.size(), reach / 2));
+  int calls = 0;
+  for (; calls < 60; ++calls) {
+    auto moved = x;
+    for (auto& p : moved)
+      for (int k = 0; k < D; ++k) p[k] += step(random);
+    const auto pairs = list.cover(x, moved);
+    expect_covered<D>(box, x, reach, pairs);
+    // At the end of the step positions are not wrapped yet: the list's images are those of the start.
+    std::set<NeighbourPair<D>> listed(pairs.begin(), pairs.end());
+    for (const auto& pair : brute_force<D>(box, moved, reach)) EXPECT_TRUE(listed.contains(pair));
+    x = moved;
+    for (std::size_t i = 0; i < x.size(); ++i) box.wrap(x[i], image[i]);
+  }
+  EXPECT_GT(list.rebuilds(), 1u);
+  EXPECT_LT(list.rebuilds(), 60u);
+}
+
+TEST(NeighbourList, CoversAllPairsWhileParticlesMoveAndAreWrapped) {
+  walk<2>(Boundary::periodic, 6, 1.0);
+  walk<2>(Boundary::wall, 6, 1.0);
+  walk<3>(Boundary::periodic, 4, 1.0);
+  walk<3>(Boundary::open, 4, 1.0);
+}
+
+TEST(NeighbourList, SeesSeveralImagesOfOnePairInASmallBox) {
+  walk<2>(Boundary::periodic, 1.5, 1.4);
+  walk<3>(Boundary::periodic, 1.5, 1.4);
+}
+
+TEST(NeighbourList, LeavesOutWhatIsNotWanted) {
+  Box<2> box;
+  box.edges = {10, 10};
+  box.boundary.fill(Boundary::wall);
+  const std::vector<Vec<2>> x = {{1, 1}, {2, 1}, {3, 1}};
+  NeighbourList<2> list(box, {2, 2, 2}, [](Id i, Id j) { return i + j != 2; });
+  const auto pairs = list.cover(x);
+  ASSERT_EQ(pairs.size(), 2u);
+  EXPECT_EQ(pairs[0].j, 1u);
+  EXPECT_EQ(pairs[1].i, 1u);
+}
+
+}  // namespace
+}  // namespace carom
