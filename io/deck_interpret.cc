@@ -2,14 +2,12 @@
 
 #include <algorithm>
 
+#include "io/deck_interactions.h"
+#include "io/deck_species.h"
 #include "io/options.h"
 
 namespace carom {
 namespace {
-
-std::string count_of(std::size_t n, const std::string& what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
 
 /// The parts of a deck in the order in which they build on each other.
 class Interpreter {
@@ -20,10 +18,10 @@ class Interpreter {
   void all() {
     top();
     system();
-    particles();
+    read_species(values_, dimension_, source_.species, problems_);
     placement();
-    interactions_();
     integrator();
+    read_interactions(source_, dimension_, problems_);
     run();
     output();
   }
@@ -68,92 +66,6 @@ class Interpreter {
     if (dimension_ != 0 && size != dimension_)
       problems_.error(table.place(key), "'" + key + "' has the wrong length (" + std::to_string(size) + ")",
                       "give " + std::to_string(dimension_) + ", one for each axis");
-  }
-
-  void particles() {
-    std::vector<std::string> names;
-    for (const ValueTable& table : values_.list("particles")) {
-      SpeciesConfig species;
-      species.at = table.at;
-      if (const auto* name = table.find<std::string>("name")) {
-        if (std::find(names.begin(), names.end(), *name) != names.end())
-          problems_.error(table.place("name"), "two species are called '" + *name + "'", "give each its own name");
-        species.name = *name;
-        names.push_back(*name);
-      }
-      positions(table, species);
-      velocities(table, species);
-      if (species.count > 0) {
-        species.radius = one_a_particle(table, "radius", species.count);
-        species.mass = one_a_particle(table, "mass", species.count);
-        species.charge = one_a_particle(table, "charge", species.count);
-      }
-      source_.species.push_back(std::move(species));
-    }
-    if (source_.particles() > std::numeric_limits<std::uint32_t>::max() / 2)
-      problems_.error(values_.list("particles").front().at, "too many particles", "give at most 2^31");
-  }
-
-  void positions(const ValueTable& table, SpeciesConfig& species) {
-    const auto* position = table.find<std::vector<std::vector<double>>>("position");
-    const auto* count = table.find<std::int64_t>("count");
-    if (!table.given("position") && !table.given("count"))
-      problems_.error(table.at, "missing key 'position' or 'count' in [[particles]]",
-                      "give explicit positions, or a count for [placement] to place");
-    if (table.given("position") && table.given("count"))
-      problems_.error(table.place("count"), "'position' and 'count' exclude each other", "leave one of them out");
-    if (position != nullptr) {
-      species.position = *position;
-      species.count = position->size();
-      if (position->empty())
-        problems_.error(table.place("position"), "'position' is empty", "give at least one vector");
-      vectors(table, "position", *position);
-    } else if (count != nullptr) {
-      species.count = static_cast<std::size_t>(*count);
-      species.placed = true;
-    }
-  }
-
-  void velocities(const ValueTable& table, SpeciesConfig& species) {
-    if (const auto* temperature = table.find<double>("temperature")) species.temperature = *temperature;
-    if (const auto* velocity = table.find<std::vector<std::vector<double>>>("velocity")) {
-      species.velocity = *velocity;
-      if (species.count > 0 && velocity->size() != species.count && !species.placed)
-        problems_.error(
-            table.place("velocity"),
-            "'velocity' has " + count_of(velocity->size(), "vector") + " for " + count_of(species.count, "particle"),
-            "give one for each");
-      vectors(table, "velocity", *velocity);
-    }
-    if (table.given("velocity") && table.given("temperature"))
-      problems_.error(table.place("temperature"), "'velocity' and 'temperature' exclude each other",
-                      "leave one of them out");
-    else if (table.given("count") && table.given("velocity"))
-      problems_.error(table.place("velocity"), "'velocity' goes with explicit positions only",
-                      "give a temperature with a count");
-    else if (table.given("count") && !table.given("temperature"))
-      problems_.error(table.at, "missing key 'temperature' in [[particles]]",
-                      "a species given by count needs it; 0 leaves the particles at rest");
-  }
-
-  void vectors(const ValueTable& table, const std::string& key, const std::vector<std::vector<double>>& list) {
-    for (std::size_t n = 0; n < list.size() && dimension_ != 0; ++n)
-      if (list[n].size() != dimension_)
-        problems_.error(
-            table.place(key),
-            "vector " + std::to_string(n) + " (from 0) of '" + key + "' has " + count_of(list[n].size(), "number"),
-            "system.dimension asks for " + std::to_string(dimension_));
-  }
-
-  std::vector<double> one_a_particle(const ValueTable& table, const std::string& key, std::size_t count) {
-    if (const auto* number = table.find<double>(key)) return std::vector<double>(count, *number);
-    const auto* list = table.find<std::vector<double>>(key);
-    if (list == nullptr) return {};
-    if (list->size() != count)
-      problems_.error(table.place(key),
-                      "'" + key + "' has " + count_of(list->size(), "number") + " for " + count_of(count, "particle"),
-                      "give one number for all, or one for each");
-    return *list;
   }
 
   void placement() {
@@ -206,54 +118,6 @@ class Interpreter {
     std::vector<std::string> names;
     for (const Variant& variant : table_schema("placement").variants) names.push_back(variant.name);
     return names;
-  }
-
-  void interactions_() {
-    for (const ValueTable& table : values_.list("interaction")) {
-      if (table.variant == nullptr) continue;
-      InteractionConfig config;
-      config.at = table.at;
-      config.parameters = parameters_of(table);
-      for (const InteractionInfo& info : interactions())
-        if (info.name == table.variant->name) config.info = &info;
-      ids_exist(table);
-      species_exist(table);
-      const bool periodic =
-          std::find(source_.boundary.begin(), source_.boundary.end(), Boundary::periodic) != source_.boundary.end();
-      if (config.info->kind == InteractionInfo::Kind::pair && periodic && !config.parameters.has("cutoff"))
-        problems_.error(table.place("type"),
-                        "'" + table.variant->name + "' between all pairs has no end in a periodic box",
-                        "give it a cutoff, or make the box walled or open");
-      source_.interactions.push_back(std::move(config));
-    }
-  }
-
-  void ids_exist(const ValueTable& table) {
-    const std::size_t n = source_.particles();
-    table.each_key([&](const Key& key) {
-      const auto* pairs = table.find<PairList>(key.name);
-      if (pairs == nullptr) return;
-      for (const auto& pair : *pairs) {
-        const std::string text = "[" + std::to_string(pair[0]) + ", " + std::to_string(pair[1]) + "]";
-        for (const std::uint32_t id : pair)
-          if (id >= n)
-            problems_.error(table.place(key.name),
-                            "pair " + text + " names particle " + std::to_string(id) + ", which is not there",
-                            "there are " + count_of(n, "particle") + ", with ids from 0");
-        if (pair[0] == pair[1])
-          problems_.error(table.place(key.name), "pair " + text + " joins a particle to itself", "name two particles");
-      }
-    });
-  }
-
-  void species_exist(const ValueTable& table) {
-    const auto* named = table.find<std::vector<std::string>>("species");
-    if (named == nullptr) return;
-    std::vector<std::string> known;
-    for (const SpeciesConfig& species : source_.species) known.push_back(species.name);
-    for (const std::string& name : *named)
-      if (std::find(known.begin(), known.end(), name) == known.end())
-        problems_.error(table.place("species"), "unknown species '" + name + "'", suggestion(name, known));
   }
 
   void integrator() {
@@ -313,12 +177,6 @@ class Interpreter {
 };
 
 }  // namespace
-
-std::size_t Deck::Source::particles() const {
-  std::size_t n = 0;
-  for (const SpeciesConfig& s : species) n += s.count;
-  return n;
-}
 
 Parameters parameters_of(const ValueTable& table) {
   Parameters parameters;

@@ -1,5 +1,6 @@
 #include "io/deck_values.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -96,8 +97,15 @@ class NodeReader {
       value = static_cast<std::int64_t>(real->get());
     else
       return wrong_type(node, "an integer");
-    if (!in_range(node, value)) return {};
+    if (!in_range(node, value) || !chosen(node, std::to_string(value))) return {};
     return value;
+  }
+
+  bool chosen(const toml::node& node, const std::string& value) {
+    if (key_.choices.empty() || std::find(key_.choices.begin(), key_.choices.end(), value) != key_.choices.end())
+      return true;
+    complain(node, "cannot be '" + value + "'", suggestion(value, key_.choices));
+    return false;
   }
 
   std::optional<std::string> read_text(const toml::node& node) {
@@ -111,10 +119,7 @@ class NodeReader {
     } else {
       return wrong_type(node, "a text");
     }
-    if (!key_.choices.empty() && std::find(key_.choices.begin(), key_.choices.end(), value) == key_.choices.end()) {
-      complain(node, "cannot be '" + value + "'", suggestion(value, key_.choices));
-      return {};
-    }
+    if (!chosen(node, value)) return {};
     return value;
   }
 

@@ -1,0 +1,127 @@
+#include "io/deck_build.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <numbers>
+
+#include "engine/placement.h"
+#include "io/deck_interactions.h"
+#include "io/validate_state.h"
+
+namespace carom {
+namespace {
+
+/// Velocities as given, or drawn for the species that have a temperature.
+template <int D>
+void give_velocities(const Deck::Source& source, System<D>& system) {
+  std::vector<Id> drawn;
+  std::vector<double> temperature;
+  Id id = 0;
+  for (const SpeciesConfig& species : source.species)
+    for (std::size_t n = 0; n < species.count; ++n, ++id) {
+      if (!species.velocity.empty()) system.particles.v[id] = Eigen::Map<const Vec<D>>(species.velocity[n].data());
+      if (!species.temperature) continue;
+      drawn.push_back(id);
+      temperature.push_back(*species.temperature);
+    }
+  draw_velocities<D>(system.particles, drawn, temperature, source.placement.seed);
+}
+
+/// Writes what was left to the initial state into the values of the deck, so that they say it themselves from now on.
+template <int D>
+void complete_values(Deck& deck, const System<D>& system) {
+  Deck::Source& source = *deck.source;
+  if (source.edges.empty()) {
+    source.edges.assign(system.box.edges.begin(), system.box.edges.end());
+    source.values.find("system")->values.insert_or_assign("box", source.edges);
+    source.values.find("placement")->values.erase("packing_fraction");
+  }
+  if (ValueTable* placement = source.values.find("placement"); placement != nullptr && !source.placement.file.empty())
+    placement->values.insert_or_assign("file", source.placement.file.string());
+  if (deck.plan.step == 0) {
+    deck.plan.step = default_epoch(system);
+    deck.integrator_parameters.set("step", deck.plan.step);
+    source.values.find("integrator")->values.insert_or_assign("step", deck.plan.step);
+  }
+  deck.toml_text = write_deck(source.values);
+}
+
+}  // namespace
+
+template <int D>
+void fill_system(const Deck::Source& source, System<D>& system) {
+  std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
+  if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
+  Particles<D>& all = system.particles;
+  for (const SpeciesConfig& species : source.species) {
+    const auto index = static_cast<std::uint16_t>(system.species.size());
+    system.species.push_back(species.name);
+    all.mass.insert(all.mass.end(), species.mass.begin(), species.mass.end());
+    all.radius.insert(all.radius.end(), species.radius.begin(), species.radius.end());
+    all.charge.insert(all.charge.end(), species.charge.begin(), species.charge.end());
+    all.species.insert(all.species.end(), species.count, index);
+  }
+  const std::size_t n = all.mass.size();
+  all.x.assign(n, Vec<D>::Zero());
+  all.v.assign(n, Vec<D>::Zero());
+  all.image.assign(n, Image<D>{});
+}
+
+template <int D>
+double default_epoch(const System<D>& system) {
+  const auto& p = system.particles;
+  const auto n = static_cast<double>(p.size());
+  double twice_kinetic = 0, mass = 0, diameter = 0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    twice_kinetic += p.mass[i] * p.v[i].squaredNorm();
+    mass += p.mass[i] / n;
+    diameter += 2 * p.radius[i] / n;
+  }
+  if (twice_kinetic == 0) return 1;
+  // Collision rate of one particle by Enskog's theory, contact value by Carnahan–Starling (3-D), Henderson (2-D).
+  const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));
+  const double density = n / system.box.volume(), filled = packing_fraction<D>(system.box.volume(), p.radius);
+  const double empty = std::max(1 - filled, 0.01);
+  const double contact_value =
+      D == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
+  const double cross_section = D == 2 ? 2 * diameter : 4 * diameter * diameter;
+  const double rate = density * cross_section * contact_value * std::sqrt(std::numbers::pi) * thermal_speed;
+  const double epoch = std::min(10 / rate, 10 * system.box.edges.maxCoeff() / thermal_speed);
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), epoch, std::chars_format::scientific, 1).ptr;
+  double rounded = epoch;
+  std::from_chars(text.data(), end, rounded);
+  return rounded;
+}
+
+template <int D>
+std::unique_ptr<System<D>> build_system(Deck& deck) {
+  const Deck::Source& source = *deck.source;
+  if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
+  auto system = std::make_unique<System<D>>();
+  fill_system(source, *system);
+  place_particles(source, *system);
+  system->wrap();
+  give_velocities(source, *system);
+
+  Problems problems;
+  make_interactions(source, {}, *system, problems);
+  problems.throw_errors(Failure::deck);
+  complete_values(deck, *system);
+  check_state(deck, *system, problems);
+  problems.throw_errors(Failure::initial_state);
+  warn_of_state(deck, *system, problems);
+  for (const std::string& warning : problems.warnings()) deck.warnings.push_back(warning);
+  return system;
+}
+
+#define CAROM_INSTANTIATE(D)                                  \
+  template void fill_system(const Deck::Source&, System<D>&); \
+  template double default_epoch(const System<D>&);            \
+  template std::unique_ptr<System<D>> build_system<D>(Deck&);
+CAROM_INSTANTIATE(2)
+CAROM_INSTANTIATE(3)
+#undef CAROM_INSTANTIATE
+
+}  // namespace carom

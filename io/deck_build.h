@@ -1,0 +1,25 @@
+#pragma once
+// The parts of build_system(): from the words of a deck to particles, box and interactions.
+
+#include "io/deck_source.h"
+
+namespace carom {
+
+/// Box (unit edges where the deck leaves them to the packing fraction), species, masses, radii and charges.
+template <int D>
+void fill_system(const Deck::Source& source, System<D>& system);
+
+/// Positions as [placement] says, for species given by count. Sets the box where the packing fraction does so.
+template <int D>
+void place_particles(const Deck::Source& source, System<D>& system);
+
+/// Positions from a table of numbers: `dimension` a line, separated by commas or blanks; # begins a comment, and the
+/// first line may be a heading. Throws Error(Failure::file) and DeckError.
+std::vector<std::vector<double>> read_positions(const std::filesystem::path& file, std::size_t dimension);
+
+/// Ten mean free times of the fluid that the state would be (Enskog's theory), at most the time to cross the box ten
+/// times, rounded to two digits; 1 if nothing moves.
+template <int D>
+double default_epoch(const System<D>& system);
+
+}  // namespace carom

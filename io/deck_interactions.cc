@@ -1,0 +1,112 @@
+#include "io/deck_interactions.h"
+
+#include <algorithm>
+
+#include "io/deck_build.h"
+#include "io/deck_interpret.h"
+#include "io/deck_species.h"
+
+namespace carom {
+namespace {
+
+void ids_exist(const Deck::Source& source, const ValueTable& table, Problems& problems) {
+  const std::size_t n = source.particles();
+  table.each_key([&](const Key& key) {
+    const auto* pairs = table.find<PairList>(key.name);
+    if (pairs == nullptr) return;
+    for (const auto& pair : *pairs) {
+      const std::string text = "[" + std::to_string(pair[0]) + ", " + std::to_string(pair[1]) + "]";
+      for (const std::uint32_t id : pair)
+        if (id >= n)
+          problems.error(table.place(key.name),
+                         "pair " + text + " names particle " + std::to_string(id) + ", which is not there",
+                         "there are " + count_of(n, "particle") + ", with ids from 0");
+      if (pair[0] == pair[1])
+        problems.error(table.place(key.name), "pair " + text + " joins a particle to itself", "name two particles");
+    }
+  });
+}
+
+void species_exist(const Deck::Source& source, const ValueTable& table, Problems& problems) {
+  const auto* named = table.find<std::vector<std::string>>("species");
+  if (named == nullptr) return;
+  std::vector<std::string> known;
+  for (const SpeciesConfig& species : source.species) known.push_back(species.name);
+  for (const std::string& name : *named)
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      problems.error(table.place("species"), "unknown species '" + name + "'", suggestion(name, known));
+}
+
+/// Whether enough is known of the particles and the box to make interactions for them.
+bool ready(const Deck::Source& source, std::size_t dimension) {
+  const bool box = dimension != 0 && source.boundary.size() == dimension &&
+                   (source.edges.empty() || source.edges.size() == dimension);
+  return box && std::all_of(source.species.begin(), source.species.end(), [](const SpeciesConfig& s) {
+           return s.count > 0 && s.mass.size() == s.count && s.radius.size() == s.count && s.charge.size() == s.count;
+         });
+}
+
+template <int D>
+void try_interactions(const Deck::Source& source, const std::vector<bool>& skip, Problems& problems) {
+  System<D> system;
+  fill_system(source, system);
+  make_interactions(source, skip, system, problems);
+}
+
+}  // namespace
+
+void read_interactions(Deck::Source& source, std::size_t dimension, Problems& problems) {
+  std::vector<bool> wrong;
+  for (const ValueTable& table : source.values.list("interaction")) {
+    if (table.variant == nullptr) continue;
+    const std::size_t before = problems.errors();
+    InteractionConfig config;
+    config.at = table.at;
+    config.parameters = parameters_of(table);
+    for (const InteractionInfo& info : interactions())
+      if (info.name == table.variant->name) config.info = &info;
+    bool complete = true;
+    table.each_key([&](const Key& key) {
+      if ((key.required() || table.given(key.name)) && table.values.find(key.name) == table.values.end())
+        complete = false;
+    });
+    ids_exist(source, table, problems);
+    species_exist(source, table, problems);
+    wrong.push_back(!complete || problems.errors() > before);
+    source.interactions.push_back(std::move(config));
+  }
+  if (!ready(source, dimension)) return;
+  if (dimension == 2)
+    try_interactions<2>(source, wrong, problems);
+  else
+    try_interactions<3>(source, wrong, problems);
+}
+
+template <int D>
+void make_interactions(const Deck::Source& source, const std::vector<bool>& skip, System<D>& system,
+                       Problems& problems) {
+  for (std::size_t n = 0; n < source.interactions.size(); ++n) {
+    const InteractionConfig& config = source.interactions[n];
+    if (n < skip.size() && skip[n]) continue;
+    try {
+      auto term = config.info->make<D>(config.parameters, {system.box, system.particles, system.species});
+      if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
+        problems.error(
+            config.at,
+            std::string(source.integrator->name) + " cannot carry the interaction '" + std::string(config.info->name) +
+                "'",
+            "it knows no forces but a uniform-field; leave the interaction out, or take psa, cva, mcva or cdda");
+      system.interactions.push_back(std::move(term));
+    } catch (const Error& e) {  // its message has the form "what; what to do"
+      const std::string message = e.what();
+      const std::size_t cut = std::min(message.find("; "), message.size());
+      problems.error(config.at, message.substr(0, cut),
+                     cut < message.size() ? message.substr(cut + 2) : "see `carom schema`");
+    }
+  }
+}
+
+template void make_interactions(const Deck::Source&, const std::vector<bool>&, System<2>&, Problems&);
+template void make_interactions(const Deck::Source&, const std::vector<bool>&, System<3>&, Problems&);
+
+}  // namespace carom

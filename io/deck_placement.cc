@@ -1,0 +1,134 @@
+// Where the particles stand at the start.
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+
+#include "engine/placement.h"
+#include "io/deck_build.h"
+
+namespace carom {
+namespace {
+
+/// The numbers of one line; nothing if there is anything else in it.
+std::optional<std::vector<double>> numbers(std::string line) {
+  line = line.substr(0, line.find('#'));
+  std::vector<double> found;
+  std::size_t at = 0;
+  constexpr const char* separators = ",; \t\r";
+  while ((at = line.find_first_not_of(separators, at)) != std::string::npos) {
+    const std::size_t end = std::min(line.find_first_of(separators, at), line.size());
+    const char* first = line.data() + at + (line[at] == '+' ? 1 : 0);
+    double value = 0;
+    const auto [stop, failed] = std::from_chars(first, line.data() + end, value);
+    if (failed != std::errc{} || stop != line.data() + end) return {};
+    found.push_back(value);
+    at = end;
+  }
+  return found;
+}
+
+template <int D>
+void place_from_file(const Deck::Source& source, const std::vector<Id>& placed, System<D>& system) {
+  const auto positions = read_positions(source.placement.file, D);
+  if (positions.size() != placed.size()) {
+    Problems problems;
+    problems.error({source.placement.file.string()},
+                   "this file has " + std::to_string(positions.size()) + " positions for " +
+                       std::to_string(placed.size()) + " particles given by count",
+                   "give one line for each");
+    problems.throw_errors(Failure::deck);
+  }
+  for (std::size_t n = 0; n < placed.size(); ++n)
+    system.particles.x[placed[n]] = Eigen::Map<const Vec<D>>(positions[n].data());
+}
+
+template <int D>
+void place_at_random(const Deck::Source& source, const std::vector<Id>& placed, System<D>& system) {
+  const auto& radius = system.particles.radius;
+  const std::size_t done = insert_at_random<D>(system.box, system.particles.x, radius, placed, source.placement.seed);
+  if (done == placed.size()) return;
+  const double wanted = packing_fraction<D>(system.box.volume(), radius);
+  Problems problems;
+  problems.error(
+      source.placement.at,
+      "random insertion found no place for sphere " + std::to_string(done + 1) + " of " +
+          std::to_string(placed.size()) + " (packing fraction wanted: " + std::to_string(wanted) + ")",
+      std::string("take a lattice, a larger box or fewer spheres; insertion jams at a packing fraction of ") +
+          (D == 2 ? "0.547" : "0.384"));
+  problems.throw_errors(Failure::initial_state);
+}
+
+/// Every species takes its sites in the order of their coordinates; which sites those are is drawn.
+template <int D>
+void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& system) {
+  std::vector<std::size_t> counts;
+  for (const SpeciesConfig& species : source.species) counts.push_back(species.count);
+  const auto& radius = system.particles.radius;
+  const double margin = *std::max_element(radius.begin(), radius.end());
+  const auto sites = lattice_sites(lattice, system.box, source.particles(), margin);
+  const std::vector<int> owner = distribute(sites.size(), counts, source.placement.seed);
+  Id id = 0;
+  for (std::size_t s = 0; s < counts.size(); ++s)
+    for (std::size_t site = 0; site < sites.size(); ++site)
+      if (owner[site] == static_cast<int>(s)) system.particles.x[id++] = sites[site];
+}
+
+}  // namespace
+
+std::vector<std::vector<double>> read_positions(const std::filesystem::path& file, std::size_t dimension) {
+  std::ifstream in(file);
+  if (!in || std::filesystem::is_directory(file))
+    throw Error(Failure::file, file.string() + ": error: cannot read the positions; check placement.file");
+  std::vector<std::vector<double>> positions;
+  Problems problems;
+  std::string line;
+  bool heading = true;
+  for (int number = 1; std::getline(in, line); ++number) {
+    const auto row = numbers(line);
+    const bool first = heading;
+    if (!row || !row->empty()) heading = false;
+    if ((row && row->empty()) || (!row && first)) continue;
+    const bool good = row && row->size() == dimension &&
+                      std::all_of(row->begin(), row->end(), [](double x) { return std::isfinite(x); });
+    if (!good)
+      problems.error({file.string(), number, 1}, "not a position",
+                     "give " + std::to_string(dimension) + " finite numbers, separated by commas or blanks");
+    else
+      positions.push_back(*row);
+  }
+  problems.throw_errors(Failure::deck);
+  return positions;
+}
+
+template <int D>
+void place_particles(const Deck::Source& source, System<D>& system) {
+  const PlacementConfig& placement = source.placement;
+  const bool centred = placement.type == "fcc" || placement.type == "hexagonal";
+  const Lattice lattice = centred ? Lattice::centred : Lattice::simple;
+  if (source.edges.empty()) {
+    const double filled = packing_fraction<D>(1, system.particles.radius);
+    system.box.edges = commensurate_edges<D>(lattice, source.particles(), filled / *placement.packing_fraction);
+  }
+  std::vector<Id> placed;
+  Id id = 0;
+  for (const SpeciesConfig& species : source.species)
+    for (std::size_t n = 0; n < species.count; ++n, ++id) {
+      if (species.placed)
+        placed.push_back(id);
+      else
+        system.particles.x[id] = Eigen::Map<const Vec<D>>(species.position[n].data());
+    }
+  if (placed.empty()) return;
+  if (placement.type == "file")
+    place_from_file(source, placed, system);
+  else if (placement.type == "random")
+    place_at_random(source, placed, system);
+  else
+    place_on_lattice(source, lattice, system);
+}
+
+template void place_particles(const Deck::Source&, System<2>&);
+template void place_particles(const Deck::Source&, System<3>&);
+
+}  // namespace carom

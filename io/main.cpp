@@ -1,0 +1,90 @@
+// The `carom` command.
+//
+//   carom run inputs/five-springs.toml --set integrator.step=0.02 -o runs/trial
+//   carom validate DECK     carom schema --markdown     carom methods     carom info FILE     carom --version
+//
+// Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75 stopped
+// early.
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "engine/error.h"
+#include "io/command.h"
+#include "io/info.h"
+#include "io/options.h"
+#include "io/run.h"
+
+namespace {
+
+constexpr int usage_error = 2;
+constexpr int internal_error = 70;  // EX_SOFTWARE: a fault of the program, not of the deck
+
+/// Each --set takes one value; what has commas or brackets in it is not split.
+void add_set(CLI::App& command, std::vector<std::string>& set) {
+  command.add_option("--set", set, "Change a value of the deck: table.key=value, list.0.key=value; may be repeated")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+}
+
+int carom_main(int argc, char** argv) {
+  // 1. What can be asked.
+  CLI::App app{"Carom: event-driven molecular dynamics with smooth forces"};
+  app.set_version_flag("--version", carom::version_page, "Version, git hash, compiler, flags, library versions");
+  app.require_subcommand(1);
+
+  carom::RunOptions options;
+  CLI::App& run = *app.add_subcommand("run", "Run a deck");
+  run.add_option("deck", options.deck, "The deck (TOML)")->required()->type_name("DECK");
+  add_set(run, options.set);
+  run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")->type_name("DIR");
+  const auto wall_time = [&](const std::string& text) {
+    options.max_wall_seconds = carom::wall_seconds(text);
+    if (!options.max_wall_seconds) throw CLI::ValidationError("--max-wall", "'" + text + "' is not hh:mm:ss");
+  };
+  run.add_option_function<std::string>("--max-wall", wall_time, "Stop after this wall time with exit code 75")
+      ->type_name("HH:MM:SS");
+  run.add_flag("--quiet", options.quiet, "No banner and no progress line");
+
+  std::filesystem::path deck, file;
+  std::vector<std::string> set;
+  CLI::App& validate = *app.add_subcommand("validate", "Parse, check, build the initial state, say what would run");
+  validate.add_option("deck", deck, "The deck (TOML)")->required()->type_name("DECK");
+  add_set(validate, set);
+
+  bool markdown = false;
+  CLI::App& schema = *app.add_subcommand("schema", "Every key of a deck: type, unit, default, meaning");
+  schema.add_flag("--markdown", markdown, "As Markdown");
+  CLI::App& methods =
+      *app.add_subcommand("methods", "Every integrator: order, conserved quantities, parameters, source");
+  CLI::App& info = *app.add_subcommand("info", "What is in a trajectory");
+  info.add_option("file", file, "The file")->required()->type_name("FILE");
+
+  // 2. What is asked.
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : usage_error;
+  }
+
+  // 3. Do it.
+  if (run.parsed()) return carom::run_command(options);
+  if (validate.parsed()) return carom::validate_command(deck, set);
+  if (schema.parsed()) return carom::schema_command(markdown);
+  if (methods.parsed()) return carom::methods_command();
+  return carom::info_command(file);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return carom_main(argc, argv);
+  } catch (const carom::Error& e) {
+    std::cerr << e.what() << '\n';
+    return e.exit_code();
+  } catch (const std::exception& e) {
+    std::cerr << "internal error: " << e.what() << '\n';
+    return internal_error;
+  }
+}

@@ -1,0 +1,152 @@
+#include "io/validate_state.h"
+
+#include <algorithm>
+#include <numbers>
+#include <sstream>
+
+#include "engine/placement.h"
+#include "engine/random.h"
+
+namespace carom {
+namespace {
+
+/// Text with enough digits to tell a distance from a contact distance.
+template <class... Items>
+std::string say(const Items&... items) {
+  std::ostringstream text;
+  text.precision(15);
+  (text << ... << items);
+  return text.str();
+}
+
+std::string plural(std::size_t n, const std::string& one, const std::string& many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+/// Where the deck says the positions of this particle.
+const Place& place_of(const Deck::Source& source, std::uint16_t species) {
+  const SpeciesConfig& config = source.species[species];
+  return config.placed ? source.placement.at : config.at;
+}
+
+template <int D>
+void check_box(const Deck::Source& source, const System<D>& system, Problems& problems) {
+  const auto& radius = system.particles.radius;
+  const double diameter = 2 * *std::max_element(radius.begin(), radius.end());
+  for (int k = 0; k < D; ++k) {
+    const double edge = system.box.edges[k];
+    if (!system.box.periodic(k) || edge >= diameter - contact_tolerance(system.box, diameter)) continue;
+    problems.error(source.box,
+                   say("the periodic box is ", edge, " long on axis ", k, ", less than a diameter of ", diameter),
+                   "enlarge the box; a sphere must not touch itself");
+  }
+  if (const double filled = packing_fraction<D>(system.box.volume(), radius); filled > 1 && closed(system.box))
+    problems.error(source.box, say("the spheres fill ", filled, " of the box"),
+                   "enlarge the box or take fewer spheres");
+}
+
+template <int D>
+void check_spheres(const Deck::Source& source, const System<D>& system, Problems& problems) {
+  const Particles<D>& p = system.particles;
+  if (const Outsiders out = find_outsiders<D>(system.box, p.x, p.radius); out.spheres > 0)
+    problems.error(place_of(source, p.species[out.worst]),
+                   say(plural(out.spheres, "sphere is", "spheres are"), " not inside the walls; the worst is particle ",
+                       out.worst, ", which reaches ", out.depth, " beyond a wall of axis ", out.axis),
+                   "move it inside (at least a radius from every wall), or enlarge the box");
+  if (const Overlaps overlaps = find_overlaps<D>(system.box, p.x, p.radius); overlaps.pairs > 0)
+    problems.error(place_of(source, p.species[overlaps.hi]),
+                   say(plural(overlaps.pairs, "pair of spheres overlaps", "pairs of spheres overlap"),
+                       "; the worst is particles ", overlaps.lo, " and ", overlaps.hi, " at distance ",
+                       overlaps.distance, ", contact distance ", overlaps.contact),
+                   "move them apart, make the radii smaller or the box larger");
+}
+
+}  // namespace
+
+template <int D>
+bool closed(const Box<D>& box) {
+  return std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) == box.boundary.end();
+}
+
+template <int D>
+void check_state(const Deck& deck, const System<D>& system, Problems& problems) {
+  const Deck::Source& source = *deck.source;
+  if (!source.integrator->hard_cores) return;
+  check_box(source, system, problems);
+  if (problems.errors() == 0) check_spheres(source, system, problems);
+}
+
+template <int D>
+double shortest_period(const System<D>& system) {
+  const Particles<D>& p = system.particles;
+  const std::size_t n = p.size();
+  std::vector<Vec<D>> u(n), w(n), force(n);
+  for (Id i = 0; i < n; ++i) {
+    RandomStream random(0, RandomPurpose::probe, i);
+    for (int k = 0; k < D; ++k) u[i][k] = random.uniform() - 0.5;
+  }
+  double curvature = 0;
+  for (int round = 0; round < 40; ++round) {
+    double norm = 0;
+    for (const Vec<D>& part : u) norm += part.squaredNorm();
+    for (std::size_t i = 0; i < n; ++i) {
+      w[i] = u[i] / std::sqrt(norm * p.mass[i]);
+      force[i].setZero();
+    }
+    for (const auto& term : system.interactions) term->add_hessian_product(p.x, w, force);
+    double stretched = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      u[i] = force[i] / std::sqrt(p.mass[i]);
+      stretched += u[i].squaredNorm();
+    }
+    curvature = std::sqrt(stretched);
+    if (!(curvature > 0)) return std::numeric_limits<double>::infinity();
+  }
+  return 2 * std::numbers::pi / std::sqrt(curvature);
+}
+
+template <int D>
+void warn_of_state(const Deck& deck, const System<D>& system, Problems& problems) {
+  const Deck::Source& source = *deck.source;
+  const Box<D>& box = system.box;
+  const bool walls = std::find(box.boundary.begin(), box.boundary.end(), Boundary::wall) != box.boundary.end();
+  if (!source.integrator->hard_cores && walls)
+    problems.warning(source.system, "walls do not act with " + deck.integrator + ", which knows no hard cores",
+                     "make the boundary open or periodic, or take another integrator");
+
+  const double close_packing = D == 2 ? std::numbers::pi / std::sqrt(12.0) : std::numbers::pi / std::sqrt(18.0);
+  const double filled = packing_fraction<D>(box.volume(), system.particles.radius);
+  if (source.integrator->hard_cores && closed(box) && filled > close_packing)
+    problems.warning(source.box,
+                     say("packing fraction ", filled, " is beyond close packing of equal spheres, ", close_packing),
+                     "check box and radii");
+
+  double shortest = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < D; ++k)
+    if (box.periodic(k)) shortest = std::min(shortest, box.edges[k]);
+  for (const InteractionConfig& config : source.interactions)
+    if (config.parameters.has("cutoff") && config.parameters.real("cutoff") > shortest / 2)
+      problems.warning(config.at,
+                       say("cutoff ", config.parameters.real("cutoff"), " is more than half the box, ", shortest / 2),
+                       "particles meet several images of each other; enlarge the box");
+
+  constexpr std::uint64_t affordable = 500'000;  // pairs: below a second of work
+  std::uint64_t pairs = 0;
+  for (const auto& term : system.interactions) pairs += term->interacting_pairs(system.particles.x);
+  if (!source.integrator->stepping || system.interactions.empty() || pairs > affordable) return;
+  if (const double period = shortest_period(system); deck.plan.step > period / 10)
+    problems.warning(source.step,
+                     say("step ", deck.plan.step, " is long for the shortest period at the start, ", period),
+                     "a tenth of that period or less is usual");
+}
+
+#define CAROM_INSTANTIATE(D)                                           \
+  template bool closed(const Box<D>&);                                 \
+  template void check_state(const Deck&, const System<D>&, Problems&); \
+  template double shortest_period(const System<D>&);                   \
+  template void warn_of_state(const Deck&, const System<D>&, Problems&);
+CAROM_INSTANTIATE(2)
+CAROM_INSTANTIATE(3)
+#undef CAROM_INSTANTIATE
+
+}  // namespace carom
