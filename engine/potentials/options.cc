@@ -53,7 +53,7 @@ std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters&
     const auto at = std::ranges::find(known, name);
     if (at == known.end()) {
       std::string list;
-      for (const std::string& other : known) list += (list.empty() ? "'" : ", '") + other + "'";
+      for (const std::string& other : known) list.append(list.empty() ? "'" : ", '").append(other).append("'");
       refuse(type, "'species' names '" + name + "', which is not there; known species: " + list);
     }
     pair.push_back(static_cast<std::uint16_t>(at - known.begin()));
