@@ -42,6 +42,18 @@ void refuse(std::string_view type, const std::string& problem) {
   throw Error(Failure::deck, std::string(type) + ": " + problem);
 }
 
+namespace {
+
+std::uint16_t species_index(std::string_view type, const std::string& name, const std::vector<std::string>& known) {
+  const auto at = std::ranges::find(known, name);
+  if (at != known.end()) return static_cast<std::uint16_t>(at - known.begin());
+  std::string list;
+  for (const std::string& other : known) list.append(list.empty() ? "'" : ", '").append(other).append("'");
+  refuse(type, "'species' names '" + name + "', which is not there; known species: " + list);
+}
+
+}  // namespace
+
 std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters& parameters,
                                         const std::vector<std::string>& known) {
   if (!parameters.has("species")) return {};
@@ -49,15 +61,7 @@ std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters&
   if (names.size() != 2)
     refuse(type, "'species' has " + std::to_string(names.size()) + " entries; give the two species it acts between");
   std::vector<std::uint16_t> pair;
-  for (const std::string& name : names) {
-    const auto at = std::ranges::find(known, name);
-    if (at == known.end()) {
-      std::string list;
-      for (const std::string& other : known) list.append(list.empty() ? "'" : ", '").append(other).append("'");
-      refuse(type, "'species' names '" + name + "', which is not there; known species: " + list);
-    }
-    pair.push_back(static_cast<std::uint16_t>(at - known.begin()));
-  }
+  for (const std::string& name : names) pair.push_back(species_index(type, name, known));
   return pair;
 }
 
