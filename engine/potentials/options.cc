@@ -60,9 +60,7 @@ std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters&
   const auto& names = parameters.get<std::vector<std::string>>("species");
   if (names.size() != 2)
     refuse(type, "'species' has " + std::to_string(names.size()) + " entries; give the two species it acts between");
-  std::vector<std::uint16_t> pair;
-  for (const std::string& name : names) pair.push_back(species_index(type, name, known));
-  return pair;
+  return {species_index(type, names[0], known), species_index(type, names[1], known)};
 }
 
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles) {
