@@ -1,0 +1,58 @@
+"""A regression run that deviates must be noticed, and only then."""
+
+import copy
+import sys
+import pathlib
+
+import pytest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+
+import regression
+
+STORED = {
+    "platform": "g++ 12.2.0, x86_64", "sha256": "ab",
+    "values": {"steps": 10, "end_time": 1.0, "sphere_sphere": 3, "energy_final": 2.0, "energy_reference": 2.0,
+               "energy_error": 1e-3, "shadow_energy_error": None},
+    "state": {"x": [[0.0, 1.0], [2.0, 3.0]], "v": [[0.5, 0.5], [0.1, 0.2]]},
+}
+
+
+def changed(**changes):
+    """The stored result with some entries changed: platform, sha256, a value by its name, or x of particle 1."""
+    new = copy.deepcopy(STORED)
+    for name, value in changes.items():
+        if name == "x":
+            new["state"]["x"][1][0] += value
+        else:
+            (new if name in new else new["values"])[name] = value
+    return new
+
+
+def test_the_same_is_the_same():
+    assert regression.differences(STORED, changed()) == []
+
+
+@pytest.mark.parametrize("deviation", [
+    {"sha256": "cd"}, {"x": 1e-7}, {"steps": 11}, {"sphere_sphere": 4}, {"end_time": 1.0 + 1e-7},
+    {"energy_final": 2.0 + 1e-7}, {"energy_error": 1.01e-3}, {"shadow_energy_error": 1e-3}])
+def test_a_deviation_is_noticed(deviation):
+    assert len(regression.differences(STORED, changed(**deviation))) == 1
+
+
+def test_another_platform_may_round_otherwise():
+    new = changed(platform="clang 19, aarch64", sha256="cd", x=1e-12, end_time=1.0 + 1e-12, energy_error=1.0000001e-3)
+    assert regression.differences(STORED, new) == []
+    assert regression.differences(STORED, changed(platform="clang 19, aarch64", sha256="cd", x=1e-7)) != []
+
+
+def test_energy_errors_at_rounding_level_are_equal():
+    stored = copy.deepcopy(STORED)
+    stored["values"]["energy_error"] = 1e-15
+    assert regression.differences(stored, changed(energy_error=1.5e-12)) == []
+    assert regression.differences(stored, changed(energy_error=1e-11)) != []
+
+
+def test_every_deck_has_a_result():
+    decks = {deck.stem for deck in (regression.HERE / "decks").glob("*.toml")}
+    assert decks and decks == {result.stem for result in (regression.HERE / "results").glob("*.json")}
