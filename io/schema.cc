@@ -53,18 +53,7 @@ std::vector<Variant> interaction_variants() {
 
 std::vector<Variant> integrator_variants() {
   std::vector<Variant> all;
-  for (const IntegratorInfo& info : integrators()) {
-    Variant v = variant(info.name, info.parameters);
-    if (!info.stepping)  // without steps, `step` is the length of an epoch, and the initial state can tell a good one
-      for (Key& key : v.keys)
-        if (key.name == "step") {
-          key.fallback = "none";
-          key.meaning =
-              "length of an epoch, at whose ends all particles are brought to the same time; by default about "
-              "ten mean free times";
-        }
-    all.push_back(std::move(v));
-  }
+  for (const IntegratorInfo& info : integrators()) all.push_back(variant(info.name, info.parameters));
   return all;
 }
 

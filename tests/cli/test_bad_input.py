@@ -1,0 +1,291 @@
+"""Runs the real command on bad decks: each problem has its exit code, its place and its remedy."""
+
+import os
+import subprocess
+
+import pytest
+
+CAROM = os.environ["CAROM"]
+
+GOOD = """\
+format = 1
+title = "two discs"
+
+[system]
+dimension = 2
+box = [10.0, 10.0]
+boundary = ["wall", "wall"]
+
+[[particles]]
+name = "disc"
+position = [[2.0, 5.0], [5.0, 5.0]]
+velocity = [[1.0, 0.0], [0.0, 0.0]]
+radius = 0.5
+mass = 1.0
+
+[[interaction]]
+type = "harmonic-bond"
+pairs = [[0, 1]]
+stiffness = 1.0
+rest_length = 2.0
+
+[integrator]
+type = "cdda"
+step = 0.01
+
+[run]
+steps = 10
+"""
+
+FLUID = """\
+format = 1
+
+[system]
+dimension = 3
+box = [6.0, 6.0, 6.0]
+boundary = ["periodic", "periodic", "periodic"]
+
+[[particles]]
+name = "sphere"
+count = 64
+temperature = 1.0
+radius = 0.5
+
+[placement]
+type = "fcc"
+
+[integrator]
+type = "free-flight"
+
+[run]
+collisions = 10
+"""
+
+
+def carom(*arguments, cwd=None):
+    return subprocess.run([CAROM, *arguments], capture_output=True, text=True, timeout=60, cwd=cwd)
+
+
+def validate(tmp_path, text, *arguments):
+    (tmp_path / "deck.toml").write_text(text)
+    return carom("validate", "deck.toml", *arguments, cwd=tmp_path)
+
+
+def changed(old, new, deck=GOOD):
+    assert deck.count(old) == 1, f"{old!r} stands {deck.count(old)} times in the deck"
+    return deck.replace(old, new)
+
+
+def test_good_decks_are_valid(tmp_path):
+    for deck in (GOOD, FLUID):
+        answer = validate(tmp_path, deck)
+        assert (answer.returncode, answer.stderr) == (0, "")
+        assert "deck.toml: valid" in answer.stdout
+
+
+# name: (deck, line of the message, all of these in it)
+DECK_ERRORS = {
+    "malformed TOML": (changed("step = 0.01", "step = = 0.01"), 24, ["not valid TOML"]),
+    "TOML key twice": (changed("step = 0.01", "step = 0.01\nstep = 0.02"), 25, ["not valid TOML"]),
+    "unknown key": (
+        changed("radius = 0.5", "raduis = 0.5\nradius = 0.5"),
+        13, ["unknown key 'raduis'", "did you mean 'radius'?"]),
+    "unknown table": (
+        changed("[run]", "[outptu]\nevents = true\n[run]"),
+        26, ["unknown key 'outptu'", "did you mean 'output'?"]),
+    "wrong type": (
+        changed("steps = 10", 'steps = "ten"'),
+        27, ["'steps' has the wrong type: string", "give a positive integer"]),
+    "fraction for an integer": (changed("steps = 10", "steps = 10.5"), 27, ["'steps' has the wrong type", "integer"]),
+    "wrong type in a list": (changed("[[2.0, 5.0]", '[[2.0, "5"]'), 11, ["'position' has the wrong type: string"]),
+    "single table for a list": (changed("[[particles]]", "[particles]"), 9, ["write [[particles]]"]),
+    "missing key": (changed("step = 0.01\n", ""), 22, ["missing key 'step' in [integrator]", "positive number"]),
+    "missing position and count": (
+        changed("position = [[2.0, 5.0], [5.0, 5.0]]\nvelocity = [[1.0, 0.0], [0.0, 0.0]]\n", ""),
+        9, ["missing key 'position' or 'count'"]),
+    "missing box": (changed("box = [10.0, 10.0]\n", ""), 4, ["missing key 'box'", "packing_fraction"]),
+    "negative radius": (changed("radius = 0.5", "radius = -0.5"), 13, ["'radius' must be positive (is -0.5)"]),
+    "zero radius in a list": (changed("radius = 0.5", "radius = [0.5, 0]"), 13, ["'radius' must be positive (is 0)"]),
+    "zero mass": (changed("mass = 1.0", "mass = 0"), 14, ["'mass' must be positive (is 0)"]),
+    "zero step": (changed("step = 0.01", "step = 0.0"), 24, ["'step' must be positive (is 0)"]),
+    "negative step": (changed("step = 0.01", "step = -1"), 24, ["'step' must be positive (is -1)"]),
+    "infinite stiffness": (changed("stiffness = 1.0", "stiffness = inf"), 19, ["'stiffness' must be finite"]),
+    "position not a number": (changed("[[2.0, 5.0]", "[[nan, 5.0]"), 11, ["'position' must be finite (is nan)"]),
+    "unknown integrator": (changed('"cdda"', '"cddaa"'), 23, ["unknown integrator 'cddaa'", "did you mean 'cdda'?"]),
+    "unknown interaction": (
+        changed('"harmonic-bond"', '"harmonic-bnd"'),
+        17, ["unknown interaction 'harmonic-bnd'", "did you mean 'harmonic-bond'?"]),
+    "unknown placement": (changed('"fcc"', '"fc"', FLUID), 15, ["unknown placement 'fc'", "did you mean 'fcc'?"]),
+    "unknown boundary": (
+        changed('["wall", "wall"]', '["wall", "periodical"]'),
+        7, ["'boundary' cannot be 'periodical'", "did you mean 'periodic'?"]),
+    "unknown order": (changed("step = 0.01", "step = 0.01\norder = 3"), 25, ["'order' cannot be '3'"]),
+    "boundary for too few axes": (
+        changed('["wall", "wall"]', '["wall"]'),
+        7, ["'boundary' has the wrong length (1)", "give 2"]),
+    "box of too many axes": (
+        changed("box = [10.0, 10.0]", "box = [10, 10, 10]"),
+        6, ["'box' has the wrong length (3)", "give 2"]),
+    "dimension 4": (changed("dimension = 2", "dimension = 4"), 5, ["'dimension' must be 2 or 3 (is 4)"]),
+    "format of the future": (changed("format = 1", "format = 2"), 1, ["unknown deck format 2"]),
+    "position in three dimensions": (
+        changed("[5.0, 5.0]]", "[5.0, 5.0, 5.0]]"),
+        11, ["vector 1 (from 0) of 'position' has 3 numbers", "asks for 2"]),
+    "too few velocities": (
+        changed("[[1.0, 0.0], [0.0, 0.0]]", "[[1.0, 0.0]]"),
+        12, ["'velocity' has 1 vector for 2 particles"]),
+    "too many masses": (changed("mass = 1.0", "mass = [1, 1, 1]"), 14, ["'mass' has 3 numbers for 2 particles"]),
+    "bond to a missing particle": (
+        changed("[[0, 1]]", "[[0, 2]]"),
+        18, ["names particle 2, which is not there", "there are 2 particles"]),
+    "bond to itself": (changed("[[0, 1]]", "[[1, 1]]"), 18, ["joins a particle to itself"]),
+    "bond of three": (changed("[[0, 1]]", "[[0, 1, 1]]"), 18, ["'pairs' has the wrong type"]),
+    "no bonds": (changed("pairs = [[0, 1]]\n", ""), 16, ["harmonic-bond: no bonds are given"]),
+    "run without end": (changed("steps = 10\n", ""), 26, ["[run] has no end", "end_time"]),
+    "negative end": (changed("steps = 10", "end_time = -1"), 27, ["'end_time' must be positive"]),
+    "count without placement": (
+        changed('[placement]\ntype = "fcc"\n', "", FLUID),
+        8, ["no [placement]", "simple-cubic"]),
+    "count without temperature": (changed("temperature = 1.0\n", "", FLUID), 8, ["missing key 'temperature'"]),
+    "box and packing fraction": (
+        changed('"fcc"', '"fcc"\npacking_fraction = 0.3', FLUID),
+        16, ["exclude each other"]),
+    "flat lattice in 3-D": (changed('"fcc"', '"square"', FLUID), 15, ["'square' is a lattice of 2 dimensions"]),
+    "gravity in a periodic box": (
+        changed("[integrator]\ntype = \"free-flight\"", '[[interaction]]\ntype = "gravity"\n[integrator]\ntype = "cva"\nstep = 0.1', FLUID),
+        17, ["gravity", "periodic", "boundaries"]),
+    "forces in free flight": (
+        changed("[integrator]", '[[interaction]]\ntype = "wca"\nepsilon = 1\nsigma = 1\n[integrator]', FLUID),
+        17, ["free-flight cannot carry the interaction 'wca'", "uniform-field"]),
+    "unknown species": (
+        changed("[integrator]", '[[interaction]]\ntype = "wca"\nepsilon = 1\nsigma = 1\nspecies = ["sphere", "spere"]\n[integrator]', FLUID),
+        21, ["unknown species 'spere'", "did you mean 'sphere'?"]),
+    "checkpoint time": (GOOD + '[output]\ncheckpoint_wall = "soon"\n', 29, ["'soon' is not a time", "hh:mm:ss"]),
+}
+
+
+@pytest.mark.parametrize("name", DECK_ERRORS)
+def test_deck_error(tmp_path, name):
+    deck, line, wanted = DECK_ERRORS[name]
+    answer = validate(tmp_path, deck)
+    messages = answer.stderr.splitlines()
+    found = [m for m in messages if m.startswith(f"deck.toml:{line}:") and all(w in m for w in wanted)]
+    assert found, f"no message at line {line} with {wanted} in:\n{answer.stderr}"
+    assert all(": error: " in m and "; " in m for m in messages)
+    assert answer.returncode == 2
+    assert answer.stdout == ""
+
+
+# name: (deck, all of these in the message)
+IMPOSSIBLE_STATES = {
+    "overlap": (
+        changed("[5.0, 5.0]]", "[2.8, 5.0]]"),
+        ["1 pair of spheres overlaps", "particles 0 and 1 at distance 0.8, contact distance 1"]),
+    "overlap through the boundary": (
+        changed('["wall", "wall"]', '["periodic", "wall"]').replace("[[2.0, 5.0], [5.0, 5.0]]", "[[0.25, 5.0], [9.5, 5.0]]"),
+        ["1 pair of spheres overlaps", "distance 0.75"]),
+    "lattice too dense": (
+        changed("box = [6.0, 6.0, 6.0]", "box = [3.6, 3.6, 3.6]", FLUID),
+        ["pairs of spheres overlap", "contact distance 1"]),
+    "outside a wall": (
+        changed("[[2.0, 5.0]", "[[0.25, 5.0]"),
+        ["1 sphere is not inside the walls", "particle 0", "0.25 beyond a wall of axis 0"]),
+    "periodic box too small": (
+        changed('["wall", "wall"]', '["wall", "periodic"]').replace("[10.0, 10.0]", "[10.0, 0.9]").replace("5.0]", "0.45]"),
+        ["the periodic box is 0.9 long on axis 1, less than a diameter of 1"]),
+    "more spheres than box": (
+        changed("box = [6.0, 6.0, 6.0]", "box = [2.0, 2.0, 2.0]", FLUID),
+        ["of the box", "enlarge the box"]),
+    "random insertion jams": (
+        changed('"fcc"', '"random"', FLUID).replace("count = 64", "count = 200"),
+        ["random insertion found no place for sphere", "of 200", "0.384"]),
+}
+
+
+@pytest.mark.parametrize("name", IMPOSSIBLE_STATES)
+def test_impossible_state(tmp_path, name):
+    deck, wanted = IMPOSSIBLE_STATES[name]
+    answer = validate(tmp_path, deck)
+    assert all(w in answer.stderr for w in wanted), answer.stderr
+    assert answer.stderr.startswith("deck.toml:")
+    assert answer.returncode == 3
+
+
+def test_every_problem_is_told_in_the_order_of_the_deck(tmp_path):
+    deck = GOOD.replace("radius = 0.5", "radius = -1").replace("step = 0.01", "step = 0").replace("[[0, 1]]", "[[0, 7]]")
+    messages = validate(tmp_path, deck).stderr.splitlines()
+    assert [m.split(":")[1] for m in messages] == ["13", "18", "24"]
+
+
+def test_touching_spheres_are_no_overlap(tmp_path):
+    assert validate(tmp_path, changed("[5.0, 5.0]]", "[3.0, 5.0]]")).returncode == 0
+
+
+def test_points_may_overlap(tmp_path):
+    deck = changed("[5.0, 5.0]]", "[2.8, 5.0]]").replace('"cdda"', '"verlet"').replace('["wall", "wall"]', '["open", "open"]')
+    answer = validate(tmp_path, deck)
+    assert (answer.returncode, answer.stderr) == (0, "")
+
+
+def test_warnings(tmp_path):
+    answer = validate(tmp_path, changed("stiffness = 1.0", "stiffness = 1e4"))
+    assert answer.returncode == 0
+    assert answer.stderr.startswith("deck.toml:24:8: warning: step 0.01 is long for the shortest period")
+
+
+SET_ERRORS = {
+    "zero step": ("integrator.step=0", "--set integrator.step: error: 'step' must be positive (is 0); "),
+    "unknown key": ("integrator.stp=1", "--set integrator.stp: error: unknown key 'stp' in [integrator]; did you mean 'step'?"),
+    "negative radius by index": ("particles.0.radius=-1", "--set particles.0.radius: error: 'radius' must be positive"),
+    "no such table": ("particles.3.radius=1", "--set particles.3.radius: error: there is no such table; "),
+    "no value": ("integrator.step", "--set integrator.step: error: no value; "),
+    "malformed value": ("system.box=[1, 2", "--set system.box: error: cannot read the value"),
+}
+
+
+@pytest.mark.parametrize("name", SET_ERRORS)
+def test_set_error(tmp_path, name):
+    override, message = SET_ERRORS[name]
+    answer = validate(tmp_path, GOOD, "--set", override)
+    assert answer.stderr.startswith(message)
+    assert answer.returncode == 2
+
+
+def test_positions_file(tmp_path):
+    deck = changed('type = "fcc"', 'type = "file"\nfile = "places.csv"', FLUID).replace("count = 64", "count = 2")
+    answer = validate(tmp_path, deck)
+    assert (answer.returncode, "places.csv" in answer.stderr) == (5, True)
+    (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n2.5 1 oops\n")
+    answer = validate(tmp_path, deck)
+    assert answer.returncode == 2
+    assert "places.csv:3:1: error: not a position; give 3 finite numbers" in answer.stderr
+    (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n")
+    answer = validate(tmp_path, deck)
+    assert answer.returncode == 2
+    assert "1 positions for 2 particles" in answer.stderr
+    (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n2.5 1 +1  # on the floor\n")
+    assert validate(tmp_path, deck).returncode == 0
+
+
+def test_unreadable_deck(tmp_path):
+    for path in ("nowhere.toml", "."):
+        answer = carom("validate", path, cwd=tmp_path)
+        assert answer.returncode == 5
+        assert "cannot read this deck" in answer.stderr
+
+
+@pytest.mark.parametrize("arguments", [[], ["frobnicate"], ["run"], ["validate"], ["validate", "a", "--bogus"], ["run", "a", "--max-wall", "soon"]])
+def test_usage(arguments):
+    answer = carom(*arguments)
+    assert answer.returncode == 2
+    assert answer.stderr != ""
+
+
+@pytest.mark.parametrize("arguments, wanted", [
+    (["--version"], "git"), (["--help"], "validate"), (["methods"], "Mol. Phys. 98"), (["schema"], "[[particles]]"),
+    (["schema", "--markdown"], "| `radius` |"),
+])
+def test_pages(arguments, wanted):
+    answer = carom(*arguments)
+    assert answer.returncode == 0
+    assert wanted in answer.stdout
