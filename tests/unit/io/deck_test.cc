@@ -1,0 +1,223 @@
+#include "io/deck.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <numbers>
+
+#include "engine/placement.h"
+#include "io/validate_state.h"
+
+namespace carom {
+namespace {
+
+/// A folder of this test's own with decks in it.
+class DeckTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::path(testing::TempDir()) / (std::string("carom-deck-") + info->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+
+  Deck read(const std::string& text, const std::vector<std::string>& set = {}) const {
+    return read_deck(write("deck.toml", text), set);
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+const std::string springs = R"(format = 1
+title = "a \"quoted\" title"
+description = """two
+lines"""
+[system]
+dimension = 2
+box = [10, 8.5]
+boundary = ["wall", "periodic"]
+[[particles]]
+name = "a"
+position = [[2, 5], [5, 5]]
+velocity = [[0.1, 0], [0, -0.3]]
+radius = [0.5, 0.25]
+[[particles]]
+name = "b"
+position = [[8, 5]]
+radius = 0.5
+mass = 2
+charge = -1
+[[interaction]]
+type = "harmonic-bond"
+pairs = [[0, 1], [1, 2]]
+stiffness = 3
+rest_length = 3.0
+[integrator]
+type = "cdda"
+step = 0.01
+[run]
+steps = 1e3
+)";
+
+const std::string fluid = R"(format = 1
+[system]
+dimension = 3
+boundary = ["periodic", "periodic", "periodic"]
+[[particles]]
+name = "small"
+count = 80
+temperature = 1.5
+radius = 0.4
+[[particles]]
+name = "large"
+count = 20
+temperature = 1.5
+radius = 0.5
+mass = 2.0
+[placement]
+type = "fcc"
+packing_fraction = 0.30
+seed = 7
+[integrator]
+type = "free-flight"
+[run]
+collisions = 1000
+)";
+
+template <int D>
+void expect_equal(const System<D>& a, const System<D>& b) {
+  EXPECT_EQ(a.box.edges, b.box.edges);
+  EXPECT_EQ(a.box.boundary, b.box.boundary);
+  EXPECT_EQ(a.species, b.species);
+  EXPECT_EQ(a.particles.x, b.particles.x);
+  EXPECT_EQ(a.particles.v, b.particles.v);
+  EXPECT_EQ(a.particles.mass, b.particles.mass);
+  EXPECT_EQ(a.particles.radius, b.particles.radius);
+  EXPECT_EQ(a.particles.charge, b.particles.charge);
+  EXPECT_EQ(a.particles.species, b.particles.species);
+  EXPECT_EQ(a.interactions.size(), b.interactions.size());
+}
+
+TEST_F(DeckTest, ReadsWhatItSays) {
+  Deck deck = read(springs);
+  EXPECT_EQ(deck.title, "a \"quoted\" title");
+  EXPECT_EQ(deck.description, "two\nlines");
+  EXPECT_EQ(deck.integrator, "cdda");
+  EXPECT_EQ(deck.integrator_parameters.real("step"), 0.01);
+  EXPECT_EQ(deck.integrator_parameters.integer("order"), 2);  // a default
+  EXPECT_EQ(deck.plan.step, 0.01);
+  EXPECT_EQ(deck.plan.steps, 1000);
+  EXPECT_FALSE(deck.plan.end_time);
+  EXPECT_EQ(deck.output.directory, "runs/deck");
+
+  const auto system = build_system<2>(deck);
+  const Particles<2>& p = system->particles;
+  EXPECT_EQ(system->box.edges, Vec<2>(10, 8.5));
+  EXPECT_EQ(system->box.boundary, (std::array{Boundary::wall, Boundary::periodic}));
+  EXPECT_EQ(p.x, (std::vector<Vec<2>>{{2, 5}, {5, 5}, {8, 5}}));
+  EXPECT_EQ(p.v, (std::vector<Vec<2>>{{0.1, 0}, {0, -0.3}, {0, 0}}));
+  EXPECT_EQ(p.radius, (std::vector<double>{0.5, 0.25, 0.5}));
+  EXPECT_EQ(p.mass, (std::vector<double>{1, 1, 2}));
+  EXPECT_EQ(p.charge, (std::vector<double>{0, 0, -1}));
+  EXPECT_EQ(p.species, (std::vector<std::uint16_t>{0, 0, 1}));
+}
+
+TEST_F(DeckTest, ResolvedDeckGivesTheSameRun) {
+  Deck deck = read(springs);
+  const auto system = build_system<2>(deck);
+  Deck again = read(deck.toml_text);
+  expect_equal(*system, *build_system<2>(again));
+  EXPECT_EQ(again.toml_text, deck.toml_text);
+  EXPECT_EQ(again.title, deck.title);
+  EXPECT_EQ(again.description, deck.description);
+  EXPECT_NE(deck.toml_text.find("charge = 0.0"), std::string::npos) << "defaults are written out";
+}
+
+TEST_F(DeckTest, ResolvedDeckKeepsWhatTheInitialStateDecided) {
+  Deck deck = read(fluid);
+  const auto system = build_system<3>(deck);
+  EXPECT_GT(deck.plan.step, 0);
+  Deck again = read(deck.toml_text);
+  EXPECT_EQ(again.plan.step, deck.plan.step);
+  EXPECT_EQ(again.integrator_parameters.real("step"), deck.plan.step);
+  expect_equal(*system, *build_system<3>(again));
+  EXPECT_EQ(again.toml_text, deck.toml_text);
+}
+
+TEST_F(DeckTest, PackingFractionAndTemperatureAreMet) {
+  Deck deck = read(fluid);
+  const auto system = build_system<3>(deck);
+  EXPECT_NEAR(packing_fraction<3>(system->box.volume(), system->particles.radius), 0.30, 1e-14);
+  double twice_kinetic = 0;
+  for (std::size_t i = 0; i < 100; ++i)
+    twice_kinetic += system->particles.mass[i] * system->particles.v[i].squaredNorm();
+  EXPECT_NEAR(twice_kinetic / 300, 1.5, 1e-14);
+  Deck other = read(fluid, {"placement.seed=8"});
+  EXPECT_NE(build_system<3>(other)->particles.v, system->particles.v);
+}
+
+TEST_F(DeckTest, EpochIsAboutTenMeanFreeTimes) {
+  // Equal spheres of diameter and temperature 1 at packing fraction 0.3: Enskog's rate is 10.1 collisions a unit time.
+  Deck deck = read(fluid, {"particles.0.radius=0.5", "particles.1.mass=1.0", "particles.0.temperature=1",
+                           "particles.1.temperature=1"});
+  build_system<3>(deck);
+  EXPECT_NEAR(deck.plan.step, 10 / 10.1, 0.02);
+  Deck at_rest = read(fluid, {"particles.0.temperature=0", "particles.1.temperature=0"});
+  build_system<3>(at_rest);
+  EXPECT_EQ(at_rest.plan.step, 1);
+}
+
+TEST_F(DeckTest, SetReplacesAndAdds) {
+  Deck deck = read(springs, {"integrator.type=cva", "run.end_time=2.5", "interaction.stiffness=7",
+                             "particles.1.mass=[4]", "output.events = true", "output.checkpoint_wall=00:05:00"});
+  EXPECT_EQ(deck.integrator, "cva");
+  EXPECT_EQ(deck.plan.end_time, 2.5);
+  EXPECT_TRUE(deck.plan.events);
+  EXPECT_EQ(deck.output.checkpoint_wall, "00:05:00");
+  EXPECT_NE(deck.toml_text.find("stiffness = 7.0"), std::string::npos);
+  EXPECT_EQ(build_system<2>(deck)->particles.mass[2], 4);
+}
+
+TEST_F(DeckTest, PeriodicPositionsAreWrappedAndRememberTheirImage) {
+  Deck deck = read(springs, {"particles.1.position=[[8, -3.5]]"});
+  const auto system = build_system<2>(deck);
+  EXPECT_EQ(system->particles.x[2], Vec<2>(8, 5));
+  EXPECT_EQ(system->particles.image[2], (Image<2>{0, -1}));
+}
+
+TEST_F(DeckTest, PositionsFromAFileGiveTheSameRunFromAnotherFolder) {
+  write("places.txt", "# two\n1.0 2.0 3.0\n\n4.5, 5, 6e0\n");
+  const std::vector<std::string> set{"particles.0.count=1", "particles.1.count=1", "placement.type=file",
+                                     "placement.file=places.txt", "placement.packing_fraction=0.001"};
+  Deck deck = read(fluid, set);
+  const auto system = build_system<3>(deck);
+  EXPECT_EQ(system->particles.x, (std::vector<Vec<3>>{{1, 2, 3}, {4.5, 5, 6}}));
+  std::filesystem::create_directories(deck.file.parent_path() / "elsewhere");
+  Deck again = read_deck(write("elsewhere/deck.toml", deck.toml_text), {});
+  expect_equal(*system, *build_system<3>(again));
+}
+
+TEST_F(DeckTest, ExplicitSpheresStandAmongRandomOnes) {
+  Deck deck = read(springs +
+                   "[[particles]]\nname = \"c\"\ncount = 12\ntemperature = 1\nradius = 0.5\n"
+                   "[placement]\ntype = \"random\"\n");
+  const auto system = build_system<2>(deck);
+  EXPECT_EQ(system->particles.x[1], Vec<2>(5, 5));
+  EXPECT_EQ(system->particles.v[1], Vec<2>(0, -0.3));
+  EXPECT_EQ(system->particles.size(), 15u);
+}
+
+TEST_F(DeckTest, ShortestPeriodOfOneBondIsThatOfItsOscillator) {
+  Deck deck = read(springs, {"interaction.0.pairs=[[1, 2]]"});
+  const auto system = build_system<2>(deck);
+  EXPECT_NEAR(shortest_period(*system), 2 * std::numbers::pi / std::sqrt(3 * (1 + 0.5)), 1e-12);
+}
+
+}  // namespace
+}  // namespace carom
