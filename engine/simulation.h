@@ -21,11 +21,11 @@ namespace carom {
 
 /// When a run ends and what it shows on the way. Of several ends the first reached counts; at least one is given.
 struct Plan {
-  double step = 0;                    ///< length of a slab [time], > 0
-  std::optional<std::int64_t> steps;  ///< number of slabs
-  std::optional<double> end_time;     ///< the last slab is shortened to meet it
+  double step = 0;                      ///< length of a slab [time], > 0
+  std::optional<std::int64_t> steps{};  ///< number of slabs
+  std::optional<double> end_time{};     ///< the last slab is shortened to meet it
   std::optional<std::uint64_t>
-      collisions;              ///< pair collisions; free flight stops exactly there, the others at the slab's end
+      collisions{};            ///< pair collisions; free flight stops exactly there, the others at the slab's end
   double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
   double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
   bool events = false;         ///< pass every contact on to the observers

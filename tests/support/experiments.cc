@@ -74,7 +74,14 @@ std::unique_ptr<System<2>> nine_gravity(unsigned start) {
   auto system = make_system<2>(
       {10, 10}, Boundary::wall,
       {{2.5, 2.5}, {5.0, 2.5}, {7.5, 2.5}, {2.5, 5.0}, {5.0, 5.0}, {7.5, 5.0}, {2.5, 7.5}, {5.0, 7.5}, {7.5, 7.5}},
-      {{0.2899, 0.2899}, {0, 0.52}, {-0.2616, 0.2616}, {0.61, 0}, {0, 0}, {-0.45, 0}, {0.4101, -0.4101}, {0, -0.33},
+      {{0.2899, 0.2899},
+       {0, 0.52},
+       {-0.2616, 0.2616},
+       {0.61, 0},
+       {0, 0},
+       {-0.45, 0},
+       {0.4101, -0.4101},
+       {0, -0.33},
        {-0.3465, -0.3465}});
   add_interaction(*system, "gravity", {{"constant", 1.0}});
   return perturbed(std::move(system), start);
@@ -85,19 +92,25 @@ std::unique_ptr<System<3>> bonded_cluster(unsigned start) {
       {8, 8, 8}, Boundary::wall, {{2.5, 4, 4}, {4, 2.4, 3.7}, {5.6, 4, 4.2}, {4, 5.5, 4}, {4.1, 4, 5.7}, {4, 4.2, 2.4}},
       {{0.9, 0.1, 0}, {0, 0.7, 0.3}, {-0.8, 0, 0.2}, {0.1, -0.9, 0}, {0, 0.2, -1.0}, {-0.1, 0, 0.6}},
       {0.5, 0.6, 0.4, 0.7, 0.55, 0.45}, {1.0, 2.0, 0.7, 3.0, 1.5, 0.9});
-  add_interaction(*system, "harmonic-bond",
-                  {{"pairs", PairList{{0, 1}, {1, 2}, {2, 3}, {0, 3}, {0, 4}, {1, 5}}},
-                   {"stiffness", 2.0},
-                   {"rest_length", 2.0}});
+  add_interaction(
+      *system, "harmonic-bond",
+      {{"pairs", PairList{{0, 1}, {1, 2}, {2, 3}, {0, 3}, {0, 4}, {1, 5}}}, {"stiffness", 2.0}, {"rest_length", 2.0}});
   return perturbed(std::move(system), start);
 }
 
 std::unique_ptr<System<3>> gravity_cluster(unsigned start) {
-  auto system = make_system<3>({8, 8, 8}, Boundary::wall,
-                               {{2, 2, 2}, {6, 2, 2.2}, {2, 6, 2}, {6, 6, 2}, {2, 2, 6}, {6, 2, 6}, {2.1, 6, 6}, {6, 6, 6}},
-                               {{0.2, 0.1, 0}, {-0.1, 0.2, 0.1}, {0.1, -0.2, 0}, {-0.2, 0, 0.1}, {0.1, 0.1, -0.2},
-                                {-0.2, 0.1, 0}, {0.1, -0.1, 0.1}, {0, -0.1, -0.1}},
-                               {0.5, 0.6, 0.4, 0.7, 0.55, 0.45, 0.5, 0.6}, {1.0, 2.0, 0.7, 3.0, 1.5, 0.9, 1.0, 1.2});
+  auto system =
+      make_system<3>({8, 8, 8}, Boundary::wall,
+                     {{2, 2, 2}, {6, 2, 2.2}, {2, 6, 2}, {6, 6, 2}, {2, 2, 6}, {6, 2, 6}, {2.1, 6, 6}, {6, 6, 6}},
+                     {{0.2, 0.1, 0},
+                      {-0.1, 0.2, 0.1},
+                      {0.1, -0.2, 0},
+                      {-0.2, 0, 0.1},
+                      {0.1, 0.1, -0.2},
+                      {-0.2, 0.1, 0},
+                      {0.1, -0.1, 0.1},
+                      {0, -0.1, -0.1}},
+                     {0.5, 0.6, 0.4, 0.7, 0.55, 0.45, 0.5, 0.6}, {1.0, 2.0, 0.7, 3.0, 1.5, 0.9, 1.0, 1.2});
   add_interaction(*system, "gravity", {{"constant", 1.0}});
   return perturbed(std::move(system), start);
 }
@@ -111,7 +124,7 @@ std::unique_ptr<System<D>> hard_spheres(int cells, double packing_fraction, unsi
   box.edges = commensurate_edges<D>(Lattice::centred, n, volume);
   box.boundary.fill(Boundary::periodic);
   auto x = lattice_sites<D>(Lattice::centred, box, n, 0.0);
-  if (x.size() != n) throw std::logic_error("the lattice is not commensurate");
+  x.resize(n);  // a hexagonal lattice may have a few sites too many
   auto system = make_system<D>(box.edges, Boundary::periodic, std::move(x), std::vector<Vec<D>>(n, Vec<D>::Zero()));
   std::vector<Id> all(n);
   for (Id i = 0; i < n; ++i) all[i] = i;
@@ -165,17 +178,17 @@ double fitted_order(const std::vector<double>& x, const std::vector<double>& y) 
   return (n * sxy - sx * sy) / (n * sxx - sx * sx);
 }
 
-#define CAROM_FOR_DIMENSION(D)                                                                                          \
-  template std::unique_ptr<System<D>> make_system<D>(const Vec<D>&, Boundary, std::vector<Vec<D>>, std::vector<Vec<D>>, \
-                                                     std::vector<double>, std::vector<double>);                         \
-  template void add_interaction<D>(System<D>&, const std::string&, const Given&);                                       \
-  template std::unique_ptr<System<D>> hard_spheres<D>(int, double, unsigned);                                           \
-  template std::unique_ptr<Simulation<D>> make_run<D>(std::unique_ptr<System<D>>, const std::string&, Plan,             \
-                                                      const Given&);                                                    \
-  template std::unique_ptr<Simulation<D>> run_steps<D>(std::unique_ptr<System<D>>, const std::string&, double,          \
-                                                       std::int64_t, const Given&);                                     \
-  template std::unique_ptr<Simulation<D>> run_until<D>(std::unique_ptr<System<D>>, const std::string&, double, double,  \
-                                                       const Given&);                                                   \
+#define CAROM_FOR_DIMENSION(D)                                                                                         \
+  template std::unique_ptr<System<D>> make_system<D>(const Vec<D>&, Boundary, std::vector<Vec<D>>,                     \
+                                                     std::vector<Vec<D>>, std::vector<double>, std::vector<double>);   \
+  template void add_interaction<D>(System<D>&, const std::string&, const Given&);                                      \
+  template std::unique_ptr<System<D>> hard_spheres<D>(int, double, unsigned);                                          \
+  template std::unique_ptr<Simulation<D>> make_run<D>(std::unique_ptr<System<D>>, const std::string&, Plan,            \
+                                                      const Given&);                                                   \
+  template std::unique_ptr<Simulation<D>> run_steps<D>(std::unique_ptr<System<D>>, const std::string&, double,         \
+                                                       std::int64_t, const Given&);                                    \
+  template std::unique_ptr<Simulation<D>> run_until<D>(std::unique_ptr<System<D>>, const std::string&, double, double, \
+                                                       const Given&);                                                  \
   template double largest_difference<D>(const std::vector<Vec<D>>&, const std::vector<Vec<D>>&);
 CAROM_FOR_DIMENSION(2)
 CAROM_FOR_DIMENSION(3)

@@ -1,0 +1,250 @@
+#include "engine/event_core.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "engine/collision.h"
+#include "engine/contact.h"
+#include "engine/error.h"
+#include "engine/forces.h"
+#include "tests/support/experiments.h"
+
+namespace carom {
+namespace {
+
+struct Hit {
+  double t;
+  EventKind kind;
+  Id lo, hi;
+};
+
+/// Event-driven dynamics the slow and obvious way: everybody is moved to every event, all pairs and images are tried.
+template <int D>
+std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g, double end) {
+  std::vector<Hit> hits;
+  double now = 0;
+  const int n = static_cast<int>(p.size());
+  for (;;) {
+    double best = end - now;
+    Hit next{};
+    Vec<D> best_shift = Vec<D>::Zero();
+    for (int i = 0; i < n; ++i) {
+      for (int j = i + 1; j < n; ++j) {
+        const double sigma = p.radius[i] + p.radius[j];
+        for (int code = 0; code < static_cast<int>(std::pow(5, D)); ++code) {
+          Image<D> image;
+          int digits = code;
+          bool allowed = true;
+          for (int k = 0; k < D; ++k, digits /= 5) {
+            image[k] = digits % 5 - 2;
+            allowed = allowed && (image[k] == 0 || box.periodic(k));
+          }
+          if (!allowed) continue;
+          const Vec<D> d = p.x[i] - p.x[j] + box.shift(image), v = p.v[i] - p.v[j];
+          const double b = d.dot(v), c = d.squaredNorm() - sigma * sigma, disc = b * b - v.squaredNorm() * c;
+          if (b >= 0 || disc <= 0) continue;
+          const double s = std::max(0.0, c / (std::sqrt(disc) - b));
+          if (s < best) best = s, next = {now + s, EventKind::pair, Id(i), Id(j)}, best_shift = box.shift(image);
+        }
+      }
+      for (int k = 0; k < D; ++k)
+        for (int side = 0; side < 2 && box.walled(k); ++side) {
+          const double sign = side == 0 ? 1 : -1,
+                       gap = side == 0 ? p.x[i][k] - p.radius[i] : box.edges[k] - p.radius[i] - p.x[i][k];
+          const double v = sign * p.v[i][k], a = sign * g[k];
+          double s = kNever;
+          if (a == 0)
+            s = v < 0 ? std::max(0.0, gap / -v) : kNever;
+          else if (const double disc = v * v - 2 * a * gap; disc > 0)  // the root where it moves towards the wall
+            s = (-v - std::sqrt(disc)) / a;
+          if (s < -1e-9 || (s < 1e-9 && v + a * s >= 0)) s = kNever;
+          if (s < best) best = s, next = {now + s, EventKind::wall, Id(i), Id(2 * k + side)};
+        }
+    }
+    for (int i = 0; i < n; ++i) {
+      p.x[i] += best * p.v[i] + 0.5 * best * best * g;
+      p.v[i] += best * g;
+    }
+    if (next.t == 0 && best == end - now) return hits;
+    now += best;
+    hits.push_back(next);
+    if (next.kind == EventKind::wall) {
+      p.v[next.lo][next.hi / 2] *= -1;
+    } else {
+      const Vec<D> d = p.x[next.lo] - p.x[next.hi] + best_shift;
+      const double f = collision_factor<D>(d, p.v[next.lo] - p.v[next.hi], p.mass[next.lo], p.mass[next.hi]);
+      p.v[next.lo] += f / p.mass[next.lo] * d;
+      p.v[next.hi] -= f / p.mass[next.hi] * d;
+    }
+  }
+}
+
+template <int D>
+std::unique_ptr<System<D>> random_spheres(int n, double edge, std::array<Boundary, D> boundary, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1), radius(0.2, 0.5), velocity(-1, 1);
+  std::vector<Vec<D>> x, v;
+  std::vector<double> r, m;
+  while (static_cast<int>(x.size()) < n) {
+    Vec<D> at, speed;
+    const double size = radius(random);
+    for (int k = 0; k < D; ++k) at[k] = size + uniform(random) * (edge - 2 * size), speed[k] = velocity(random);
+    bool free = true;
+    for (std::size_t j = 0; j < x.size(); ++j) {
+      Vec<D> d = at - x[j];
+      for (int k = 0; k < D; ++k) d[k] -= edge * std::nearbyint(d[k] / edge);
+      free = free && d.norm() > size + r[j];
+    }
+    if (!free) continue;
+    x.push_back(at), v.push_back(speed), r.push_back(size), m.push_back(0.5 + uniform(random));
+  }
+  auto system = test::make_system<D>(Vec<D>::Constant(edge), Boundary::open, x, v, r, m);
+  system->box.boundary = boundary;
+  return system;
+}
+
+template <int D>
+void expect_same_events(const System<D>& system, const Vec<D>& g, double end, std::size_t at_least) {
+  Counters counters;
+  std::vector<Contact<D>> contacts;
+  EventCore<D> core(system.box, system.particles);
+  core.load(system.particles, g, end);
+  core.run(end, {.counters = counters, .contacts = &contacts});
+  const auto obvious = obvious_run<D>(system.box, system.particles, g, end);
+  ASSERT_GE(obvious.size(), at_least);
+  ASSERT_EQ(contacts.size(), obvious.size());
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const auto& key = contacts[k].key;
+    EXPECT_NEAR(key.time, obvious[k].t, 1e-6) << "event " << k;  // rounding grows with every collision
+    EXPECT_EQ(key.kind, obvious[k].kind) << "event " << k;
+    EXPECT_EQ(key.lo, obvious[k].lo) << "event " << k;
+    EXPECT_EQ(key.hi, obvious[k].hi) << "event " << k;
+  }
+}
+
+constexpr Boundary W = Boundary::wall, P = Boundary::periodic, O = Boundary::open;
+
+TEST(EventCore, FindsTheEventsThatTryingEverythingFinds) {
+  expect_same_events<2>(*random_spheres<2>(8, 4, {P, P}, 1), Vec<2>::Zero(), 6, 20);
+  expect_same_events<2>(*random_spheres<2>(8, 4, {W, P}, 2), Vec<2>::Zero(), 6, 20);
+  expect_same_events<2>(*random_spheres<2>(9, 4, {W, W}, 3), Vec<2>::Zero(), 6, 20);
+  expect_same_events<2>(*random_spheres<2>(9, 4, {O, P}, 4), Vec<2>::Zero(), 6, 3);
+  expect_same_events<3>(*random_spheres<3>(10, 2.6, {P, P, P}, 5), Vec<3>::Zero(), 4, 20);
+  expect_same_events<3>(*random_spheres<3>(10, 3, {P, W, P}, 6), Vec<3>::Zero(), 4, 20);
+}
+
+TEST(EventCore, FindsThemInAUniformField) {
+  expect_same_events<2>(*random_spheres<2>(8, 5, {P, W}, 7), Vec<2>(0, -1), 5, 20);
+  expect_same_events<3>(*random_spheres<3>(8, 4, {W, P, W}, 8), Vec<3>(0.3, 0.5, -1), 4, 20);
+}
+
+TEST(EventCore, TwoSpheresInADiluteBoxMeetThroughAFarImage) {
+  // They part in a periodic box of 40 diameters and meet on the other side: the nearest image at the start is not it.
+  auto system = test::make_system<2>({40, 40}, P, {{10, 20}, {12, 20}}, {{-1, 0}, {1, 0}});
+  Counters counters;
+  std::vector<Contact<2>> contacts;
+  EventCore<2> core(system->box, system->particles);
+  core.load(system->particles, Vec<2>::Zero(), 50);
+  core.run(50, {.counters = counters, .contacts = &contacts});
+  ASSERT_GE(contacts.size(), 1u);
+  EXPECT_NEAR(contacts[0].key.time, (40 - 2 - 1) / 2.0, 1e-12);
+  EXPECT_EQ(std::abs(contacts[0].key.image[0]), 1);
+}
+
+TEST(EventCore, StoppingOnTheWayChangesNothing) {
+  auto system = test::hard_spheres<3>(3, 0.4);
+  const double end = 2;
+  auto records = [&](const std::vector<double>& stops) {
+    Counters counters;
+    EventCore<3> core(system->box, system->particles);
+    core.load(system->particles, Vec<3>::Zero(), end);
+    Particles<3> copies = system->particles;
+    for (double stop : stops) {
+      core.run(stop, {.counters = counters});
+      core.fly_to(stop, copies);
+    }
+    core.run(end, {.counters = counters});
+    core.fly_to(end, copies);
+    EXPECT_GT(counters.sphere_sphere, 300u);
+    return copies;
+  };
+  const auto plain = records({}), stopped = records({0.1, 0.100001, 0.7, 1.3, 1.9999});
+  EXPECT_EQ(plain.x, stopped.x);
+  EXPECT_EQ(plain.v, stopped.v);
+}
+
+TEST(EventCore, StopsAtTheCollisionLimit) {
+  auto system = test::hard_spheres<2>(6, 0.5);
+  Counters counters;
+  std::vector<Contact<2>> contacts;
+  EventCore<2> core(system->box, system->particles);
+  core.load(system->particles, Vec<2>::Zero(), 10);
+  const double reached = core.run(10, {.counters = counters, .contacts = &contacts, .collision_limit = 123});
+  EXPECT_EQ(counters.sphere_sphere, 123u);
+  EXPECT_EQ(reached, contacts.back().key.time);
+}
+
+TEST(EventCore, SimultaneousCollisionsOfALatticeKeepTheirOrder) {
+  // Discs on a square lattice with velocities ±1 along x: whole columns collide at one instant.
+  std::vector<Vec<2>> x, v;
+  for (int i = 0; i < 8; ++i)
+    for (int j = 0; j < 8; ++j) {
+      x.push_back({1.5 * i + 0.75, 1.5 * j + 0.75});
+      v.push_back({(i % 2) ? -1.0 : 1.0, 0.0});
+    }
+  auto system = test::make_system<2>({12, 12}, P, x, v);
+  Counters counters;
+  std::vector<Contact<2>> contacts;
+  EventCore<2> core(system->box, system->particles);
+  core.load(system->particles, Vec<2>::Zero(), 5);
+  core.run(5, {.counters = counters, .contacts = &contacts});
+  ASSERT_EQ(contacts.size() % 32, 0u);
+  ASSERT_GE(contacts.size(), 64u);
+  for (std::size_t k = 1; k < contacts.size(); ++k) EXPECT_LT(contacts[k - 1].key, contacts[k].key);
+}
+
+TEST(EventCore, NewtonsCradlePassesTheBlowThroughAChainInContact) {
+  auto system = test::make_system<2>({20, 4}, W, {{2, 2}, {6, 2}, {7, 2}, {8, 2}, {9, 2}},
+                                     {{1, 0}, {0, 0}, {0, 0}, {0, 0}, {0, 0}});
+  Counters counters;
+  std::vector<Contact<2>> contacts;
+  EventCore<2> core(system->box, system->particles);
+  core.load(system->particles, Vec<2>::Zero(), 5);
+  core.run(5, {.counters = counters, .contacts = &contacts});
+  Particles<2> p = system->particles;
+  core.fly_to(5, p);
+  ASSERT_EQ(contacts.size(), 4u);
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(contacts[k].key.time, 3.0);
+    EXPECT_EQ(contacts[k].key.generation, k == 0 ? 0u : k);
+    EXPECT_EQ(contacts[k].key.lo, k);
+  }
+  EXPECT_EQ(p.v[4], Vec<2>(1, 0));
+  EXPECT_EQ(p.x[4], Vec<2>(11, 2));
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(p.v[i], Vec<2>(0, 0));
+}
+
+TEST(EventCore, ASphereAtRestOnAWallUnderAFieldIsAnErrorThatNamesIt) {
+  auto system = test::make_system<2>({4, 4}, W, {{2, 0.5}}, {{0.3, 0}});
+  EventCore<2> core(system->box, system->particles);
+  try {
+    core.load(system->particles, Vec<2>(0, -1), 1);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.failure(), Failure::numerical);
+    EXPECT_NE(std::string(error.what()).find("particle 0 rests on the lower wall of axis 1"), std::string::npos);
+  }
+}
+
+TEST(EventCore, MoreEventsThanAllowedIsAnErrorThatNamesThePair) {
+  auto system = test::make_system<2>({6, 4}, W, {{1, 2}, {3, 2}}, {{1, 0}, {-1, 0}});
+  Counters counters;
+  EventCore<2> core(system->box, system->particles);
+  core.load(system->particles, Vec<2>::Zero(), 100);
+  EXPECT_THROW(core.run(100, {.counters = counters, .max_events = 10}), Error);
+}
+
+}  // namespace
+}  // namespace carom

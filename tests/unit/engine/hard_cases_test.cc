@@ -1,0 +1,166 @@
+// The cases in which plain codes hang, overlap or lose energy: contacts that rest, graze, come together or in chains.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/contact.h"
+#include "engine/error.h"
+#include "engine/placement.h"
+#include "tests/support/experiments.h"
+
+namespace carom {
+namespace {
+
+struct Method {
+  const char* name;
+  std::int64_t order = 2;
+  const char* variant = "grid";
+  double energy;  // the relative energy error it may make at step 0.01 in these cases
+};
+
+class HardCases : public testing::TestWithParam<Method> {
+ protected:
+  template <int D>
+  std::unique_ptr<Simulation<D>> run(std::unique_ptr<System<D>> system, double h, std::int64_t steps) {
+    return test::run_steps<D>(std::move(system), GetParam().name, h, steps,
+                              {{"order", GetParam().order}, {"variant", std::string(GetParam().variant)}});
+  }
+
+  template <int D>
+  void expect_sane(const Simulation<D>& run) {
+    const auto& s = run.statistics();
+    EXPECT_LE(s.max_energy_error, GetParam().energy * s.energy_reference);
+    EXPECT_LE(s.counters.max_overlap, 1e-12);
+    const auto& system = run.system();
+    EXPECT_EQ(find_overlaps<D>(system.box, system.particles.x, system.particles.radius).pairs, 0u);
+    EXPECT_EQ(find_outsiders<D>(system.box, system.particles.x, system.particles.radius).spheres, 0u);
+  }
+};
+
+std::unique_ptr<System<2>> gravitating(std::vector<Vec<2>> x, std::vector<Vec<2>> v) {
+  auto system = test::make_system<2>({12, 12}, Boundary::wall, std::move(x), std::move(v));
+  test::add_interaction(*system, "gravity", {{"constant", 1.0}});
+  return system;
+}
+
+TEST_P(HardCases, TwoTouchingSpheresAtRestStayTogether) {
+  auto result = run(gravitating({{5, 5}, {6, 5}}, {{0, 0}, {0, 0}}), 0.01, 500);
+  expect_sane(*result);
+  if (std::string(GetParam().name) == "psa") return;  // it kicks and lets them bounce, to first order
+  EXPECT_EQ(result->system().particles.x[0], Vec<2>(5, 5));
+  EXPECT_EQ(result->statistics().counters.sphere_sphere, 0u);
+}
+
+TEST_P(HardCases, APressedChainThatMovesAsOneKeepsMoving) {
+  auto result =
+      run(gravitating({{3, 5}, {4, 5}, {5, 5}, {6, 5}}, std::vector<Vec<2>>(4, Vec<2>(0.5, 0.25))), 0.01, 500);
+  expect_sane(*result);
+  if (std::string(GetParam().name) == "psa") return;
+  EXPECT_NEAR(result->system().particles.x[0][0], 5.5, 1e-11);
+  EXPECT_NEAR(result->system().particles.x[3][1], 6.25, 1e-11);
+}
+
+TEST_P(HardCases, ABlowIntoAChainAtRestPassesThrough) {
+  auto system =
+      test::make_system<2>({20, 4}, Boundary::wall, {{2, 2}, {6, 2}, {7, 2}, {8, 2}}, {{1, 0}, {0, 0}, {0, 0}, {0, 0}});
+  auto result = run(std::move(system), 0.01, 600);
+  expect_sane(*result);
+  EXPECT_NEAR(result->system().particles.x[3][0], 8 + 3, 1e-11);
+  EXPECT_EQ(result->statistics().counters.sphere_sphere, 3u);
+}
+
+TEST_P(HardCases, ThreeBodiesMeetAtOneInstant) {
+  // Three discs fall on a fourth from three sides at the same time, by symmetry.
+  const double s = std::sqrt(0.75);
+  auto result =
+      run(gravitating({{6, 6}, {8, 6}, {6 - 1, 6 + 2 * s}, {6 - 1, 6 - 2 * s}}, std::vector<Vec<2>>(4, Vec<2>::Zero())),
+          0.01, 400);
+  expect_sane(*result);
+  EXPECT_GE(result->statistics().counters.sphere_sphere, 6u);
+}
+
+TEST_P(HardCases, GrazingPairsUnderAttraction) {
+  // Pairs that pass at 1 ± a little: some of them touch in one step size and not in another.
+  for (double miss : {-1e-3, -1e-6, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 1e-6, 1e-3}) {
+    auto result = run(gravitating({{3, 5}, {9, 6.13 + miss}}, {{1, 0}, {-1, 0}}), 0.05, 300);
+    const auto& s = result->statistics();
+    EXPECT_LE(s.counters.max_overlap, 1e-12) << miss;
+    EXPECT_LE(s.max_energy_error, 25 * GetParam().energy * s.energy_reference)
+        << miss;  // the step is five times as long
+  }
+}
+
+TEST_P(HardCases, APairDrawnTogetherBouncesWithoutEndAndWithoutLoss) {
+  auto result = run(gravitating({{5, 6}, {7, 6}}, {{0, 0}, {0, 0}}), 0.01, 3000);
+  expect_sane(*result);
+  EXPECT_GT(result->statistics().counters.sphere_sphere, 5u);
+}
+
+TEST_P(HardCases, AContactAtTheVeryStartAndTheVeryEndOfAStep) {
+  // Contact at t = 1 exactly, a step end; then at the wall, also at a step end.
+  auto system = test::make_system<2>({8, 4}, Boundary::wall, {{2, 2}, {5, 2}}, {{1, 0}, {-1, 0}});
+  auto result = run(std::move(system), 0.25, 40);
+  expect_sane(*result);
+  EXPECT_NEAR(std::abs(result->system().particles.v[0][0]), 1, 1e-12);
+}
+
+TEST_P(HardCases, UnequalRadiiAndMassesInACornerUnderAField) {
+  auto system = test::make_system<3>(
+      {4, 4, 4}, Boundary::wall, {{0.8, 0.8, 0.8}, {2.5, 1, 1}, {1, 2.7, 1.2}, {1.3, 1.2, 2.9}},
+      {{0, 0, 0}, {-0.3, 0, 0}, {0, -0.4, 0.1}, {0.1, 0, -0.2}}, {0.8, 0.5, 0.3, 0.6}, {5, 1, 0.2, 2});
+  test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{-0.3, -0.2, -0.5}}});
+  auto result = run(std::move(system), 0.01, 2000);
+  const auto& s = result->statistics();
+  EXPECT_LE(s.counters.max_overlap, 1e-12);
+  // Spheres roll in the corner, with contacts much faster than the step: only the exact method is held to its order
+  // here.
+  if (std::string(GetParam().name) != "cdda") return;
+  EXPECT_LE(s.max_energy_error, GetParam().energy * s.energy_reference);
+}
+
+TEST_P(HardCases, ASmallPeriodicBoxMeetsItsOwnImages) {
+  auto system = test::make_system<2>({2.2, 2.3}, Boundary::periodic, {{0.6, 0.6}, {1.7, 1.7}}, {{1, 0.3}, {-0.7, 0.9}});
+  auto result = run(std::move(system), 0.01, 2000);
+  const auto& s = result->statistics();
+  EXPECT_GT(s.counters.sphere_sphere, 20u);
+  EXPECT_LE(s.counters.max_overlap, 1e-12);
+  EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);  // no forces: exact for every method
+  EXPECT_LE(*s.max_momentum_error, 1e-12);
+}
+
+TEST_P(HardCases, OneParticleAlone) {
+  auto system = test::make_system<3>({3, 3, 3}, Boundary::wall, {{1, 1, 1}}, {{1, 0.7, -0.3}});
+  auto result = run(std::move(system), 0.1, 500);
+  expect_sane(*result);
+  EXPECT_GT(result->statistics().counters.sphere_wall, 20u);
+}
+
+TEST_P(HardCases, MoreContactsThanAllowedNameTheParticles) {
+  auto system = test::make_system<2>({5, 4}, Boundary::wall, {{1, 2}, {3, 2}}, {{50, 0}, {-50, 0}});
+  try {
+    test::run_steps<2>(std::move(system), GetParam().name, 1.0, 1,
+                       {{"order", GetParam().order},
+                        {"variant", std::string(GetParam().variant)},
+                        {"max_events_per_step", std::int64_t{8}}});
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.failure(), Failure::numerical);
+    EXPECT_NE(std::string(error.what()).find("particle"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("max_events_per_step = 8"), std::string::npos) << error.what();
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, HardCases,
+                         testing::Values(Method{"psa", 2, "grid", 0.1}, Method{"cva", 2, "grid", 3e-3},
+                                         Method{"mcva", 2, "grid", 3e-3}, Method{"mcva", 2, "restart", 3e-3},
+                                         Method{"cdda", 2, "grid", 1e-13}, Method{"cdda", 4, "grid", 1e-13}),
+                         [](const auto& test) {
+                           std::string name = test.param.name;
+                           if (name == "mcva") name += std::string("_") + test.param.variant;
+                           if (name == "cdda") name += "_order_" + std::to_string(test.param.order);
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace carom

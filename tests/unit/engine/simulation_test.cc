@@ -1,0 +1,143 @@
+#include "engine/simulation.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "engine/error.h"
+#include "tests/support/experiments.h"
+
+namespace carom {
+namespace {
+
+/// Notes when it was shown what.
+template <int D>
+struct Notebook : Observer<D> {
+  void frame(const Snapshot<D>& shot) override { frames.push_back(shot.time), x.push_back(shot.particles->x); }
+  void thermo(const Snapshot<D>& shot) override { rows.push_back(shot.time), pressure.push_back(shot.pressure); }
+  void contacts(double start, std::span<const Contact<D>> all) override {
+    for (const auto& contact : all) {
+      if (contact.key.kind == EventKind::pair) ++pairs;
+      times.push_back(start + contact.key.time);
+    }
+  }
+  void progress(const Statistics& s) override { fraction = s.fraction_done; }
+  std::vector<double> frames, rows, pressure, times;
+  std::vector<std::vector<Vec<D>>> x;
+  std::uint64_t pairs = 0;
+  double fraction = 0;
+};
+
+TEST(Simulation, ShowsSlabEndsAtOrAfterTheirDueTimes) {
+  auto run = test::make_run<2>(test::five_springs(), "cva",
+                               {.step = 0.03, .steps = 40, .frame_interval = 0.5, .thermo_interval = 0.1});
+  Notebook<2> notes;
+  run->add(notes);
+  run->run();
+  ASSERT_EQ(notes.frames.size(), 4u);  // 0, 0.5 → 0.51, 1.0 → 1.02, and the end
+  EXPECT_DOUBLE_EQ(notes.frames[1], 0.51);
+  EXPECT_DOUBLE_EQ(notes.frames[2], 1.02);
+  EXPECT_DOUBLE_EQ(notes.frames[3], 1.2);
+  ASSERT_EQ(notes.rows.size(), 13u);
+  EXPECT_DOUBLE_EQ(notes.rows[1], 0.12);
+  EXPECT_DOUBLE_EQ(notes.rows.back(), 1.2);
+  EXPECT_DOUBLE_EQ(notes.fraction, 1.0);
+}
+
+TEST(Simulation, FreeFlightIsShownExactlyAtTheDueTimes) {
+  auto run = test::make_run<3>(test::hard_spheres<3>(2, 0.2), "free-flight",
+                               {.step = 1.0, .end_time = 2.5, .frame_interval = 0.4});
+  Notebook<3> notes;
+  run->add(notes);
+  run->run();
+  ASSERT_EQ(notes.frames.size(), 8u);
+  for (int k = 0; k < 7; ++k) EXPECT_DOUBLE_EQ(notes.frames[k], 0.4 * k);
+  EXPECT_DOUBLE_EQ(notes.frames[7], 2.5);
+}
+
+TEST(Simulation, ShortensTheLastStepToMeetTheEnd) {
+  const auto run = test::run_until<2>(test::five_springs(), "cdda", 0.04, 0.1);
+  EXPECT_EQ(run->statistics().steps, 3);
+  EXPECT_DOUBLE_EQ(run->statistics().end_time, 0.1);
+  const auto straight = test::run_until<2>(test::five_springs(), "cdda", 0.001, 0.1);
+  EXPECT_LT(test::largest_difference(run->system().particles.x, straight->system().particles.x), 1e-4);
+}
+
+TEST(Simulation, EndsAtTheFirstOfSeveralEnds) {
+  auto run = test::make_run<2>(test::five_springs(), "psa", {.step = 0.01, .steps = 50, .end_time = 100});
+  run->run();
+  EXPECT_EQ(run->statistics().steps, 50);
+}
+
+TEST(Simulation, FreeFlightEndsAtTheNthCollision) {
+  auto run =
+      test::make_run<3>(test::hard_spheres<3>(2, 0.3), "free-flight", {.step = 5, .collisions = 200, .events = true});
+  Notebook<3> notes;
+  run->add(notes);
+  run->run();
+  EXPECT_EQ(run->statistics().counters.sphere_sphere, 200u);
+  EXPECT_EQ(notes.pairs, 200u);
+  EXPECT_DOUBLE_EQ(run->statistics().end_time, notes.times.back());
+}
+
+TEST(Simulation, StopsWhenAsked) {
+  auto run = test::make_run<2>(test::five_springs(), "cva", {.step = 0.01, .steps = 1000});
+  int asked = 0;
+  run->run([&] { return ++asked > 7; });
+  EXPECT_TRUE(run->statistics().stopped_early);
+  EXPECT_EQ(run->statistics().steps, 7);
+}
+
+TEST(Simulation, ReportsEveryContactInOrder) {
+  for (const char* method : {"free-flight", "psa", "cva", "mcva", "cdda"}) {
+    auto system = std::string(method) == "free-flight" ? test::hard_spheres<2>(4, 0.4) : test::nine_gravity();
+    auto run = test::make_run<2>(std::move(system), method, {.step = 0.05, .steps = 150, .events = true});
+    Notebook<2> notes;
+    run->add(notes);
+    run->run();
+    const auto& counters = run->statistics().counters;
+    EXPECT_GT(notes.times.size(), 20u) << method;
+    EXPECT_EQ(notes.times.size(), counters.sphere_sphere + counters.sphere_wall) << method;
+    EXPECT_TRUE(std::ranges::is_sorted(notes.times)) << method;
+  }
+}
+
+TEST(Simulation, ObservingChangesNoBit) {
+  for (const char* method : {"free-flight", "psa", "cva", "mcva", "cdda"}) {
+    for (const char* variant : {"grid", "restart"}) {
+      if (std::string(variant) == "restart" && std::string(method) != "mcva") continue;
+      auto final_state = [&](double frames, double rows, bool events) {
+        auto system = std::string(method) == "free-flight" ? test::hard_spheres<2>(5, 0.5) : test::nine_gravity();
+        auto run = test::make_run<2>(
+            std::move(system), method,
+            {.step = 0.05, .steps = 200, .frame_interval = frames, .thermo_interval = rows, .events = events},
+            {{"variant", std::string(variant)}});
+        Notebook<2> notes;
+        run->add(notes);
+        run->run();
+        return std::pair(run->system().particles.x, run->system().particles.v);
+      };
+      const auto plain = final_state(0, 0, false);
+      EXPECT_EQ(plain, final_state(0.05, 0.013, true)) << method;
+      EXPECT_EQ(plain, final_state(0.37, 1.1, false)) << method;
+    }
+  }
+}
+
+TEST(Simulation, ForcesThatAreNotFiniteEndTheRun) {
+  auto system = test::make_system<2>({10, 10}, Boundary::wall, {{2, 2}, {2, 2}}, {{0, 0}, {0, 0}});
+  test::add_interaction(*system, "gravity", {{"constant", 1.0}});
+  EXPECT_THROW(test::run_steps<2>(std::move(system), "verlet", 0.1, 10), Error);
+}
+
+TEST(Simulation, RefusesAPlanWithoutEnd) {
+  EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0.1}), Error);
+  EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0, .steps = 1}), Error);
+}
+
+TEST(Simulation, FreeFlightRefusesForces) {
+  EXPECT_THROW(test::run_steps<2>(test::five_springs(), "free-flight", 0.1, 1), Error);
+}
+
+}  // namespace
+}  // namespace carom
