@@ -6,6 +6,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "engine/random.h"
+
 namespace carom {
 namespace {
 
@@ -106,8 +108,9 @@ TEST(Overlaps, AgreeWithAllPairsInEveryKindOfBox) {
       const auto box = box_of<3>(Vec<3>::Constant(edge), boundary);
       std::vector<Vec<3>> x;
       std::vector<double> radius;
-      for (int i = 0; i < 200; ++i) {  // a low-discrepancy scatter, some of it outside
-        const Vec<3> fraction{std::fmod(0.8191725 * i, 1), std::fmod(0.6710436 * i, 1), std::fmod(0.5497004 * i, 1)};
+      RandomStream random(1, RandomPurpose::probe, 0);
+      for (int i = 0; i < 200; ++i) {  // some of them outside
+        const Vec<3> fraction{random.uniform(), random.uniform(), random.uniform()};
         x.push_back((1.4 * fraction - Vec<3>::Constant(0.2)) * edge);
         radius.push_back(0.2 + 0.1 * (i % 6));
       }
