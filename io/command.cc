@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <iostream>
 #include <sstream>
 
@@ -38,13 +37,13 @@ std::string end_text(const Plan& plan) {
   return out.str();
 }
 
-/// Bytes a run of this size takes, roughly: the state and its copy for output, records, cells, queue and neighbours.
+/// Bytes a run of this size takes, roughly, as measured with the decks in inputs/.
 template <int D>
-double estimated_memory(std::size_t particles) {
+double estimated_memory(std::size_t particles, bool neighbour_lists) {
   constexpr double program = 30e6;  // libraries and MPI
   constexpr double state = (2 * D + 3) * sizeof(double) + D * sizeof(std::int32_t) + sizeof(std::uint16_t);
-  constexpr double engine = 1000;
-  return program + static_cast<double>(particles) * (2 * state + engine);
+  constexpr double events = 300, neighbours = 900;
+  return program + static_cast<double>(particles) * (2 * state + events + (neighbour_lists ? neighbours : 0));
 }
 
 template <int D>
@@ -65,7 +64,11 @@ int describe(Deck& deck) {
   std::cout << "integrator        " << deck.integrator << ", step " << deck.plan.step << '\n';
   std::cout << "ends at           " << end_text(deck.plan) << '\n';
   std::cout << "output            " << deck.output.directory.string() << '\n';
-  std::cout << "memory            about " << std::setprecision(2) << estimated_memory<D>(p.size()) / 1e6 << " MB\n";
+  const auto& terms = deck.source->interactions;
+  const bool lists = std::any_of(terms.begin(), terms.end(), [](const InteractionConfig& term) {
+    return term.info->kind == InteractionInfo::Kind::pair;
+  });
+  std::cout << "memory            about " << std::ceil(estimated_memory<D>(p.size(), lists) / 1e6) << " MB\n";
   return 0;
 }
 

@@ -79,16 +79,18 @@ TEST(Distribute, GivesEachGroupItsShareAndDependsOnTheSeed) {
 }
 
 TEST(RandomInsertion, PlacesUnequalSpheresWithoutOverlap) {
-  const auto box = box_of<2>(Vec<2>::Constant(12), Boundary::wall);
-  std::vector<double> radius(100, 0.3);
-  std::fill_n(radius.begin() + 50, 20, 0.8);
-  std::vector<Vec<2>> x(radius.size(), Vec<2>::Constant(6));  // the first one stands there already
-  std::vector<Id> who(radius.size() - 1);
-  std::iota(who.begin(), who.end(), 1);
-  ASSERT_EQ(insert_at_random<2>(box, x, radius, who, 5), who.size());
-  EXPECT_EQ(x[0], Vec<2>::Constant(6));
-  EXPECT_EQ(find_overlaps<2>(box, x, radius).pairs, 0u);
-  EXPECT_EQ(find_outsiders<2>(box, x, radius).spheres, 0u);
+  for (const Boundary boundary : {Boundary::wall, Boundary::periodic}) {
+    const auto box = box_of<2>(Vec<2>::Constant(12), boundary);
+    std::vector<double> radius(100, 0.3);
+    std::fill_n(radius.begin() + 50, 20, 0.8);
+    std::vector<Vec<2>> x(radius.size(), Vec<2>::Constant(6));  // the first one stands there already
+    std::vector<Id> who(radius.size() - 1);
+    std::iota(who.begin(), who.end(), 1);
+    ASSERT_EQ(insert_at_random<2>(box, x, radius, who, 5), who.size());
+    EXPECT_EQ(x[0], Vec<2>::Constant(6));
+    EXPECT_EQ(find_overlaps<2>(box, x, radius).pairs, 0u);
+    EXPECT_EQ(find_outsiders<2>(box, x, radius).spheres, 0u);
+  }
 }
 
 TEST(RandomInsertion, TellsHowFarItCame) {
