@@ -13,7 +13,7 @@ constexpr double kWorstContraction = 0.5;
 template <int D>
 DiscreteGradient<D>::DiscreteGradient(const System<D>& system, int order) : system_(system) {
   if (order == 4) {
-    const double gamma = 1 / (4 - std::cbrt(4.0));
+    constexpr double gamma = 0.41449077179437573714;  // 1/(4 − 4^{1/3})
     fractions_ = {gamma, gamma, 1 - 4 * gamma, gamma, gamma};
   } else {
     fractions_ = {1.0};
