@@ -59,11 +59,13 @@ struct EventWriter<D>::Contents {
   void write() {
     if (time.waiting.empty()) return;
     file.reserve(kRowBytes * time.waiting.size());
-    for (auto* column : {&time, &time_in_slab, &x_lo, &x_hi, &impulse}) column->write();
+    for (auto* column : {&time_in_slab, &x_lo, &x_hi, &impulse}) column->write();
     for (auto* column : {&generation, &lo, &hi}) column->write();
     slab.write();
     kind.write();
     image.write();
+    file.flush();
+    time.write();  // its length tells how many rows are whole, also after a kill in the middle of a batch
     file.flush();
   }
 

@@ -145,7 +145,6 @@ template <int D>
 void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   Contents& c = *contents_;
   c.file.reserve(c.frame_bytes());
-  c.position.value.append(three_columns<double>(s.particles->x, D));
   c.velocity.value.append(three_columns<double>(s.particles->v, D));
   c.image.value.append(three_columns<std::int32_t>(s.particles->image, D));
   c.edges.value.append(c.edge_rows);
@@ -158,6 +157,10 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   for (const auto& [name, value] : scalars) c.observables.at(name).value.append(value);
   c.time.append(s.time);
   c.step.append(s.step);
+  c.file.flush();
+  // Readers count the frames by the positions: these go in when all else is safe, so that a kill in the middle of a
+  // frame leaves no frame with holes.
+  c.position.value.append(three_columns<double>(s.particles->x, D));
   c.file.flush();
 }
 

@@ -10,7 +10,8 @@
 // boundary along z; the true dimension and boundaries stand in /parameters), box edges at every frame, every `step` and
 // `time` explicit and shared by hard links, texts of fixed length, observables without subgroups. Units are reduced:
 // there are no `unit` attributes, so readers must be told not to convert. Positions are wrapped; unwrapped position =
-// position + image · edge. Every frame is flushed: it survives the end of the process.
+// position + image · edge. Every frame is flushed: it
+// survives the end of the process; positions go in last, and their number is the number of whole frames.
 
 #include <filesystem>
 #include <memory>

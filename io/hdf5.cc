@@ -1,6 +1,8 @@
 #include "io/hdf5.h"
 
 #include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,16 +16,6 @@
 namespace carom::hdf5 {
 
 namespace {
-
-/// Stops HDF5 from printing to stderr and from working behind our back at exit.
-void quiet_library() {
-  static const bool once = [] {
-    H5dont_atexit();
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    return true;
-  }();
-  static_cast<void>(once);
-}
 
 /// The innermost entry of HDF5's error stack, or the operating system's words in it.
 std::string reason() {
@@ -51,6 +43,19 @@ std::string reason() {
                   "; check free space, quota and permissions there, or choose another directory with -o");
 }
 
+/// Has the file system set `length` bytes aside from `start` on, beyond the end of the file; returns 0 or an error
+/// number.
+int set_aside(int descriptor, std::uint64_t start, std::uint64_t length) {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && start + length > limit.rlim_cur) return EFBIG;
+  if (fallocate(descriptor, FALLOC_FL_KEEP_SIZE, static_cast<off_t>(start), static_cast<off_t>(length)) == 0) return 0;
+  if (errno != EOPNOTSUPP && errno != ENOSYS) return errno;
+  // A file system that cannot: at least look whether there is room now.
+  struct statvfs disk {};
+  if (fstatvfs(descriptor, &disk) != 0) return 0;
+  return disk.f_bavail * disk.f_frsize < length ? ENOSPC : 0;
+}
+
 Handle fixed_text_type(std::size_t length) {
   Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   H5Tset_size(type.id(), std::max<std::size_t>(length, 1));
@@ -73,6 +78,15 @@ std::pair<std::string, std::size_t> packed(const std::vector<std::string>& texts
 }
 
 }  // namespace
+
+void start_library() {
+  static const bool once = [] {
+    H5dont_atexit();
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    return true;
+  }();
+  static_cast<void>(once);
+}
 
 template <>
 hid_t native_type<double>() {
@@ -100,14 +114,14 @@ hid_t native_type<std::uint64_t>() {
 }
 
 File File::create(const std::filesystem::path& path) {
-  quiet_library();
+  start_library();
   const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   if (id < 0) throw_write_error(path, "create the file", reason());
   return {path, id, true};
 }
 
 File File::open(const std::filesystem::path& path) {
-  quiet_library();
+  start_library();
   const hid_t id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   if (id < 0) throw Error(Failure::file, path.string() + ": cannot read it as an HDF5 file: " + reason());
   return {path, id, false};
@@ -135,11 +149,9 @@ void File::reserve(std::uint64_t bytes) {
   void* descriptor = nullptr;
   check(H5Fget_vfd_handle(file_.id(), H5P_DEFAULT, &descriptor), "find the file's descriptor");
   const std::uint64_t length = bytes + 2 * kMetadata;
-  if (fallocate(*static_cast<int*>(descriptor), FALLOC_FL_KEEP_SIZE, static_cast<off_t>(size),
-                static_cast<off_t>(length)) == 0)
-    reserved_until_ = size + length;
-  else if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG || errno == EIO)
-    throw_write_error(path_, "write the next frame", std::strerror(errno));
+  if (const int error = set_aside(*static_cast<int*>(descriptor), size, length); error != 0)
+    throw_write_error(path_, "write more", std::strerror(error));
+  reserved_until_ = size + length;
 }
 
 void File::flush() { check(H5Fflush(file_.id(), H5F_SCOPE_LOCAL), "flush the file"); }

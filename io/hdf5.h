@@ -13,7 +13,7 @@
 // A file must stay readable up to its last flush when the disk fills up. HDF5 cannot promise that: a write that fails
 // in the middle of a flush leaves metadata half written. So reserve() has the file system set the room aside first
 // (fallocate beyond the end of the file): a full disk is met before HDF5 writes anything. Where the file system cannot
-// reserve, the failure is met in the flush.
+// do that, the free space is looked at instead.
 
 #include <hdf5.h>
 
@@ -25,6 +25,10 @@
 #include <vector>
 
 namespace carom::hdf5 {
+
+/// Starts the library: no printing to stderr, no work of its own when the process ends. To be called before MPI starts:
+/// otherwise HDF5 closes all files once more in MPI_Finalize, and crashes there if one could not be written.
+void start_library();
 
 /// Owns one identifier, closed by the function that belongs to its kind.
 class Handle {

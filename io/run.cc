@@ -11,6 +11,7 @@
 
 #include "engine/error.h"
 #include "io/deck.h"
+#include "io/hdf5.h"
 #include "io/log.h"
 #include "io/log_report.h"
 #include "io/output_directory.h"
@@ -110,6 +111,7 @@ int run_command(const RunOptions& options) {
   // A file that grows beyond its limit and a reader of stdout that goes away are errors to report, not reasons to die.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
+  hdf5::start_library();
   const Communicator ranks;
   return ranks.on_first([&] {
     Deck deck = read_deck(options.deck, options.set);

@@ -1,0 +1,126 @@
+"""What the tests of `carom run` share: small decks, ways to start the command, reading what it left."""
+
+import csv
+import json
+import os
+import pathlib
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+CAROM = os.environ.get("CAROM", "")
+needs_carom = pytest.mark.skipif(not CAROM, reason="needs the command: CAROM=build/release/io/carom")
+
+# Four discs joined by springs between hard walls: smooth forces, pair and wall collisions.
+SPRINGS = """
+format = 1
+title = "four discs on springs"
+[system]
+dimension = 2
+box = [9.0, 5.0]
+boundary = ["wall", "wall"]
+[[particles]]
+name = "disc"
+position = [[1.5, 2.5], [3.5, 2.5], [5.5, 2.6], [7.5, 2.5]]
+velocity = [[0.3, 0.1], [1.1, -0.4], [-0.9, 0.7], [0.2, -0.3]]
+radius = 0.5
+mass = [1.0, 2.0, 1.5, 1.0]
+[[interaction]]
+type = "harmonic-bond"
+pairs = [[0, 1], [1, 2], [2, 3]]
+stiffness = 1.0
+rest_length = 1.8
+[integrator]
+type = "cdda"
+step = 0.02
+[run]
+steps = 400
+[output]
+directory = "unused"
+frame_interval = 0.5
+thermo_interval = 0.1
+"""
+
+# Spheres in a periodic box: free flight in three dimensions.
+SPHERES = """
+format = 1
+title = "periodic hard spheres"
+[system]
+dimension = 3
+boundary = ["periodic", "periodic", "periodic"]
+[[particles]]
+name = "sphere"
+count = 108
+temperature = 1.0
+radius = 0.5
+[placement]
+type = "fcc"
+packing_fraction = 0.3
+seed = 7
+[integrator]
+type = "free-flight"
+[run]
+end_time = 3.0
+[output]
+directory = "unused"
+frame_interval = 0.5
+thermo_interval = 0.1
+"""
+
+
+def mpi_environment():
+    """The environment with the settings of tools/mpi-env.sh."""
+    lines = (ROOT / "tools" / "mpi-env.sh").read_text().splitlines()
+    settings = [line.removeprefix("export ").split("=", 1) for line in lines if line.startswith("export ")]
+    assert len(settings) == 5
+    return os.environ | dict(settings)
+
+
+def write_deck(directory, text):
+    path = pathlib.Path(directory) / "input.toml"
+    path.write_text(text)
+    return path
+
+
+def command(deck, output, overrides=(), arguments=("--quiet",)):
+    sets = [part for override in overrides for part in ("--set", override)]
+    return [CAROM, "run", str(deck), "-o", str(output), *sets, *arguments]
+
+
+def run(deck, output, overrides=(), arguments=("--quiet",), code=0, **options):
+    done = subprocess.run(command(deck, output, overrides, arguments), capture_output=True, text=True, timeout=120,
+                          **options)
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def summary(output):
+    return json.loads((output / "summary.json").read_text())
+
+
+def thermo(output):
+    with open(output / "thermo.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]} if rows else {}
+
+
+def data_sets(path):
+    """Every data set of an HDF5 file, by each of its names (h5py's visititems shows a hard-linked one once only)."""
+    def members(group, prefix):
+        for name, item in group.items():
+            if isinstance(item, h5py.Group):
+                yield from members(item, prefix + name + "/")
+            else:
+                yield prefix + name, item[()]
+
+    with h5py.File(path) as file:
+        return dict(members(file, ""))
+
+
+def same(one, other):
+    """Whether two dictionaries of arrays are equal bit by bit."""
+    return one.keys() == other.keys() and all(
+        np.asarray(one[k]).tobytes() == np.asarray(other[k]).tobytes() for k in one)

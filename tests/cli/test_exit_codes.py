@@ -1,0 +1,143 @@
+"""Trouble at run time: exit code, message, and what is left to read."""
+
+import os
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from runs import CAROM, ROOT, SPHERES, SPRINGS, command, data_sets, needs_carom, run, same, summary, thermo, write_deck
+
+pytestmark = needs_carom
+
+# A namespace of its own for mounts, as root or with user namespaces: nothing of it is left behind.
+UNSHARE = ["unshare", "-m"] if os.geteuid() == 0 else ["unshare", "-Urm"]
+can_mount = subprocess.run(UNSHARE + ["mount", "-t", "tmpfs", "none", "/mnt"], capture_output=True).returncode == 0
+needs_mount = pytest.mark.skipif(not can_mount, reason="may not mount here (not root, no user namespaces)")
+
+
+def in_mount(options, target, arguments, keep=None):
+    """Runs a command with a tmpfs on `target`; afterwards copies what is there to `keep`."""
+    script = 'mount -t tmpfs -o "$1" none "$2"; keep="$3"; target="$2"; shift 3; "$@"; code=$?; '
+    script += 'if [ -n "$keep" ]; then cp -r "$target" "$keep"; fi; exit $code'
+    return subprocess.run(UNSHARE + ["sh", "-c", script, "sh", options, str(target), str(keep or ""), *arguments],
+                          capture_output=True, text=True, timeout=120)
+
+
+def frames_are_sound(output):
+    """Every frame that is in the file is whole and the same as in a run on an empty disk."""
+    sets, rows = data_sets(output / "trajectory.h5md"), thermo(output)
+    n = len(sets["particles/trajectory/position/value"])
+    lengths = {len(v) for k, v in sets.items() if k.split("/")[-1] in ("value", "step", "time")}
+    assert lengths == {n}
+    assert np.array_equal(sets["particles/trajectory/position/time"], rows["time"][:n])
+    assert np.array_equal(sets["observables/kinetic_energy/value"], rows["kinetic"][:n])
+    return n
+
+
+@needs_mount
+@pytest.mark.parametrize("size", ["3m", "5m"])
+def test_full_disk(size, tmp_path):
+    deck, disk = write_deck(tmp_path, SPHERES), tmp_path / "disk"
+    disk.mkdir()
+    overrides = ["run.end_time=100000.0", "output.frame_interval=0.05", "output.thermo_interval=0.05",
+                 "output.events=true"]
+    done = in_mount(f"size={size}", disk, command(deck, disk, overrides), tmp_path / "kept")
+    assert done.returncode == 5, done.stderr
+    assert str(disk) in done.stderr and "No space left" in done.stderr and "free space" in done.stderr
+    kept = tmp_path / "kept"
+    n = frames_are_sound(kept)
+    assert n > 20
+    s = summary(kept)
+    assert s["status"] == "failed" and "No space left" in s["error"]
+    assert "No space left" in (kept / "run.log").read_text()
+    run(deck, tmp_path / "free", [f"run.end_time={0.05 * (n - 1)}"] + overrides[1:])
+    position = "particles/trajectory/position/value"
+    whole = data_sets(tmp_path / "free" / "trajectory.h5md")[position]
+    assert same({"x": data_sets(kept / "trajectory.h5md")[position][: n - 1]}, {"x": whole[: n - 1]})
+
+
+@needs_mount
+def test_disk_full_from_the_start(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    done = in_mount("size=4k", disk, command(write_deck(tmp_path, SPRINGS), disk))
+    assert done.returncode == 5 and "No space left" in done.stderr, done.stderr
+
+
+def test_file_size_limit(tmp_path):
+    """The same without a mount: a limit on file sizes, which would kill a process that does not look."""
+    deck, out = write_deck(tmp_path, SPHERES), tmp_path / "out"
+    limited = ["sh", "-c", 'ulimit -f 20000; exec "$@"', "sh"]  # blocks of 512 bytes
+    done = subprocess.run(limited + command(deck, out, ["run.end_time=100000.0", "output.frame_interval=0.05",
+                                                        "output.thermo_interval=0.05"]),
+                          capture_output=True, text=True, timeout=120)
+    assert done.returncode == 5, (done.returncode, done.stderr)
+    assert "trajectory.h5md" in done.stderr and "File too large" in done.stderr
+    assert frames_are_sound(out) > 20
+    assert summary(out)["status"] == "failed"
+
+
+def test_directory_below_a_file(tmp_path):
+    (tmp_path / "file").write_text("x")
+    done = run(write_deck(tmp_path, SPRINGS), tmp_path / "file" / "out", code=5)
+    assert str(tmp_path / "file" / "out") in done.stderr and "Not a directory" in done.stderr and "-o" in done.stderr
+
+
+@needs_mount
+def test_read_only_directory(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    done = in_mount("ro", disk, command(write_deck(tmp_path, SPRINGS), disk))
+    assert done.returncode == 5 and "Read-only file system" in done.stderr and str(disk) in done.stderr
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="permissions do not bind root")
+def test_unwritable_directory(tmp_path):
+    out = tmp_path / "out"
+    out.mkdir(mode=0o555)
+    done = run(write_deck(tmp_path, SPRINGS), out, code=5)
+    assert "Permission denied" in done.stderr and str(out) in done.stderr
+
+
+def test_standard_output_full(tmp_path):
+    out = tmp_path / "out"
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command(write_deck(tmp_path, SPRINGS), out, arguments=()), stdout=full,
+                              stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 5 and "standard output" in done.stderr
+    assert summary(out)["status"] == "done"
+
+
+@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda"])
+def test_too_many_events_in_a_step(method, tmp_path):
+    out = tmp_path / "out"
+    overrides = [f"integrator.type=\"{method}\"", "integrator.max_events_per_step=1", "integrator.step=0.5",
+                 "run.steps=1000", "output.frame_interval=0.5", "output.thermo_interval=0.5"]
+    done = run(write_deck(tmp_path, SPRINGS), out, overrides, code=4)
+    assert "max_events_per_step" in done.stderr and "particle" in done.stderr
+    assert any(digit in done.stderr for digit in "0123"), done.stderr
+    s = summary(out)
+    assert s["status"] == "failed" and "max_events_per_step" in s["error"]
+    assert "max_events_per_step" in (out / "run.log").read_text()
+    assert frames_are_sound(out) == len(thermo(out)["time"]) == s["steps"] + 1
+
+
+@pytest.mark.parametrize("change, code, words", [
+    ("integrator.type=\"rk4\"", 2, "rk4"),
+    ("integrator.step=0.0", 2, "integrator.step"),
+    ("integrator.stpe=0.1", 2, "step"),
+    ("system.dimension=4", 2, "dimension"),
+    ("system.box=[2.0, 2.0]", 3, "wall"),
+])
+def test_bad_deck(change, code, words, tmp_path):
+    out = tmp_path / "out"
+    done = run(write_deck(tmp_path, SPRINGS), out, [change], code=code)
+    assert words in done.stderr
+    assert not out.exists()  # nothing is touched by a deck that cannot run
+
+
+def test_missing_deck(tmp_path):
+    done = run(tmp_path / "missing.toml", tmp_path / "out", code=5)
+    assert "missing.toml" in done.stderr

@@ -1,0 +1,221 @@
+"""`carom run`: the files it leaves, that observing changes nothing, ranks, early stops and kills."""
+
+import os
+import pty
+import random
+import resource
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from runs import (CAROM, SPHERES, SPRINGS, command, data_sets, mpi_environment, needs_carom, run, same, summary, thermo,
+                  write_deck)
+
+pytestmark = needs_carom
+
+PROMISED = """status deck integrator dimension particles ranks steps end_time events.sphere_sphere events.sphere_wall
+energy.initial energy.after_first_step energy.final energy.reference energy.max_abs_error shadow_energy.max_abs_error
+momentum.max_abs_error max_overlap pressure collision_rate force_passes sweeps slabs_halved fallbacks wall_seconds
+collisions_per_second peak_memory_bytes""".split()
+
+
+def last_records(output):
+    """Time, positions, velocities and images of the last frame."""
+    with h5py.File(output / "trajectory.h5md") as file:
+        group = file["particles/trajectory"]
+        return {"time": group["position/time"][-1], "step": group["position/step"][-1]} | {
+            name: group[name]["value"][-1] for name in ("position", "velocity", "image")}
+
+
+def test_files(tmp_path):
+    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
+    run(deck, out)
+    assert sorted(p.name for p in out.iterdir()) == ["deck.toml", "run.log", "summary.json", "thermo.csv",
+                                                     "trajectory.h5md"]
+    s, rows = summary(out), thermo(out)
+    for name in PROMISED:
+        value = s
+        for part in name.split("."):
+            assert part in value, name
+            value = value[part]
+    assert (s["status"], s["integrator"], s["dimension"], s["particles"], s["ranks"], s["steps"]) == (
+        "done", "cdda", 2, 4, 1, 400)
+    assert s["events"]["sphere_sphere"] > 0 and s["events"]["sphere_wall"] > 0
+    assert s["momentum"]["max_abs_error"] is None and s["shadow_energy"]["max_abs_error"] is None
+    assert rows["total"][0] == s["energy"]["initial"] and rows["total"][-1] == s["energy"]["final"]
+    assert rows["max_energy_error"][-1] == s["energy"]["max_abs_error"] <= 1e-12 * s["energy"]["reference"]
+    assert rows["collisions"][-1] == s["events"]["sphere_sphere"]
+    assert len(rows["time"]) == 81 and rows["time"][-1] == s["end_time"] == pytest.approx(8, abs=1e-12)
+    log = (out / "run.log").read_text()
+    for part in ("carom ", "host ", "temperature", "predict", "communicate", "output", "done at time 8"):
+        assert part in log, part
+
+
+@pytest.mark.parametrize("text", [SPRINGS, SPHERES], ids=["springs", "spheres"])
+def test_resolved_deck_gives_the_same_run(text, tmp_path):
+    run(write_deck(tmp_path, text), tmp_path / "a")
+    run(tmp_path / "a" / "deck.toml", tmp_path / "b")
+    a, b = (data_sets(tmp_path / name / "trajectory.h5md") for name in "ab")
+    for sets in (a, b):  # the resolved decks may differ in where they say the output goes
+        del sets["parameters/deck"]
+    assert same(a, b)
+    assert (tmp_path / "a" / "thermo.csv").read_bytes() == (tmp_path / "b" / "thermo.csv").read_bytes()
+
+
+@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "verlet", "free-flight", "collisions", "end_time"])
+def test_observing_changes_nothing(method, tmp_path):
+    always = {"free-flight": [], "collisions": ["run.collisions=333"],
+              "end_time": ["run.end_time=5.013", "integrator.type=\"cva\""]}.get(
+                  method, [f"integrator.type=\"{method}\""])
+    deck = write_deck(tmp_path, SPHERES if method in ("free-flight", "collisions") else SPRINGS)
+    ways = [["output.frame_interval=0.0", "output.thermo_interval=0.0"],
+            ["output.frame_interval=0.037", "output.thermo_interval=0.0"],
+            ["output.frame_interval=0.0", "output.thermo_interval=0.0113", "output.events=true"],
+            ["output.frame_interval=0.02", "output.thermo_interval=0.9", "output.events=true"]]
+    records, counts = [], []
+    for n, way in enumerate(ways):
+        run(deck, tmp_path / str(n), always + way)
+        records.append(last_records(tmp_path / str(n)))
+        s = summary(tmp_path / str(n))
+        counts.append((s["events"], s["steps"], s["end_time"], s["energy"]["final"]))
+    assert method == "verlet" or counts[0][0]["sphere_sphere"] >= 2
+    for record, count in zip(records[1:], counts[1:]):
+        assert same(records[0], record)
+        assert count == counts[0]
+
+
+@pytest.mark.parametrize("text", [SPRINGS, SPHERES], ids=["springs", "spheres"])
+def test_events_are_exact(text, tmp_path):
+    deck, out = write_deck(tmp_path, text), tmp_path / "out"
+    run(deck, out, ["output.events=true"])
+    events = {name.removeprefix("events/"): value for name, value in data_sets(out / "events.h5").items()
+              if name.startswith("events/")}
+    s, pairs = summary(out)["events"], events["kind"] == 0
+    assert pairs.sum() == s["sphere_sphere"] > 0 and (~pairs).sum() == s["sphere_wall"]
+    assert len({len(column) for column in events.values()}) == 1
+    assert (np.diff(events["time"]) >= -1e-12).all() and (np.diff(events["slab"]) >= 0).all()
+    assert (events["lo"][pairs] < events["hi"][pairs]).all()
+    gap = np.linalg.norm(events["x_lo"] - events["x_hi"], axis=1) - np.where(pairs, 1.0, 0.5)
+    assert np.abs(gap).max() <= 1e-12
+    if text is SPHERES:  # nothing but collisions changes a velocity: the impulses add up to the change
+        with h5py.File(out / "trajectory.h5md") as file:
+            v = file["particles/trajectory/velocity/value"][()]
+        change = np.zeros_like(v[0])
+        np.add.at(change, events["lo"], events["impulse"])
+        np.add.at(change, events["hi"], -events["impulse"])
+        assert np.abs(v[0] + change - v[-1]).max() < 1e-11
+        # Flushed frames count the collisions that came before them.
+        frames = data_sets(out / "trajectory.h5md")
+        before = np.searchsorted(events["time"], frames["particles/trajectory/position/time"])
+        assert (before == frames["observables/collisions/value"]).all()
+
+
+def test_an_earlier_run_is_kept(tmp_path):
+    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
+    run(deck, out)
+    first = (out / "trajectory.h5md").read_bytes()
+    (out / "notes.txt").write_text("mine")
+    done = run(deck, out, ["run.steps=10"])
+    assert "backup.1" in done.stderr
+    assert (out / "backup.1" / "trajectory.h5md").read_bytes() == first
+    assert summary(out / "backup.1")["steps"] == 400 and summary(out)["steps"] == 10
+    assert (out / "notes.txt").read_text() == "mine"
+    run(deck, out, ["integrator.step=-1"], code=2)  # a deck that cannot run touches nothing
+    assert summary(out)["steps"] == 10 and not (out / "backup.2").exists()
+
+
+def test_terminal(tmp_path):
+    deck = write_deck(tmp_path, SPRINGS)
+    assert run(deck, tmp_path / "quiet").stdout == ""
+    loud = run(deck, tmp_path / "loud", arguments=()).stdout
+    assert "4 particles in 2-D" in loud and "done at time 8" in loud and "\r" not in loud
+    # On a terminal: one line that renews itself.
+    reader, terminal = pty.openpty()
+    child = subprocess.Popen(command(deck, tmp_path / "tty", ["run.steps=10000000"], ("--max-wall", "00:00:02")),
+                             stdout=terminal, stderr=subprocess.PIPE)
+    os.close(terminal)
+    shown = b""
+    try:
+        while part := os.read(reader, 65536):
+            shown += part
+    except OSError:  # Linux: the other side has closed
+        pass
+    child.stderr.read()
+    assert child.wait() == 75
+    lines = [line for line in shown.decode().split("\r") if "ETA" in line]
+    assert len(lines) >= 3 and "collisions/s" in lines[-1] and "|ΔE/E| = " in lines[-1]
+    assert "ETA --" not in lines[-1]
+
+
+def test_max_wall(tmp_path):
+    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
+    start = time.monotonic()
+    done = run(deck, out, ["run.steps=100000000", "output.thermo_interval=100.0", "output.frame_interval=0.0"],
+               ("--quiet", "--max-wall", "00:00:01"), code=75)
+    assert time.monotonic() - start < 10
+    assert "no checkpoint" in done.stderr
+    s, last = summary(out), last_records(out)
+    assert s["status"] == "stopped" and 0 < s["steps"] < 100000000
+    assert last["time"] == s["end_time"] == thermo(out)["time"][-1]
+    assert last["step"] == s["steps"]
+    assert s["energy"]["max_abs_error"] <= 1e-10
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_kill_leaves_readable_files(seed, tmp_path):
+    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
+    child = subprocess.Popen(command(deck, out, ["run.steps=100000000", "output.thermo_interval=0.02",
+                                                 "output.frame_interval=0.02", "output.events=true"]))
+    while not (out / "thermo.csv").exists():
+        time.sleep(0.01)
+    time.sleep(random.Random(seed).uniform(0.05, 0.5))
+    child.send_signal(signal.SIGKILL)
+    assert child.wait() == -signal.SIGKILL
+    rows, frames, events = thermo(out), data_sets(out / "trajectory.h5md"), data_sets(out / "events.h5")
+    written = len(frames["particles/trajectory/position/value"])
+    assert written > 10
+    assert all(len(value) >= written for name, value in frames.items() if name.endswith(("/value", "/step", "/time")))
+    assert len(rows["time"]) - written in (0, 1)  # a row is written before the frame of the same time
+    assert np.isfinite(frames["particles/trajectory/position/value"]).all()
+    assert np.array_equal(frames["particles/trajectory/position/time"][:written], rows["time"][:written])
+    assert np.array_equal(frames["observables/total_energy/value"][:written], rows["total"][:written])
+    columns = {name.removeprefix("events/"): value for name, value in events.items() if name.startswith("events/")}
+    whole = len(columns["time"])
+    assert all(len(value) >= whole for value in columns.values())
+    assert same({"t": columns["time"]}, {"t": columns["time_in_slab"][:whole] + 0.02 * columns["slab"][:whole]})
+    pairs = (columns["kind"][:whole] == 0).sum()
+    assert frames["observables/collisions/value"][written - 1] <= pairs <= rows["collisions"][-1] + 4
+
+def test_ranks(tmp_path):
+    deck = write_deck(tmp_path, SPHERES)
+    run(deck, tmp_path / "one")
+    mpirun = ["timeout", "-k", "10", "120", "mpirun", "--timeout", "100", "-n", "3"]
+    done = subprocess.run(mpirun + command(deck, tmp_path / "three"), env=mpi_environment(), capture_output=True,
+                          text=True)
+    assert done.returncode == 0, done.stderr
+    assert "this version uses one rank; the other 2 wait" in done.stderr
+    assert summary(tmp_path / "three")["ranks"] == 3
+    one, three = (data_sets(tmp_path / name / "trajectory.h5md") for name in ("one", "three"))
+    for sets in (one, three):
+        del sets["parameters/deck"]
+    assert same(one, three)
+
+
+def test_idle_ranks_sleep_and_share_the_exit_code(tmp_path):
+    mpirun = ["timeout", "-k", "10", "120", "mpirun", "--timeout", "100", "-n", "4"]
+    deck = write_deck(tmp_path, SPRINGS)
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    done = subprocess.run(mpirun + command(deck, tmp_path / "out", ["run.steps=100000000", "output.frame_interval=0.0"],
+                                           ("--quiet", "--max-wall", "00:00:04")),
+                          env=mpi_environment(), capture_output=True, text=True)
+    wall, after = time.monotonic() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert done.returncode == 75, done.stderr
+    busy = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    assert busy < 1.3 * wall  # one rank at work; ranks that spin would fill every core there is
+    missing = subprocess.run(mpirun + [CAROM, "run", str(tmp_path / "missing.toml")], env=mpi_environment(),
+                             capture_output=True, text=True)
+    assert missing.returncode == 5 and missing.stderr.count("cannot read this deck") == 1
