@@ -6,6 +6,7 @@
 
 #include "engine/error.h"
 #include "engine/forces.h"
+#include "engine/neighbour_list.h"
 
 namespace carom {
 
@@ -37,6 +38,21 @@ struct Simulation<D>::Monitor {
     for (const auto& term : run.system_->interactions) momentum_kept = momentum_kept && term->keeps_momentum();
     const std::size_t n = run.system_->particles.size();
     if (run.info_.shadow) force.resize(n), scratch.resize(n);
+    if (run.info_.hard_cores) touching.emplace(box, run.system_->particles.radius);
+  }
+
+  /// The deepest overlap of any two spheres, relative to their contact distance: an independent check that no contact
+  /// was missed. Not positive where none overlap.
+  double deepest_overlap() {
+    const System<D>& system = *simulation.system_;
+    const auto& p = system.particles;
+    double deepest = 0;
+    for (const auto& pair : touching->cover(p.x)) {
+      const double sigma = p.radius[pair.i] + p.radius[pair.j];
+      const double squared = (p.x[pair.i] - p.x[pair.j] + system.box.shift(pair.image)).squaredNorm();
+      if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
+    }
+    return deepest;
   }
 
   /// Energies, momentum, temperature and instantaneous pressure of a state; `energies_at` where energies are measured.
@@ -108,6 +124,7 @@ struct Simulation<D>::Monitor {
   double last_row_time = -1, last_frame_time = -1, last_row_virial = 0;
   double virial_time = 0;  // ∫ (2K + Σ d·F) dt
   std::vector<Vec<D>> force, scratch;
+  std::optional<NeighbourList<D>> touching;  // pairs that may overlap
 };
 
 template <int D>
@@ -182,11 +199,16 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     };
     integrator_->slab(*system_, slab, report);
     ++s.steps;
-    s.end_time = slab.start + report.reached;
+    // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
+    if (report.reached < slab.length)
+      s.end_time = slab.start + report.reached;
+    else
+      s.end_time = slab.length == plan_.step ? static_cast<double>(s.steps) * plan_.step : *plan_.end_time;
     s.force_passes = counters.force_passes;
 
     shot = monitor.measure(s.end_time, s.steps, particles, energy_state());
     s.energy_final = shot.total();
+    if (info_.hard_cores) counters.max_overlap = std::max(counters.max_overlap, monitor.deepest_overlap());
     if (s.steps == 1 && info_.stepping) {
       monitor.first_energy = shot.total();
       monitor.first_shadow = shot.shadow;
