@@ -261,19 +261,26 @@ double packing_fraction(double volume, std::span<const double> radius) {
   return filled / volume;
 }
 
-#define CAROM_INSTANTIATE(D)                                                                                 \
-  template LatticeCells<D> fit_lattice(Lattice, const Box<D>&, std::size_t, double);                         \
-  template std::vector<Vec<D>> lattice_sites(Lattice, const Box<D>&, std::size_t, double);                   \
-  template Vec<D> commensurate_edges<D>(Lattice, std::size_t, double);                                       \
-  template std::size_t insert_at_random(const Box<D>&, std::span<Vec<D>>, std::span<const double>,           \
-                                        std::span<const Id>, std::uint64_t, std::uint64_t);                  \
-  template double contact_tolerance(const Box<D>&, double);                                                  \
-  template Overlaps find_overlaps(const Box<D>&, std::span<const Vec<D>>, std::span<const double>);          \
-  template Outsiders find_outsiders(const Box<D>&, std::span<const Vec<D>>, std::span<const double>);        \
-  template void draw_velocities(Particles<D>&, std::span<const Id>, std::span<const double>, std::uint64_t); \
-  template double packing_fraction<D>(double, std::span<const double>);
-CAROM_INSTANTIATE(2)
-CAROM_INSTANTIATE(3)
-#undef CAROM_INSTANTIATE
+template LatticeCells<2> fit_lattice(Lattice, const Box<2>&, std::size_t, double);
+template std::vector<Vec<2>> lattice_sites(Lattice, const Box<2>&, std::size_t, double);
+template Vec<2> commensurate_edges<2>(Lattice, std::size_t, double);
+template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::span<const double>, std::span<const Id>,
+                                      std::uint64_t, std::uint64_t);
+template double contact_tolerance(const Box<2>&, double);
+template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
+template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
+template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t);
+template double packing_fraction<2>(double, std::span<const double>);
+
+template LatticeCells<3> fit_lattice(Lattice, const Box<3>&, std::size_t, double);
+template std::vector<Vec<3>> lattice_sites(Lattice, const Box<3>&, std::size_t, double);
+template Vec<3> commensurate_edges<3>(Lattice, std::size_t, double);
+template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::span<const double>, std::span<const Id>,
+                                      std::uint64_t, std::uint64_t);
+template double contact_tolerance(const Box<3>&, double);
+template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
+template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
+template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t);
+template double packing_fraction<3>(double, std::span<const double>);
 
 }  // namespace carom

@@ -116,12 +116,12 @@ std::unique_ptr<System<D>> build_system(Deck& deck) {
   return system;
 }
 
-#define CAROM_INSTANTIATE(D)                                  \
-  template void fill_system(const Deck::Source&, System<D>&); \
-  template double default_epoch(const System<D>&);            \
-  template std::unique_ptr<System<D>> build_system<D>(Deck&);
-CAROM_INSTANTIATE(2)
-CAROM_INSTANTIATE(3)
-#undef CAROM_INSTANTIATE
+template void fill_system(const Deck::Source&, System<2>&);
+template double default_epoch(const System<2>&);
+template std::unique_ptr<System<2>> build_system<2>(Deck&);
+
+template void fill_system(const Deck::Source&, System<3>&);
+template double default_epoch(const System<3>&);
+template std::unique_ptr<System<3>> build_system<3>(Deck&);
 
 }  // namespace carom

@@ -84,7 +84,7 @@ class Interpreter {
       if (const auto* seed = table->find<std::int64_t>("seed")) placement.seed = static_cast<std::uint64_t>(*seed);
       if (const auto* fraction = table->find<double>("packing_fraction")) packing(*table, *fraction);
       if (table->variant != nullptr) placement.type = table->variant->name;
-      if (!some && !all.empty() && placement.type != "")
+      if (!some && !all.empty() && !placement.type.empty())
         problems_.warning(table->at, "[placement] places nobody: all positions are explicit",
                           "leave it out, or give a species by count");
       const bool flat = placement.type == "hexagonal" || placement.type == "square";

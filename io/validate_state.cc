@@ -140,13 +140,14 @@ void warn_of_state(const Deck& deck, const System<D>& system, Problems& problems
                      "a tenth of that period or less is usual");
 }
 
-#define CAROM_INSTANTIATE(D)                                           \
-  template bool closed(const Box<D>&);                                 \
-  template void check_state(const Deck&, const System<D>&, Problems&); \
-  template double shortest_period(const System<D>&);                   \
-  template void warn_of_state(const Deck&, const System<D>&, Problems&);
-CAROM_INSTANTIATE(2)
-CAROM_INSTANTIATE(3)
-#undef CAROM_INSTANTIATE
+template bool closed(const Box<2>&);
+template void check_state(const Deck&, const System<2>&, Problems&);
+template double shortest_period(const System<2>&);
+template void warn_of_state(const Deck&, const System<2>&, Problems&);
+
+template bool closed(const Box<3>&);
+template void check_state(const Deck&, const System<3>&, Problems&);
+template double shortest_period(const System<3>&);
+template void warn_of_state(const Deck&, const System<3>&, Problems&);
 
 }  // namespace carom
