@@ -24,8 +24,13 @@ void wait_asleep(MPI_Request& request) {
 }  // namespace
 
 Communicator::Communicator() {
-  // A process started without mpirun needs no daemon of Open MPI's beside it. Only a default: the user's word counts.
-  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+  // A process started without a launcher needs neither a daemon of Open MPI's beside it nor its directory in /tmp,
+  // which may be full, and which other jobs of the same user take away when they end. Only defaults: the user's word
+  // counts.
+  if (std::getenv("PMIX_RANK") == nullptr && std::getenv("PMI_RANK") == nullptr) {
+    setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+    setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
+  }
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
   MPI_Comm_dup(MPI_COMM_WORLD, &world_);

@@ -171,6 +171,7 @@ def test_a_kill_leaves_readable_files(seed, tmp_path):
     child = subprocess.Popen(command(deck, out, ["run.steps=100000000", "output.thermo_interval=0.02",
                                                  "output.frame_interval=0.02", "output.events=true"]))
     while not (out / "thermo.csv").exists():
+        assert child.poll() is None
         time.sleep(0.01)
     time.sleep(random.Random(seed).uniform(0.05, 0.5))
     child.send_signal(signal.SIGKILL)
@@ -189,6 +190,11 @@ def test_a_kill_leaves_readable_files(seed, tmp_path):
     assert same({"t": columns["time"]}, {"t": columns["time_in_slab"][:whole] + 0.02 * columns["slab"][:whole]})
     pairs = (columns["kind"][:whole] == 0).sum()
     assert frames["observables/collisions/value"][written - 1] <= pairs <= rows["collisions"][-1] + 4
+
+def test_one_rank_needs_no_temporary_directory(tmp_path):
+    (tmp_path / "file").write_text("x")
+    run(write_deck(tmp_path, SPRINGS), tmp_path / "out", env=os.environ | {"TMPDIR": str(tmp_path / "file" / "tmp")})
+
 
 def test_ranks(tmp_path):
     deck = write_deck(tmp_path, SPHERES)
