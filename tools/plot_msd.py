@@ -4,8 +4,8 @@
     tools/plot_msd.py runs/hard-sphere-fluid
     tools/plot_msd.py runs/hard-discs --fit 5,20 -o msd.png
 
-Averaged over particles and over all time origins, with displacements followed through periodic boundaries. Needs frames at
-equal times. D = slope / (2 d) over --fit (default: the later half of the lags); a CSV with lag, msd stands beside the picture.
+Averaged over particles and over all time origins, with displacements followed through periodic boundaries. Needs frames
+at equal times. D = slope / (2 d) over --fit (default: the later half of the lags); a CSV with lag, msd stands beside the picture.
 (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.7.)
 """
 

@@ -5,9 +5,9 @@
     tools/plot_rdf.py runs/primitive-electrolyte --species cation,anion --bins 200 --first-frame 20 -o rdf.png
 
 Periodic axes use the nearest image, so r ends at half the shortest periodic edge. Along walls the count expected of an
-ideal gas is the exact one of the region the centres can reach (the average over directions of prod_k (1 - r |u_k| / L_k)), so
-that g = 1 without correlations up to the walls (of species with unequal radii: nearly). A CSV with r, g stands beside the picture. (Allen, Tildesley, Computer
-Simulation of Liquids, 2nd ed., section 2.6 and 6.2.)
+ideal gas is the exact one of the region the centres can reach (the average over directions u of the product over the
+walled axes of 1 - r |u_k| / L_k), so that g = 1 without correlations up to the walls (for unequal radii: nearly). A CSV
+with r, g stands beside the picture. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
 """
 
 import argparse

@@ -1,4 +1,7 @@
-"""Every deck of inputs/, shortened, through the command itself ($CAROM): ends well, keeps its energy, leaves a sound file."""
+"""Every deck of inputs/, shortened, through the command itself ($CAROM).
+
+Each must end well, keep its energy, leave a sound file, and not care how it is observed.
+"""
 
 import os
 import pathlib
@@ -11,6 +14,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
 import check_h5md
+import compare
 from carom_files import Trajectory, find_carom, read_thermo, run_carom
 
 DECKS = sorted((ROOT / "inputs").glob("*.toml"))
@@ -26,7 +30,7 @@ def shortened(deck):
     """Overrides that leave about a second's work, and several frames in it."""
     if deck["integrator"]["type"] == "free-flight":
         return ["run.end_time=1.0", "output.frame_interval=0.25", "output.thermo_interval=0.25"]
-    steps = 50 if deck["particles"][0].get("count") else 1000
+    steps = 80 if deck["particles"][0].get("count") else 1000
     interval = steps * deck["integrator"]["step"] / 5
     plan = f"run.end_time={steps * deck['integrator']['step']}" if "end_time" in deck["run"] else f"run.steps={steps}"
     return [plan, f"output.frame_interval={interval}", f"output.thermo_interval={interval}"]
@@ -52,3 +56,11 @@ def test_deck(file, tmp_path):
     with Trajectory(tmp_path) as trajectory:
         assert len(trajectory) >= 4
         assert trajectory.title == deck["title"]
+
+
+@pytest.mark.parametrize("file", DECKS, ids=lambda file: file.stem)
+def test_observing_changes_nothing(file, tmp_path):
+    overrides = shortened(tomllib.loads(file.read_text()))
+    run_carom(find_carom(), file, tmp_path / "often", overrides + ["output.events=true"])
+    run_carom(find_carom(), file, tmp_path / "seldom", overrides + ["output.frame_interval=0.0", "output.thermo_interval=0.0"])
+    assert compare.compare(tmp_path / "often", tmp_path / "seldom", last=True) == []

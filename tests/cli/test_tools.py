@@ -20,7 +20,7 @@ import movie
 import plot_energy
 import plot_msd
 import plot_rdf
-from carom_files import Trajectory, find_carom, read_thermo, toml_text
+from carom_files import Trajectory, toml_text
 from synthetic_run import write_run
 
 
