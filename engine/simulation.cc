@@ -234,8 +234,10 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
                           : 0.0});
     s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
 
-    if (plan_.events)
+    if (plan_.events) {
+      const Stopwatch watch(counters.seconds.output);
       for (auto* observer : observers_) observer->contacts(slab.start, contacts);
+    }
     monitor.show(shot, slack, finished());
     for (auto* observer : observers_) observer->progress(s);
   }
