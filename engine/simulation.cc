@@ -14,6 +14,9 @@ namespace {
 /// Due times and ends are met up to this share of a step.
 constexpr double kTimeSlack = 1e-9;
 
+/// S_h costs two passes over all pairs. Systems larger than this are measured at thermo rows and frames only.
+constexpr std::size_t kShadowAtEveryStep = 100;
+
 /// The next of the times 0, interval, 2·interval, …; never, where there is no interval.
 struct Schedule {
   double interval;
@@ -56,7 +59,9 @@ struct Simulation<D>::Monitor {
   }
 
   /// Energies, momentum, temperature and instantaneous pressure of a state; `energies_at` where energies are measured.
-  Snapshot<D> measure(double time, std::int64_t step, const Particles<D>& state, const Particles<D>& energies_at) {
+  Snapshot<D> measure(double time, std::int64_t step, const Particles<D>& state, const Particles<D>& energies_at,
+                      bool with_shadow) {
+    const Stopwatch watch(simulation.statistics_.counters.seconds.output);
     const System<D>& system = *simulation.system_;
     Snapshot<D> shot;
     shot.time = time;
@@ -67,7 +72,7 @@ struct Simulation<D>::Monitor {
     shot.kinetic = kinetic_energy(energies_at);
     shot.potential = sums.energy.value();
     magnitude = shot.kinetic + sums.magnitude.value();
-    if (simulation.info_.shadow) {
+    if (simulation.info_.shadow && with_shadow) {
       Counters uncounted;
       evaluate_forces<D>(system, energies_at.x, force, uncounted);
       const double g = shadow_term<D>(system, energies_at, force, scratch, uncounted);
@@ -153,7 +158,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     const auto* nodes = integrator_->energy_state();
     return nodes ? *nodes : particles;
   };
-  Snapshot<D> shot = monitor.measure(0, 0, particles, energy_state());
+  Snapshot<D> shot = monitor.measure(0, 0, particles, energy_state(), true);
   s.energy_initial = s.energy_final = monitor.first_energy = shot.total();
   s.energy_reference = std::max(std::abs(shot.total()), monitor.magnitude);
   monitor.first_shadow = shot.shadow;
@@ -195,7 +200,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     }
     report.observe = observe;
     report.observer = [&](double offset, const Particles<D>& copies) {
-      monitor.show(monitor.measure(slab.start + offset, s.steps, copies, copies), slack, false);
+      monitor.show(monitor.measure(slab.start + offset, s.steps, copies, copies, false), slack, false);
     };
     integrator_->slab(*system_, slab, report);
     ++s.steps;
@@ -206,7 +211,9 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       s.end_time = slab.length == plan_.step ? static_cast<double>(s.steps) * plan_.step : *plan_.end_time;
     s.force_passes = counters.force_passes;
 
-    shot = monitor.measure(s.end_time, s.steps, particles, energy_state());
+    const bool with_shadow = particles.size() <= kShadowAtEveryStep || s.steps == 1 ||
+                             monitor.next_due() <= s.end_time + slack || finished();
+    shot = monitor.measure(s.end_time, s.steps, particles, energy_state(), with_shadow);
     s.energy_final = shot.total();
     if (info_.hard_cores) counters.max_overlap = std::max(counters.max_overlap, monitor.deepest_overlap());
     if (s.steps == 1 && info_.stepping) {
@@ -216,7 +223,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       s.energy_reference = std::max(std::abs(shot.total()), monitor.magnitude);
     }
     s.max_energy_error = std::max(s.max_energy_error, std::abs(shot.total() - monitor.first_energy));
-    if (info_.shadow)
+    if (info_.shadow && with_shadow)
       s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot.shadow - monitor.first_shadow));
     if (monitor.momentum_kept)
       s.max_momentum_error = std::max(*s.max_momentum_error, (shot.momentum - monitor.first_momentum).norm());

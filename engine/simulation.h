@@ -70,7 +70,8 @@ struct Statistics {
   double energy_initial = 0, energy_after_first_step = 0, energy_final = 0;
   double energy_reference = 0;  ///< max(|H₁|, K₁ + Σ|V|): what to divide energy errors by
   double max_energy_error = 0;  ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the start)
-  std::optional<double> max_shadow_energy_error;  ///< Verlet types
+  std::optional<double>
+      max_shadow_energy_error;  ///< Verlet types; of more than 100 particles at thermo rows and frames only
   std::optional<double> max_momentum_error;  ///< where nothing takes momentum (no walls, no fields): max |P − P₀|
   double mean_pressure = 0;                  ///< over the whole run
   double collision_rate = 0;   ///< pair collisions a unit time and particle, times two: what one sphere suffers

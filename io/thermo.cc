@@ -15,10 +15,10 @@ ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path) : file_(path) {
 
 template <int D>
 void ThermoWriter<D>::thermo(const Snapshot<D>& s) {
-  std::string row = fmt::format("{:.17g},{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}", s.time, s.step, s.collisions,
-                                s.kinetic, s.potential, s.total(), s.shadow, s.max_energy_error);
-  for (const double p : s.momentum) row += fmt::format(",{:.17g}", p);
-  file_.append(row + fmt::format(",{:.17g},{:.17g}\n", s.temperature, s.pressure));
+  std::string row = fmt::format("{},{},{},{},{},{},{},{}", s.time, s.step, s.collisions, s.kinetic, s.potential,
+                                s.total(), s.shadow, s.max_energy_error);
+  for (const double p : s.momentum) row += fmt::format(",{}", p);
+  file_.append(row + fmt::format(",{},{}\n", s.temperature, s.pressure));
 }
 
 template class ThermoWriter<2>;

@@ -29,8 +29,8 @@ from carom_plot import picture
 
 ROUNDING = 1e-11  # relative to E_ref: below, an error is called rounding and given no order
 COLUMNS = ["method", "step", "start", "max_abs_energy_error", "energy_reference", "relative_energy_error",
-           "max_abs_shadow_energy_error", "max_overlap", "sphere_sphere", "sphere_wall", "steps", "wall_seconds",
-           "status"]
+           "max_abs_shadow_energy_error", "max_overlap", "sphere_sphere", "sphere_wall", "steps", "passes_per_step",
+           "wall_seconds", "status"]
 
 
 def parse_arguments(arguments=None):
@@ -111,6 +111,7 @@ def run_one(options, carom, deck, method, step, start):
         "max_abs_shadow_energy_error": summary["shadow_energy"]["max_abs_error"],
         "max_overlap": summary["max_overlap"], "sphere_sphere": summary["events"]["sphere_sphere"],
         "sphere_wall": summary["events"]["sphere_wall"], "steps": summary["steps"],
+        "passes_per_step": summary["force_passes"] / summary["steps"],
         "wall_seconds": summary["wall_seconds"], "status": summary["status"]}
 
 

@@ -36,13 +36,26 @@ class PairTerm final : public Interaction<D> {
       : potential_(std::move(potential)), weight_(weight), pairs_(std::move(pairs)) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override {
+    // Pairs come with ascending i: what belongs to one i is summed in that order, and exactly from there on.
+    struct Partial {
+      double energy = 0, magnitude = 0, virial = 0;
+    } partial;
+    Id owner = 0;
+    auto pass_on = [&] {
+      sums.energy.add(partial.energy);
+      sums.magnitude.add(partial.magnitude);
+      sums.virial.add(partial.virial);
+      partial = {};
+    };
     for_each_within_reach(x, [&](Id i, Id j, const Vec<D>&, double rho) {
-      const double weight = weight_(i, j);
-      const double v = weight * potential_.value(rho);
-      sums.energy.add(v);
-      sums.magnitude.add(std::abs(v));
-      sums.virial.add(-2 * weight * potential_.derivative(rho) * rho);
+      if (i != owner) pass_on();
+      owner = i;
+      const double weight = weight_(i, j), v = weight * potential_.value(rho);
+      partial.energy += v;
+      partial.magnitude += std::abs(v);
+      partial.virial -= 2 * weight * potential_.derivative(rho) * rho;
     });
+    pass_on();
   }
 
   void add_forces(Positions<D> x, Vectors<D> force) const override {

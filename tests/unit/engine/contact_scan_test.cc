@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "engine/error.h"
 #include "tests/support/experiments.h"
 
@@ -52,6 +55,22 @@ TEST(ContactScan, ResolvesABlowThroughAChainInKeyOrder) {
   EXPECT_EQ(scene.system->particles.v[2], Vec<2>(1, 0));
   EXPECT_EQ(scene.contacts[1].impulse, Vec<2>(-1, 0));  // given to the lower id
   EXPECT_EQ(scene.counters.sphere_sphere, 2u);
+}
+
+TEST(ContactScan, LeavesAPairThatAnEarlierImpulseHasParted) {
+  // A light disc runs into two heavy ones at once; the first blow throws it back from both.
+  const double angle = 25 * std::numbers::pi / 180;
+  auto system = test::make_system<2>(
+      {20, 6}, Boundary::wall,
+      {{5, 3}, {5 + std::cos(angle), 3 + std::sin(angle)}, {5 + std::cos(angle), 3 - std::sin(angle)}},
+      {{1, 0}, {0, 0}, {0, 0}}, {0.6, 0.4, 0.4}, {0.001, 1, 1});
+  Counters counters;
+  ContactScan<2> scan(*system, 100);
+  scan.begin_slab(counters, nullptr, {}, 1.0);
+  auto& p = system->particles;
+  scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
+  EXPECT_EQ(counters.sphere_sphere, 1u);
+  EXPECT_EQ(p.v[2], Vec<2>(0, 0));
 }
 
 TEST(ContactScan, HoldsAPressedChainAndLetsAPulledOneGo) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/error.h"
 #include "tests/support/experiments.h"
@@ -61,6 +62,16 @@ TEST(Simulation, ShortensTheLastStepToMeetTheEnd) {
   EXPECT_DOUBLE_EQ(run->statistics().end_time, 0.1);
   const auto straight = test::run_until<2>(test::five_springs(), "cdda", 0.001, 0.1);
   EXPECT_LT(test::largest_difference(run->system().particles.x, straight->system().particles.x), 1e-4);
+}
+
+TEST(Simulation, MeasuresEnergyErrorsFromTheFirstStepOn) {
+  const auto one = test::run_steps<2>(test::five_springs(), "cva", 0.3, 1);
+  EXPECT_EQ(one->statistics().max_energy_error, 0);
+  EXPECT_NE(one->statistics().energy_after_first_step, one->statistics().energy_initial);
+  const auto two = test::run_steps<2>(test::five_springs(), "cva", 0.3, 2);
+  const auto& s = two->statistics();
+  EXPECT_EQ(s.max_energy_error, std::abs(s.energy_final - s.energy_after_first_step));
+  EXPECT_GT(s.max_energy_error, 0);
 }
 
 TEST(Simulation, EndsAtTheFirstOfSeveralEnds) {
