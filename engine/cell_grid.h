@@ -7,6 +7,7 @@
 // reach to infinity. Which cells there are is nobody's business but the search's: results never depend on them.
 
 #include <algorithm>
+#include <boost/container/small_vector.hpp>
 #include <cmath>
 #include <span>
 #include <vector>
@@ -37,6 +38,8 @@ class CellGrid {
       origin_[k] = low;
       edge_[k] = length / count_[k];
     }
+    stride_[D - 1] = 1;
+    for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * static_cast<std::size_t>(count_[k]);
   }
 
   std::size_t cells() const {
@@ -64,45 +67,55 @@ class CellGrid {
   /// Where an unwrapped cell is stored.
   std::size_t index(const Cell<D>& c) const {
     std::size_t at = 0;
-    for (int k = 0; k < D; ++k)
-      at = at * static_cast<std::size_t>(count_[k]) + static_cast<std::size_t>(wrapped(k, c[k]));
+    for (int k = 0; k < D; ++k) at += stride_[k] * static_cast<std::size_t>(wrapped(k, c[k]));
     return at;
   }
 
   /// How many boxes an unwrapped cell number lies away.
   std::int32_t boxes(int axis, std::int32_t c) const { return (c - wrapped(axis, c)) / count_[axis]; }
 
-  /// Calls visit(index, boxes) for every stored cell within `range` cells of `centre`, each image for itself; `boxes`
-  /// is how many boxes away the visited cell lies. Cells beyond walls and open ends do not exist.
+  /// Calls visit(index, boxes) for every stored cell from `low` to `high` (inclusive, by axis), each image for itself;
+  /// `boxes` is how many boxes away the visited cell lies. Cells beyond walls and open ends do not exist.
+  template <class Visit>
+  void for_each_between(Cell<D> low, Cell<D> high, Visit&& visit) const {
+    struct Place {
+      std::size_t offset;
+      std::int32_t boxes;
+    };
+    std::array<boost::container::small_vector<Place, 4>, D> places;  // of each axis
+    for (int k = 0; k < D; ++k) {
+      if (!box_.periodic(k)) low[k] = std::max(low[k], 0), high[k] = std::min(high[k], count_[k] - 1);
+      for (std::int32_t c = low[k]; c <= high[k]; ++c) {
+        const std::int32_t w = wrapped(k, c);
+        places[k].push_back({stride_[k] * static_cast<std::size_t>(w), (c - w) / count_[k]});
+      }
+    }
+    for (const Place& p : places[0])
+      for (const Place& q : places[1])
+        if constexpr (D == 2)
+          visit(p.offset + q.offset, Image<D>{p.boxes, q.boxes});
+        else
+          for (const Place& r : places[2]) visit(p.offset + q.offset + r.offset, Image<D>{p.boxes, q.boxes, r.boxes});
+  }
+
+  /// The same for every stored cell within `range` cells of `centre`.
   template <class Visit>
   void for_each_around(const Cell<D>& centre, const Cell<D>& range, Visit&& visit) const {
-    Cell<D> low, high, c;
-    for (int k = 0; k < D; ++k) {
-      low[k] = centre[k] - range[k];
-      high[k] = centre[k] + range[k];
-      if (!box_.periodic(k)) low[k] = std::max(low[k], 0), high[k] = std::min(high[k], count_[k] - 1);
-      c[k] = low[k];
-    }
-    for (;;) {
-      Image<D> away;
-      for (int k = 0; k < D; ++k) away[k] = boxes(k, c[k]);
-      visit(index(c), away);
-      int k = D - 1;
-      while (k >= 0 && c[k] == high[k]) c[k] = low[k], --k;
-      if (k < 0) return;
-      ++c[k];
-    }
+    Cell<D> low, high;
+    for (int k = 0; k < D; ++k) low[k] = centre[k] - range[k], high[k] = centre[k] + range[k];
+    for_each_between(low, high, visit);
   }
 
  private:
   std::int32_t wrapped(int axis, std::int32_t c) const {
-    if (!box_.periodic(axis)) return c;
+    if (!box_.periodic(axis) || (c >= 0 && c < count_[axis])) return c;
     const std::int32_t r = c % count_[axis];
     return r < 0 ? r + count_[axis] : r;
   }
 
   Box<D> box_;
   Cell<D> count_;
+  std::array<std::size_t, D> stride_;
   Vec<D> origin_, edge_;
 };
 

@@ -25,9 +25,9 @@ bool EventCore<D>::Earlier::operator()(const CalendarEntry& a, const CalendarEnt
   const bool p_stale = p.stamp != a.stamp, q_stale = q.stamp != b.stamp;
   if (p_stale != q_stale) return p_stale;
   if (p_stale) return a.slot < b.slot;
-  if (p.crossing != q.crossing) return q.crossing;
-  if (p.crossing) return a.slot < b.slot;
-  return p.key < q.key;
+  if (p.crosses_first() != q.crosses_first()) return q.crosses_first();
+  if (p.crosses_first()) return a.slot < b.slot;
+  return p.contact < q.contact;
 }
 
 template <int D>
@@ -67,41 +67,33 @@ double EventCore<D>::run(double end, const Report& report) {
     const Id i = entry->slot;
     const Pending& pending = pending_[i];
     const bool stale = pending.stamp != entry->stamp;
-    if (stale) {
-      calendar_.pop();
+    calendar_.pop();
+    if (stale) continue;
+    if (pending.crosses_first()) {
+      cross(i);
       continue;
     }
-    if (!pending.crossing && pending.key.kind == EventKind::pair) {
-      const Id j = pending.key.lo == i ? pending.key.hi : pending.key.lo;
-      if (version_[j] != pending.partner_version) {
-        calendar_.pop();
-        predict(i, event_time);
-        continue;
-      }
-    }
-    calendar_.pop();
-    const Pending event = pending;
-    if (event.crossing) {
-      cross(i, event);
+    const EventKey<D> key = pending.contact;
+    if (key.kind == EventKind::pair && version_[key.lo == i ? key.hi : key.lo] != pending.partner_version) {
       predict(i, event_time);
       continue;
     }
     if (++events_ > report.max_events) {
-      const std::string partner = event.key.kind == EventKind::pair ? "particle " + std::to_string(event.key.hi)
-                                                                    : "wall " + std::to_string(event.key.hi);
+      const std::string partner =
+          key.kind == EventKind::pair ? "particle " + std::to_string(key.hi) : "wall " + std::to_string(key.hi);
       throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
                                           " collisions in one step, the last between particle " +
-                                          std::to_string(event.key.lo) + " and " + partner +
+                                          std::to_string(key.lo) + " and " + partner +
                                           "; use a smaller step or raise integrator.max_events_per_step");
     }
-    if (event.key.kind == EventKind::pair) {
-      collide_pair(event.key, report);
-      predict(event.key.lo, event_time);
-      predict(event.key.hi, event_time);
+    if (key.kind == EventKind::pair) {
+      collide_pair(key, report);
+      predict(key.lo, event_time);
+      predict(key.hi, event_time);
       if (report.counters.sphere_sphere >= report.collision_limit) return event_time;
     } else {
-      collide_wall(event.key, report);
-      predict(event.key.lo, event_time);
+      collide_wall(key, report);
+      predict(key.lo, event_time);
     }
   }
   return end;
@@ -137,26 +129,36 @@ std::uint32_t EventCore<D>::generation_at(const Record<D>& r, double t) const {
 
 template <int D>
 void EventCore<D>::predict(Id i, double now) {
-  Pending best;
-  best.key.time = kNever;
-  Cell<D> range;
-  range.fill(1);
-  grid_->for_each_around(cell_[i], range, [&](std::size_t cell, const Image<D>& away) {
+  pending_[i].contact.time = kNever;
+  Cell<D> low = cell_[i], high = cell_[i];
+  for (int k = 0; k < D; ++k) --low[k], ++high[k];
+  predict_pairs(i, low, high);
+  predict_walls(i, pending_[i]);
+  predict_crossing(i, now, pending_[i]);
+  schedule(i);
+}
+
+/// Looks for contacts with whoever is in the cells from low to high.
+template <int D>
+void EventCore<D>::predict_pairs(Id i, const Cell<D>& low, const Cell<D>& high) {
+  grid_->for_each_between(low, high, [&](std::size_t cell, const Image<D>& away) {
     for (Id j = first_[cell]; j != kNobody; j = next_[j]) {
       if (j == i) continue;
       Image<D> image;
       for (int k = 0; k < D; ++k) image[k] = grid_->boxes(k, cell_[j][k]) - away[k];
-      predict_pair(i, j, image, best);
+      predict_pair(i, j, image, pending_[i]);
     }
   });
-  predict_walls(i, best);
-  predict_crossing(i, now, best);
-  best.stamp = pending_[i].stamp + 1;
-  pending_[i] = best;
-  if (best.key.time < horizon_) {
-    calendar_.push({best.key.time, i, best.stamp});
-    ++scheduled_;
-  }
+}
+
+template <int D>
+void EventCore<D>::schedule(Id i) {
+  Pending& pending = pending_[i];
+  ++pending.stamp;
+  const double time = std::min(pending.contact.time, pending.crossing);
+  if (!(time < horizon_)) return;
+  calendar_.push({time, i, pending.stamp});
+  ++scheduled_;
 }
 
 template <int D>
@@ -178,12 +180,13 @@ void EventCore<D>::predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending&
   }
   d += box_.shift(key.image);
   const double sigma = particles_.radius[key.lo] + particles_.radius[key.hi];
-  const double s = contact_time<D>(d, v, sigma, approach_slack(sigma, a.v.norm(), b.v.norm()));
-  key.time = now + s;
-  if (!(key.time <= best.key.time)) return;
+  const bool apart = d.squaredNorm() > sigma * sigma;
+  const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm());
+  key.time = now + contact_time<D>(d, v, sigma, slack);
+  if (!(key.time <= best.contact.time) || key.time == kNever) return;
   key.generation = std::max(generation_at(a, key.time), generation_at(b, key.time));
-  if (key < best.key) {
-    best.key = key;
+  if (key < best.contact) {
+    best.contact = key;
     best.partner_version = version_[j];
   }
 }
@@ -207,22 +210,21 @@ void EventCore<D>::predict_walls(Id i, Pending& best) const {
                         " under the uniform field and would bounce without end; give it a height or a velocity");
       EventKey<D> key;
       key.time = r.t + s;
-      if (!(key.time <= best.key.time)) continue;
+      if (!(key.time <= best.contact.time) || key.time == kNever) continue;
       key.kind = EventKind::wall;
       key.lo = i;
       key.hi = static_cast<Id>(2 * k + side);
       key.generation = generation_at(r, key.time);
-      if (key < best.key) {
-        best.key = key;
-      }
+      if (key < best.contact) best.contact = key;
     }
   }
 }
 
 template <int D>
-void EventCore<D>::predict_crossing(Id i, double now, Pending& best) const {
+void EventCore<D>::predict_crossing(Id i, double now, Pending& pending) const {
   Record<D> r = records_[i];
   advance(r, now);
+  pending.crossing = kNever;
   for (int k = 0; k < D; ++k) {
     for (int side = 0; side < 2; ++side) {
       const std::int32_t c = cell_[i][k] + side;
@@ -231,22 +233,32 @@ void EventCore<D>::predict_crossing(Id i, double now, Pending& best) const {
       const double gap = outward * (grid_->face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
       const double s =
           wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * g_[k], horizon_ - now, false, 0.0);
-      const double t = now + s;
-      if (t < best.key.time) {
-        best.key = EventKey<D>{};
-        best.key.time = t;
-        best.crossing = true;
-        best.face = static_cast<std::uint8_t>(2 * k + side);
+      if (now + s < pending.crossing) {
+        pending.crossing = now + s;
+        pending.face = static_cast<std::uint8_t>(2 * k + side);
       }
     }
   }
 }
 
+/// Moves a particle into the next cell. Its contact stands; only the cells that have come into view are searched.
 template <int D>
-void EventCore<D>::cross(Id i, const Pending& crossing) {
+void EventCore<D>::cross(Id i) {
+  Pending& pending = pending_[i];
+  const double now = pending.crossing;
+  const int axis = pending.face / 2, step = pending.face % 2 == 1 ? 1 : -1;
   remove(i);
-  cell_[i][crossing.face / 2] += crossing.face % 2 == 1 ? 1 : -1;
+  cell_[i][axis] += step;
   insert(i, grid_->index(cell_[i]));
+  Cell<D> low = cell_[i], high = cell_[i];
+  for (int k = 0; k < D; ++k)
+    if (k == axis)
+      low[k] = high[k] = cell_[i][k] + step;
+    else
+      --low[k], ++high[k];
+  predict_pairs(i, low, high);
+  predict_crossing(i, now, pending);
+  schedule(i);
 }
 
 template <int D>

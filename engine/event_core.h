@@ -67,11 +67,12 @@ class EventCore {
 
  private:
   struct Pending {
-    EventKey<D> key;          // key.time is kNever when nothing will happen
-    bool crossing = false;    // into the next cell: no contact
-    std::uint8_t face = 0;    // crossing: 2·axis + (0 downwards, 1 upwards)
-    std::uint32_t stamp = 0;  // of the calendar entry that stands for it
-    std::uint32_t partner_version = 0;
+    EventKey<D> contact;                // the next contact; its time is kNever when there is none
+    std::uint32_t partner_version = 0;  // the contact is stale when the partner's has moved on
+    double crossing = 0;                // when the particle leaves its cell
+    std::uint8_t face = 0;              // through: 2·axis + (0 downwards, 1 upwards)
+    std::uint32_t stamp = 0;            // of the calendar entry that stands for the earlier of the two
+    bool crosses_first() const { return crossing < contact.time; }
   };
   struct Earlier {
     const EventCore* core;
@@ -79,12 +80,14 @@ class EventCore {
   };
 
   void predict(Id i, double now);
+  void predict_pairs(Id i, const Cell<D>& low, const Cell<D>& high);
   void predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending& best) const;
   void predict_walls(Id i, Pending& best) const;
-  void predict_crossing(Id i, double now, Pending& best) const;
+  void predict_crossing(Id i, double now, Pending& pending) const;
+  void schedule(Id i);
   std::uint32_t generation_at(const Record<D>& r, double t) const;
   void advance(Record<D>& r, double t) const;
-  void cross(Id i, const Pending& crossing);
+  void cross(Id i);
   void collide_pair(const EventKey<D>& key, const Report& report);
   void collide_wall(const EventKey<D>& key, const Report& report);
   void insert(Id i, std::size_t cell);

@@ -93,6 +93,11 @@ TEST(Order, PositionsOfTheSecondOrderMethods) {
   }
 }
 
+TEST(Order, PositionsOfMcvaWithRestartAreShownAtTheRightTime) {
+  const Given restart = {{"variant", std::string("restart")}};
+  EXPECT_NEAR(position_order<2>(test::five_springs, "mcva", 6, {0.04, 0.02, 0.01, 0.005}, restart), 2, 0.2);
+}
+
 TEST(Order, PositionsOfCddaOrderFourBetweenCollisions) {
   const Given four = {{"order", std::int64_t{4}}};
   // The first collision of five-springs comes after t = 1.
