@@ -97,7 +97,10 @@ class Simulation {
   const System<D>& system() const { return *system_; }
 
  private:
-  struct Monitor;
+  Slab next_slab(double slack) const;
+  bool finished(double slack) const;
+  double fraction_done() const;
+
   std::unique_ptr<System<D>> system_;
   const IntegratorInfo& info_;
   std::unique_ptr<Integrator<D>> integrator_;

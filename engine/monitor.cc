@@ -1,0 +1,165 @@
+#include "engine/monitor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "engine/error.h"
+#include "engine/forces.h"
+
+namespace carom {
+
+namespace {
+/// S_h costs two passes over all pairs. Systems larger than this are measured at thermo rows and frames only.
+constexpr std::size_t kShadowAtEveryStep = 100;
+}  // namespace
+
+template <int D>
+Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const Plan& plan,
+                    const std::vector<Observer<D>*>& observers, Statistics& statistics)
+    : system_(system),
+      info_(info),
+      plan_(plan),
+      observers_(observers),
+      statistics_(statistics),
+      frames_(plan.frame_interval),
+      rows_(plan.thermo_interval) {
+  bool momentum_kept = true;
+  for (int k = 0; k < D; ++k) momentum_kept = momentum_kept && !system.box.walled(k);
+  for (const auto& term : system.interactions) momentum_kept = momentum_kept && term->keeps_momentum();
+  if (momentum_kept) statistics.max_momentum_error = 0;
+  if (info.hard_cores) touching_.emplace(system.box, system.particles.radius);
+  if (!info.shadow) return;
+  statistics.max_shadow_energy_error = 0;
+  force_.resize(system.particles.size());
+  scratch_.resize(system.particles.size());
+}
+
+template <int D>
+void Monitor<D>::start(const Particles<D>& nodes) {
+  shot_ = measure(0, system_.particles, nodes, info_.shadow);
+  statistics_.energy_initial = statistics_.energy_final = shot_.total();
+  first_momentum_ = shot_.momentum;
+  count_from(shot_);
+  show(shot_, true);
+}
+
+/// Energy errors count from this state on.
+template <int D>
+void Monitor<D>::count_from(const Snapshot<D>& shot) {
+  first_energy_ = statistics_.energy_after_first_step = shot.total();
+  first_shadow_ = shot.shadow;
+  statistics_.energy_reference = std::max(std::abs(shot.total()), magnitude_);
+}
+
+template <int D>
+std::vector<double> Monitor<D>::due_within(const Slab& slab) const {
+  std::vector<double> times;
+  Schedule frames = frames_, rows = rows_;
+  for (double due; (due = std::min(frames.due(), rows.due())) < slab.start + slab.length - time_slack();) {
+    times.push_back(due - slab.start);
+    frames.pass(due + time_slack());
+    rows.pass(due + time_slack());
+  }
+  return times;
+}
+
+template <int D>
+void Monitor<D>::observe(double time, const Particles<D>& copies) {
+  show(measure(time, copies, copies, false), false);
+}
+
+template <int D>
+void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool last) {
+  Statistics& s = statistics_;
+  const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
+  const bool with_shadow = info_.shadow && (due || s.steps == 1 || nodes.size() <= kShadowAtEveryStep);
+  shot_ = measure(s.end_time, system_.particles, nodes, with_shadow);
+  s.energy_final = shot_.total();
+  if (s.steps == 1 && info_.stepping) count_from(shot_);
+  s.max_energy_error = std::max(s.max_energy_error, std::abs(shot_.total() - first_energy_));
+  if (with_shadow)
+    s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - first_shadow_));
+  if (s.max_momentum_error)
+    s.max_momentum_error = std::max(*s.max_momentum_error, (shot_.momentum - first_momentum_).norm());
+  if (info_.hard_cores) s.counters.max_overlap = std::max(s.counters.max_overlap, deepest_overlap());
+  virial_time_ += elapsed * virial_;
+  if (s.end_time > 0) {
+    s.mean_pressure = (virial_time_ + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
+    s.collision_rate = 2.0 * static_cast<double>(s.counters.sphere_sphere) /
+                       (static_cast<double>(system_.particles.size()) * s.end_time);
+  }
+  show(shot_, last);
+}
+
+template <int D>
+Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Particles<D>& nodes, bool with_shadow) {
+  const Stopwatch watch(statistics_.counters.seconds.output);
+  Snapshot<D> shot;
+  shot.time = time;
+  shot.step = statistics_.steps;
+  shot.collisions = statistics_.counters.sphere_sphere;
+  shot.particles = &state;
+  const PotentialSums sums = evaluate_energy<D>(system_, nodes.x);
+  shot.kinetic = kinetic_energy(nodes);
+  shot.potential = sums.energy.value();
+  magnitude_ = shot.kinetic + sums.magnitude.value();
+  virial_ = 2 * shot.kinetic + sums.virial.value();
+  if (with_shadow) {
+    Counters uncounted;
+    evaluate_forces<D>(system_, nodes.x, force_, uncounted);
+    const double g = shadow_term<D>(system_, nodes, force_, scratch_, uncounted);
+    shot.shadow = shot.total() + plan_.step * plan_.step * g;
+  }
+  shot.momentum = total_momentum(state);
+  if (state.size() > 0) shot.temperature = 2 * shot.kinetic / (D * static_cast<double>(state.size()));
+  if (!std::isfinite(shot.total()))
+    throw Error(Failure::numerical, "the energy is not finite at step " + std::to_string(shot.step) + ", time " +
+                                        std::to_string(time) + "; use a smaller integrator.step");
+  return shot;
+}
+
+template <int D>
+void Monitor<D>::show(Snapshot<D> shot, bool last) {
+  const double now = shot.time + time_slack();
+  const bool frame = frames_.due() <= now || (last && shot.time > last_frame_);
+  const bool row = rows_.due() <= now || (last && shot.time > last_row_);
+  if (!frame && !row) return;
+  const Stopwatch watch(statistics_.counters.seconds.output);
+  const double collision_virial = statistics_.counters.collision_virial.value();
+  const double collisions = last_row_ >= 0 && shot.time > last_row_
+                                ? (collision_virial - last_row_virial_) / (shot.time - last_row_)
+                                : 0;  // nothing has collided before the start
+  shot.pressure = (virial_ + collisions) / (D * system_.box.volume());
+  shot.max_energy_error = statistics_.max_energy_error;
+  if (row) {
+    for (auto* observer : observers_) observer->thermo(shot);
+    rows_.pass(now);
+    last_row_ = shot.time;
+    last_row_virial_ = collision_virial;
+  }
+  if (frame) {
+    for (auto* observer : observers_) observer->frame(shot);
+    frames_.pass(now);
+    last_frame_ = shot.time;
+  }
+}
+
+/// The deepest overlap of any two spheres, relative to their contact distance: an independent check that no contact was
+/// missed. 0 where none overlap.
+template <int D>
+double Monitor<D>::deepest_overlap() {
+  const auto& p = system_.particles;
+  double deepest = 0;
+  for (const auto& pair : touching_->cover(p.x)) {
+    const double sigma = p.radius[pair.i] + p.radius[pair.j];
+    const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
+    if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
+  }
+  return deepest;
+}
+
+template class Monitor<2>;
+template class Monitor<3>;
+
+}  // namespace carom

@@ -1,0 +1,80 @@
+#pragma once
+// What is measured while a run goes on, and who is shown it when. The run itself never looks at it.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/neighbour_list.h"
+#include "engine/simulation.h"
+
+namespace carom {
+
+/// The next of the times interval, 2·interval, …; never, where there is no interval.
+class Schedule {
+ public:
+  explicit Schedule(double interval) : interval_(interval) {}
+  double due() const {
+    return interval_ > 0 ? static_cast<double>(next_) * interval_ : std::numeric_limits<double>::infinity();
+  }
+  /// Moves on to the first time after `time`.
+  void pass(double time) {
+    while (due() <= time) ++next_;
+  }
+
+ private:
+  double interval_;
+  std::int64_t next_ = 1;  // the start is shown whatever the interval
+};
+
+template <int D>
+class Monitor {
+ public:
+  /// Keeps references to all of these.
+  Monitor(const System<D>& system, const IntegratorInfo& info, const Plan& plan,
+          const std::vector<Observer<D>*>& observers, Statistics& statistics);
+
+  /// Measures and shows the state at the start. `nodes` is the state at which energies are measured.
+  void start(const Particles<D>& nodes);
+
+  /// Due times inside a slab, for integrators that are exact at any time: since the slab's start, ascending.
+  std::vector<double> due_within(const Slab& slab) const;
+
+  /// Shows copies of the particles flown to a due time inside a slab.
+  void observe(double time, const Particles<D>& copies);
+
+  /// Measures the state at the end of a slab, updates the statistics, shows it where it is due or `last`.
+  /// statistics.steps and end_time already tell of the slab, which advanced the time by `elapsed`.
+  void end_of_slab(double elapsed, const Particles<D>& nodes, bool last);
+
+  /// Shows the last state again to those who have not seen it.
+  void finish() { show(shot_, true); }
+
+  /// Due times and ends are met up to this [time].
+  double time_slack() const { return 1e-9 * plan_.step; }
+
+ private:
+  Snapshot<D> measure(double time, const Particles<D>& state, const Particles<D>& nodes, bool with_shadow);
+  void show(Snapshot<D> shot, bool last);
+  void count_from(const Snapshot<D>& shot);
+  double deepest_overlap();
+
+  const System<D>& system_;
+  const IntegratorInfo& info_;
+  const Plan& plan_;
+  const std::vector<Observer<D>*>& observers_;
+  Statistics& statistics_;
+
+  Schedule frames_, rows_;
+  double last_frame_ = -1, last_row_ = -1;      // when they were shown; before the start, nobody was
+  double last_row_virial_ = 0;                  // collision virial up to the last row
+  Snapshot<D> shot_;                            // of the last slab's end
+  double magnitude_ = 0, virial_ = 0;           // of the last measurement: K + Σ|V|, 2K + Σ d·F
+  double virial_time_ = 0;                      // ∫ (2K + Σ d·F) dt
+  double first_energy_ = 0, first_shadow_ = 0;  // H₁ and S_h,1
+  Vec<D> first_momentum_ = Vec<D>::Zero();
+  std::vector<Vec<D>> force_, scratch_;       // for S_h
+  std::optional<NeighbourList<D>> touching_;  // pairs that may overlap
+};
+
+}  // namespace carom
