@@ -17,4 +17,10 @@ Deck read_deck(const std::filesystem::path& file, std::span<const std::string> o
   return deck;
 }
 
+void set_output_directory(Deck& deck, const std::filesystem::path& directory) {
+  deck.output.directory = directory;
+  deck.source->values.find("output")->values.insert_or_assign("directory", directory.string());
+  deck.toml_text = write_deck(deck.source->values);
+}
+
 }  // namespace carom

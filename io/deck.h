@@ -48,6 +48,9 @@ class DeckError : public Error {
 /// Reads, applies `table.key=value` overrides, validates against the schema, resolves defaults.
 Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides);
 
+/// Puts the results elsewhere than the deck says; the resolved deck says so too.
+void set_output_directory(Deck& deck, const std::filesystem::path& directory);
+
 /// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
 /// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards.
 template <int D>

@@ -166,6 +166,8 @@ class Interpreter {
       if (!wall_seconds(*wall))
         problems_.error(table->place("checkpoint_wall"), "'" + *wall + "' is not a time",
                         "write hh:mm:ss, for instance 00:05:00");
+      problems_.warning(table->place("checkpoint_wall"), "this version writes no checkpoints",
+                        "the run ends as it should, but cannot be continued");
     }
   }
 

@@ -46,16 +46,14 @@ RunLog::RunLog(const std::filesystem::path& path, bool quiet) : sink_(std::make_
   warnings_ = std::make_unique<spdlog::logger>("warnings", spdlog::sinks_init_list{sink_, to_stderr});
   sink_->set_pattern("%Y-%m-%d %H:%M:%S  %v");
   to_stdout->set_pattern("%v");
-  to_stderr->set_pattern("carom: %v");
+  to_stderr->set_pattern("%v");
 }
 
 RunLog::~RunLog() = default;
 
 void RunLog::note(std::string_view text) { log(*file_, spdlog::level::info, text); }
 void RunLog::say(std::string_view text) { log(*screen_, spdlog::level::info, text); }
-void RunLog::warn(std::string_view text) {
-  log(*warnings_, spdlog::level::warn, std::string("warning: ").append(text));
-}
+void RunLog::warn(std::string_view text) { log(*warnings_, spdlog::level::warn, text); }
 void RunLog::error(std::string_view text) { log(*file_, spdlog::level::err, std::string("error: ").append(text)); }
 
 void RunLog::close() { sink_->close(); }

@@ -20,7 +20,7 @@ class RunLog {
 
   void note(std::string_view text);   ///< to the file
   void say(std::string_view text);    ///< to the file and to stdout
-  void warn(std::string_view text);   ///< to the file and to stderr, as a warning
+  void warn(std::string_view text);   ///< to the file and to stderr; the text itself says that it is a warning
   void error(std::string_view text);  ///< to the file, as an error; the command prints it when it ends
   /// Puts everything on the disk.
   void close();

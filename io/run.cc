@@ -65,8 +65,8 @@ int run_deck(Deck& deck, const RunOptions& options, int ranks, const Deadline& d
   RunOutcome outcome{.status = "done", .error = "", .particles = system->particles.size(), .ranks = ranks};
   log.say(banner_text(deck, outcome.particles, ranks));
   for (const std::string& warning : deck.warnings) log.warn(warning);
-  if (ranks > 1) log.warn(fmt::format("this version uses one rank; the other {} wait", ranks - 1));
-  if (backup) log.warn("the files of an earlier run in this directory are now in " + backup->string());
+  if (ranks > 1) log.warn(fmt::format("warning: this version uses one rank; the other {} wait", ranks - 1));
+  if (backup) log.warn("warning: the files of an earlier run in this directory are now in " + backup->string());
   write_file_atomically(directory / run_file::deck, deck.toml_text);
 
   Simulation<D> simulation(std::move(system), info, info.make<D>(deck.integrator_parameters), deck.plan);
@@ -88,7 +88,7 @@ int run_deck(Deck& deck, const RunOptions& options, int ranks, const Deadline& d
     if (statistics.stopped_early) outcome.status = "stopped";
     log.say(report_text(deck, statistics));
     if (statistics.stopped_early)
-      log.warn("stopped by --max-wall; this version writes no checkpoint, so the run cannot be continued");
+      log.warn("warning: stopped by --max-wall; this version writes no checkpoint, so the run cannot be continued");
     log.close();
     summary();
   } catch (const std::exception& e) {
@@ -115,7 +115,7 @@ int run_command(const RunOptions& options) {
   const Communicator ranks;
   return ranks.on_first([&] {
     Deck deck = read_deck(options.deck, options.set);
-    if (options.output) deck.output.directory = *options.output;
+    if (options.output) set_output_directory(deck, *options.output);
     const int code = deck.dimension == 2 ? run_deck<2>(deck, options, ranks.size(), deadline)
                                          : run_deck<3>(deck, options, ranks.size(), deadline);
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
