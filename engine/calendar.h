@@ -20,12 +20,9 @@ struct CalendarEntry {
   std::uint32_t stamp;  ///< valid while it is the slot's newest
 };
 
-/// Earlier(a, b) is a strict order of entries that puts smaller times first and decides ties by the event keys.
-template <class Earlier>
+/// Serves entries by time; the order of equal times is the caller's business.
 class Calendar {
  public:
-  explicit Calendar(Earlier earlier) : earlier_(earlier), present_(Later{earlier}) {}
-
   /// Empties the calendar and sets it up for times in [0, horizon), of which about `expected` will be scheduled.
   void reset(double horizon, std::size_t expected) {
     horizon_ = horizon;
@@ -58,7 +55,7 @@ class Calendar {
         opened_ = false;
         continue;
       }
-      from_heap_ = !present_.empty() && (sorted_.empty() || earlier_(present_.top(), sorted_.back()));
+      from_heap_ = !present_.empty() && (sorted_.empty() || present_.top().time < sorted_.back().time);
       return from_heap_ ? &present_.top() : &sorted_.back();
     }
   }
@@ -73,8 +70,7 @@ class Calendar {
 
  private:
   struct Later {  // boost::heap keeps the largest on top
-    Earlier earlier;
-    bool operator()(const CalendarEntry& a, const CalendarEntry& b) const { return earlier(b, a); }
+    bool operator()(const CalendarEntry& a, const CalendarEntry& b) const { return b.time < a.time; }
   };
   static constexpr std::size_t kEntriesPerBin = 8, kMostBins = std::size_t{1} << 20;
 
@@ -84,11 +80,10 @@ class Calendar {
   void open() {
     sorted_.swap(bins_[current_]);
     bins_[current_].clear();
-    std::sort(sorted_.begin(), sorted_.end(), Later{earlier_});
+    std::sort(sorted_.begin(), sorted_.end(), Later{});
     opened_ = true;
   }
 
-  Earlier earlier_;
   double horizon_ = 0, per_time_ = 0;
   std::vector<std::vector<CalendarEntry>> bins_;
   std::vector<CalendarEntry> sorted_;  // the current bin, latest first

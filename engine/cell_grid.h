@@ -55,8 +55,9 @@ class CellGrid {
   Cell<D> cell(const Vec<D>& x) const {
     Cell<D> c;
     for (int k = 0; k < D; ++k) {
-      c[k] = static_cast<std::int32_t>(std::floor((x[k] - origin_[k]) / edge_[k]));
-      if (!box_.periodic(k)) c[k] = std::clamp(c[k], 0, count_[k] - 1);
+      double at = std::floor((x[k] - origin_[k]) / edge_[k]);
+      if (!box_.periodic(k)) at = std::clamp(at, 0.0, count_[k] - 1.0);
+      c[k] = static_cast<std::int32_t>(at);
     }
     return c;
   }
@@ -143,7 +144,7 @@ class CellTable {
   void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
     Cell<D> range;
     for (int k = 0; k < D; ++k)
-      range[k] = std::max(1, static_cast<std::int32_t>(std::ceil(reach / grid_.edge(k) - 1e-9)));
+      range[k] = std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid_.edge(k) - 1e-9), kFarthest)));
     grid_.for_each_around(grid_.cell(x), range, [&](std::size_t cell, const Image<D>& away) {
       for (std::size_t q = start_[cell]; q < start_[cell + 1]; ++q) {
         const Id j = who_[q];
@@ -155,6 +156,7 @@ class CellTable {
   }
 
  private:
+  static constexpr double kFarthest = 1 << 28;  // cells: what an integer holds
   const CellGrid<D>& grid_;
   std::vector<std::size_t> start_;
   std::vector<Id> who_;

@@ -2,6 +2,7 @@
 // A collision as observers see it.
 
 #include <compare>
+#include <string>
 
 #include "engine/vec.h"
 
@@ -21,6 +22,15 @@ struct EventKey {
   Image<D> image{};
   auto operator<=>(const EventKey&) const = default;
 };
+
+/// Names the partners for messages: "particles 3 and 7", "particle 3 and the upper wall of axis 1".
+template <int D>
+std::string partners(const EventKey<D>& key) {
+  const std::string lo = std::to_string(key.lo);
+  if (key.kind == EventKind::pair) return "particles " + lo + " and " + std::to_string(key.hi);
+  return "particle " + lo + " and the " + (key.hi % 2 == 0 ? "lower" : "upper") + " wall of axis " +
+         std::to_string(key.hi / 2);
+}
 
 /// One executed collision.
 template <int D>

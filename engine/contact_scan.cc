@@ -21,6 +21,7 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   counters_ = &counters;
   contacts_ = contacts;
   events_ = 0;
+  events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
   double fastest = 0, strongest = 0;
   for (const auto& v : particles_.v) fastest = std::max(fastest, v.squaredNorm());
   for (const auto& each : a) strongest = std::max(strongest, each.squaredNorm());
@@ -123,12 +124,18 @@ bool ContactScan<D>::rests(const EventKey<D>& key) const {
 }
 
 template <int D>
-void ContactScan<D>::hold(Positions<D> v, Vectors<D> a) {
-  for (auto& contact : resting_) {  // the gap's second derivative, u² + d·a, must not be negative
-    contact.lambda = 0;
-    contact.bound = contact.key.kind == EventKind::pair ? -(v[contact.key.lo] - v[contact.key.hi]).squaredNorm() : 0.0;
+void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double rest) {
+  for (auto& contact : resting_) {
+    contact.lambda = contact.bound = 0;
+    if (contact.key.kind != EventKind::pair) continue;
+    // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `rest`. A pair that turns (u) while it
+    // is braked (u·a < 0) would go in by the second term; u·a is not changed by the reaction, which is normal to u.
+    const Vec<D> u = v[contact.key.lo] - v[contact.key.hi];
+    const double braking = std::max(0.0, -u.dot(a[contact.key.lo] - a[contact.key.hi]));
+    contact.bound = braking * rest - u.squaredNorm();
   }
   press_apart<D>(resting_, particles_.mass, a);
+  std::erase_if(resting_, [](const auto& contact) { return contact.lambda == 0; });  // they leave, and may come back
 }
 
 template <int D>
@@ -139,6 +146,32 @@ void ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v) {
     contact.lambda = contact.bound = 0;
   }
   press_apart<D>(resting_, particles_.mass, v);
+}
+
+template <int D>
+void ContactScan<D>::slide(Positions<D> x, Vectors<D> v) {
+  constexpr int kMostSweeps = 100;
+  constexpr double kSteepest = 0.1;  // normal against tangential speed: beyond, it is a blow and no sliding
+  bool turned = true;
+  for (int sweep = 0; turned && sweep < kMostSweeps; ++sweep) {
+    turned = false;
+    for (const auto& contact : resting_) {
+      if (contact.lambda == 0) continue;
+      const Id lo = contact.key.lo, hi = contact.key.hi;
+      const bool pair = contact.key.kind == EventKind::pair;
+      const Vec<D> normal =
+          (pair ? Vec<D>(x[lo] - x[hi] + box_.shift(contact.key.image)) : contact.normal).normalized();
+      const Vec<D> u = pair ? Vec<D>(v[lo] - v[hi]) : v[lo];
+      const double along = u.dot(normal);
+      const Vec<D> tangent = u - along * normal;
+      if (std::abs(along) <= 0.1 * resting_speed_ || std::abs(along) > kSteepest * tangent.norm()) continue;
+      const Vec<D> change = tangent * (u.norm() / tangent.norm()) - u;
+      const double share = pair ? particles_.mass[hi] / (particles_.mass[lo] + particles_.mass[hi]) : 1.0;
+      v[lo] += share * change;
+      if (pair) v[hi] -= (1 - share) * change;
+      turned = true;
+    }
+  }
 }
 
 template <int D>
@@ -182,6 +215,9 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
                                    gap <= tolerance(particles_.radius[i]), resting_speed_);
       if (key.time < kNever) offer(inward(wall) * Vec<D>::Unit(axis));
     }
+  // Pieces that end in a contact without an impulse count too: there must be an end to them.
+  if (first.key.time < kNever && events_ == events_at_last_cut_) count_event(first.key);
+  events_at_last_cut_ = events_;
   return first;
 }
 
@@ -199,18 +235,9 @@ void collide_elastically(const Touch<D>& touch, Particles<D>& particles) {
   particles.v[hi] -= (g / mass_hi) * touch.normal;
 }
 
-template <int D>
-std::string partners(const EventKey<D>& key) {
-  if (key.kind == EventKind::pair) return "particles " + std::to_string(key.lo) + " and " + std::to_string(key.hi);
-  return "particle " + std::to_string(key.lo) + " and the " + (key.hi % 2 == 0 ? "lower" : "upper") + " wall of axis " +
-         std::to_string(key.hi / 2);
-}
-
 template class ContactScan<2>;
 template class ContactScan<3>;
 template void collide_elastically<2>(const Touch<2>&, Particles<2>&);
 template void collide_elastically<3>(const Touch<3>&, Particles<3>&);
-template std::string partners<2>(const EventKey<2>&);
-template std::string partners<3>(const EventKey<3>&);
 
 }  // namespace carom

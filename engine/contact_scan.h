@@ -43,8 +43,9 @@ class ContactScan {
   std::span<RestingContact<D>> resting() { return resting_; }
   bool rests(const EventKey<D>& key) const;
 
-  /// Keeps resting contacts from approaching: accelerations a become those of the held system.
-  void hold(Positions<D> v, Vectors<D> a);
+  /// Keeps resting contacts from approaching for a time `rest`: accelerations a become those of the held system. Those
+  /// that nothing presses are resting no more.
+  void hold(Positions<D> v, Vectors<D> a, double rest);
 
   /// Takes the approach out of resting contacts at new positions.
   void stop_approach(Positions<D> x, Vectors<D> v);
@@ -53,11 +54,21 @@ class ContactScan {
   /// Call resolve() before; contacts held at rest are not looked for.
   Touch<D> earliest(Positions<D> x, Positions<D> v, Positions<D> a, double rest);
 
+  /// Turns the relative velocities of contacts that were held over a piece into the tangent at x, keeping their size
+  /// and so the energy. (What a held piece of finite length leaves along the normal would make the pair bounce at
+  /// once.)
+  void slide(Positions<D> x, Vectors<D> v);
+
   /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, Positions<D> x_new) { return list_.cover(x, x_new); }
 
   double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
   double tolerance(double sigma) const { return gap_tolerance(sigma, largest_edge_); }
+  /// The least gap a piece may end with, for a contact that touches at its start: one that rounding has left at the
+  /// edge of the tolerance must be able to depart.
+  double floor(double gap_at_start, double tolerance) const {
+    return std::min(-tolerance, gap_at_start - std::numeric_limits<double>::epsilon() * largest_edge_);
+  }
   /// The gap of particle i to a wall (2·axis + side), and the wall's inward normal component along its axis.
   double wall_gap(const Vec<D>& x, Id i, int wall) const;
   static double inward(int wall) { return wall % 2 == 0 ? 1.0 : -1.0; }
@@ -77,7 +88,7 @@ class ContactScan {
   double largest_edge_;
   NeighbourList<D> list_;
   std::uint64_t max_events_;
-  std::uint64_t events_ = 0;
+  std::uint64_t events_ = 0, events_at_last_cut_ = 0;
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* contacts_ = nullptr;
   double resting_speed_ = 0;
@@ -88,9 +99,5 @@ class ContactScan {
 /// The elastic impulse: kinetic energy and momentum are kept.
 template <int D>
 void collide_elastically(const Touch<D>& touch, Particles<D>& particles);
-
-/// Names the partners of a contact for messages: "particles 3 and 7", "particle 3 and the upper wall of axis 1".
-template <int D>
-std::string partners(const EventKey<D>& key);
 
 }  // namespace carom

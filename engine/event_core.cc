@@ -9,26 +9,12 @@
 namespace carom {
 
 template <int D>
-EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles)
-    : box_(box), particles_(particles), calendar_(Earlier{this}) {
+EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles) : box_(box), particles_(particles) {
   for (double r : particles.radius) largest_radius_ = std::max(largest_radius_, r);
 }
 
 template <int D>
 EventCore<D>::~EventCore() = default;
-
-template <int D>
-bool EventCore<D>::Earlier::operator()(const CalendarEntry& a, const CalendarEntry& b) const {
-  if (a.time != b.time) return a.time < b.time;
-  // Equal times: stale entries first, to be dropped; then in the order of the keys; crossings last.
-  const Pending &p = core->pending_[a.slot], &q = core->pending_[b.slot];
-  const bool p_stale = p.stamp != a.stamp, q_stale = q.stamp != b.stamp;
-  if (p_stale != q_stale) return p_stale;
-  if (p_stale) return a.slot < b.slot;
-  if (p.crosses_first() != q.crosses_first()) return q.crosses_first();
-  if (p.crosses_first()) return a.slot < b.slot;
-  return p.contact < q.contact;
-}
 
 template <int D>
 void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon) {
@@ -55,20 +41,45 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
     cell_[i] = grid_->cell(particles.x[i]);
     insert(static_cast<Id>(i), grid_->index(cell_[i]));
   }
+  tied_ = {};
   calendar_.reset(horizon, std::max(expected_, n));
   for (std::size_t i = 0; i < n; ++i) predict(static_cast<Id>(i), 0.0);
 }
 
+/// Takes the next valid entry before `end` from the calendar: the smallest time, and of equal times the smallest key.
+template <int D>
+bool EventCore<D>::next_event(double end, CalendarEntry& entry) {
+  const auto tie = [&] {
+    const CalendarEntry& top = *calendar_.top();
+    const Pending& pending = pending_[top.slot];
+    if (valid(top)) tied_.push({top, pending.crosses_first(), pending.contact});
+    calendar_.pop();
+  };
+  for (;;) {
+    if (tied_.empty()) {
+      const CalendarEntry* top = calendar_.top();
+      if (!top || top->time >= end) return false;
+      entry = *top;
+      calendar_.pop();
+      if (!valid(entry)) continue;
+      top = calendar_.top();
+      if (!top || top->time != entry.time) return true;
+      tied_.push({entry, pending_[entry.slot].crosses_first(), pending_[entry.slot].contact});
+    }
+    const double now = tied_.top().entry.time;
+    while (calendar_.top() && calendar_.top()->time == now) tie();
+    entry = tied_.top().entry;
+    tied_.pop();
+    if (valid(entry)) return true;
+  }
+}
+
 template <int D>
 double EventCore<D>::run(double end, const Report& report) {
-  while (const CalendarEntry* entry = calendar_.top()) {
-    const double event_time = entry->time;
-    if (event_time >= end) break;
-    const Id i = entry->slot;
+  for (CalendarEntry entry; next_event(end, entry);) {
+    const Id i = entry.slot;
+    const double event_time = entry.time;
     const Pending& pending = pending_[i];
-    const bool stale = pending.stamp != entry->stamp;
-    calendar_.pop();
-    if (stale) continue;
     if (pending.crosses_first()) {
       cross(i);
       continue;
@@ -78,14 +89,10 @@ double EventCore<D>::run(double end, const Report& report) {
       predict(i, event_time);
       continue;
     }
-    if (++events_ > report.max_events) {
-      const std::string partner =
-          key.kind == EventKind::pair ? "particle " + std::to_string(key.hi) : "wall " + std::to_string(key.hi);
+    if (++events_ > report.max_events)
       throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
-                                          " collisions in one step, the last between particle " +
-                                          std::to_string(key.lo) + " and " + partner +
+                                          " collisions in one step, the last between " + partners(key) +
                                           "; use a smaller step or raise integrator.max_events_per_step");
-    }
     if (key.kind == EventKind::pair) {
       collide_pair(key, report);
       predict(key.lo, event_time);
@@ -233,8 +240,10 @@ void EventCore<D>::predict_crossing(Id i, double now, Pending& pending) const {
       const double gap = outward * (grid_->face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
       const double s =
           wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * g_[k], horizon_ - now, false, 0.0);
-      if (now + s < pending.crossing) {
-        pending.crossing = now + s;
+      // At least an ulp from now: at the top of its path a particle could cross back and forth in no time.
+      const double t = std::max(now + s, std::nextafter(now, kNever));
+      if (t < pending.crossing) {
+        pending.crossing = t;
         pending.face = static_cast<std::uint8_t>(2 * k + side);
       }
     }
@@ -262,6 +271,14 @@ void EventCore<D>::cross(Id i) {
 }
 
 template <int D>
+void EventCore<D>::set_generation(Record<D>& r, const EventKey<D>& key) {
+  if (key.generation > std::numeric_limits<std::uint16_t>::max())
+    throw Error(Failure::numerical,
+                partners(key) + " collide without end at one instant; separate the spheres that touch there");
+  r.generation = static_cast<std::uint16_t>(key.generation);
+}
+
+template <int D>
 void EventCore<D>::collide_pair(const EventKey<D>& key, const Report& report) {
   Record<D>&a = records_[key.lo], &b = records_[key.hi];
   advance(a, key.time);
@@ -272,10 +289,8 @@ void EventCore<D>::collide_pair(const EventKey<D>& key, const Report& report) {
   const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, mass_a, mass_b) * d;
   a.v += impulse / mass_a;
   b.v -= impulse / mass_b;
-  if (key.generation > std::numeric_limits<std::uint16_t>::max())
-    throw Error(Failure::numerical, "particles " + std::to_string(key.lo) + " and " + std::to_string(key.hi) +
-                                        " collide without end at one instant; separate the spheres that touch there");
-  a.generation = b.generation = static_cast<std::uint16_t>(key.generation);
+  set_generation(a, key);
+  set_generation(b, key);
   ++version_[key.lo];
   ++version_[key.hi];
   ++report.counters.sphere_sphere;
@@ -300,7 +315,7 @@ void EventCore<D>::collide_wall(const EventKey<D>& key, const Report& report) {
   const double gap = key.hi % 2 == 0 ? r.x[axis] - radius : box_.edges[axis] - radius - r.x[axis];
   report.counters.max_overlap = std::max(report.counters.max_overlap, -gap / radius);
   r.v[axis] = -r.v[axis];
-  r.generation = static_cast<std::uint16_t>(key.generation);
+  set_generation(r, key);
   ++version_[key.lo];
   ++report.counters.sphere_wall;
 }

@@ -15,6 +15,7 @@
 
 #include <limits>
 #include <memory>
+#include <queue>
 #include <vector>
 
 #include "engine/box.h"
@@ -74,11 +75,18 @@ class EventCore {
     std::uint32_t stamp = 0;            // of the calendar entry that stands for the earlier of the two
     bool crosses_first() const { return crossing < contact.time; }
   };
-  struct Earlier {
-    const EventCore* core;
-    bool operator()(const CalendarEntry& a, const CalendarEntry& b) const;
+  /// An event among several at one time, with the key it had when it was found there.
+  struct Tied {
+    CalendarEntry entry;
+    bool crossing;
+    EventKey<D> key;
+    bool operator<(const Tied& other) const {  // crossings last; std::priority_queue keeps the largest on top
+      return crossing != other.crossing ? crossing : other.key < key;
+    }
   };
 
+  bool valid(const CalendarEntry& entry) const { return pending_[entry.slot].stamp == entry.stamp; }
+  bool next_event(double end, CalendarEntry& entry);
   void predict(Id i, double now);
   void predict_pairs(Id i, const Cell<D>& low, const Cell<D>& high);
   void predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending& best) const;
@@ -88,6 +96,7 @@ class EventCore {
   std::uint32_t generation_at(const Record<D>& r, double t) const;
   void advance(Record<D>& r, double t) const;
   void cross(Id i);
+  void set_generation(Record<D>& r, const EventKey<D>& key);
   void collide_pair(const EventKey<D>& key, const Report& report);
   void collide_wall(const EventKey<D>& key, const Report& report);
   void insert(Id i, std::size_t cell);
@@ -103,7 +112,8 @@ class EventCore {
   std::vector<Record<D>> records_;
   std::vector<std::uint32_t> version_;  // grows with every event of the particle
   std::vector<Pending> pending_;
-  Calendar<Earlier> calendar_;
+  Calendar calendar_;
+  std::priority_queue<Tied> tied_;  // events at one and the same time, in the order of their keys
 
   std::unique_ptr<CellGrid<D>> grid_;
   std::vector<Cell<D>> cell_;  // unwrapped

@@ -4,38 +4,46 @@
 #include <numeric>
 
 #include "engine/cell_grid.h"
+#include "engine/error.h"
 
 namespace carom {
+
+namespace {
+constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
+constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
+}  // namespace
 
 template <int D>
 NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::function<bool(Id, Id)> wanted)
     : box_(box), reach_(std::move(reach)), wanted_(std::move(wanted)) {
   const double mean =
       std::accumulate(reach_.begin(), reach_.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, reach_.size()));
-  skin_ = 0.3 * mean;  // 15 % of a mean pair reach
+  least_skin_ = skin_ = 0.3 * mean;  // 15 % of a mean pair reach
 }
 
 template <int D>
 std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new,
                                                           double margin) {
   follow_wraps(x);
-  const bool same = x.data() == x_new.data();
-  // The largest distances from where the list was built, and within this step: two bounds for everybody.
-  double from_build = 0, step = 0;
-  if (built_at_.size() == x.size())
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      from_build = std::max(from_build, (x[i] - built_at_[i]).squaredNorm());
-      if (!same) {
-        from_build = std::max(from_build, (x_new[i] - built_at_[i]).squaredNorm());
-        step = std::max(step, (x_new[i] - x[i]).squaredNorm());
-      }
-    }
-  const bool usable = built_at_.size() == x.size() && std::sqrt(from_build) + margin <= 0.5 * skin_;
-  if (!usable) {
-    if (built_at_.size() != x.size() && !same)
-      for (std::size_t i = 0; i < x.size(); ++i) step = std::max(step, (x_new[i] - x[i]).squaredNorm());
-    // A step that eats more than half the skin by itself asks for a wider one, with room for several such steps.
-    skin_ = std::max(skin_, 4.0 * (std::sqrt(step) + margin));
+  const bool known = built_at_.size() == x.size(), still = x.data() == x_new.data();
+  double squared_from_build = 0, squared_step = 0;  // the largest distances: two bounds for everybody
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (known) squared_from_build = std::max(squared_from_build, (x[i] - built_at_[i]).squaredNorm());
+    if (still) continue;
+    if (known) squared_from_build = std::max(squared_from_build, (x_new[i] - built_at_[i]).squaredNorm());
+    squared_step = std::max(squared_step, (x_new[i] - x[i]).squaredNorm());
+  }
+  const double step = std::sqrt(squared_step) + margin;
+  const bool covers = known && std::sqrt(squared_from_build) + margin <= 0.5 * skin_;
+  const double wanted = std::max(least_skin_, 4 * step);        // room for the step and for some more of its size
+  const bool wasteful = step > 0 && skin_ > kTooWide * wanted;  // made for one wild step
+  if (!covers || wasteful) {
+    for (int k = 0; k < D; ++k)
+      if (box_.periodic(k) && !(step <= kMostBoxes * box_.edges[k]))
+        throw Error(Failure::numerical,
+                    "a particle moves farther than " + std::to_string(kMostBoxes) +
+                        " edges of the periodic box within one step; use a smaller integrator.step");
+    skin_ = std::max(wanted, wasteful ? 0.0 : 0.5 * skin_);
     build(x);
   }
   return pairs_;
@@ -60,6 +68,10 @@ void NeighbourList<D>::follow_wraps(std::span<const Vec<D>> x) {
 
 template <int D>
 void NeighbourList<D>::build(std::span<const Vec<D>> x) {
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (!x[i].allFinite())
+      throw Error(Failure::numerical,
+                  "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
   ++rebuilds_;
   built_at_.assign(x.begin(), x.end());
   pairs_.clear();

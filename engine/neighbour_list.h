@@ -31,7 +31,8 @@ class NeighbourList {
   NeighbourList(const Box<D>& box, std::vector<double> reach, std::function<bool(Id, Id)> wanted = {});
 
   /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them
-  /// (arcs that stray no farther from x than `margin` besides the straight displacement). Rebuilds where needed.
+  /// (arcs that stray no farther from x than `margin` besides the straight displacement). Rebuilds where needed. Throws
+  /// Error(Failure::numerical) for steps of several edges of a periodic box.
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new, double margin = 0);
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, double margin = 0) { return cover(x, x, margin); }
 
@@ -44,7 +45,7 @@ class NeighbourList {
   const Box<D>& box_;
   std::vector<double> reach_;
   std::function<bool(Id, Id)> wanted_;
-  double skin_;
+  double least_skin_, skin_;
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
   std::vector<NeighbourPair<D>> pairs_;
   std::uint64_t rebuilds_ = 0;

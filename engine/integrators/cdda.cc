@@ -41,6 +41,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     while (!ended) {
       scan_->resolve(done, p.x, p.v, elastic);
       const double rest = slab.length - done;
+      if (!(rest > 0)) break;  // the last contact rounds to the end of the slab
       const double wanted = std::min(rest, longest), tau = find_piece(p, wanted);
       if (tau == 0) {  // no convergence
         longest = 0.5 * wanted;
@@ -55,6 +56,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       ended = tau == rest;
       std::ranges::copy(piece_->x(), p.x.begin());
       std::ranges::copy(piece_->v(), p.v.begin());
+      if (!scan_->resting().empty()) scan_->slide(p.x, p.v);
       done += tau;
     }
     system.wrap();
@@ -69,6 +71,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     if (!end.converged) return 0;
     if (!end.violates) return rest;
     double lo = 0, hi = rest, tau = rest, last_tau = 0, last_miss = 0;
+    EventKey<D> violator = end.violator;
     bool known = false;  // a point for the secant
     for (int iteration = 0; hi - lo > 4 * std::numeric_limits<double>::epsilon() * rest; ++iteration) {
       const double miss = end.contact - tau;
@@ -89,6 +92,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       if (!end.converged) return 0;
       if (end.violates) {
         hi = tau;
+        violator = end.violator;
       } else {
         if (end.touches) return tau;
         lo = tau;
@@ -96,10 +100,10 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     }
     // The bracket has closed on a jump: a grazing contact that comes and goes with τ. The piece before it stands.
     if (lo == 0)
-      throw Error(Failure::numerical, partners(end.key) +
+      throw Error(Failure::numerical, partners(violator) +
                                           " meet at once, however short the step; "
                                           "separate them or give them a relative velocity");
-    scan_->count_event(end.key);
+    scan_->count_event(violator);
     end = solve(p, lo);
     return end.converged ? lo : 0;
   }

@@ -21,6 +21,7 @@ struct PieceEnd {
   bool touches = false;     ///< some gap is closed to tolerance
   double contact = kNever;  ///< c(τ)
   EventKey<D> key{};        ///< whose contact that is
+  EventKey<D> violator{};   ///< who has gone into whom
 };
 
 template <int D>
@@ -64,6 +65,10 @@ class ChordContacts {
  private:
   static constexpr double kProlongation = 4;  // contacts are still told this far beyond the end of the chord (squared)
 
+  static void violate(const EventKey<D>& key, PieceEnd<D>& end) {
+    end.violates = true;
+    end.violator = key;
+  }
   static void offer(double contact, const EventKey<D>& key, PieceEnd<D>& end) {
     if (!(contact < end.contact)) return;
     end.contact = contact;
@@ -80,14 +85,14 @@ class ChordContacts {
       if (std::abs(gap_end) <= tolerance)
         end.touches = true;
       else if (c < tau)
-        end.violates = true;
+        violate(key, end);
       offer(c, key, end);
       return;
     }
     const double departing = 2 * d.dot(v), quotient = 2 * d.dot(u) + tau * u.squaredNorm();
     const bool through = d.dot(u) < 0 && d.dot(d_end) < 0.5 * sigma * sigma;
-    if (gap_end < -tolerance || through)
-      end.violates = true;
+    if (gap_end < scan_.floor(d.norm() - sigma, tolerance) || through)
+      violate(key, end);
     else if (gap_end <= tolerance && d_end.dot(v_end) < -slack)
       end.touches = true;
     if (quotient < departing) offer(std::max(0.0, departing) * tau / (departing - quotient), key, end);
@@ -100,12 +105,12 @@ class ChordContacts {
       if (std::abs(gap_end) <= tolerance)
         end.touches = true;
       else if (gap_end < 0)
-        end.violates = true;
+        violate(key, end);
       if (u < 0) offer(gap / -u, key, end);
       return;
     }
-    if (gap_end < -tolerance)
-      end.violates = true;
+    if (gap_end < scan_.floor(gap, tolerance))
+      violate(key, end);
     else if (gap_end <= tolerance && v_end < -scan_.resting_speed())
       end.touches = true;
     if (u < v) offer(std::max(0.0, v) * tau / (v - u), key, end);

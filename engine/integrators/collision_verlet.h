@@ -32,7 +32,7 @@ class VerletPieces {
   /// resting contacts together.
   double next_contact(double rest) {
     flight_ = accelerations_.a;
-    if (!scan_.resting().empty()) scan_.hold(system_.particles.v, flight_);
+    if (!scan_.resting().empty()) scan_.hold(system_.particles.v, flight_, rest);
     return std::min(rest, scan_.earliest(system_.particles.x, system_.particles.v, flight_, rest).key.time);
   }
 

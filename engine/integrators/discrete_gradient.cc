@@ -43,16 +43,19 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<Resti
   const std::size_t n = x_.size();
   const auto& mass = system_.particles.mass;
   auto& a = mean_acceleration_[stage];
-  double speed = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    mean_[i] = v_[i] + (0.5 * tau) * a[i];
-    speed = std::max(speed, mean_[i].squaredNorm());
-  }
-  // Below this increments are rounding and their ratios mean nothing.
-  const double floor = 16 * std::numeric_limits<double>::epsilon() * std::sqrt(speed);
+  const auto& box = system_.box;
+  auto give_up = [&] {
+    for (auto& stage_guess : mean_acceleration_) std::ranges::fill(stage_guess, Vec<D>::Zero());
+    return false;
+  };
+  for (std::size_t i = 0; i < n; ++i) mean_[i] = v_[i] + (0.5 * tau) * a[i];
   double last = std::numeric_limits<double>::infinity();
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
-    for (std::size_t i = 0; i < n; ++i) trial_[i] = x_[i] + tau * mean_[i];
+    for (std::size_t i = 0; i < n; ++i) {
+      trial_[i] = x_[i] + tau * mean_[i];
+      for (int k = 0; k < D; ++k)  // a wild iterate would meet images without number
+        if (box.periodic(k) && !(std::abs(tau * mean_[i][k]) <= 0.5 * box.edges[k])) return give_up();
+    }
     evaluate_mean_forces<D>(system_, x_, trial_, force_, counters);
     ++counters.sweeps;
     for (std::size_t i = 0; i < n; ++i) {
@@ -60,9 +63,14 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<Resti
       next_[i] = v_[i] + (0.5 * tau) * a[i];
     }
     if (!resting.empty()) hold(tau, resting);
-    double change = 0;
-    for (std::size_t i = 0; i < n; ++i) change = std::max(change, (next_[i] - mean_[i]).squaredNorm());
+    double change = 0, speed = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      change = std::max(change, (next_[i] - mean_[i]).squaredNorm());
+      speed = std::max({speed, next_[i].squaredNorm(), v_[i].squaredNorm()});
+    }
     change = std::sqrt(change);
+    // Below this increments are rounding and their ratios mean nothing.
+    const double floor = 16 * std::numeric_limits<double>::epsilon() * std::sqrt(speed);
     std::swap(mean_, next_);
     if (!std::isfinite(change)) break;
     if (change == 0 || (change >= last && change <= floor)) {
@@ -75,8 +83,7 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<Resti
     if (iteration > 2 && change > floor && change > kWorstContraction * last) break;
     last = change;
   }
-  for (auto& stage_guess : mean_acceleration_) std::ranges::fill(stage_guess, Vec<D>::Zero());
-  return false;
+  return give_up();
 }
 
 /// Keeps resting contacts from closing: |d'|² − |d|² = τ n·u ≥ 0 with n = d + d', u the relative mean velocity.

@@ -6,8 +6,11 @@
 //                               separation is separation(x[i], x[j], shift), at x_new with the same shift
 //   count()                     how many pairs there are, where that does not depend on positions
 
+#include <cmath>
+#include <string>
 #include <vector>
 
+#include "engine/error.h"
 #include "engine/interaction.h"
 #include "engine/neighbour_list.h"
 
@@ -44,7 +47,8 @@ class SpeciesPair {
   std::uint16_t a_ = 0, b_ = 0;
 };
 
-/// Bonds, given with i < j in ascending order. A bond spans the image that is nearest at x.
+/// Bonds, given with i < j in ascending order. A bond spans the image that is nearest at x; one that grows to nearly
+/// half an edge of a periodic box, where another image becomes the nearest, throws Error(Failure::numerical).
 template <int D>
 class Bonds {
  public:
@@ -52,11 +56,23 @@ class Bonds {
 
   template <class Visit>
   void for_each(Positions<D> x, Positions<D> /*x_new*/, Visit&& visit) const {
-    for (const auto& [i, j] : pairs_) visit(i, j, box_.shift(box_.nearest_image(x[i] - x[j])));
+    for (const auto& [i, j] : pairs_) {
+      const Vec<D> shift = box_.shift(box_.nearest_image(x[i] - x[j]));
+      check_length(i, j, x[i] - x[j] + shift);
+      visit(i, j, shift);
+    }
   }
   std::uint64_t count() const { return pairs_.size(); }
 
  private:
+  void check_length(Id i, Id j, const Vec<D>& d) const {
+    for (int k = 0; k < D; ++k)
+      if (box_.periodic(k) && std::abs(d[k]) > 0.48 * box_.edges[k])
+        throw Error(Failure::numerical, "the bond of particles " + std::to_string(i) + " and " + std::to_string(j) +
+                                            " spans nearly half the periodic box along axis " + std::to_string(k) +
+                                            ", where its image is ambiguous; use a larger box");
+  }
+
   const Box<D>& box_;
   PairList pairs_;
 };

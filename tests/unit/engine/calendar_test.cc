@@ -7,17 +7,11 @@
 namespace carom {
 namespace {
 
-struct ByTimeThenSlot {
-  bool operator()(const CalendarEntry& a, const CalendarEntry& b) const {
-    return a.time != b.time ? a.time < b.time : a.slot < b.slot;
-  }
-};
-
 TEST(Calendar, ServesInOrderWhateverIsScheduledMeanwhile) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (std::size_t expected : {1ul, 100ul, 100000ul}) {
-    Calendar<ByTimeThenSlot> calendar{ByTimeThenSlot{}};
+    Calendar calendar;
     calendar.reset(2.0, expected);
     std::size_t scheduled = 0, served = 0;
     auto push = [&](double time) {
@@ -37,22 +31,8 @@ TEST(Calendar, ServesInOrderWhateverIsScheduledMeanwhile) {
   }
 }
 
-TEST(Calendar, BreaksTiesByTheOrderGiven) {
-  Calendar<ByTimeThenSlot> calendar{ByTimeThenSlot{}};
-  calendar.reset(1.0, 4);
-  for (std::uint32_t slot : {3u, 1u, 2u}) calendar.push({0.5, slot, 0});
-  EXPECT_EQ(calendar.top()->slot, 1u);
-  calendar.push({0.5, 0, 0});  // into the bin that is being served
-  for (std::uint32_t slot = 0; slot < 4; ++slot) {
-    ASSERT_NE(calendar.top(), nullptr);
-    EXPECT_EQ(calendar.top()->slot, slot);
-    calendar.pop();
-  }
-  EXPECT_EQ(calendar.top(), nullptr);
-}
-
 TEST(Calendar, StartsAfresh) {
-  Calendar<ByTimeThenSlot> calendar{ByTimeThenSlot{}};
+  Calendar calendar;
   calendar.reset(1.0, 4);
   calendar.push({0.5, 0, 0});
   calendar.top();

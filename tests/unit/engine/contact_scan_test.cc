@@ -79,12 +79,12 @@ TEST(ContactScan, HoldsAPressedChainAndLetsAPulledOneGo) {
   scene.resolve();
   ASSERT_EQ(scene.scan.resting().size(), 2u);
   auto a = scene.a;
-  scene.scan.hold(scene.system->particles.v, a);
+  scene.scan.hold(scene.system->particles.v, a, 1.0);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(a[i][0], 1.0 / 3, 1e-14);  // they move on together
   EXPECT_EQ(a[0][1], 0.5);
   EXPECT_EQ(scene.scan.earliest(scene.system->particles.x, scene.system->particles.v, a, 1.0).key.time, kNever);
   a = {{-2, 0}, {0, 0}, {1, 0}};
-  scene.scan.hold(scene.system->particles.v, a);
+  scene.scan.hold(scene.system->particles.v, a, 1.0);
   EXPECT_EQ(a[0], Vec<2>(-2, 0));
   EXPECT_EQ(a[2], Vec<2>(1, 0));
 }
@@ -93,7 +93,7 @@ TEST(ContactScan, HoldsADiscOnAWall) {
   Scene scene({{3, 0.5}}, {{1, 0}}, {{0.1, -2}});
   scene.resolve();
   auto a = scene.a;
-  scene.scan.hold(scene.system->particles.v, a);
+  scene.scan.hold(scene.system->particles.v, a, 1.0);
   EXPECT_EQ(a[0], Vec<2>(0.1, 0));
 }
 

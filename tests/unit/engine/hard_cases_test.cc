@@ -80,6 +80,20 @@ TEST_P(HardCases, ThreeBodiesMeetAtOneInstant) {
   EXPECT_GE(result->statistics().counters.sphere_sphere, 6u);
 }
 
+TEST_P(HardCases, ATurningPairInContactIsBraked) {
+  // Two touching discs that circle each other, and a third that pulls: the pair turns, is braked and is pressed
+  // together.
+  for (double h : {0.1, 0.01}) {
+    auto system =
+        test::make_system<2>({20, 20}, Boundary::open, {{10, 10}, {11, 10}, {10.3, 13}}, {{0, -0.6}, {0, 0.6}, {0, 0}});
+    test::add_interaction(*system, "gravity", {{"constant", 4.0}});
+    auto result = run(std::move(system), h, static_cast<std::int64_t>(3 / h));
+    const auto& s = result->statistics();
+    EXPECT_LE(s.counters.max_overlap, 1e-12) << "step " << h;
+    EXPECT_LE(s.max_energy_error, (h < 0.1 ? 1 : 100) * GetParam().energy * s.energy_reference) << "step " << h;
+  }
+}
+
 TEST_P(HardCases, GrazingPairsUnderAttraction) {
   // Pairs that pass at 1 ± a little: some of them touch in one step size and not in another.
   for (double miss : {-1e-3, -1e-6, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 1e-6, 1e-3}) {

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 #include <set>
+
+#include "engine/error.h"
 
 namespace carom {
 namespace {
@@ -80,6 +83,24 @@ TEST(NeighbourList, CoversAllPairsWhileParticlesMoveAndAreWrapped) {
 TEST(NeighbourList, SeesSeveralImagesOfOnePairInASmallBox) {
   walk<2>(Boundary::periodic, 1.5, 1.4);
   walk<3>(Boundary::periodic, 1.5, 1.4);
+}
+
+TEST(NeighbourList, RecoversFromOneWildStep) {
+  Box<2> box;
+  box.edges = {2, 2};
+  box.boundary.fill(Boundary::periodic);
+  const std::vector<Vec<2>> x = {{0.2, 0.2}, {1, 1}, {1.7, 0.4}};
+  auto wild = x, tame = x;
+  wild[0][0] += 7;
+  tame[0][0] += 1e-4;
+  NeighbourList<2> list(box, {0.1, 0.1, 0.1});
+  const auto before = list.cover(x, tame).size();
+  EXPECT_GT(list.cover(x, wild).size(), 10 * before + 10);
+  EXPECT_EQ(list.cover(x, tame).size(), before);
+  wild[0][0] += 30;
+  EXPECT_THROW(list.cover(x, wild), Error);
+  wild[0][0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(NeighbourList<2>(box, {0.1, 0.1, 0.1}).cover(wild), Error);
 }
 
 TEST(NeighbourList, LeavesOutWhatIsNotWanted) {
