@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <iostream>
 #include <thread>
 
 #include "engine/error.h"
@@ -45,22 +46,23 @@ Communicator::~Communicator() {
 
 int Communicator::on_first(const std::function<int()>& work) const {
   int code = 0;
-  std::exception_ptr error;
   if (rank_ == 0) try {
       code = work();
     } catch (const Error& e) {
       code = e.exit_code();
-      error = std::current_exception();
+      std::fprintf(stderr, "%s\n", e.what());
     } catch (const std::exception& e) {
       if (size_ == 1) throw;
       abort(EXIT_FAILURE, e.what());
     }
+  // Everything must be said before the others know: the first of them to end with an error makes mpirun end the rest.
+  std::cout.flush();
+  std::fflush(nullptr);
   if (size_ > 1) {
     MPI_Request request = MPI_REQUEST_NULL;
     MPI_Ibcast(&code, 1, MPI_INT, 0, world_, &request);
     wait_asleep(request);
   }
-  if (error) std::rethrow_exception(error);
   return code;
 }
 

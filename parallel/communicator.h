@@ -25,8 +25,9 @@ class Communicator {
   int size() const { return size_; }
   MPI_Comm handle() const { return world_; }
 
-  /// Runs `work` on rank 0, while the others sleep. Returns its exit code on every rank. If `work` throws an Error, the
-  /// others return that error's exit code and rank 0 rethrows it; any other exception ends all ranks by abort().
+  /// Runs `work` on rank 0, while the others sleep. Returns its exit code on every rank. An Error that `work` throws is
+  /// told on stderr and becomes its exit code; any other exception ends all ranks by abort() (or is thrown on, where
+  /// there is one rank only).
   int on_first(const std::function<int()>& work) const;
 
   /// Ends all ranks at once with a message that names this one. For failures the other ranks cannot know of.

@@ -24,18 +24,12 @@ int work(const std::string& what) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "ok";
-  int code = 0;
-  try {
-    const carom::Communicator ranks;
-    if (what == "abort") {
-      if (ranks.rank() == 1) ranks.abort(5, "a full disk");
-      for (;;) std::this_thread::sleep_for(std::chrono::seconds(1));
-    }
-    code = ranks.on_first([&] { return work(what); });
-    std::cout << "rank of " + std::to_string(ranks.size()) + " ends with " + std::to_string(code) + "\n";
-  } catch (const carom::Error& e) {
-    std::cerr << e.what() << '\n';
-    code = e.exit_code();
+  const carom::Communicator ranks;
+  if (what == "abort") {
+    if (ranks.rank() == 1) ranks.abort(5, "a full disk");
+    for (;;) std::this_thread::sleep_for(std::chrono::seconds(1));
   }
+  const int code = ranks.on_first([&] { return work(what); });
+  std::cout << "rank of " + std::to_string(ranks.size()) + " ends with " + std::to_string(code) + "\n" << std::flush;
   return code;
 }
