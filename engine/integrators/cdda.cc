@@ -18,6 +18,9 @@
 namespace carom::integrator {
 namespace {
 
+/// A step that would not converge in so many equal pieces ends the run.
+constexpr int kMostPieces = 1 << 14;
+
 template <int D>
 class CollisionDiscreteDerivative : public Integrator<D> {
  public:
@@ -46,11 +49,11 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       if (tau == 0) {  // no convergence
         longest = 0.5 * wanted;
         ++report.counters.slabs_halved;
-        if (longest < 1e-9 * slab.length)
-          throw Error(Failure::numerical,
-                      "the discrete-gradient step does not converge even for a billionth of the step; "
-                      "the forces are not finite or far too stiff for step = " +
-                          std::to_string(slab.length));
+        if (longest * kMostPieces < slab.length)
+          throw Error(
+              Failure::numerical,
+              "the discrete-gradient step does not converge even in " + std::to_string(kMostPieces) +
+                  " pieces; the forces are not finite or far too stiff for step = " + std::to_string(slab.length));
         continue;
       }
       ended = tau == rest;
