@@ -4,6 +4,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "engine/contact.h"
 #include "engine/placement_grid.h"
 #include "engine/random.h"
 
@@ -175,13 +176,6 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
 }
 
 template <int D>
-double contact_tolerance(const Box<D>& box, double contact_distance) {
-  const double longest = box.edges.maxCoeff();
-  const double ulp = std::nextafter(longest, std::numeric_limits<double>::infinity()) - longest;
-  return std::max(1e-13 * contact_distance, 4 * ulp);
-}
-
-template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius) {
   Overlaps found;
   if (x.empty()) return found;
@@ -196,7 +190,7 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
       Image<D> ignored{};
       box.wrap(other, ignored);
       const double distance = (inside - other - shift).norm(), contact = radius[i] + radius[j];
-      if (distance >= contact - contact_tolerance(box, contact)) return;
+      if (distance >= contact - gap_tolerance(contact, box.edges.maxCoeff())) return;
       ++found.pairs;
       if (distance / contact >= worst) return;
       worst = distance / contact;
@@ -218,7 +212,7 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
     for (int k = 0; k < D; ++k) {
       if (!box.walled(k)) continue;
       const double depth = std::max(radius[i] - x[i][k], x[i][k] + radius[i] - box.edges[k]);
-      if (depth <= contact_tolerance(box, radius[i])) continue;
+      if (depth <= gap_tolerance(radius[i], box.edges.maxCoeff())) continue;
       outside = true;
       if (depth <= found.depth) continue;
       found.worst = i;
@@ -266,7 +260,6 @@ template std::vector<Vec<2>> lattice_sites(Lattice, const Box<2>&, std::size_t, 
 template Vec<2> commensurate_edges<2>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::span<const double>, std::span<const Id>,
                                       std::uint64_t, std::uint64_t);
-template double contact_tolerance(const Box<2>&, double);
 template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
 template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
 template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t);
@@ -277,7 +270,6 @@ template std::vector<Vec<3>> lattice_sites(Lattice, const Box<3>&, std::size_t, 
 template Vec<3> commensurate_edges<3>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::span<const double>, std::span<const Id>,
                                       std::uint64_t, std::uint64_t);
-template double contact_tolerance(const Box<3>&, double);
 template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
 template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
 template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t);

@@ -50,12 +50,8 @@ template <int D>
 std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<const double> radius,
                              std::span<const Id> who, std::uint64_t seed, std::uint64_t tries = 20000);
 
-/// How far two spheres, or a sphere and a wall, may overlap for want of digits: max(1e-13 contact distances, 4 ulp of
-/// the longest edge).
-template <int D>
-double contact_tolerance(const Box<D>& box, double contact_distance);
-
-/// Pairs closer than their contact distance by more than the tolerance, through periodic images too.
+/// Pairs closer than their contact distance by more than the gap tolerance (engine/contact.h), through periodic images
+/// too.
 struct Overlaps {
   std::size_t pairs = 0;
   Id lo = 0, hi = 0;    ///< the pair that overlaps most, relative to its contact distance
@@ -65,7 +61,7 @@ struct Overlaps {
 template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius);
 
-/// Spheres that reach through a wall by more than the tolerance.
+/// Spheres that reach through a wall by more than the gap tolerance.
 struct Outsiders {
   std::size_t spheres = 0;
   Id worst = 0;
