@@ -7,6 +7,11 @@
 
 namespace carom {
 
+namespace {
+/// Output intervals shorter than this share of a step are refused: there would be no end to counting them.
+constexpr double kLeastInterval = 1e-6;
+}  // namespace
+
 template <int D>
 Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info,
                           std::unique_ptr<Integrator<D>> integrator, Plan plan)
@@ -14,6 +19,10 @@ Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInf
   if (!(plan_.step > 0)) throw Error(Failure::deck, "the step must be positive");
   if (!plan_.steps && !plan_.end_time && !plan_.collisions)
     throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
+  for (const double interval : {plan_.frame_interval, plan_.thermo_interval})
+    if (interval > 0 && interval < kLeastInterval * plan_.step)
+      throw Error(Failure::deck,
+                  "an output interval is shorter than a millionth of the step; give 0, the step or something longer");
 }
 
 template <int D>

@@ -156,11 +156,12 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
       {"pressure", s.pressure}};
   for (const auto& [name, value] : scalars) c.observables.at(name).value.append(value);
   c.time.append(s.time);
-  c.step.append(s.step);
-  c.file.flush();
-  // Readers count the frames by the positions: these go in when all else is safe, so that a kill in the middle of a
-  // frame leaves no frame with holes.
   c.position.value.append(three_columns<double>(s.particles->x, D));
+  c.file.flush();
+  // The frames there are, are those that have a step: to MDAnalysis a missing step is the end of the file, and a
+  // missing position an error. So the step goes in when all else is safe; a kill in between leaves rows nobody looks
+  // at.
+  c.step.append(s.step);
   c.file.flush();
 }
 

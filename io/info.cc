@@ -32,7 +32,7 @@ std::string optional_text(const hdf5::File& file, const std::string& dataset) {
 std::string describe_trajectory(const hdf5::File& file) {
   const std::string particles = "/particles/trajectory";
   const auto shape = hdf5::shape(file, particles + "/position/value");
-  const hsize_t frames = hdf5::shape(file, particles + "/position/time").at(0);
+  const hsize_t frames = hdf5::shape(file, particles + "/position/step").at(0);
   const int dimension = hdf5::exists(file, "/parameters/dimension")
                             ? static_cast<int>(hdf5::number_at(file, "/parameters/dimension", 0))
                             : static_cast<int>(shape.at(2));

@@ -78,8 +78,8 @@ class Trajectory:
         self._file = h5py.File(path / TRAJECTORY if path.is_dir() else path, "r")
         self._group = self._file["particles/trajectory"]
         self.dimension = int(self._file["parameters/dimension"][()])
-        self.time = self._group["position/time"][:]
-        self.step = self._group["position/step"][:]
+        self.step = self._group["position/step"][:]  # written last: a kill may have left one more of everything else
+        self.time = self._group["position/time"][:len(self.step)]
         self.radius = self._group["radius"][:]
         self.mass = self._group["mass"][:]
         self.species = self._group["species"][:]  # indices into species_names

@@ -181,7 +181,7 @@ def test_a_kill_leaves_readable_files(seed, tmp_path):
     child.send_signal(signal.SIGKILL)
     assert child.wait() == -signal.SIGKILL
     rows, frames, events = thermo(out), data_sets(out / "trajectory.h5md"), data_sets(out / "events.h5")
-    written = len(frames["particles/trajectory/position/value"])
+    written = len(frames["particles/trajectory/position/step"])  # MDAnalysis ends where a step is missing
     assert written > 10
     assert all(len(value) >= written for name, value in frames.items() if name.endswith(("/value", "/step", "/time")))
     assert len(rows["time"]) - written in (0, 1)  # a row is written before the frame of the same time
@@ -194,6 +194,7 @@ def test_a_kill_leaves_readable_files(seed, tmp_path):
     assert same({"t": columns["time"]}, {"t": columns["time_in_slab"][:whole] + 0.02 * columns["slab"][:whole]})
     pairs = (columns["kind"][:whole] == 0).sum()
     assert frames["observables/collisions/value"][written - 1] <= pairs <= rows["collisions"][-1] + 4
+
 
 def test_one_rank_needs_no_temporary_directory(tmp_path):
     (tmp_path / "file").write_text("x")

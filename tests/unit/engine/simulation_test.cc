@@ -146,6 +146,14 @@ TEST(Simulation, RefusesAPlanWithoutEnd) {
   EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0, .steps = 1}), Error);
 }
 
+TEST(Simulation, RefusesIntervalsThatCannotBeCounted) {
+  EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0.1, .steps = 1, .thermo_interval = 1e-12}),
+               Error);
+  EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0.1, .steps = 1, .frame_interval = 1e-300}),
+               Error);
+  EXPECT_NO_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0.1, .steps = 1, .frame_interval = 1e-6}));
+}
+
 TEST(Simulation, FreeFlightRefusesForces) {
   EXPECT_THROW(test::run_steps<2>(test::five_springs(), "free-flight", 0.1, 1), Error);
 }
