@@ -106,7 +106,7 @@ class Checker:
         for name in ("velocity", "image"):
             if self.element(f"{PARTICLES}/{name}"):
                 value = self.file[f"{PARTICLES}/{name}/value"]
-                self.expect(value.shape == position.shape, f"{name}: shape {value.shape}, position's is {position.shape}")
+                self.expect(value.shape[1:] == position.shape[1:], f"{name}: shape {value.shape}, position's is {position.shape}")
         for name in ("mass", "radius", "charge", "species", "id"):
             if self.has(f"{PARTICLES}/{name}", h5py.Dataset):
                 values = self.file[f"{PARTICLES}/{name}"]
@@ -131,7 +131,7 @@ class Checker:
         for name in ("step", "time"):
             self.expect(self.file[f"{box}/edges/{name}"] == self.file[f"{PARTICLES}/position/{name}"],
                         f"/{box}/edges/{name}: must be a hard link to position's")
-        return self.expect(edges.shape == (len(position), 3, 3), f"/{box}/edges: value must be [frames][3][3]")
+        return self.expect(edges.shape[1:] == (3, 3), f"/{box}/edges: value must be [frames][3][3]")
 
     def check_observables(self):
         if not self.has("observables", h5py.Group):
@@ -182,8 +182,9 @@ class Checker:
         if as_text(integrator) == "verlet" or len(radius) != self.file[f"{PARTICLES}/position/value"].shape[1]:
             return
         for axis in [axis for axis, rule in enumerate(rules) if as_text(rule) == "wall"]:
-            x = self.file[f"{PARTICLES}/position/value"][:, :, axis]
-            edge = self.file[f"{PARTICLES}/box/edges/value"][:, axis, axis][:, None]
+            frames = len(self.file[f"{PARTICLES}/position/step"])
+            x = self.file[f"{PARTICLES}/position/value"][:frames, :, axis]
+            edge = self.file[f"{PARTICLES}/box/edges/value"][:frames, axis, axis][:, None]
             gap = np.minimum(x, edge - x) - radius
             self.expect(np.all(gap >= -OVERHANG * edge), f"position: a sphere stands over the wall along {'xyz'[axis]}")
 
@@ -201,7 +202,8 @@ class Checker:
             except Exception as error:  # whatever it says is the violation
                 self.violations.append(f"MDAnalysis can't read it: {error}")
                 return
-        self.expect(len(read) == len(position), f"MDAnalysis sees {len(read)} of {len(position)} frames")
+        frames = len(self.file[f"{PARTICLES}/position/step"])
+        self.expect(len(read) == frames, f"MDAnalysis sees {len(read)} of {frames} frames")
         self.expect(all(np.array_equal(mine, theirs.astype(np.float32)) for mine, theirs in zip(read, position)),
                     "MDAnalysis reads other positions")
 
