@@ -8,33 +8,33 @@
 
 namespace carom {
 
+/// One force pass: `add` adds each interaction's share to `out`, which begins at zero.
+template <int D, class Add>
+void force_pass(const System<D>& system, Vectors<D> out, Counters& counters, Add&& add) {
+  const Stopwatch watch(counters.seconds.force);
+  for (auto& f : out) f.setZero();
+  for (const auto& term : system.interactions) add(*term);
+  counters.force_passes += 1;
+}
+
 /// out[i] = force on particle i at positions x. One force pass.
 template <int D>
 void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Counters& counters) {
-  const Stopwatch watch(counters.seconds.force);
-  for (auto& f : out) f.setZero();
-  for (const auto& term : system.interactions) term->add_forces(x, out);
-  counters.force_passes += 1;
+  force_pass<D>(system, out, counters, [&](const auto& term) { term.add_forces(x, out); });
 }
 
 /// out[i] = −∇̄_i V(x, x_new), the mean force of a discrete-gradient step. One force pass.
 template <int D>
 void evaluate_mean_forces(const System<D>& system, Positions<D> x, Positions<D> x_new, Vectors<D> out,
                           Counters& counters) {
-  const Stopwatch watch(counters.seconds.force);
-  for (auto& f : out) f.setZero();
-  for (const auto& term : system.interactions) term->add_mean_forces(x, x_new, out);
-  counters.force_passes += 1;
+  force_pass<D>(system, out, counters, [&](const auto& term) { term.add_mean_forces(x, x_new, out); });
 }
 
 /// out = V″(x) w. One force pass.
 template <int D>
 void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions<D> w, Vectors<D> out,
                               Counters& counters) {
-  const Stopwatch watch(counters.seconds.force);
-  for (auto& f : out) f.setZero();
-  for (const auto& term : system.interactions) term->add_hessian_product(x, w, out);
-  counters.force_passes += 1;
+  force_pass<D>(system, out, counters, [&](const auto& term) { term.add_hessian_product(x, w, out); });
 }
 
 /// V, Σ|V| and the virial at x; exact sums, not counted as a pass.
