@@ -61,7 +61,10 @@ bool EventCore<D>::next_event(double end, CalendarEntry& entry) {
       if (!top || top->time >= end) return false;
       entry = *top;
       calendar_.pop();
-      if (!valid(entry)) continue;
+      if (!valid(entry)) {
+        ++counts_.dropped;
+        continue;
+      }
       top = calendar_.top();
       if (!top || top->time != entry.time) return true;
       tied_.push({entry, pending_[entry.slot].crosses_first(), pending_[entry.slot].contact});
@@ -86,6 +89,7 @@ double EventCore<D>::run(double end, const Report& report) {
     }
     const EventKey<D> key = pending.contact;
     if (key.kind == EventKind::pair && version_[key.lo == i ? key.hi : key.lo] != pending.partner_version) {
+      ++counts_.stale;
       predict(i, event_time);
       continue;
     }
@@ -136,6 +140,7 @@ std::uint32_t EventCore<D>::generation_at(const Record<D>& r, double t) const {
 
 template <int D>
 void EventCore<D>::predict(Id i, double now) {
+  ++counts_.predictions;
   pending_[i].contact.time = kNever;
   Cell<D> low = cell_[i], high = cell_[i];
   for (int k = 0; k < D; ++k) --low[k], ++high[k];
@@ -151,6 +156,7 @@ void EventCore<D>::predict_pairs(Id i, const Cell<D>& low, const Cell<D>& high) 
   grid_->for_each_between(low, high, [&](std::size_t cell, const Image<D>& away) {
     for (Id j = first_[cell]; j != kNobody; j = next_[j]) {
       if (j == i) continue;
+      ++counts_.candidates;
       Image<D> image;
       for (int k = 0; k < D; ++k) image[k] = grid_->boxes(k, cell_[j][k]) - away[k];
       predict_pair(i, j, image, pending_[i]);
@@ -166,6 +172,7 @@ void EventCore<D>::schedule(Id i) {
   if (!(time < horizon_)) return;
   calendar_.push({time, i, pending.stamp});
   ++scheduled_;
+  ++counts_.scheduled;
 }
 
 template <int D>
@@ -253,6 +260,7 @@ void EventCore<D>::predict_crossing(Id i, double now, Pending& pending) const {
 /// Moves a particle into the next cell. Its contact stands; only the cells that have come into view are searched.
 template <int D>
 void EventCore<D>::cross(Id i) {
+  ++counts_.crossings;
   Pending& pending = pending_[i];
   const double now = pending.crossing;
   const int axis = pending.face / 2, step = pending.face % 2 == 1 ? 1 : -1;

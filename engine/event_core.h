@@ -23,6 +23,7 @@
 #include "engine/cell_grid.h"
 #include "engine/contact_log.h"
 #include "engine/counters.h"
+#include "engine/event_counts.h"
 #include "engine/particles.h"
 
 namespace carom {
@@ -65,6 +66,9 @@ class EventCore {
 
   /// Copies of all spheres flown to `time`, which no event precedes any more.
   void fly_to(double time, Particles<D>& copies) const;
+
+  /// Since the core was made.
+  const EventCounts& counts() const { return counts_; }
 
  private:
   struct Pending {
@@ -118,7 +122,8 @@ class EventCore {
   std::unique_ptr<CellGrid<D>> grid_;
   std::vector<Cell<D>> cell_;  // unwrapped
   static constexpr Id kNobody = std::numeric_limits<Id>::max();
-  std::vector<Id> first_, next_, previous_;   // who is in a cell: a list through the particles
+  std::vector<Id> first_, next_, previous_;  // who is in a cell: a list through the particles
+  EventCounts counts_;
   std::uint64_t events_ = 0;                  // contacts since load()
   std::size_t scheduled_ = 0, expected_ = 0;  // entries of this slab, and of the last
 };

@@ -1,0 +1,18 @@
+#pragma once
+// What an event core has done, counted: the same numbers on every machine, unlike times.
+
+#include <cstdint>
+
+namespace carom {
+
+struct EventCounts {
+  std::uint64_t predictions = 0;  ///< scans of a particle's surroundings for its next contact
+  std::uint64_t candidates = 0;   ///< pairs evaluated in them
+  std::uint64_t stale = 0;  ///< contacts that came up after their partner had collided: the particle is scanned again
+  std::uint64_t crossings = 0;  ///< particles that moved into another cell
+  std::uint64_t rebuilds = 0;   ///< neighbour lists made anew (0 where the core works on cells alone)
+  std::uint64_t scheduled = 0;  ///< entries put into the calendar
+  std::uint64_t dropped = 0;    ///< of these, met when they no longer held
+};
+
+}  // namespace carom
