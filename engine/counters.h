@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 
+#include "engine/event_counts.h"
 #include "engine/exact_sum.h"
 
 namespace carom {
@@ -17,6 +18,7 @@ struct Counters {
   std::uint64_t fallbacks = 0;  ///< mcva: plain elastic impulses; cdda: Newton–Krylov solves
   double max_overlap = 0;       ///< deepest overlap met, relative to the contact distance
   ExactSum collision_virial;    ///< Σ d·impulse over pair collisions [mass·length²/time]
+  EventCounts events;           ///< of the event core, at the end of the last slab; 0 where a method has none
 
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;

@@ -2,6 +2,7 @@
 //
 //   carom run inputs/five-springs.toml --set integrator.step=0.02 -o runs/trial
 //   carom validate DECK     carom schema --markdown     carom methods     carom info FILE     carom --version
+//   carom bench --n 10000 --packing-fraction 0.49
 //
 // Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75 stopped
 // early.
@@ -10,6 +11,7 @@
 #include <iostream>
 
 #include "engine/error.h"
+#include "io/bench.h"
 #include "io/command.h"
 #include "io/info.h"
 #include "io/options.h"
@@ -25,6 +27,36 @@ void add_set(CLI::App& command, std::vector<std::string>& set) {
   command.add_option("--set", set, "Change a value of the deck: table.key=value, list.0.key=value; may be repeated")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
+}
+
+void add_bench(CLI::App& app, carom::BenchOptions& options) {
+  CLI::App& bench = *app.add_subcommand("bench", "The event core's speed on this machine");
+  auto* n = bench.add_option("--n", options.n, "Numbers of spheres")->capture_default_str();
+  n->type_name("N")->check(CLI::Range(std::uint64_t{10}, std::uint64_t{4000000000}));
+  auto* filled = bench.add_option("--packing-fraction", options.packing_fraction, "Packing fractions");
+  filled->capture_default_str()->type_name("PHI")->check(CLI::Range(1e-6, 0.91));
+  auto* dimension = bench.add_option("--dimension", options.dimension, "2 or 3")->capture_default_str();
+  dimension->check(CLI::IsMember({2, 3}));
+  bench.add_option("--equilibrate", options.equilibrate, "Collisions a particle before measuring; 100, of a state 10")
+      ->type_name("NUMBER")
+      ->check(CLI::Range(0.0, 1e9));
+  bench
+      .add_option("--collisions", options.collisions,
+                  "Collisions of a measurement, at least; whole epochs are measured")
+      ->capture_default_str()
+      ->type_name("NUMBER")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 50));
+  bench.add_option("--repeat", options.repeat, "Measurements of each state")
+      ->capture_default_str()
+      ->type_name("NUMBER")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1000000}));
+  bench.add_option("--json", options.json, "Also write all results to this file")->type_name("FILE");
+  bench.add_option("--save-state", options.save_state, "Write the equilibrated state, as text")->type_name("FILE");
+  bench.add_option("--state", options.state, "Measure this state instead of a table")
+      ->type_name("FILE")
+      ->excludes(n)
+      ->excludes(filled)
+      ->excludes(dimension);
 }
 
 int carom_main(int argc, char** argv) {
@@ -60,6 +92,9 @@ int carom_main(int argc, char** argv) {
   CLI::App& info = *app.add_subcommand("info", "What is in a trajectory");
   info.add_option("file", file, "The file")->required()->type_name("FILE");
 
+  carom::BenchOptions bench;
+  add_bench(app, bench);
+
   // 2. What is asked.
   try {
     app.parse(argc, argv);
@@ -72,7 +107,8 @@ int carom_main(int argc, char** argv) {
   if (validate.parsed()) return carom::validate_command(deck, set);
   if (schema.parsed()) return carom::schema_command(markdown);
   if (methods.parsed()) return carom::methods_command();
-  return carom::info_command(file);
+  if (info.parsed()) return carom::info_command(file);
+  return carom::bench_command(bench);
 }
 
 }  // namespace

@@ -46,6 +46,7 @@ class FreeFlight : public Integrator<D> {
     }
     if (report.observe.empty() || report.reached == report.observe.back()) report.reached = run(slab.length, events);
     core_->fly_to(report.reached, system.particles);
+    report.counters.events = core_->counts();
     system.wrap();
   }
 

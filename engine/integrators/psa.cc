@@ -32,6 +32,7 @@ class PrimitiveSplitting : public Integrator<D> {
       core_->run(slab.length, {.counters = report.counters, .contacts = report.contacts, .max_events = max_events_});
     }
     core_->fly_to(slab.length, p);
+    report.counters.events = core_->counts();
     accelerations_.update(system, report.counters);
     kick(p, accelerations_.a, 0.5 * slab.length);
     system.wrap();

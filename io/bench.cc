@@ -1,0 +1,270 @@
+#include "io/bench.h"
+
+#include <malloc.h>
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "engine/error.h"
+#include "engine/integrator.h"
+#include "engine/placement.h"
+#include "io/bench_state.h"
+#include "io/deck_build.h"
+#include "io/text_file.h"
+#include "io/version.h"
+
+namespace carom {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::uint64_t kSeed = 20240117;
+
+/// A size in the table of /proc/self/status [bytes]; nothing where there is no such table.
+std::optional<double> process_memory(const std::string& name) {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;)
+    if (double kibibytes = 0; word == name + ":" && status >> kibibytes) return 1024 * kibibytes;
+  return {};
+}
+
+/// The peak of resident memory above what was resident at its making [bytes]. Linux forgets the earlier peak when asked
+/// (proc(5), clear_refs); where it does not, there is no answer.
+class PeakMemory {
+ public:
+  PeakMemory() {
+    malloc_trim(0);  // what earlier points have freed
+    std::ofstream clear("/proc/self/clear_refs");
+    clear << "5" << std::flush;
+    if (clear) before_ = process_memory("VmRSS");
+  }
+  std::optional<double> growth() const {
+    const auto peak = process_memory("VmHWM");
+    if (!peak || !before_) return {};
+    return *peak - *before_;
+  }
+
+ private:
+  std::optional<double> before_;
+};
+
+const IntegratorInfo& free_flight() {
+  const auto& all = integrators();
+  return *std::find_if(all.begin(), all.end(), [](const IntegratorInfo& info) { return info.name == "free-flight"; });
+}
+
+Parameters free_flight_parameters(double epoch) {
+  Parameters parameters;
+  parameters.set("step", epoch);
+  parameters.set("max_events_per_step", std::int64_t{100000});
+  return parameters;
+}
+
+/// A stretch of a run.
+struct Stretch {
+  std::uint64_t collisions = 0;
+  double seconds = 0, time = 0;
+  double rate() const { return static_cast<double>(collisions) / seconds; }
+};
+
+/// Free flight in whole epochs.
+template <int D>
+class Flow {
+ public:
+  explicit Flow(std::unique_ptr<System<D>> system)
+      : system_(std::move(system)),
+        epoch_(default_epoch(*system_)),
+        integrator_(free_flight().make<D>(free_flight_parameters(epoch_))) {
+    integrator_->start(*system_, counters_);
+  }
+
+  /// Runs whole epochs until there have been this many more pair collisions.
+  Stretch run(std::uint64_t collisions) {
+    constexpr int kPatience = 1000;  // epochs, each of ten mean free times
+    const std::uint64_t before = counters_.sphere_sphere;
+    const auto start = std::chrono::steady_clock::now();
+    Stretch done;
+    for (int epochs = 0; done.collisions < collisions; ++epochs) {
+      if (epochs == kPatience && done.collisions == 0)
+        throw Error(Failure::numerical, "nothing collides; take more spheres or a higher packing fraction");
+      SlabReport<D> report{.counters = counters_};
+      integrator_->slab(*system_, {.index = slabs_, .start = static_cast<double>(slabs_) * epoch_, .length = epoch_},
+                        report);
+      ++slabs_;
+      done.collisions = counters_.sphere_sphere - before;
+      done.time += epoch_;
+    }
+    done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return done;
+  }
+
+  const System<D>& system() const { return *system_; }
+  const Counters& counters() const { return counters_; }
+  double epoch() const { return epoch_; }
+
+ private:
+  std::unique_ptr<System<D>> system_;
+  double epoch_;
+  std::unique_ptr<Integrator<D>> integrator_;
+  Counters counters_;
+  std::int64_t slabs_ = 0;
+};
+
+double ratio(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
+
+/// pV/(N k T) of a stretch, from the virial: it tells a fluid from a crystal that has not melted.
+template <int D>
+double compressibility(const System<D>& system, double virial, double time) {
+  double twice_kinetic = 0;
+  for (std::size_t i = 0; i < system.particles.size(); ++i)
+    twice_kinetic += system.particles.mass[i] * system.particles.v[i].squaredNorm();
+  return 1 + virial / (time * twice_kinetic);
+}
+
+/// Equilibrates and measures one state.
+template <int D>
+Json measure(std::unique_ptr<System<D>> state, double equilibrate, const BenchOptions& options,
+             const PeakMemory& memory) {
+  const std::size_t n = state->particles.size();
+  const double filled = packing_fraction<D>(state->box.volume(), state->particles.radius);
+  Flow<D> flow(std::move(state));
+  // A collision is one of each of its partners.
+  const Stretch melting = flow.run(static_cast<std::uint64_t>(std::ceil(equilibrate * static_cast<double>(n) / 2)));
+  if (options.save_state) write_state(*options.save_state, flow.system());
+
+  const Counters before = flow.counters();
+  std::vector<double> rates;
+  Json repeats = Json::array();
+  Stretch all;
+  for (std::uint64_t r = 0; r < options.repeat; ++r) {
+    const Stretch stretch = flow.run(options.collisions);
+    rates.push_back(stretch.rate());
+    repeats.push_back({{"collisions", stretch.collisions}, {"seconds", stretch.seconds}});
+    all.collisions += stretch.collisions;
+    all.time += stretch.time;
+  }
+  const auto bytes = memory.growth();
+
+  const EventCounts &a = before.events, &b = flow.counters().events;
+  const EventCounts count{b.predictions - a.predictions, b.candidates - a.candidates, b.stale - a.stale,
+                          b.crossings - a.crossings,     b.rebuilds - a.rebuilds,     b.scheduled - a.scheduled,
+                          b.dropped - a.dropped};
+  const auto a_collision = [&](std::uint64_t number) { return ratio(number, all.collisions); };
+  const double virial = flow.counters().collision_virial.value() - before.collision_virial.value();
+  return {
+      {"n", n},
+      {"dimension", D},
+      {"packing_fraction", filled},
+      {"epoch", flow.epoch()},
+      {"equilibration_collisions", melting.collisions},
+      {"collisions", all.collisions},
+      {"collisions_per_second",
+       {{"median", median(rates)},
+        {"min", *std::min_element(rates.begin(), rates.end())},
+        {"max", *std::max_element(rates.begin(), rates.end())}}},
+      {"repeats", repeats},
+      {"bytes_per_particle", bytes ? Json(*bytes / static_cast<double>(n)) : Json(nullptr)},
+      {"per_collision",
+       {{"crossings", a_collision(count.crossings)},
+        {"rebuilds", a_collision(count.rebuilds)},
+        {"stale", a_collision(count.stale)},
+        {"predictions", a_collision(count.predictions)},
+        {"scheduled", a_collision(count.scheduled)}}},
+      {"candidates_per_prediction", ratio(count.candidates, count.predictions)},
+      {"stale_fraction", ratio(count.dropped, count.scheduled)},
+      {"compressibility_factor", compressibility(flow.system(), virial, all.time)},
+      {"max_overlap", flow.counters().max_overlap},
+  };
+}
+
+template <int D>
+Json lattice_point(std::uint64_t n, double filled, const BenchOptions& options) {
+  const PeakMemory memory;
+  return measure(lattice_state<D>(n, filled, kSeed), options.equilibrate.value_or(BenchOptions::kEquilibrateLattice),
+                 options, memory);
+}
+
+template <int D>
+Json file_point(const BenchOptions& options) {
+  const PeakMemory memory;
+  return measure(read_state<D>(*options.state), options.equilibrate.value_or(BenchOptions::kEquilibrateState), options,
+                 memory);
+}
+
+void say(const std::string& text) {
+  if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
+    throw Error(Failure::file, "standard output: cannot write to it");
+}
+
+std::string heading(const BenchOptions& options) {
+  const double equilibrate =
+      options.equilibrate.value_or(options.state ? BenchOptions::kEquilibrateState : BenchOptions::kEquilibrateLattice);
+  return "carom " + version_string() + "\n" + compiler_string() + "\n" +
+         fmt::format(
+             "Hard spheres in a periodic box, free-flight, one core. Equilibrated with {:g} collisions a particle, "
+             "then "
+             "measured\n{} times over at least {} collisions (whole epochs). B/part.: peak resident memory above that "
+             "before the state was made.\nZ = pV/NkT. Events, predictions, schedulings: a collision; cand.: pairs "
+             "evaluated a prediction; dropped: share of scheduled.\n\n",
+             equilibrate, options.repeat, options.collisions) +
+         fmt::format("{:>8} {:>6} {:>12} {:>21} {:>7} {:>7} {:>9} {:>8} {:>7} {:>7} {:>6} {:>7} {:>7}\n", "N", "phi",
+                     "collisions/s", "min .. max", "B/part.", "Z", "crossings", "rebuilds", "stale", "predict", "cand.",
+                     "sched.", "dropped");
+}
+
+std::string row(const Json& point) {
+  const Json &rate = point["collisions_per_second"], &per = point["per_collision"],
+             &bytes = point["bytes_per_particle"];
+  const auto number = [](const Json& value) { return value.get<double>(); };
+  return fmt::format(
+      "{:>8} {:>6.3f} {:>12.0f} {:>21} {:>7} {:>7.3f} {:>9.3f} {:>8.4f} {:>7.3f} {:>7.3f} {:>6.1f} {:>7.3f} {:>7.3f}\n",
+      point["n"].get<std::uint64_t>(), number(point["packing_fraction"]), number(rate["median"]),
+      fmt::format("{:.0f} .. {:.0f}", number(rate["min"]), number(rate["max"])),
+      bytes.is_null() ? "-" : fmt::format("{:.0f}", number(bytes)), number(point["compressibility_factor"]),
+      number(per["crossings"]), number(per["rebuilds"]), number(per["stale"]), number(per["predictions"]),
+      number(point["candidates_per_prediction"]), number(per["scheduled"]), number(point["stale_fraction"]));
+}
+
+}  // namespace
+
+int bench_command(const BenchOptions& options) {
+  if (options.save_state && !options.state && options.n.size() * options.packing_fraction.size() != 1)
+    throw Error(Failure::deck,
+                "--save-state: error: there are several states; give one --n and one --packing-fraction");
+  const int dimension = options.state ? state_dimension(*options.state) : options.dimension;
+  Json points = Json::array();
+  const auto store = [&] {
+    const Json all = {{"version", version_string()}, {"compiler", compiler_string()}, {"points", points}};
+    if (options.json) write_file_atomically(*options.json, all.dump(2) + "\n");
+  };
+  const auto add = [&](Json point) {
+    say(row(point));
+    points.push_back(std::move(point));
+    store();
+  };
+  store();  // a file that cannot be written is better known before an hour of work
+  say(heading(options));
+  if (options.state) {
+    add(dimension == 2 ? file_point<2>(options) : file_point<3>(options));
+  } else {
+    for (const std::uint64_t n : options.n)
+      for (const double filled : options.packing_fraction)
+        add(dimension == 2 ? lattice_point<2>(n, filled, options) : lattice_point<3>(n, filled, options));
+  }
+  return 0;
+}
+
+}  // namespace carom

@@ -1,0 +1,32 @@
+#pragma once
+// `carom bench`: how fast the event core is on this machine.
+//
+// Every point of the table is a periodic fluid of hard spheres, run by the free-flight integrator slab after slab as a
+// run does it, first to equilibrate and then, a number of times, to measure. Slabs are whole epochs, so the cost of
+// their beginnings is in the figures with its true share; the observables of a run (energies, overlaps, files) are not.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+namespace carom {
+
+struct BenchOptions {
+  std::vector<std::uint64_t> n{1000, 10000, 100000, 1000000};
+  std::vector<double> packing_fraction{0.10, 0.30, 0.49};
+  int dimension = 3;
+  std::optional<double> equilibrate;                ///< collisions a particle before measuring; default below
+  std::uint64_t collisions = 1000000;               ///< of a measurement, at least: whole epochs are measured
+  std::uint64_t repeat = 3;                         ///< measurements a point, one after the other
+  std::optional<std::filesystem::path> json;        ///< all results, for scripts
+  std::optional<std::filesystem::path> state;       ///< measure this state instead of the table
+  std::optional<std::filesystem::path> save_state;  ///< write the equilibrated state of the only point here
+
+  static constexpr double kEquilibrateLattice = 100, kEquilibrateState = 10;
+};
+
+/// Prints the table as it grows; returns the exit code of the process. Throws Error.
+int bench_command(const BenchOptions& options);
+
+}  // namespace carom
