@@ -6,6 +6,7 @@
 // spheres that overlap by rounding and part are left alone, spheres that overlap and approach touch at once.
 //
 //   const double s = contact_time(d, v, sigma, slack);            // straight flights
+//   const double s = contact_time(d, v, sigma, w, slack);         // straight flights of spheres that grow
 //   const double s = contact_time(d, v, a, sigma, rest, slack);   // parabolas, sought in [0, rest)
 //
 // Approach slower than `slack` (rounding of the velocities, see approach_slack) does not count for pairs that touch:
@@ -50,6 +51,26 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double slack
   const double discriminant = v.squaredNorm() * sigma * sigma - squared_cross<D>(d, v);
   if (discriminant <= 0) return kNever;
   return c / (std::sqrt(discriminant) - b);
+}
+
+/// The same for spheres that grow: the first s ≥ 0 with |d + v s| = sigma + w s, where w ≥ 0 is the rate of the contact
+/// distance (Lubachevsky, Stillinger, J. Stat. Phys. 60 (1990) 561). With w = 0 the bits are those of the function
+/// above.
+///
+/// With A = v² − w², b = d·v − sigma w and c = d² − sigma² the squared gap is c + 2 b s + A s². Growth catches up even
+/// with spheres that part, where A < 0. Spheres that touch and part have A ≥ 0 and never meet again.
+template <int D>
+double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double w, double slack) {
+  const double dv = d.dot(v), b = dv - sigma * w;
+  const double outrun = v.squaredNorm() - w * w;
+  if (b >= 0 && outrun >= 0) return kNever;
+  const double c = d.squaredNorm() - sigma * sigma;
+  if (c <= 0) return b < -slack ? 0.0 : kNever;
+  const double discriminant =
+      v.squaredNorm() * sigma * sigma - squared_cross<D>(d, v) + w * (w * d.squaredNorm() - 2 * sigma * dv);
+  if (discriminant <= 0) return kNever;
+  const double root = std::sqrt(discriminant);
+  return b < 0 ? c / (root - b) : (b + root) / -outrun;  // of the two forms of one root the one that does not cancel
 }
 
 /// Parabolic relative motion d + v s + a s²/2, sought in [0, rest). `touching` divides out the root s = 0 of a pair in

@@ -9,19 +9,18 @@
 namespace carom {
 
 template <int D>
-EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles) : box_(box), particles_(particles) {
-  for (double r : particles.radius) largest_radius_ = std::max(largest_radius_, r);
-}
+EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles) : box_(box), particles_(particles) {}
 
 template <int D>
 EventCore<D>::~EventCore() = default;
 
 template <int D>
-void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon) {
+void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
   const std::size_t n = particles.size();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   horizon_ = horizon;
+  growth_ = growth;
   events_ = 0;
   expected_ = scheduled_;
   scheduled_ = 0;
@@ -32,7 +31,9 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
     records_[i] = {particles.x[i], particles.v[i], 0.0, static_cast<Id>(i), 0, particles.species[i]};
     ++version_[i];
   }
-  grid_ = std::make_unique<CellGrid<D>>(box_, 2 * largest_radius_, particles.x);
+  double largest_radius = 0;
+  for (double r : particles_.radius) largest_radius = std::max(largest_radius, r);
+  grid_ = std::make_unique<CellGrid<D>>(box_, 2 * grown(largest_radius, horizon), particles.x);
   first_.assign(grid_->cells(), kNobody);
   next_.assign(n, kNobody);
   previous_.assign(n, kNobody);
@@ -193,10 +194,11 @@ void EventCore<D>::predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending&
     v += (s_a - s_b) * g_;
   }
   d += box_.shift(key.image);
-  const double sigma = particles_.radius[key.lo] + particles_.radius[key.hi];
+  const double radii = particles_.radius[key.lo] + particles_.radius[key.hi];
+  const double sigma = grown(radii, now), rate = radii * growth_;
   const bool apart = d.squaredNorm() > sigma * sigma;
-  const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm());
-  key.time = now + contact_time<D>(d, v, sigma, slack);
+  const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
+  key.time = now + contact_time<D>(d, v, sigma, rate, slack);
   if (!(key.time <= best.contact.time) || key.time == kNever) return;
   key.generation = std::max(generation_at(a, key.time), generation_at(b, key.time));
   if (key < best.contact) {
@@ -208,16 +210,18 @@ void EventCore<D>::predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending&
 template <int D>
 void EventCore<D>::predict_walls(Id i, Pending& best) const {
   const Record<D>& r = records_[i];
+  const double radius = grown(particles_.radius[i], r.t), rate = particles_.radius[i] * growth_;
   for (int k = 0; k < D; ++k) {
     if (!box_.walled(k)) continue;
     for (int side = 0; side < 2; ++side) {
       const double inward = side == 0 ? 1.0 : -1.0;
-      const double gap = side == 0 ? r.x[k] - particles_.radius[i] : box_.edges[k] - particles_.radius[i] - r.x[k];
-      const double tolerance = gap_tolerance(2 * particles_.radius[i], box_.edges[k]);
-      const double slack = approach_slack(1.0, r.v.norm(), 0.0);
+      const double gap = side == 0 ? r.x[k] - radius : box_.edges[k] - radius - r.x[k];
+      const double opening = inward * r.v[k] - rate;
+      const double tolerance = gap_tolerance(2 * radius, box_.edges[k]);
+      const double slack = approach_slack(1.0, r.v.norm(), rate);
       const bool touching = gap <= tolerance;
-      const double s = wall_contact_time(gap, inward * r.v[k], inward * g_[k], horizon_ - r.t, touching, slack);
-      if (s == 0 && !(inward * r.v[k] < -slack))
+      const double s = wall_contact_time(gap, opening, inward * g_[k], horizon_ - r.t, touching, slack);
+      if (s == 0 && !(opening < -slack))
         throw Error(Failure::numerical,
                     "particle " + std::to_string(i) + " rests on the " + (side == 0 ? "lower" : "upper") +
                         " wall of axis " + std::to_string(k) +
@@ -294,7 +298,8 @@ void EventCore<D>::collide_pair(const EventKey<D>& key, const Report& report) {
   const Vec<D> shift = box_.shift(key.image);
   const Vec<D> d = a.x - b.x + shift;
   const double mass_a = particles_.mass[key.lo], mass_b = particles_.mass[key.hi];
-  const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, mass_a, mass_b) * d;
+  const double radii = particles_.radius[key.lo] + particles_.radius[key.hi], sigma = grown(radii, key.time);
+  const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, sigma, radii * growth_, mass_a, mass_b) * d;
   a.v += impulse / mass_a;
   b.v -= impulse / mass_b;
   set_generation(a, key);
@@ -303,7 +308,6 @@ void EventCore<D>::collide_pair(const EventKey<D>& key, const Report& report) {
   ++version_[key.hi];
   ++report.counters.sphere_sphere;
   report.counters.collision_virial.add(d.dot(impulse));
-  const double sigma = particles_.radius[key.lo] + particles_.radius[key.hi];
   report.counters.max_overlap = std::max(report.counters.max_overlap, 1 - d.norm() / sigma);
   if (report.contacts) report.contacts->push_back({key, a.x, b.x - shift, impulse});
 }
@@ -313,16 +317,18 @@ void EventCore<D>::collide_wall(const EventKey<D>& key, const Report& report) {
   Record<D>& r = records_[key.lo];
   advance(r, key.time);
   const int axis = static_cast<int>(key.hi / 2);
-  const double mass = particles_.mass[key.lo], radius = particles_.radius[key.lo];
+  const double mass = particles_.mass[key.lo], radius = grown(particles_.radius[key.lo], key.time);
+  const double rate = particles_.radius[key.lo] * growth_;
+  const double after = (key.hi % 2 == 0 ? 2 * rate : -2 * rate) - r.v[axis];
   if (report.contacts) {
     Contact<D> contact{key, r.x, r.x, Vec<D>::Zero()};
     contact.x_hi[axis] = key.hi % 2 == 0 ? 0.0 : box_.edges[axis];
-    contact.impulse[axis] = -2 * mass * r.v[axis];
+    contact.impulse[axis] = mass * (after - r.v[axis]);
     report.contacts->push_back(contact);
   }
   const double gap = key.hi % 2 == 0 ? r.x[axis] - radius : box_.edges[axis] - radius - r.x[axis];
   report.counters.max_overlap = std::max(report.counters.max_overlap, -gap / radius);
-  r.v[axis] = -r.v[axis];
+  r.v[axis] = after;
   set_generation(r, key);
   ++version_[key.lo];
   ++report.counters.sphere_wall;

@@ -12,6 +12,9 @@
 //   core.load(particles, g, horizon);             // everybody at time 0
 //   core.run(end, report);                        // events with time < end
 //   core.fly_to(end, particles);                  // copies at `end`
+//
+// Spheres may grow meanwhile, all by a common factor (engine/compression.h): their contact distances and their
+// distances from walls are then functions of time like their positions.
 
 #include <limits>
 #include <memory>
@@ -50,15 +53,16 @@ class EventCore {
     std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();       ///< contacts since load()
   };
 
-  /// Masses and radii are read from `particles`, which outlives the core.
+  /// Masses and radii are read from `particles`, which outlives the core; they change between slabs only.
   EventCore(const Box<D>& box, const Particles<D>& particles);
   ~EventCore();
   EventCore(const EventCore&) = delete;
   EventCore& operator=(const EventCore&) = delete;
 
   /// Starts a slab: everybody at time 0 at particles.x with particles.v, under the acceleration g. No event at or after
-  /// `horizon` will be asked for.
-  void load(const Particles<D>& particles, const Vec<D>& g, double horizon);
+  /// `horizon` will be asked for. All radii are those of the particles times 1 + growth·t, t since the start of the
+  /// slab; `growth` ≥ 0 [1/time].
+  void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth = 0);
 
   /// Executes every event before `end`, or up to the collision limit; returns the time reached: `end`, or that of the
   /// last collision. Throws Error(Failure::numerical) when more than max_events contacts are needed.
@@ -89,6 +93,8 @@ class EventCore {
     }
   };
 
+  /// A radius or a contact distance as it is at a time.
+  double grown(double length, double t) const { return length * (1 + growth_ * t); }
   bool valid(const CalendarEntry& entry) const { return pending_[entry.slot].stamp == entry.stamp; }
   bool next_event(double end, CalendarEntry& entry);
   void predict(Id i, double now);
@@ -108,10 +114,9 @@ class EventCore {
 
   const Box<D>& box_;
   const Particles<D>& particles_;
-  double largest_radius_ = 0;
   Vec<D> g_ = Vec<D>::Zero();
   bool field_ = false;
-  double horizon_ = 0;
+  double horizon_ = 0, growth_ = 0;
 
   std::vector<Record<D>> records_;
   std::vector<std::uint32_t> version_;  // grows with every event of the particle

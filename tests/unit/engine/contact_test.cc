@@ -91,6 +91,99 @@ TYPED_TEST(Contact, StraightFlightsThatPassOrPartNeverTouch) {
   EXPECT_EQ(contact_time<D>(d, 1e-17 * v, 1.0, 1e-15), kNever);  // approach below rounding
 }
 
+/// |d + v s|² − (sigma + w s)², in 50 digits.
+template <int D>
+Precise grown_gap(const Vec<D>& d, const Vec<D>& v, double sigma, double w, double s) {
+  const Precise reach = Precise(sigma) + Precise(w) * s;
+  return gap_squared<D>(d, v, Vec<D>::Zero(), 0.0, s) - reach * reach;
+}
+
+/// The first contact of growing spheres by walking in small steps.
+template <int D>
+double walked_growth(const Vec<D>& d, const Vec<D>& v, double sigma, double w, double rest, int steps) {
+  auto gap = [&](double s) { return (d + s * v).norm() - (sigma + w * s); };
+  for (int k = 0; k < steps; ++k) {
+    double lo = rest * k / steps, hi = rest * (k + 1) / steps;
+    if (!(gap(lo) > 0 && gap(hi) <= 0)) continue;
+    for (int bisection = 0; bisection < 80; ++bisection) (gap(0.5 * (lo + hi)) > 0 ? lo : hi) = 0.5 * (lo + hi);
+    return hi;
+  }
+  return kNever;
+}
+
+TYPED_TEST(Contact, GrowingSpheresMeetWhereWalkingFindsThem) {
+  constexpr int D = TypeParam::kD;
+  std::mt19937_64 random(6);
+  int parting = 0, approaching = 0, misses = 0;
+  for (int trial = 0; trial < 12000; ++trial) {
+    const Vec<D> d = random_vector<D>(random, 4), v = random_vector<D>(random, trial % 3 == 0 ? 0.3 : 2);
+    const double w = 0.001 * (trial % 1000), rest = 5;
+    if (d.norm() < 1.01) continue;
+    const double s = contact_time<D>(d, v, 1.0, w, 0.0);
+    const double walked = walked_growth<D>(d, v, 1.0, w, rest, 1000);
+    if (walked == kNever) {
+      ++misses;
+      if (s >= rest) continue;
+      EXPECT_LT((d + s * v).norm() - (1 + w * s), 1e-13);  // a dip between two steps of the walk: a shallow one
+      EXPECT_GT((d + (s + 0.0025) * v).norm() - (1 + w * (s + 0.0025)), -1e-4);
+      continue;
+    }
+    ++(d.dot(v) > 0 ? parting : approaching);
+    ASSERT_LE(s, walked * (1 + 1e-12)) << "d " << d.transpose() << " v " << v.transpose() << " w " << w;
+    EXPECT_LE(std::abs(static_cast<double>(grown_gap<D>(d, v, 1.0, w, s))), 2e-13);
+    const double falling = (d + s * v).dot(v) - (1 + w * s) * w;
+    EXPECT_LE(falling, 1e-12);
+  }
+  EXPECT_GT(parting, 100);
+  EXPECT_GT(approaching, 1000);
+  EXPECT_GT(misses, 1000);
+}
+
+TYPED_TEST(Contact, WithoutGrowthTheBitsAreThoseOfStraightFlights) {
+  constexpr int D = TypeParam::kD;
+  std::mt19937_64 random(7);
+  int hits = 0;
+  for (int trial = 0; trial < 5000; ++trial) {
+    const Vec<D> d = random_vector<D>(random, 1.5), v = random_vector<D>(random, 2);  // overlaps among them
+    const double plain = contact_time<D>(d, v, 1.0, 1e-3), grown = contact_time<D>(d, v, 1.0, 0.0, 1e-3);
+    EXPECT_EQ(plain, grown);
+    EXPECT_EQ(collision_factor<D>(d, v, 0.7, 1.3), collision_factor<D>(d, v, 1.0, 0.0, 0.7, 1.3));
+    if (plain < kNever) ++hits;
+  }
+  EXPECT_GT(hits, 500);
+}
+
+TYPED_TEST(Contact, GrowthBringsPartingAndRestingSpheresTogether) {
+  constexpr int D = TypeParam::kD;
+  const Vec<D> d = 2 * Vec<D>::Unit(0), v = Vec<D>::Unit(0), still = Vec<D>::Zero();
+  EXPECT_DOUBLE_EQ(contact_time<D>(d, still, 1.0, 0.5, 0.0), 2.0);     // 2 = 1 + s/2
+  EXPECT_DOUBLE_EQ(contact_time<D>(d, 0.25 * v, 1.0, 0.5, 0.0), 4.0);  // 2 + s/4 = 1 + s/2
+  EXPECT_DOUBLE_EQ(contact_time<D>(d, -0.5 * v, 1.0, 0.5, 0.0), 1.0);  // 2 − s/2 = 1 + s/2: A = 0
+  EXPECT_EQ(contact_time<D>(d, 0.5 * v, 1.0, 0.5, 0.0), kNever);       // as fast as they grow
+  EXPECT_EQ(contact_time<D>(d, v, 1.0, 0.5, 0.0), kNever);
+  const Vec<D> touching = Vec<D>::Unit(0);
+  EXPECT_EQ(contact_time<D>(touching, 0.4 * v, 1.0, 0.5, 1e-15), 0.0);  // parts slower than it grows
+  EXPECT_EQ(contact_time<D>(touching, 0.6 * v, 1.0, 0.5, 1e-15), kNever);
+}
+
+TYPED_TEST(Contact, GrowingSpheresPartFasterThanTheyGrow) {
+  constexpr int D = TypeParam::kD;
+  std::mt19937_64 random(8);
+  for (int trial = 0; trial < 2000; ++trial) {
+    Vec<D> d = random_vector<D>(random, 1);
+    const Vec<D> v_i = random_vector<D>(random, 2), v_j = random_vector<D>(random, 2);
+    const double m_i = 0.1 + trial % 7, m_j = 0.3 + trial % 5, w = 0.001 * trial, sigma = d.norm();
+    const Vec<D> impulse = collision_factor<D>(d, v_i - v_j, sigma, w, m_i, m_j) * d;
+    const Vec<D> w_i = v_i + impulse / m_i, w_j = v_j - impulse / m_j;
+    const double before = d.dot(v_i - v_j) / sigma, after = d.dot(w_i - w_j) / sigma;
+    EXPECT_NEAR(after, 2 * w - before, 1e-12);
+    EXPECT_LT((m_i * w_i + m_j * w_j - m_i * v_i - m_j * v_j).norm(), 1e-12);
+    // Right after the collision, which left the gap where it was, they don't meet again.
+    if (before >= w) continue;
+    EXPECT_EQ(contact_time<D>(d, w_i - w_j, sigma, w, approach_slack(sigma, 4, 4 + w)), kNever);
+  }
+}
+
 TYPED_TEST(Contact, ParabolasMissNoContactAndInventNone) {
   constexpr int D = TypeParam::kD;
   std::mt19937_64 random(2);

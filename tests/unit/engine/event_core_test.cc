@@ -205,6 +205,78 @@ TEST(EventCore, SimultaneousCollisionsOfALatticeKeepTheirOrder) {
   for (std::size_t k = 1; k < contacts.size(); ++k) EXPECT_LT(contacts[k - 1].key, contacts[k].key);
 }
 
+/// The smallest gap over contact distance, of pairs through periodic images and of walls, with radii scaled.
+template <int D>
+double smallest_gap(const System<D>& system, const Particles<D>& p, double scale) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      Vec<D> d = p.x[i] - p.x[j];
+      d += system.box.shift(system.box.nearest_image(d));
+      const double sigma = scale * (p.radius[i] + p.radius[j]);
+      smallest = std::min(smallest, d.norm() / sigma - 1);
+    }
+    for (int k = 0; k < D; ++k)
+      if (system.box.walled(k))
+        smallest = std::min(smallest, std::min(p.x[i][k], system.box.edges[k] - p.x[i][k]) / (scale * p.radius[i]) - 1);
+  }
+  return smallest;
+}
+
+TEST(EventCore, GrowingSpheresNeverOverlap) {
+  auto check = [](auto system, double growth, double end) {
+    constexpr int D = std::decay_t<decltype(system->box.edges)>::RowsAtCompileTime;
+    Counters counters;
+    std::vector<Contact<D>> contacts;
+    EventCore<D> core(system->box, system->particles);
+    core.load(system->particles, Vec<D>::Zero(), end, growth);
+    Particles<D> copies = system->particles;
+    for (int stop = 1; stop <= 50; ++stop) {
+      const double time = end * stop / 50;
+      core.run(time, {.counters = counters, .contacts = &contacts});
+      core.fly_to(time, copies);
+      EXPECT_GT(smallest_gap<D>(*system, copies, 1 + growth * time), -1e-12) << "time " << time;
+    }
+    EXPECT_GT(counters.sphere_sphere, 20u);
+    EXPECT_LT(counters.max_overlap, 1e-12);
+    for (const Contact<D>& contact :
+         contacts) {  // at the moment of contact the spheres touch, as large as they are then
+      const Particles<D>& p = system->particles;
+      const double now = 1 + growth * contact.key.time;
+      const double distance = (contact.x_lo - contact.x_hi).norm();
+      const double sigma =
+          p.radius[contact.key.lo] + (contact.key.kind == EventKind::pair ? p.radius[contact.key.hi] : 0);
+      if (contact.key.kind == EventKind::pair) {
+        EXPECT_NEAR(distance / (sigma * now), 1, 1e-12);
+      } else {
+        const auto axis = contact.key.hi / 2;
+        EXPECT_NEAR(std::abs(contact.x_lo[axis] - contact.x_hi[axis]) / (sigma * now), 1, 1e-12);
+      }
+    }
+  };
+  check(random_spheres<2>(8, 4, {W, W}, 9), 0.05, 8);
+  check(random_spheres<2>(8, 4, {P, W}, 10), 0.05, 8);
+  check(random_spheres<3>(10, 2.6, {P, P, P}, 11), 0.02, 8);
+  check(random_spheres<3>(10, 3.2, {W, P, W}, 12), 0.02, 8);
+}
+
+TEST(EventCore, GrowthPushesRestingSpheresOffTheWalls) {
+  // Two discs at rest, each 1 from a wall and of radius 0.5 (1 + growth·t).
+  auto system = test::make_system<2>({5, 9}, W, {{1, 4.5}, {4, 4.5}}, {{0, 0}, {0, 0}});
+  Counters counters;
+  EventCore<2> core(system->box, system->particles);
+  core.load(system->particles, Vec<2>::Zero(), 1.2, 0.1);
+  Particles<2> p = system->particles;
+  core.run(1.2, {.counters = counters});
+  EXPECT_EQ(counters.sphere_sphere + counters.sphere_wall, 0u);
+  core.load(system->particles, Vec<2>::Zero(), 1.2, 1.0);
+  core.run(1.2, {.counters = counters});
+  core.fly_to(1.2, p);
+  EXPECT_EQ(counters.sphere_wall, 2u);
+  EXPECT_DOUBLE_EQ(p.v[0][0], 1.0);  // twice the rate of the radius
+  EXPECT_DOUBLE_EQ(p.v[1][0], -1.0);
+}
+
 TEST(EventCore, NewtonsCradlePassesTheBlowThroughAChainInContact) {
   auto system = test::make_system<2>({20, 4}, W, {{2, 2}, {6, 2}, {7, 2}, {8, 2}, {9, 2}},
                                      {{1, 0}, {0, 0}, {0, 0}, {0, 0}, {0, 0}});
