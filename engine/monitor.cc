@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "engine/error.h"
 #include "engine/forces.h"
@@ -12,6 +13,14 @@ namespace carom {
 namespace {
 /// S_h costs two passes over all pairs. Systems larger than this are measured at thermo rows and frames only.
 constexpr std::size_t kShadowAtEveryStep = 100;
+
+/// The mean of |v|; an exact sum.
+template <int D>
+double mean_speed(const Particles<D>& particles) {
+  ExactSum sum;
+  for (const Vec<D>& v : particles.v) sum.add(v.norm());
+  return sum.value() / static_cast<double>(std::max<std::size_t>(1, particles.size()));
+}
 }  // namespace
 
 template <int D>
@@ -28,6 +37,8 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
   for (int k = 0; k < D; ++k) momentum_kept = momentum_kept && !system.box.walled(k);
   for (const auto& term : system.interactions) momentum_kept = momentum_kept && term->keeps_momentum();
   if (momentum_kept) statistics.max_momentum_error = 0;
+  for (auto* observer : observers)
+    if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
   if (info.hard_cores) touching_.emplace(system.box, system.particles.radius);
   if (!info.shadow) return;
   statistics.max_shadow_energy_error = 0;
@@ -40,7 +51,9 @@ void Monitor<D>::start(const Particles<D>& nodes) {
   shot_ = measure(0, system_.particles, nodes, info_.shadow);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   first_momentum_ = shot_.momentum;
+  speed_ = mean_speed(nodes);
   count_from(shot_);
+  sample(0, system_.particles);
   show(shot_, true);
 }
 
@@ -55,18 +68,33 @@ void Monitor<D>::count_from(const Snapshot<D>& shot) {
 template <int D>
 std::vector<double> Monitor<D>::due_within(const Slab& slab) const {
   std::vector<double> times;
-  Schedule frames = frames_, rows = rows_;
-  for (double due; (due = std::min(frames.due(), rows.due())) < slab.start + slab.length - time_slack();) {
+  std::vector<Schedule> all = {frames_, rows_};
+  for (const Sampler& sampler : samplers_) all.push_back(sampler.due);
+  for (;;) {
+    double due = std::numeric_limits<double>::infinity();
+    for (const Schedule& schedule : all) due = std::min(due, schedule.due());
+    if (!(due < slab.start + slab.length - time_slack())) break;
     times.push_back(due - slab.start);
-    frames.pass(due + time_slack());
-    rows.pass(due + time_slack());
+    for (Schedule& schedule : all) schedule.pass(due + time_slack());
   }
   return times;
 }
 
 template <int D>
 void Monitor<D>::observe(double time, const Particles<D>& copies) {
-  show(measure(time, copies, copies, false), false);
+  sample(time, copies);
+  if (std::min(frames_.due(), rows_.due()) <= time + time_slack()) show(measure(time, copies, copies, false), false);
+}
+
+/// Shows the particles to those who look at times of their own.
+template <int D>
+void Monitor<D>::sample(double time, const Particles<D>& state) {
+  for (Sampler& sampler : samplers_) {
+    if (sampler.due.due() > time + time_slack()) continue;
+    const Stopwatch watch(statistics_.counters.seconds.output);
+    sampler.observer->sample(time, state);
+    sampler.due.pass(time + time_slack());
+  }
 }
 
 template <int D>
@@ -89,6 +117,13 @@ void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool las
     s.collision_rate = 2.0 * static_cast<double>(s.counters.sphere_sphere) /
                        (static_cast<double>(system_.particles.size()) * s.end_time);
   }
+  const double speed = mean_speed(nodes);
+  path_ += elapsed * 0.5 * (std::exchange(speed_, speed) + speed);
+  if (s.collision_rate > 0) {
+    s.mean_free_time = 1 / s.collision_rate;
+    s.mean_free_path = path_ / s.end_time / s.collision_rate;
+  }
+  sample(s.end_time, system_.particles);
   show(shot_, last);
 }
 

@@ -10,12 +10,14 @@
 
 namespace carom {
 
-/// The next of the times interval, 2·interval, …; never, where there is no interval.
+/// The next of the times interval, 2·interval, …, or of start, start + interval, …; never, where there is no interval.
 class Schedule {
  public:
+  /// Of what is shown at the start in any case.
   explicit Schedule(double interval) : interval_(interval) {}
+  explicit Schedule(const Sampling& sampling) : interval_(sampling.interval), start_(sampling.start), next_(0) {}
   double due() const {
-    return interval_ > 0 ? static_cast<double>(next_) * interval_ : std::numeric_limits<double>::infinity();
+    return interval_ > 0 ? start_ + static_cast<double>(next_) * interval_ : std::numeric_limits<double>::infinity();
   }
   /// Moves on to the first time after `time`.
   void pass(double time) {
@@ -23,8 +25,8 @@ class Schedule {
   }
 
  private:
-  double interval_;
-  std::int64_t next_ = 1;  // the start is shown whatever the interval
+  double interval_, start_ = 0;
+  std::int64_t next_ = 1;
 };
 
 template <int D>
@@ -54,6 +56,13 @@ class Monitor {
   double time_slack() const { return 1e-9 * plan_.step; }
 
  private:
+  /// An observer that looks at times of its own.
+  struct Sampler {
+    Observer<D>* observer;
+    Schedule due;
+  };
+
+  void sample(double time, const Particles<D>& state);
   Snapshot<D> measure(double time, const Particles<D>& state, const Particles<D>& nodes, bool with_shadow);
   void show(Snapshot<D> shot, bool last);
   void count_from(const Snapshot<D>& shot);
@@ -66,11 +75,13 @@ class Monitor {
   Statistics& statistics_;
 
   Schedule frames_, rows_;
+  std::vector<Sampler> samplers_;
   double last_frame_ = -1, last_row_ = -1;      // when they were shown; before the start, nobody was
   double last_row_virial_ = 0;                  // collision virial up to the last row
   Snapshot<D> shot_;                            // of the last slab's end
   double magnitude_ = 0, virial_ = 0;           // of the last measurement: K + Σ|V|, 2K + Σ d·F
   double virial_time_ = 0;                      // ∫ (2K + Σ d·F) dt
+  double speed_ = 0, path_ = 0;                 // mean |v| at the last slab's end; ∫ mean |v| dt
   double first_energy_ = 0, first_shadow_ = 0;  // H₁ and S_h,1
   Vec<D> first_momentum_ = Vec<D>::Zero();
   std::vector<Vec<D>> force_, scratch_;       // for S_h

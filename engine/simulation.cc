@@ -10,6 +10,12 @@ namespace carom {
 namespace {
 /// Output intervals shorter than this share of a step are refused: there would be no end to counting them.
 constexpr double kLeastInterval = 1e-6;
+
+void check_interval(double interval, double step) {
+  if (interval > 0 && interval < kLeastInterval * step)
+    throw Error(Failure::deck,
+                "an output interval is shorter than a millionth of the step; give 0, the step or something longer");
+}
 }  // namespace
 
 template <int D>
@@ -19,14 +25,17 @@ Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInf
   if (!(plan_.step > 0)) throw Error(Failure::deck, "the step must be positive");
   if (!plan_.steps && !plan_.end_time && !plan_.collisions)
     throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
-  for (const double interval : {plan_.frame_interval, plan_.thermo_interval})
-    if (interval > 0 && interval < kLeastInterval * plan_.step)
-      throw Error(Failure::deck,
-                  "an output interval is shorter than a millionth of the step; give 0, the step or something longer");
+  for (const double interval : {plan_.frame_interval, plan_.thermo_interval}) check_interval(interval, plan_.step);
 }
 
 template <int D>
 Simulation<D>::~Simulation() = default;
+
+template <int D>
+void Simulation<D>::add(Observer<D>& observer) {
+  check_interval(observer.sampling().interval, plan_.step);
+  observers_.push_back(&observer);
+}
 
 template <int D>
 void Simulation<D>::run(const std::function<bool()>& should_stop) {

@@ -47,10 +47,21 @@ struct Snapshot {
   double total() const { return kinetic + potential; }
 };
 
+/// The times at which an observer wants to see the particles: start, start + interval, …
+struct Sampling {
+  double interval = 0;  ///< simulated time; 0: never
+  double start = 0;     ///< ≥ 0
+};
+
 template <int D>
 class Observer {
  public:
   virtual ~Observer() = default;
+  /// Asked once, before the run begins.
+  virtual Sampling sampling() const { return {}; }
+  /// Copies of the particles at a time of sampling(): exactly then with free flight, else at the first step end at or
+  /// after it. Costs no measurement: this is the way to look often.
+  virtual void sample(double /*time*/, const Particles<D>&) {}
   virtual void frame(const Snapshot<D>&) {}
   virtual void thermo(const Snapshot<D>&) {}
   /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`.
@@ -74,7 +85,11 @@ struct Statistics {
       max_shadow_energy_error;  ///< Verlet types; of more than 100 particles at thermo rows and frames only
   std::optional<double> max_momentum_error;  ///< where nothing takes momentum (no walls, no fields): max |P − P₀|
   double mean_pressure = 0;                  ///< over the whole run
-  double collision_rate = 0;   ///< pair collisions a unit time and particle, times two: what one sphere suffers
+  double collision_rate = 0;  ///< pair collisions a unit time and particle, times two: what one sphere suffers
+  /// Of the flight of one sphere from one pair collision to the next: its mean time N t/(2 collisions), and its mean
+  /// length, that time × the mean speed. The mean of |v| over all particles is taken at slab ends and averaged over
+  /// time by the trapezoidal rule. Absent while nobody has collided.
+  std::optional<double> mean_free_time, mean_free_path;
   double wall_seconds = 0;     ///< of the run's loop
   bool stopped_early = false;  ///< should_stop said so
 };
@@ -87,8 +102,8 @@ class Simulation {
              Plan plan);
   ~Simulation();
 
-  /// Observers outlive the run.
-  void add(Observer<D>& observer) { observers_.push_back(&observer); }
+  /// Observers outlive the run. Throws Error(deck) where one wants samples at intervals that cannot be counted.
+  void add(Observer<D>& observer);
 
   /// Runs to the end of the plan, or until should_stop() says so at the end of a slab. Throws Error.
   void run(const std::function<bool()>& should_stop = {});

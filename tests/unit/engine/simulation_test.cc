@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "engine/error.h"
+#include "engine/mean_squared_displacement.h"
+#include "engine/radial_distribution.h"
 #include "tests/support/experiments.h"
 
 namespace carom {
@@ -23,6 +25,11 @@ struct Notebook : Observer<D> {
     }
   }
   void progress(const Statistics& s) override { fraction = s.fraction_done; }
+  Sampling sampling() const override { return wanted; }
+  void sample(double time, const Particles<D>& p) override { samples.push_back(time), sampled.push_back(p.x); }
+  Sampling wanted;
+  std::vector<double> samples;
+  std::vector<std::vector<Vec<D>>> sampled;
   std::vector<double> frames, rows, pressure, times;
   std::vector<std::vector<Vec<D>>> x;
   std::uint64_t pairs = 0;
@@ -54,6 +61,50 @@ TEST(Simulation, FreeFlightIsShownExactlyAtTheDueTimes) {
   ASSERT_EQ(notes.frames.size(), 8u);
   for (int k = 0; k < 7; ++k) EXPECT_DOUBLE_EQ(notes.frames[k], 0.4 * k);
   EXPECT_DOUBLE_EQ(notes.frames[7], 2.5);
+}
+
+TEST(Simulation, SamplesAtTheTimesOfEachObserver) {
+  for (const double step : {1.0, 0.7}) {
+    auto run = test::make_run<3>(test::hard_spheres<3>(2, 0.2), "free-flight",
+                                 {.step = step, .end_time = 2.5, .frame_interval = 0.4});
+    Notebook<3> often, late, never;
+    often.wanted = {.interval = 0.2};
+    late.wanted = {.interval = 0.5, .start = 0.9};
+    for (auto* notes : {&often, &late, &never}) run->add(*notes);
+    run->run();
+    ASSERT_EQ(often.samples.size(), 13u);  // 0, 0.2, … 2.4; the end is no due time
+    for (int k = 0; k < 13; ++k) EXPECT_NEAR(often.samples[k], 0.2 * k, 1e-12);
+    ASSERT_EQ(late.samples.size(), 4u);  // 0.9, 1.4, 1.9, 2.4
+    for (int k = 0; k < 4; ++k) EXPECT_NEAR(late.samples[k], 0.9 + 0.5 * k, 1e-12);
+    EXPECT_TRUE(never.samples.empty());
+    for (int k = 0; k < 7; ++k) EXPECT_LT(test::largest_difference(often.x[k], often.sampled[2 * k]), 1e-12);
+  }
+  auto run = test::make_run<2>(test::five_springs(), "cva", {.step = 0.03, .steps = 40});
+  Notebook<2> notes;
+  notes.wanted = {.interval = 0.5};
+  run->add(notes);
+  run->run();
+  ASSERT_EQ(notes.samples.size(), 3u);
+  EXPECT_DOUBLE_EQ(notes.samples[1], 0.51);
+  EXPECT_DOUBLE_EQ(notes.samples[2], 1.02);
+}
+
+TEST(Simulation, MeasuresTheMeanFreeFlight) {
+  // Two discs that meet head on, in a periodic box: 3.5 of way to go each, at 2 and at 1; equal masses exchange
+  // velocities.
+  auto run = test::make_run<2>(test::make_system<2>({8, 4}, Boundary::periodic, {{1, 1}, {5, 1}}, {{2, 0}, {-1, 0}}),
+                               "free-flight", {.step = 1, .end_time = 700});
+  run->run();
+  const auto& s = run->statistics();
+  // The first time at 1, then every (8 − 2)/3; in between one goes 4 and the other 2.
+  EXPECT_EQ(s.counters.sphere_sphere, 350u);
+  EXPECT_NEAR(*s.mean_free_time, 2, 1e-12);
+  EXPECT_NEAR(*s.mean_free_path, 3, 1e-12);
+  const auto none = test::run_steps<2>(
+      test::make_system<2>({8, 4}, Boundary::wall, {{1, 1}, {5, 3}}, {{2, 0}, {-1, 0}}), "free-flight", 1, 20);
+  EXPECT_GT(none->statistics().counters.sphere_wall, 5u);
+  EXPECT_FALSE(none->statistics().mean_free_time);
+  EXPECT_FALSE(none->statistics().mean_free_path);
 }
 
 TEST(Simulation, ShortensTheLastStepToMeetTheEnd) {
@@ -117,20 +168,27 @@ TEST(Simulation, ObservingChangesNoBit) {
   for (const char* method : {"free-flight", "psa", "cva", "mcva", "cdda"}) {
     for (const char* variant : {"grid", "restart"}) {
       if (std::string(variant) == "restart" && std::string(method) != "mcva") continue;
-      auto final_state = [&](double frames, double rows, bool events) {
+      auto final_state = [&](double frames, double rows, bool events, Sampling wanted = {}) {
         auto system = std::string(method) == "free-flight" ? test::hard_spheres<2>(5, 0.5) : test::nine_gravity();
         auto run = test::make_run<2>(
             std::move(system), method,
             {.step = 0.05, .steps = 200, .frame_interval = frames, .thermo_interval = rows, .events = events},
             {{"variant", std::string(variant)}});
         Notebook<2> notes;
+        notes.wanted = wanted;
         run->add(notes);
+        RadialDistribution<2> rdf(run->system(), {.sampling = wanted, .range = 1.2, .bins = 10});
+        MeanSquaredDisplacement<2> msd(run->system(), wanted);
+        run->add(rdf);
+        run->add(msd);
         run->run();
         return std::pair(run->system().particles.x, run->system().particles.v);
       };
       const auto plain = final_state(0, 0, false);
       EXPECT_EQ(plain, final_state(0.05, 0.013, true)) << method;
       EXPECT_EQ(plain, final_state(0.37, 1.1, false)) << method;
+      EXPECT_EQ(plain, final_state(0, 0, false, {.interval = 0.021, .start = 0.4})) << method;
+      EXPECT_EQ(plain, final_state(0.31, 0, true, {.interval = 0.7})) << method;
     }
   }
 }
@@ -152,6 +210,9 @@ TEST(Simulation, RefusesIntervalsThatCannotBeCounted) {
   EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0.1, .steps = 1, .frame_interval = 1e-300}),
                Error);
   EXPECT_NO_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0.1, .steps = 1, .frame_interval = 1e-6}));
+  Notebook<2> notes;
+  notes.wanted = {.interval = 1e-12};
+  EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0.1, .steps = 1})->add(notes), Error);
 }
 
 TEST(Simulation, FreeFlightRefusesForces) {

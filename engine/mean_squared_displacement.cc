@@ -1,0 +1,71 @@
+#include "engine/mean_squared_displacement.h"
+
+#include <numeric>
+#include <utility>
+
+namespace carom {
+
+template <int D>
+MeanSquaredDisplacement<D>::MeanSquaredDisplacement(const System<D>& system, const Sampling& sampling)
+    : system_(system), sampling_(sampling), number_(system.species.size()) {
+  for (const auto species : system.particles.species) number_[species] += 1;
+}
+
+template <int D>
+void MeanSquaredDisplacement<D>::sample(double time, const Particles<D>& particles) {
+  now_.resize(particles.size());
+  for (std::size_t i = 0; i < particles.size(); ++i)
+    for (int k = 0; k < D; ++k)
+      now_[i][k] = particles.x[i][k] + static_cast<double>(particles.image[i][k]) * system_.box.edges[k];
+  const std::uint64_t index = samples_++;
+  if (index == 0) {
+    decades_.push_back({time, now_, {}});
+    return;
+  }
+  std::uint64_t spacing = 1;  // of the lags of a decade, in samples
+  for (std::size_t n = 0; index % spacing == 0; ++n, spacing *= kLags) {
+    const std::uint64_t lag = index / spacing % kLags;
+    if (lag != 0) {
+      add(decades_[n].lag[lag], time, decades_[n]);
+      return;
+    }
+    // The window is over. It is one lag of the next decade, whose first window began where this one's first did.
+    if (n + 1 == decades_.size()) decades_.push_back({decades_[n].origin_time, std::move(decades_[n].origin), {}});
+    decades_[n].origin_time = time;
+    decades_[n].origin = now_;
+  }
+}
+
+template <int D>
+void MeanSquaredDisplacement<D>::add(Lag& lag, double time, const Decade& from) {
+  lag.squares.resize(number_.size());
+  ++lag.origins;
+  lag.time.add(time - from.origin_time);
+  const auto& species = system_.particles.species;
+  for (std::size_t i = 0; i < now_.size(); ++i) lag.squares[species[i]].add((now_[i] - from.origin[i]).squaredNorm());
+}
+
+template <int D>
+auto MeanSquaredDisplacement<D>::rows() const -> std::vector<Row> {
+  const double everybody = std::accumulate(number_.begin(), number_.end(), 0.0);
+  std::vector<Row> rows;
+  for (const Decade& decade : decades_)
+    for (const Lag& lag : decade.lag) {
+      if (lag.origins == 0) continue;
+      const auto origins = static_cast<double>(lag.origins);
+      Row row{lag.time.value() / origins, lag.origins, 0, {}};
+      ExactSum all;
+      for (std::size_t s = 0; s < number_.size(); ++s) {
+        all.add(lag.squares[s]);
+        row.of.push_back(lag.squares[s].value() / (origins * number_[s]));
+      }
+      row.msd = all.value() / (origins * everybody);
+      rows.push_back(std::move(row));
+    }
+  return rows;
+}
+
+template class MeanSquaredDisplacement<2>;
+template class MeanSquaredDisplacement<3>;
+
+}  // namespace carom

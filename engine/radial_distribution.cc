@@ -1,0 +1,301 @@
+#include "engine/radial_distribution.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+#include "engine/error.h"
+
+namespace carom {
+
+namespace {
+
+/// Cells of half the range: of 1/1 to 1/4 the fastest, at densities from 0.2 to 0.9.
+constexpr int kCellsInRange = 2;
+
+/// A grid of equal cells over the box. Cells are stored with the last axis running fastest, and particles in the order
+/// of their cells, so that a row of cells is a run of particles.
+template <int D>
+struct Grid {
+  std::array<std::int32_t, D> count, reach;  // cells of an axis; how many cells away a partner may be
+  Vec<D> edge;
+
+  Grid(const Box<D>& box, double range, std::size_t particles) {
+    const double most = std::max(1.0, std::floor(std::pow(static_cast<double>(particles), 1.0 / D)));
+    for (int k = 0; k < D; ++k) {
+      count[k] = static_cast<std::int32_t>(
+          std::clamp(std::floor(box.edges[k] * kCellsInRange / (range * (1 + 1e-9))), 1.0, most));
+      edge[k] = box.edges[k] / count[k];
+      reach[k] = static_cast<std::int32_t>(std::ceil(range / edge[k]));
+    }
+  }
+  std::size_t cells() const {
+    std::size_t n = 1;
+    for (const auto c : count) n *= static_cast<std::size_t>(c);
+    return n;
+  }
+  std::int32_t cell(int axis, double x) const {
+    return std::clamp(static_cast<std::int32_t>(x / edge[axis]), 0, count[axis] - 1);
+  }
+};
+
+/// A run of particles in neighbouring cells of one row, and what to add to x_i − x_j for the image of the row.
+template <int D>
+struct Run {
+  std::uint32_t begin, end;
+  Vec<D> shift;
+};
+
+/// Floor division of a cell number that may lie outside the box: how many boxes away.
+std::int32_t boxes_away(std::int32_t cell, std::int32_t count) {
+  return cell >= 0 ? cell / count : -((count - 1 - cell) / count);
+}
+
+/// The runs of all cells that come after `centre` in the order of unwrapped cells and may hold partners: each pair of
+/// cells is met from one side only. What is left of the cell itself is its caller's.
+template <int D>
+void list_runs(const Grid<D>& grid, const Box<D>& box, const std::vector<std::uint32_t>& start,
+               const std::array<std::int32_t, D>& centre, double range, std::vector<Run<D>>& runs) {
+  runs.clear();
+  constexpr int last = D - 1;
+  const auto row = [&](const std::array<std::int32_t, D>& offset, std::int32_t from) {
+    Vec<D> shift = Vec<D>::Zero();
+    std::size_t first = 0;  // cell of the row
+    double squared_gap = 0;
+    for (int k = 0; k < last; ++k) {
+      const std::int32_t at = centre[k] + offset[k], away = boxes_away(at, grid.count[k]);
+      if (away != 0 && !box.periodic(k)) return;
+      shift[k] = away == 0 ? 0.0 : -away * box.edges[k];
+      first = first * static_cast<std::size_t>(grid.count[k]) + static_cast<std::size_t>(at - away * grid.count[k]);
+      const double gap = std::max(std::abs(offset[k]) - 1, 0) * grid.edge[k];
+      squared_gap += gap * gap;
+    }
+    if (squared_gap > range * range) return;
+    const std::int32_t n = grid.count[last];
+    first *= static_cast<std::size_t>(n);
+    std::int32_t low = centre[last] + from, high = centre[last] + grid.reach[last];
+    if (!box.periodic(last)) low = std::max(low, 0), high = std::min(high, n - 1);
+    while (low <= high) {
+      const std::int32_t away = boxes_away(low, n), stop = std::min(high, (away + 1) * n - 1);
+      shift[last] = away == 0 ? 0.0 : -away * box.edges[last];
+      const std::size_t begin = first + static_cast<std::size_t>(low - away * n);
+      const std::uint32_t a = start[begin], b = start[begin + static_cast<std::size_t>(stop - low) + 1];
+      if (a < b) runs.push_back({a, b, shift});
+      low = stop + 1;
+    }
+  };
+  std::array<std::int32_t, D> offset{};
+  row(offset, 1);
+  if constexpr (D == 3)
+    for (offset[0] = 0, offset[1] = 1; offset[1] <= grid.reach[1]; ++offset[1]) row(offset, -grid.reach[last]);
+  for (offset[0] = 1; offset[0] <= grid.reach[0]; ++offset[0]) {
+    if constexpr (D == 2)
+      row(offset, -grid.reach[last]);
+    else
+      for (offset[1] = -grid.reach[1]; offset[1] <= grid.reach[1]; ++offset[1]) row(offset, -grid.reach[last]);
+  }
+}
+
+/// The volume in which an ideal gas finds a partner at distances from a to b, on average over the region of these
+/// edges; along the axes that are walled there is nobody beyond the edge.
+template <int D>
+double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bool, D>& walled) {
+  // Averages of |u_x|, |u_x u_y|, |u_x u_y u_z| over directions u.
+  constexpr double pi = std::numbers::pi;
+  constexpr std::array<double, 3> mean = {D == 2 ? 2 / pi : 0.5, D == 2 ? 1 / pi : 2 / (3 * pi), 1 / (4 * pi)};
+  std::array<double, D + 1> c{1};  // of the average of Π (1 − r|u_k|/L_k) as a polynomial in r
+  for (int k = 0; k < D; ++k)
+    if (walled[k])
+      for (int p = D; p > 0; --p) c[p] -= c[p - 1] / edges[k];
+  double volume = 0;
+  for (int p = 0; p <= D; ++p)
+    volume += c[p] * (p == 0 ? 1.0 : mean[p - 1]) * (std::pow(b, D + p) - std::pow(a, D + p)) / (D + p);
+  return (D == 2 ? 2 * pi : 4 * pi) * volume;
+}
+
+}  // namespace
+
+template <int D>
+RadialDistribution<D>::RadialDistribution(const System<D>& system, const RadialDistributionOptions& options)
+    : system_(system), options_(options) {
+  for (const Boundary boundary : system.box.boundary)
+    if (boundary == Boundary::open)
+      throw Error(Failure::deck, "g(r) needs a density: there is none in a box with an open boundary");
+  if (!(options.range > 0) || options.range > longest_range(system) * (1 + 1e-9) || options.bins < 1)
+    throw Error(Failure::deck, "g(r) cannot be taken to r = " + std::to_string(options.range) +
+                                   ": half the shortest periodic edge, or the way between two walls, is " +
+                                   std::to_string(longest_range(system)));
+  const std::size_t species = system.species.size();
+  number_.resize(species);
+  smallest_.assign(species, std::numeric_limits<double>::infinity());
+  largest_.resize(species);
+  counts_.resize(species * (species + 1) / 2 * static_cast<std::size_t>(options.bins));
+  const auto& p = system.particles;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const std::size_t s = p.species[i];
+    number_[s] += 1;
+    smallest_[s] = std::min(smallest_[s], p.radius[i]);
+    largest_[s] = std::max(largest_[s], p.radius[i]);
+  }
+}
+
+template <int D>
+double RadialDistribution<D>::longest_range(const System<D>& system) {
+  const auto& radius = system.particles.radius;
+  const double margin = radius.empty() ? 0 : 2 * *std::ranges::min_element(radius);
+  double longest = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < D; ++k)
+    longest = std::min(longest, system.box.periodic(k) ? system.box.edges[k] / 2 : system.box.edges[k] - margin);
+  return longest;
+}
+
+template <int D>
+double RadialDistribution<D>::usual_range(const System<D>& system) {
+  const auto& radius = system.particles.radius;
+  return std::min(longest_range(system), radius.empty() ? 1.0 : 8 * *std::ranges::max_element(radius));
+}
+
+template <int D>
+std::size_t RadialDistribution<D>::pair_index(std::size_t a, std::size_t b) const {
+  const std::size_t lo = std::min(a, b), hi = std::max(a, b);
+  return hi * (hi + 1) / 2 + lo;
+}
+
+template <int D>
+void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particles) {
+  ++samples_;
+  const std::size_t n = particles.size(), bins = static_cast<std::size_t>(options_.bins);
+  const Grid<D> grid(system_.box, options_.range, n);
+
+  // Everybody in the order of the cells.
+  start_.assign(grid.cells() + 1, 0);
+  cell_.resize(n);
+  species_.resize(n);
+  for (auto& x : x_) x.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::uint32_t c = 0;
+    for (int k = 0; k < D; ++k)
+      c = c * static_cast<std::uint32_t>(grid.count[k]) + static_cast<std::uint32_t>(grid.cell(k, particles.x[i][k]));
+    cell_[i] = c;
+    ++start_[c + 1];
+  }
+  std::partial_sum(start_.begin(), start_.end(), start_.begin());
+  auto next = start_;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t at = next[cell_[i]]++;
+    for (int k = 0; k < D; ++k) x_[k][at] = particles.x[i][k];
+    species_[at] = system_.particles.species[i];
+  }
+
+  const std::size_t kinds = number_.size();
+  std::vector<std::uint64_t*> histogram(kinds * kinds);
+  for (std::size_t a = 0; a < kinds; ++a)
+    for (std::size_t b = 0; b < kinds; ++b) histogram[a * kinds + b] = &counts_[pair_index(a, b) * bins];
+  const double squared_range = options_.range * options_.range, shells = static_cast<double>(bins) / options_.range;
+  const auto count = [&](std::uint32_t i, const Run<D>& run) {
+    std::uint64_t* const* const of = &histogram[species_[i] * kinds];
+    Vec<D> x;
+    for (int k = 0; k < D; ++k) x[k] = x_[k][i];
+    for (std::uint32_t j = run.begin; j < run.end; ++j) {
+      double squared = 0;
+      for (int k = 0; k < D; ++k) {
+        const double d = (x[k] - x_[k][j]) + run.shift[k];  // the negative for j and i, to the last bit
+        squared += d * d;
+      }
+      if (squared < squared_range)
+        ++of[species_[j]][std::min(static_cast<std::size_t>(std::sqrt(squared) * shells), bins - 1)];
+    }
+  };
+  std::vector<Run<D>> runs;
+  std::array<std::int32_t, D> centre{};
+  for (std::size_t cell = 0; cell < grid.cells(); ++cell) {
+    if (start_[cell] < start_[cell + 1]) {
+      list_runs<D>(grid, system_.box, start_, centre, options_.range, runs);
+      for (std::uint32_t i = start_[cell]; i < start_[cell + 1]; ++i) {
+        count(i, {i + 1, start_[cell + 1], Vec<D>::Zero()});
+        for (const Run<D>& run : runs) count(i, run);
+      }
+    }
+    for (int k = D - 1; k >= 0 && ++centre[k] == grid.count[k]; --k) centre[k] = 0;
+  }
+}
+
+template <int D>
+std::vector<double> RadialDistribution<D>::radii() const {
+  std::vector<double> r(static_cast<std::size_t>(options_.bins));
+  for (std::size_t b = 0; b < r.size(); ++b)
+    r[b] = (static_cast<double>(b) + 0.5) * options_.range / static_cast<double>(options_.bins);
+  return r;
+}
+
+template <int D>
+double RadialDistribution<D>::pairs_between(std::size_t a, std::size_t b) const {
+  return a == b ? number_[a] * (number_[a] - 1) / 2 : number_[a] * number_[b];
+}
+
+/// Counts over those of an ideal gas of so many pairs. `margin`: the radius that centres keep from walls.
+template <int D>
+std::vector<double> RadialDistribution<D>::normalised(const std::vector<std::uint64_t>& counts, double pairs,
+                                                      double margin) const {
+  Vec<D> edges = system_.box.edges;
+  std::array<bool, D> walled;
+  for (int k = 0; k < D; ++k) {
+    walled[k] = system_.box.walled(k);
+    if (walled[k]) edges[k] -= 2 * margin;
+  }
+  const double width = options_.range / static_cast<double>(options_.bins);
+  std::vector<double> g(counts.size());
+  for (std::size_t b = 0; b < g.size(); ++b) {
+    const double inner = static_cast<double>(b) * width, outer = static_cast<double>(b + 1) * width;
+    const double expected =
+        static_cast<double>(samples_) * pairs * shell_volume<D>(inner, outer, edges, walled) / edges.prod();
+    g[b] = static_cast<double>(counts[b]) / expected;
+  }
+  return g;
+}
+
+template <int D>
+std::vector<double> RadialDistribution<D>::g() const {
+  const std::size_t bins = static_cast<std::size_t>(options_.bins);
+  std::vector<std::uint64_t> all(bins);
+  for (std::size_t k = 0; k < counts_.size(); ++k) all[k % bins] += counts_[k];
+  const double n = std::accumulate(number_.begin(), number_.end(), 0.0);
+  return normalised(all, n * (n - 1) / 2, *std::ranges::min_element(smallest_));
+}
+
+template <int D>
+std::vector<double> RadialDistribution<D>::g(std::size_t a, std::size_t b) const {
+  const auto first = counts_.begin() + static_cast<std::ptrdiff_t>(pair_index(a, b)) * options_.bins;
+  return normalised({first, first + options_.bins}, pairs_between(a, b), std::min(smallest_[a], smallest_[b]));
+}
+
+template <int D>
+std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::size_t b) const {
+  if (smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
+  const double contact = smallest_[a] + smallest_[b], width = options_.range / options_.bins;
+  const auto r = radii(), value = g(a, b);
+  const std::uint64_t* counts = &counts_[pair_index(a, b) * static_cast<std::size_t>(options_.bins)];
+  // Shells from the contact distance on, and rounding must not lose the first.
+  const auto first = static_cast<std::size_t>(std::ceil(contact / width * (1 - 1e-9)));
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  int used = 0;
+  for (std::size_t k = first; k < r.size() && (k < first + 6 || r[k] + width / 2 <= 1.15 * contact); ++k) {
+    if (counts[k] == 0) continue;
+    const double s = (r[k] - contact) / contact, weight = static_cast<double>(counts[k]);
+    const Eigen::Vector3d powers(1, s, s * s);
+    normal += weight * powers * powers.transpose();
+    right += weight * std::log(value[k]) * powers;
+    ++used;
+  }
+  if (used < 4) return {};
+  return std::exp(normal.ldlt().solve(right)[0]);
+}
+
+template class RadialDistribution<2>;
+template class RadialDistribution<3>;
+
+}  // namespace carom
