@@ -226,12 +226,12 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
 
 template <int D>
 void draw_velocities(Particles<D>& particles, std::span<const Id> who, std::span<const double> temperature,
-                     std::uint64_t seed) {
+                     std::uint64_t seed, RandomPurpose purpose) {
   double total_mass = 0, twice_kinetic_wanted = 0;
   Vec<D> momentum = Vec<D>::Zero();
   for (std::size_t n = 0; n < who.size(); ++n) {
     const Id i = who[n];
-    RandomStream random(seed, RandomPurpose::velocity, i);
+    RandomStream random(seed, purpose, i);
     const auto first = random.normal_pair(), second = random.normal_pair();
     const std::array<double, 4> normal{first[0], first[1], second[0], second[1]};
     for (int k = 0; k < D; ++k) particles.v[i][k] = std::sqrt(temperature[n] / particles.mass[i]) * normal[k];
@@ -262,7 +262,8 @@ template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::spa
                                       std::uint64_t, std::uint64_t);
 template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
 template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
-template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t);
+template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t,
+                              RandomPurpose);
 template double packing_fraction<2>(double, std::span<const double>);
 
 template LatticeCells<3> fit_lattice(Lattice, const Box<3>&, std::size_t, double);
@@ -272,7 +273,8 @@ template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::spa
                                       std::uint64_t, std::uint64_t);
 template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
 template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
-template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t);
+template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t,
+                              RandomPurpose);
 template double packing_fraction<3>(double, std::span<const double>);
 
 }  // namespace carom

@@ -14,6 +14,7 @@
 
 #include "engine/box.h"
 #include "engine/particles.h"
+#include "engine/random.h"
 
 namespace carom {
 
@@ -75,7 +76,7 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
 /// (not so a single particle) and scaled so that 2K = D Σ temperature exactly, up to rounding.
 template <int D>
 void draw_velocities(Particles<D>& particles, std::span<const Id> who, std::span<const double> temperature,
-                     std::uint64_t seed);
+                     std::uint64_t seed, RandomPurpose purpose = RandomPurpose::velocity);
 
 /// The part of the box that the spheres fill, 0 … 1.
 template <int D>

@@ -30,7 +30,7 @@ constexpr std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> c
 
 /// What numbers are drawn for: streams of different purposes are independent of each other. Values are part of what a
 /// seed means and never change.
-enum class RandomPurpose : std::uint32_t { position = 1, velocity = 2, species = 3, probe = 4 };
+enum class RandomPurpose : std::uint32_t { position = 1, velocity = 2, species = 3, probe = 4, compression = 5 };
 
 /// The numbers of one purpose and one id, one after the other.
 class RandomStream {

@@ -96,12 +96,26 @@ class Interpreter {
       if ((flat || deep) && some && !every)
         problems_.error(table->place("type"), "a lattice cannot make room for explicit positions",
                         "take type = \"random\", or give all species by count");
+      if (placement.type == "compressed") compressed(*table, some && !every);
       if (const auto* file = table->find<std::string>("file"))
         placement.file = std::filesystem::absolute(deck_.file.parent_path() / *file).lexically_normal();
     }
     if (system != nullptr && !system->given("box") && (table == nullptr || !table->given("packing_fraction")))
       problems_.error(system->at, "missing key 'box' in [system]",
                       "give the edges, or placement.packing_fraction to set them");
+  }
+
+  void compressed(const ValueTable& table, bool mixed) {
+    PlacementConfig& placement = source_.placement;
+    if (const auto* rate = table.find<double>("growth_rate")) placement.growth_rate = *rate;
+    if (const auto* most = table.find<double>("max_collisions")) placement.max_collisions = *most;
+    if (mixed)
+      problems_.error(table.place("type"), "compression moves everybody, explicit positions too",
+                      "take type = \"random\", or give all species by count");
+    const auto& boundary = source_.boundary;
+    if (std::find(boundary.begin(), boundary.end(), Boundary::open) != boundary.end())
+      problems_.error(table.place("type"), "nothing is compressed in an open box",
+                      "make the boundaries wall or periodic, or take type = \"random\"");
   }
 
   void packing(const ValueTable& table, double fraction) {

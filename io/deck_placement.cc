@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <fstream>
+#include <sstream>
 
+#include "engine/compression.h"
 #include "engine/placement.h"
 #include "io/deck_build.h"
 
@@ -50,12 +53,47 @@ void place_at_random(const Deck::Source& source, const std::vector<Id>& placed, 
   if (done == placed.size()) return;
   const double wanted = packing_fraction<D>(system.box.volume(), radius);
   Problems problems;
-  problems.error(
-      source.placement.at,
-      "random insertion found no place for sphere " + std::to_string(done + 1) + " of " +
-          std::to_string(placed.size()) + " (packing fraction wanted: " + std::to_string(wanted) + ")",
-      std::string("take a lattice, a larger box or fewer spheres; insertion jams at a packing fraction of ") +
-          (D == 2 ? "0.547" : "0.384"));
+  problems.error(source.placement.at,
+                 "random insertion found no place for sphere " + std::to_string(done + 1) + " of " +
+                     std::to_string(placed.size()) + " (packing fraction wanted: " + std::to_string(wanted) + ")",
+                 std::string("take type = \"compressed\" or a lattice, a larger box or fewer spheres; insertion jams "
+                             "at a packing fraction of ") +
+                     (D == 2 ? "0.547" : "0.384"));
+  problems.throw_errors(Failure::initial_state);
+}
+
+template <int D>
+void place_by_compression(const Deck::Source& source, System<D>& system) {
+  using End = typename Compression<D>::End;
+  const PlacementConfig& placement = source.placement;
+  const auto& radius = system.particles.radius;
+  Compression<D> done = compress<D>(
+      system.box, radius,
+      {.seed = placement.seed, .growth_rate = placement.growth_rate, .max_collisions = placement.max_collisions});
+  if (done.reached()) {
+    system.particles.x = std::move(done.x);
+    return;
+  }
+  const double wanted = packing_fraction<D>(system.box.volume(), radius);
+  std::ostringstream what, remedy;
+  what.precision(4);
+  if (done.end == End::no_room) {
+    what << "the spheres have no room in the box: the largest diameter is "
+         << 2 * *std::max_element(radius.begin(), radius.end()) << ", the shortest edge "
+         << system.box.edges.minCoeff();
+    remedy << "enlarge the box or make the spheres smaller";
+  } else {
+    what << (done.end == End::jammed ? "the spheres jammed" : "compression gave up") << " at packing fraction "
+         << wanted * std::pow(done.factor, D) << ", short of " << wanted << " (reduced pressure "
+         << done.reduced_pressure << ", " << std::round(done.collisions) << " collisions a particle)";
+    if (done.end == End::too_many_collisions) remedy << "raise placement.max_collisions, or ";
+    remedy << "take a lower packing fraction, a smaller placement.growth_rate (is " << placement.growth_rate
+           << ") or another seed; "
+           << (D == 2 ? "discs of two sizes jam near 0.84, equal discs crystallise"
+                      : "equal spheres jam at 0.64 to 0.65 unless they crystallise");
+  }
+  Problems problems;
+  problems.error(placement.at, what.str(), remedy.str());
   problems.throw_errors(Failure::initial_state);
 }
 
@@ -124,6 +162,8 @@ void place_particles(const Deck::Source& source, System<D>& system) {
     place_from_file(source, placed, system);
   else if (placement.type == "random")
     place_at_random(source, placed, system);
+  else if (placement.type == "compressed")
+    place_by_compression(source, system);
   else
     place_on_lattice(source, lattice, system);
 }

@@ -113,6 +113,13 @@ std::vector<TableSchema> make_schema() {
         {"hexagonal", {}},
         {"square", {}},
         {"random", {}},
+        {"compressed",
+         {{"growth_rate", real, "0.1", "-",
+           "speed at which the largest diameter grows, over the thermal speed; divided by the reduced pressure "
+           "PV/(NkT) as that rises. The slower, the denser the spheres jam",
+           Range::positive},
+          {"max_collisions", real, "100000.0", "-", "for each particle, before compression gives up",
+           Range::positive}}},
         {"file",
          {{"file", text, "", "-",
            "table of positions, separated by commas or blanks, one particle a line; "

@@ -1,0 +1,140 @@
+#include "engine/compression.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/placement.h"
+
+namespace carom {
+namespace {
+
+constexpr Boundary W = Boundary::wall, P = Boundary::periodic;
+
+template <int D>
+Box<D> box_for(const std::vector<double>& radius, double fraction, std::array<Boundary, D> boundary) {
+  Box<D> box;
+  box.edges = Vec<D>::Constant(std::pow(packing_fraction<D>(1, radius) / fraction, 1.0 / D));
+  box.boundary = boundary;
+  return box;
+}
+
+std::vector<double> two_sizes(std::size_t n, std::size_t large, double ratio) {
+  std::vector<double> radius(n, 0.5);
+  std::fill_n(radius.begin(), large, 0.5 * ratio);
+  return radius;
+}
+
+/// Not a single overlap, not even by rounding, through any image; everybody in the box and off its walls.
+template <int D>
+void expect_sound(const Box<D>& box, const std::vector<double>& radius, const Compression<D>& done) {
+  ASSERT_TRUE(done.reached()) << "factor " << done.factor << ", pressure " << done.reduced_pressure;
+  ASSERT_EQ(done.x.size(), radius.size());
+  EXPECT_GE(done.factor, 1);
+  for (std::size_t i = 0; i < radius.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      Vec<D> d = done.x[i] - done.x[j];
+      d += box.shift(box.nearest_image(d));
+      ASSERT_GE(d.norm(), radius[i] + radius[j]) << i << " and " << j;
+    }
+    for (int k = 0; k < D; ++k) {
+      const double margin = box.walled(k) ? radius[i] : 0;
+      ASSERT_GE(done.x[i][k], margin) << i;
+      ASSERT_LE(done.x[i][k], box.edges[k] - margin) << i;
+    }
+  }
+}
+
+template <int D>
+void expect_reached(const std::vector<double>& radius, double fraction, std::array<Boundary, D> boundary,
+                    const CompressionOptions& options = {}) {
+  const auto box = box_for<D>(radius, fraction, boundary);
+  expect_sound<D>(box, radius, compress<D>(box, radius, options));
+}
+
+TEST(Compression, ReachesRandomClosePackingOfEqualSpheres) {
+  expect_reached<3>(std::vector<double>(100, 0.5), 0.64, {P, P, P}, {.seed = 3});
+}
+
+TEST(Compression, ReachesDenseDiscsOfTwoSizes) { expect_reached<2>(two_sizes(150, 75, 1.4), 0.84, {P, P}); }
+
+TEST(Compression, ReachesDenseStatesBetweenWalls) {
+  expect_reached<2>(two_sizes(100, 50, 1.4), 0.75, {W, W});
+  expect_reached<2>(two_sizes(100, 50, 1.4), 0.78, {P, W});
+  expect_reached<3>(std::vector<double>(120, 0.5), 0.50, {W, P, W});
+}
+
+TEST(Compression, ReachesDenseMixturesUpToTenToOne) {
+  expect_reached<3>(two_sizes(200, 100, 1.4), 0.60, {P, P, P});
+  expect_reached<3>(two_sizes(150, 6, 10), 0.45, {P, P, P}, {.growth_rate = 0.5});
+  expect_reached<2>(two_sizes(120, 6, 10), 0.65, {P, W}, {.growth_rate = 0.5});
+  std::vector<double> polydisperse;
+  for (int i = 0; i < 200; ++i) polydisperse.push_back(0.3 + 0.005 * ((i * 37) % 100));
+  expect_reached<3>(polydisperse, 0.58, {P, P, P});
+}
+
+TEST(Compression, SmallSystemsAndLowDensitiesComeOutToo) {
+  expect_reached<2>({0.5}, 0.7, {P, P});
+  expect_reached<3>({0.5}, 0.52, {W, W, W});
+  expect_reached<3>({0.5, 0.3}, 0.3, {P, P, P});
+  expect_reached<3>(std::vector<double>(50, 0.5), 0.01, {P, P, P});
+}
+
+TEST(Compression, DependsOnTheSeedAndOnNothingElse) {
+  const auto radius = two_sizes(60, 30, 1.4);
+  const auto box = box_for<3>(radius, 0.5, {P, P, P});
+  const auto one = compress<3>(box, radius, {.seed = 1}), again = compress<3>(box, radius, {.seed = 1});
+  const auto other = compress<3>(box, radius, {.seed = 2});
+  EXPECT_EQ(one.x, again.x);
+  EXPECT_EQ(one.reduced_pressure, again.reduced_pressure);
+  EXPECT_NE(one.x, other.x);
+}
+
+TEST(Compression, SlowGrowthFollowsTheEquationOfState) {
+  const std::vector<double> radius(400, 0.5);
+  const double fraction = 0.40;
+  const auto box = box_for<3>(radius, fraction, {P, P, P});
+  const auto done = compress<3>(box, radius, {.growth_rate = 0.005});
+  expect_sound<3>(box, radius, done);
+  // Carnahan, Starling, J. Chem. Phys. 51 (1969) 635; the last slab ends there and has 1 % less of the volume on
+  // average.
+  const double z = (1 + fraction + fraction * fraction - std::pow(fraction, 3)) / std::pow(1 - fraction, 3);
+  EXPECT_NEAR(done.reduced_pressure, z, 0.08 * z);
+}
+
+TEST(Compression, TellsWhereTheSpheresJammed) {
+  const std::vector<double> radius(40, 0.5);
+  const auto box = box_for<3>(radius, 0.75, {P, P, P});
+  const auto done = compress<3>(box, radius, {.growth_rate = 0.3});
+  EXPECT_EQ(done.end, Compression<3>::End::jammed);
+  const double reached = 0.75 * std::pow(done.factor, 3);
+  EXPECT_GT(reached, 0.60);
+  EXPECT_LT(reached, 0.74);
+  auto smaller = radius;
+  for (double& r : smaller) r *= done.factor;
+  EXPECT_EQ(find_overlaps<3>(box, done.x, smaller).pairs, 0u);  // that far it came without overlap
+}
+
+TEST(Compression, GivesUpAfterTooManyCollisions) {
+  const std::vector<double> radius(60, 0.5);
+  const auto box = box_for<3>(radius, 0.6, {P, P, P});
+  const auto done = compress<3>(box, radius, {.growth_rate = 1e-9, .max_collisions = 50});
+  EXPECT_EQ(done.end, Compression<3>::End::too_many_collisions);
+  EXPECT_GT(done.collisions, 50);
+  EXPECT_LT(done.collisions, 1000);
+  EXPECT_LT(done.factor, 1);
+}
+
+TEST(Compression, ABoxThatIsTooNarrowHasNoRoom) {
+  const std::vector<double> radius{0.5, 1.0};
+  Box<2> box;
+  box.edges = {10, 1.99};
+  for (const Boundary boundary : {P, W}) {
+    box.boundary = {P, boundary};
+    EXPECT_EQ(compress<2>(box, radius, {}).end, Compression<2>::End::no_room);
+  }
+}
+
+}  // namespace
+}  // namespace carom
