@@ -47,7 +47,7 @@ class Compressor {
     std::iota(everybody.begin(), everybody.end(), Id{0});
     constexpr double dilute = D == 2 ? 0.2 : 0.1, least = 1e-3;
     const double filled = packing_fraction<D>(box_.volume(), radius_);
-    result_.factor = std::min(0.8, std::pow(dilute / filled, 1.0 / D));
+    result_.factor = std::min(0.8, D == 2 ? std::sqrt(dilute / filled) : std::cbrt(dilute / filled));
     for (const double first = result_.factor; !insert(everybody); result_.factor *= 0.8)
       if (result_.factor < least * first) return false;
     draw_velocities<D>(particles_, everybody, std::vector<double>(radius_.size(), 1.0), options_.seed,

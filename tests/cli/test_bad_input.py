@@ -150,6 +150,16 @@ DECK_ERRORS = {
     "box and packing fraction": (
         changed('"fcc"', '"fcc"\npacking_fraction = 0.3', FLUID),
         16, ["exclude each other"]),
+    "compression in an open box": (
+        changed('"fcc"', '"compressed"', changed('["periodic", "periodic", "periodic"]', '["periodic", "open", "wall"]', FLUID)),
+        15, ["nothing is compressed in an open box", "wall or periodic"]),
+    "compression of explicit positions": (
+        changed('"fcc"', '"compressed"', changed(
+            "[placement]", '[[particles]]\nname = "b"\nposition = [[1, 1, 1]]\nradius = 0.5\n[placement]', FLUID)),
+        19, ["compression moves everybody", "by count"]),
+    "growth that stands still": (
+        changed('"fcc"', '"compressed"\ngrowth_rate = 0', FLUID), 16, ["'growth_rate' must be positive (is 0)"]),
+    "growth of a lattice": (changed('"fcc"', '"fcc"\ngrowth_rate = 1', FLUID), 16, ["unknown key 'growth_rate'"]),
     "flat lattice in 3-D": (changed('"fcc"', '"square"', FLUID), 15, ["'square' is a lattice of 2 dimensions"]),
     "gravity in a periodic box": (
         changed("[integrator]\ntype = \"free-flight\"", '[[interaction]]\ntype = "gravity"\n[integrator]\ntype = "cva"\nstep = 0.1', FLUID),

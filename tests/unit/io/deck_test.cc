@@ -213,6 +213,25 @@ TEST_F(DeckTest, ExplicitSpheresStandAmongRandomOnes) {
   EXPECT_EQ(system->particles.size(), 15u);
 }
 
+TEST_F(DeckTest, CompressedMixturesAreWhatTheDeckSaysAndComeOutOfTheResolvedDeckAgain) {
+  const std::vector<std::string> set{"placement.type=compressed", "placement.packing_fraction=0.5",
+                                     "placement.growth_rate=0.5", "particles.1.mass=7"};
+  Deck deck = read(fluid, set);
+  const auto system = build_system<3>(deck);
+  const auto& p = system->particles;
+  EXPECT_EQ(p.radius.front(), 0.4);  // exactly
+  EXPECT_NE(p.radius.back(), p.radius.front());
+  EXPECT_NEAR(packing_fraction<3>(system->box.volume(), p.radius), 0.5, 1e-14);
+  EXPECT_EQ(find_overlaps<3>(system->box, p.x, p.radius).pairs, 0u);
+  Deck again = read_deck(write("again.toml", deck.toml_text), {});
+  expect_equal(*system, *build_system<3>(again));
+
+  auto lighter = set;
+  lighter.back() = "particles.1.mass=1";
+  Deck other = read(fluid, lighter);
+  EXPECT_EQ(build_system<3>(other)->particles.x, p.x);  // masses and velocities of the run don't matter
+}
+
 TEST_F(DeckTest, ShortestPeriodOfOneBondIsThatOfItsOscillator) {
   Deck deck = read(springs, {"interaction.0.pairs=[[1, 2]]"});
   const auto system = build_system<2>(deck);
