@@ -38,18 +38,24 @@ std::optional<double> process_memory(const std::string& name) {
 class PeakMemory {
  public:
   PeakMemory() {
-    malloc_trim(0);  // what earlier points have freed
+    forget();
+    before_ = process_memory("VmRSS");
+  }
+  /// Counts the peak from now on.
+  void forget() {
+    malloc_trim(0);  // what has been freed
     std::ofstream clear("/proc/self/clear_refs");
     clear << "5" << std::flush;
-    if (clear) before_ = process_memory("VmRSS");
+    known_ = clear.good();
   }
   std::optional<double> growth() const {
     const auto peak = process_memory("VmHWM");
-    if (!peak || !before_) return {};
+    if (!known_ || !peak || !before_) return {};
     return *peak - *before_;
   }
 
  private:
+  bool known_ = false;
   std::optional<double> before_;
 };
 
@@ -83,14 +89,14 @@ class Flow {
     integrator_->start(*system_, counters_);
   }
 
-  /// Runs whole epochs until there have been this many more pair collisions.
-  Stretch run(std::uint64_t collisions) {
-    constexpr int kPatience = 1000;  // epochs, each of ten mean free times
+  /// Runs this many epochs, and more until there have been this many pair collisions.
+  Stretch run(std::uint64_t epochs, std::uint64_t collisions) {
+    constexpr std::uint64_t kPatience = 1000;  // epochs, each of ten mean free times
     const std::uint64_t before = counters_.sphere_sphere;
     const auto start = std::chrono::steady_clock::now();
     Stretch done;
-    for (int epochs = 0; done.collisions < collisions; ++epochs) {
-      if (epochs == kPatience && done.collisions == 0)
+    for (std::uint64_t k = 0; k < epochs || done.collisions < collisions; ++k) {
+      if (k == kPatience && done.collisions == 0)
         throw Error(Failure::numerical, "nothing collides; take more spheres or a higher packing fraction");
       SlabReport<D> report{.counters = counters_};
       integrator_->slab(*system_, {.index = slabs_, .start = static_cast<double>(slabs_) * epoch_, .length = epoch_},
@@ -103,6 +109,8 @@ class Flow {
     return done;
   }
 
+  /// Gives the system away; nothing else may be asked any more.
+  std::unique_ptr<System<D>> release() { return std::move(system_); }
   const System<D>& system() const { return *system_; }
   const Counters& counters() const { return counters_; }
   double epoch() const { return epoch_; }
@@ -134,23 +142,28 @@ double compressibility(const System<D>& system, double virial, double time) {
   return 1 + virial / (time * twice_kinetic);
 }
 
-/// Equilibrates and measures one state.
+/// Equilibrates and measures one state. The core that is measured has not seen the lattice melt, which is hard work.
 template <int D>
-Json measure(std::unique_ptr<System<D>> state, double equilibrate, const BenchOptions& options,
-             const PeakMemory& memory) {
+Json measure(std::unique_ptr<System<D>> state, const BenchOptions& options, PeakMemory& memory) {
   const std::size_t n = state->particles.size();
   const double filled = packing_fraction<D>(state->box.volume(), state->particles.radius);
-  Flow<D> flow(std::move(state));
-  // A collision is one of each of its partners.
-  const Stretch melting = flow.run(static_cast<std::uint64_t>(std::ceil(equilibrate * static_cast<double>(n) / 2)));
-  if (options.save_state) write_state(*options.save_state, flow.system());
+  Stretch melting;
+  if (options.epochs_before() > 0) {
+    Flow<D> flow(std::move(state));
+    melting = flow.run(options.epochs_before(), 0);
+    state = flow.release();
+  }
+  if (options.save_state) write_state(*options.save_state, *state);
 
+  memory.forget();
+  Flow<D> flow(std::move(state));
+  flow.run(BenchOptions::kWarmUp, 0);
   const Counters before = flow.counters();
   std::vector<double> rates;
   Json repeats = Json::array();
   Stretch all;
   for (std::uint64_t r = 0; r < options.repeat; ++r) {
-    const Stretch stretch = flow.run(options.collisions);
+    const Stretch stretch = flow.run(1, options.collisions);
     rates.push_back(stretch.rate());
     repeats.push_back({{"collisions", stretch.collisions}, {"seconds", stretch.seconds}});
     all.collisions += stretch.collisions;
@@ -169,6 +182,7 @@ Json measure(std::unique_ptr<System<D>> state, double equilibrate, const BenchOp
       {"dimension", D},
       {"packing_fraction", filled},
       {"epoch", flow.epoch()},
+      {"equilibration_epochs", options.epochs_before()},
       {"equilibration_collisions", melting.collisions},
       {"collisions", all.collisions},
       {"collisions_per_second",
@@ -192,16 +206,14 @@ Json measure(std::unique_ptr<System<D>> state, double equilibrate, const BenchOp
 
 template <int D>
 Json lattice_point(std::uint64_t n, double filled, const BenchOptions& options) {
-  const PeakMemory memory;
-  return measure(lattice_state<D>(n, filled, kSeed), options.equilibrate.value_or(BenchOptions::kEquilibrateLattice),
-                 options, memory);
+  PeakMemory memory;
+  return measure(lattice_state<D>(n, filled, kSeed), options, memory);
 }
 
 template <int D>
 Json file_point(const BenchOptions& options) {
-  const PeakMemory memory;
-  return measure(read_state<D>(*options.state), options.equilibrate.value_or(BenchOptions::kEquilibrateState), options,
-                 memory);
+  PeakMemory memory;
+  return measure(read_state<D>(*options.state), options, memory);
 }
 
 void say(const std::string& text) {
@@ -210,16 +222,14 @@ void say(const std::string& text) {
 }
 
 std::string heading(const BenchOptions& options) {
-  const double equilibrate =
-      options.equilibrate.value_or(options.state ? BenchOptions::kEquilibrateState : BenchOptions::kEquilibrateLattice);
   return "carom " + version_string() + "\n" + compiler_string() + "\n" +
          fmt::format(
-             "Hard spheres in a periodic box, free-flight, one core. Equilibrated with {:g} collisions a particle, "
-             "then "
-             "measured\n{} times over at least {} collisions (whole epochs). B/part.: peak resident memory above that "
-             "before the state was made.\nZ = pV/NkT. Events, predictions, schedulings: a collision; cand.: pairs "
-             "evaluated a prediction; dropped: share of scheduled.\n\n",
-             equilibrate, options.repeat, options.collisions) +
+             "Hard spheres in a periodic box, free-flight, one core. Equilibrated for {} epochs of about ten mean free "
+             "times,\n"
+             "then measured {} times over at least {} collisions (whole epochs). B/part.: peak resident memory above\n"
+             "that before the state was made. Z = pV/NkT. Events, predictions and entries scheduled: a collision;\n"
+             "cand.: pairs evaluated a prediction; dropped: entries of these that no longer held, a scheduled one.\n\n",
+             options.epochs_before(), options.repeat, options.collisions) +
          fmt::format("{:>8} {:>6} {:>12} {:>21} {:>7} {:>7} {:>9} {:>8} {:>7} {:>7} {:>6} {:>7} {:>7}\n", "N", "phi",
                      "collisions/s", "min .. max", "B/part.", "Z", "crossings", "rebuilds", "stale", "predict", "cand.",
                      "sched.", "dropped");

@@ -33,13 +33,28 @@ std::unique_ptr<System<D>> blank_system(std::size_t n, const Vec<D>& edges) {
   return system;
 }
 
-template <int D>
-void refuse_overlaps(const std::string& what, const System<D>& system) {
-  const auto found = find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
+void refuse(const Overlaps& found, const std::string& what) {
   if (found.pairs == 0) return;
   throw Error(Failure::initial_state, what + ": " + std::to_string(found.pairs) +
                                           " pairs of spheres overlap, particles " + std::to_string(found.lo) + " and " +
                                           std::to_string(found.hi) + " most; lower the packing fraction");
+}
+
+template <int D>
+Overlaps overlaps(const System<D>& system) {
+  return find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
+}
+
+/// Puts everybody on sites drawn at random from those of a lattice.
+template <int D>
+void place(Lattice lattice, double volume, std::uint64_t seed, System<D>& system) {
+  Particles<D>& p = system.particles;
+  system.box.edges = commensurate_edges<D>(lattice, p.size(), volume);
+  const auto sites = lattice_sites<D>(lattice, system.box, p.size(), 0.0);
+  const auto owner = distribute(sites.size(), std::vector<std::size_t>{p.size()}, seed);
+  std::size_t i = 0;
+  for (std::size_t site = 0; site < sites.size(); ++site)
+    if (owner[site] == 0) p.x[i++] = sites[site];
 }
 
 /// Reads the file line by line and complains with its name and the line.
@@ -105,21 +120,14 @@ template <int D>
 std::unique_ptr<System<D>> lattice_state(std::uint64_t n, double packing_fraction, std::uint64_t seed) {
   const double sphere = D == 2 ? std::numbers::pi / 4 : std::numbers::pi / 6;
   const double volume = static_cast<double>(n) * sphere / packing_fraction;
-  auto system = blank_system<D>(n, commensurate_edges<D>(Lattice::centred, n, volume));
-  Particles<D>& p = system->particles;
-  {
-    const auto sites = lattice_sites<D>(Lattice::centred, system->box, n, 0.0);
-    const auto owner = distribute(sites.size(), std::vector<std::size_t>{n}, seed);
-    std::size_t i = 0;
-    for (std::size_t site = 0; site < sites.size(); ++site)
-      if (owner[site] == 0) p.x[i++] = sites[site];
-  }
-  refuse_overlaps(
-      "a lattice of " + std::to_string(n) + " spheres at packing fraction " + std::to_string(packing_fraction),
-      *system);
+  auto system = blank_system<D>(n, Vec<D>::Ones());
+  place(Lattice::simple, volume, seed, *system);
+  if (overlaps(*system).pairs > 0) place(Lattice::centred, volume, seed, *system);
+  refuse(overlaps(*system),
+         "a lattice of " + std::to_string(n) + " spheres at packing fraction " + std::to_string(packing_fraction));
   std::vector<Id> everybody(n);
   std::iota(everybody.begin(), everybody.end(), Id{0});
-  draw_velocities<D>(p, everybody, std::vector<double>(n, 1.0), seed);
+  draw_velocities<D>(system->particles, everybody, std::vector<double>(n, 1.0), seed);
   return system;
 }
 
@@ -153,7 +161,7 @@ std::unique_ptr<System<D>> read_state(const std::filesystem::path& file) {
   p.species.assign(n, 0);
   p.image.assign(n, Image<D>{});
   system->wrap();
-  refuse_overlaps(file.string(), *system);
+  refuse(overlaps(*system), file.string());
   return system;
 }
 

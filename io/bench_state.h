@@ -13,8 +13,10 @@
 
 namespace carom {
 
-/// `n` spheres of diameter 1 and mass 1 at temperature 1 on the fcc (2-D: hexagonal) lattice of the periodic cube (2-D:
-/// a box near the square) that has this packing fraction. Throws Error(Failure::initial_state) where they overlap.
+/// `n` spheres of diameter 1 and mass 1 at temperature 1 on a lattice in the periodic box of this packing fraction: the
+/// simple cubic (2-D: square) lattice where it holds them, since that is unstable and melts at once, else the
+/// face-centred (hexagonal) one, which takes hundreds of collisions a particle to melt near freezing. The box is a cube
+/// (square), but for hexagonal lattices only near one. Throws Error(Failure::initial_state) where spheres overlap.
 template <int D>
 std::unique_ptr<System<D>> lattice_state(std::uint64_t n, double packing_fraction, std::uint64_t seed);
 

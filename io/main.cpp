@@ -37,9 +37,11 @@ void add_bench(CLI::App& app, carom::BenchOptions& options) {
   filled->capture_default_str()->type_name("PHI")->check(CLI::Range(1e-6, 0.91));
   auto* dimension = bench.add_option("--dimension", options.dimension, "2 or 3")->capture_default_str();
   dimension->check(CLI::IsMember({2, 3}));
-  bench.add_option("--equilibrate", options.equilibrate, "Collisions a particle before measuring; 100, of a state 10")
+  bench
+      .add_option("--equilibrate", options.equilibrate,
+                  "Epochs of ten mean free times before measuring; 10, of a state 0")
       ->type_name("NUMBER")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
   bench
       .add_option("--collisions", options.collisions,
                   "Collisions of a measurement, at least; whole epochs are measured")
