@@ -1,0 +1,65 @@
+// Search cells: where a sphere is, who is near it, and the table of who is where.
+
+#include <benchmark/benchmark.h>
+
+#include "engine/cell_grid.h"
+#include "tests/support/experiments.h"
+
+namespace carom {
+namespace {
+
+constexpr double kPackingFraction = 0.3, kDiameter = 1;
+
+/// A lattice of 4·cells³ spheres (2-D: 2·cells² discs).
+template <int D>
+std::unique_ptr<System<D>> lattice(const benchmark::State& state) {
+  return test::hard_spheres<D>(static_cast<int>(state.range(0)), kPackingFraction);
+}
+
+template <int D>
+void cell_of(benchmark::State& state) {
+  const auto system = lattice<D>(state);
+  const auto& x = system->particles.x;
+  const CellGrid<D> grid(system->box, kDiameter, x);
+  for (auto _ : state)
+    for (const auto& place : x) benchmark::DoNotOptimize(grid.index(grid.cell(place)));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(x.size()));
+}
+BENCHMARK(cell_of<2>)->Arg(64);
+BENCHMARK(cell_of<3>)->Arg(13);
+
+/// The 3^D cells around each sphere, empty visits.
+template <int D>
+void cells_around(benchmark::State& state) {
+  const auto system = lattice<D>(state);
+  const auto& x = system->particles.x;
+  const CellGrid<D> grid(system->box, kDiameter, x);
+  Cell<D> range;
+  range.fill(1);
+  for (auto _ : state)
+    for (const auto& place : x)
+      grid.for_each_around(grid.cell(place), range, [](std::size_t cell, const Image<D>& away) {
+        benchmark::DoNotOptimize(cell);
+        benchmark::DoNotOptimize(away);
+      });
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(x.size()));
+}
+BENCHMARK(cells_around<2>)->Arg(64);
+BENCHMARK(cells_around<3>)->Arg(13);
+
+template <int D>
+void cell_table(benchmark::State& state) {
+  const auto system = lattice<D>(state);
+  const auto& x = system->particles.x;
+  const CellGrid<D> grid(system->box, kDiameter, x);
+  for (auto _ : state) {
+    const CellTable<D> table(grid, x);
+    benchmark::DoNotOptimize(&table);
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(x.size()));
+}
+BENCHMARK(cell_table<2>)->Arg(64);
+BENCHMARK(cell_table<3>)->Arg(13)->Arg(29)->Arg(63);
+
+}  // namespace
+}  // namespace carom
