@@ -147,7 +147,7 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
                              std::span<const Id> who, std::uint64_t seed, std::uint64_t tries) {
   std::vector<bool> waiting(x.size(), false);
   for (const Id i : who) waiting[i] = true;
-  PlacementGrid<D> grid(box, 2 * *std::max_element(radius.begin(), radius.end()), x.size());
+  PlacementGrid<D> grid(box, radius);
   for (Id i = 0; i < x.size(); ++i)
     if (!waiting[i]) grid.insert(i, x[i]);
 
@@ -163,7 +163,7 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
         x[i][k] = margin + random.uniform() * (box.edges[k] - 2 * margin);
       }
       free = true;
-      grid.near(x[i], [&](Id j, const Vec<D>& shift) {
+      grid.near(x[i], radius[i], [&](Id j, const Vec<D>& shift) {
         const double contact = radius[i] + radius[j];
         if ((x[i] - x[j] - shift).squaredNorm() < contact * contact) free = false;
       });
@@ -179,13 +179,13 @@ template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius) {
   Overlaps found;
   if (x.empty()) return found;
-  PlacementGrid<D> grid(box, 2 * *std::max_element(radius.begin(), radius.end()), x.size());
+  PlacementGrid<D> grid(box, radius);
   double worst = 1;
   for (Id i = 0; i < x.size(); ++i) {
     Vec<D> inside = x[i];
     Image<D> image{};
     box.wrap(inside, image);
-    grid.near(inside, [&](Id j, const Vec<D>& shift) {
+    grid.near(inside, radius[i], [&](Id j, const Vec<D>& shift) {
       Vec<D> other = x[j];
       Image<D> ignored{};
       box.wrap(other, ignored);

@@ -31,7 +31,7 @@ template <int D>
 void expect_sound(const Box<D>& box, const std::vector<double>& radius, const Compression<D>& done) {
   ASSERT_TRUE(done.reached()) << "factor " << done.factor << ", pressure " << done.reduced_pressure;
   ASSERT_EQ(done.x.size(), radius.size());
-  EXPECT_GE(done.factor, 1);
+  EXPECT_GT(done.factor, 1);  // by so little that it only keeps rounding from overlapping
   for (std::size_t i = 0; i < radius.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       Vec<D> d = done.x[i] - done.x[j];

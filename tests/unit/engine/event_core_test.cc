@@ -254,13 +254,15 @@ TEST(EventCore, GrowingSpheresNeverOverlap) {
       }
     }
   };
+  check(test::hard_spheres<2>(8, 0.4), 0.1, 3);  // many small cells, which growth makes larger
+  check(test::hard_spheres<3>(3, 0.2), 0.1, 3);
   check(random_spheres<2>(8, 4, {W, W}, 9), 0.05, 8);
   check(random_spheres<2>(8, 4, {P, W}, 10), 0.05, 8);
   check(random_spheres<3>(10, 2.6, {P, P, P}, 11), 0.02, 8);
   check(random_spheres<3>(10, 3.2, {W, P, W}, 12), 0.02, 8);
 }
 
-TEST(EventCore, GrowthPushesRestingSpheresOffTheWalls) {
+TEST(EventCore, GrowthPushesRestingSpheresApartAndOffTheWalls) {
   // Two discs at rest, each 1 from a wall and of radius 0.5 (1 + growth·t).
   auto system = test::make_system<2>({5, 9}, W, {{1, 4.5}, {4, 4.5}}, {{0, 0}, {0, 0}});
   Counters counters;
@@ -275,6 +277,17 @@ TEST(EventCore, GrowthPushesRestingSpheresOffTheWalls) {
   EXPECT_EQ(counters.sphere_wall, 2u);
   EXPECT_DOUBLE_EQ(p.v[0][0], 1.0);  // twice the rate of the radius
   EXPECT_DOUBLE_EQ(p.v[1][0], -1.0);
+
+  // Two discs at rest at a distance of 2, far from the walls: they touch at t = 1 and part at twice the rate of σ = 1 +
+  // t.
+  auto pair = test::make_system<2>({10, 9}, W, {{4, 4.5}, {6, 4.5}}, {{0, 0}, {0, 0}});
+  EventCore<2> other(pair->box, pair->particles);
+  other.load(pair->particles, Vec<2>::Zero(), 1.2, 1.0);
+  other.run(1.2, {.counters = counters});
+  other.fly_to(1.2, p);
+  EXPECT_EQ(counters.sphere_sphere, 1u);
+  EXPECT_DOUBLE_EQ(p.v[0][0], -1.0);
+  EXPECT_DOUBLE_EQ(p.v[1][0], 1.0);
 }
 
 TEST(EventCore, NewtonsCradlePassesTheBlowThroughAChainInContact) {

@@ -93,6 +93,23 @@ TEST(RandomInsertion, PlacesUnequalSpheresWithoutOverlap) {
   }
 }
 
+TEST(RandomInsertion, PlacesSpheresOfTenToOneInThreeDimensions) {
+  std::vector<double> radius(600, 0.1);
+  for (std::size_t i = 0; i < radius.size(); i += 60) radius[i] = 1.0;
+  for (std::size_t i = 5; i < radius.size(); i += 20) radius[i] = 0.35;
+  const auto box = box_of<3>({5, 6, 7}, Boundary::periodic);
+  std::vector<Vec<3>> x(radius.size());
+  std::vector<Id> who(radius.size());
+  std::iota(who.begin(), who.end(), 0);
+  ASSERT_EQ(insert_at_random<3>(box, x, radius, who, 5), who.size());
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      Vec<3> d = x[i] - x[j];
+      d += box.shift(box.nearest_image(d));
+      ASSERT_GE(d.norm(), radius[i] + radius[j]) << i << " and " << j;
+    }
+}
+
 TEST(RandomInsertion, TellsHowFarItCame) {
   const auto box = box_of<2>(Vec<2>::Constant(5), Boundary::periodic);
   const std::vector<double> radius(30, 0.5);  // packing fraction 0.94
@@ -114,7 +131,7 @@ TEST(Overlaps, AgreeWithAllPairsInEveryKindOfBox) {
       for (int i = 0; i < 200; ++i) {  // some of them outside
         const Vec<3> fraction{random.uniform(), random.uniform(), random.uniform()};
         x.push_back((1.4 * fraction - Vec<3>::Constant(0.2)) * edge);
-        radius.push_back(0.2 + 0.1 * (i % 6));
+        radius.push_back(i % 9 == 0 ? 0.07 : 0.2 + 0.1 * (i % 6));  // up to ten to one
       }
       std::size_t pairs = 0;
       double worst = 1;
