@@ -11,7 +11,8 @@ namespace carom {
 namespace {
 
 constexpr double kFull = 1 + 1e-13;      // the factor aimed at: touching by rounding is not overlapping
-constexpr double kShare = 0.1;           // of the free volume that a slab takes
+constexpr double kShare = 0.1;           // of the free volume that a slab takes, …
+constexpr double kLongest = 10;          // … and its length at most, in diameters at the thermal speed
 constexpr double kJammedPressure = 300;  // from here on free-volume theory tells where the spheres jam …
 constexpr double kHopeless = 5;          // … and a target so many times farther away is out of reach
 
@@ -65,11 +66,11 @@ class Compressor {
   }
 
   End grow() {
-    while (result_.factor < kFull) {
+    for (double slabs = 1; result_.factor < kFull; ++slabs) {
       slab();
       const double left = kFull / result_.factor - 1;
       if (result_.reduced_pressure > kJammedPressure && left * result_.reduced_pressure > kHopeless) return End::jammed;
-      if (result_.collisions > options_.max_collisions && left > 0) return End::too_many_collisions;
+      if (left > 0 && std::max(result_.collisions, slabs) > options_.max_collisions) return End::too_many_collisions;
     }
     return End::reached;
   }
@@ -77,19 +78,20 @@ class Compressor {
   /// Grows for the time in which the factor takes its share of the free volume, or for fewer collisions.
   void slab() {
     const auto n = static_cast<double>(radius_.size());
-    const double growth = options_.growth_rate / (2 * result_.factor * largest_ * result_.reduced_pressure);
-    const double full = kFull / result_.factor - 1;  // relative growth left
-    const double wanted = std::min(kShare / result_.reduced_pressure, full);
-    const double length = wanted / growth;
+    const double diameter = 2 * result_.factor * largest_;
+    const double growth = options_.growth_rate / (diameter * result_.reduced_pressure);
+    const double to_the_end = (kFull / result_.factor - 1) / growth;
+    const double length = std::min(diameter * std::min(kShare / options_.growth_rate, kLongest), to_the_end);
     // What the last rate lets expect, ten times over: more come where the spheres jam on the way.
-    const double expected = n * (100 + 10 * collision_rate_ * length);
+    const double expected = 100 + 10 * collision_rate_ * length;
+    const double most = n * std::min(expected, 1 + options_.max_collisions - result_.collisions);
     Counters counters;
     core_.load(particles_, Vec<D>::Zero(), length, growth);
     const double reached =
-        core_.run(length, {.counters = counters, .collision_limit = static_cast<std::uint64_t>(expected)});
+        core_.run(length, {.counters = counters, .collision_limit = static_cast<std::uint64_t>(most)});
     core_.fly_to(reached, particles_);
     for (std::size_t i = 0; i < particles_.size(); ++i) box_.wrap(particles_.x[i], particles_.image[i]);
-    result_.factor = reached == length && wanted == full ? kFull : result_.factor * (1 + growth * reached);
+    result_.factor = reached == to_the_end ? kFull : result_.factor * (1 + growth * reached);
     scale_radii();
 
     const double collisions = static_cast<double>(counters.sphere_sphere) / n;

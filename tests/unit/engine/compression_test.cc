@@ -116,14 +116,28 @@ TEST(Compression, TellsWhereTheSpheresJammed) {
   EXPECT_EQ(find_overlaps<3>(box, done.x, smaller).pairs, 0u);  // that far it came without overlap
 }
 
+TEST(Compression, GrowthFasterThanTheSpheresEndsToo) {
+  const std::vector<double> radius(60, 0.5);
+  const auto box = box_for<3>(radius, 0.45, {P, P, P});
+  expect_sound<3>(box, radius, compress<3>(box, radius, {.growth_rate = 10}));
+  EXPECT_FALSE(compress<3>(box_for<3>(radius, 0.9, {P, W, P}), radius, {.growth_rate = 1e3}).reached());
+}
+
 TEST(Compression, GivesUpAfterTooManyCollisions) {
   const std::vector<double> radius(60, 0.5);
   const auto box = box_for<3>(radius, 0.6, {P, P, P});
-  const auto done = compress<3>(box, radius, {.growth_rate = 1e-9, .max_collisions = 50});
+  const auto done = compress<3>(box, radius, {.growth_rate = 1e-9, .max_collisions = 500});
   EXPECT_EQ(done.end, Compression<3>::End::too_many_collisions);
-  EXPECT_GT(done.collisions, 50);
-  EXPECT_LT(done.collisions, 1000);
+  EXPECT_GT(done.collisions, 500);
+  EXPECT_LT(done.collisions, 502);
   EXPECT_LT(done.factor, 1);
+}
+
+TEST(Compression, ASphereThatNeverCollidesEndsToo) {
+  const std::vector<double> radius{0.5};
+  const auto box = box_for<2>(radius, 0.5, {P, P});
+  EXPECT_EQ(compress<2>(box, radius, {.growth_rate = 1e-9, .max_collisions = 100}).end,
+            Compression<2>::End::too_many_collisions);
 }
 
 TEST(Compression, ABoxThatIsTooNarrowHasNoRoom) {
