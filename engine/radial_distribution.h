@@ -37,7 +37,7 @@ class RadialDistribution : public Observer<D> {
 
   /// Half the shortest periodic edge, or the shortest way between walls that centres can go, if that is less.
   static double longest_range(const System<D>& system);
-  /// Four of the largest diameters, or longest_range() where that is less.
+  /// Three of the largest diameters, or longest_range() where that is less.
   static double usual_range(const System<D>& system);
 
   Sampling sampling() const override { return options_.sampling; }

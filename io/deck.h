@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,7 +21,12 @@ namespace carom {
 
 struct OutputConfig {
   std::filesystem::path directory;
-  std::string checkpoint_wall;  ///< hh:mm:ss of wall time between checkpoints, or empty
+  std::string checkpoint_wall;      ///< hh:mm:ss of wall time between checkpoints, or empty
+  double sample_start = 0;          ///< simulated time of the first sample of g(r) and displacements
+  double rdf_interval = 0;          ///< simulated time between samples of g(r); 0: none
+  std::optional<double> rdf_range;  ///< the largest r; set by build_system() where the deck leaves it open
+  int rdf_bins = 200;
+  double msd_interval = 0;  ///< the shortest lag of the mean squared displacement; 0: none
 };
 
 /// The deck as a value; `toml_text` is the resolved deck, which gives the same run when it is run again.

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "engine/placement.h"
+#include "engine/radial_distribution.h"
 #include "io/deck_interactions.h"
 #include "io/validate_state.h"
 
@@ -43,6 +44,10 @@ void complete_values(Deck& deck, const System<D>& system) {
     deck.plan.step = default_epoch(system);
     deck.integrator_parameters.set("step", deck.plan.step);
     source.values.find("integrator")->values.insert_or_assign("step", deck.plan.step);
+  }
+  if (deck.output.rdf_interval > 0 && !deck.output.rdf_range) {
+    deck.output.rdf_range = RadialDistribution<D>::usual_range(system);
+    source.values.find("output")->values.insert_or_assign("rdf_range", *deck.output.rdf_range);
   }
   deck.toml_text = write_deck(source.values);
 }

@@ -9,6 +9,8 @@
 namespace carom {
 namespace {
 
+constexpr std::int64_t kMostBins = 1'000'000;  // of g(r), for each pair of species
+
 /// The parts of a deck in the order in which they build on each other.
 class Interpreter {
  public:
@@ -174,6 +176,16 @@ class Interpreter {
     }
     if (const auto* interval = table->find<double>("frame_interval")) deck_.plan.frame_interval = *interval;
     if (const auto* interval = table->find<double>("thermo_interval")) deck_.plan.thermo_interval = *interval;
+    if (const auto* start = table->find<double>("sample_start")) deck_.output.sample_start = *start;
+    if (const auto* interval = table->find<double>("rdf_interval")) deck_.output.rdf_interval = *interval;
+    if (const auto* range = table->find<double>("rdf_range")) deck_.output.rdf_range = *range;
+    if (const auto* bins = table->find<std::int64_t>("rdf_bins")) {
+      deck_.output.rdf_bins = static_cast<int>(std::min(*bins, kMostBins));
+      if (*bins > kMostBins)
+        problems_.error(table->place("rdf_bins"), "'rdf_bins' is " + std::to_string(*bins),
+                        "take at most " + std::to_string(kMostBins));
+    }
+    if (const auto* interval = table->find<double>("msd_interval")) deck_.output.msd_interval = *interval;
     if (const auto* events = table->find<bool>("events")) deck_.plan.events = *events;
     if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {
       deck_.output.checkpoint_wall = *wall;

@@ -83,6 +83,8 @@ std::string report_text(const Deck& deck, const Statistics& s) {
   if (s.max_momentum_error) text += fmt::format("\nmomentum, largest error {:.2e}", *s.max_momentum_error);
   text += fmt::format("\npressure {:.6g}, collision rate of a sphere {:.6g}, deepest overlap {:.1e}", s.mean_pressure,
                       s.collision_rate, c.max_overlap);
+  if (s.mean_free_time)
+    text += fmt::format("\nmean free time {:.6g}, mean free path {:.6g}", *s.mean_free_time, *s.mean_free_path);
   if (s.force_passes > 0)
     text += fmt::format("\n{:.6g} force passes, {} sweeps, {} steps halved, {} fallbacks", s.force_passes, c.sweeps,
                         c.slabs_halved, c.fallbacks);

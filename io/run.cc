@@ -62,7 +62,8 @@ int run_deck(Deck& deck, const RunOptions& options, int ranks, const Deadline& d
   const auto& directory = deck.output.directory;
   const auto backup = prepare_output_directory(directory);
   RunLog log(directory / run_file::log, options.quiet);
-  RunOutcome outcome{.status = "done", .error = "", .particles = system->particles.size(), .ranks = ranks};
+  RunOutcome outcome{
+      .status = "done", .error = "", .particles = system->particles.size(), .ranks = ranks, .contact_values = {}};
   log.say(banner_text(deck, outcome.particles, ranks));
   for (const std::string& warning : deck.warnings) log.warn(warning);
   if (ranks > 1) log.warn(fmt::format("warning: this version uses one rank; the other {} wait", ranks - 1));
@@ -85,6 +86,7 @@ int run_deck(Deck& deck, const RunOptions& options, int ranks, const Deadline& d
     simulation.run([&] { return deadline.passed(); });
     progress.end_line();
     files->close();
+    outcome.contact_values = files->contact_values();
     if (statistics.stopped_early) outcome.status = "stopped";
     log.say(report_text(deck, statistics));
     if (statistics.stopped_early)

@@ -3,8 +3,10 @@
 
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "engine/simulation.h"
+#include "io/averages.h"
 #include "io/deck.h"
 #include "io/events.h"
 #include "io/h5md.h"
@@ -27,10 +29,16 @@ class RunFiles {
   /// The same for a run that has failed: each file is closed as well as it can be.
   void close_after_failure();
 
+  /// g at contact as far as it was measured, for the summary.
+  std::vector<ContactValue> contact_values() const;
+
  private:
   TrajectoryWriter<D> trajectory_;
   ThermoWriter<D> thermo_;
-  std::unique_ptr<EventWriter<D>> events_;  // null: not asked for
+  // Null where they are not asked for.
+  std::unique_ptr<EventWriter<D>> events_;
+  std::unique_ptr<RdfWriter<D>> rdf_;
+  std::unique_ptr<MsdWriter<D>> msd_;
 };
 
 }  // namespace carom

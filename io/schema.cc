@@ -153,6 +153,22 @@ std::vector<TableSchema> make_schema() {
          "simulated time between frames of the trajectory; 0: first and last only", Range::non_negative},
         {"thermo_interval", real, "0.0", "time",
          "simulated time between rows of the table of observables; 0: first and last only", Range::non_negative},
+        {"rdf_interval", real, "0.0", "time",
+         "simulated time between samples of the radial distribution function, averaged into rdf.csv; 0: none. A sample "
+         "costs O(count); configurations a hundred mean free times apart are about independent",
+         Range::non_negative},
+        {"rdf_range", real, "none", "length",
+         "the largest distance of rdf.csv, at most half the shortest periodic edge; three of the largest diameters, if "
+         "there is room, where it is absent",
+         Range::positive},
+        {"rdf_bins", integer, "200", "-", "shells of equal thickness from 0 to rdf_range", Range::positive},
+        {"msd_interval", real, "0.0", "time",
+         "the shortest lag of the mean squared displacement, averaged into msd.csv; 0: none. Lags are 1 … 9, 10, 20 … "
+         "90, 100 … times this, up to the length of the run",
+         Range::non_negative},
+        {"sample_start", real, "0.0", "time",
+         "simulated time of the first sample for rdf.csv and msd.csv: what comes before is equilibration",
+         Range::non_negative},
         {"checkpoint_wall", text, "\"\"", "-", "wall time between checkpoints, hh:mm:ss; empty: none"},
         {"events", boolean, "false", "-", "write every collision to events.h5"}}},
   };

@@ -48,6 +48,8 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"max_overlap", c.max_overlap},
       {"pressure", s.mean_pressure},
       {"collision_rate", s.collision_rate},
+      {"mean_free_time", number_or_null(s.mean_free_time)},
+      {"mean_free_path", number_or_null(s.mean_free_path)},
       {"force_passes", s.force_passes},
       {"sweeps", c.sweeps},
       {"slabs_halved", c.slabs_halved},
@@ -56,6 +58,8 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"collisions_per_second", rate},
       {"peak_memory_bytes", peak_memory_bytes()},
   };
+  for (const ContactValue& value : outcome.contact_values)
+    json["contact_value"].push_back({{"species", {value.first, value.second}}, {"g", value.g}});
   if (!outcome.error.empty()) json["error"] = outcome.error;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -4,8 +4,10 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "engine/simulation.h"
+#include "io/averages.h"
 #include "io/deck.h"
 
 namespace carom {
@@ -16,6 +18,7 @@ struct RunOutcome {
   std::string error;   ///< why it failed; empty otherwise
   std::size_t particles = 0;
   int ranks = 1;
+  std::vector<ContactValue> contact_values{};  ///< of g(r), where it was taken
 };
 
 /// The summary as JSON text; names as in the manual. What a method does not have is null.

@@ -6,6 +6,7 @@
 
 #include "engine/contact.h"
 #include "engine/placement.h"
+#include "engine/radial_distribution.h"
 #include "engine/random.h"
 
 namespace carom {
@@ -62,6 +63,20 @@ void check_spheres(const Deck::Source& source, const System<D>& system, Problems
                    "move them apart, make the radii smaller or the box larger");
 }
 
+/// What output.rdf_interval asks for must have a meaning.
+template <int D>
+void check_rdf(const Deck& deck, const System<D>& system, Problems& problems) {
+  if (!(deck.output.rdf_interval > 0)) return;
+  const ValueTable& output = *deck.source->values.find("output");
+  if (!closed(system.box))
+    problems.error(output.place("rdf_interval"), "g(r) needs a density, and a box with an open boundary has none",
+                   "set rdf_interval = 0, or close the box");
+  else if (const double longest = RadialDistribution<D>::longest_range(system);
+           !(*deck.output.rdf_range <= longest * (1 + 1e-9)))
+    problems.error(output.place("rdf_range"), say("g(r) cannot be taken to ", *deck.output.rdf_range, " in this box"),
+                   say("take at most ", longest, ": half the shortest periodic edge, or the way between two walls"));
+}
+
 }  // namespace
 
 template <int D>
@@ -72,9 +87,11 @@ bool closed(const Box<D>& box) {
 template <int D>
 void check_state(const Deck& deck, const System<D>& system, Problems& problems) {
   const Deck::Source& source = *deck.source;
+  check_rdf(deck, system, problems);
   if (!source.integrator->hard_cores) return;
+  const std::size_t before = problems.errors();
   check_box(source, system, problems);
-  if (problems.errors() == 0) check_spheres(source, system, problems);
+  if (problems.errors() == before) check_spheres(source, system, problems);
 }
 
 template <int D>

@@ -60,7 +60,12 @@ def read_summary(directory):
 
 def read_thermo(directory):
     """thermo.csv as a dictionary of columns; an empty cell becomes NaN."""
-    with open(pathlib.Path(directory) / "thermo.csv", newline="") as file:
+    return read_table(pathlib.Path(directory) / "thermo.csv")
+
+
+def read_table(path):
+    """A CSV file of a run (thermo.csv, rdf.csv, msd.csv) as a dictionary of columns; an empty cell becomes NaN."""
+    with open(path, newline="") as file:
         rows = list(csv.reader(file))
     values = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows[1:]])
     values = values.reshape(len(rows) - 1, len(rows[0]))

@@ -3,11 +3,12 @@
 
     tools/plot_rdf.py runs/hard-sphere-fluid
     tools/plot_rdf.py runs/primitive-electrolyte --species cation,anion --bins 200 --first-frame 20 -o rdf.png
+    tools/plot_rdf.py runs/hard-sphere-fluid/rdf.csv          # what the run itself has averaged (output.rdf_interval)
 
 Periodic axes use the nearest image, so r ends at half the shortest periodic edge. Along walls the count expected of an
 ideal gas is the exact one of the region the centres can reach (the average over directions u of the product over the
 walled axes of 1 - r |u_k| / L_k), so that g = 1 without correlations up to the walls (for unequal radii: nearly). A CSV
-with r, g stands beside the picture. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
+with r, g stands beside the picture, rdf-frames.csv by default. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
 """
 
 import argparse
@@ -16,7 +17,7 @@ import pathlib
 import numpy as np
 from scipy.spatial import cKDTree
 
-from carom_files import Trajectory
+from carom_files import Trajectory, read_table
 from carom_plot import picture
 
 
@@ -77,6 +78,19 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
     return 0.5 * (radii[1:] + radii[:-1]), counts / expected
 
 
+def curves_of_table(file, species=None):
+    """What a run's rdf.csv holds: r, and g by name; all of it, or that of two species."""
+    columns = read_table(file)
+    r = columns.pop("r")
+    if species is None:
+        return r, columns
+    names = [f"g_{a}_{b}" for a, b in (species, species[::-1])]
+    found = [name for name in names if name in columns]
+    if not found:
+        raise SystemExit(f"There is no {names[0]} in {file}, only {', '.join(columns)}.")
+    return r, {found[0]: columns[found[0]]}
+
+
 def _into(x, edges, periodic):
     """Rounding may put a wrapped coordinate on the edge itself, which the tree refuses."""
     return np.where(periodic & (x >= edges), x - edges, x)
@@ -84,7 +98,7 @@ def _into(x, edges, periodic):
 
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("run", type=pathlib.Path, help="directory of a run, or its trajectory")
+    parser.add_argument("run", type=pathlib.Path, help="directory of a run, its trajectory, or its rdf.csv")
     parser.add_argument("--bins", type=int, default=150)
     parser.add_argument("--largest", type=float, help="largest r; default: half the shortest edge")
     parser.add_argument("--species", help="names of two species, as cation,anion; default: all particles")
@@ -94,6 +108,12 @@ def main(arguments=None):
     species = options.species.split(",") if options.species else None
     if species and len(species) != 2:
         parser.error("--species takes two names")
+    if options.run.suffix == ".csv":
+        r, curves = curves_of_table(options.run, species)
+        file = options.output or options.run.with_suffix(".png")
+        draw(file, r, curves)
+        print(f"Results: {file}")
+        return
     with Trajectory(options.run) as trajectory:
         if options.first_frame >= len(trajectory):
             parser.error(f"there are {len(trajectory)} frames")
@@ -101,12 +121,17 @@ def main(arguments=None):
         title = trajectory.title
     folder = options.run if options.run.is_dir() else options.run.parent
     file = options.output or folder / "rdf.png"
-    table = file.with_suffix(".csv")
+    table = file.with_name(file.stem + "-frames.csv")
     np.savetxt(table, np.stack([r, g], axis=1), delimiter=",", header="r,g", comments="")
-    with picture(file, xlabel="r", ylabel="g(r)", title=title) as axes:
-        axes.plot(r, g)
-        axes.axhline(1, color="grey", linewidth=0.8)
+    draw(file, r, {"g": g}, title)
     print(f"Results: {table}, {file}")
+
+
+def draw(file, r, curves, title=""):
+    with picture(file, xlabel="r", ylabel="g(r)", title=title) as axes:
+        for name, g in curves.items():
+            axes.plot(r, g, label=name if len(curves) > 1 else None)
+        axes.axhline(1, color="grey", linewidth=0.8)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ pytestmark = needs_carom
 
 PROMISED = """status deck integrator dimension particles ranks steps end_time events.sphere_sphere events.sphere_wall
 energy.initial energy.after_first_step energy.final energy.reference energy.max_abs_error shadow_energy.max_abs_error
-momentum.max_abs_error max_overlap pressure collision_rate force_passes sweeps slabs_halved fallbacks wall_seconds
+momentum.max_abs_error max_overlap pressure collision_rate mean_free_time mean_free_path force_passes sweeps slabs_halved fallbacks wall_seconds
 collisions_per_second peak_memory_bytes""".split()
 
 
@@ -56,6 +56,47 @@ def test_files(tmp_path):
         assert part in log, part
 
 
+def test_averages(tmp_path):
+    two = SPHERES.replace('type = "fcc"', 'type = "random"').replace("0.3\n", "0.2\n").replace("[placement]", """[[particles]]
+name = "small"
+count = 50
+temperature = 1.0
+radius = 0.3
+[placement]""")
+    out = tmp_path / "out"
+    run(write_deck(tmp_path, two), out,
+        ["output.rdf_interval=0.1", "output.rdf_bins=60", "output.msd_interval=0.05", "output.sample_start=0.5"])
+    rdf, msd = (np.genfromtxt(out / name, delimiter=",", names=True) for name in ("rdf.csv", "msd.csv"))
+    assert rdf.dtype.names == ("r", "g", "g_sphere_sphere", "g_sphere_small", "g_small_small")
+    assert msd.dtype.names == ("time", "origins", "msd", "msd_sphere", "msd_small")
+    # rdf_range is the default: half the edge, which is less than three diameters; the resolved deck names it.
+    edge = float(re.search(r"box = \[([0-9.]+),", (out / "deck.toml").read_text())[1])
+    largest = float(re.search(r"rdf_range = ([0-9.]+)", (out / "deck.toml").read_text())[1])
+    assert largest == min(edge / 2, 3.0) and len(rdf) == 60
+    assert rdf["r"] == pytest.approx((np.arange(60) + 0.5) * largest / 60)
+    for name, contact in (("g_sphere_sphere", 1.0), ("g_sphere_small", 0.8), ("g_small_small", 0.6)):
+        assert not rdf[name][rdf["r"] + largest / 120 <= contact].any()
+        assert rdf[name][rdf["r"] > 1.5 * contact].mean() == pytest.approx(1, abs=0.1)
+    assert msd["time"][:9] == pytest.approx(0.05 * np.arange(1, 10))
+    assert msd["origins"][0] == 5 and msd["origins"][9] == 1  # of 51 samples
+    assert msd["msd"] == pytest.approx((108 * msd["msd_sphere"] + 50 * msd["msd_small"]) / 158)
+    s = summary(out)
+    assert s["mean_free_time"] == pytest.approx(158 * s["end_time"] / (2 * s["events"]["sphere_sphere"]))
+    assert f"mean free path {s['mean_free_path']:.6g}" in (out / "run.log").read_text()
+    assert [value["species"] for value in s["contact_value"]] == [["sphere", "sphere"], ["sphere", "small"],
+                                                                  ["small", "small"]]
+    # The resolved deck gives the same averages; without samples in between the run is the same.
+    run(out / "deck.toml", tmp_path / "again")
+    assert (tmp_path / "again" / "rdf.csv").read_bytes() == (out / "rdf.csv").read_bytes()
+    assert (tmp_path / "again" / "msd.csv").read_bytes() == (out / "msd.csv").read_bytes()
+    run(out / "deck.toml", tmp_path / "plain", ["output.rdf_interval=0", "output.msd_interval=0"])
+    assert not (tmp_path / "plain" / "rdf.csv").exists() and not (tmp_path / "plain" / "msd.csv").exists()
+    assert same(last_records(out), last_records(tmp_path / "plain"))
+    # A second run in the directory takes nothing away.
+    run(write_deck(tmp_path, two), out)
+    assert (out / "backup.1" / "rdf.csv").exists() and not (out / "rdf.csv").exists()
+
+
 @pytest.mark.parametrize("text", [SPRINGS, SPHERES], ids=["springs", "spheres"])
 def test_resolved_deck_gives_the_same_run(text, tmp_path):
     run(write_deck(tmp_path, text), tmp_path / "a")
@@ -76,7 +117,8 @@ def test_observing_changes_nothing(method, tmp_path):
     ways = [["output.frame_interval=0.0", "output.thermo_interval=0.0"],
             ["output.frame_interval=0.037", "output.thermo_interval=0.0"],
             ["output.frame_interval=0.0", "output.thermo_interval=0.0113", "output.events=true"],
-            ["output.frame_interval=0.02", "output.thermo_interval=0.9", "output.events=true"]]
+            ["output.frame_interval=0.02", "output.thermo_interval=0.9", "output.events=true"],
+            ["output.rdf_interval=0.017", "output.msd_interval=0.11", "output.sample_start=0.3"]]
     records, counts = [], []
     for n, way in enumerate(ways):
         run(deck, tmp_path / str(n), always + way)

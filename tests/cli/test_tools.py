@@ -163,6 +163,29 @@ def test_msd_of_straight_flight(tmp_path):
     assert plot_msd.diffusion_coefficient(lag, 6 * lag, 3) == pytest.approx(1.0)
 
 
+def test_tables_of_a_run_are_drawn(tmp_path, capsys):
+    (tmp_path / "rdf.csv").write_text("r,g,g_a_a,g_a_b,g_b_b\n" + "".join(f"{r},1,2,{r},nan\n" for r in (0.5, 1.5, 2.5)))
+    r, curves = plot_rdf.curves_of_table(tmp_path / "rdf.csv", ["b", "a"])
+    assert list(curves) == ["g_a_b"] and (curves["g_a_b"] == r).all()
+    assert list(plot_rdf.curves_of_table(tmp_path / "rdf.csv")[1]) == ["g", "g_a_a", "g_a_b", "g_b_b"]
+    with pytest.raises(SystemExit):
+        plot_rdf.curves_of_table(tmp_path / "rdf.csv", ["a", "c"])
+    (tmp_path / "msd.csv").write_text("time,origins,msd,msd_a\n" + "".join(f"{t},9,{4 * t},{8 * t}\n" for t in range(1, 9)))
+    before = (tmp_path / "rdf.csv").read_text()
+    plot_rdf.main([str(tmp_path / "rdf.csv")])
+    plot_msd.main([str(tmp_path / "msd.csv"), "--dimension", "2"])
+    assert "msd: D = 1\nmsd_a: D = 2\n" in capsys.readouterr().out
+    for name in ("rdf.png", "msd.png"):
+        assert (tmp_path / name).stat().st_size > 1000
+    # What is made of frames does not take the place of the run's own tables.
+    run = make_run(tmp_path / "run", dimension=3)
+    for name, tool in (("rdf", plot_rdf), ("msd", plot_msd)):
+        (run / f"{name}.csv").write_text(before)
+        tool.main([str(run)])
+        assert (run / f"{name}.csv").read_text() == before
+        assert (run / f"{name}-frames.csv").stat().st_size > 100
+
+
 def test_compare(tmp_path):
     a, b = make_run(tmp_path / "a"), make_run(tmp_path / "b")
     assert compare.compare(a, b) == []

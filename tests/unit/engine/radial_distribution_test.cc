@@ -131,7 +131,7 @@ TEST(RadialDistribution, DoesNotDependOnTheOrderOfParticles) {
 TEST(RadialDistribution, RefusesWhatHasNoMeaning) {
   auto system = random_points<2>(10, {3, 4}, {kPeriodic, kPeriodic}, 0.05, 5);
   EXPECT_DOUBLE_EQ(RadialDistribution<2>::longest_range(*system), 1.5);
-  EXPECT_DOUBLE_EQ(RadialDistribution<2>::usual_range(*system), 0.4);
+  EXPECT_DOUBLE_EQ(RadialDistribution<2>::usual_range(*system), 0.3);
   EXPECT_THROW(RadialDistribution<2>(*system, {.sampling = {}, .range = 1.6}), Error);
   EXPECT_THROW(RadialDistribution<2>(*system, {.sampling = {}, .range = 0}), Error);
   EXPECT_NO_THROW(RadialDistribution<2>(*system, {.sampling = {}, .range = 1.5}));

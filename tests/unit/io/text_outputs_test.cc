@@ -102,6 +102,8 @@ TEST(Summary, HasEveryPromisedName) {
                            "/max_overlap",
                            "/pressure",
                            "/collision_rate",
+                           "/mean_free_time",
+                           "/mean_free_path",
                            "/force_passes",
                            "/sweeps",
                            "/slabs_halved",
