@@ -114,6 +114,8 @@ std::unique_ptr<System<D>> build_system(Deck& deck) {
   make_interactions(source, {}, *system, problems);
   problems.throw_errors(Failure::deck);
   complete_values(deck, *system);
+  check_output(deck, *system, problems);
+  problems.throw_errors(Failure::deck);
   check_state(deck, *system, problems);
   problems.throw_errors(Failure::initial_state);
   warn_of_state(deck, *system, problems);

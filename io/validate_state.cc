@@ -63,9 +63,15 @@ void check_spheres(const Deck::Source& source, const System<D>& system, Problems
                    "move them apart, make the radii smaller or the box larger");
 }
 
-/// What output.rdf_interval asks for must have a meaning.
+}  // namespace
+
 template <int D>
-void check_rdf(const Deck& deck, const System<D>& system, Problems& problems) {
+bool closed(const Box<D>& box) {
+  return std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) == box.boundary.end();
+}
+
+template <int D>
+void check_output(const Deck& deck, const System<D>& system, Problems& problems) {
   if (!(deck.output.rdf_interval > 0)) return;
   const ValueTable& output = *deck.source->values.find("output");
   if (!closed(system.box))
@@ -77,21 +83,12 @@ void check_rdf(const Deck& deck, const System<D>& system, Problems& problems) {
                    say("take at most ", longest, ": half the shortest periodic edge, or the way between two walls"));
 }
 
-}  // namespace
-
-template <int D>
-bool closed(const Box<D>& box) {
-  return std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) == box.boundary.end();
-}
-
 template <int D>
 void check_state(const Deck& deck, const System<D>& system, Problems& problems) {
   const Deck::Source& source = *deck.source;
-  check_rdf(deck, system, problems);
   if (!source.integrator->hard_cores) return;
-  const std::size_t before = problems.errors();
   check_box(source, system, problems);
-  if (problems.errors() == before) check_spheres(source, system, problems);
+  if (problems.errors() == 0) check_spheres(source, system, problems);
 }
 
 template <int D>
@@ -159,11 +156,13 @@ void warn_of_state(const Deck& deck, const System<D>& system, Problems& problems
 }
 
 template bool closed(const Box<2>&);
+template void check_output(const Deck&, const System<2>&, Problems&);
 template void check_state(const Deck&, const System<2>&, Problems&);
 template double shortest_period(const System<2>&);
 template void warn_of_state(const Deck&, const System<2>&, Problems&);
 
 template bool closed(const Box<3>&);
+template void check_output(const Deck&, const System<3>&, Problems&);
 template void check_state(const Deck&, const System<3>&, Problems&);
 template double shortest_period(const System<3>&);
 template void warn_of_state(const Deck&, const System<3>&, Problems&);

@@ -221,6 +221,15 @@ def test_impossible_state(tmp_path, name):
     assert answer.returncode == 3
 
 
+def test_g_of_r_without_a_density_or_room(tmp_path):
+    sampled = GOOD + "\n[output]\nrdf_interval = 1.0\n" if "[output]" not in GOOD else changed("[output]", "[output]\nrdf_interval = 1.0")
+    assert validate(tmp_path, sampled).returncode == 0
+    open_box = validate(tmp_path, changed('["wall", "wall"]', '["wall", "open"]', sampled))
+    assert open_box.returncode == 2 and "error: g(r) needs a density" in open_box.stderr
+    too_far = validate(tmp_path, sampled.replace("rdf_interval = 1.0", "rdf_interval = 1.0\nrdf_range = 9.1"))
+    assert too_far.returncode == 2 and "error: g(r) cannot be taken to 9.1 in this box; take at most 9" in too_far.stderr
+
+
 def test_every_problem_is_told_in_the_order_of_the_deck(tmp_path):
     deck = GOOD.replace("radius = 0.5", "radius = -1").replace("step = 0.01", "step = 0").replace("[[0, 1]]", "[[0, 7]]")
     messages = validate(tmp_path, deck).stderr.splitlines()
