@@ -1,62 +1,81 @@
 #pragma once
-// The event queue: a calendar of time bins with a small heap for the present.
+// The event queue: a ring of time bins with a small heap for the present.
 //
-// Entries of later bins are only appended; a bin is sorted once, when its time has come, and then served in order
-// beside a heap that holds what is scheduled into the present. Nothing is ever removed: an entry whose particle has
-// been scheduled anew since is recognised by its stamp and dropped by the caller when it is met. (Brown, Commun. ACM 31
-// (1988) 1220; Paul, J. Comput. Phys. 221 (2007) 615.)
+// Entries of later bins are only appended, to a few cache lines that stay hot; what lies beyond the ring waits in a
+// list of its own. When its time has come a bin is sorted once and then served in order, beside a heap that holds what
+// is scheduled into the present. Nothing is ever removed: the caller tells which entries no longer hold, when a bin is
+// opened and again when an entry is served. Bins adapt to the rate of events. (Brown, Commun. ACM 31 (1988) 1220; Paul,
+// J. Comput. Phys. 221 (2007) 615.)
 
 #include <algorithm>
 #include <boost/heap/d_ary_heap.hpp>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
+
+#include "engine/pages.h"
 
 namespace carom {
 
 struct CalendarEntry {
   double time;
-  std::uint32_t slot;   ///< whose event it is
-  std::uint32_t stamp;  ///< valid while it is the slot's newest
+  std::uint32_t slot;  ///< whose event it is
+  std::uint32_t spare = 0;
 };
 
 /// Serves entries by time; the order of equal times is the caller's business.
 class Calendar {
  public:
-  /// Empties the calendar and sets it up for times in [0, horizon), of which about `expected` will be scheduled.
-  void reset(double horizon, std::size_t expected) {
+  /// Empties the calendar and sets it up for times in [0, horizon), for about `alive` entries at a time.
+  /// `entries_per_bin` forces the size of bins (0: about right).
+  void reset(double horizon, std::size_t alive, double entries_per_bin = 0) {
     horizon_ = horizon;
-    bins_.resize(std::clamp<std::size_t>(expected / kEntriesPerBin, 1, kMostBins));
-    for (auto& bin : bins_) bin.clear();
-    per_time_ = static_cast<double>(bins_.size()) / horizon;
-    sorted_.clear();
+    forced_ = entries_per_bin > 0;
+    wanted_ = forced_ ? entries_per_bin : std::clamp(static_cast<double>(alive) / 256, 8.0, 2048.0);
+    ring_.assign(kBins, Bin{});
+    chunks_.clear();
+    next_.clear();
+    free_ = kNone;
+    later_.clear();
+    later_.reserve(alive);
     present_.clear();
-    current_ = 0;
-    opened_ = false;
+    sorted_.clear();
+    served_ = 0;
+    width_ = 0;  // not laid out: everything waits
+    start_ = -1;
+    per_width_ = std::numeric_limits<double>::infinity();
+    current_ = -1;
+    count_ = 0;
   }
 
   /// Schedules an entry; times at or beyond the horizon are not kept.
-  void push(const CalendarEntry& entry) {
-    if (!(entry.time < horizon_)) return;
-    const std::size_t bin = bin_of(entry.time);
-    if (bin < current_ || (bin == current_ && opened_))
-      present_.push(entry);
+  void push(double time, std::uint32_t slot) {
+    if (!(time < horizon_)) return;
+    const double bin = (time - start_) * per_width_;
+    if (bin < static_cast<double>(current_ + 1))
+      present_.push({time, slot});
+    else if (bin < kBins)
+      append(ring_[static_cast<std::size_t>(bin)], {time, slot});
     else
-      bins_[bin].push_back(entry);
+      later_.push_back({time, slot});
   }
 
-  /// The earliest entry, or null when none is left. Stays valid until the next call.
-  const CalendarEntry* top() {
+  /// The earliest entry, or null when none is left before the horizon. Stays valid until the next call. Entries for
+  /// which holds(entry) is false may be left out.
+  template <class Holds>
+  const CalendarEntry* top(Holds&& holds) {
     for (;;) {
-      if (!opened_) open();
-      if (sorted_.empty() && present_.empty()) {
-        if (current_ + 1 >= bins_.size()) return nullptr;
-        ++current_;
-        opened_ = false;
-        continue;
+      const bool heap = !present_.empty();
+      if (served_ < sorted_.size()) {
+        from_heap_ = heap && present_.top().time < sorted_[served_].time;
+        return from_heap_ ? &present_.top() : &sorted_[served_];
       }
-      from_heap_ = !present_.empty() && (sorted_.empty() || present_.top().time < sorted_.back().time);
-      return from_heap_ ? &present_.top() : &sorted_.back();
+      if (heap) {
+        from_heap_ = true;
+        return &present_.top();
+      }
+      if (!open_next(holds)) return nullptr;
     }
   }
 
@@ -65,31 +84,161 @@ class Calendar {
     if (from_heap_)
       present_.pop();
     else
-      sorted_.pop_back();
+      ++served_;
+  }
+
+  /// The entry that comes up `ahead` places later, as far as is known; null where it is not.
+  const CalendarEntry* upcoming(std::size_t ahead) const {
+    return served_ + ahead < sorted_.size() ? &sorted_[served_ + ahead] : nullptr;
   }
 
  private:
+  struct Earlier {
+    bool operator()(const CalendarEntry& a, const CalendarEntry& b) const { return a.time < b.time; }
+  };
   struct Later {  // boost::heap keeps the largest on top
     bool operator()(const CalendarEntry& a, const CalendarEntry& b) const { return b.time < a.time; }
   };
-  static constexpr std::size_t kEntriesPerBin = 8, kMostBins = std::size_t{1} << 20;
+  static constexpr std::uint32_t kNone = 0xffffffff;
+  static constexpr std::uint32_t kChunk = 16;  // entries: four cache lines
+  static constexpr int kBins = 2048;
+  struct Chunk {
+    CalendarEntry entry[kChunk];
+  };
+  struct Bin {
+    std::uint32_t chunk = kNone;  // the last one, not full but for the moment
+    std::uint32_t count = 0;
+  };
 
-  std::size_t bin_of(double time) const {
-    return std::min(bins_.size() - 1, static_cast<std::size_t>(std::max(0.0, time) * per_time_));
-  }
-  void open() {
-    sorted_.swap(bins_[current_]);
-    bins_[current_].clear();
-    std::sort(sorted_.begin(), sorted_.end(), Later{});
-    opened_ = true;
+  void append(Bin& bin, const CalendarEntry& entry) {
+    const std::uint32_t at = bin.count % kChunk;
+    if (at == 0) {
+      std::uint32_t fresh = free_;
+      if (fresh != kNone) {
+        free_ = next_[fresh];
+      } else {
+        fresh = static_cast<std::uint32_t>(chunks_.size());
+        chunks_.emplace_back();
+        next_.push_back(kNone);
+      }
+      next_[fresh] = bin.chunk;
+      bin.chunk = fresh;
+    }
+    chunks_[bin.chunk].entry[at] = entry;
+    ++bin.count;
   }
 
-  double horizon_ = 0, per_time_ = 0;
-  std::vector<std::vector<CalendarEntry>> bins_;
-  std::vector<CalendarEntry> sorted_;  // the current bin, latest first
+  template <class Visit>
+  void empty(Bin& bin, Visit&& visit) {
+    std::uint32_t n = bin.count == 0 ? 0 : (bin.count - 1) % kChunk + 1;
+    for (std::uint32_t chunk = bin.chunk; chunk != kNone;) {
+      for (std::uint32_t k = 0; k < n; ++k) visit(chunks_[chunk].entry[k]);
+      const std::uint32_t next = next_[chunk];
+      next_[chunk] = free_;
+      free_ = chunk;
+      chunk = next;
+      n = kChunk;
+    }
+    bin = Bin{};
+  }
+
+  /// Opens the next bin that has entries; false when there is none. sorted_ and present_ are empty.
+  template <class Holds>
+  bool open_next(Holds&& holds) {
+    for (;;) {
+      while (++current_ < kBins && width_ > 0) {
+        Bin& bin = ring_[static_cast<std::size_t>(current_)];
+        if (bin.count == 0) continue;
+        sorted_.clear();
+        served_ = 0;
+        count_ += bin.count;
+        empty(bin, [&](const CalendarEntry& entry) {
+          if (holds(entry)) sorted_.push_back(entry);
+        });
+        sort();
+        if (!sorted_.empty()) return true;
+      }
+      if (!turn(holds)) return false;
+    }
+  }
+
+  /// Lays out the ring anew from the first of the entries that wait; false where there are none.
+  template <class Holds>
+  bool turn(Holds&& holds) {
+    current_ = kBins - 1;
+    std::erase_if(later_, [&](const CalendarEntry& entry) { return !holds(entry); });
+    if (later_.empty()) return false;
+    const double end = start_ + width_ * kBins;
+    start_ = std::min_element(later_.begin(), later_.end(), Earlier{})->time;
+    if (width_ == 0) {  // the first time: the density of the first events there are
+      const std::size_t few = std::min(later_.size() - 1, static_cast<std::size_t>(16 * wanted_));
+      std::nth_element(later_.begin(), later_.begin() + static_cast<std::ptrdiff_t>(few), later_.end(), Earlier{});
+      width_ = (later_[few].time - start_) * wanted_ / static_cast<double>(few + 1);
+    } else if (!forced_ && count_ > 0) {
+      const double rate = static_cast<double>(count_) / (end - first_), factor = wanted_ / rate / width_;
+      if (factor > 1.5 || factor < 0.67) width_ *= std::clamp(factor, 0.125, 8.0);
+    }
+    width_ = std::max(width_, std::max(horizon_ * 1e-9, start_ * 1e-12));
+    per_width_ = 1 / width_;
+    first_ = start_;
+    count_ = 0;
+    current_ = -1;
+    std::vector<CalendarEntry> waiting;
+    waiting.swap(later_);
+    later_.reserve(waiting.capacity() / 4);
+    for (const CalendarEntry& entry : waiting) push(entry.time, entry.slot);
+    return true;
+  }
+
+  /// Sorts the opened bin: into buckets first, then neighbours among themselves.
+  void sort() {
+    const std::size_t n = sorted_.size();
+    if (n > 24) {
+      const double start = start_ + current_ * width_, scale = per_width_ * static_cast<double>(n);
+      bucket_.assign(n + 1, 0);
+      which_.resize(n);
+      for (std::size_t k = 0; k < n; ++k) {
+        const double at = (sorted_[k].time - start) * scale;
+        which_[k] = at <= 0 ? 0 : std::min(static_cast<std::uint32_t>(n - 1), static_cast<std::uint32_t>(at));
+        ++bucket_[which_[k] + 1];
+      }
+      for (std::size_t b = 0; b < n; ++b) bucket_[b + 1] += bucket_[b];
+      scratch_.resize(n);
+      for (std::size_t k = 0; k < n; ++k) scratch_[bucket_[which_[k]]++] = sorted_[k];
+      sorted_.swap(scratch_);
+    }
+    std::size_t moves = 0;
+    for (std::size_t k = 1; k < n; ++k) {
+      const CalendarEntry entry = sorted_[k];
+      std::size_t to = k;
+      for (; to > 0 && entry.time < sorted_[to - 1].time; --to) sorted_[to] = sorted_[to - 1];
+      sorted_[to] = entry;
+      moves += k - to;
+      if (moves > 16 * n) {  // crowded into one bucket
+        std::sort(sorted_.begin(), sorted_.end(), Earlier{});
+        return;
+      }
+    }
+  }
+
+  double horizon_ = 0, wanted_ = 8;
+  bool forced_ = false;
+  double start_ = 0, width_ = 0, per_width_ = 0;  // of the ring
+  int current_ = -1;                              // the bin that is open, or was last
+  std::vector<Bin> ring_;
+  PageVector<Chunk> chunks_;
+  std::vector<std::uint32_t> next_;  // by chunk: the one filled before it, or the next free one
+  std::uint32_t free_ = kNone;
+  std::vector<CalendarEntry> later_;  // beyond the ring
+
+  std::vector<CalendarEntry> sorted_, scratch_;  // the open bin
+  std::vector<std::uint32_t> bucket_, which_;
+  std::size_t served_ = 0;
   boost::heap::d_ary_heap<CalendarEntry, boost::heap::arity<4>, boost::heap::compare<Later>> present_;
-  std::size_t current_ = 0;
-  bool opened_ = false, from_heap_ = false;
+  bool from_heap_ = false;
+
+  std::size_t count_ = 0;  // entries opened since the ring was laid out
+  double first_ = 0;       // its start
 };
 
 }  // namespace carom

@@ -22,10 +22,10 @@ using Cell = std::array<std::int32_t, D>;
 template <int D>
 class CellGrid {
  public:
-  /// A grid with cells of edge at least `smallest` over the box (open axes: over the positions), with no more cells
-  /// than about two a particle.
-  CellGrid(const Box<D>& box, double smallest, std::span<const Vec<D>> x) : box_(box) {
-    const double most = std::max(1.0, std::floor(std::pow(2.0 * static_cast<double>(x.size()), 1.0 / D)));
+  /// A grid with cells of edge at least `smallest` over the box (open axes: over the positions), with no more than
+  /// about so many cells a particle.
+  CellGrid(const Box<D>& box, double smallest, std::span<const Vec<D>> x, double cells_a_particle = 2) : box_(box) {
+    const double most = std::max(1.0, std::floor(std::pow(cells_a_particle * static_cast<double>(x.size()), 1.0 / D)));
     for (int k = 0; k < D; ++k) {
       double low = 0, high = box.edges[k];
       if (box.boundary[k] == Boundary::open && !x.empty()) {
@@ -73,7 +73,31 @@ class CellGrid {
   }
 
   /// How many boxes an unwrapped cell number lies away.
-  std::int32_t boxes(int axis, std::int32_t c) const { return (c - wrapped(axis, c)) / count_[axis]; }
+  std::int32_t boxes(int axis, std::int32_t c) const {
+    return c >= 0 && c < count_[axis] ? 0 : (c - wrapped(axis, c)) / count_[axis];
+  }
+  Image<D> boxes(const Cell<D>& c) const {
+    Image<D> image;
+    for (int k = 0; k < D; ++k) image[k] = boxes(k, c[k]);
+    return image;
+  }
+
+  /// A cell number of one axis as index() sums them up, and how many boxes away it lies.
+  struct Step {
+    std::size_t offset;
+    std::int32_t boxes;
+  };
+  /// The step to unwrapped cell number c; false where there is no such cell, beyond a wall or an open end.
+  bool step(int axis, std::int32_t c, Step& to) const {
+    if (c >= 0 && c < count_[axis]) {
+      to = {stride_[axis] * static_cast<std::size_t>(c), 0};
+      return true;
+    }
+    if (!box_.periodic(axis)) return false;
+    const std::int32_t w = wrapped(axis, c);
+    to = {stride_[axis] * static_cast<std::size_t>(w), (c - w) / count_[axis]};
+    return true;
+  }
 
   /// Calls visit(index, boxes) for every stored cell from `low` to `high` (inclusive, by axis), each image for itself;
   /// `boxes` is how many boxes away the visited cell lies. Cells beyond walls and open ends do not exist.

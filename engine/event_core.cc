@@ -1,5 +1,6 @@
 #include "engine/event_core.h"
 
+#include <numeric>
 #include <string>
 
 #include "engine/collision.h"
@@ -7,117 +8,253 @@
 #include "engine/error.h"
 
 namespace carom {
+namespace {
+
+/// The common value, or nothing where they differ.
+double common(const std::vector<double>& values) {
+  const bool equal = std::all_of(values.begin(), values.end(), [&](double v) { return v == values[0]; });
+  return equal && !values.empty() ? values[0] : 0;
+}
+
+/// Interleaves the bits of D numbers: places near on this curve are near in space (Morton).
+template <int D>
+std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
+  std::uint64_t code = 0;
+  for (int bit = 20; bit >= 0; --bit)
+    for (int k = 0; k < D; ++k) code = code << 1 | (place[k] >> bit & 1);
+  return code;
+}
+
+}  // namespace
 
 template <int D>
-EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles) : box_(box), particles_(particles) {}
+EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options)
+    : box_(box), particles_(particles), options_(options), kernels_(scan_kernels()) {
+  for (int k = 0; k < D; ++k) walled_ = walled_ || box.walled(k);
+}
 
 template <int D>
 EventCore<D>::~EventCore() = default;
+
+/// Gives the particles slots in the order of a space-filling curve.
+template <int D>
+void EventCore<D>::sort(const Particles<D>& particles) {
+  const std::size_t n = particles.size();
+  Vec<D> low = particles.x[0], high = low;
+  for (const auto& x : particles.x) low = low.cwiseMin(x), high = high.cwiseMax(x);
+  const double scale = ((1 << 20) - 1) / std::max((high - low).maxCoeff(), 1e-300);
+  std::vector<std::pair<std::uint64_t, Id>> places(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::array<std::uint32_t, D> place;
+    for (int k = 0; k < D; ++k) place[k] = static_cast<std::uint32_t>((particles.x[i][k] - low[k]) * scale);
+    places[i] = {interleave<D>(place), static_cast<Id>(i)};
+  }
+  std::sort(places.begin(), places.end());
+  order_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) order_[i] = places[i].second;
+  since_sort_ = 0;
+}
 
 template <int D>
 void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
   const std::size_t n = particles.size();
   g_ = g;
   field_ = g != Vec<D>::Zero();
-  horizon_ = horizon;
   growth_ = growth;
+  horizon_ = horizon;
   events_ = 0;
-  expected_ = scheduled_;
-  scheduled_ = 0;
+  const bool anew = order_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
+  if (anew) sort(particles);
+  common_radius_ = common(particles_.radius);
+  common_mass_ = common(particles_.mass);
+  radius_.clear();
+  mass_.clear();
+  if (common_radius_ == 0)
+    for (const Id i : order_) radius_.push_back(particles_.radius[i]);
+  if (common_mass_ == 0)
+    for (const Id i : order_) mass_.push_back(particles_.mass[i]);
+  packing_ = Packing<D>(n);
   records_.resize(n);
-  version_.resize(n, 0);
-  pending_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    records_[i] = {particles.x[i], particles.v[i], 0.0, static_cast<Id>(i), 0, particles.species[i]};
-    ++version_[i];
+    const Id id = order_[i];
+    records_[i] = {particles.x[id], particles.v[id], 0.0, id, 0, particles.species[id]};
   }
-  double largest_radius = 0;
-  for (double r : particles_.radius) largest_radius = std::max(largest_radius, r);
-  grid_ = std::make_unique<CellGrid<D>>(box_, 2 * grown(largest_radius, horizon), particles.x);
-  first_.assign(grid_->cells(), kNobody);
-  next_.assign(n, kNobody);
-  previous_.assign(n, kNobody);
-  cell_.resize(n);
-  for (std::size_t i = n; i-- > 0;) {
-    cell_[i] = grid_->cell(particles.x[i]);
-    insert(static_cast<Id>(i), grid_->index(cell_[i]));
+  setting_ = {.records = reinterpret_cast<const double*>(records_.data()),
+              .radius = radius_.empty() ? nullptr : radius_.data(),
+              .diameter = common_radius_ + common_radius_,
+              .growth = growth,
+              .slot_mask = packing_.slot_mask,
+              .slot_bits = packing_.slot_bits,
+              .field_bits = packing_.field_bits,
+              .plain = radius_.empty() && !field_ && growth == 0};
+  for (int k = 0; k < D; ++k) {
+    setting_.edges[k] = box_.edges[k];
+    setting_.g[k] = g[k];
   }
   tied_ = {};
-  calendar_.reset(horizon, std::max(expected_, n));
-  for (std::size_t i = 0; i < n; ++i) predict(static_cast<Id>(i), 0.0);
+  calendar_.reset(horizon, n, options_.entries_per_bin);
+  if (lists_ && !anew && growth == 0 && grown_for_ == common_radius_) {
+    lists_->follow(records_);
+    for (auto& a : agenda_) a.version = 0;
+  } else {
+    agenda_.assign(n, Agenda<D>{});
+    choose_search(horizon);
+  }
+  for (std::size_t i = 0; i < n; ++i) predict(static_cast<Slot>(i), 0.0);
 }
 
-/// Takes the next valid entry before `end` from the calendar: the smallest time, and of equal times the smallest key.
 template <int D>
-bool EventCore<D>::next_event(double end, CalendarEntry& entry) {
-  const auto tie = [&] {
-    const CalendarEntry& top = *calendar_.top();
-    const Pending& pending = pending_[top.slot];
-    if (valid(top)) tied_.push({top, pending.crosses_first(), pending.contact});
-    calendar_.pop();
-  };
+void EventCore<D>::choose_search(double horizon) {
+  double largest = grown(common_radius_, horizon), smallest = largest;
+  grown_for_ = growth_ == 0 ? common_radius_ : -1;
+  grown_ = radius_;
+  for (double& r : grown_) {
+    r = grown(r, horizon);
+    largest = std::max(largest, r);
+    smallest = smallest == 0 ? r : std::min(smallest, r);
+  }
+  const bool use_cells = options_.method == SearchOptions::Method::cells;
+  if (use_cells) {
+    lists_.reset();
+    const double edge = std::max(options_.cell, 2 * largest);
+    cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, edge, particles_.x);
+    for (Slot i = 0; i < records_.size(); ++i) {
+      agenda_[i].where.cell = cells_->place(records_[i].x);
+      cells_->insert(i, agenda_[i].where.cell);
+    }
+    return;
+  }
+  cells_.reset();
+  const double skin = options_.skin > 0 ? options_.skin : 0.2 * 2 * smallest;
+  if (grown_.empty()) grown_.push_back(largest);
+  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, grown_, skin, agenda_);
+  lists_->build(records_);
+}
+
+template <int D>
+bool EventCore<D>::stale(const Agenda<D>& a) const {
+  return a.kind == EventKind::pair && agenda_[packing_.slot(a.partner)].version != a.partner_version;
+}
+
+/// Of the contact that is planned.
+template <int D>
+std::uint32_t EventCore<D>::generation_of(Slot i) const {
+  const Agenda<D>& a = agenda_[i];
+  const std::uint32_t own = generation_at(records_[i], a.contact);
+  if (a.kind == EventKind::wall) return own;
+  return std::max(own, generation_at(records_[packing_.slot(a.partner)], a.contact));
+}
+
+template <int D>
+EventKey<D> EventCore<D>::key_of(Slot i) const {
+  const Agenda<D>& a = agenda_[i];
+  const Record<D>& r = records_[i];
+  EventKey<D> key;
+  key.time = a.contact;
+  key.kind = a.kind;
+  key.generation = generation_of(i);
+  if (a.kind == EventKind::wall) {
+    key.lo = r.id;
+    key.hi = a.partner;
+    return key;
+  }
+  const Record<D>& other = records_[packing_.slot(a.partner)];
+  key.image = packing_.image(a.partner);
+  if (r.id < other.id) {
+    key.lo = r.id;
+    key.hi = other.id;
+  } else {
+    key.lo = other.id;
+    key.hi = r.id;
+    for (auto& k : key.image) k = -k;
+  }
+  return key;
+}
+
+template <int D>
+typename EventCore<D>::Tied EventCore<D>::tie(Slot i) const {
+  const Agenda<D>& a = agenda_[i];
+  if (a.update < a.contact) return {Tied::Rank::update, EventKey<D>{.lo = records_[i].id}, i};
+  return {stale(a) ? Tied::Rank::stale : Tied::Rank::contact, key_of(i), i};
+}
+
+/// The next event before `end`: the smallest time, and of equal times the smallest key.
+template <int D>
+bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
+  const auto holds = [&](const CalendarEntry& entry) { return agenda_[entry.slot].due() == entry.time; };
   for (;;) {
+    const CalendarEntry* top = calendar_.top(holds);
     if (tied_.empty()) {
-      const CalendarEntry* top = calendar_.top();
       if (!top || top->time >= end) return false;
-      entry = *top;
+      const CalendarEntry entry = *top;
       calendar_.pop();
-      if (!valid(entry)) {
+      if (!holds(entry)) {
         ++counts_.dropped;
         continue;
       }
-      top = calendar_.top();
-      if (!top || top->time != entry.time) return true;
-      tied_.push({entry, pending_[entry.slot].crosses_first(), pending_[entry.slot].contact});
+      slot = entry.slot;
+      time = entry.time;
+      top = calendar_.top(holds);
+      if (!top || top->time != time) return true;
+      tied_.push(tie(slot));
+      tied_time_ = time;
     }
-    const double now = tied_.top().entry.time;
-    while (calendar_.top() && calendar_.top()->time == now) tie();
-    entry = tied_.top().entry;
+    time = tied_time_;
+    while ((top = calendar_.top(holds)) && top->time == time) {
+      if (holds(*top)) tied_.push(tie(top->slot));
+      calendar_.pop();
+    }
+    const Tied first = tied_.top();
     tied_.pop();
-    if (valid(entry)) return true;
+    slot = first.slot;
+    if (agenda_[slot].due() == time && tie(slot) == first) return true;
   }
 }
 
 template <int D>
 double EventCore<D>::run(double end, const Report& report) {
-  for (CalendarEntry entry; next_event(end, entry);) {
-    const Id i = entry.slot;
-    const double event_time = entry.time;
-    const Pending& pending = pending_[i];
-    if (pending.crosses_first()) {
-      cross(i);
+  Slot i;
+  double now;
+  while (next_event(end, i, now)) {
+    Agenda<D>& a = agenda_[i];
+    if (a.update < a.contact) {
+      update(i, now);
       continue;
     }
-    const EventKey<D> key = pending.contact;
-    if (key.kind == EventKind::pair && version_[key.lo == i ? key.hi : key.lo] != pending.partner_version) {
+    if (stale(a)) {
       ++counts_.stale;
-      predict(i, event_time);
+      predict(i, now);
       continue;
     }
+    ++since_sort_;
+    const std::uint32_t generation = generation_of(i);
+    if (generation > std::numeric_limits<std::uint16_t>::max())
+      throw Error(Failure::numerical,
+                  partners(key_of(i)) + " collide without end at one instant; separate the spheres that touch there");
     if (++events_ > report.max_events)
       throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
-                                          " collisions in one step, the last between " + partners(key) +
+                                          " collisions in one step, the last between " + partners(key_of(i)) +
                                           "; use a smaller step or raise integrator.max_events_per_step");
-    if (key.kind == EventKind::pair) {
-      collide_pair(key, report);
-      predict(key.lo, event_time);
-      predict(key.hi, event_time);
-      if (report.counters.sphere_sphere >= report.collision_limit) return event_time;
-    } else {
-      collide_wall(key, report);
-      predict(key.lo, event_time);
+    if (a.kind == EventKind::wall) {
+      collide_wall(i, now, report);
+      predict(i, now);
+      continue;
     }
+    const Slot j = packing_.slot(a.partner);
+    collide_pair(i, now, report);
+    predict(i, now);
+    predict(j, now);
+    if (report.counters.sphere_sphere >= report.collision_limit) return now;
   }
   return end;
 }
 
 template <int D>
 void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
-  for (std::size_t i = 0; i < records_.size(); ++i) {
-    Record<D> r = records_[i];
+  for (Record<D> r : records_) {
     advance(r, time);
-    copies.x[i] = r.x;
-    copies.v[i] = r.v;
+    copies.x[r.id] = r.x;
+    copies.v[r.id] = r.v;
   }
 }
 
@@ -139,52 +276,62 @@ std::uint32_t EventCore<D>::generation_at(const Record<D>& r, double t) const {
   return r.t == t ? r.generation + 1u : 0u;
 }
 
+/// Looks for the next contact of a sphere whose record, or whose partner's, has changed.
 template <int D>
-void EventCore<D>::predict(Id i, double now) {
+void EventCore<D>::predict(Slot i, double now) {
   ++counts_.predictions;
-  pending_[i].contact.time = kNever;
-  Cell<D> low = cell_[i], high = cell_[i];
-  for (int k = 0; k < D; ++k) --low[k], ++high[k];
-  predict_pairs(i, low, high);
-  predict_walls(i, pending_[i]);
-  predict_crossing(i, now, pending_[i]);
+  Agenda<D>& a = agenda_[i];
+  a.contact = kNever;
+  if (lists_) {
+    predict_pairs(i, lists_->candidates(a), a.count, a.shifted);
+    predict_leaving(i, now);
+  } else {
+    cells_->around(i, a.where.cell, found_);
+    predict_pairs(i, found_.packed.data(), found_.count, found_.shifted);
+    predict_crossing(i, now);
+  }
+  if (walled_) predict_walls(i);
   schedule(i);
 }
 
-/// Looks for contacts with whoever is in the cells from low to high.
+/// Takes the first contact with the candidates where it comes before the one that is planned.
 template <int D>
-void EventCore<D>::predict_pairs(Id i, const Cell<D>& low, const Cell<D>& high) {
-  grid_->for_each_between(low, high, [&](std::size_t cell, const Image<D>& away) {
-    for (Id j = first_[cell]; j != kNobody; j = next_[j]) {
-      if (j == i) continue;
-      ++counts_.candidates;
-      Image<D> image;
-      for (int k = 0; k < D; ++k) image[k] = grid_->boxes(k, cell_[j][k]) - away[k];
-      predict_pair(i, j, image, pending_[i]);
-    }
-  });
+void EventCore<D>::predict_pairs(Slot i, const std::uint32_t* candidates, unsigned n, bool shifted) {
+  counts_.candidates += n;
+  const ScanResult first = kernels_.scan[D - 2](setting_, i, candidates, n, shifted);
+  Agenda<D>& a = agenda_[i];
+  if (first.time > a.contact || first.time == kNever) return;
+  if (first.tied || first.time == a.contact || first.time == -kNever) return predict_pairs_one_by_one(i, candidates, n);
+  a.contact = first.time;
+  a.kind = EventKind::pair;
+  a.partner = candidates[first.which];
+  a.partner_version = agenda_[packing_.slot(a.partner)].version;
 }
 
 template <int D>
-void EventCore<D>::schedule(Id i) {
-  Pending& pending = pending_[i];
-  ++pending.stamp;
-  const double time = std::min(pending.contact.time, pending.crossing);
-  if (!(time < horizon_)) return;
-  calendar_.push({time, i, pending.stamp});
-  ++scheduled_;
-  ++counts_.scheduled;
+void EventCore<D>::predict_pairs_one_by_one(Slot i, const std::uint32_t* candidates, unsigned n) {
+  Agenda<D>& a = agenda_[i];
+  for (unsigned q = 0; q < n; ++q) {
+    if (packing_.slot(candidates[q]) == i) continue;
+    const double time = pair_contact(i, candidates[q]);
+    if (time > a.contact || time == kNever) continue;
+    const Agenda<D> before = a;
+    const bool first = before.contact == kNever;
+    const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
+    a.contact = time;
+    a.kind = EventKind::pair;
+    a.partner = candidates[q];
+    a.partner_version = agenda_[packing_.slot(a.partner)].version;
+    if (!first && !(key_of(i) < rival)) a = before;
+  }
 }
 
 template <int D>
-void EventCore<D>::predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending& best) const {
-  EventKey<D> key;
-  key.kind = EventKind::pair;
-  key.lo = std::min(i, j);
-  key.hi = std::max(i, j);
-  for (int k = 0; k < D; ++k) key.image[k] = i < j ? image_of_j[k] : -image_of_j[k];
-  // A pure function of the two records: taken in id order, synchronised to the later of their times.
-  const Record<D>&a = records_[key.lo], &b = records_[key.hi];
+double EventCore<D>::pair_contact(Slot i, std::uint32_t candidate) const {
+  // A pure function of the two records, synchronised to the later of their times; exchanging the two gives the same
+  // bits, because every difference only changes its sign.
+  const Slot j = packing_.slot(candidate);
+  const Record<D>&a = records_[i], &b = records_[j];
   const double now = std::max(a.t, b.t);
   const double s_a = now - a.t, s_b = now - b.t;
   Vec<D> d = (a.x + s_a * a.v) - (b.x + s_b * b.v);
@@ -193,162 +340,215 @@ void EventCore<D>::predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending&
     d += (0.5 * (s_a * s_a - s_b * s_b)) * g_;
     v += (s_a - s_b) * g_;
   }
-  d += box_.shift(key.image);
-  const double radii = particles_.radius[key.lo] + particles_.radius[key.hi];
-  const double sigma = grown(radii, now), rate = radii * growth_;
+  d += box_.shift(packing_.image(candidate));
+  const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
   const bool apart = d.squaredNorm() > sigma * sigma;
   const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
-  key.time = now + contact_time<D>(d, v, sigma, rate, slack);
-  if (!(key.time <= best.contact.time) || key.time == kNever) return;
-  key.generation = std::max(generation_at(a, key.time), generation_at(b, key.time));
-  if (key < best.contact) {
-    best.contact = key;
-    best.partner_version = version_[j];
-  }
+  return now + contact_time<D>(d, v, sigma, rate, slack);
 }
 
 template <int D>
-void EventCore<D>::predict_walls(Id i, Pending& best) const {
-  const Record<D>& r = records_[i];
-  const double radius = grown(particles_.radius[i], r.t), rate = particles_.radius[i] * growth_;
-  for (int k = 0; k < D; ++k) {
-    if (!box_.walled(k)) continue;
-    for (int side = 0; side < 2; ++side) {
-      const double inward = side == 0 ? 1.0 : -1.0;
-      const double gap = side == 0 ? r.x[k] - radius : box_.edges[k] - radius - r.x[k];
-      const double opening = inward * r.v[k] - rate;
-      const double tolerance = gap_tolerance(2 * radius, box_.edges[k]);
-      const double slack = approach_slack(1.0, r.v.norm(), rate);
-      const bool touching = gap <= tolerance;
-      const double s = wall_contact_time(gap, opening, inward * g_[k], horizon_ - r.t, touching, slack);
-      if (s == 0 && !(opening < -slack))
-        throw Error(Failure::numerical,
-                    "particle " + std::to_string(i) + " rests on the " + (side == 0 ? "lower" : "upper") +
-                        " wall of axis " + std::to_string(k) +
-                        " under the uniform field and would bounce without end; give it a height or a velocity");
-      EventKey<D> key;
-      key.time = r.t + s;
-      if (!(key.time <= best.contact.time) || key.time == kNever) continue;
-      key.kind = EventKind::wall;
-      key.lo = i;
-      key.hi = static_cast<Id>(2 * k + side);
-      key.generation = generation_at(r, key.time);
-      if (key < best.contact) best.contact = key;
+void EventCore<D>::predict_walls(Slot i) {
+  Agenda<D>& a = agenda_[i];
+  for (int axis = 0; axis < D; ++axis)
+    for (int side = 0; side < 2 && box_.walled(axis); ++side) {
+      const double time = wall_contact(i, axis, side);
+      if (time > a.contact || time == kNever) continue;
+      const Agenda<D> before = a;
+      const bool first = before.contact == kNever;
+      const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
+      a.contact = time;
+      a.kind = EventKind::wall;
+      a.partner = static_cast<std::uint32_t>(2 * axis + side);
+      if (!first && !(key_of(i) < rival)) a = before;
     }
-  }
 }
 
 template <int D>
-void EventCore<D>::predict_crossing(Id i, double now, Pending& pending) const {
+double EventCore<D>::wall_contact(Slot i, int axis, int side) const {
+  const Record<D>& r = records_[i];
+  const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
+  const double inward = side == 0 ? 1.0 : -1.0;
+  const double gap = side == 0 ? r.x[axis] - at_record : box_.edges[axis] - at_record - r.x[axis];
+  const double opening = inward * r.v[axis] - rate;
+  const double tolerance = gap_tolerance(2 * at_record, box_.edges[axis]);
+  const double slack = approach_slack(1.0, r.v.norm(), rate);
+  const bool touching = gap <= tolerance;
+  const double s = wall_contact_time(gap, opening, inward * g_[axis], horizon_ - r.t, touching, slack);
+  if (s == 0 && !(opening < -slack))
+    throw Error(Failure::numerical,
+                "particle " + std::to_string(r.id) + " rests on the " + (side == 0 ? "lower" : "upper") +
+                    " wall of axis " + std::to_string(axis) +
+                    " under the uniform field and would bounce without end; give it a height or a velocity");
+  return r.t + s;
+}
+
+/// When does the sphere leave the region its list is good for?
+template <int D>
+void EventCore<D>::predict_leaving(Slot i, double now) {
+  const Record<D>& r = records_[i];
+  Agenda<D>& a = agenda_[i];
+  Vec<D> e;
+  for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
+  const double skin = lists_->skin() * (1 - 1e-6);
+  if (!field_) {  // |e + v s| = skin
+    const double b = e.dot(r.v), v_squared = r.v.squaredNorm(), room = skin * skin - e.squaredNorm();
+    const double root = std::sqrt(std::max(b * b + v_squared * room, 0.0));
+    const double s = b > 0 ? room / (b + root) : (root - b) / v_squared;
+    a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
+    return;
+  }
+  // At most |v| s + |g| s²/2 farther than at `now`.
+  const double s0 = now - r.t;
+  e += s0 * r.v + (0.5 * s0 * s0) * g_;
+  const double speed = (r.v + s0 * g_).norm(), room = std::max(skin - e.norm(), 0.0);
+  a.update = std::max(now + 2 * room / (speed + std::sqrt(speed * speed + 2 * g_.norm() * room)), now);
+}
+
+/// When does the sphere leave its cell, and through which face?
+template <int D>
+void EventCore<D>::predict_crossing(Slot i, double now) {
+  if (field_) return predict_crossing_in_field(i, now);
+  const Record<D>& r = records_[i];
+  const CellGrid<D>& grid = cells_->grid();
+  Agenda<D>& a = agenda_[i];
+  double first = kNever;
+  int face = 0;
+  for (int k = 0; k < D; ++k) {
+    const int up = r.v[k] > 0 ? 1 : 0;
+    const std::int32_t c = a.where.cell.unwrapped[k] + up;
+    double s = (grid.face(k, c) - r.x[k]) / r.v[k];
+    if (r.v[k] == 0 || (!box_.periodic(k) && (c <= 0 || c >= grid.count(k)))) s = kNever;
+    face = s < first ? 2 * k + up : face;
+    first = s < first ? s : first;
+  }
+  a.update = std::max(r.t + first, now);
+  a.face = static_cast<std::uint8_t>(face);
+}
+
+template <int D>
+void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
   Record<D> r = records_[i];
   advance(r, now);
-  pending.crossing = kNever;
-  for (int k = 0; k < D; ++k) {
+  const CellGrid<D>& grid = cells_->grid();
+  Agenda<D>& a = agenda_[i];
+  a.update = kNever;
+  for (int k = 0; k < D; ++k)
     for (int side = 0; side < 2; ++side) {
-      const std::int32_t c = cell_[i][k] + side;
-      if (!box_.periodic(k) && (c <= 0 || c >= grid_->count(k))) continue;  // the outermost cells have no outer face
+      const std::int32_t c = a.where.cell.unwrapped[k] + side;
+      if (!box_.periodic(k) && (c <= 0 || c >= grid.count(k))) continue;  // the outermost cells have no outer face
       const double outward = side == 1 ? 1.0 : -1.0;
-      const double gap = outward * (grid_->face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
+      const double gap = outward * (grid.face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
       const double s =
           wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * g_[k], horizon_ - now, false, 0.0);
       // At least an ulp from now: at the top of its path a particle could cross back and forth in no time.
       const double t = std::max(now + s, std::nextafter(now, kNever));
-      if (t < pending.crossing) {
-        pending.crossing = t;
-        pending.face = static_cast<std::uint8_t>(2 * k + side);
+      if (t < a.update) {
+        a.update = t;
+        a.face = static_cast<std::uint8_t>(2 * k + side);
       }
     }
-  }
 }
 
-/// Moves a particle into the next cell. Its contact stands; only the cells that have come into view are searched.
 template <int D>
-void EventCore<D>::cross(Id i) {
+void EventCore<D>::schedule(Slot i) {
+  const double time = agenda_[i].due();
+  if (!(time < horizon_)) return;
+  calendar_.push(time, i);
+  ++counts_.scheduled;
+}
+
+/// The surroundings of a sphere must be looked at again.
+template <int D>
+void EventCore<D>::update(Slot i, double now) {
+  if (!lists_) return cross(i, now);
+  Record<D> r = records_[i];
+  advance(r, now);
+  Agenda<D>& a = agenda_[i];
+  if (field_) {  // it may still be far from where its list ends
+    Vec<D> e;
+    for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
+    if (e.norm() < 0.7 * lists_->skin()) {
+      predict_leaving(i, now);
+      schedule(i);
+      return;
+    }
+  }
+  ++counts_.rebuilds;
+  const unsigned fresh = lists_->renew(i, r.x);
+  if (fresh > 0) {  // the planned contact stands; only those who are new in the list are looked at
+    const std::uint32_t* const list = lists_->candidates(a);
+    unsigned first = a.count - fresh;
+    first -= first % 8;  // scans read by eight
+    predict_pairs(i, list + first, a.count - first, a.shifted);
+  }
+  predict_leaving(i, now);
+  schedule(i);
+}
+
+/// Moves a sphere into the next cell. Its contact stands; only the cells that have come into view are searched.
+template <int D>
+void EventCore<D>::cross(Slot i, double now) {
   ++counts_.crossings;
-  Pending& pending = pending_[i];
-  const double now = pending.crossing;
-  const int axis = pending.face / 2, step = pending.face % 2 == 1 ? 1 : -1;
-  remove(i);
-  cell_[i][axis] += step;
-  insert(i, grid_->index(cell_[i]));
-  Cell<D> low = cell_[i], high = cell_[i];
-  for (int k = 0; k < D; ++k)
-    if (k == axis)
-      low[k] = high[k] = cell_[i][k] + step;
-    else
-      --low[k], ++high[k];
-  predict_pairs(i, low, high);
-  predict_crossing(i, now, pending);
+  Agenda<D>& a = agenda_[i];
+  const int axis = a.face / 2, step = a.face % 2 == 1 ? 1 : -1;
+  cells_->cross(i, a.where.cell, axis, step);
+  cells_->ahead(i, a.where.cell, axis, step, found_);
+  if (found_.count > 0) predict_pairs(i, found_.packed.data(), found_.count, found_.shifted);
+  predict_crossing(i, now);
   schedule(i);
 }
 
 template <int D>
-void EventCore<D>::set_generation(Record<D>& r, const EventKey<D>& key) {
-  if (key.generation > std::numeric_limits<std::uint16_t>::max())
-    throw Error(Failure::numerical,
-                partners(key) + " collide without end at one instant; separate the spheres that touch there");
-  r.generation = static_cast<std::uint16_t>(key.generation);
-}
-
-template <int D>
-void EventCore<D>::collide_pair(const EventKey<D>& key, const Report& report) {
-  Record<D>&a = records_[key.lo], &b = records_[key.hi];
-  advance(a, key.time);
-  advance(b, key.time);
-  const Vec<D> shift = box_.shift(key.image);
+void EventCore<D>::collide_pair(Slot i, double time, const Report& report) {
+  Agenda<D>& agenda = agenda_[i];
+  const Slot j = packing_.slot(agenda.partner);
+  EventKey<D> key;
+  if (report.contacts) key = key_of(i);
+  Record<D>&a = records_[i], &b = records_[j];
+  const auto generation = static_cast<std::uint16_t>(generation_of(i));
+  advance(a, time);
+  advance(b, time);
+  const Vec<D> shift = box_.shift(packing_.image(agenda.partner));
   const Vec<D> d = a.x - b.x + shift;
-  const double mass_a = particles_.mass[key.lo], mass_b = particles_.mass[key.hi];
-  const double radii = particles_.radius[key.lo] + particles_.radius[key.hi], sigma = grown(radii, key.time);
+  const double mass_a = mass(i), mass_b = mass(j);
+  const double radii = radius(i) + radius(j), sigma = grown(radii, time);
   const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, sigma, radii * growth_, mass_a, mass_b) * d;
   a.v += impulse / mass_a;
   b.v -= impulse / mass_b;
-  set_generation(a, key);
-  set_generation(b, key);
-  ++version_[key.lo];
-  ++version_[key.hi];
+  a.generation = b.generation = generation;
+  ++agenda.version;
+  ++agenda_[j].version;
   ++report.counters.sphere_sphere;
   report.counters.collision_virial.add(d.dot(impulse));
   report.counters.max_overlap = std::max(report.counters.max_overlap, 1 - d.norm() / sigma);
-  if (report.contacts) report.contacts->push_back({key, a.x, b.x - shift, impulse});
+  if (!report.contacts) return;
+  if (a.id < b.id)
+    report.contacts->push_back({key, a.x, b.x - shift, impulse});
+  else
+    report.contacts->push_back({key, b.x, a.x + shift, -impulse});
 }
 
 template <int D>
-void EventCore<D>::collide_wall(const EventKey<D>& key, const Report& report) {
-  Record<D>& r = records_[key.lo];
-  advance(r, key.time);
+void EventCore<D>::collide_wall(Slot i, double time, const Report& report) {
+  const EventKey<D> key = key_of(i);
+  Record<D>& r = records_[i];
+  advance(r, time);
   const int axis = static_cast<int>(key.hi / 2);
-  const double mass = particles_.mass[key.lo], radius = grown(particles_.radius[key.lo], key.time);
-  const double rate = particles_.radius[key.lo] * growth_;
+  const double at_contact = grown(radius(i), time), rate = radius(i) * growth_;
   const double after = (key.hi % 2 == 0 ? 2 * rate : -2 * rate) - r.v[axis];
   if (report.contacts) {
     Contact<D> contact{key, r.x, r.x, Vec<D>::Zero()};
     contact.x_hi[axis] = key.hi % 2 == 0 ? 0.0 : box_.edges[axis];
-    contact.impulse[axis] = mass * (after - r.v[axis]);
+    contact.impulse[axis] = mass(i) * (after - r.v[axis]);
     report.contacts->push_back(contact);
   }
-  const double gap = key.hi % 2 == 0 ? r.x[axis] - radius : box_.edges[axis] - radius - r.x[axis];
-  report.counters.max_overlap = std::max(report.counters.max_overlap, -gap / radius);
+  const double gap = key.hi % 2 == 0 ? r.x[axis] - at_contact : box_.edges[axis] - at_contact - r.x[axis];
+  report.counters.max_overlap = std::max(report.counters.max_overlap, -gap / at_contact);
   r.v[axis] = after;
-  set_generation(r, key);
-  ++version_[key.lo];
+  r.generation = static_cast<std::uint16_t>(key.generation);
+  ++agenda_[i].version;
   ++report.counters.sphere_wall;
-}
-
-template <int D>
-void EventCore<D>::insert(Id i, std::size_t cell) {
-  previous_[i] = kNobody;
-  next_[i] = first_[cell];
-  if (next_[i] != kNobody) previous_[next_[i]] = i;
-  first_[cell] = i;
-}
-
-template <int D>
-void EventCore<D>::remove(Id i) {
-  if (previous_[i] != kNobody)
-    next_[previous_[i]] = next_[i];
-  else
-    first_[grid_->index(cell_[i])] = next_[i];
-  if (next_[i] != kNobody) previous_[next_[i]] = previous_[i];
 }
 
 template class EventCore<2>;

@@ -4,42 +4,44 @@
 // Every sphere is on a flight x + v s + g s²/2 (g the same for all: 0, or a uniform field) that is known from its
 // record; an event changes the records of the spheres that take part in it and of nobody else. One pending event a
 // particle is kept, with the particle that was scanned last; it is stale when its partner has had an event since, and
-// the particle is scanned again when a stale event comes up (Lubachevsky, J. Comput. Phys. 94 (1991) 255). Cells prune
-// the candidates; a crossing into another cell changes no record. Nothing that the search does can therefore reach the
-// physics.
+// the particle is scanned again when a stale event comes up (Lubachevsky, J. Comput. Phys. 94 (1991) 255). Neighbour
+// lists prune the candidates, or cells where the system is dilute; neither changes a record. Nothing that the search
+// does can therefore reach the physics.
+//
+// Spheres may grow meanwhile, all by a common factor (engine/compression.h): their contact distances and their
+// distances from walls are then functions of time like their positions.
 //
 //   EventCore<3> core(box, particles);
 //   core.load(particles, g, horizon);             // everybody at time 0
 //   core.run(end, report);                        // events with time < end
 //   core.fly_to(end, particles);                  // copies at `end`
-//
-// Spheres may grow meanwhile, all by a common factor (engine/compression.h): their contact distances and their
-// distances from walls are then functions of time like their positions.
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <queue>
 #include <vector>
 
+#include "engine/agenda.h"
 #include "engine/box.h"
 #include "engine/calendar.h"
-#include "engine/cell_grid.h"
 #include "engine/contact_log.h"
 #include "engine/counters.h"
 #include "engine/event_counts.h"
+#include "engine/linked_cells.h"
 #include "engine/particles.h"
+#include "engine/skin_lists.h"
 
 namespace carom {
 
-/// What the core knows of one sphere: its state right after its last event. One cache line in three dimensions.
-template <int D>
-struct alignas(64) Record {
-  Vec<D> x;  ///< not wrapped within a slab
-  Vec<D> v;
-  double t;  ///< of the last event, since the start of the slab
-  Id id;
-  std::uint16_t generation;
-  std::uint16_t species;
+/// How the core searches. Nothing of it changes a result; 0 and nothing mean: as the core thinks best.
+struct SearchOptions {
+  enum class Method : std::uint8_t { automatic, lists, cells };
+  Method method = Method::automatic;
+  double skin = 0;             ///< how far a sphere may move before its list is renewed [length]
+  double cell = 0;             ///< least edge of a cell [length]
+  double entries_per_bin = 0;  ///< of the calendar
+  double sort_interval = 40;   ///< contacts a particle after which the particles are sorted in space again
 };
 
 template <int D>
@@ -54,7 +56,7 @@ class EventCore {
   };
 
   /// Masses and radii are read from `particles`, which outlives the core; they change between slabs only.
-  EventCore(const Box<D>& box, const Particles<D>& particles);
+  EventCore(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options = {});
   ~EventCore();
   EventCore(const EventCore&) = delete;
   EventCore& operator=(const EventCore&) = delete;
@@ -75,62 +77,75 @@ class EventCore {
   const EventCounts& counts() const { return counts_; }
 
  private:
-  struct Pending {
-    EventKey<D> contact;                // the next contact; its time is kNever when there is none
-    std::uint32_t partner_version = 0;  // the contact is stale when the partner's has moved on
-    double crossing = 0;                // when the particle leaves its cell
-    std::uint8_t face = 0;              // through: 2·axis + (0 downwards, 1 upwards)
-    std::uint32_t stamp = 0;            // of the calendar entry that stands for the earlier of the two
-    bool crosses_first() const { return crossing < contact.time; }
-  };
-  /// An event among several at one time, with the key it had when it was found there.
+  /// An event among several at one time, with what it was when it was found there.
   struct Tied {
-    CalendarEntry entry;
-    bool crossing;
+    enum class Rank : std::uint8_t { stale, contact, update } rank;
     EventKey<D> key;
-    bool operator<(const Tied& other) const {  // crossings last; std::priority_queue keeps the largest on top
-      return crossing != other.crossing ? crossing : other.key < key;
+    Slot slot;
+    bool operator<(const Tied& other) const {  // std::priority_queue keeps the largest on top
+      return rank != other.rank ? rank > other.rank : other.key < key;
     }
+    bool operator==(const Tied& other) const { return rank == other.rank && key == other.key; }
   };
 
-  /// A radius or a contact distance as it is at a time.
-  double grown(double length, double t) const { return length * (1 + growth_ * t); }
-  bool valid(const CalendarEntry& entry) const { return pending_[entry.slot].stamp == entry.stamp; }
-  bool next_event(double end, CalendarEntry& entry);
-  void predict(Id i, double now);
-  void predict_pairs(Id i, const Cell<D>& low, const Cell<D>& high);
-  void predict_pair(Id i, Id j, const Image<D>& image_of_j, Pending& best) const;
-  void predict_walls(Id i, Pending& best) const;
-  void predict_crossing(Id i, double now, Pending& pending) const;
-  void schedule(Id i);
+  void sort(const Particles<D>& particles);
+  void choose_search(double horizon);
+  bool next_event(double end, Slot& slot, double& time);
+  bool stale(const Agenda<D>& a) const;
+  std::uint32_t generation_of(Slot i) const;
+  EventKey<D> key_of(Slot i) const;
+  Tied tie(Slot i) const;
+
+  void predict(Slot i, double now);
+  void predict_pairs(Slot i, const std::uint32_t* candidates, unsigned n, bool shifted);
+  void predict_pairs_one_by_one(Slot i, const std::uint32_t* candidates, unsigned n);
+  void predict_walls(Slot i);
+  void predict_leaving(Slot i, double now);
+  void predict_crossing(Slot i, double now);
+  void predict_crossing_in_field(Slot i, double now);
+  double pair_contact(Slot i, std::uint32_t candidate) const;
+  double wall_contact(Slot i, int axis, int side) const;
+  void schedule(Slot i);
+  void update(Slot i, double now);
+  void cross(Slot i, double now);
+
   std::uint32_t generation_at(const Record<D>& r, double t) const;
   void advance(Record<D>& r, double t) const;
-  void cross(Id i);
-  void set_generation(Record<D>& r, const EventKey<D>& key);
-  void collide_pair(const EventKey<D>& key, const Report& report);
-  void collide_wall(const EventKey<D>& key, const Report& report);
-  void insert(Id i, std::size_t cell);
-  void remove(Id i);
+  void collide_pair(Slot i, double time, const Report& report);
+  void collide_wall(Slot i, double time, const Report& report);
+  /// A radius or a contact distance as it is at a time.
+  double grown(double length, double t) const { return length * (1 + growth_ * t); }
+  double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
+  double mass(Slot i) const { return mass_.empty() ? common_mass_ : mass_[i]; }
 
   const Box<D>& box_;
   const Particles<D>& particles_;
+  SearchOptions options_;
+  const ScanKernels& kernels_;
+  bool walled_ = false;
   Vec<D> g_ = Vec<D>::Zero();
   bool field_ = false;
-  double horizon_ = 0, growth_ = 0;
+  double growth_ = 0, horizon_ = 0;
 
-  std::vector<Record<D>> records_;
-  std::vector<std::uint32_t> version_;  // grows with every event of the particle
-  std::vector<Pending> pending_;
+  PageVector<Record<D>> records_;  // by slot
+  PageVector<Agenda<D>> agenda_;
+  PageVector<Id> order_;                      // whose record is in a slot
+  std::vector<double> radius_, mass_, grown_; // by slot; empty where all are equal
+  double common_radius_ = 0, common_mass_ = 0;
+  double grown_for_ = -1;  // the radius the lists were made for, where it is one and stays
+  Packing<D> packing_;
+  ScanSetting setting_;
   Calendar calendar_;
   std::priority_queue<Tied> tied_;  // events at one and the same time, in the order of their keys
+  double tied_time_ = 0;
 
-  std::unique_ptr<CellGrid<D>> grid_;
-  std::vector<Cell<D>> cell_;  // unwrapped
-  static constexpr Id kNobody = std::numeric_limits<Id>::max();
-  std::vector<Id> first_, next_, previous_;  // who is in a cell: a list through the particles
+  std::unique_ptr<SkinLists<D>> lists_;  // one of the two
+  std::unique_ptr<LinkedCells<D>> cells_;
+  Candidates found_;
+
   EventCounts counts_;
-  std::uint64_t events_ = 0;                  // contacts since load()
-  std::size_t scheduled_ = 0, expected_ = 0;  // entries of this slab, and of the last
+  std::uint64_t events_ = 0;       // contacts since load()
+  std::uint64_t since_sort_ = 0;   // contacts
 };
 
 }  // namespace carom

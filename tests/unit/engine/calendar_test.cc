@@ -7,6 +7,8 @@
 namespace carom {
 namespace {
 
+const auto always = [](const CalendarEntry&) { return true; };
+
 TEST(Calendar, ServesInOrderWhateverIsScheduledMeanwhile) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -15,12 +17,12 @@ TEST(Calendar, ServesInOrderWhateverIsScheduledMeanwhile) {
     calendar.reset(2.0, expected);
     std::size_t scheduled = 0, served = 0;
     auto push = [&](double time) {
-      calendar.push({time, static_cast<std::uint32_t>(scheduled), 0});
+      calendar.push(time, static_cast<std::uint32_t>(scheduled));
       if (time < 2.0) ++scheduled;
     };
     for (int k = 0; k < 3000; ++k) push(3 * uniform(random));  // a third of them beyond the horizon
     double now = 0;
-    while (const CalendarEntry* entry = calendar.top()) {
+    while (const CalendarEntry* entry = calendar.top(always)) {
       ASSERT_GE(entry->time, now);
       now = entry->time;
       calendar.pop();
@@ -31,13 +33,50 @@ TEST(Calendar, ServesInOrderWhateverIsScheduledMeanwhile) {
   }
 }
 
+TEST(Calendar, LeavesOutWhatNoLongerHolds) {
+  Calendar calendar;
+  calendar.reset(1.0, 1000);
+  for (std::uint32_t k = 0; k < 1000; ++k) calendar.push(0.9 * ((k * 617) % 1000) / 1000.0, k);
+  const auto even = [](const CalendarEntry& entry) { return entry.slot % 2 == 0; };
+  std::size_t served = 0;
+  double before = -1;
+  while (const CalendarEntry* entry = calendar.top(even)) {
+    EXPECT_TRUE(even(*entry));
+    EXPECT_LT(before, entry->time);
+    before = entry->time;
+    calendar.pop();
+    ++served;
+  }
+  EXPECT_EQ(served, 500u);
+}
+
+TEST(Calendar, TakesVeryUnevenTimes) {  // bins adapt; entries at one time and far beyond the ring among them
+  Calendar calendar;
+  calendar.reset(1e6, 100);
+  std::size_t scheduled = 0;
+  const auto push = [&](double time) {
+    calendar.push(time, 0);
+    scheduled += time < 1e6 ? 1 : 0;
+  };
+  for (int k = 0; k < 200; ++k) push(0.0), push(1e-9 * k), push(5000.0 * k), push(999.0 + 1e-3 * k);
+  double now = 0;
+  std::size_t served = 0;
+  while (const CalendarEntry* entry = calendar.top(always)) {
+    ASSERT_GE(entry->time, now);
+    now = entry->time;
+    calendar.pop();
+    if (++served % 3 == 0 && served < 3000) push(now + (served % 2 == 0 ? 1e-6 : 2e5));
+  }
+  EXPECT_EQ(served, scheduled);
+}
+
 TEST(Calendar, StartsAfresh) {
   Calendar calendar;
   calendar.reset(1.0, 4);
-  calendar.push({0.5, 0, 0});
-  calendar.top();
+  calendar.push(0.5, 0);
+  calendar.top(always);
   calendar.reset(2.0, 4);
-  EXPECT_EQ(calendar.top(), nullptr);
+  EXPECT_EQ(calendar.top(always), nullptr);
 }
 
 }  // namespace

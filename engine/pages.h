@@ -1,0 +1,42 @@
+#pragma once
+// Memory for large arrays that are accessed at random: in huge pages where the system grants them, which saves most of
+// the address translations that a million particles would miss.
+
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
+
+namespace carom {
+
+template <class T>
+struct PageAllocator {
+  using value_type = T;
+  PageAllocator() = default;
+  template <class U>
+  PageAllocator(const PageAllocator<U>&) {}  // NOLINT(google-explicit-constructor): as the standard wants it
+
+  T* allocate(std::size_t n) {
+    const std::size_t bytes = n * sizeof(T), page = bytes < kHugePage ? kLine : kHugePage;
+    void* const memory = std::aligned_alloc(page, (bytes + page - 1) / page * page);
+    if (!memory) throw std::bad_alloc();
+#if defined(__linux__)
+    if (page == kHugePage) madvise(memory, bytes, MADV_HUGEPAGE);
+#endif
+    return static_cast<T*>(memory);
+  }
+  void deallocate(T* memory, std::size_t) { std::free(memory); }
+  bool operator==(const PageAllocator&) const { return true; }
+
+ private:
+  static constexpr std::size_t kLine = 64, kHugePage = std::size_t{1} << 21;
+};
+
+/// A vector for the core's large arrays; its memory starts at a cache line.
+template <class T>
+using PageVector = std::vector<T, PageAllocator<T>>;
+
+}  // namespace carom

@@ -1,0 +1,6 @@
+// See scan_kernel.h.
+#include "engine/scan_kernel.h"
+
+namespace carom::kernels {
+const ScanKernels avx2{"avx2", {scan<2, 4>, scan<3, 4>}, near};
+}

@@ -1,0 +1,6 @@
+// See scan_kernel.h.
+#include "engine/scan_kernel.h"
+
+namespace carom::kernels {
+const ScanKernels avx512{"avx512", {scan<2, 8>, scan<3, 8>}, near};
+}

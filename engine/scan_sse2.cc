@@ -1,0 +1,6 @@
+// See scan_kernel.h.
+#include "engine/scan_kernel.h"
+
+namespace carom::kernels {
+const ScanKernels sse2{"sse2", {scan<2, 2>, scan<3, 2>}, near};
+}

@@ -1,0 +1,81 @@
+#pragma once
+// Neighbour lists with a skin: for each sphere all others that it could touch while both stay within `skin` of where
+// they were when their lists were made. A sphere that leaves that region gets a new list, and its neighbours are told.
+//
+// The centres of the regions stand in cells, eight to a cache line with their places in ten bits an axis; spheres of
+// very different sizes have cells of their own, a factor of two in radius each, so that a small sphere does not look
+// through cells as large as the largest one. Lists are symmetric. (Verlet, Phys. Rev. 159 (1967) 98; event-driven:
+// Donev, Torquato, Stillinger, J. Comput. Phys. 202 (2005) 737.)
+
+#include <span>
+#include <vector>
+
+#include "engine/agenda.h"
+#include "engine/pages.h"
+#include "engine/scan.h"
+
+namespace carom {
+
+template <int D>
+class SkinLists {
+ public:
+  /// `radius` by slot, the largest one they will have; one entry where all are equal.
+  SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> radius,
+            double skin, PageVector<Agenda<D>>& agenda);
+
+  double skin() const { return skin_; }
+  const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{8} * a.list]; }
+
+  /// Makes all lists for spheres at x, by slot.
+  void build(std::span<const Record<D>> records);
+
+  /// The sphere is now at x: makes its list anew and mends those of its neighbours. Those who are new in it come last;
+  /// returns how many.
+  unsigned renew(Slot i, const Vec<D>& x);
+
+  /// The spheres have moved since, and been wrapped into the box: mends images and renews the lists of those that have
+  /// left their regions.
+  void follow(std::span<const Record<D>> records);
+
+ private:
+  struct Level {  // spheres of similar size
+    CellGrid<D> grid;
+    double largest_radius;
+    PageVector<CellLine> lines;
+    std::vector<std::uint32_t> next;  // by line
+    std::uint32_t free = kNobody;
+  };
+  using Place = std::array<std::int32_t, D>;  // in 1024ths of a cell
+
+  std::size_t level_of(Slot i) const { return level_.empty() ? 0 : level_[i]; }
+  double radius(Slot i) const { return radius_[level_.empty() ? 0 : i]; }
+  Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
+  void insert(Slot i, const Vec<D>& x);
+  void remove(Slot i, const Vec<D>& x);
+  unsigned surround(Slot i, const Vec<D>& x);
+  void look_into(const Level& level, Slot i, const Vec<D>& x, unsigned& found);
+  void assign(Slot i, unsigned n);
+  void add(Slot i, std::uint32_t candidate);
+  void drop(Slot i, std::uint32_t candidate);
+  void shift(Slot i, const Image<D>& boxes);
+  std::uint32_t take(unsigned units);
+
+  Box<D> box_;
+  Packing<D> packing_;
+  const ScanKernels& kernels_;
+  std::span<const double> radius_;
+  double skin_;
+  PageVector<Agenda<D>>& agenda_;
+  std::vector<Level> levels_;
+  std::vector<std::uint8_t> level_;          // by slot; empty where there is one level
+  PageVector<std::int32_t> boxes_;           // by slot: the box of the region's centre, as a linear image
+  PageVector<std::uint32_t> pool_;           // the lists
+  std::vector<std::vector<std::uint32_t>> unused_;  // lists given back, by capacity
+
+  std::vector<CellVisit> visits_;
+  std::vector<std::uint32_t> slots_, found_, gone_;
+  std::vector<std::int32_t> away_;
+  bool exact_ = false;  // places in cells do not tell all
+};
+
+}  // namespace carom
