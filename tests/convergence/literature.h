@@ -99,17 +99,35 @@ struct Component {
   double fraction, diameter;
 };
 
-/// A mixture of hard spheres: Mansoori, Carnahan, Starling, Leland, J. Chem. Phys. 54 (1971) 1523. Right to about 0.3 %
-/// of Z: that is how far it is off for equal spheres, where it is the equation of Carnahan and Starling.
-inline double mixture(std::span<const Component> components, double eta) {
-  double m1 = 0, m2 = 0, m3 = 0;  // mean powers of the diameter
-  for (const auto& c : components) {
-    m1 += c.fraction * c.diameter;
-    m2 += c.fraction * std::pow(c.diameter, 2);
-    m3 += c.fraction * std::pow(c.diameter, 3);
+/// a = ⟨σ⟩⟨σ²⟩/⟨σ³⟩ and b = ⟨σ²⟩³/⟨σ³⟩²: all that the two equations below know of a mixture; 1 for equal spheres.
+struct MixtureMoments {
+  double a, b;
+  explicit MixtureMoments(std::span<const Component> components) {
+    double m1 = 0, m2 = 0, m3 = 0;
+    for (const auto& c : components) {
+      m1 += c.fraction * c.diameter;
+      m2 += c.fraction * std::pow(c.diameter, 2);
+      m3 += c.fraction * std::pow(c.diameter, 3);
+    }
+    a = m1 * m2 / m3;
+    b = m2 * m2 * m2 / (m3 * m3);
   }
-  const double a = m1 * m2 / m3, b = m2 * m2 * m2 / (m3 * m3), e = 1 - eta;
-  return 1 / e + 3 * eta * a / (e * e) + eta * eta * (3 - eta) * b / (e * e * e);
+};
+
+/// A mixture of hard spheres: Mansoori, Carnahan, Starling, Leland, J. Chem. Phys. 54 (1971) 1523. B2 and B3 are exact.
+/// For equal spheres it is the equation of Carnahan and Starling, 0.3 % low at packing fractions about 0.35; for
+/// mixtures it is up to 0.7 % below the next one.
+inline double mixture(std::span<const Component> components, double eta) {
+  const MixtureMoments m(components);
+  const double e = 1 - eta;
+  return 1 / e + 3 * eta * m.a / (e * e) + eta * eta * (3 - eta) * m.b / (e * e * e);
+}
+
+/// The same from the equation of state of equal spheres: Santos, Yuste, López de Haro, Mol. Phys. 96 (1999) 1, with
+/// Kolafa's spheres(). B2 and B3 are exact.
+inline double extended_mixture(std::span<const Component> components, double eta) {
+  const MixtureMoments m(components);
+  return 1 + (spheres(eta) - 1) * (m.a + m.b) / 2 + eta / (1 - eta) * (1 + m.a - 2 * m.b);
 }
 
 }  // namespace carom::literature
