@@ -17,22 +17,19 @@ void calendar_epoch(benchmark::State& state) {
   std::vector<double> waits(1u << 16);
   for (double& wait : waits) wait = -std::log(random.uniform());
   Calendar calendar;
-  std::size_t at = 0, expected = n;
+  std::size_t at = 0;
   std::int64_t served = 0;
   const auto wait = [&] { return waits[at++ % waits.size()]; };
+  const auto holds = [](const CalendarEntry&) { return true; };
   for (auto _ : state) {
-    calendar.reset(kHorizon, expected);
-    for (std::uint32_t i = 0; i < n; ++i) calendar.push({wait(), i, 0});
-    std::size_t count = 0;
-    while (const CalendarEntry* top = calendar.top()) {
-      CalendarEntry entry = *top;
+    calendar.reset(kHorizon, n);
+    for (std::uint32_t i = 0; i < n; ++i) calendar.push(wait(), i);
+    while (const CalendarEntry* top = calendar.top(holds)) {
+      const CalendarEntry entry = *top;
       calendar.pop();
-      entry.time += wait();
-      calendar.push(entry);
-      ++count;
+      calendar.push(entry.time + wait(), entry.slot);
+      ++served;
     }
-    expected = count;
-    served += static_cast<std::int64_t>(count);
   }
   state.SetItemsProcessed(served);
 }
