@@ -146,16 +146,17 @@ void expect_contact_value(double eta, double tolerance) {
 TEST(HardSphereFluid, ContactValueOfSpheres) { expect_contact_value<3>(0.40, 0.03); }
 TEST(HardSphereFluid, ContactValueOfDiscs) { expect_contact_value<2>(0.50, 0.04); }
 
-/// A Lorentz gas: one light point between heavy discs (spheres) that stand still on a lattice, so dense that the way is
-/// barred in all directions (discs) or almost all (spheres). The mean length of its flights is exact: π A/P in the
+/// A Lorentz gas: one light sphere between heavy discs (spheres) that stand still on a lattice, so dense that the way
+/// is barred in all directions (discs) or almost all (spheres). The mean length of its flights is exact: π A/P in the
 /// plane and 4 V/S in space, A and V what is free, P and S what it bounces off (Chernov, J. Stat. Phys. 88 (1997) 1).
 template <int D>
-void expect_lorentz(int cells, double eta, std::uint64_t collisions) {
-  auto system = test::hard_spheres<D>(cells, eta);
+void expect_lorentz(int cells, double barred, std::uint64_t collisions) {
+  // `barred`: the share of the box that its centre cannot reach.
+  const double radius = 0.1, r = 0.5 + radius;
+  auto system = test::hard_spheres<D>(cells, barred * std::pow(0.5 / r, D));
   auto& p = system->particles;
   for (auto& v : p.v) v.setZero();
   for (auto& m : p.mass) m = 1e30;
-  const double radius = 1e-3, r = 0.5 + radius;
   // A place for it where nobody is near.
   Vec<D> place = Vec<D>::Zero(), v = Vec<D>::Zero();
   const auto taken = [&] {
@@ -176,7 +177,7 @@ void expect_lorentz(int cells, double eta, std::uint64_t collisions) {
   p.image.push_back({});
   auto run = test::make_run<D>(std::move(system), "free-flight", {.step = 200, .collisions = collisions});
   run->run();
-  // Each collision ends a flight of the point, and one of a scatterer, of length 0.
+  // Each collision ends a flight of the light sphere, and one of a scatterer, of length 0.
   const double path = 2 * run->statistics().mean_free_path.value();
   const double pi = std::numbers::pi, volume = run->system().box.volume();
   const double expected = D == 2 ? (volume - scatterers * pi * r * r) / (2 * r * scatterers)
