@@ -24,7 +24,7 @@ struct alignas(64) Agenda {
   double contact = std::numeric_limits<double>::infinity();
   double update = std::numeric_limits<double>::infinity();  ///< it leaves its cell, or the region its list is good for
   union Where {
-    double centre[D];  ///< of the region: where the sphere was when its list was made
+    double centre[D];   ///< of the region: where the sphere was when its list was made
     CellPlace<D> cell;  ///< where the core works on cells alone
   } where{};
   std::uint32_t partner = 0;          ///< as a candidate (Packing); at a wall: 2·axis + (0 lower, 1 upper)

@@ -87,6 +87,12 @@ class Calendar {
       ++served_;
   }
 
+  /// Whether another entry of this time, that of the entry served last, is waiting.
+  bool more_at(double time) const {
+    return (served_ < sorted_.size() && sorted_[served_].time == time) ||
+           (!present_.empty() && present_.top().time == time);
+  }
+
   /// The entry that comes up `ahead` places later, as far as is known; null where it is not.
   const CalendarEntry* upcoming(std::size_t ahead) const {
     return served_ + ahead < sorted_.size() ? &sorted_[served_ + ahead] : nullptr;
@@ -149,12 +155,15 @@ class Calendar {
       while (++current_ < kBins && width_ > 0) {
         Bin& bin = ring_[static_cast<std::size_t>(current_)];
         if (bin.count == 0) continue;
-        sorted_.clear();
+        sorted_.resize(bin.count);
         served_ = 0;
         count_ += bin.count;
+        CalendarEntry* end = sorted_.data();
         empty(bin, [&](const CalendarEntry& entry) {
-          if (holds(entry)) sorted_.push_back(entry);
+          *end = entry;
+          end += holds(entry) ? 1 : 0;
         });
+        sorted_.resize(static_cast<std::size_t>(end - sorted_.data()));
         sort();
         if (!sorted_.empty()) return true;
       }

@@ -37,6 +37,7 @@ class CellGrid {
       count_[k] = static_cast<std::int32_t>(std::clamp(std::floor(length / (smallest * (1 + 1e-9))), 1.0, most));
       origin_[k] = low;
       edge_[k] = length / count_[k];
+      inverse_[k] = 1 / edge_[k];
     }
     stride_[D - 1] = 1;
     for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * static_cast<std::size_t>(count_[k]);
@@ -49,13 +50,14 @@ class CellGrid {
   }
   int count(int axis) const { return count_[axis]; }
   double edge(int axis) const { return edge_[axis]; }
+  double inverse_edge(int axis) const { return inverse_[axis]; }
   const Box<D>& box() const { return box_; }
 
   /// The unwrapped cell of a position.
   Cell<D> cell(const Vec<D>& x) const {
     Cell<D> c;
     for (int k = 0; k < D; ++k) {
-      double at = std::floor((x[k] - origin_[k]) / edge_[k]);
+      double at = std::floor((x[k] - origin_[k]) * inverse_[k]);
       if (!box_.periodic(k)) at = std::clamp(at, 0.0, count_[k] - 1.0);
       c[k] = static_cast<std::int32_t>(at);
     }
@@ -141,7 +143,7 @@ class CellGrid {
   Box<D> box_;
   Cell<D> count_;
   std::array<std::size_t, D> stride_;
-  Vec<D> origin_, edge_;
+  Vec<D> origin_, edge_, inverse_;
 };
 
 /// Who is in which cell, for one set of positions: built once, by counting, and read.

@@ -29,7 +29,7 @@ std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
 
 template <int D>
 EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options)
-    : box_(box), particles_(particles), options_(options), kernels_(scan_kernels()) {
+    : box_(box), particles_(particles), options_(options), kernels_(scan_kernels()), tuning_(options) {
   for (int k = 0; k < D; ++k) walled_ = walled_ || box.walled(k);
 }
 
@@ -63,7 +63,8 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
   growth_ = growth;
   horizon_ = horizon;
   events_ = 0;
-  const bool anew = order_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
+  const bool anew =
+      order_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
   if (anew) sort(particles);
   common_radius_ = common(particles_.radius);
   common_mass_ = common(particles_.mass);
@@ -105,19 +106,29 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
 
 template <int D>
 void EventCore<D>::choose_search(double horizon) {
-  double largest = grown(common_radius_, horizon), smallest = largest;
+  double largest = grown(common_radius_, horizon), sum = 0;
   grown_for_ = growth_ == 0 ? common_radius_ : -1;
   grown_ = radius_;
   for (double& r : grown_) {
     r = grown(r, horizon);
     largest = std::max(largest, r);
-    smallest = smallest == 0 ? r : std::min(smallest, r);
+    sum += r;
   }
-  const bool use_cells = options_.method == SearchOptions::Method::cells;
-  if (use_cells) {
+  double volume = 1;
+  for (int k = 0; k < D; ++k) {
+    double edge = box_.edges[k];
+    if (box_.boundary[k] == Boundary::open) {  // as far as there are spheres
+      double low = records_[0].x[k], high = low;
+      for (const auto& r : records_) low = std::min(low, r.x[k]), high = std::max(high, r.x[k]);
+      edge = high - low + 2 * largest;
+    }
+    volume *= edge;
+  }
+  const auto n = static_cast<double>(records_.size());
+  tuning_.choose({D, n / volume, radius_.empty() ? 2 * largest : 2 * sum / n, 2 * largest}, counts_);
+  if (!tuning_.lists()) {
     lists_.reset();
-    const double edge = std::max(options_.cell, 2 * largest);
-    cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, edge, particles_.x);
+    cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, tuning_.cell(), particles_.x);
     for (Slot i = 0; i < records_.size(); ++i) {
       agenda_[i].where.cell = cells_->place(records_[i].x);
       cells_->insert(i, agenda_[i].where.cell);
@@ -125,8 +136,10 @@ void EventCore<D>::choose_search(double horizon) {
     return;
   }
   cells_.reset();
-  const double skin = options_.skin > 0 ? options_.skin : 0.2 * 2 * smallest;
   if (grown_.empty()) grown_.push_back(largest);
+  double skin = tuning_.skin();
+  for (int k = 0; k < D; ++k)
+    if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
   lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, grown_, skin, agenda_);
   lists_->build(records_);
 }
@@ -178,13 +191,22 @@ typename EventCore<D>::Tied EventCore<D>::tie(Slot i) const {
   return {stale(a) ? Tied::Rank::stale : Tied::Rank::contact, key_of(i), i};
 }
 
+/// Whether two spheres plan the same contact, and it still holds.
+template <int D>
+bool EventCore<D>::mirrored(Slot i, Slot j) const {
+  const Agenda<D>&a = agenda_[i], &b = agenda_[j];
+  return a.kind == EventKind::pair && b.kind == EventKind::pair && b.contact == a.contact && a.contact <= a.update &&
+         b.contact <= b.update && packing_.slot(a.partner) == j && b.partner == packing_.reversed(i, a.partner) &&
+         !stale(a) && !stale(b);
+}
+
 /// The next event before `end`: the smallest time, and of equal times the smallest key.
 template <int D>
 bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
   const auto holds = [&](const CalendarEntry& entry) { return agenda_[entry.slot].due() == entry.time; };
   for (;;) {
-    const CalendarEntry* top = calendar_.top(holds);
     if (tied_.empty()) {
+      const CalendarEntry* const top = calendar_.top(holds);
       if (!top || top->time >= end) return false;
       const CalendarEntry entry = *top;
       calendar_.pop();
@@ -194,20 +216,59 @@ bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
       }
       slot = entry.slot;
       time = entry.time;
-      top = calendar_.top(holds);
-      if (!top || top->time != time) return true;
+      if (!calendar_.more_at(time)) return true;
+      // Often it is the same contact, planned by both partners: the other's plan falls with this one.
+      Slot other = slot;
+      if (const CalendarEntry* const next = calendar_.top(holds); mirrored(slot, next->slot)) {
+        other = next->slot;
+        calendar_.pop();
+        if (!calendar_.more_at(time)) return true;
+      }
       tied_.push(tie(slot));
+      if (other != slot) tied_.push(tie(other));
       tied_time_ = time;
     }
     time = tied_time_;
-    while ((top = calendar_.top(holds)) && top->time == time) {
+    while (calendar_.more_at(time)) {
+      const CalendarEntry* const top = calendar_.top(holds);
       if (holds(*top)) tied_.push(tie(top->slot));
       calendar_.pop();
     }
     const Tied first = tied_.top();
     tied_.pop();
     slot = first.slot;
-    if (agenda_[slot].due() == time && tie(slot) == first) return true;
+    if (agenda_[slot].due() != time) continue;  // its plans have changed, and its new ones are in the calendar
+    const Tied now = tie(slot);
+    if (now == first) return true;
+    tied_.push(now);  // what it plans has another place among these: its partner has collided
+  }
+}
+
+/// Fetches what the next events will need, while this one is at work.
+template <int D>
+void EventCore<D>::prefetch_upcoming() const {
+  if (const CalendarEntry* const later = calendar_.upcoming(3)) {
+    __builtin_prefetch(&agenda_[later->slot]);
+    __builtin_prefetch(&records_[later->slot]);
+  }
+  if (const CalendarEntry* const next = calendar_.upcoming(1)) {
+    const Agenda<D>& a = agenda_[next->slot];
+    if (lists_) {
+      __builtin_prefetch(lists_->candidates(a));
+      if (a.contact < a.update) {
+        const Slot j = packing_.slot(a.partner);
+        __builtin_prefetch(&agenda_[j]);
+      }
+    } else {
+      cells_->prefetch(a.where.cell);
+    }
+  }
+  if (const CalendarEntry* const next = calendar_.upcoming(0); next && lists_) {
+    const Agenda<D>& a = agenda_[next->slot];
+    const std::uint32_t* const list = lists_->candidates(a);
+    for (unsigned q = 0; q < a.count; ++q) __builtin_prefetch(&records_[packing_.slot(list[q])]);
+    if (a.contact < a.update && a.kind == EventKind::pair)
+      __builtin_prefetch(lists_->candidates(agenda_[packing_.slot(a.partner)]));
   }
 }
 
@@ -216,6 +277,7 @@ double EventCore<D>::run(double end, const Report& report) {
   Slot i;
   double now;
   while (next_event(end, i, now)) {
+    prefetch_upcoming();
     Agenda<D>& a = agenda_[i];
     if (a.update < a.contact) {
       update(i, now);
@@ -242,8 +304,7 @@ double EventCore<D>::run(double end, const Report& report) {
     }
     const Slot j = packing_.slot(a.partner);
     collide_pair(i, now, report);
-    predict(i, now);
-    predict(j, now);
+    predict_two(i, j, now);
     if (report.counters.sphere_sphere >= report.collision_limit) return now;
   }
   return end;
@@ -283,22 +344,58 @@ void EventCore<D>::predict(Slot i, double now) {
   Agenda<D>& a = agenda_[i];
   a.contact = kNever;
   if (lists_) {
-    predict_pairs(i, lists_->candidates(a), a.count, a.shifted);
+    predict_pairs(i, lists_->candidates(a), a.count, a.shifted, records_[i].t == now);
     predict_leaving(i, now);
   } else {
     cells_->around(i, a.where.cell, found_);
-    predict_pairs(i, found_.packed.data(), found_.count, found_.shifted);
+    predict_pairs(i, found_.packed.data(), found_.count, found_.shifted, records_[i].t == now);
     predict_crossing(i, now);
   }
   if (walled_) predict_walls(i);
   schedule(i);
 }
 
-/// Takes the first contact with the candidates where it comes before the one that is planned.
+/// The same for two spheres that have just collided.
 template <int D>
-void EventCore<D>::predict_pairs(Slot i, const std::uint32_t* candidates, unsigned n, bool shifted) {
+void EventCore<D>::predict_two(Slot i, Slot j, double now) {
+  counts_.predictions += 2;
+  Agenda<D>&a = agenda_[i], &b = agenda_[j];
+  ScanTask task[2];
+  if (lists_) {
+    task[0] = {i, lists_->candidates(a), a.count, a.shifted};
+    task[1] = {j, lists_->candidates(b), b.count, b.shifted};
+  } else {
+    cells_->around(i, a.where.cell, found_);
+    cells_->around(j, b.where.cell, others_);
+    task[0] = {i, found_.packed.data(), found_.count, found_.shifted};
+    task[1] = {j, others_.packed.data(), others_.count, others_.shifted};
+  }
+  counts_.candidates += task[0].n + task[1].n;
+  ScanResult first[2];
+  kernels_.scan_two[D - 2](setting_, task, first);
+  a.contact = b.contact = kNever;
+  for (const int k : {0, 1}) {
+    const Slot one = task[k].self;
+    take(one, first[k], task[k].candidates, task[k].n);
+    if (lists_)
+      predict_leaving(one, now);
+    else
+      predict_crossing(one, now);
+    if (walled_) predict_walls(one);
+    schedule(one);
+  }
+}
+
+/// Plans the first contact with the candidates where it comes before the one that is planned. `latest`: no record is of
+/// a later time than the sphere's own.
+template <int D>
+void EventCore<D>::predict_pairs(Slot i, const std::uint32_t* candidates, unsigned n, bool shifted, bool latest) {
   counts_.candidates += n;
-  const ScanResult first = kernels_.scan[D - 2](setting_, i, candidates, n, shifted);
+  take(i, kernels_.scan[D - 2](setting_, i, candidates, n, shifted, latest), candidates, n);
+}
+
+template <int D>
+void EventCore<D>::take(Slot i, const ScanResult& first, const std::uint32_t* candidates, unsigned n) {
   Agenda<D>& a = agenda_[i];
   if (first.time > a.contact || first.time == kNever) return;
   if (first.tied || first.time == a.contact || first.time == -kNever) return predict_pairs_one_by_one(i, candidates, n);
@@ -391,10 +488,9 @@ void EventCore<D>::predict_leaving(Slot i, double now) {
   Vec<D> e;
   for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
   const double skin = lists_->skin() * (1 - 1e-6);
-  if (!field_) {  // |e + v s| = skin
+  if (!field_) {  // |e + v s| = skin; the form that cancels is good enough for a bound
     const double b = e.dot(r.v), v_squared = r.v.squaredNorm(), room = skin * skin - e.squaredNorm();
-    const double root = std::sqrt(std::max(b * b + v_squared * room, 0.0));
-    const double s = b > 0 ? room / (b + root) : (root - b) / v_squared;
+    const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
     a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
     return;
   }
@@ -480,7 +576,7 @@ void EventCore<D>::update(Slot i, double now) {
     const std::uint32_t* const list = lists_->candidates(a);
     unsigned first = a.count - fresh;
     first -= first % 8;  // scans read by eight
-    predict_pairs(i, list + first, a.count - first, a.shifted);
+    predict_pairs(i, list + first, a.count - first, a.shifted, false);
   }
   predict_leaving(i, now);
   schedule(i);
@@ -494,7 +590,7 @@ void EventCore<D>::cross(Slot i, double now) {
   const int axis = a.face / 2, step = a.face % 2 == 1 ? 1 : -1;
   cells_->cross(i, a.where.cell, axis, step);
   cells_->ahead(i, a.where.cell, axis, step, found_);
-  if (found_.count > 0) predict_pairs(i, found_.packed.data(), found_.count, found_.shifted);
+  if (found_.count > 0) predict_pairs(i, found_.packed.data(), found_.count, found_.shifted, false);
   predict_crossing(i, now);
   schedule(i);
 }
@@ -509,13 +605,19 @@ void EventCore<D>::collide_pair(Slot i, double time, const Report& report) {
   const auto generation = static_cast<std::uint16_t>(generation_of(i));
   advance(a, time);
   advance(b, time);
-  const Vec<D> shift = box_.shift(packing_.image(agenda.partner));
+  Vec<D> shift = Vec<D>::Zero();
+  if (packing_.linear(agenda.partner) != 0) shift = box_.shift(packing_.image(agenda.partner));
   const Vec<D> d = a.x - b.x + shift;
   const double mass_a = mass(i), mass_b = mass(j);
   const double radii = radius(i) + radius(j), sigma = grown(radii, time);
   const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, sigma, radii * growth_, mass_a, mass_b) * d;
-  a.v += impulse / mass_a;
-  b.v -= impulse / mass_b;
+  if (common_mass_ == 1) {  // the same bits without divisions
+    a.v += impulse;
+    b.v -= impulse;
+  } else {
+    a.v += impulse / mass_a;
+    b.v -= impulse / mass_b;
+  }
   a.generation = b.generation = generation;
   ++agenda.version;
   ++agenda_[j].version;

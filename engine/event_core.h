@@ -30,19 +30,10 @@
 #include "engine/event_counts.h"
 #include "engine/linked_cells.h"
 #include "engine/particles.h"
+#include "engine/search_tuning.h"
 #include "engine/skin_lists.h"
 
 namespace carom {
-
-/// How the core searches. Nothing of it changes a result; 0 and nothing mean: as the core thinks best.
-struct SearchOptions {
-  enum class Method : std::uint8_t { automatic, lists, cells };
-  Method method = Method::automatic;
-  double skin = 0;             ///< how far a sphere may move before its list is renewed [length]
-  double cell = 0;             ///< least edge of a cell [length]
-  double entries_per_bin = 0;  ///< of the calendar
-  double sort_interval = 40;   ///< contacts a particle after which the particles are sorted in space again
-};
 
 template <int D>
 class EventCore {
@@ -90,6 +81,8 @@ class EventCore {
 
   void sort(const Particles<D>& particles);
   void choose_search(double horizon);
+  void prefetch_upcoming() const;
+  bool mirrored(Slot i, Slot j) const;
   bool next_event(double end, Slot& slot, double& time);
   bool stale(const Agenda<D>& a) const;
   std::uint32_t generation_of(Slot i) const;
@@ -97,7 +90,9 @@ class EventCore {
   Tied tie(Slot i) const;
 
   void predict(Slot i, double now);
-  void predict_pairs(Slot i, const std::uint32_t* candidates, unsigned n, bool shifted);
+  void predict_two(Slot i, Slot j, double now);
+  void take(Slot i, const ScanResult& first, const std::uint32_t* candidates, unsigned n);
+  void predict_pairs(Slot i, const std::uint32_t* candidates, unsigned n, bool shifted, bool latest);
   void predict_pairs_one_by_one(Slot i, const std::uint32_t* candidates, unsigned n);
   void predict_walls(Slot i);
   void predict_leaving(Slot i, double now);
@@ -129,8 +124,8 @@ class EventCore {
 
   PageVector<Record<D>> records_;  // by slot
   PageVector<Agenda<D>> agenda_;
-  PageVector<Id> order_;                      // whose record is in a slot
-  std::vector<double> radius_, mass_, grown_; // by slot; empty where all are equal
+  PageVector<Id> order_;                       // whose record is in a slot
+  std::vector<double> radius_, mass_, grown_;  // by slot; empty where all are equal
   double common_radius_ = 0, common_mass_ = 0;
   double grown_for_ = -1;  // the radius the lists were made for, where it is one and stays
   Packing<D> packing_;
@@ -141,11 +136,12 @@ class EventCore {
 
   std::unique_ptr<SkinLists<D>> lists_;  // one of the two
   std::unique_ptr<LinkedCells<D>> cells_;
-  Candidates found_;
+  Candidates found_, others_;
 
+  SearchTuning tuning_;
   EventCounts counts_;
-  std::uint64_t events_ = 0;       // contacts since load()
-  std::uint64_t since_sort_ = 0;   // contacts
+  std::uint64_t events_ = 0;      // contacts since load()
+  std::uint64_t since_sort_ = 0;  // contacts
 };
 
 }  // namespace carom

@@ -22,11 +22,20 @@ class LinkedCells {
 
   /// Cells of edge at least `smallest`.
   LinkedCells(const Box<D>& box, const Packing<D>& packing, double smallest, std::span<const Vec<D>> x)
-      : packing_(packing), grid_(box, smallest, x, kCellsAParticle), first_(grid_.cells(), kNobody), link_(x.size()) {
+      : packing_(packing),
+        grid_(box, smallest, x, kCellsAParticle),
+        first_(grid_.cells(), kNobody),
+        link_(x.size()),
+        here_(packing.pack(0, 0)) {
     stride_[D - 1] = 1;
     for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * grid_.count(k);
     for (int k = 0; k < D; ++k) {
       one_[k] = 1 << (packing.field_bits * k);
+      for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
+        typename CellGrid<D>::Step step{0, 0};
+        grid_.step(k, c, step);
+        steps_[k].push_back({static_cast<std::ptrdiff_t>(step.offset), join(0, shifted(step.boxes * one_[k]))});
+      }
       periodic_[k] = box.periodic(k);
     }
   }
@@ -46,15 +55,30 @@ class LinkedCells {
     return place;
   }
 
+  /// Fetches the cells around a place into the cache.
+  void prefetch(const Place& place) const {
+    const Step* const x = &steps_[0][place.wrapped[0] + 1];
+    const Step* const y = &steps_[1][place.wrapped[1] + 1];
+    const std::uint32_t* const first = first_.data() + (D == 3 ? place.wrapped[D - 1] : 0);
+    for (int a = -1; a <= 1; ++a)
+      for (int b = D == 3 ? -1 : 0; b <= (D == 3 ? 1 : 0); ++b) __builtin_prefetch(first + x[a].offset + y[b].offset);
+  }
+
   void insert(Slot i, const Place& place) {
     std::uint32_t& first = first_[index(place)];
-    link_[i] = {first, place.boxes};
+    link_[i] = join(first, packing_.pack(i, place.boxes));
     first = i;
   }
   void remove(Slot i, const Place& place) {
-    std::uint32_t* at = &first_[index(place)];
-    while (*at != i) at = &link_[*at].next;
-    *at = link_[i].next;
+    std::uint32_t& first = first_[index(place)];
+    const std::uint32_t next = low(link_[i]);
+    if (first == i) {
+      first = next;
+      return;
+    }
+    Slot before = first;
+    while (low(link_[before]) != i) before = low(link_[before]);
+    link_[before] = join(next, high(link_[before]));
   }
 
   /// Moves a sphere into the next cell along an axis.
@@ -76,60 +100,55 @@ class LinkedCells {
 
   /// Everybody in the sphere's cell and those around it, itself among them.
   void around(Slot self, const Place& place, Candidates& found) {
-    bool inner = true;
-    for (int k = 0; k < D; ++k) inner = inner && place.wrapped[k] > 0 && place.wrapped[k] + 1 < grid_.count(k);
-    unsigned n = 0;
-    if (inner) {
-      const std::uint32_t* const middle = &first_[index(place)];
-      for (int a = -1; a <= 1; ++a) {
-        if constexpr (D == 2) n = row(middle + a * stride_[0], place.boxes, n);
-        if constexpr (D == 3)
-          for (int b = -1; b <= 1; ++b) n = row(middle + a * stride_[0] + b * stride_[1], place.boxes, n);
-      }
-    } else {
-      int low[D], high[D];
-      for (int k = 0; k < D; ++k) low[k] = -1, high[k] = 1;
-      n = outer(place, low, high);
+    int low[D], high[D];
+    bool whole = true;
+    for (int k = 0; k < D; ++k) {
+      low[k] = periodic_[k] || place.wrapped[k] > 0 ? -1 : 0;
+      high[k] = periodic_[k] || place.wrapped[k] + 1 < grid_.count(k) ? 1 : 0;
+      whole = whole && high[k] - low[k] == 2;
     }
-    follow(self, n, found);
+    Seen* end;
+    if (whole) {  // bounds that the compiler knows
+      for (int k = 0; k < D; ++k) low[k] = -1, high[k] = 1;
+      end = heads(place, low, high);
+    } else {
+      end = heads(place, low, high);
+    }
+    follow(self, end, found);
   }
 
   /// Everybody in the cells that came into view when the sphere crossed along an axis.
   void ahead(Slot self, const Place& place, int axis, int step, Candidates& found) {
-    bool inner = true;
-    for (int k = 0; k < D; ++k) inner = inner && place.wrapped[k] > 0 && place.wrapped[k] + 1 < grid_.count(k);
-    unsigned n = 0;
-    if (inner) {
-      const std::uint32_t* const middle = &first_[index(place)] + step * stride_[axis];
-      if (axis == D - 1) {
-        for (int a = -1; a <= 1; ++a) {
-          if constexpr (D == 2) n = head(middle + a * stride_[0], place.boxes, n);
-          if constexpr (D == 3)
-            for (int b = -1; b <= 1; ++b) n = head(middle + a * stride_[0] + b * stride_[1], place.boxes, n);
-        }
-      } else {
-        if constexpr (D == 2) n = row(middle, place.boxes, n);
-        if constexpr (D == 3)
-          for (int a = -1; a <= 1; ++a) n = row(middle + a * stride_[1 - axis], place.boxes, n);
-      }
-    } else {
-      int low[D], high[D];
-      for (int k = 0; k < D; ++k) low[k] = k == axis ? step : -1, high[k] = k == axis ? step : 1;
-      n = outer(place, low, high);
+    int low[D], high[D];
+    for (int k = 0; k < D; ++k) {
+      low[k] = periodic_[k] || place.wrapped[k] > 0 ? -1 : 0;
+      high[k] = periodic_[k] || place.wrapped[k] + 1 < grid_.count(k) ? 1 : 0;
     }
-    follow(self, n, found);
+    const int edge = step < 0 ? low[axis] : high[axis];
+    Seen* const end = who_.data();
+    if (edge != step) return follow(self, end, found);  // beyond the wall there is nobody
+    low[axis] = high[axis] = step;
+    follow(self, heads(place, low, high), found);
   }
 
  private:
-  struct Link {
-    std::uint32_t next;
-    std::int32_t boxes;
-  };
-  struct Seen {
-    std::uint32_t slot;
-    std::int32_t away;  // the box of the cell it was seen in
+  // Pairs of 32 bits, low half first: of a sphere the next one in its cell and itself, packed with the boxes of its
+  // place; of a sphere that was seen its slot and the box of the cell it was seen in, shifted to its bits.
+  using Link = std::uint64_t;
+  using Seen = std::uint64_t;
+  static std::uint64_t join(std::uint32_t low, std::uint32_t high) {
+    return low | static_cast<std::uint64_t>(high) << 32;
+  }
+  static std::uint32_t low(std::uint64_t pair) { return static_cast<std::uint32_t>(pair); }
+  static std::uint32_t high(std::uint64_t pair) { return static_cast<std::uint32_t>(pair >> 32); }
+  /// To a cell along one axis.
+  struct Step {
+    std::ptrdiff_t offset;
+    std::uint64_t away;  // shifted, in the high half
   };
   static constexpr double kCellsAParticle = 8;
+
+  std::uint32_t shifted(std::int32_t boxes) const { return static_cast<std::uint32_t>(boxes) << packing_.slot_bits; }
 
   std::ptrdiff_t index(const Place& place) const {
     std::ptrdiff_t at = place.wrapped[D - 1];
@@ -137,74 +156,69 @@ class LinkedCells {
     return at;
   }
 
-  /// Whoever is first in a cell, if anybody: without a branch.
-  unsigned head(const std::uint32_t* first, std::int32_t away, unsigned n) {
-    who_[n] = {*first, away};
-    return n + (*first != kNobody ? 1 : 0);
-  }
-  unsigned row(const std::uint32_t* middle, std::int32_t away, unsigned n) {
-    n = head(middle - 1, away, n);
-    n = head(middle, away, n);
-    return head(middle + 1, away, n);
-  }
-  /// The same where cells may lie beyond the box.
-  unsigned outer(const Place& place, const int* low, const int* high) {
-    struct Step {
-      std::ptrdiff_t offset;
-      std::int32_t away;
-    } steps[D][3];
-    int number[D];
-    for (int k = 0; k < D; ++k) {
-      number[k] = 0;
-      for (int s = low[k]; s <= high[k]; ++s) {
-        int c = place.wrapped[k] + s;
-        std::int32_t away = 0;
-        if (c < 0 || c >= grid_.count(k)) {
-          if (!periodic_[k]) continue;
-          away = c < 0 ? -one_[k] : one_[k];
-          c = c < 0 ? grid_.count(k) - 1 : 0;
+  /// Whoever is first in the cells from `low` to `high` about a place, without a branch; returns the end of who_.
+  Seen* heads(const Place& place, const int* low, const int* high) {
+    const std::uint32_t* const first = first_.data();
+    const std::uint64_t here = join(0, shifted(place.boxes));
+    const Step* const x = &steps_[0][place.wrapped[0] + 1];
+    const Step* const y = &steps_[1][place.wrapped[1] + 1];
+    Seen* end = who_.data();
+    const auto head = [&](std::ptrdiff_t cell, std::uint64_t away) {
+      const std::uint32_t slot = first[cell];
+      *end = away | slot;
+      end += slot != kNobody ? 1 : 0;
+    };
+    for (int a = low[0]; a <= high[0]; ++a)
+      for (int b = low[1]; b <= high[1]; ++b) {
+        const std::ptrdiff_t row = x[a].offset + y[b].offset;
+        const std::uint64_t away = here + x[a].away + y[b].away;
+        if constexpr (D == 2) {
+          head(row, away);
+        } else {
+          const Step* const z = &steps_[2][place.wrapped[2] + 1];
+          for (int c = low[2]; c <= high[2]; ++c) head(row + z[c].offset, away + z[c].away);
         }
-        steps[k][number[k]++] = {c * stride_[k], away};
       }
-    }
-    unsigned n = 0;
-    for (int a = 0; a < number[0]; ++a)
-      for (int b = 0; b < number[1]; ++b) {
-        const std::ptrdiff_t at = steps[0][a].offset + steps[1][b].offset;
-        const std::int32_t away = place.boxes + steps[0][a].away + steps[1][b].away;
-        if constexpr (D == 2)
-          n = head(&first_[at], away, n);
-        else
-          for (int c = 0; c < number[2]; ++c) n = head(&first_[at + steps[2][c].offset], away + steps[2][c].away, n);
-      }
-    return n;
+    return end;
   }
 
   /// Takes the heads that were seen and those behind them for candidates.
-  void follow(Slot self, unsigned n, Candidates& found) {
+  void follow(Slot self, const Seen* seen_end, Candidates& found) {
+    Seen* who = who_.data();
+    std::uint32_t* packed = found.packed.data();
+    const Link* const links = link_.data();
+    const std::uint32_t here = here_;
+    auto n = static_cast<unsigned>(seen_end - who);
+    std::size_t room = std::min(who_.size(), found.packed.size()) - 9;
     std::uint32_t any = 0;
     for (unsigned q = 0; q < n; ++q) {
-      if (n + 9 > who_.size()) who_.resize(2 * who_.size());
-      if (found.packed.size() < who_.size()) found.packed.resize(who_.size());
-      const Seen seen = who_[q];
-      const Link link = link_[seen.slot];
-      const std::int32_t image = link.boxes - seen.away;
-      any |= static_cast<std::uint32_t>(image);
-      found.packed[q] = packing_.pack(seen.slot, image);
-      who_[n] = {link.next, seen.away};
-      n += link.next != kNobody ? 1 : 0;
+      if (n >= room) {
+        who_.resize(2 * who_.size());
+        found.packed.resize(who_.size());
+        who = who_.data();
+        packed = found.packed.data();
+        room = who_.size() - 9;
+      }
+      const Seen seen = who[q];
+      const Link link = links[low(seen)];
+      const std::uint32_t candidate = high(link) - high(seen);  // the difference of the boxes is the image
+      any |= candidate ^ here;
+      packed[q] = candidate;
+      who[n] = (seen & 0xffffffff00000000) | low(link);
+      n += low(link) != kNobody ? 1 : 0;
     }
-    if (any != 0 && 2 * widest_ + 1 > packing_.largest()) check(n);
-    found.shifted = any != 0;
+    found.shifted = any >> packing_.slot_bits != 0;
+    if (found.shifted && 2 * widest_ + 1 > packing_.largest()) check(n);
     found.count = n;
-    for (unsigned q = n; q % 8 != 0; ++q) found.packed[q] = packing_.pack(self, 0);
+    const std::uint32_t nobody = packing_.pack(self, 0);
+    for (unsigned q = 0; q < 8; ++q) packed[n + q] = nobody;
   }
 
   /// Where spheres have come so far that a difference of boxes may not fit: look at each.
   void check(unsigned n) const {
     for (unsigned q = 0; q < n; ++q) {
-      const Image<D> boxes = packing_.image(packing_.pack(0, link_[who_[q].slot].boxes));
-      const Image<D> away = packing_.image(packing_.pack(0, who_[q].away));
+      const Image<D> boxes = packing_.image(high(link_[low(who_[q])]));
+      const Image<D> away = packing_.image(high(who_[q]) + here_);
       for (int k = 0; k < D; ++k)
         if (std::abs(boxes[k] - away[k]) > packing_.largest()) throw_too_far();
     }
@@ -213,10 +227,12 @@ class LinkedCells {
   Packing<D> packing_;
   CellGrid<D> grid_;
   std::ptrdiff_t stride_[D];
-  std::int32_t one_[D];  // a box along each axis, as a linear image
+  std::vector<Step> steps_[D];  // to the cells −1 … count along each axis
+  std::int32_t one_[D];         // a box along each axis, as a linear image
   bool periodic_[D];
   PageVector<std::uint32_t> first_;
   PageVector<Link> link_;
+  std::uint32_t here_;  // a candidate in the same box, but for its slot
   std::vector<Seen> who_ = std::vector<Seen>(64);
   std::int32_t widest_ = 0;  // the farthest box anyone has come to
 };

@@ -59,7 +59,9 @@ class Packing {
     return slot | static_cast<std::uint32_t>(linear_image + bias) << slot_bits;
   }
   Slot slot(std::uint32_t candidate) const { return candidate & slot_mask; }
-  std::int32_t linear(std::uint32_t candidate) const { return static_cast<std::int32_t>(candidate >> slot_bits) - bias; }
+  std::int32_t linear(std::uint32_t candidate) const {
+    return static_cast<std::int32_t>(candidate >> slot_bits) - bias;
+  }
   Image<D> image(std::uint32_t candidate) const {
     Image<D> image;
     const std::uint32_t code = candidate >> slot_bits;

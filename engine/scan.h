@@ -28,6 +28,14 @@ struct ScanResult {
   bool tied;            ///< another contact may have the same time: look one by one
 };
 
+/// A sphere to scan for, whose record is later than those of its candidates, as after a collision.
+struct ScanTask {
+  std::uint32_t self;
+  const std::uint32_t* candidates;
+  unsigned n;
+  bool shifted;
+};
+
 /// Eight spheres of a cell: places in 1024ths of the cell, ten bits an axis, and slots (kNobody where there is none).
 struct alignas(64) CellLine {
   std::uint32_t place[8];
@@ -35,18 +43,21 @@ struct alignas(64) CellLine {
 };
 inline constexpr std::uint32_t kNobody = 0xffffffff;
 
-/// A cell to look into.
-struct CellVisit {
-  std::uint32_t line;  ///< its first line
-  std::int32_t away;   ///< the box it lies in, as a linear image
-  float offset[3];     ///< of the cell from that of the sphere who looks [1024ths of a cell]
+/// A step to a cell along one axis, from that of the sphere who looks.
+struct CellStep {
+  std::uint32_t line;  ///< what it adds to the number of the cell's first line
+  std::int32_t away;   ///< the boxes it leads through, as a linear image
+  float offset;        ///< [1024ths of a cell]
+  float squared;       ///< square of the distance to the nearest point of the cells there
 };
 
 struct NearTask {
   const CellLine* lines;
   const std::uint32_t* next;  ///< by line: the next line of the same cell, or kNobody
-  float at[3];                ///< where in its cell the sphere stands [1024ths]
-  float scale[3];             ///< length of 1/1024 of a cell, by axis
+  const CellStep* step[3];    ///< along each axis
+  unsigned steps[3];
+  float at[3];     ///< where in its cell the sphere stands [1024ths]
+  float scale[3];  ///< length of 1/1024 of a cell, by axis
   float limit_squared;
 };
 
@@ -54,12 +65,15 @@ struct NearTask {
 struct ScanKernels {
   const char* name;
   /// The first contact of sphere `self` among n candidates, which are padded with `self` to a multiple of 8; `shifted`:
-  /// some of them are not in the same box. By dimension − 2.
+  /// some of them are not in the same box; `latest`: none of their records is of a later time than its own. By
+  /// dimension − 2.
   ScanResult (*scan[2])(const ScanSetting&, std::uint32_t self, const std::uint32_t* candidates, unsigned n,
-                        bool shifted);
+                        bool shifted, bool latest);
+  /// The same for the two spheres of a collision.
+  void (*scan_two[2])(const ScanSetting&, const ScanTask* task, ScanResult* result);
   /// Writes slots and linear images of the cells of all spheres within the limit; returns how many. The arrays must
   /// hold as many as there are in the cells.
-  unsigned (*near)(const NearTask&, const CellVisit* visits, unsigned n, std::uint32_t* slots, std::int32_t* away);
+  unsigned (*near)(const NearTask&, std::uint32_t* slots, std::int32_t* away);
 };
 
 /// The widest kernels this machine has, or those that CAROM_SIMD names. Throws Error(Failure::deck) where it names what

@@ -108,8 +108,24 @@ inline Double<W> all(double x) {
   return lanes;
 }
 
-template <int D, int W, bool shifted, bool plain>
-ScanResult scan_lanes(const ScanSetting& s, std::uint32_t self, const std::uint32_t* candidates, unsigned n) {
+/// The first contact in every lane.
+template <int W>
+struct First {
+  Double<W> time;
+  Long<W> which, tied;
+};
+
+template <int W>
+inline ScanResult finish(const First<W>& lanes) {
+  const double first = smallest<W>(lanes.time);
+  const unsigned at = bits<W>(lanes.time == first);
+  const bool several = (at & (at - 1)) != 0 && first < __builtin_inf();
+  return {first, static_cast<std::uint32_t>(lanes.which[__builtin_ctz(at)]), several || bits<W>(lanes.tied) != 0};
+}
+
+template <int D, int W, bool shifted, bool latest, bool plain>
+inline __attribute__((always_inline)) First<W> scan_lanes(const ScanSetting& s, std::uint32_t self,
+                                                          const std::uint32_t* candidates, unsigned n) {
   using V = Double<W>;
   constexpr double kNever = __builtin_inf();
   const double* const own = s.records + std::size_t{8} * self;
@@ -121,16 +137,18 @@ ScanResult scan_lanes(const ScanSetting& s, std::uint32_t self, const std::uint3
   Long<W> place, which{}, tied{};
   for (int l = 0; l < W; ++l) place[l] = l;
   V best = none;
-  for (unsigned at = 0; at < n; at += W, place += W) {
+  const double* const records = s.records;
+  const std::uint32_t slot_mask = s.slot_mask;
+  for (const std::uint32_t* const end = candidates + n; candidates < end; candidates += W, place += W) {
     const double* record[W];
-    for (int l = 0; l < W; ++l) record[l] = s.records + std::size_t{8} * (candidates[at + l] & s.slot_mask);
+    for (int l = 0; l < W; ++l) record[l] = records + std::size_t{8} * (candidates[l] & slot_mask);
     V field[2 * D + 2];  // x, v, t of the candidates, and what comes after
     for (int k = 0; k < 2 * D + 2; k += 2) load_pairs(record, k, field[k], field[k + 1]);
     const V t_j = field[2 * D];
-    const V now = t_i > t_j ? t_i : t_j, s_i = now - t_i, s_j = now - t_j;
+    const V now = latest ? t_i : t_i > t_j ? t_i : t_j, s_i = now - t_i, s_j = now - t_j;
     V d[D], v[D];
     for (int k = 0; k < D; ++k) {
-      d[k] = (x_i[k] + s_i * v_i[k]) - (field[k] + s_j * field[D + k]);
+      d[k] = (latest ? x_i[k] : x_i[k] + s_i * v_i[k]) - (field[k] + s_j * field[D + k]);
       v[k] = v_i[k] - field[D + k];
     }
     if constexpr (!plain) {
@@ -142,7 +160,7 @@ ScanResult scan_lanes(const ScanSetting& s, std::uint32_t self, const std::uint3
     }
     if constexpr (shifted) {
       typename Lanes<W>::Bits code;
-      __builtin_memcpy(&code, candidates + at, sizeof code);
+      __builtin_memcpy(&code, candidates, sizeof code);
       const unsigned mask = (1u << s.field_bits) - 1, zero = 1u << (s.field_bits - 1);
       for (int k = 0; k < D; ++k) {
         const auto image = (typename Lanes<W>::Int)((code >> (s.slot_bits + k * s.field_bits) & mask) - zero);
@@ -172,7 +190,7 @@ ScanResult scan_lanes(const ScanSetting& s, std::uint32_t self, const std::uint3
       time = (b < 0.0) & (c <= 0.0) ? overlapping : time;
     } else {
       if (s.radius)
-        for (int l = 0; l < W; ++l) sigma[l] = s.radius[self] + s.radius[candidates[at + l] & s.slot_mask];
+        for (int l = 0; l < W; ++l) sigma[l] = s.radius[self] + s.radius[candidates[l] & slot_mask];
       // As contact_time() for growing spheres, contact.h.
       const V rate = sigma * s.growth, reach = sigma * (1.0 + s.growth * now);
       const V c = d_squared - reach * reach, falling = b - reach * rate, outrun = v_squared - rate * rate;
@@ -180,26 +198,44 @@ ScanResult scan_lanes(const ScanSetting& s, std::uint32_t self, const std::uint3
       const V root = square_root<W>(discriminant);
       time = now + (falling < 0.0 ? c / (root - falling) : (falling + root) / -outrun);
       time = (discriminant > 0.0) & ((falling < 0.0) | (outrun < 0.0)) ? time : none;
-      time = (c <= 0.0) ? ((falling < 0.0) ? overlapping : none) : time;
+      time = (c <= 0.0) ? ((falling < 0.0) & (d_squared > 0.0) ? overlapping : none) : time;  // but for the padding
     }
     tied |= (time == best) & (time < none);
     const Long<W> sooner = time < best;
     best = sooner ? time : best;
     which = sooner ? place : which;
   }
-  const double first = smallest<W>(best);
-  const unsigned lanes = bits<W>(best == first);
-  const bool several = (lanes & (lanes - 1)) != 0 && first < kNever;
-  return {first, static_cast<std::uint32_t>(which[__builtin_ctz(lanes)]), several || bits<W>(tied) != 0};
+  return {best, which, tied};
 }
 
 template <int D, int W>
-ScanResult scan(const ScanSetting& s, std::uint32_t self, const std::uint32_t* candidates, unsigned n, bool shifted) {
-  if (s.plain)
-    return shifted ? scan_lanes<D, W, true, true>(s, self, candidates, n)
-                   : scan_lanes<D, W, false, true>(s, self, candidates, n);
-  return shifted ? scan_lanes<D, W, true, false>(s, self, candidates, n)
-                 : scan_lanes<D, W, false, false>(s, self, candidates, n);
+ScanResult scan(const ScanSetting& s, std::uint32_t self, const std::uint32_t* candidates, unsigned n, bool shifted,
+                bool latest) {
+  if (!s.plain) return finish<W>(scan_lanes<D, W, true, false, false>(s, self, candidates, n));
+  if (shifted)
+    return latest ? finish<W>(scan_lanes<D, W, true, true, true>(s, self, candidates, n))
+                  : finish<W>(scan_lanes<D, W, true, false, true>(s, self, candidates, n));
+  return latest ? finish<W>(scan_lanes<D, W, false, true, true>(s, self, candidates, n))
+                : finish<W>(scan_lanes<D, W, false, false, true>(s, self, candidates, n));
+}
+
+/// Two at once: the end of one and the start of the other overlap in the processor.
+template <int D, int W>
+void scan_two(const ScanSetting& s, const ScanTask* task, ScanResult* result) {
+  if (!s.plain) {
+    for (int k = 0; k < 2; ++k)
+      result[k] = finish<W>(scan_lanes<D, W, true, false, false>(s, task[k].self, task[k].candidates, task[k].n));
+  } else if (task[0].shifted || task[1].shifted) {
+    const First<W> a = scan_lanes<D, W, true, true, true>(s, task[0].self, task[0].candidates, task[0].n);
+    const First<W> b = scan_lanes<D, W, true, true, true>(s, task[1].self, task[1].candidates, task[1].n);
+    result[0] = finish<W>(a);
+    result[1] = finish<W>(b);
+  } else {
+    const First<W> a = scan_lanes<D, W, false, true, true>(s, task[0].self, task[0].candidates, task[0].n);
+    const First<W> b = scan_lanes<D, W, false, true, true>(s, task[1].self, task[1].candidates, task[1].n);
+    result[0] = finish<W>(a);
+    result[1] = finish<W>(b);
+  }
 }
 
 typedef int Ints __attribute__((vector_size(32)));
@@ -211,7 +247,8 @@ inline unsigned bits(Ints mask) {
   return static_cast<unsigned>(_mm256_movemask_ps((__m256)mask));
 #elif defined(__SSE2__)
   typedef int Half __attribute__((vector_size(16)));
-  const Half low = __builtin_shufflevector(mask, mask, 0, 1, 2, 3), high = __builtin_shufflevector(mask, mask, 4, 5, 6, 7);
+  const Half low = __builtin_shufflevector(mask, mask, 0, 1, 2, 3),
+             high = __builtin_shufflevector(mask, mask, 4, 5, 6, 7);
   return static_cast<unsigned>(_mm_movemask_ps((__m128)low) | _mm_movemask_ps((__m128)high) << 4);
 #else
   unsigned all = 0;
@@ -221,39 +258,49 @@ inline unsigned bits(Ints mask) {
 }
 
 /// Which spheres of a line are within the limit.
-inline unsigned within(const NearTask& task, const CellLine& cell, const CellVisit& visit) {
+inline unsigned within(const NearTask& task, const CellLine& cell, float x0, float y0, float z0) {
   Ints place, slot;
   __builtin_memcpy(&place, cell.place, sizeof place);
   __builtin_memcpy(&slot, cell.slot, sizeof slot);
-  const Floats x = (__builtin_convertvector(place & 1023, Floats) + (visit.offset[0] - task.at[0])) * task.scale[0];
-  const Floats y = (__builtin_convertvector(place >> 10 & 1023, Floats) + (visit.offset[1] - task.at[1])) * task.scale[1];
-  const Floats z = (__builtin_convertvector(place >> 20 & 1023, Floats) + (visit.offset[2] - task.at[2])) * task.scale[2];
+  const Floats x = (__builtin_convertvector(place & 1023, Floats) + x0) * task.scale[0];
+  const Floats y = (__builtin_convertvector(place >> 10 & 1023, Floats) + y0) * task.scale[1];
+  const Floats z = (__builtin_convertvector(place >> 20 & 1023, Floats) + z0) * task.scale[2];
   return bits((x * x + y * y + z * z < task.limit_squared) & (slot != -1));
 }
 
-unsigned near(const NearTask& task, const CellVisit* visits, unsigned n, std::uint32_t* slots, std::int32_t* away) {
-  unsigned found = 0;
-  for (unsigned start = 0; start < n; start += 8) {  // eight cells at a time: one bit for each of their spheres
-    std::uint64_t hits = 0;
-    const unsigned cells = n - start < 8 ? n - start : 8;
-    for (unsigned q = 0; q < cells; ++q) {
-      const CellVisit& visit = visits[start + q];
-      hits |= static_cast<std::uint64_t>(within(task, task.lines[visit.line], visit)) << (8 * q);
-      for (std::uint32_t line = task.next[visit.line]; line != kNobody; line = task.next[line]) {  // crowded cells
-        unsigned more = within(task, task.lines[line], visit);
-        for (; more != 0; more &= more - 1) {
-          slots[found] = task.lines[line].slot[__builtin_ctz(more)];
-          away[found++] = visit.away;
-        }
-      }
-    }
+[[maybe_unused]] unsigned near(const NearTask& task, std::uint32_t* slots, std::int32_t* away) {
+  unsigned found = 0, cells = 0;
+  std::uint32_t line[8];
+  std::int32_t box[8];
+  std::uint64_t hits = 0;  // of eight cells, one bit for each of their spheres
+  const auto flush = [&] {
     for (; hits != 0; hits &= hits - 1) {
       const int bit = __builtin_ctzll(hits);
-      const CellVisit& visit = visits[start + static_cast<unsigned>(bit / 8)];
-      slots[found] = task.lines[visit.line].slot[bit % 8];
-      away[found++] = visit.away;
+      slots[found] = task.lines[line[bit / 8]].slot[bit % 8];
+      away[found++] = box[bit / 8];
     }
-  }
+    cells = 0;
+  };
+  for (unsigned a = 0; a < task.steps[0]; ++a)
+    for (unsigned b = 0; b < task.steps[1]; ++b) {
+      const CellStep &p = task.step[0][a], &q = task.step[1][b];
+      const float squared = p.squared + q.squared;
+      if (!(squared < task.limit_squared)) continue;
+      for (unsigned c = 0; c < task.steps[2]; ++c) {
+        const CellStep& r = task.step[2][c];
+        const float x0 = p.offset - task.at[0], y0 = q.offset - task.at[1], z0 = r.offset - task.at[2];
+        line[cells] = p.line + q.line + r.line;
+        box[cells] = p.away + q.away + r.away;
+        hits |= static_cast<std::uint64_t>(within(task, task.lines[line[cells]], x0, y0, z0)) << (8 * cells);
+        for (std::uint32_t l = task.next[line[cells]]; l != kNobody; l = task.next[l])  // crowded cells
+          for (unsigned more = within(task, task.lines[l], x0, y0, z0); more != 0; more &= more - 1) {
+            slots[found] = task.lines[l].slot[__builtin_ctz(more)];
+            away[found++] = box[cells];
+          }
+        if (++cells == 8) flush();
+      }
+    }
+  flush();
   return found;
 }
 

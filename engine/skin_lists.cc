@@ -1,6 +1,7 @@
 #include "engine/skin_lists.h"
 
 #include <cmath>
+#include <cstring>
 
 namespace carom {
 namespace {
@@ -21,7 +22,8 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
                         std::span<const double> radius, double skin, PageVector<Agenda<D>>& agenda)
     : box_(box), packing_(packing), kernels_(kernels), radius_(radius), skin_(skin), agenda_(agenda) {
   const double largest = *std::max_element(radius.begin(), radius.end());
-  exact_ = radius.size() > 1 || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
+  exact_ =
+      radius.size() > 1 || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
   if (radius.size() > 1) {
     level_.resize(radius.size());
     for (std::size_t i = 0; i < radius.size(); ++i)
@@ -71,7 +73,7 @@ template <int D>
 Cell<D> SkinLists<D>::locate(const Level& level, const Vec<D>& x, Place& place) const {
   const Cell<D> cell = level.grid.cell(x);
   for (int k = 0; k < D; ++k) {
-    const double within = (x[k] - level.grid.face(k, cell[k])) / level.grid.edge(k);
+    const double within = (x[k] - level.grid.face(k, cell[k])) * level.grid.inverse_edge(k);
     place[k] = static_cast<std::int32_t>(std::clamp(within * kPlaces, 0.0, kPlaces - 1));
   }
   return cell;
@@ -144,7 +146,7 @@ template <int D>
 void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsigned& found) {
   Place place;
   const Cell<D> cell = locate(level, x, place);
-  NearTask task{level.lines.data(), level.next.data(), {0, 0, 0}, {0, 0, 0}, 0};
+  NearTask task{level.lines.data(), level.next.data(), {}, {}, {}, {}, 0};
   double rounding = 0;
   const double reach = radius(i) + level.largest_radius + 2 * skin_;
   std::int32_t range[D];
@@ -153,54 +155,42 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsign
     task.at[k] = static_cast<float>(place[k]);
     task.scale[k] = static_cast<float>(scale);
     rounding += scale * scale;
-    range[k] = std::max(1, static_cast<std::int32_t>(std::ceil(reach * (1 + 2 * std::sqrt(D) / kPlaces) / level.grid.edge(k))));
+    const double places = reach * (1 + 2 * std::sqrt(D) / kPlaces);
+    range[k] = places <= level.grid.edge(k) ? 1 : static_cast<std::int32_t>(std::ceil(places / level.grid.edge(k)));
     if (!box_.periodic(k)) range[k] = std::min(range[k], level.grid.count(k));
   }
   const double limit = (reach + std::sqrt(rounding)) * (1 + 1e-5);
   task.limit_squared = static_cast<float>(limit * limit);
 
   // The cells in reach, with the square of the distance to the nearest point of each.
-  struct Step {
-    std::uint32_t line;
-    std::int32_t away;
-    float offset, squared;
-  };
-  std::array<boost::container::small_vector<Step, 4>, D> steps;
-  for (int k = 0; k < D; ++k)
+  std::size_t images = 1;  // how often a cell may be seen
+  for (int k = 0; k < D; ++k) {
+    steps_[k].clear();
+    images *= static_cast<std::size_t>(1 + 2 * range[k] / level.grid.count(k));
     for (std::int32_t o = -range[k]; o <= range[k]; ++o) {
       typename CellGrid<D>::Step step;
       if (!level.grid.step(k, cell[k] + o, step)) continue;
       if (std::abs(step.boxes) > packing_.largest()) throw_too_far();
       const float offset = static_cast<float>(o) * static_cast<float>(kPlaces);
-      const float places = o == 0 ? 0 : o > 0 ? offset - task.at[k] - 1 : task.at[k] - offset - static_cast<float>(kPlaces);
+      const float places = o == 0  ? 0
+                           : o > 0 ? offset - task.at[k] - 1
+                                   : task.at[k] - offset - static_cast<float>(kPlaces);
       const float gap = std::max(places, 0.0f) * task.scale[k];
-      steps[k].push_back({static_cast<std::uint32_t>(step.offset), step.boxes * (1 << (packing_.field_bits * k)), offset,
-                          gap * gap});
+      steps_[k].push_back(
+          {static_cast<std::uint32_t>(step.offset), step.boxes * (1 << (packing_.field_bits * k)), offset, gap * gap});
     }
-  unsigned visits = 0;
+  }
+  if constexpr (D == 2) steps_[2].assign(1, {0, 0, 0, 0});
   std::size_t cells = 1;
-  for (const auto& s : steps) cells *= s.size();
-  if (visits_.size() < cells) visits_.resize(cells);
-  for (const Step& a : steps[0])
-    for (const Step& b : steps[1]) {
-      const CellVisit row{a.line + b.line, a.away + b.away, {a.offset, b.offset, 0}};
-      const float squared = a.squared + b.squared;
-      if constexpr (D == 2) {
-        visits_[visits] = row;
-        visits += squared < task.limit_squared ? 1 : 0;
-      } else {
-        for (const Step& c : steps[2]) {
-          visits_[visits] = {row.line + c.line, row.away + c.away, {a.offset, b.offset, c.offset}};
-          visits += squared + c.squared < task.limit_squared ? 1 : 0;
-        }
-      }
-    }
-  std::size_t most = 8u * visits;
-  if (level.lines.size() > level.grid.cells())  // some cells have more than a line
-    for (unsigned q = 0; q < visits; ++q)
-      for (std::uint32_t line = level.next[visits_[q].line]; line != kNobody; line = level.next[line]) most += 8;
+  for (int k = 0; k < 3; ++k) {
+    task.step[k] = steps_[k].data();
+    task.steps[k] = static_cast<unsigned>(steps_[k].size());
+    cells *= steps_[k].size();
+  }
+  // Lines beyond the first of their cells may all be here.
+  const std::size_t most = 8 * (cells + (level.lines.size() - level.grid.cells()) * images);
   if (slots_.size() < most) slots_.resize(2 * most), away_.resize(2 * most);
-  const unsigned n = kernels_.near(task, visits_.data(), visits, slots_.data(), away_.data());
+  const unsigned n = kernels_.near(task, slots_.data(), away_.data());
   if (found_.size() < found + n + 8) found_.resize(2 * (found + n + 8));
 
   for (unsigned q = 0; q < n; ++q) {
@@ -208,7 +198,8 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsign
     if (j == i) continue;
     const std::int32_t linear = boxes_[j] - away_[q];
     if ((boxes_[j] | away_[q]) != 0) {
-      const Image<D> theirs = packing_.image(packing_.pack(0, boxes_[j])), seen = packing_.image(packing_.pack(0, away_[q]));
+      const Image<D> theirs = packing_.image(packing_.pack(0, boxes_[j])),
+                     seen = packing_.image(packing_.pack(0, away_[q]));
       for (int k = 0; k < D; ++k)
         if (std::abs(theirs[k] - seen[k]) > packing_.largest()) throw_too_far();
     }
@@ -293,13 +284,21 @@ unsigned SkinLists<D>::renew(Slot i, const Vec<D>& x) {
   for (int k = 0; k < D; ++k) a.where.centre[k] = x[k];
   insert(i, x);
   const unsigned n = surround(i, x);
-  // Those who are gone and those who are new are told.
+  // Those who are gone and those who are new are told. Both lists are padded with the sphere itself.
   const std::uint32_t* const list = candidates(a);
   const unsigned before = a.count;
+  for (unsigned q = n; q % 8 != 0; ++q) found_[q] = packing_.pack(i, 0);
   const auto among = [](const std::uint32_t* all, unsigned count, std::uint32_t one) {
-    unsigned found = 0;
-    for (unsigned q = 0; q < count; ++q) found |= all[q] == one ? 1u : 0u;
-    return found != 0;
+    typedef std::uint32_t Four __attribute__((vector_size(16)));
+    Four found{};
+    for (unsigned q = 0; q < count; q += 4) {
+      Four four;
+      std::memcpy(&four, all + q, sizeof four);
+      found |= (Four)(four == one);
+    }
+    std::uint64_t halves[2];
+    std::memcpy(halves, &found, sizeof halves);
+    return (halves[0] | halves[1]) != 0;
   };
   gone_.clear();
   for (unsigned q = 0; q < before; ++q)
@@ -347,7 +346,8 @@ void SkinLists<D>::follow(std::span<const Record<D>> records) {
     bool carried = false;
     for (int k = 0; k < D; ++k) {
       if (!box_.periodic(k)) continue;
-      boxes[k] = static_cast<std::int32_t>(std::nearbyint((records[i].x[k] - agenda_[i].where.centre[k]) / box_.edges[k]));
+      boxes[k] =
+          static_cast<std::int32_t>(std::nearbyint((records[i].x[k] - agenda_[i].where.centre[k]) / box_.edges[k]));
       carried = carried || boxes[k] != 0;
     }
     if (carried) shift(i, boxes);

@@ -67,12 +67,12 @@ class SkinLists {
   double skin_;
   PageVector<Agenda<D>>& agenda_;
   std::vector<Level> levels_;
-  std::vector<std::uint8_t> level_;          // by slot; empty where there is one level
-  PageVector<std::int32_t> boxes_;           // by slot: the box of the region's centre, as a linear image
-  PageVector<std::uint32_t> pool_;           // the lists
+  std::vector<std::uint8_t> level_;                 // by slot; empty where there is one level
+  PageVector<std::int32_t> boxes_;                  // by slot: the box of the region's centre, as a linear image
+  PageVector<std::uint32_t> pool_;                  // the lists
   std::vector<std::vector<std::uint32_t>> unused_;  // lists given back, by capacity
 
-  std::vector<CellVisit> visits_;
+  std::array<std::vector<CellStep>, 3> steps_;
   std::vector<std::uint32_t> slots_, found_, gone_;
   std::vector<std::int32_t> away_;
   bool exact_ = false;  // places in cells do not tell all

@@ -91,7 +91,7 @@ class Flow {
 
   /// Runs this many epochs, and more until there have been this many pair collisions.
   Stretch run(std::uint64_t epochs, std::uint64_t collisions) {
-    constexpr std::uint64_t kPatience = 1000;  // epochs, each of ten mean free times
+    constexpr std::uint64_t kPatience = 1000;  // epochs, each of forty mean free times
     const std::uint64_t before = counters_.sphere_sphere;
     const auto start = std::chrono::steady_clock::now();
     Stretch done;
@@ -224,7 +224,7 @@ void say(const std::string& text) {
 std::string heading(const BenchOptions& options) {
   return "carom " + version_string() + "\n" + compiler_string() + "\n" +
          fmt::format(
-             "Hard spheres in a periodic box, free-flight, one core. Equilibrated for {} epochs of about ten mean free "
+             "Hard spheres in a periodic box, free-flight, one core. Equilibrated for {} epochs of about forty mean free "
              "times,\n"
              "then measured {} times over at least {} collisions (whole epochs). B/part.: peak resident memory above\n"
              "that before the state was made. Z = pV/NkT. Events, predictions and entries scheduled: a collision;\n"

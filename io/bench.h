@@ -16,15 +16,15 @@ struct BenchOptions {
   std::vector<std::uint64_t> n{1000, 10000, 100000, 1000000};
   std::vector<double> packing_fraction{0.10, 0.30, 0.49};
   int dimension = 3;
-  std::optional<std::uint64_t> equilibrate;         ///< epochs of ten mean free times before; default epochs_before()
+  std::optional<std::uint64_t> equilibrate;         ///< epochs of forty mean free times before; default epochs_before()
   std::uint64_t collisions = 1000000;               ///< of a measurement, at least: whole epochs are measured
   std::uint64_t repeat = 3;                         ///< measurements a point, one after the other
   std::optional<std::filesystem::path> json;        ///< all results, for scripts
   std::optional<std::filesystem::path> state;       ///< measure this state instead of the table
   std::optional<std::filesystem::path> save_state;  ///< write the equilibrated state of the only point here
 
-  static constexpr std::uint64_t kWarmUp = 2;  ///< epochs of the measured core before it is measured
-  std::uint64_t epochs_before() const { return equilibrate.value_or(state ? 0 : 10); }
+  static constexpr std::uint64_t kWarmUp = 1;  ///< epochs of the measured core before it is measured
+  std::uint64_t epochs_before() const { return equilibrate.value_or(state ? 0 : 3); }
 };
 
 /// Prints the table as it grows; returns the exit code of the process. Throws Error.

@@ -92,7 +92,8 @@ double default_epoch(const System<D>& system) {
       D == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
   const double cross_section = D == 2 ? 2 * diameter : 4 * diameter * diameter;
   const double rate = density * cross_section * contact_value * std::sqrt(std::numbers::pi) * thermal_speed;
-  const double epoch = std::min(10 / rate, 10 * system.box.edges.maxCoeff() / thermal_speed);
+  const double farthest = std::min(300 * diameter, 4 * system.box.edges.minCoeff());
+  const double epoch = std::min(40 / rate, farthest / thermal_speed);
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), epoch, std::chars_format::scientific, 1).ptr;
   double rounded = epoch;

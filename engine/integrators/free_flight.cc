@@ -68,7 +68,7 @@ IntegratorInfo free_flight() {
   Parameter epoch = parameter::step();
   epoch.fallback = "none";
   epoch.meaning =
-      "length of an epoch, after which all particles are brought to one time; about ten mean free times where it is "
+      "length of an epoch, after which all particles are brought to one time; about forty mean free times where it is "
       "absent";
   Parameter limit = parameter::max_events_per_step();
   limit.meaning = "collisions that one epoch may need, per particle, before the run ends with an error";

@@ -1,0 +1,324 @@
+// Nothing that the search does may reach the physics: the same bits whatever the method, the skin, the cells, the bins,
+// the sorting and the vector width.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "engine/contact.h"
+#include "engine/error.h"
+#include "engine/event_core.h"
+#include "engine/placement.h"
+#include "engine/random.h"
+#include "engine/scan_kernel.h"
+#include "tests/support/experiments.h"
+
+namespace carom {
+namespace {
+
+constexpr Boundary W = Boundary::wall, P = Boundary::periodic, O = Boundary::open;
+
+/// Sets an environment variable for a while.
+class Environment {
+ public:
+  Environment(const char* name, const char* value) : name_(name) {
+    if (value) setenv(name, value, 1);
+  }
+  ~Environment() { unsetenv(name_); }
+
+ private:
+  const char* name_;
+};
+
+bool machine_has(const char* simd) {
+  const Environment environment("CAROM_SIMD", simd);
+  try {
+    scan_kernels();
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+template <int D>
+struct Case {
+  std::unique_ptr<System<D>> system;
+  Vec<D> g = Vec<D>::Zero();
+  double growth = 0;
+  double slab = 1;
+  int slabs = 3;
+};
+
+/// What a run leaves: every contact and the last state.
+template <int D>
+struct Trace {
+  std::vector<Contact<D>> contacts;
+  Particles<D> particles;
+};
+
+template <int D>
+Trace<D> run(const Case<D>& c, const SearchOptions& options, const char* simd = nullptr) {
+  const Environment environment("CAROM_SIMD", simd);
+  Trace<D> trace;
+  trace.particles = c.system->particles;
+  Particles<D>& p = trace.particles;
+  EventCore<D> core(c.system->box, p, options);
+  Counters counters;
+  for (int k = 0; k < c.slabs; ++k) {
+    core.load(p, c.g, c.slab, c.growth);
+    core.run(c.slab, {.counters = counters, .contacts = &trace.contacts});
+    core.fly_to(c.slab, p);
+    for (std::size_t i = 0; i < p.size(); ++i) c.system->box.wrap(p.x[i], p.image[i]);
+    for (double& r : p.radius) r *= 1 + c.growth * c.slab;
+  }
+  EXPECT_LT(counters.max_overlap, 1e-12);
+  return trace;
+}
+
+template <int D>
+std::uint64_t bits_of(const std::vector<Vec<D>>& x) {
+  std::uint64_t sum = 0;
+  for (const auto& v : x)
+    for (int k = 0; k < D; ++k) {
+      std::uint64_t bits;
+      std::memcpy(&bits, &v[k], sizeof bits);
+      sum = sum * 0x100000001b3 + bits;
+    }
+  return sum;
+}
+
+template <int D>
+void expect_same(const Trace<D>& a, const Trace<D>& b, const std::string& what) {
+  ASSERT_EQ(a.contacts.size(), b.contacts.size()) << what;
+  for (std::size_t k = 0; k < a.contacts.size(); ++k) {
+    ASSERT_TRUE(a.contacts[k].key == b.contacts[k].key) << what << ", contact " << k;
+    ASSERT_EQ(a.contacts[k].impulse, b.contacts[k].impulse) << what << ", contact " << k;
+    ASSERT_EQ(a.contacts[k].x_lo, b.contacts[k].x_lo) << what << ", contact " << k;
+  }
+  EXPECT_EQ(bits_of<D>(a.particles.x), bits_of<D>(b.particles.x)) << what;
+  EXPECT_EQ(bits_of<D>(a.particles.v), bits_of<D>(b.particles.v)) << what;
+}
+
+using Method = SearchOptions::Method;
+
+template <int D>
+void expect_the_same_whatever_the_search(const Case<D>& c, std::size_t at_least) {
+  const auto reference = run(c, {.method = Method::cells});
+  ASSERT_GE(reference.contacts.size(), at_least);
+  for (std::size_t k = 1; k < reference.contacts.size(); ++k) {
+    if (reference.contacts[k].key.time > reference.contacts[k - 1].key.time) continue;
+    if (reference.contacts[k].key.time < reference.contacts[k - 1].key.time) continue;  // the next slab
+    EXPECT_LT(reference.contacts[k - 1].key, reference.contacts[k].key);
+  }
+  expect_same(reference, run(c, {}), "automatic");
+  for (const double cell : {1.3, 2.1}) expect_same(reference, run(c, {.method = Method::cells, .cell = cell}), "cells");
+  for (const double skin : {0.03, 0.11, 0.3, 0.6})
+    expect_same(reference, run(c, {.method = Method::lists, .skin = skin}), "skin " + std::to_string(skin));
+  for (const double bin : {1.0, 7.0, 5000.0})
+    expect_same(reference, run(c, {.entries_per_bin = bin}), "bin " + std::to_string(bin));
+  for (const double sort : {0.0, 0.7, 1e9})
+    for (const Method method : {Method::lists, Method::cells})
+      expect_same(reference, run(c, {.method = method, .sort_interval = sort}), "sort " + std::to_string(sort));
+  for (const char* simd : {"sse2", "avx2", "avx512"}) {
+    if (!machine_has(simd)) continue;
+    expect_same(reference, run(c, {.method = Method::lists}, simd), simd);
+    expect_same(reference, run(c, {.method = Method::cells}, simd), simd);
+  }
+}
+
+/// Spheres at random places in a box, with radii between those given.
+template <int D>
+std::unique_ptr<System<D>> random_system(int n, const Vec<D>& edges, std::array<Boundary, D> boundary, double smallest,
+                                         double largest, std::uint64_t seed) {
+  std::vector<double> radius(n), mass(n);
+  for (int i = 0; i < n; ++i) {
+    radius[i] = smallest * std::pow(largest / smallest, static_cast<double>(i) / std::max(n - 1, 1));
+    mass[i] = std::pow(radius[i] / largest, D);
+  }
+  if (smallest == largest) mass.assign(n, 1.0);
+  std::vector<Vec<D>> x(n, Vec<D>::Zero()), v(n, Vec<D>::Zero());
+  auto system = test::make_system<D>(edges, P, x, v, radius, mass);
+  system->box.boundary = boundary;
+  std::vector<Id> everybody(n);
+  for (int i = 0; i < n; ++i) everybody[i] = static_cast<Id>(i);
+  EXPECT_EQ(insert_at_random<D>(system->box, system->particles.x, radius, everybody, seed), everybody.size());
+  draw_velocities<D>(system->particles, everybody, std::vector<double>(n, 1.0), seed);
+  return system;
+}
+
+TEST(Search, DenseFluid) {
+  expect_the_same_whatever_the_search<3>({.system = test::hard_spheres<3>(5, 0.49), .slab = 0.4}, 5000);
+  expect_the_same_whatever_the_search<2>({.system = test::hard_spheres<2>(14, 0.69), .slab = 0.4}, 1000);
+}
+
+TEST(Search, Crystal) {
+  expect_the_same_whatever_the_search<3>({.system = test::hard_spheres<3>(4, 0.7), .slab = 0.05}, 3000);
+  expect_the_same_whatever_the_search<2>({.system = test::hard_spheres<2>(8, 0.8), .slab = 0.1}, 500);
+}
+
+TEST(Search, DiluteGas) {
+  expect_the_same_whatever_the_search<3>({.system = test::hard_spheres<3>(5, 0.1), .slab = 3}, 1500);
+  expect_the_same_whatever_the_search<3>({.system = test::hard_spheres<3>(4, 0.001), .slab = 120}, 200);
+  expect_the_same_whatever_the_search<2>({.system = test::hard_spheres<2>(8, 0.02), .slab = 50}, 200);
+}
+
+TEST(Search, ManySizes) {
+  expect_the_same_whatever_the_search<3>(
+      {.system = random_system<3>(300, {7, 7, 7}, {P, P, P}, 0.1, 1.0, 3), .slab = 0.05}, 1000);
+  expect_the_same_whatever_the_search<2>({.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3},
+                                         300);
+}
+
+TEST(Search, Walls) {
+  expect_the_same_whatever_the_search<3>(
+      {.system = random_system<3>(150, {7, 6, 6}, {W, P, W}, 0.5, 0.5, 5), .slab = 1}, 1000);
+  expect_the_same_whatever_the_search<2>({.system = random_system<2>(40, {9.5, 9}, {W, W}, 0.5, 0.5, 6), .slab = 2},
+                                         300);
+}
+
+TEST(Search, Field) {
+  expect_the_same_whatever_the_search<3>(
+      {.system = random_system<3>(150, {6, 6, 9}, {P, P, W}, 0.5, 0.5, 7), .g = {0.1, 0, -1}, .slab = 1}, 1000);
+  expect_the_same_whatever_the_search<2>(
+      {.system = random_system<2>(40, {7, 12}, {W, W}, 0.3, 0.5, 8), .g = {0, -0.5}, .slab = 1}, 200);
+}
+
+TEST(Search, OpenSpace) {  // they fly away, some meet
+  expect_the_same_whatever_the_search<3>(
+      {.system = random_system<3>(200, {8, 8, 8}, {O, O, P}, 0.5, 0.5, 9), .slab = 4, .slabs = 4}, 150);
+}
+
+TEST(Search, TinyPeriodicBoxes) {  // a sphere meets its neighbour through several images, and flies many boxes far
+  expect_the_same_whatever_the_search<3>(
+      {.system = random_system<3>(3, {1.7, 1.9, 2.1}, {P, P, P}, 0.4, 0.4, 10), .slab = 5}, 50);
+  expect_the_same_whatever_the_search<2>({.system = random_system<2>(2, {2.2, 2.6}, {P, P}, 0.5, 0.5, 11), .slab = 20},
+                                         30);
+}
+
+TEST(Search, GrowingSpheres) {
+  expect_the_same_whatever_the_search<3>(
+      {.system = random_system<3>(200, {7, 7, 7}, {P, P, P}, 0.4, 0.4, 12), .growth = 0.05, .slab = 0.5}, 500);
+  expect_the_same_whatever_the_search<2>(
+      {.system = random_system<2>(60, {9, 9}, {W, P}, 0.2, 0.4, 13), .growth = 0.1, .slab = 0.5}, 100);
+}
+
+TEST(Search, ExactTies) {  // a lattice with speeds of 1: whole layers collide at one instant
+  std::vector<Vec<3>> x, v;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      for (int k = 0; k < 6; ++k) {
+        x.push_back({1.5 * i + 0.75, 1.5 * j + 0.75, 1.5 * k + 0.75});
+        v.push_back({i % 2 == 0 ? 1.0 : -1.0, j % 2 == 0 ? 1.0 : -1.0, 0.0});
+      }
+  expect_the_same_whatever_the_search<3>({.system = test::make_system<3>({9, 9, 9}, P, x, v), .slab = 2}, 400);
+}
+
+TEST(Search, AWidthThisMachineLacksIsAnError) {
+  const Environment environment("CAROM_SIMD", "mmx");
+  EXPECT_THROW(scan_kernels(), Error);
+}
+
+/// One sphere and 30 others at random, some of them in other boxes.
+template <int D>
+struct Surroundings {
+  explicit Surroundings(bool plain) : packing(31), records(31), radius(31, 0.5) {
+    RandomStream random(5, RandomPurpose::position, 0);
+    for (auto& r : records) {
+      for (int k = 0; k < D; ++k) r.x[k] = 6 * random.uniform() - 3, r.v[k] = 2 * random.uniform() - 1;
+      r.t = random.uniform();
+    }
+    setting = {.records = reinterpret_cast<const double*>(records.data()),
+               .diameter = 1,
+               .slot_mask = packing.slot_mask,
+               .slot_bits = packing.slot_bits,
+               .field_bits = packing.field_bits,
+               .plain = plain};
+    for (int k = 0; k < D; ++k) setting.edges[k] = 7.3, setting.g[k] = plain ? 0 : 0.1 * k - 0.3;
+    if (!plain) {
+      for (auto& r : radius) r = 0.3 + 0.4 * random.uniform();
+      setting.radius = radius.data();
+      setting.growth = 0.2;
+    }
+    for (Slot j = 1; j < 31; ++j) {
+      Image<D> image{};
+      image[0] = static_cast<int>(j % 3) - 1;
+      candidates.push_back(packing.pack(j, packing.linear(image)));
+    }
+    candidates.resize(32, packing.pack(0, 0));
+  }
+  Packing<D> packing;
+  std::vector<Record<D>> records;
+  std::vector<double> radius;
+  ScanSetting setting;
+  std::vector<std::uint32_t> candidates;
+};
+
+template <int D>
+void expect_all_widths_agree(bool plain) {
+  const Surroundings<D> s(plain);
+  for (unsigned n = 0; n <= 30; ++n) {
+    auto candidates = s.candidates;
+    for (unsigned q = n; q < 32; ++q) candidates[q] = s.packing.pack(0, 0);
+    // One by one, as contact.h has it.
+    double first = kNever;
+    std::uint32_t which = 0;
+    for (unsigned q = 0; q < n; ++q) {
+      const Slot j = s.packing.slot(candidates[q]);
+      const Record<D>&a = s.records[0], &b = s.records[j];
+      const double now = std::max(a.t, b.t), s_a = now - a.t, s_b = now - b.t;
+      const Vec<D> g = Eigen::Map<const Vec<D>>(s.setting.g);
+      Vec<D> d = (a.x + s_a * a.v) - (b.x + s_b * b.v), v = a.v - b.v;
+      d += (0.5 * (s_a * s_a - s_b * s_b)) * g;
+      v += (s_a - s_b) * g;
+      d[0] += s.packing.image(candidates[q])[0] * 7.3;
+      const double sum = s.setting.radius ? s.radius[0] + s.radius[j] : 1.0, growth = s.setting.growth;
+      const double sigma = sum * (1 + growth * now);
+      const double time = now + contact_time<D>(d, v, sigma, sum * growth, 0.0);
+      if (time == now) {  // they overlap
+        first = -kNever;
+        break;
+      }
+      if (time < first) first = time, which = q;
+    }
+    const ScanResult results[] = {scan<D, 2>(s.setting, 0, candidates.data(), n, true, false),
+                                  scan<D, 4>(s.setting, 0, candidates.data(), n, true, false),
+                                  scan<D, 8>(s.setting, 0, candidates.data(), n, true, false),
+                                  scan_kernels().scan[D - 2](s.setting, 0, candidates.data(), n, true, false)};
+    for (const ScanResult& result : results) {
+      EXPECT_EQ(result.time, first) << n;
+      if (std::isfinite(first)) {
+        EXPECT_EQ(result.which, which) << n;
+        EXPECT_FALSE(result.tied) << n;
+      }
+    }
+  }
+}
+
+TEST(Scan, AllWidthsGiveTheBitsOfThePureFunction) {
+  expect_all_widths_agree<3>(true);
+  expect_all_widths_agree<2>(true);
+  expect_all_widths_agree<3>(false);
+  expect_all_widths_agree<2>(false);
+}
+
+TEST(Scan, ReportsTies) {
+  Surroundings<3> s(true);
+  s.records[0].x = Vec<3>::Zero();
+  s.records[0].v = Vec<3>::Zero();
+  s.records[0].t = 0;
+  for (Slot j = 1; j < 31; ++j) s.records[j] = {{50.0 + j, 0, 0}, Vec<3>::Zero(), 0, j, 0, 0};
+  s.records[4] = {{3, 0, 0}, {-1, 0, 0}, 0, 4, 0, 0};
+  s.records[11] = {{-3, 0, 0}, {1, 0, 0}, 0, 11, 0, 0};
+  for (Slot j = 1; j < 31; ++j) s.candidates[j - 1] = s.packing.pack(j, 0);
+  for (const auto& result : {scan<3, 2>(s.setting, 0, s.candidates.data(), 30, false, true),
+                             scan<3, 4>(s.setting, 0, s.candidates.data(), 30, false, true),
+                             scan<3, 8>(s.setting, 0, s.candidates.data(), 30, false, true)}) {
+    EXPECT_EQ(result.time, 2.0);
+    EXPECT_TRUE(result.tied);
+  }
+}
+
+}  // namespace
+}  // namespace carom
