@@ -513,10 +513,11 @@ void EventCore<D>::predict_crossing(Slot i, double now) {
   for (int k = 0; k < D; ++k) {
     const int up = r.v[k] > 0 ? 1 : 0;
     const std::int32_t c = a.where.cell.unwrapped[k] + up;
-    double s = (grid.face(k, c) - r.x[k]) / r.v[k];
-    if (r.v[k] == 0 || (!box_.periodic(k) && (c <= 0 || c >= grid.count(k)))) s = kNever;
-    face = s < first ? 2 * k + up : face;
-    first = s < first ? s : first;
+    double s = (grid.face(k, c) - r.x[k]) / r.v[k];  // 0/0 and ±a/0 never come first
+    if (!box_.periodic(k) && (c <= 0 || c >= grid.count(k))) s = kNever;
+    const bool sooner = r.v[k] != 0 && s < first;
+    face = sooner ? 2 * k + up : face;
+    first = sooner ? s : first;
   }
   a.update = std::max(r.t + first, now);
   a.face = static_cast<std::uint8_t>(face);

@@ -2,6 +2,8 @@
 // Who is in which cell, for dilute systems: cells as small as a diameter, most of them empty, with a list through the
 // spheres of each. A sphere that crosses into another cell looks at the new ones around it.
 
+#include <cstring>
+
 #include "engine/agenda.h"
 #include "engine/pages.h"
 #include "engine/scan.h"
@@ -26,6 +28,7 @@ class LinkedCells {
         grid_(box, smallest, x, kCellsAParticle),
         first_(grid_.cells(), kNobody),
         link_(x.size()),
+        boxes_(x.size()),
         here_(packing.pack(0, 0)) {
     stride_[D - 1] = 1;
     for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * grid_.count(k);
@@ -34,7 +37,7 @@ class LinkedCells {
       for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
         typename CellGrid<D>::Step step{0, 0};
         grid_.step(k, c, step);
-        steps_[k].push_back({static_cast<std::ptrdiff_t>(step.offset), join(0, shifted(step.boxes * one_[k]))});
+        steps_[k].push_back({static_cast<std::ptrdiff_t>(step.offset), shifted(step.boxes * one_[k])});
       }
       periodic_[k] = box.periodic(k);
     }
@@ -66,19 +69,18 @@ class LinkedCells {
 
   void insert(Slot i, const Place& place) {
     std::uint32_t& first = first_[index(place)];
-    link_[i] = join(first, packing_.pack(i, place.boxes));
-    first = i;
+    link_[i] = first;
+    boxes_[i] = place.boxes;
+    first = packing_.pack(i, place.boxes) | (first != kNobody ? kMore : 0);
   }
   void remove(Slot i, const Place& place) {
-    std::uint32_t& first = first_[index(place)];
-    const std::uint32_t next = low(link_[i]);
-    if (first == i) {
-      first = next;
-      return;
+    std::uint32_t *at = &first_[index(place)], *before = nullptr;
+    while (packing_.slot(*at) != i) {
+      before = at;
+      at = &link_[packing_.slot(*at)];
     }
-    Slot before = first;
-    while (low(link_[before]) != i) before = low(link_[before]);
-    link_[before] = join(next, high(link_[before]));
+    *at = link_[i];
+    if (before && *at == kNobody) *before &= ~kMore;
   }
 
   /// Moves a sphere into the next cell along an axis.
@@ -100,51 +102,26 @@ class LinkedCells {
 
   /// Everybody in the sphere's cell and those around it, itself among them.
   void around(Slot self, const Place& place, Candidates& found) {
-    int low[D], high[D];
-    bool whole = true;
-    for (int k = 0; k < D; ++k) {
-      low[k] = periodic_[k] || place.wrapped[k] > 0 ? -1 : 0;
-      high[k] = periodic_[k] || place.wrapped[k] + 1 < grid_.count(k) ? 1 : 0;
-      whole = whole && high[k] - low[k] == 2;
-    }
-    Seen* end;
-    if (whole) {  // bounds that the compiler knows
-      for (int k = 0; k < D; ++k) low[k] = -1, high[k] = 1;
-      end = heads(place, low, high);
-    } else {
-      end = heads(place, low, high);
-    }
-    follow(self, end, found);
+    if (whole(place)) return heads<true, -1>(self, place, 0, 0, found);
+    heads<false, -1>(self, place, 0, 0, found);
   }
 
   /// Everybody in the cells that came into view when the sphere crossed along an axis.
   void ahead(Slot self, const Place& place, int axis, int step, Candidates& found) {
-    int low[D], high[D];
-    for (int k = 0; k < D; ++k) {
-      low[k] = periodic_[k] || place.wrapped[k] > 0 ? -1 : 0;
-      high[k] = periodic_[k] || place.wrapped[k] + 1 < grid_.count(k) ? 1 : 0;
+    if (whole(place)) {
+      if (axis == 0) return heads<true, 0>(self, place, 0, step, found);
+      if (axis == 1) return heads<true, 1>(self, place, 1, step, found);
+      if constexpr (D == 3) return heads<true, 2>(self, place, 2, step, found);
     }
-    const int edge = step < 0 ? low[axis] : high[axis];
-    Seen* const end = who_.data();
-    if (edge != step) return follow(self, end, found);  // beyond the wall there is nobody
-    low[axis] = high[axis] = step;
-    follow(self, heads(place, low, high), found);
+    heads<false, D>(self, place, axis, step, found);
   }
 
  private:
-  // Pairs of 32 bits, low half first: of a sphere the next one in its cell and itself, packed with the boxes of its
-  // place; of a sphere that was seen its slot and the box of the cell it was seen in, shifted to its bits.
-  using Link = std::uint64_t;
-  using Seen = std::uint64_t;
-  static std::uint64_t join(std::uint32_t low, std::uint32_t high) {
-    return low | static_cast<std::uint64_t>(high) << 32;
-  }
-  static std::uint32_t low(std::uint64_t pair) { return static_cast<std::uint32_t>(pair); }
-  static std::uint32_t high(std::uint64_t pair) { return static_cast<std::uint32_t>(pair >> 32); }
+  static constexpr std::uint32_t kMore = std::uint32_t{1} << 31;  ///< beside a sphere: another one is behind it
   /// To a cell along one axis.
   struct Step {
     std::ptrdiff_t offset;
-    std::uint64_t away;  // shifted, in the high half
+    std::uint32_t away;  // the box it leads into, shifted to its bits of a candidate
   };
   static constexpr double kCellsAParticle = 8;
 
@@ -156,71 +133,93 @@ class LinkedCells {
     return at;
   }
 
-  /// Whoever is first in the cells from `low` to `high` about a place, without a branch; returns the end of who_.
-  Seen* heads(const Place& place, const int* low, const int* high) {
-    const std::uint32_t* const first = first_.data();
-    const std::uint64_t here = join(0, shifted(place.boxes));
-    const Step* const x = &steps_[0][place.wrapped[0] + 1];
-    const Step* const y = &steps_[1][place.wrapped[1] + 1];
-    Seen* end = who_.data();
-    const auto head = [&](std::ptrdiff_t cell, std::uint64_t away) {
-      const std::uint32_t slot = first[cell];
-      *end = away | slot;
-      end += slot != kNobody ? 1 : 0;
-    };
-    for (int a = low[0]; a <= high[0]; ++a)
-      for (int b = low[1]; b <= high[1]; ++b) {
-        const std::ptrdiff_t row = x[a].offset + y[b].offset;
-        const std::uint64_t away = here + x[a].away + y[b].away;
-        if constexpr (D == 2) {
-          head(row, away);
-        } else {
-          const Step* const z = &steps_[2][place.wrapped[2] + 1];
-          for (int c = low[2]; c <= high[2]; ++c) head(row + z[c].offset, away + z[c].away);
-        }
-      }
-    return end;
+  /// Whether there are cells on all sides.
+  bool whole(const Place& place) const {
+    bool all = true;
+    for (int k = 0; k < D; ++k)
+      all = all && (periodic_[k] || (place.wrapped[k] > 0 && place.wrapped[k] + 1 < grid_.count(k)));
+    return all;
   }
 
-  /// Takes the heads that were seen and those behind them for candidates.
-  void follow(Slot self, const Seen* seen_end, Candidates& found) {
-    Seen* who = who_.data();
-    std::uint32_t* packed = found.packed.data();
-    const Link* const links = link_.data();
-    const std::uint32_t here = here_;
-    auto n = static_cast<unsigned>(seen_end - who);
-    std::size_t room = std::min(who_.size(), found.packed.size()) - 9;
-    std::uint32_t any = 0;
-    for (unsigned q = 0; q < n; ++q) {
-      if (n >= room) {
-        who_.resize(2 * who_.size());
-        found.packed.resize(who_.size());
-        who = who_.data();
-        packed = found.packed.data();
-        room = who_.size() - 9;
+  /// Takes everybody in the cells around a place for a candidate, or only in those a step away along an axis. `whole`:
+  /// all the cells are there. `ahead`: the axis, −1 for none, D for one known at run time.
+  template <bool whole, int ahead>
+  void heads(Slot self, const Place& place, int axis, int step, Candidates& found) {
+    const std::uint32_t* const first = first_.data();
+    Step to[D][3];
+    int number[D];
+    bool nobody = false;
+    for (int k = 0; k < D; ++k) {
+      const Step* const here = &steps_[k][place.wrapped[k] + 1];
+      const bool one = ahead >= 0 && (ahead < D ? k == ahead : k == axis);
+      int low = -1, high = 1;
+      if constexpr (!whole) {
+        if (!periodic_[k] && place.wrapped[k] == 0) low = 0;
+        if (!periodic_[k] && place.wrapped[k] + 1 == grid_.count(k)) high = 0;
       }
-      const Seen seen = who[q];
-      const Link link = links[low(seen)];
-      const std::uint32_t candidate = high(link) - high(seen);  // the difference of the boxes is the image
-      any |= candidate ^ here;
-      packed[q] = candidate;
-      who[n] = (seen & 0xffffffff00000000) | low(link);
-      n += low(link) != kNobody ? 1 : 0;
+      if (one) {
+        nobody = nobody || step < low || step > high;  // beyond the wall
+        to[k][0] = here[nobody ? 0 : step];
+        number[k] = nobody ? 0 : 1;
+      } else {
+        for (int c = low; c <= high; ++c) to[k][c - low] = here[c];
+        number[k] = whole ? 3 : high - low + 1;
+      }
     }
-    found.shifted = any >> packing_.slot_bits != 0;
-    if (found.shifted && 2 * widest_ + 1 > packing_.largest()) check(n);
-    found.count = n;
-    const std::uint32_t nobody = packing_.pack(self, 0);
-    for (unsigned q = 0; q < 8; ++q) packed[n + q] = nobody;
+    // The first of each cell, if there is one: without a branch. The difference of the boxes is the image.
+    const std::uint32_t away = shifted(place.boxes), here = here_;
+    std::uint32_t* const start = found.packed.data();
+    std::uint32_t *end = start, any = 0;
+    const auto head = [&](std::ptrdiff_t cell, std::uint32_t box) {
+      const std::uint32_t candidate = first[cell] - box;
+      *end = candidate;
+      const bool there = first[cell] != kNobody;
+      any |= there ? candidate ^ here : 0;
+      end += there ? 1 : 0;
+    };
+    for (int a = 0; a < number[0]; ++a)
+      for (int b = 0; b < number[1]; ++b) {
+        const std::ptrdiff_t row = to[0][a].offset + to[1][b].offset;
+        const std::uint32_t box = away + to[0][a].away + to[1][b].away;
+        if constexpr (D == 2)
+          head(row, box);
+        else
+          for (int c = 0; c < number[2]; ++c) head(row + to[2][c].offset, box + to[2][c].away);
+      }
+    found.count = static_cast<unsigned>(end - start);
+    if ((any & kMore) != 0) any |= follow(found);
+    found.shifted = (any & ~kMore) >> packing_.slot_bits != 0;
+    if (found.shifted && 2 * widest_ + 1 > packing_.largest()) check(place, found);
+    const std::uint32_t own = packing_.pack(self, 0);
+    std::uint32_t padding[8];
+    for (auto& p : padding) p = own;
+    std::memcpy(found.packed.data() + found.count, padding, sizeof padding);
+  }
+
+  /// Appends those behind the first of their cells.
+  std::uint32_t follow(Candidates& found) const {
+    std::uint32_t any = 0;
+    for (unsigned q = 0; q < found.count; ++q) {
+      const std::uint32_t candidate = found.packed[q];
+      if ((candidate & kMore) == 0) continue;
+      found.packed[q] = candidate & ~kMore;
+      const Slot slot = packing_.slot(candidate);
+      // The box that was taken from the candidate is taken from who comes next, too.
+      const std::uint32_t box = packing_.pack(slot, boxes_[slot]) - (candidate & ~kMore), next = link_[slot] - box;
+      any |= next ^ here_;
+      if (found.count + 9u > found.packed.size()) found.packed.resize(2 * found.packed.size());
+      found.packed[found.count++] = next;
+    }
+    return any;
   }
 
   /// Where spheres have come so far that a difference of boxes may not fit: look at each.
-  void check(unsigned n) const {
-    for (unsigned q = 0; q < n; ++q) {
-      const Image<D> boxes = packing_.image(high(link_[low(who_[q])]));
-      const Image<D> away = packing_.image(high(who_[q]) + here_);
+  void check(const Place& place, const Candidates& found) const {
+    const Image<D> own = packing_.image(packing_.pack(0, place.boxes));
+    for (unsigned q = 0; q < found.count; ++q) {
+      const Image<D> theirs = packing_.image(packing_.pack(0, boxes_[packing_.slot(found.packed[q])]));
       for (int k = 0; k < D; ++k)
-        if (std::abs(boxes[k] - away[k]) > packing_.largest()) throw_too_far();
+        if (std::abs(theirs[k] - own[k]) + 1 > packing_.largest() + 1) throw_too_far();
     }
   }
 
@@ -230,11 +229,11 @@ class LinkedCells {
   std::vector<Step> steps_[D];  // to the cells −1 … count along each axis
   std::int32_t one_[D];         // a box along each axis, as a linear image
   bool periodic_[D];
-  PageVector<std::uint32_t> first_;
-  PageVector<Link> link_;
-  std::uint32_t here_;  // a candidate in the same box, but for its slot
-  std::vector<Seen> who_ = std::vector<Seen>(64);
-  std::int32_t widest_ = 0;  // the farthest box anyone has come to
+  PageVector<std::uint32_t> first_;  // of each cell: a sphere with the boxes of its place, and kMore; or kNobody
+  PageVector<std::uint32_t> link_;   // by slot: who is behind it in its cell, as first_ has it
+  PageVector<std::int32_t> boxes_;   // by slot: of its place
+  std::uint32_t here_;               // a candidate in the same box, but for its slot
+  std::int32_t widest_ = 0;          // the farthest box anyone has come to
 };
 
 }  // namespace carom

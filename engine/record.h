@@ -32,15 +32,16 @@ static_assert(sizeof(Record<2>) == 64 && offsetof(Record<2>, v) == 16 && offseto
               "spheres fly through too many periodic boxes in one epoch; give integrator.step a smaller value");
 }
 
-/// A candidate for a contact in 32 bits: the slot in the low bits, above it the image as a number of few bits an axis.
-/// Images are also handled as one integer, `linear`, whose sums and differences are those of the images.
+/// A candidate for a contact in 31 bits: the slot in the low bits, above it the image as a number of few bits an axis.
+/// The last bit is for lists of them. Images are also handled as one integer, `linear`, whose sums and differences are
+/// those of the images.
 template <int D>
 class Packing {
  public:
   Packing() = default;
   explicit Packing(std::size_t particles) {
     slot_bits = std::max(1, static_cast<int>(std::bit_width(particles)));
-    field_bits = std::min(10, (32 - slot_bits) / D);
+    field_bits = std::min(10, (31 - slot_bits) / D);
     if (field_bits < 2) throw Error(Failure::deck, "too many particles for one event core");
     slot_mask = (std::uint32_t{1} << slot_bits) - 1;
     for (int k = 0; k < D; ++k) bias |= 1 << (field_bits * (k + 1) - 1);
