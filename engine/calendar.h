@@ -35,6 +35,7 @@ class Calendar {
     wanted_ = forced_ ? entries_per_bin : std::clamp(static_cast<double>(alive) / 256, 8.0, 2048.0);
     ring_.assign(kBins, Bin{});
     chunks_.clear();
+    chunks_.reserve(2 * alive / kChunk + kBins);  // growing would copy; what is not used is not touched
     next_.clear();
     free_ = kNone;
     later_.clear();

@@ -16,7 +16,7 @@ constexpr double kFewestPredictions = 20000;                // before counts are
 constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02;  // in mean diameters
 
 /// Packing fraction from which on lists are faster, as measured for equal spheres and discs.
-double dense(int dimension) { return dimension == 2 ? 0.55 : 0.38; }
+double dense(int dimension) { return dimension == 2 ? 0.55 : 0.32; }
 
 double packing(const SearchSituation& s) {
   const double d = s.largest;
