@@ -1,5 +1,6 @@
 #include "engine/event_core.h"
 
+#include <numbers>
 #include <numeric>
 #include <string>
 
@@ -106,13 +107,14 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
 
 template <int D>
 void EventCore<D>::choose_search(double horizon) {
-  double largest = grown(common_radius_, horizon), sum = 0;
+  double largest = grown(common_radius_, horizon), sum = 0, sum_of_powers = 0;
   grown_for_ = growth_ == 0 ? common_radius_ : -1;
   grown_ = radius_;
   for (double& r : grown_) {
     r = grown(r, horizon);
     largest = std::max(largest, r);
     sum += r;
+    sum_of_powers += std::pow(r, D);
   }
   double volume = 1;
   for (int k = 0; k < D; ++k) {
@@ -125,7 +127,9 @@ void EventCore<D>::choose_search(double horizon) {
     volume *= edge;
   }
   const auto n = static_cast<double>(records_.size());
-  tuning_.choose({D, n / volume, radius_.empty() ? 2 * largest : 2 * sum / n, 2 * largest}, counts_);
+  if (radius_.empty()) sum = n * largest, sum_of_powers = n * std::pow(largest, D);
+  const double filled = (D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * sum_of_powers / volume;
+  tuning_.choose({D, n / volume, filled, 2 * sum / n, 2 * largest}, counts_);
   if (!tuning_.lists()) {
     lists_.reset();
     cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, tuning_.cell(), particles_.x);

@@ -18,15 +18,10 @@ constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02;  // in mean diameters
 /// Packing fraction from which on lists are faster, as measured for equal spheres and discs.
 double dense(int dimension) { return dimension == 2 ? 0.55 : 0.32; }
 
-double packing(const SearchSituation& s) {
-  const double d = s.largest;
-  return s.density * (s.dimension == 2 ? std::numbers::pi / 4 * d * d : std::numbers::pi / 6 * d * d * d);
-}
-
 /// Contacts of a sphere while a thermal sphere flies the length 1 (Enskog, with the contact values of Henderson and of
 /// Carnahan and Starling).
 double contacts_a_length(const SearchSituation& s) {
-  const double filled = std::min(packing(s), 0.8), empty = 1 - filled;
+  const double filled = std::min(s.filled, 0.8), empty = 1 - filled;
   const double contact_value =
       s.dimension == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
   const double cross_section = s.dimension == 2 ? 2 * s.largest : 4 * s.largest * s.largest;
@@ -71,10 +66,10 @@ void SearchTuning::choose(const SearchSituation& situation, const EventCounts& c
 void SearchTuning::choose_first(const SearchSituation& s) {
   chosen_ = true;
   lists_ = options_.method == SearchOptions::Method::automatic
-               ? packing(s) > dense(s.dimension) || s.largest > 1.0001 * s.mean
+               ? s.filled > dense(s.dimension) || s.largest > 1.0001 * s.mean
                : options_.method == SearchOptions::Method::lists;
   // The room that spheres have beside a close packing of theirs, about.
-  const double room = s.mean * (std::pow(0.74 / std::clamp(packing(s), 0.01, 0.73), 1.0 / s.dimension) - 1);
+  const double room = s.mean * (std::pow(0.74 / std::clamp(s.filled, 0.01, 0.73), 1.0 / s.dimension) - 1);
   skin_ = options_.skin > 0 ? options_.skin : std::clamp(2 * room, 0.1 * s.mean, 0.4 * s.mean);
   cell_ = options_.cell > 0 ? options_.cell : best_cell(s);
 }

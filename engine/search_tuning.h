@@ -24,6 +24,7 @@ struct SearchOptions {
 struct SearchSituation {
   int dimension = 3;
   double density = 0;            ///< particles a volume
+  double filled = 0;             ///< packing fraction
   double mean = 0, largest = 0;  ///< diameters
 };
 
