@@ -1,7 +1,6 @@
 #include "engine/event_core.h"
 
 #include <numbers>
-#include <numeric>
 #include <string>
 
 #include "engine/collision.h"
@@ -95,7 +94,9 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
   }
   tied_ = {};
   calendar_.reset(horizon, n, options_.entries_per_bin);
-  if (lists_ && !anew && growth == 0 && grown_for_ == common_radius_) {
+  // Lists outlive a slab while they were made for the same radii.
+  if (lists_ && !anew && growth == 0 &&
+      (radius_.empty() ? grown_.size() == 1 && grown_[0] == common_radius_ : grown_ == radius_)) {
     lists_->follow(records_);
     for (auto& a : agenda_) a.version = 0;
   } else {
@@ -108,7 +109,6 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
 template <int D>
 void EventCore<D>::choose_search(double horizon) {
   double largest = grown(common_radius_, horizon), sum = 0, sum_of_powers = 0;
-  grown_for_ = growth_ == 0 ? common_radius_ : -1;
   grown_ = radius_;
   for (double& r : grown_) {
     r = grown(r, horizon);
@@ -302,12 +302,12 @@ double EventCore<D>::run(double end, const Report& report) {
                                           " collisions in one step, the last between " + partners(key_of(i)) +
                                           "; use a smaller step or raise integrator.max_events_per_step");
     if (a.kind == EventKind::wall) {
-      collide_wall(i, now, report);
+      collide_wall(i, now, generation, report);
       predict(i, now);
       continue;
     }
     const Slot j = packing_.slot(a.partner);
-    collide_pair(i, now, report);
+    collide_pair(i, now, generation, report);
     predict_two(i, j, now);
     if (report.counters.sphere_sphere >= report.collision_limit) return now;
   }
@@ -601,13 +601,12 @@ void EventCore<D>::cross(Slot i, double now) {
 }
 
 template <int D>
-void EventCore<D>::collide_pair(Slot i, double time, const Report& report) {
+void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, const Report& report) {
   Agenda<D>& agenda = agenda_[i];
   const Slot j = packing_.slot(agenda.partner);
   EventKey<D> key;
   if (report.contacts) key = key_of(i);
   Record<D>&a = records_[i], &b = records_[j];
-  const auto generation = static_cast<std::uint16_t>(generation_of(i));
   advance(a, time);
   advance(b, time);
   Vec<D> shift = Vec<D>::Zero();
@@ -623,7 +622,7 @@ void EventCore<D>::collide_pair(Slot i, double time, const Report& report) {
     a.v += impulse / mass_a;
     b.v -= impulse / mass_b;
   }
-  a.generation = b.generation = generation;
+  a.generation = b.generation = static_cast<std::uint16_t>(generation);
   ++agenda.version;
   ++agenda_[j].version;
   ++report.counters.sphere_sphere;
@@ -637,7 +636,7 @@ void EventCore<D>::collide_pair(Slot i, double time, const Report& report) {
 }
 
 template <int D>
-void EventCore<D>::collide_wall(Slot i, double time, const Report& report) {
+void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = key_of(i);
   Record<D>& r = records_[i];
   advance(r, time);
@@ -653,7 +652,7 @@ void EventCore<D>::collide_wall(Slot i, double time, const Report& report) {
   const double gap = key.hi % 2 == 0 ? r.x[axis] - at_contact : box_.edges[axis] - at_contact - r.x[axis];
   report.counters.max_overlap = std::max(report.counters.max_overlap, -gap / at_contact);
   r.v[axis] = after;
-  r.generation = static_cast<std::uint16_t>(key.generation);
+  r.generation = static_cast<std::uint16_t>(generation);
   ++agenda_[i].version;
   ++report.counters.sphere_wall;
 }

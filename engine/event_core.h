@@ -18,7 +18,6 @@
 
 #include <limits>
 #include <memory>
-#include <optional>
 #include <queue>
 #include <vector>
 
@@ -106,8 +105,8 @@ class EventCore {
 
   std::uint32_t generation_at(const Record<D>& r, double t) const;
   void advance(Record<D>& r, double t) const;
-  void collide_pair(Slot i, double time, const Report& report);
-  void collide_wall(Slot i, double time, const Report& report);
+  void collide_pair(Slot i, double time, std::uint32_t generation, const Report& report);
+  void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
   /// A radius or a contact distance as it is at a time.
   double grown(double length, double t) const { return length * (1 + growth_ * t); }
   double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
@@ -124,10 +123,10 @@ class EventCore {
 
   PageVector<Record<D>> records_;  // by slot
   PageVector<Agenda<D>> agenda_;
-  PageVector<Id> order_;                       // whose record is in a slot
-  std::vector<double> radius_, mass_, grown_;  // by slot; empty where all are equal
+  PageVector<Id> order_;               // whose record is in a slot
+  std::vector<double> radius_, mass_;  // by slot; empty where all are equal
+  std::vector<double> grown_;          // radii that the lists are good for; one where all are equal
   double common_radius_ = 0, common_mass_ = 0;
-  double grown_for_ = -1;  // the radius the lists were made for, where it is one and stays
   Packing<D> packing_;
   ScanSetting setting_;
   Calendar calendar_;

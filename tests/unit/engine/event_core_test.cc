@@ -175,6 +175,30 @@ TEST(EventCore, StoppingOnTheWayChangesNothing) {
   EXPECT_EQ(plain.v, stopped.v);
 }
 
+TEST(EventCore, RadiiMayChangeBetweenSlabs) {  // equal and unequal ones: no list that was made for others is kept
+  for (const bool equal : {true, false}) {
+    auto system = test::hard_spheres<3>(3, 0.2);
+    Particles<3>& p = system->particles;
+    for (std::size_t i = 0; i < p.size(); ++i)
+      if (!equal && i % 2 == 1) p.radius[i] = 0.4;
+    const SearchOptions lists{.method = SearchOptions::Method::lists, .skin = 0.05};
+    EventCore<3> kept(system->box, p, lists);
+    kept.load(p, Vec<3>::Zero(), 1);
+    for (double& r : p.radius) r *= 1.3;
+    std::vector<std::vector<Contact<3>>> contacts(2);
+    EventCore<3> fresh(system->box, p, lists);
+    for (EventCore<3>* core : {&kept, &fresh}) {
+      Counters counters;
+      core->load(p, Vec<3>::Zero(), 1);
+      core->run(1, {.counters = counters, .contacts = &contacts[core == &fresh]});
+      EXPECT_LT(counters.max_overlap, 1e-12);
+    }
+    ASSERT_GT(contacts[1].size(), 100u);
+    ASSERT_EQ(contacts[0].size(), contacts[1].size());
+    for (std::size_t k = 0; k < contacts[0].size(); ++k) EXPECT_TRUE(contacts[0][k].key == contacts[1][k].key);
+  }
+}
+
 TEST(EventCore, StopsAtTheCollisionLimit) {
   auto system = test::hard_spheres<2>(6, 0.5);
   Counters counters;
