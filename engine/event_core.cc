@@ -3,18 +3,11 @@
 #include <numbers>
 #include <string>
 
-#include "engine/collision.h"
 #include "engine/contact.h"
 #include "engine/error.h"
 
 namespace carom {
 namespace {
-
-/// The common value, or nothing where they differ.
-double common(const std::vector<double>& values) {
-  const bool equal = std::all_of(values.begin(), values.end(), [&](double v) { return v == values[0]; });
-  return equal && !values.empty() ? values[0] : 0;
-}
 
 /// Interleaves the bits of D numbers: places near on this curve are near in space (Morton).
 template <int D>
@@ -29,7 +22,7 @@ std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
 
 template <int D>
 EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options)
-    : box_(box), particles_(particles), options_(options), kernels_(scan_kernels()), tuning_(options) {
+    : box_(box), particles_(particles), flights_(box), options_(options), kernels_(scan_kernels()), tuning_(options) {
   for (int k = 0; k < D; ++k) walled_ = walled_ || box.walled(k);
 }
 
@@ -58,94 +51,63 @@ void EventCore<D>::sort(const Particles<D>& particles) {
 template <int D>
 void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
   const std::size_t n = particles.size();
-  g_ = g;
-  field_ = g != Vec<D>::Zero();
-  growth_ = growth;
-  horizon_ = horizon;
   events_ = 0;
   const bool anew =
       order_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
   if (anew) sort(particles);
-  common_radius_ = common(particles_.radius);
-  common_mass_ = common(particles_.mass);
-  radius_.clear();
-  mass_.clear();
-  if (common_radius_ == 0)
-    for (const Id i : order_) radius_.push_back(particles_.radius[i]);
-  if (common_mass_ == 0)
-    for (const Id i : order_) mass_.push_back(particles_.mass[i]);
+  flights_.load(particles, order_, g, horizon, growth);
   packing_ = Packing<D>(n);
-  records_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Id id = order_[i];
-    records_[i] = {particles.x[id], particles.v[id], 0.0, id, 0, particles.species[id]};
-  }
-  setting_ = {.records = reinterpret_cast<const double*>(records_.data()),
-              .radius = radius_.empty() ? nullptr : radius_.data(),
-              .diameter = common_radius_ + common_radius_,
-              .growth = growth,
-              .slot_mask = packing_.slot_mask,
-              .slot_bits = packing_.slot_bits,
-              .field_bits = packing_.field_bits,
-              .plain = radius_.empty() && !field_ && growth == 0};
-  for (int k = 0; k < D; ++k) {
-    setting_.edges[k] = box_.edges[k];
-    setting_.g[k] = g[k];
-  }
+  setting_ = flights_.setting(packing_);
   tied_ = {};
   calendar_.reset(horizon, n, options_.entries_per_bin);
-  // Lists outlive a slab while they were made for the same radii.
-  if (lists_ && !anew && growth == 0 &&
-      (radius_.empty() ? grown_.size() == 1 && grown_[0] == common_radius_ : grown_ == radius_)) {
-    lists_->follow(records_);
+  std::vector<double> radii = flights_.radii(horizon);
+  if (lists_ && !anew && radii_ == radii) {  // lists outlive a slab while they are good for its radii
+    lists_->follow(flights_.records());
     for (auto& a : agenda_) a.version = 0;
   } else {
     agenda_.assign(n, Agenda<D>{});
-    choose_search(horizon);
+    radii_ = std::move(radii);
+    choose_search();
   }
   for (std::size_t i = 0; i < n; ++i) predict(static_cast<Slot>(i), 0.0);
 }
 
 template <int D>
-void EventCore<D>::choose_search(double horizon) {
-  double largest = grown(common_radius_, horizon), sum = 0, sum_of_powers = 0;
-  grown_ = radius_;
-  for (double& r : grown_) {
-    r = grown(r, horizon);
+void EventCore<D>::choose_search() {
+  const auto n = static_cast<double>(flights_.size()), each = n / static_cast<double>(radii_.size());
+  double largest = 0, sum = 0, sum_of_powers = 0;
+  for (const double r : radii_) {
     largest = std::max(largest, r);
-    sum += r;
-    sum_of_powers += std::pow(r, D);
+    sum += each * r;
+    sum_of_powers += each * std::pow(r, D);
   }
   double volume = 1;
   for (int k = 0; k < D; ++k) {
     double edge = box_.edges[k];
     if (box_.boundary[k] == Boundary::open) {  // as far as there are spheres
-      double low = records_[0].x[k], high = low;
-      for (const auto& r : records_) low = std::min(low, r.x[k]), high = std::max(high, r.x[k]);
+      double low = flights_[0].x[k], high = low;
+      for (const auto& r : flights_.records()) low = std::min(low, r.x[k]), high = std::max(high, r.x[k]);
       edge = high - low + 2 * largest;
     }
     volume *= edge;
   }
-  const auto n = static_cast<double>(records_.size());
-  if (radius_.empty()) sum = n * largest, sum_of_powers = n * std::pow(largest, D);
   const double filled = (D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * sum_of_powers / volume;
   tuning_.choose({D, n / volume, filled, 2 * sum / n, 2 * largest}, counts_);
   if (!tuning_.lists()) {
     lists_.reset();
     cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, tuning_.cell(), particles_.x);
-    for (Slot i = 0; i < records_.size(); ++i) {
-      agenda_[i].where.cell = cells_->place(records_[i].x);
+    for (Slot i = 0; i < flights_.size(); ++i) {
+      agenda_[i].where.cell = cells_->place(flights_[i].x);
       cells_->insert(i, agenda_[i].where.cell);
     }
     return;
   }
   cells_.reset();
-  if (grown_.empty()) grown_.push_back(largest);
   double skin = tuning_.skin();
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
-  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, grown_, skin, agenda_);
-  lists_->build(records_);
+  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, skin, agenda_);
+  lists_->build(flights_.records());
 }
 
 template <int D>
@@ -157,15 +119,15 @@ bool EventCore<D>::stale(const Agenda<D>& a) const {
 template <int D>
 std::uint32_t EventCore<D>::generation_of(Slot i) const {
   const Agenda<D>& a = agenda_[i];
-  const std::uint32_t own = generation_at(records_[i], a.contact);
+  const std::uint32_t own = flights_.generation_at(i, a.contact);
   if (a.kind == EventKind::wall) return own;
-  return std::max(own, generation_at(records_[packing_.slot(a.partner)], a.contact));
+  return std::max(own, flights_.generation_at(packing_.slot(a.partner), a.contact));
 }
 
 template <int D>
 EventKey<D> EventCore<D>::key_of(Slot i) const {
   const Agenda<D>& a = agenda_[i];
-  const Record<D>& r = records_[i];
+  const Record<D>& r = flights_[i];
   EventKey<D> key;
   key.time = a.contact;
   key.kind = a.kind;
@@ -175,7 +137,7 @@ EventKey<D> EventCore<D>::key_of(Slot i) const {
     key.hi = a.partner;
     return key;
   }
-  const Record<D>& other = records_[packing_.slot(a.partner)];
+  const Record<D>& other = flights_[packing_.slot(a.partner)];
   key.image = packing_.image(a.partner);
   if (r.id < other.id) {
     key.lo = r.id;
@@ -191,7 +153,7 @@ EventKey<D> EventCore<D>::key_of(Slot i) const {
 template <int D>
 typename EventCore<D>::Tied EventCore<D>::tie(Slot i) const {
   const Agenda<D>& a = agenda_[i];
-  if (a.update < a.contact) return {Tied::Rank::update, EventKey<D>{.lo = records_[i].id}, i};
+  if (a.update < a.contact) return {Tied::Rank::update, EventKey<D>{.lo = flights_[i].id}, i};
   return {stale(a) ? Tied::Rank::stale : Tied::Rank::contact, key_of(i), i};
 }
 
@@ -253,7 +215,7 @@ template <int D>
 void EventCore<D>::prefetch_upcoming() const {
   if (const CalendarEntry* const later = calendar_.upcoming(3)) {
     __builtin_prefetch(&agenda_[later->slot]);
-    __builtin_prefetch(&records_[later->slot]);
+    __builtin_prefetch(&flights_[later->slot]);
   }
   if (const CalendarEntry* const next = calendar_.upcoming(1)) {
     const Agenda<D>& a = agenda_[next->slot];
@@ -270,7 +232,7 @@ void EventCore<D>::prefetch_upcoming() const {
   if (const CalendarEntry* const next = calendar_.upcoming(0); next && lists_) {
     const Agenda<D>& a = agenda_[next->slot];
     const std::uint32_t* const list = lists_->candidates(a);
-    for (unsigned q = 0; q < a.count; ++q) __builtin_prefetch(&records_[packing_.slot(list[q])]);
+    for (unsigned q = 0; q < a.count; ++q) __builtin_prefetch(&flights_[packing_.slot(list[q])]);
     if (a.contact < a.update && a.kind == EventKind::pair)
       __builtin_prefetch(lists_->candidates(agenda_[packing_.slot(a.partner)]));
   }
@@ -316,29 +278,11 @@ double EventCore<D>::run(double end, const Report& report) {
 
 template <int D>
 void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
-  for (Record<D> r : records_) {
-    advance(r, time);
+  for (Slot i = 0; i < flights_.size(); ++i) {
+    const Record<D> r = flights_.at(i, time);
     copies.x[r.id] = r.x;
     copies.v[r.id] = r.v;
   }
-}
-
-template <int D>
-void EventCore<D>::advance(Record<D>& r, double t) const {
-  const double s = t - r.t;
-  if (s != 0) {
-    r.x += s * r.v;
-    if (field_) {
-      r.x += (0.5 * s * s) * g_;
-      r.v += s * g_;
-    }
-  }
-  r.t = t;
-}
-
-template <int D>
-std::uint32_t EventCore<D>::generation_at(const Record<D>& r, double t) const {
-  return r.t == t ? r.generation + 1u : 0u;
 }
 
 /// Looks for the next contact of a sphere whose record, or whose partner's, has changed.
@@ -348,11 +292,11 @@ void EventCore<D>::predict(Slot i, double now) {
   Agenda<D>& a = agenda_[i];
   a.contact = kNever;
   if (lists_) {
-    predict_pairs(i, lists_->candidates(a), a.count, a.shifted, records_[i].t == now);
+    predict_pairs(i, lists_->candidates(a), a.count, a.shifted, flights_[i].t == now);
     predict_leaving(i, now);
   } else {
     cells_->around(i, a.where.cell, found_);
-    predict_pairs(i, found_.packed.data(), found_.count, found_.shifted, records_[i].t == now);
+    predict_pairs(i, found_.packed.data(), found_.count, found_.shifted, flights_[i].t == now);
     predict_crossing(i, now);
   }
   if (walled_) predict_walls(i);
@@ -414,7 +358,8 @@ void EventCore<D>::predict_pairs_one_by_one(Slot i, const std::uint32_t* candida
   Agenda<D>& a = agenda_[i];
   for (unsigned q = 0; q < n; ++q) {
     if (packing_.slot(candidates[q]) == i) continue;
-    const double time = pair_contact(i, candidates[q]);
+    const double time =
+        flights_.pair_contact(i, packing_.slot(candidates[q]), box_.shift(packing_.image(candidates[q])));
     if (time > a.contact || time == kNever) continue;
     const Agenda<D> before = a;
     const bool first = before.contact == kNever;
@@ -428,32 +373,11 @@ void EventCore<D>::predict_pairs_one_by_one(Slot i, const std::uint32_t* candida
 }
 
 template <int D>
-double EventCore<D>::pair_contact(Slot i, std::uint32_t candidate) const {
-  // A pure function of the two records, synchronised to the later of their times; exchanging the two gives the same
-  // bits, because every difference only changes its sign.
-  const Slot j = packing_.slot(candidate);
-  const Record<D>&a = records_[i], &b = records_[j];
-  const double now = std::max(a.t, b.t);
-  const double s_a = now - a.t, s_b = now - b.t;
-  Vec<D> d = (a.x + s_a * a.v) - (b.x + s_b * b.v);
-  Vec<D> v = a.v - b.v;
-  if (field_) {
-    d += (0.5 * (s_a * s_a - s_b * s_b)) * g_;
-    v += (s_a - s_b) * g_;
-  }
-  d += box_.shift(packing_.image(candidate));
-  const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
-  const bool apart = d.squaredNorm() > sigma * sigma;
-  const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
-  return now + contact_time<D>(d, v, sigma, rate, slack);
-}
-
-template <int D>
 void EventCore<D>::predict_walls(Slot i) {
   Agenda<D>& a = agenda_[i];
   for (int axis = 0; axis < D; ++axis)
     for (int side = 0; side < 2 && box_.walled(axis); ++side) {
-      const double time = wall_contact(i, axis, side);
+      const double time = flights_.wall_contact(i, axis, side);
       if (time > a.contact || time == kNever) continue;
       const Agenda<D> before = a;
       const bool first = before.contact == kNever;
@@ -465,34 +389,15 @@ void EventCore<D>::predict_walls(Slot i) {
     }
 }
 
-template <int D>
-double EventCore<D>::wall_contact(Slot i, int axis, int side) const {
-  const Record<D>& r = records_[i];
-  const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
-  const double inward = side == 0 ? 1.0 : -1.0;
-  const double gap = side == 0 ? r.x[axis] - at_record : box_.edges[axis] - at_record - r.x[axis];
-  const double opening = inward * r.v[axis] - rate;
-  const double tolerance = gap_tolerance(2 * at_record, box_.edges[axis]);
-  const double slack = approach_slack(1.0, r.v.norm(), rate);
-  const bool touching = gap <= tolerance;
-  const double s = wall_contact_time(gap, opening, inward * g_[axis], horizon_ - r.t, touching, slack);
-  if (s == 0 && !(opening < -slack))
-    throw Error(Failure::numerical,
-                "particle " + std::to_string(r.id) + " rests on the " + (side == 0 ? "lower" : "upper") +
-                    " wall of axis " + std::to_string(axis) +
-                    " under the uniform field and would bounce without end; give it a height or a velocity");
-  return r.t + s;
-}
-
 /// When does the sphere leave the region its list is good for?
 template <int D>
 void EventCore<D>::predict_leaving(Slot i, double now) {
-  const Record<D>& r = records_[i];
+  const Record<D>& r = flights_[i];
   Agenda<D>& a = agenda_[i];
   Vec<D> e;
   for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
   const double skin = lists_->skin() * (1 - 1e-6);
-  if (!field_) {  // |e + v s| = skin; the form that cancels is good enough for a bound
+  if (!flights_.field()) {  // |e + v s| = skin; the form that cancels is good enough for a bound
     const double b = e.dot(r.v), v_squared = r.v.squaredNorm(), room = skin * skin - e.squaredNorm();
     const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
     a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
@@ -500,16 +405,16 @@ void EventCore<D>::predict_leaving(Slot i, double now) {
   }
   // At most |v| s + |g| s²/2 farther than at `now`.
   const double s0 = now - r.t;
-  e += s0 * r.v + (0.5 * s0 * s0) * g_;
-  const double speed = (r.v + s0 * g_).norm(), room = std::max(skin - e.norm(), 0.0);
-  a.update = std::max(now + 2 * room / (speed + std::sqrt(speed * speed + 2 * g_.norm() * room)), now);
+  e += s0 * r.v + (0.5 * s0 * s0) * flights_.g();
+  const double speed = (r.v + s0 * flights_.g()).norm(), room = std::max(skin - e.norm(), 0.0);
+  a.update = std::max(now + 2 * room / (speed + std::sqrt(speed * speed + 2 * flights_.g().norm() * room)), now);
 }
 
 /// When does the sphere leave its cell, and through which face?
 template <int D>
 void EventCore<D>::predict_crossing(Slot i, double now) {
-  if (field_) return predict_crossing_in_field(i, now);
-  const Record<D>& r = records_[i];
+  if (flights_.field()) return predict_crossing_in_field(i, now);
+  const Record<D>& r = flights_[i];
   const CellGrid<D>& grid = cells_->grid();
   Agenda<D>& a = agenda_[i];
   double first = kNever;
@@ -529,8 +434,7 @@ void EventCore<D>::predict_crossing(Slot i, double now) {
 
 template <int D>
 void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
-  Record<D> r = records_[i];
-  advance(r, now);
+  const Record<D> r = flights_.at(i, now);
   const CellGrid<D>& grid = cells_->grid();
   Agenda<D>& a = agenda_[i];
   a.update = kNever;
@@ -540,8 +444,8 @@ void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
       if (!box_.periodic(k) && (c <= 0 || c >= grid.count(k))) continue;  // the outermost cells have no outer face
       const double outward = side == 1 ? 1.0 : -1.0;
       const double gap = outward * (grid.face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
-      const double s =
-          wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * g_[k], horizon_ - now, false, 0.0);
+      const double s = wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * flights_.g()[k],
+                                         flights_.horizon() - now, false, 0.0);
       // At least an ulp from now: at the top of its path a particle could cross back and forth in no time.
       const double t = std::max(now + s, std::nextafter(now, kNever));
       if (t < a.update) {
@@ -554,7 +458,7 @@ void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
 template <int D>
 void EventCore<D>::schedule(Slot i) {
   const double time = agenda_[i].due();
-  if (!(time < horizon_)) return;
+  if (!(time < flights_.horizon())) return;
   calendar_.push(time, i);
   ++counts_.scheduled;
 }
@@ -563,10 +467,9 @@ void EventCore<D>::schedule(Slot i) {
 template <int D>
 void EventCore<D>::update(Slot i, double now) {
   if (!lists_) return cross(i, now);
-  Record<D> r = records_[i];
-  advance(r, now);
+  const Record<D> r = flights_.at(i, now);
   Agenda<D>& a = agenda_[i];
-  if (field_) {  // it may still be far from where its list ends
+  if (flights_.field()) {  // it may still be far from where its list ends
     Vec<D> e;
     for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
     if (e.norm() < 0.7 * lists_->skin()) {
@@ -606,55 +509,34 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
   const Slot j = packing_.slot(agenda.partner);
   EventKey<D> key;
   if (report.contacts) key = key_of(i);
-  Record<D>&a = records_[i], &b = records_[j];
-  advance(a, time);
-  advance(b, time);
   Vec<D> shift = Vec<D>::Zero();
   if (packing_.linear(agenda.partner) != 0) shift = box_.shift(packing_.image(agenda.partner));
-  const Vec<D> d = a.x - b.x + shift;
-  const double mass_a = mass(i), mass_b = mass(j);
-  const double radii = radius(i) + radius(j), sigma = grown(radii, time);
-  const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, sigma, radii * growth_, mass_a, mass_b) * d;
-  if (common_mass_ == 1) {  // the same bits without divisions
-    a.v += impulse;
-    b.v -= impulse;
-  } else {
-    a.v += impulse / mass_a;
-    b.v -= impulse / mass_b;
-  }
-  a.generation = b.generation = static_cast<std::uint16_t>(generation);
+  const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
   ++agenda.version;
   ++agenda_[j].version;
   ++report.counters.sphere_sphere;
-  report.counters.collision_virial.add(d.dot(impulse));
-  report.counters.max_overlap = std::max(report.counters.max_overlap, 1 - d.norm() / sigma);
+  report.counters.collision_virial.add(blow.d.dot(blow.impulse));
+  report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
   if (!report.contacts) return;
+  const Record<D>&a = flights_[i], &b = flights_[j];
   if (a.id < b.id)
-    report.contacts->push_back({key, a.x, b.x - shift, impulse});
+    report.contacts->push_back({key, a.x, b.x - shift, blow.impulse});
   else
-    report.contacts->push_back({key, b.x, a.x + shift, -impulse});
+    report.contacts->push_back({key, b.x, a.x + shift, -blow.impulse});
 }
 
 template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = key_of(i);
-  Record<D>& r = records_[i];
-  advance(r, time);
-  const int axis = static_cast<int>(key.hi / 2);
-  const double at_contact = grown(radius(i), time), rate = radius(i) * growth_;
-  const double after = (key.hi % 2 == 0 ? 2 * rate : -2 * rate) - r.v[axis];
-  if (report.contacts) {
-    Contact<D> contact{key, r.x, r.x, Vec<D>::Zero()};
-    contact.x_hi[axis] = key.hi % 2 == 0 ? 0.0 : box_.edges[axis];
-    contact.impulse[axis] = mass(i) * (after - r.v[axis]);
-    report.contacts->push_back(contact);
-  }
-  const double gap = key.hi % 2 == 0 ? r.x[axis] - at_contact : box_.edges[axis] - at_contact - r.x[axis];
-  report.counters.max_overlap = std::max(report.counters.max_overlap, -gap / at_contact);
-  r.v[axis] = after;
-  r.generation = static_cast<std::uint16_t>(generation);
+  const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
+  const Blow<D> blow = flights_.bounce(i, axis, side, time, generation);
   ++agenda_[i].version;
   ++report.counters.sphere_wall;
+  report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
+  if (!report.contacts) return;
+  Contact<D> contact{key, flights_[i].x, flights_[i].x, blow.impulse};
+  contact.x_hi[axis] = side == 0 ? 0.0 : box_.edges[axis];
+  report.contacts->push_back(contact);
 }
 
 template class EventCore<2>;

@@ -27,6 +27,7 @@
 #include "engine/contact_log.h"
 #include "engine/counters.h"
 #include "engine/event_counts.h"
+#include "engine/flights.h"
 #include "engine/linked_cells.h"
 #include "engine/particles.h"
 #include "engine/search_tuning.h"
@@ -79,7 +80,7 @@ class EventCore {
   };
 
   void sort(const Particles<D>& particles);
-  void choose_search(double horizon);
+  void choose_search();
   void prefetch_upcoming() const;
   bool mirrored(Slot i, Slot j) const;
   bool next_event(double end, Slot& slot, double& time);
@@ -97,36 +98,22 @@ class EventCore {
   void predict_leaving(Slot i, double now);
   void predict_crossing(Slot i, double now);
   void predict_crossing_in_field(Slot i, double now);
-  double pair_contact(Slot i, std::uint32_t candidate) const;
-  double wall_contact(Slot i, int axis, int side) const;
   void schedule(Slot i);
   void update(Slot i, double now);
   void cross(Slot i, double now);
 
-  std::uint32_t generation_at(const Record<D>& r, double t) const;
-  void advance(Record<D>& r, double t) const;
   void collide_pair(Slot i, double time, std::uint32_t generation, const Report& report);
   void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
-  /// A radius or a contact distance as it is at a time.
-  double grown(double length, double t) const { return length * (1 + growth_ * t); }
-  double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
-  double mass(Slot i) const { return mass_.empty() ? common_mass_ : mass_[i]; }
 
   const Box<D>& box_;
   const Particles<D>& particles_;
+  Flights<D> flights_;
   SearchOptions options_;
   const ScanKernels& kernels_;
   bool walled_ = false;
-  Vec<D> g_ = Vec<D>::Zero();
-  bool field_ = false;
-  double growth_ = 0, horizon_ = 0;
-
-  PageVector<Record<D>> records_;  // by slot
   PageVector<Agenda<D>> agenda_;
-  PageVector<Id> order_;               // whose record is in a slot
-  std::vector<double> radius_, mass_;  // by slot; empty where all are equal
-  std::vector<double> grown_;          // radii that the lists are good for; one where all are equal
-  double common_radius_ = 0, common_mass_ = 0;
+  PageVector<Id> order_;       // whose record is in a slot
+  std::vector<double> radii_;  // that lists or cells are made for; one where all are equal
   Packing<D> packing_;
   ScanSetting setting_;
   Calendar calendar_;

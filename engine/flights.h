@@ -1,0 +1,79 @@
+#pragma once
+// The spheres of one core and all that may happen to them: flight, contact, collision. What is here is physics; who is
+// asked about whom, and when, is the business of event_core.h.
+//
+// Between contacts every sphere flies on x + v s + g s²/2 from its record. All radii may grow by a common factor
+// 1 + growth·t. A contact is a pure function of two records: no time of asking and no list is in it.
+
+#include <span>
+
+#include "engine/box.h"
+#include "engine/contact_log.h"
+#include "engine/pages.h"
+#include "engine/particles.h"
+#include "engine/record.h"
+#include "engine/scan.h"
+
+namespace carom {
+
+/// What a collision did.
+template <int D>
+struct Blow {
+  Vec<D> d;        ///< from the second centre to the first [length]
+  Vec<D> impulse;  ///< given to the first sphere [mass·length/time]
+  double overlap;  ///< at contact, relative to the contact distance
+};
+
+template <int D>
+class Flights {
+ public:
+  explicit Flights(const Box<D>& box) : box_(box) {}
+
+  /// Starts a slab: everybody at time 0, in the slots that `order` gives them.
+  void load(const Particles<D>& particles, std::span<const Id> order, const Vec<D>& g, double horizon, double growth);
+
+  std::size_t size() const { return records_.size(); }
+  const Record<D>& operator[](Slot i) const { return records_[i]; }
+  std::span<const Record<D>> records() const { return records_; }
+  const Vec<D>& g() const { return g_; }
+  bool field() const { return field_; }
+  double horizon() const { return horizon_; }
+
+  /// One radius where all are equal, else by slot; as they are at a time.
+  std::vector<double> radii(double t) const;
+  /// What the kernels of scan.h are to know.
+  ScanSetting setting(const Packing<D>& packing) const;
+
+  /// The record as it is at time t.
+  Record<D> at(Slot i, double t) const;
+  /// 1 + the generation of the record where it is of this very time, else 0 (EventKey).
+  std::uint32_t generation_at(Slot i, double t) const { return records_[i].t == t ? records_[i].generation + 1u : 0u; }
+
+  /// The time at which the two next touch, x_i − x_j taken with `shift`; infinite: never. Exchanging the two gives the
+  /// same bits, because every difference only changes its sign.
+  double pair_contact(Slot i, Slot j, const Vec<D>& shift) const;
+  /// The same for a sphere and the lower (side 0) or upper wall of an axis. Throws Error(Failure::numerical) for a
+  /// sphere that rests there under the field.
+  double wall_contact(Slot i, int axis, int side) const;
+
+  /// The two collide at time t.
+  Blow<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation);
+  /// The sphere collides with a wall at time t; the second "centre" is the point touched.
+  Blow<D> bounce(Slot i, int axis, int side, double t, std::uint32_t generation);
+
+ private:
+  void advance(Record<D>& r, double t) const;
+  double grown(double length, double t) const { return length * (1 + growth_ * t); }
+  double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
+  double mass(Slot i) const { return mass_.empty() ? common_mass_ : mass_[i]; }
+
+  const Box<D>& box_;
+  Vec<D> g_ = Vec<D>::Zero();
+  bool field_ = false;
+  double growth_ = 0, horizon_ = 0;
+  PageVector<Record<D>> records_;      // by slot
+  std::vector<double> radius_, mass_;  // by slot; empty where all are equal
+  double common_radius_ = 0, common_mass_ = 0;
+};
+
+}  // namespace carom
