@@ -34,8 +34,8 @@ struct alignas(64) Agenda {
   std::uint16_t count = 0;            ///< candidates in the list
   std::uint16_t capacity = 0;         ///< in units of 8
   EventKind kind = EventKind::pair;
-  std::uint8_t face = 0;  ///< it leaves its cell through: 2·axis + (0 downwards, 1 upwards)
-  bool shifted = false;   ///< some of its list are not in the same box
+  std::uint8_t face = 0;   ///< it leaves its cell through: 2·axis + (0 downwards, 1 upwards)
+  std::uint16_t same = 0;  ///< candidates at the start of the list that are in the same box
 
   double due() const { return contact < update ? contact : update; }
 };

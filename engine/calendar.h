@@ -27,9 +27,9 @@ struct CalendarEntry {
 /// Serves entries by time; the order of equal times is the caller's business.
 class Calendar {
  public:
-  /// Empties the calendar and sets it up for times in [0, horizon), for about `alive` entries at a time.
-  /// `entries_per_bin` forces the size of bins (0: about right).
-  void reset(double horizon, std::size_t alive, double entries_per_bin = 0) {
+  /// Empties the calendar and sets it up for times in [0, horizon), for about `alive` entries at a time, which will be
+  /// spread about like the `sample`. `entries_per_bin` forces the size of bins (0: about right).
+  void reset(double horizon, std::size_t alive, double entries_per_bin = 0, std::vector<double> sample = {}) {
     horizon_ = horizon;
     forced_ = entries_per_bin > 0;
     wanted_ = forced_ ? entries_per_bin : std::clamp(static_cast<double>(alive) / 256, 8.0, 2048.0);
@@ -39,27 +39,30 @@ class Calendar {
     next_.clear();
     free_ = kNone;
     later_.clear();
-    later_.reserve(alive);
     present_.clear();
     sorted_.clear();
     served_ = 0;
-    width_ = 0;  // not laid out: everything waits
-    start_ = -1;
-    per_width_ = std::numeric_limits<double>::infinity();
-    current_ = -1;
-    count_ = 0;
+    // Bins for the density of the first entries there will be.
+    const double each = static_cast<double>(alive) / static_cast<double>(std::max<std::size_t>(sample.size(), 1));
+    const auto few = std::min(sample.size(), static_cast<std::size_t>(16 * wanted_ / each) + 16);
+    double end = horizon;
+    if (few > 0) {
+      std::nth_element(sample.begin(), sample.begin() + static_cast<std::ptrdiff_t>(few - 1), sample.end());
+      end = std::min(end, sample[few - 1]);
+    }
+    lay_out(0, end * wanted_ / (each * static_cast<double>(std::max<std::size_t>(few, 1))));
   }
 
   /// Schedules an entry; times at or beyond the horizon are not kept.
   void push(double time, std::uint32_t slot) {
     if (!(time < horizon_)) return;
     const double bin = (time - start_) * per_width_;
-    if (bin < static_cast<double>(current_ + 1))
-      present_.push({time, slot});
-    else if (bin < kBins)
-      append(ring_[static_cast<std::size_t>(bin)], {time, slot});
-    else
+    if (!(bin < kBins))
       later_.push_back({time, slot});
+    else if (const int number = static_cast<int>(bin); number > current_)
+      append(ring_[static_cast<std::size_t>(number)], {time, slot});
+    else
+      present_.push({time, slot});
   }
 
   /// The earliest entry, or null when none is left before the horizon. Stays valid until the next call. Entries for
@@ -153,7 +156,7 @@ class Calendar {
   template <class Holds>
   bool open_next(Holds&& holds) {
     for (;;) {
-      while (++current_ < kBins && width_ > 0) {
+      while (++current_ < kBins) {
         Bin& bin = ring_[static_cast<std::size_t>(current_)];
         if (bin.count == 0) continue;
         sorted_.resize(bin.count);
@@ -178,26 +181,26 @@ class Calendar {
     current_ = kBins - 1;
     std::erase_if(later_, [&](const CalendarEntry& entry) { return !holds(entry); });
     if (later_.empty()) return false;
-    const double end = start_ + width_ * kBins;
-    start_ = std::min_element(later_.begin(), later_.end(), Earlier{})->time;
-    if (width_ == 0) {  // the first time: the density of the first events there are
-      const std::size_t few = std::min(later_.size() - 1, static_cast<std::size_t>(16 * wanted_));
-      std::nth_element(later_.begin(), later_.begin() + static_cast<std::ptrdiff_t>(few), later_.end(), Earlier{});
-      width_ = (later_[few].time - start_) * wanted_ / static_cast<double>(few + 1);
-    } else if (!forced_ && count_ > 0) {
-      const double rate = static_cast<double>(count_) / (end - first_), factor = wanted_ / rate / width_;
-      if (factor > 1.5 || factor < 0.67) width_ *= std::clamp(factor, 0.125, 8.0);
+    const double end = start_ + width_ * kBins, start = std::min_element(later_.begin(), later_.end(), Earlier{})->time;
+    double width = width_;
+    if (!forced_ && count_ > 0) {
+      const double rate = static_cast<double>(count_) / (end - start_), factor = wanted_ / rate / width_;
+      if (factor > 1.5 || factor < 0.67) width *= std::clamp(factor, 0.125, 8.0);
     }
-    width_ = std::max(width_, std::max(horizon_ * 1e-9, start_ * 1e-12));
-    per_width_ = 1 / width_;
-    first_ = start_;
-    count_ = 0;
-    current_ = -1;
+    lay_out(start, width);
     std::vector<CalendarEntry> waiting;
     waiting.swap(later_);
-    later_.reserve(waiting.capacity() / 4);
     for (const CalendarEntry& entry : waiting) push(entry.time, entry.slot);
     return true;
+  }
+
+  /// Makes bins of a width from `start`.
+  void lay_out(double start, double width) {
+    start_ = start;
+    width_ = std::max(width, std::max(horizon_ * 1e-9, start_ * 1e-12));
+    per_width_ = 1 / width_;
+    count_ = 0;
+    current_ = -1;
   }
 
   /// Sorts the opened bin: into buckets first, then neighbours among themselves.
@@ -248,7 +251,6 @@ class Calendar {
   bool from_heap_ = false;
 
   std::size_t count_ = 0;  // entries opened since the ring was laid out
-  double first_ = 0;       // its start
 };
 
 }  // namespace carom

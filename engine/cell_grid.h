@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <boost/container/small_vector.hpp>
 #include <cmath>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -19,19 +20,30 @@ namespace carom {
 template <int D>
 using Cell = std::array<std::int32_t, D>;
 
+/// What a grid must know of the particles that it is for.
+template <int D>
+struct Extent {
+  std::size_t particles = 0;
+  Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();  ///< of their positions
+
+  void add(const Vec<D>& x) {
+    low = particles == 0 ? x : low.cwiseMin(x).eval();
+    high = particles == 0 ? x : high.cwiseMax(x).eval();
+    ++particles;
+  }
+};
+
 template <int D>
 class CellGrid {
  public:
   /// A grid with cells of edge at least `smallest` over the box (open axes: over the positions), with no more than
   /// about so many cells a particle.
-  CellGrid(const Box<D>& box, double smallest, std::span<const Vec<D>> x, double cells_a_particle = 2) : box_(box) {
-    const double most = std::max(1.0, std::floor(std::pow(cells_a_particle * static_cast<double>(x.size()), 1.0 / D)));
+  CellGrid(const Box<D>& box, double smallest, const Extent<D>& extent, double cells_a_particle = 2) : box_(box) {
+    const double most =
+        std::max(1.0, std::floor(std::pow(cells_a_particle * static_cast<double>(extent.particles), 1.0 / D)));
     for (int k = 0; k < D; ++k) {
-      double low = 0, high = box.edges[k];
-      if (box.boundary[k] == Boundary::open && !x.empty()) {
-        low = high = x[0][k];
-        for (const auto& p : x) low = std::min(low, p[k]), high = std::max(high, p[k]);
-      }
+      const bool open = box.boundary[k] == Boundary::open;
+      const double low = open ? extent.low[k] : 0, high = open ? extent.high[k] : box.edges[k];
       const double length = box.periodic(k) ? high - low : std::max(high - low, smallest);
       // Not quite full: rounding must never make a cell smaller than what it is to hold.
       count_[k] = static_cast<std::int32_t>(std::clamp(std::floor(length / (smallest * (1 + 1e-9))), 1.0, most));
@@ -42,6 +54,12 @@ class CellGrid {
     stride_[D - 1] = 1;
     for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * static_cast<std::size_t>(count_[k]);
   }
+
+  CellGrid(const Box<D>& box, double smallest, std::span<const Vec<D>> x)
+      : CellGrid(box, smallest, std::accumulate(x.begin(), x.end(), Extent<D>{}, [](Extent<D> all, const Vec<D>& p) {
+                   all.add(p);
+                   return all;
+                 })) {}
 
   std::size_t cells() const {
     std::size_t n = 1;

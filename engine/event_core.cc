@@ -1,5 +1,6 @@
 #include "engine/event_core.h"
 
+#include <bit>
 #include <numbers>
 #include <string>
 
@@ -50,17 +51,47 @@ void EventCore<D>::sort(const Particles<D>& particles) {
 
 template <int D>
 void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  plan(read(particles, g, horizon, growth));
+}
+
+template <int D>
+void EventCore<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  const bool anew = read(particles, g, horizon, growth);
+  std::vector<Vec<D>>().swap(particles.x);
+  std::vector<Vec<D>>().swap(particles.v);
+  plan(anew);
+}
+
+template <int D>
+void EventCore<D>::give_back(double time, Particles<D>& particles) {
+  calendar_ = Calendar();  // makes room
+  fly_to(time, particles);
+}
+
+/// Takes over the records; tells whether the slots have changed.
+template <int D>
+bool EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
   const std::size_t n = particles.size();
   events_ = 0;
+  now_ = 0;
+  tied_ = {};
   const bool anew =
       order_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
-  if (anew) sort(particles);
+  if (anew) {
+    lists_.reset();
+    sort(particles);
+  }
   flights_.load(particles, order_, g, horizon, growth);
+  return anew;
+}
+
+/// Plans everybody's first event.
+template <int D>
+void EventCore<D>::plan(bool anew) {
+  const std::size_t n = flights_.size();
   packing_ = Packing<D>(n);
   setting_ = flights_.setting(packing_);
-  tied_ = {};
-  calendar_.reset(horizon, n, options_.entries_per_bin);
-  std::vector<double> radii = flights_.radii(horizon);
+  std::vector<double> radii = flights_.radii(flights_.horizon());
   if (lists_ && !anew && radii_ == radii) {  // lists outlive a slab while they are good for its radii
     lists_->follow(flights_.records());
     for (auto& a : agenda_) a.version = 0;
@@ -69,7 +100,12 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
     radii_ = std::move(radii);
     choose_search();
   }
-  for (std::size_t i = 0; i < n; ++i) predict(static_cast<Slot>(i), 0.0);
+  for (std::size_t i = 0; i < n; ++i) foresee(static_cast<Slot>(i), 0.0);
+  constexpr std::size_t kSample = 8192;
+  std::vector<double> some;
+  for (std::size_t i = 0; i < n; i += n / kSample + 1) some.push_back(agenda_[i].due());
+  calendar_.reset(flights_.horizon(), n, options_.entries_per_bin, std::move(some));
+  for (std::size_t i = 0; i < n; ++i) schedule(static_cast<Slot>(i));
 }
 
 template <int D>
@@ -81,21 +117,18 @@ void EventCore<D>::choose_search() {
     sum += each * r;
     sum_of_powers += each * std::pow(r, D);
   }
+  const Extent<D> extent = flights_.extent();
   double volume = 1;
   for (int k = 0; k < D; ++k) {
-    double edge = box_.edges[k];
-    if (box_.boundary[k] == Boundary::open) {  // as far as there are spheres
-      double low = flights_[0].x[k], high = low;
-      for (const auto& r : flights_.records()) low = std::min(low, r.x[k]), high = std::max(high, r.x[k]);
-      edge = high - low + 2 * largest;
-    }
+    const bool open = box_.boundary[k] == Boundary::open;  // as far as there are spheres
+    const double edge = open ? extent.high[k] - extent.low[k] + 2 * largest : box_.edges[k];
     volume *= edge;
   }
   const double filled = (D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * sum_of_powers / volume;
   tuning_.choose({D, n / volume, filled, 2 * sum / n, 2 * largest}, counts_);
   if (!tuning_.lists()) {
     lists_.reset();
-    cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, tuning_.cell(), particles_.x);
+    cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, kernels_, tuning_.cell(), extent);
     for (Slot i = 0; i < flights_.size(); ++i) {
       agenda_[i].where.cell = cells_->place(flights_[i].x);
       cells_->insert(i, agenda_[i].where.cell);
@@ -107,7 +140,7 @@ void EventCore<D>::choose_search() {
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
   lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, skin, agenda_);
-  lists_->build(flights_.records());
+  lists_->build(flights_.records(), extent);
 }
 
 template <int D>
@@ -243,6 +276,7 @@ double EventCore<D>::run(double end, const Report& report) {
   Slot i;
   double now;
   while (next_event(end, i, now)) {
+    now_ = now;
     prefetch_upcoming();
     Agenda<D>& a = agenda_[i];
     if (a.update < a.contact) {
@@ -278,6 +312,8 @@ double EventCore<D>::run(double end, const Report& report) {
 
 template <int D>
 void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
+  copies.x.resize(flights_.size());
+  copies.v.resize(flights_.size());
   for (Slot i = 0; i < flights_.size(); ++i) {
     const Record<D> r = flights_.at(i, time);
     copies.x[r.id] = r.x;
@@ -285,22 +321,26 @@ void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
   }
 }
 
-/// Looks for the next contact of a sphere whose record, or whose partner's, has changed.
+/// Looks for the next contact of a sphere whose record, or whose partner's, has changed, and puts it into the calendar.
 template <int D>
 void EventCore<D>::predict(Slot i, double now) {
+  foresee(i, now);
+  schedule(i);
+}
+
+template <int D>
+void EventCore<D>::foresee(Slot i, double now) {
   ++counts_.predictions;
   Agenda<D>& a = agenda_[i];
   a.contact = kNever;
   if (lists_) {
-    predict_pairs(i, lists_->candidates(a), a.count, a.shifted, flights_[i].t == now);
-    predict_leaving(i, now);
+    predict_pairs({i, lists_->candidates(a), a.count, a.same}, flights_[i].t == now);
   } else {
     cells_->around(i, a.where.cell, found_);
-    predict_pairs(i, found_.packed.data(), found_.count, found_.shifted, flights_[i].t == now);
-    predict_crossing(i, now);
+    predict_pairs({i, found_.packed.data(), found_.count, found_.same}, flights_[i].t == now);
   }
   if (walled_) predict_walls(i);
-  schedule(i);
+  predict_update(i, now);
 }
 
 /// The same for two spheres that have just collided.
@@ -310,13 +350,13 @@ void EventCore<D>::predict_two(Slot i, Slot j, double now) {
   Agenda<D>&a = agenda_[i], &b = agenda_[j];
   ScanTask task[2];
   if (lists_) {
-    task[0] = {i, lists_->candidates(a), a.count, a.shifted};
-    task[1] = {j, lists_->candidates(b), b.count, b.shifted};
+    task[0] = {i, lists_->candidates(a), a.count, a.same};
+    task[1] = {j, lists_->candidates(b), b.count, b.same};
   } else {
     cells_->around(i, a.where.cell, found_);
     cells_->around(j, b.where.cell, others_);
-    task[0] = {i, found_.packed.data(), found_.count, found_.shifted};
-    task[1] = {j, others_.packed.data(), others_.count, others_.shifted};
+    task[0] = {i, found_.packed.data(), found_.count, found_.same};
+    task[1] = {j, others_.packed.data(), others_.count, others_.same};
   }
   counts_.candidates += task[0].n + task[1].n;
   ScanResult first[2];
@@ -324,12 +364,9 @@ void EventCore<D>::predict_two(Slot i, Slot j, double now) {
   a.contact = b.contact = kNever;
   for (const int k : {0, 1}) {
     const Slot one = task[k].self;
-    take(one, first[k], task[k].candidates, task[k].n);
-    if (lists_)
-      predict_leaving(one, now);
-    else
-      predict_crossing(one, now);
+    take(task[k], first[k]);
     if (walled_) predict_walls(one);
+    predict_update(one, now);
     schedule(one);
   }
 }
@@ -337,37 +374,39 @@ void EventCore<D>::predict_two(Slot i, Slot j, double now) {
 /// Plans the first contact with the candidates where it comes before the one that is planned. `latest`: no record is of
 /// a later time than the sphere's own.
 template <int D>
-void EventCore<D>::predict_pairs(Slot i, const std::uint32_t* candidates, unsigned n, bool shifted, bool latest) {
-  counts_.candidates += n;
-  take(i, kernels_.scan[D - 2](setting_, i, candidates, n, shifted, latest), candidates, n);
+void EventCore<D>::predict_pairs(const ScanTask& task, bool latest) {
+  counts_.candidates += task.n;
+  take(task, kernels_.scan[D - 2](setting_, task, latest));
 }
 
 template <int D>
-void EventCore<D>::take(Slot i, const ScanResult& first, const std::uint32_t* candidates, unsigned n) {
-  Agenda<D>& a = agenda_[i];
+void EventCore<D>::take(const ScanTask& task, const ScanResult& first) {
+  Agenda<D>& a = agenda_[task.self];
   if (first.time > a.contact || first.time == kNever) return;
-  if (first.tied || first.time == a.contact || first.time == -kNever) return predict_pairs_one_by_one(i, candidates, n);
+  if (first.tied || first.time == a.contact || first.time == -kNever) return predict_pairs_one_by_one(task);
   a.contact = first.time;
   a.kind = EventKind::pair;
-  a.partner = candidates[first.which];
+  a.partner = task.candidates[first.which];
   a.partner_version = agenda_[packing_.slot(a.partner)].version;
 }
 
 template <int D>
-void EventCore<D>::predict_pairs_one_by_one(Slot i, const std::uint32_t* candidates, unsigned n) {
+void EventCore<D>::predict_pairs_one_by_one(const ScanTask& task) {
+  const Slot i = task.self;
   Agenda<D>& a = agenda_[i];
-  for (unsigned q = 0; q < n; ++q) {
-    if (packing_.slot(candidates[q]) == i) continue;
-    const double time =
-        flights_.pair_contact(i, packing_.slot(candidates[q]), box_.shift(packing_.image(candidates[q])));
+  for (unsigned q = 0; q < task.n; ++q) {
+    const std::uint32_t candidate = task.candidates[q];
+    const Slot j = packing_.slot(candidate);
+    if (j == i) continue;
+    const double time = flights_.pair_contact(i, j, box_.shift(packing_.image(candidate)));
     if (time > a.contact || time == kNever) continue;
     const Agenda<D> before = a;
     const bool first = before.contact == kNever;
     const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
     a.contact = time;
     a.kind = EventKind::pair;
-    a.partner = candidates[q];
-    a.partner_version = agenda_[packing_.slot(a.partner)].version;
+    a.partner = candidate;
+    a.partner_version = agenda_[j].version;
     if (!first && !(key_of(i) < rival)) a = before;
   }
 }
@@ -389,7 +428,15 @@ void EventCore<D>::predict_walls(Slot i) {
     }
 }
 
-/// When does the sphere leave the region its list is good for?
+template <int D>
+void EventCore<D>::predict_update(Slot i, double now) {
+  if (lists_)
+    predict_leaving(i, now);
+  else
+    predict_crossing(i, now);
+}
+
+/// When does the sphere leave the region its list is good for? Its contact has been planned.
 template <int D>
 void EventCore<D>::predict_leaving(Slot i, double now) {
   const Record<D>& r = flights_[i];
@@ -397,7 +444,12 @@ void EventCore<D>::predict_leaving(Slot i, double now) {
   Vec<D> e;
   for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
   const double skin = lists_->skin() * (1 - 1e-6);
-  if (!flights_.field()) {  // |e + v s| = skin; the form that cancels is good enough for a bound
+  if (!flights_.field()) {
+    if (a.contact < kNever && (e + (a.contact - r.t) * r.v).squaredNorm() < skin * skin) {
+      a.update = kNever;  // not before its contact: a straight way between two places of a ball stays in it
+      return;
+    }
+    // |e + v s| = skin; the form that cancels is good enough for a bound
     const double b = e.dot(r.v), v_squared = r.v.squaredNorm(), room = skin * skin - e.squaredNorm();
     const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
     a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
@@ -417,18 +469,19 @@ void EventCore<D>::predict_crossing(Slot i, double now) {
   const Record<D>& r = flights_[i];
   const CellGrid<D>& grid = cells_->grid();
   Agenda<D>& a = agenda_[i];
-  double first = kNever;
-  int face = 0;
+  // Without a branch, because nobody can foretell it: times that are not negative are in the order of their bits.
+  std::uint64_t first = std::bit_cast<std::uint64_t>(kNever);
+  unsigned face = 0;
   for (int k = 0; k < D; ++k) {
-    const int up = r.v[k] > 0 ? 1 : 0;
-    const std::int32_t c = a.where.cell.unwrapped[k] + up;
-    double s = (grid.face(k, c) - r.x[k]) / r.v[k];  // 0/0 and ±a/0 never come first
+    const unsigned up = static_cast<unsigned>(std::bit_cast<std::uint64_t>(r.v[k]) >> 63) ^ 1;
+    const std::int32_t c = a.where.cell.unwrapped[k] + static_cast<std::int32_t>(up);
+    double s = std::abs(grid.face(k, c) - r.x[k]) / std::abs(r.v[k]);  // 0/0 comes after all
     if (!box_.periodic(k) && (c <= 0 || c >= grid.count(k))) s = kNever;
-    const bool sooner = r.v[k] != 0 && s < first;
-    face = sooner ? 2 * k + up : face;
-    first = sooner ? s : first;
+    const std::uint64_t bits = std::bit_cast<std::uint64_t>(s);
+    face = bits < first ? 2 * static_cast<unsigned>(k) + up : face;
+    first = bits < first ? bits : first;
   }
-  a.update = std::max(r.t + first, now);
+  a.update = std::max(r.t + std::bit_cast<double>(first), now);
   a.face = static_cast<std::uint8_t>(face);
 }
 
@@ -457,9 +510,7 @@ void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
 
 template <int D>
 void EventCore<D>::schedule(Slot i) {
-  const double time = agenda_[i].due();
-  if (!(time < flights_.horizon())) return;
-  calendar_.push(time, i);
+  calendar_.push(agenda_[i].due(), i);
   ++counts_.scheduled;
 }
 
@@ -479,13 +530,9 @@ void EventCore<D>::update(Slot i, double now) {
     }
   }
   ++counts_.rebuilds;
-  const unsigned fresh = lists_->renew(i, r.x);
-  if (fresh > 0) {  // the planned contact stands; only those who are new in the list are looked at
-    const std::uint32_t* const list = lists_->candidates(a);
-    unsigned first = a.count - fresh;
-    first -= first % 8;  // scans read by eight
-    predict_pairs(i, list + first, a.count - first, a.shifted, false);
-  }
+  const std::span<const std::uint32_t> fresh = lists_->renew(i, r.x);
+  // The planned contact stands; only those who are new in the list are looked at.
+  if (!fresh.empty()) predict_pairs({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
   predict_leaving(i, now);
   schedule(i);
 }
@@ -498,7 +545,7 @@ void EventCore<D>::cross(Slot i, double now) {
   const int axis = a.face / 2, step = a.face % 2 == 1 ? 1 : -1;
   cells_->cross(i, a.where.cell, axis, step);
   cells_->ahead(i, a.where.cell, axis, step, found_);
-  if (found_.count > 0) predict_pairs(i, found_.packed.data(), found_.count, found_.shifted, false);
+  if (found_.count > 0) predict_pairs({i, found_.packed.data(), found_.count, found_.same}, false);
   predict_crossing(i, now);
   schedule(i);
 }

@@ -57,9 +57,19 @@ class EventCore {
   /// slab; `growth` ≥ 0 [1/time].
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth = 0);
 
+  /// The same for those that are too many to be kept twice: their positions and velocities are taken out of
+  /// `particles`, until give_back().
+  void take(Particles<D>& particles, const Vec<D>& g, double horizon, double growth = 0);
+
+  /// Ends a slab that began with take(): everybody is at `time`, which no event precedes any more.
+  void give_back(double time, Particles<D>& particles);
+
   /// Executes every event before `end`, or up to the collision limit; returns the time reached: `end`, or that of the
   /// last collision. Throws Error(Failure::numerical) when more than max_events contacts are needed.
   double run(double end, const Report& report);
+
+  /// The time of the event that is executed, or was last.
+  double now() const { return now_; }
 
   /// Copies of all spheres flown to `time`, which no event precedes any more.
   void fly_to(double time, Particles<D>& copies) const;
@@ -80,6 +90,8 @@ class EventCore {
   };
 
   void sort(const Particles<D>& particles);
+  bool read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
+  void plan(bool anew);
   void choose_search();
   void prefetch_upcoming() const;
   bool mirrored(Slot i, Slot j) const;
@@ -90,11 +102,13 @@ class EventCore {
   Tied tie(Slot i) const;
 
   void predict(Slot i, double now);
+  void foresee(Slot i, double now);
   void predict_two(Slot i, Slot j, double now);
-  void take(Slot i, const ScanResult& first, const std::uint32_t* candidates, unsigned n);
-  void predict_pairs(Slot i, const std::uint32_t* candidates, unsigned n, bool shifted, bool latest);
-  void predict_pairs_one_by_one(Slot i, const std::uint32_t* candidates, unsigned n);
+  void take(const ScanTask& task, const ScanResult& first);
+  void predict_pairs(const ScanTask& task, bool latest);
+  void predict_pairs_one_by_one(const ScanTask& task);
   void predict_walls(Slot i);
+  void predict_update(Slot i, double now);
   void predict_leaving(Slot i, double now);
   void predict_crossing(Slot i, double now);
   void predict_crossing_in_field(Slot i, double now);
@@ -118,7 +132,7 @@ class EventCore {
   ScanSetting setting_;
   Calendar calendar_;
   std::priority_queue<Tied> tied_;  // events at one and the same time, in the order of their keys
-  double tied_time_ = 0;
+  double tied_time_ = 0, now_ = 0;
 
   std::unique_ptr<SkinLists<D>> lists_;  // one of the two
   std::unique_ptr<LinkedCells<D>> cells_;

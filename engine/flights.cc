@@ -48,6 +48,13 @@ std::vector<double> Flights<D>::radii(double t) const {
 }
 
 template <int D>
+Extent<D> Flights<D>::extent() const {
+  Extent<D> all;
+  for (const Record<D>& r : records_) all.add(r.x);
+  return all;
+}
+
+template <int D>
 ScanSetting Flights<D>::setting(const Packing<D>& packing) const {
   ScanSetting setting{.records = reinterpret_cast<const double*>(records_.data()),
                       .radius = radius_.empty() ? nullptr : radius_.data(),

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "engine/box.h"
+#include "engine/cell_grid.h"
 #include "engine/contact_log.h"
 #include "engine/pages.h"
 #include "engine/particles.h"
@@ -41,6 +42,8 @@ class Flights {
 
   /// One radius where all are equal, else by slot; as they are at a time.
   std::vector<double> radii(double t) const;
+  /// Of the places at the records.
+  Extent<D> extent() const;
   /// What the kernels of scan.h are to know.
   ScanSetting setting(const Packing<D>& packing) const;
 

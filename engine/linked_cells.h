@@ -2,8 +2,6 @@
 // Who is in which cell, for dilute systems: cells as small as a diameter, most of them empty, with a list through the
 // spheres of each. A sphere that crosses into another cell looks at the new ones around it.
 
-#include <cstring>
-
 #include "engine/agenda.h"
 #include "engine/pages.h"
 #include "engine/scan.h"
@@ -14,7 +12,7 @@ namespace carom {
 struct Candidates {
   std::vector<std::uint32_t> packed = std::vector<std::uint32_t>(64);
   unsigned count = 0;
-  bool shifted = false;  ///< some lie in another box
+  unsigned same = 0;  ///< the first so many are in the same box
 };
 
 template <int D>
@@ -23,23 +21,29 @@ class LinkedCells {
   using Place = CellPlace<D>;
 
   /// Cells of edge at least `smallest`.
-  LinkedCells(const Box<D>& box, const Packing<D>& packing, double smallest, std::span<const Vec<D>> x)
+  LinkedCells(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, double smallest,
+              const Extent<D>& extent)
       : packing_(packing),
-        grid_(box, smallest, x, kCellsAParticle),
-        first_(grid_.cells(), kNobody),
-        link_(x.size()),
-        boxes_(x.size()),
+        kernels_(kernels),
+        grid_(box, smallest, extent, kCellsAParticle),
+        link_(extent.particles),
+        boxes_(extent.particles),
         here_(packing.pack(0, 0)) {
-    stride_[D - 1] = 1;
-    for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * grid_.count(k);
+    // A row along the last axis has a cell before it and one behind it, and rows are read by four.
+    std::ptrdiff_t cells = grid_.count(D - 1) + 2;
+    for (int k = D - 2; k >= 0; --k) {
+      stride_[k] = cells;
+      cells *= grid_.count(k);
+    }
+    first_.assign(static_cast<std::size_t>(cells + 3), kNobody);
     for (int k = 0; k < D; ++k) {
       one_[k] = 1 << (packing.field_bits * k);
-      for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
-        typename CellGrid<D>::Step step{0, 0};
-        grid_.step(k, c, step);
-        steps_[k].push_back({static_cast<std::ptrdiff_t>(step.offset), shifted(step.boxes * one_[k])});
-      }
       periodic_[k] = box.periodic(k);
+      if (k == D - 1) break;
+      for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
+        const std::int32_t count = grid_.count(k), boxes = c < 0 ? -1 : c < count ? 0 : 1;
+        steps_[k].push_back({stride_[k] * (c - boxes * count), shifted(boxes * one_[k])});
+      }
     }
   }
 
@@ -60,11 +64,12 @@ class LinkedCells {
 
   /// Fetches the cells around a place into the cache.
   void prefetch(const Place& place) const {
-    const Step* const x = &steps_[0][place.wrapped[0] + 1];
-    const Step* const y = &steps_[1][place.wrapped[1] + 1];
-    const std::uint32_t* const first = first_.data() + (D == 3 ? place.wrapped[D - 1] : 0);
+    const HeadStep* const x = &steps_[0][place.wrapped[0] + 1u];
+    const HeadStep* const y = D == 3 ? &steps_[D - 2][place.wrapped[D - 2] + 1u] : nullptr;
+    const std::uint32_t* const first = first_.data() + place.wrapped[D - 1];
     for (int a = -1; a <= 1; ++a)
-      for (int b = D == 3 ? -1 : 0; b <= (D == 3 ? 1 : 0); ++b) __builtin_prefetch(first + x[a].offset + y[b].offset);
+      for (int b = D == 3 ? -1 : 0; b <= (D == 3 ? 1 : 0); ++b)
+        __builtin_prefetch(first + x[a].offset + (D == 3 ? y[b].offset : 0));
   }
 
   void insert(Slot i, const Place& place) {
@@ -72,6 +77,7 @@ class LinkedCells {
     link_[i] = first;
     boxes_[i] = place.boxes;
     first = packing_.pack(i, place.boxes) | (first != kNobody ? kMore : 0);
+    mirror(place);
   }
   void remove(Slot i, const Place& place) {
     std::uint32_t *at = &first_[index(place)], *before = nullptr;
@@ -81,6 +87,7 @@ class LinkedCells {
     }
     *at = link_[i];
     if (before && *at == kNobody) *before &= ~kMore;
+    mirror(place);
   }
 
   /// Moves a sphere into the next cell along an axis.
@@ -101,99 +108,66 @@ class LinkedCells {
   }
 
   /// Everybody in the sphere's cell and those around it, itself among them.
-  void around(Slot self, const Place& place, Candidates& found) {
-    if (whole(place)) return heads<true, -1>(self, place, 0, 0, found);
-    heads<false, -1>(self, place, 0, 0, found);
-  }
+  void around(Slot self, const Place& place, Candidates& found) const { search(self, place, D, 0, found); }
 
   /// Everybody in the cells that came into view when the sphere crossed along an axis.
-  void ahead(Slot self, const Place& place, int axis, int step, Candidates& found) {
-    if (whole(place)) {
-      if (axis == 0) return heads<true, 0>(self, place, 0, step, found);
-      if (axis == 1) return heads<true, 1>(self, place, 1, step, found);
-      if constexpr (D == 3) return heads<true, 2>(self, place, 2, step, found);
-    }
-    heads<false, D>(self, place, axis, step, found);
+  void ahead(Slot self, const Place& place, int axis, int step, Candidates& found) const {
+    search(self, place, axis, step, found);
   }
 
  private:
   static constexpr std::uint32_t kMore = std::uint32_t{1} << 31;  ///< beside a sphere: another one is behind it
-  /// To a cell along one axis.
-  struct Step {
-    std::ptrdiff_t offset;
-    std::uint32_t away;  // the box it leads into, shifted to its bits of a candidate
-  };
   static constexpr double kCellsAParticle = 8;
 
   std::uint32_t shifted(std::int32_t boxes) const { return static_cast<std::uint32_t>(boxes) << packing_.slot_bits; }
 
-  std::ptrdiff_t index(const Place& place) const {
-    std::ptrdiff_t at = place.wrapped[D - 1];
+  std::size_t index(const Place& place) const {
+    std::ptrdiff_t at = place.wrapped[D - 1] + 1;
     for (int k = 0; k + 1 < D; ++k) at += stride_[k] * place.wrapped[k];
-    return at;
+    return static_cast<std::size_t>(at);
   }
 
-  /// Whether there are cells on all sides.
-  bool whole(const Place& place) const {
-    bool all = true;
-    for (int k = 0; k < D; ++k)
-      all = all && (periodic_[k] || (place.wrapped[k] > 0 && place.wrapped[k] + 1 < grid_.count(k)));
-    return all;
+  /// The cells before and behind a periodic row are images of its ends.
+  void mirror(const Place& place) {
+    const int z = place.wrapped[D - 1], last = grid_.count(D - 1) - 1;
+    if (!periodic_[D - 1] || (z > 0 && z < last)) return;
+    const std::size_t at = index(place);
+    const std::uint32_t first = first_[at], box = shifted(one_[D - 1]);
+    const auto row = static_cast<std::size_t>(last + 1);
+    if (z == 0) first_[at + row] = first == kNobody ? first : first - box;
+    if (z == last) first_[at - row] = first == kNobody ? first : first + box;
   }
 
-  /// Takes everybody in the cells around a place for a candidate, or only in those a step away along an axis. `whole`:
-  /// all the cells are there. `ahead`: the axis, −1 for none, D for one known at run time.
-  template <bool whole, int ahead>
-  void heads(Slot self, const Place& place, int axis, int step, Candidates& found) {
-    const std::uint32_t* const first = first_.data();
-    Step to[D][3];
-    int number[D];
-    bool nobody = false;
-    for (int k = 0; k < D; ++k) {
-      const Step* const here = &steps_[k][place.wrapped[k] + 1];
-      const bool one = ahead >= 0 && (ahead < D ? k == ahead : k == axis);
-      int low = -1, high = 1;
-      if constexpr (!whole) {
-        if (!periodic_[k] && place.wrapped[k] == 0) low = 0;
-        if (!periodic_[k] && place.wrapped[k] + 1 == grid_.count(k)) high = 0;
+  /// Takes everybody in the cells around a place for a candidate, or only in those a step away along an axis.
+  void search(Slot self, const Place& place, int axis, int step, Candidates& found) const {
+    static constexpr HeadStep kNone{0, 0};
+    const bool in_row = axis == D - 1;  // a cell of each row, not three
+    HeadsTask task{.first = first_.data() + place.wrapped[D - 1] + (in_row ? 1 + step : 0),
+                   .step = {&kNone, &kNone},
+                   .steps = {1, 1},
+                   .wanted = in_row ? 1u : 7u,
+                   .away = shifted(place.boxes),
+                   .here = here_};
+    found.count = found.same = 0;
+    for (int k = 0; k < D - 1; ++k) {
+      const int here = place.wrapped[k];
+      int low = k == axis ? step : -1, high = k == axis ? step : 1;
+      if (!periodic_[k]) {  // no cells beyond walls
+        low = std::max(low, -here);
+        high = std::min(high, grid_.count(k) - 1 - here);
+        if (low > high) return;
       }
-      if (one) {
-        nobody = nobody || step < low || step > high;  // beyond the wall
-        to[k][0] = here[nobody ? 0 : step];
-        number[k] = nobody ? 0 : 1;
-      } else {
-        for (int c = low; c <= high; ++c) to[k][c - low] = here[c];
-        number[k] = whole ? 3 : high - low + 1;
-      }
+      task.step[k] = &steps_[k][static_cast<std::size_t>(here + 1 + low)];
+      task.steps[k] = static_cast<unsigned>(high - low + 1);
     }
-    // The first of each cell, if there is one: without a branch. The difference of the boxes is the image.
-    const std::uint32_t away = shifted(place.boxes), here = here_;
-    std::uint32_t* const start = found.packed.data();
-    std::uint32_t *end = start, any = 0;
-    const auto head = [&](std::ptrdiff_t cell, std::uint32_t box) {
-      const std::uint32_t candidate = first[cell] - box;
-      *end = candidate;
-      const bool there = first[cell] != kNobody;
-      any |= there ? candidate ^ here : 0;
-      end += there ? 1 : 0;
-    };
-    for (int a = 0; a < number[0]; ++a)
-      for (int b = 0; b < number[1]; ++b) {
-        const std::ptrdiff_t row = to[0][a].offset + to[1][b].offset;
-        const std::uint32_t box = away + to[0][a].away + to[1][b].away;
-        if constexpr (D == 2)
-          head(row, box);
-        else
-          for (int c = 0; c < number[2]; ++c) head(row + to[2][c].offset, box + to[2][c].away);
-      }
-    found.count = static_cast<unsigned>(end - start);
+    const Heads heads = kernels_.heads(task, found.packed.data());
+    found.count = heads.count;
+    std::uint32_t any = heads.any;
     if ((any & kMore) != 0) any |= follow(found);
-    found.shifted = (any & ~kMore) >> packing_.slot_bits != 0;
-    if (found.shifted && 2 * widest_ + 1 > packing_.largest()) check(place, found);
-    const std::uint32_t own = packing_.pack(self, 0);
-    std::uint32_t padding[8];
-    for (auto& p : padding) p = own;
-    std::memcpy(found.packed.data() + found.count, padding, sizeof padding);
+    const bool elsewhere = (any & ~kMore) >> packing_.slot_bits != 0;
+    found.same = elsewhere ? 0 : found.count;
+    if (elsewhere && 2 * widest_ + 1 > packing_.largest()) check(place, found);
+    std::fill_n(found.packed.data() + found.count, 8, packing_.pack(self, 0));  // follow() may have moved them
   }
 
   /// Appends those behind the first of their cells.
@@ -224,16 +198,18 @@ class LinkedCells {
   }
 
   Packing<D> packing_;
+  const ScanKernels& kernels_;
   CellGrid<D> grid_;
-  std::ptrdiff_t stride_[D];
-  std::vector<Step> steps_[D];  // to the cells −1 … count along each axis
-  std::int32_t one_[D];         // a box along each axis, as a linear image
+  std::ptrdiff_t stride_[D - 1];
+  std::vector<HeadStep> steps_[D - 1];  // to the cells −1 … count along each axis but the last
+  std::int32_t one_[D];                 // a box along each axis, as a linear image
   bool periodic_[D];
-  PageVector<std::uint32_t> first_;  // of each cell: a sphere with the boxes of its place, and kMore; or kNobody
-  PageVector<std::uint32_t> link_;   // by slot: who is behind it in its cell, as first_ has it
-  PageVector<std::int32_t> boxes_;   // by slot: of its place
-  std::uint32_t here_;               // a candidate in the same box, but for its slot
-  std::int32_t widest_ = 0;          // the farthest box anyone has come to
+  PageVector<std::uint32_t>
+      first_;  // of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kNobody
+  PageVector<std::uint32_t> link_;  // by slot: who is behind it in its cell, as first_ has it
+  PageVector<std::int32_t> boxes_;  // by slot: of its place
+  std::uint32_t here_;              // a candidate in the same box, but for its slot
+  std::int32_t widest_ = 0;         // the farthest box anyone has come to
 };
 
 }  // namespace carom

@@ -5,6 +5,7 @@
 // finds the spheres around a place in the cells of skin_lists.h. All widths give the same bits: the same operations in
 // the same order in every lane. The environment variable CAROM_SIMD (sse2, avx2 or avx512) forces a width.
 
+#include <cstddef>
 #include <cstdint>
 
 namespace carom {
@@ -24,16 +25,16 @@ struct ScanSetting {
 
 struct ScanResult {
   double time;          ///< of the first contact; infinite: none; −infinite: two spheres overlap, look one by one
-  std::uint32_t which;  ///< its place among the candidates
+  std::uint32_t which;  ///< its place among the candidates, if there is one
   bool tied;            ///< another contact may have the same time: look one by one
 };
 
-/// A sphere to scan for, whose record is later than those of its candidates, as after a collision.
+/// A sphere to scan for, and its candidates, padded with `self` to a multiple of 8.
 struct ScanTask {
   std::uint32_t self;
   const std::uint32_t* candidates;
   unsigned n;
-  bool shifted;
+  unsigned same;  ///< the first so many are in the same box as the sphere; others may be
 };
 
 /// Eight spheres of a cell: places in 1024ths of the cell, ten bits an axis, and slots (kNobody where there is none).
@@ -43,37 +44,64 @@ struct alignas(64) CellLine {
 };
 inline constexpr std::uint32_t kNobody = 0xffffffff;
 
-/// A step to a cell along one axis, from that of the sphere who looks.
+/// A step to a cell along one axis.
 struct CellStep {
   std::uint32_t line;  ///< what it adds to the number of the cell's first line
   std::int32_t away;   ///< the boxes it leads through, as a linear image
-  float offset;        ///< [1024ths of a cell]
-  float squared;       ///< square of the distance to the nearest point of the cells there
+};
+
+/// The same, seen from a sphere.
+struct CellView : CellStep {
+  float corner;   ///< where the cell starts [length]
+  float squared;  ///< square of the distance to the nearest point of the cells there
 };
 
 struct NearTask {
   const CellLine* lines;
   const std::uint32_t* next;  ///< by line: the next line of the same cell, or kNobody
-  const CellStep* step[3];    ///< along each axis
-  unsigned steps[3];
-  float at[3];     ///< where in its cell the sphere stands [1024ths]
+  const CellView* view[3];    ///< along each axis
+  unsigned views[3];
   float scale[3];  ///< length of 1/1024 of a cell, by axis
   float limit_squared;
+};
+
+/// A step to a linked cell (linked_cells.h) along one axis.
+struct HeadStep {
+  std::ptrdiff_t offset;  ///< what it adds to the number of the cell
+  std::uint32_t away;     ///< the boxes it leads through, in the bits that an image has in a candidate
+};
+
+/// Rows of cells whose heads are wanted: candidates in the boxes they stand in, or kNobody.
+struct HeadsTask {
+  const std::uint32_t* first;  ///< the first cell of the row that no step leads to
+  const HeadStep* step[2];     ///< to the rows
+  unsigned steps[2];
+  unsigned wanted;     ///< one bit for each of the first three cells of a row; four are read
+  std::uint32_t away;  ///< added to all steps
+  std::uint32_t here;  ///< what a candidate in the same box has beside its slot
+};
+struct Heads {
+  unsigned count;
+  std::uint32_t any;  ///< all bits in which one of them differs from `here`
 };
 
 /// The kernels of one vector width.
 struct ScanKernels {
   const char* name;
-  /// The first contact of sphere `self` among n candidates, which are padded with `self` to a multiple of 8; `shifted`:
-  /// some of them are not in the same box; `latest`: none of their records is of a later time than its own. By
-  /// dimension − 2.
-  ScanResult (*scan[2])(const ScanSetting&, std::uint32_t self, const std::uint32_t* candidates, unsigned n,
-                        bool shifted, bool latest);
-  /// The same for the two spheres of a collision.
+  /// The first contact of a sphere with one of its candidates. `latest`: none of their records is of a later time than
+  /// its own. By dimension − 2.
+  ScanResult (*scan[2])(const ScanSetting&, const ScanTask&, bool latest);
+  /// The same for the two spheres of a collision, whose records are the latest there are.
   void (*scan_two[2])(const ScanSetting&, const ScanTask* task, ScanResult* result);
   /// Writes slots and linear images of the cells of all spheres within the limit; returns how many. The arrays must
   /// hold as many as there are in the cells.
   unsigned (*near)(const NearTask&, std::uint32_t* slots, std::int32_t* away);
+  /// Compares n candidates with a list, padded to a multiple of 8: copies those that are not in it to `fresh` and
+  /// returns how many, and sets a bit in `kept` (zeros before) for everybody in the list who is among them.
+  unsigned (*compare)(const std::uint32_t* list, unsigned length, const std::uint32_t* candidates, unsigned n,
+                      std::uint32_t* fresh, std::uint64_t* kept);
+  /// Writes those who head the cells, as they are seen from the sphere; there must be room for four more.
+  Heads (*heads)(const HeadsTask&, std::uint32_t* candidates);
 };
 
 /// The widest kernels this machine has, or those that CAROM_SIMD names. Throws Error(Failure::deck) where it names what

@@ -32,10 +32,8 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
 }
 
 template <int D>
-void SkinLists<D>::build(std::span<const Record<D>> records) {
+void SkinLists<D>::build(std::span<const Record<D>> records, const Extent<D>& extent) {
   const std::size_t n = records.size();
-  std::vector<Vec<D>> x(n);
-  for (std::size_t i = 0; i < n; ++i) x[i] = records[i].x;
   // 1. Cells for each size.
   levels_.clear();
   const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
@@ -45,20 +43,20 @@ void SkinLists<D>::build(std::span<const Record<D>> records) {
       if (level_[i] == l) largest = std::max(largest, radius_[i]);
     // Places are rounded down to 1024ths: two of them may come out nearer or farther by one in each direction.
     const double edge = 2 * (std::max(largest, 1e-300) + skin_) * (1 + 2 * std::sqrt(D) / kPlaces);
-    CellGrid<D> grid(box_, edge, x);
-    Level level{grid, largest, {}, {}};
-    level.lines.resize(grid.cells());
+    Level level{CellGrid<D>(box_, edge, extent), largest, {}, {}};
+    level.lines.resize(level.grid.cells());
     for (auto& line : level.lines) std::fill_n(line.slot, 8, kNobody);
-    level.next.assign(grid.cells(), kNobody);
+    level.next.assign(level.grid.cells(), kNobody);
     levels_.push_back(std::move(level));
   }
+  widest_ = 0;
+  for (Level& level : levels_) lay_steps(level);
   // 2. Everybody into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[i][k];
-    insert(static_cast<Slot>(i), x[i]);
+    for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = records[i].x[k];
+    insert(static_cast<Slot>(i), records[i].x);
   }
-  x = {};
   // 3. Lists.
   pool_.clear();
   pool_.reserve(24 * n);
@@ -67,6 +65,31 @@ void SkinLists<D>::build(std::span<const Record<D>> records) {
     agenda_[i].capacity = 0;
     assign(static_cast<Slot>(i), surround(static_cast<Slot>(i), records[i].x));
   }
+}
+
+/// Tabulates the steps to all cells that the spheres of a level can be seen from.
+template <int D>
+void SkinLists<D>::lay_steps(Level& level) {
+  for (int k = 0; k < D; ++k) {
+    const double places = most_places(levels_[0].largest_radius, level);
+    level.margin = std::max(level.margin, static_cast<std::int32_t>(std::ceil(places / level.grid.edge(k))));
+  }
+  for (int k = 0; k < D; ++k) {
+    const std::int32_t unit = 1 << (packing_.field_bits * k), count = level.grid.count(k);
+    for (std::int32_t c = -level.margin; c < count + level.margin; ++c) {
+      typename CellGrid<D>::Step step{0, 0};
+      level.grid.step(k, c, step);  // leads nowhere beyond walls: nobody takes it
+      widest_ = std::max(widest_, std::abs(step.boxes));
+      level.steps[k].push_back({static_cast<std::uint32_t>(step.offset), step.boxes * unit});
+    }
+  }
+  if (widest_ > packing_.largest()) throw_too_far();
+}
+
+/// How far a sphere sees spheres of a level, with room for places that are rounded.
+template <int D>
+double SkinLists<D>::most_places(double radius, const Level& level) const {
+  return (radius + level.largest_radius + 2 * skin_) * (1 + 2 * std::sqrt(D) / kPlaces);
 }
 
 template <int D>
@@ -86,7 +109,8 @@ void SkinLists<D>::insert(Slot i, const Vec<D>& x) {
   const Cell<D> cell = locate(level, x, place);
   const Image<D> boxes = level.grid.boxes(cell);
   boxes_[i] = packing_.linear(boxes);
-  if (!packing_.fits(boxes)) throw_too_far();
+  for (const std::int32_t b : boxes) widest_ = std::max(widest_, std::abs(b));
+  if (widest_ > packing_.largest()) throw_too_far();
   std::uint32_t code = 0;
   for (int k = 0; k < D; ++k) code |= static_cast<std::uint32_t>(place[k]) << (10 * k);
   std::uint32_t line = static_cast<std::uint32_t>(level.grid.index(cell));
@@ -144,72 +168,63 @@ unsigned SkinLists<D>::surround(Slot i, const Vec<D>& x) {
 
 template <int D>
 void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsigned& found) {
+  static constexpr CellView kHere{};
   Place place;
   const Cell<D> cell = locate(level, x, place);
-  NearTask task{level.lines.data(), level.next.data(), {}, {}, {}, {}, 0};
+  const Image<D> boxes = level.grid.boxes(cell);
+  NearTask task{.lines = level.lines.data(), .next = level.next.data()};
+  const double places = most_places(radius(i), level);
   double rounding = 0;
-  const double reach = radius(i) + level.largest_radius + 2 * skin_;
-  std::int32_t range[D];
+  std::size_t cells = 1, images = 1;  // images: how often a cell may be seen
   for (int k = 0; k < D; ++k) {
-    const double scale = level.grid.edge(k) / kPlaces;
-    task.at[k] = static_cast<float>(place[k]);
+    const std::int32_t count = level.grid.count(k), here = cell[k] - boxes[k] * count;
+    const double edge = level.grid.edge(k), scale = edge / kPlaces;
     task.scale[k] = static_cast<float>(scale);
     rounding += scale * scale;
-    const double places = reach * (1 + 2 * std::sqrt(D) / kPlaces);
-    range[k] = places <= level.grid.edge(k) ? 1 : static_cast<std::int32_t>(std::ceil(places / level.grid.edge(k)));
-    if (!box_.periodic(k)) range[k] = std::min(range[k], level.grid.count(k));
-  }
-  const double limit = (reach + std::sqrt(rounding)) * (1 + 1e-5);
-  task.limit_squared = static_cast<float>(limit * limit);
-
-  // The cells in reach, with the square of the distance to the nearest point of each.
-  std::size_t images = 1;  // how often a cell may be seen
-  for (int k = 0; k < D; ++k) {
-    steps_[k].clear();
-    images *= static_cast<std::size_t>(1 + 2 * range[k] / level.grid.count(k));
-    for (std::int32_t o = -range[k]; o <= range[k]; ++o) {
-      typename CellGrid<D>::Step step;
-      if (!level.grid.step(k, cell[k] + o, step)) continue;
-      if (std::abs(step.boxes) > packing_.largest()) throw_too_far();
-      const float offset = static_cast<float>(o) * static_cast<float>(kPlaces);
-      const float places = o == 0  ? 0
-                           : o > 0 ? offset - task.at[k] - 1
-                                   : task.at[k] - offset - static_cast<float>(kPlaces);
-      const float gap = std::max(places, 0.0f) * task.scale[k];
-      steps_[k].push_back(
-          {static_cast<std::uint32_t>(step.offset), step.boxes * (1 << (packing_.field_bits * k)), offset, gap * gap});
+    const std::int32_t range = places <= edge ? 1 : static_cast<std::int32_t>(std::ceil(places / edge));
+    std::int32_t low = -range, high = range;
+    if (!box_.periodic(k)) low = std::max(low, -here), high = std::min(high, count - 1 - here);
+    const CellStep* step = &level.steps[k][static_cast<std::size_t>(here + low + level.margin)];
+    auto& views = views_[k];
+    views.resize(static_cast<std::size_t>(high - low + 1));
+    float corner = static_cast<float>(low * static_cast<std::int32_t>(kPlaces) - place[k]);
+    for (CellView& view : views) {
+      const float gap = std::max(std::max(corner - 1, -corner - static_cast<float>(kPlaces)), 0.0f) * task.scale[k];
+      view = {*step++, corner * task.scale[k], gap * gap};
+      corner += static_cast<float>(kPlaces);
     }
+    task.view[k] = views.data();
+    task.views[k] = static_cast<unsigned>(views.size());
+    cells *= views.size();
+    images *= 1 + 2 * static_cast<std::size_t>(range) / static_cast<std::size_t>(count);
   }
-  if constexpr (D == 2) steps_[2].assign(1, {0, 0, 0, 0});
-  std::size_t cells = 1;
-  for (int k = 0; k < 3; ++k) {
-    task.step[k] = steps_[k].data();
-    task.steps[k] = static_cast<unsigned>(steps_[k].size());
-    cells *= steps_[k].size();
-  }
+  if constexpr (D == 2) task.view[2] = &kHere, task.views[2] = 1;
+  const double limit = (radius(i) + level.largest_radius + 2 * skin_ + std::sqrt(rounding)) * (1 + 1e-5);
+  task.limit_squared = static_cast<float>(limit * limit);
   // Lines beyond the first of their cells may all be here.
   const std::size_t most = 8 * (cells + (level.lines.size() - level.grid.cells()) * images);
   if (slots_.size() < most) slots_.resize(2 * most), away_.resize(2 * most);
   const unsigned n = kernels_.near(task, slots_.data(), away_.data());
   if (found_.size() < found + n + 8) found_.resize(2 * (found + n + 8));
 
+  const std::int32_t carried = packing_.linear(boxes);
+  const bool far = 2 * widest_ > packing_.largest();
   for (unsigned q = 0; q < n; ++q) {
     const Slot j = slots_[q];
-    if (j == i) continue;
-    const std::int32_t linear = boxes_[j] - away_[q];
-    if ((boxes_[j] | away_[q]) != 0) {
+    if (far) {
       const Image<D> theirs = packing_.image(packing_.pack(0, boxes_[j])),
-                     seen = packing_.image(packing_.pack(0, away_[q]));
+                     seen = packing_.image(packing_.pack(0, away_[q] + carried));
       for (int k = 0; k < D; ++k)
         if (std::abs(theirs[k] - seen[k]) > packing_.largest()) throw_too_far();
     }
-    const std::uint32_t candidate = packing_.pack(j, linear);
+    const std::uint32_t candidate = packing_.pack(j, boxes_[j] - away_[q] - carried);
     if (exact_) {
       const Vec<D> d = x - centre(agenda_[j]) + box_.shift(packing_.image(candidate));
       const double within = radius(i) + radius(j) + 2 * skin_;
       if (!(d.squaredNorm() < within * within)) continue;
     }
-    found_[found++] = candidate;
+    found_[found] = candidate;
+    found += j != i ? 1 : 0;
   }
 }
 
@@ -240,14 +255,18 @@ void SkinLists<D>::assign(Slot i, unsigned n) {
   }
   std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
   const std::uint32_t self = packing_.pack(i, 0);
-  std::int32_t any = 0;
-  for (unsigned q = 0; q < n; ++q) {
-    list[q] = found_[q];
-    any |= packing_.linear(found_[q]);
-  }
-  for (unsigned q = n; q < 8u * a.capacity; ++q) list[q] = self;
+  std::copy_n(found_.begin(), n, list);
+  std::fill(list + n, list + 8u * a.capacity, self);
   a.count = static_cast<std::uint16_t>(n);
-  a.shifted = any != 0;
+  divide(a);
+}
+
+/// Those of a list who are in the same box come first.
+template <int D>
+void SkinLists<D>::divide(Agenda<D>& a) {
+  std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
+  const auto* const others = std::partition(list, list + a.count, [&](auto c) { return same_box(c); });
+  a.same = static_cast<std::uint16_t>(others - list);
 }
 
 template <int D>
@@ -261,58 +280,55 @@ void SkinLists<D>::add(Slot i, std::uint32_t candidate) {
     longer.swap(found_);
     return;
   }
-  pool_[std::size_t{8} * a.list + a.count++] = candidate;
-  a.shifted = a.shifted || packing_.linear(candidate) != 0;
+  std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
+  list[a.count] = candidate;
+  if (same_box(candidate)) std::swap(list[a.same++], list[a.count]);
+  ++a.count;
 }
 
+/// Takes a candidate out of the list of a sphere.
 template <int D>
 void SkinLists<D>::drop(Slot i, std::uint32_t candidate) {
+  const std::uint32_t* const list = candidates(agenda_[i]);
+  remove_from_list(i, static_cast<unsigned>(std::find(list, list + agenda_[i].count, candidate) - list));
+}
+
+/// The same, given its place; someone from behind comes there.
+template <int D>
+void SkinLists<D>::remove_from_list(Slot i, unsigned q) {
   Agenda<D>& a = agenda_[i];
+  if (q == a.count) return;
   std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
-  for (unsigned q = 0; q < a.count; ++q) {
-    if (list[q] != candidate) continue;
-    list[q] = list[--a.count];
-    list[a.count] = packing_.pack(i, 0);
-    return;
+  if (q < a.same) {
+    list[q] = list[--a.same];
+    q = a.same;
   }
+  list[q] = list[--a.count];
+  list[a.count] = packing_.pack(i, 0);
 }
 
 template <int D>
-unsigned SkinLists<D>::renew(Slot i, const Vec<D>& x) {
+std::span<const std::uint32_t> SkinLists<D>::renew(Slot i, const Vec<D>& x) {
   Agenda<D>& a = agenda_[i];
   remove(i, centre(a));
   for (int k = 0; k < D; ++k) a.where.centre[k] = x[k];
   insert(i, x);
   const unsigned n = surround(i, x);
-  // Those who are gone and those who are new are told. Both lists are padded with the sphere itself.
+  if (fresh_.size() < n + 8) fresh_.resize(2 * n + 8);
+  kept_.assign(a.count / 64 + 1u, 0);
   const std::uint32_t* const list = candidates(a);
-  const unsigned before = a.count;
-  for (unsigned q = n; q % 8 != 0; ++q) found_[q] = packing_.pack(i, 0);
-  const auto among = [](const std::uint32_t* all, unsigned count, std::uint32_t one) {
-    typedef std::uint32_t Four __attribute__((vector_size(16)));
-    Four found{};
-    for (unsigned q = 0; q < count; q += 4) {
-      Four four;
-      std::memcpy(&four, all + q, sizeof four);
-      found |= (Four)(four == one);
-    }
-    std::uint64_t halves[2];
-    std::memcpy(halves, &found, sizeof halves);
-    return (halves[0] | halves[1]) != 0;
-  };
-  gone_.clear();
-  for (unsigned q = 0; q < before; ++q)
-    if (!among(found_.data(), n, list[q])) gone_.push_back(list[q]);
-  unsigned old = n;  // those who stay come first
-  for (unsigned q = 0; q < old;)
-    if (among(list, before, found_[q]))
-      ++q;
-    else
-      std::swap(found_[q], found_[--old]);
-  assign(i, n);
-  for (const std::uint32_t candidate : gone_) drop(packing_.slot(candidate), packing_.reversed(i, candidate));
-  for (unsigned q = old; q < n; ++q) add(packing_.slot(found_[q]), packing_.reversed(i, found_[q]));
-  return n - old;
+  const unsigned fresh = kernels_.compare(list, a.count, found_.data(), n, fresh_.data(), kept_.data());
+  for (unsigned q = a.count; q-- > 0;) {  // from the end: who takes the place of one that is gone has been looked at
+    if ((kept_[q / 64] >> (q % 64) & 1) != 0) continue;
+    drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
+    remove_from_list(i, q);
+  }
+  for (unsigned q = 0; q < fresh; ++q) {
+    add(i, fresh_[q]);
+    add(packing_.slot(fresh_[q]), packing_.reversed(i, fresh_[q]));
+  }
+  std::fill_n(fresh_.begin() + fresh, 8, packing_.pack(i, 0));
+  return {fresh_.data(), fresh};
 }
 
 /// The sphere has been carried by so many boxes: its region goes with it, and the images in the lists follow.
@@ -323,7 +339,6 @@ void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
   const std::int32_t linear = packing_.linear(boxes);
   boxes_[i] += linear;
   std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
-  a.shifted = true;
   for (unsigned q = 0; q < a.count; ++q) {
     const std::uint32_t old = list[q], own = packing_.reversed(i, old);
     const Slot j = packing_.slot(old);
@@ -333,10 +348,11 @@ void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
     for (unsigned p = 0; p < other.count; ++p)
       if (others[p] == own) {
         others[p] = packing_.reversed(i, list[q]);
-        other.shifted = true;
+        divide(other);
         break;
       }
   }
+  divide(a);
 }
 
 template <int D>

@@ -27,11 +27,11 @@ class SkinLists {
   const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{8} * a.list]; }
 
   /// Makes all lists for spheres at x, by slot.
-  void build(std::span<const Record<D>> records);
+  void build(std::span<const Record<D>> records, const Extent<D>& extent);
 
-  /// The sphere is now at x: makes its list anew and mends those of its neighbours. Those who are new in it come last;
-  /// returns how many.
-  unsigned renew(Slot i, const Vec<D>& x);
+  /// The sphere is now at x: makes its list anew and mends those of its neighbours. Returns who is new in it, padded
+  /// like a list; good until the next call.
+  std::span<const std::uint32_t> renew(Slot i, const Vec<D>& x);
 
   /// The spheres have moved since, and been wrapped into the box: mends images and renews the lists of those that have
   /// left their regions.
@@ -44,19 +44,26 @@ class SkinLists {
     PageVector<CellLine> lines;
     std::vector<std::uint32_t> next;  // by line
     std::uint32_t free = kNobody;
+    std::int32_t margin = 1;                     // cells that the largest reach extends beyond one's own
+    std::array<std::vector<CellStep>, D> steps;  // by axis: to the cells −margin … count + margin
   };
   using Place = std::array<std::int32_t, D>;  // in 1024ths of a cell
 
   std::size_t level_of(Slot i) const { return level_.empty() ? 0 : level_[i]; }
   double radius(Slot i) const { return radius_[level_.empty() ? 0 : i]; }
+  void lay_steps(Level& level);
+  double most_places(double radius, const Level& level) const;
   Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
   void insert(Slot i, const Vec<D>& x);
   void remove(Slot i, const Vec<D>& x);
   unsigned surround(Slot i, const Vec<D>& x);
   void look_into(const Level& level, Slot i, const Vec<D>& x, unsigned& found);
   void assign(Slot i, unsigned n);
+  bool same_box(std::uint32_t candidate) const { return packing_.linear(candidate) == 0; }
+  void divide(Agenda<D>& a);
   void add(Slot i, std::uint32_t candidate);
   void drop(Slot i, std::uint32_t candidate);
+  void remove_from_list(Slot i, unsigned q);
   void shift(Slot i, const Image<D>& boxes);
   std::uint32_t take(unsigned units);
 
@@ -72,10 +79,12 @@ class SkinLists {
   PageVector<std::uint32_t> pool_;                  // the lists
   std::vector<std::vector<std::uint32_t>> unused_;  // lists given back, by capacity
 
-  std::array<std::vector<CellStep>, 3> steps_;
-  std::vector<std::uint32_t> slots_, found_, gone_;
+  std::array<std::vector<CellView>, D> views_;
+  std::vector<std::uint32_t> slots_, found_, fresh_;
   std::vector<std::int32_t> away_;
-  bool exact_ = false;  // places in cells do not tell all
+  std::vector<std::uint64_t> kept_;
+  std::int32_t widest_ = 0;  // boxes: the farthest that anyone has come, or can see
+  bool exact_ = false;       // places in cells do not tell all
 };
 
 }  // namespace carom

@@ -28,29 +28,38 @@ class FreeFlight : public Integrator<D> {
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
+    try {
+      run_epoch(system, slab, report);
+    } catch (...) {
+      if (system.particles.x.empty()) core_->give_back(core_->now(), system.particles);
+      throw;
+    }
+  }
+
+ private:
+  void run_epoch(System<D>& system, const Slab& slab, SlabReport<D>& report) {
     const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
                                                max_events_ * system.particles.size()};
     {
       const Stopwatch watch(report.counters.seconds.predict);
-      core_->load(system.particles, g_, slab.length);
+      core_->take(system.particles, g_, slab.length);
     }
     report.reached = slab.length;
     for (double due : report.observe) {
       report.reached = run(due, events);
       if (report.reached < due) break;
-      if (copies_.size() == 0) copies_ = system.particles;
+      if (copies_.mass.empty()) copies_ = system.particles;
       core_->fly_to(due, copies_);
       copies_.image = system.particles.image;
       for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
       report.observer(due, copies_);
     }
     if (report.observe.empty() || report.reached == report.observe.back()) report.reached = run(slab.length, events);
-    core_->fly_to(report.reached, system.particles);
+    core_->give_back(report.reached, system.particles);
     report.counters.events = core_->counts();
     system.wrap();
   }
 
- private:
   double run(double end, const typename EventCore<D>::Report& events) {
     const Stopwatch watch(events.counters.seconds.queue);
     return core_->run(end, events);

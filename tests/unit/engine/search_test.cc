@@ -282,10 +282,10 @@ void expect_all_widths_agree(bool plain) {
       }
       if (time < first) first = time, which = q;
     }
-    const ScanResult results[] = {scan<D, 2>(s.setting, 0, candidates.data(), n, true, false),
-                                  scan<D, 4>(s.setting, 0, candidates.data(), n, true, false),
-                                  scan<D, 8>(s.setting, 0, candidates.data(), n, true, false),
-                                  scan_kernels().scan[D - 2](s.setting, 0, candidates.data(), n, true, false)};
+    const ScanTask task{0, candidates.data(), n, 0};
+    const ScanResult results[] = {scan<D, 2>(s.setting, task, false), scan<D, 4>(s.setting, task, false),
+                                  scan<D, 8>(s.setting, task, false),
+                                  scan_kernels().scan[D - 2](s.setting, task, false)};
     for (const ScanResult& result : results) {
       EXPECT_EQ(result.time, first) << n;
       if (std::isfinite(first)) {
@@ -312,11 +312,57 @@ TEST(Scan, ReportsTies) {
   s.records[4] = {{3, 0, 0}, {-1, 0, 0}, 0, 4, 0, 0};
   s.records[11] = {{-3, 0, 0}, {1, 0, 0}, 0, 11, 0, 0};
   for (Slot j = 1; j < 31; ++j) s.candidates[j - 1] = s.packing.pack(j, 0);
-  for (const auto& result : {scan<3, 2>(s.setting, 0, s.candidates.data(), 30, false, true),
-                             scan<3, 4>(s.setting, 0, s.candidates.data(), 30, false, true),
-                             scan<3, 8>(s.setting, 0, s.candidates.data(), 30, false, true)}) {
+  const ScanTask task{0, s.candidates.data(), 30, 30};
+  for (const auto& result :
+       {scan<3, 2>(s.setting, task, true), scan<3, 4>(s.setting, task, true), scan<3, 8>(s.setting, task, true)}) {
     EXPECT_EQ(result.time, 2.0);
     EXPECT_TRUE(result.tied);
+  }
+}
+
+TEST(Scan, SeesAnOverlapHoweverSlowlyItGrows) {
+  Surroundings<3> s(true);
+  s.records[0] = {Vec<3>::Zero(), Vec<3>::Zero(), 0, 0, 0, 0};
+  for (const double approach : {1e-3, 1e-6, 1e-9, 1e-12}) {  // far below what the discriminant can tell
+    s.records[1] = {{1 - 1e-16, 0, 0}, {-approach, 0.7, 0.3}, 0, 1, 0, 0};
+    s.candidates.assign(8, s.packing.pack(0, 0));
+    s.candidates[0] = s.packing.pack(1, 0);
+    const ScanTask task{0, s.candidates.data(), 1, 1};
+    for (const bool latest : {false, true})
+      for (const auto& result : {scan<3, 2>(s.setting, task, latest), scan<3, 4>(s.setting, task, latest),
+                                 scan<3, 8>(s.setting, task, latest)})
+        EXPECT_EQ(result.time, -kNever) << approach;
+  }
+}
+
+TEST(Scan, FindsTheFirstOfMoreThanABlockOfCandidates) {
+  Surroundings<3> s(true);
+  s.records.resize(200);
+  s.packing = Packing<3>(200);
+  s.setting.records = reinterpret_cast<const double*>(s.records.data());
+  s.setting.slot_mask = s.packing.slot_mask;
+  s.setting.slot_bits = s.packing.slot_bits;
+  s.setting.field_bits = s.packing.field_bits;
+  s.records[0] = {Vec<3>::Zero(), Vec<3>::Zero(), 0, 0, 0, 0};
+  s.candidates.assign(200, s.packing.pack(0, 0));
+  for (Slot j = 1; j < 200; ++j) {
+    s.records[j] = {{5.0 + j, 0, 0}, {-1, 0, 0}, 0, j, 0, 0};
+    s.candidates[j - 1] = s.packing.pack(j, 0);
+  }
+  for (const unsigned first : {3u, 63u, 64u, 130u, 199u}) {
+    auto records = s.records;
+    records[first].x[0] = 3;
+    s.setting.records = reinterpret_cast<const double*>(records.data());
+    const ScanTask task{0, s.candidates.data(), 199, 199};
+    for (const auto& result :
+         {scan<3, 2>(s.setting, task, false), scan<3, 4>(s.setting, task, true), scan<3, 8>(s.setting, task, true)}) {
+      EXPECT_EQ(result.time, 2.0);
+      EXPECT_EQ(result.which, first - 1);
+      EXPECT_FALSE(result.tied);
+    }
+    records[first % 7 + 70].x[0] = 3;  // in another block, or the same
+    for (const auto& result : {scan<3, 4>(s.setting, task, true), scan<3, 8>(s.setting, task, false)})
+      EXPECT_TRUE(result.tied);
   }
 }
 
