@@ -30,9 +30,9 @@ struct alignas(64) Agenda {
   std::uint32_t partner = 0;          ///< as a candidate (Packing); at a wall: 2·axis + (0 lower, 1 upper)
   std::uint32_t partner_version = 0;  ///< the contact is stale when the partner's has moved on
   std::uint32_t version = 0;          ///< grows with every contact of the sphere
-  std::uint32_t list = 0;             ///< where its list starts, in units of 8 candidates
+  std::uint32_t list = 0;             ///< where its list starts, in units of ScanKernels::lanes candidates
   std::uint16_t count = 0;            ///< candidates in the list
-  std::uint16_t capacity = 0;         ///< in units of 8
+  std::uint16_t capacity = 0;         ///< in the same units
   EventKind kind = EventKind::pair;
   std::uint8_t face = 0;   ///< it leaves its cell through: 2·axis + (0 downwards, 1 upwards)
   std::uint16_t same = 0;  ///< candidates at the start of the list that are in the same box

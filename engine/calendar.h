@@ -18,11 +18,13 @@
 
 namespace carom {
 
+#pragma pack(push, 4)
 struct CalendarEntry {
   double time;
   std::uint32_t slot;  ///< whose event it is
-  std::uint32_t spare = 0;
 };
+#pragma pack(pop)
+static_assert(sizeof(CalendarEntry) == 12);  // there are some for every particle
 
 /// Serves entries by time; the order of equal times is the caller's business.
 class Calendar {
@@ -38,7 +40,7 @@ class Calendar {
     chunks_.reserve(2 * alive / kChunk + kBins);  // growing would copy; what is not used is not touched
     next_.clear();
     free_ = kNone;
-    later_.clear();
+    later_ = Bin{};
     present_.clear();
     sorted_.clear();
     served_ = 0;
@@ -58,7 +60,7 @@ class Calendar {
     if (!(time < horizon_)) return;
     const double bin = (time - start_) * per_width_;
     if (!(bin < kBins))
-      later_.push_back({time, slot});
+      append(later_, {time, slot});
     else if (const int number = static_cast<int>(bin); number > current_)
       append(ring_[static_cast<std::size_t>(number)], {time, slot});
     else
@@ -110,7 +112,7 @@ class Calendar {
     bool operator()(const CalendarEntry& a, const CalendarEntry& b) const { return b.time < a.time; }
   };
   static constexpr std::uint32_t kNone = 0xffffffff;
-  static constexpr std::uint32_t kChunk = 16;  // entries: four cache lines
+  static constexpr std::uint32_t kChunk = 16;  // entries: three cache lines
   static constexpr int kBins = 2048;
   struct Chunk {
     CalendarEntry entry[kChunk];
@@ -138,11 +140,12 @@ class Calendar {
     ++bin.count;
   }
 
+  /// Calls visit(entry) for the entries of a bin and gives their memory back as it goes.
   template <class Visit>
   void empty(Bin& bin, Visit&& visit) {
-    std::uint32_t n = bin.count == 0 ? 0 : (bin.count - 1) % kChunk + 1;
+    std::uint32_t n = in_last(bin);
     for (std::uint32_t chunk = bin.chunk; chunk != kNone;) {
-      for (std::uint32_t k = 0; k < n; ++k) visit(chunks_[chunk].entry[k]);
+      for (std::uint32_t k = 0; k < n; ++k) visit(CalendarEntry(chunks_[chunk].entry[k]));
       const std::uint32_t next = next_[chunk];
       next_[chunk] = free_;
       free_ = chunk;
@@ -151,6 +154,7 @@ class Calendar {
     }
     bin = Bin{};
   }
+  static std::uint32_t in_last(const Bin& bin) { return bin.count == 0 ? 0 : (bin.count - 1) % kChunk + 1; }
 
   /// Opens the next bin that has entries; false when there is none. sorted_ and present_ are empty.
   template <class Holds>
@@ -179,18 +183,28 @@ class Calendar {
   template <class Holds>
   bool turn(Holds&& holds) {
     current_ = kBins - 1;
-    std::erase_if(later_, [&](const CalendarEntry& entry) { return !holds(entry); });
-    if (later_.empty()) return false;
-    const double end = start_ + width_ * kBins, start = std::min_element(later_.begin(), later_.end(), Earlier{})->time;
+    double start = std::numeric_limits<double>::infinity();
+    std::uint32_t n = in_last(later_);
+    for (std::uint32_t chunk = later_.chunk; chunk != kNone; chunk = next_[chunk], n = kChunk)
+      for (std::uint32_t k = 0; k < n; ++k)
+        if (const CalendarEntry& entry = chunks_[chunk].entry[k]; entry.time < start && holds(entry))
+          start = entry.time;
+    Bin waiting = later_;
+    later_ = Bin{};
+    if (!(start < horizon_)) {
+      empty(waiting, [](const CalendarEntry&) {});
+      return false;
+    }
+    const double end = start_ + width_ * kBins;
     double width = width_;
     if (!forced_ && count_ > 0) {
       const double rate = static_cast<double>(count_) / (end - start_), factor = wanted_ / rate / width_;
       if (factor > 1.5 || factor < 0.67) width *= std::clamp(factor, 0.125, 8.0);
     }
     lay_out(start, width);
-    std::vector<CalendarEntry> waiting;
-    waiting.swap(later_);
-    for (const CalendarEntry& entry : waiting) push(entry.time, entry.slot);
+    empty(waiting, [&](const CalendarEntry& entry) {
+      if (holds(entry)) push(entry.time, entry.slot);
+    });
     return true;
   }
 
@@ -242,7 +256,7 @@ class Calendar {
   PageVector<Chunk> chunks_;
   std::vector<std::uint32_t> next_;  // by chunk: the one filled before it, or the next free one
   std::uint32_t free_ = kNone;
-  std::vector<CalendarEntry> later_;  // beyond the ring
+  Bin later_;  // beyond the ring
 
   std::vector<CalendarEntry> sorted_, scratch_;  // the open bin
   std::vector<std::uint32_t> bucket_, which_;

@@ -44,8 +44,9 @@ void EventCore<D>::sort(const Particles<D>& particles) {
     places[i] = {interleave<D>(place), static_cast<Id>(i)};
   }
   std::sort(places.begin(), places.end());
-  order_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) order_[i] = places[i].second;
+  std::vector<Id> order(n);
+  for (std::size_t i = 0; i < n; ++i) order[i] = places[i].second;
+  flights_.assign(order);
   since_sort_ = 0;
 }
 
@@ -76,12 +77,12 @@ bool EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double h
   now_ = 0;
   tied_ = {};
   const bool anew =
-      order_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
+      flights_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
   if (anew) {
     lists_.reset();
     sort(particles);
   }
-  flights_.load(particles, order_, g, horizon, growth);
+  flights_.load(particles, g, horizon, growth);
   return anew;
 }
 

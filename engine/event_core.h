@@ -126,7 +126,6 @@ class EventCore {
   const ScanKernels& kernels_;
   bool walled_ = false;
   PageVector<Agenda<D>> agenda_;
-  PageVector<Id> order_;       // whose record is in a slot
   std::vector<double> radii_;  // that lists or cells are made for; one where all are equal
   Packing<D> packing_;
   ScanSetting setting_;

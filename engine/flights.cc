@@ -19,8 +19,13 @@ double common(const std::vector<double>& values) {
 }  // namespace
 
 template <int D>
-void Flights<D>::load(const Particles<D>& particles, std::span<const Id> order, const Vec<D>& g, double horizon,
-                      double growth) {
+void Flights<D>::assign(std::span<const Id> order) {
+  records_.resize(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) records_[i].id = order[i];
+}
+
+template <int D>
+void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = growth;
@@ -29,14 +34,10 @@ void Flights<D>::load(const Particles<D>& particles, std::span<const Id> order, 
   common_mass_ = common(particles.mass);
   radius_.clear();
   mass_.clear();
-  if (common_radius_ == 0)
-    for (const Id i : order) radius_.push_back(particles.radius[i]);
-  if (common_mass_ == 0)
-    for (const Id i : order) mass_.push_back(particles.mass[i]);
-  records_.resize(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const Id id = order[i];
-    records_[i] = {particles.x[id], particles.v[id], 0.0, id, 0, particles.species[id]};
+  for (Record<D>& r : records_) {
+    if (common_radius_ == 0) radius_.push_back(particles.radius[r.id]);
+    if (common_mass_ == 0) mass_.push_back(particles.mass[r.id]);
+    r = {particles.x[r.id], particles.v[r.id], 0.0, r.id, 0, particles.species[r.id]};
   }
 }
 

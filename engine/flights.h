@@ -30,8 +30,11 @@ class Flights {
  public:
   explicit Flights(const Box<D>& box) : box_(box) {}
 
-  /// Starts a slab: everybody at time 0, in the slots that `order` gives them.
-  void load(const Particles<D>& particles, std::span<const Id> order, const Vec<D>& g, double horizon, double growth);
+  /// Gives everybody a slot.
+  void assign(std::span<const Id> order);
+
+  /// Starts a slab: everybody at time 0, in the slots given before.
+  void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
 
   std::size_t size() const { return records_.size(); }
   const Record<D>& operator[](Slot i) const { return records_[i]; }

@@ -29,7 +29,7 @@ struct ScanResult {
   bool tied;            ///< another contact may have the same time: look one by one
 };
 
-/// A sphere to scan for, and its candidates, padded with `self` to a multiple of 8.
+/// A sphere to scan for, and its candidates, padded with `self` to a multiple of ScanKernels::lanes.
 struct ScanTask {
   std::uint32_t self;
   const std::uint32_t* candidates;
@@ -88,6 +88,7 @@ struct Heads {
 /// The kernels of one vector width.
 struct ScanKernels {
   const char* name;
+  unsigned lanes;  ///< candidates looked at together: their lists are padded to a multiple of it
   /// The first contact of a sphere with one of its candidates. `latest`: none of their records is of a later time than
   /// its own. By dimension − 2.
   ScanResult (*scan[2])(const ScanSetting&, const ScanTask&, bool latest);
@@ -96,7 +97,7 @@ struct ScanKernels {
   /// Writes slots and linear images of the cells of all spheres within the limit; returns how many. The arrays must
   /// hold as many as there are in the cells.
   unsigned (*near)(const NearTask&, std::uint32_t* slots, std::int32_t* away);
-  /// Compares n candidates with a list, padded to a multiple of 8: copies those that are not in it to `fresh` and
+  /// Compares n candidates with a list, which is read by eight: copies those that are not in it to `fresh` and
   /// returns how many, and sets a bit in `kept` (zeros before) for everybody in the list who is among them.
   unsigned (*compare)(const std::uint32_t* list, unsigned length, const std::uint32_t* candidates, unsigned n,
                       std::uint32_t* fresh, std::uint64_t* kept);

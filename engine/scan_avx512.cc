@@ -2,5 +2,5 @@
 #include "engine/scan_kernel.h"
 
 namespace carom::kernels {
-const ScanKernels avx512{"avx512", {scan<2, 8>, scan<3, 8>}, {scan_two<2, 8>, scan_two<3, 8>}, near, compare, heads};
+const ScanKernels avx512{"avx512", 8, {scan<2, 8>, scan<3, 8>}, {scan_two<2, 8>, scan_two<3, 8>}, near, compare, heads};
 }

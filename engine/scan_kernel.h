@@ -363,7 +363,7 @@ inline unsigned bits(Ints mask) {
     for (unsigned p = 0; p < length; p += 8) {
       Ints eight;
       __builtin_memcpy(&eight, list + p, sizeof eight);
-      const unsigned same = bits(eight == one);
+      const unsigned inside = length - p < 8 ? (1u << (length - p)) - 1 : 0xff, same = bits(eight == one) & inside;
       hit |= same;
       kept[p / 64] |= static_cast<std::uint64_t>(same) << (p % 64);
     }

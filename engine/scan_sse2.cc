@@ -2,5 +2,5 @@
 #include "engine/scan_kernel.h"
 
 namespace carom::kernels {
-const ScanKernels sse2{"sse2", {scan<2, 2>, scan<3, 2>}, {scan_two<2, 2>, scan_two<3, 2>}, near, compare, heads};
+const ScanKernels sse2{"sse2", 4, {scan<2, 2>, scan<3, 2>}, {scan_two<2, 2>, scan_two<3, 2>}, near, compare, heads};
 }

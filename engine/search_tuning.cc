@@ -8,9 +8,9 @@ namespace carom {
 namespace {
 
 // Instructions, as callgrind counts them.
-constexpr double kPrediction = 500, kCandidate = 40;        // on a list
-constexpr double kRenewal = 7000;                           // of a list
-constexpr double kCellHead = 7, kCellCandidate = 75;        // a prediction on cells: for each cell and each candidate
+constexpr double kPrediction = 400, kCandidate = 32;         // on a list
+constexpr double kRenewal = 4500;                           // of a list
+constexpr double kCellHead = 9, kCellCandidate = 60;        // a prediction on cells: for each cell and each candidate
 constexpr double kCrossing = 550;                           // into another cell, beside the cells and candidates ahead
 constexpr double kFewestPredictions = 20000;                // before counts are trusted
 constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02;  // in mean diameters

@@ -7,6 +7,8 @@ namespace carom {
 namespace {
 
 constexpr double kPlaces = 1024;  // to a cell, along each axis
+constexpr unsigned kSlack = 3;    // candidates that a new list has room for, beside those it has
+constexpr double kMembers = 4;    // of a cell, at least: fewer would waste its line
 
 template <int D>
 Vec<D> centre(const Agenda<D>& a) {
@@ -20,7 +22,13 @@ Vec<D> centre(const Agenda<D>& a) {
 template <int D>
 SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels,
                         std::span<const double> radius, double skin, PageVector<Agenda<D>>& agenda)
-    : box_(box), packing_(packing), kernels_(kernels), radius_(radius), skin_(skin), agenda_(agenda) {
+    : box_(box),
+      packing_(packing),
+      kernels_(kernels),
+      lanes_(kernels.lanes),
+      radius_(radius),
+      skin_(skin),
+      agenda_(agenda) {
   const double largest = *std::max_element(radius.begin(), radius.end());
   exact_ =
       radius.size() > 1 || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
@@ -37,13 +45,20 @@ void SkinLists<D>::build(std::span<const Record<D>> records, const Extent<D>& ex
   // 1. Cells for each size.
   levels_.clear();
   const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
+  double volume = 1;
+  for (int k = 0; k < D; ++k)
+    volume *= box_.boundary[k] == Boundary::open ? extent.high[k] - extent.low[k] : box_.edges[k];
   for (std::size_t l = 0; l < levels; ++l) {
     double largest = level_.empty() ? radius_[0] : 0;
+    std::size_t members = level_.empty() ? n : 0;
     for (std::size_t i = 0; i < level_.size(); ++i)
-      if (level_[i] == l) largest = std::max(largest, radius_[i]);
+      if (level_[i] == l) largest = std::max(largest, radius_[i]), ++members;
     // Places are rounded down to 1024ths: two of them may come out nearer or farther by one in each direction.
-    const double edge = 2 * (std::max(largest, 1e-300) + skin_) * (1 + 2 * std::sqrt(D) / kPlaces);
-    Level level{CellGrid<D>(box_, edge, extent), largest, {}, {}};
+    const double reach = 2 * (std::max(largest, 1e-300) + skin_) * (1 + 2 * std::sqrt(D) / kPlaces);
+    const double roomy = std::pow(kMembers * volume / static_cast<double>(std::max<std::size_t>(members, 1)), 1.0 / D);
+    const double edge = std::max(reach, roomy);
+    Level level{
+        .grid = CellGrid<D>(box_, edge, extent), .largest_radius = largest, .lines = {}, .next = {}, .steps = {}};
     level.lines.resize(level.grid.cells());
     for (auto& line : level.lines) std::fill_n(line.slot, 8, kNobody);
     level.next.assign(level.grid.cells(), kNobody);
@@ -59,6 +74,7 @@ void SkinLists<D>::build(std::span<const Record<D>> records, const Extent<D>& ex
   }
   // 3. Lists.
   pool_.clear();
+  used_ = 0;
   pool_.reserve(24 * n);
   for (auto& unused : unused_) unused.clear();
   for (std::size_t i = 0; i < n; ++i) {
@@ -172,7 +188,9 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsign
   Place place;
   const Cell<D> cell = locate(level, x, place);
   const Image<D> boxes = level.grid.boxes(cell);
-  NearTask task{.lines = level.lines.data(), .next = level.next.data()};
+  NearTask task{};
+  task.lines = level.lines.data();
+  task.next = level.next.data();
   const double places = most_places(radius(i), level);
   double rounding = 0;
   std::size_t cells = 1, images = 1;  // images: how often a cell may be seen
@@ -236,27 +254,28 @@ std::uint32_t SkinLists<D>::take(unsigned units) {
     unused_[units].pop_back();
     return list;
   }
-  const std::size_t at = pool_.size();
-  pool_.resize(at + std::size_t{8} * units);
-  return static_cast<std::uint32_t>(at / 8);
+  const std::size_t at = used_;
+  used_ += std::size_t{lanes_} * units;
+  pool_.resize(used_ + 8);  // lists are compared by eight
+  return static_cast<std::uint32_t>(at / lanes_);
 }
 
 /// Makes the first n of found_ the list of a sphere.
 template <int D>
 void SkinLists<D>::assign(Slot i, unsigned n) {
   Agenda<D>& a = agenda_[i];
-  const unsigned units = std::max(1u, (n + 7) / 8);
-  if (units > a.capacity) {
-    if (units > std::numeric_limits<std::uint16_t>::max() / 8)
+  const unsigned units = (n + kSlack + lanes_ - 1) / lanes_;
+  if (n > lanes_ * a.capacity || a.capacity == 0) {
+    if (units > std::numeric_limits<std::uint16_t>::max() / lanes_)
       throw Error(Failure::numerical, "a sphere has more than 65 thousand neighbours");
     if (a.capacity > 0) unused_[a.capacity].push_back(a.list);
     a.list = take(units);
     a.capacity = static_cast<std::uint16_t>(units);
   }
-  std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
+  std::uint32_t* const list = start_of(a);
   const std::uint32_t self = packing_.pack(i, 0);
   std::copy_n(found_.begin(), n, list);
-  std::fill(list + n, list + 8u * a.capacity, self);
+  std::fill(list + n, list + lanes_ * a.capacity, self);
   a.count = static_cast<std::uint16_t>(n);
   divide(a);
 }
@@ -264,7 +283,7 @@ void SkinLists<D>::assign(Slot i, unsigned n) {
 /// Those of a list who are in the same box come first.
 template <int D>
 void SkinLists<D>::divide(Agenda<D>& a) {
-  std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
+  std::uint32_t* const list = start_of(a);
   const auto* const others = std::partition(list, list + a.count, [&](auto c) { return same_box(c); });
   a.same = static_cast<std::uint16_t>(others - list);
 }
@@ -272,7 +291,7 @@ void SkinLists<D>::divide(Agenda<D>& a) {
 template <int D>
 void SkinLists<D>::add(Slot i, std::uint32_t candidate) {
   Agenda<D>& a = agenda_[i];
-  if (a.count == 8u * a.capacity) {
+  if (a.count == lanes_ * a.capacity) {
     std::vector<std::uint32_t> longer(candidates(a), candidates(a) + a.count);
     longer.push_back(candidate);
     longer.swap(found_);
@@ -280,7 +299,7 @@ void SkinLists<D>::add(Slot i, std::uint32_t candidate) {
     longer.swap(found_);
     return;
   }
-  std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
+  std::uint32_t* const list = start_of(a);
   list[a.count] = candidate;
   if (same_box(candidate)) std::swap(list[a.same++], list[a.count]);
   ++a.count;
@@ -298,7 +317,7 @@ template <int D>
 void SkinLists<D>::remove_from_list(Slot i, unsigned q) {
   Agenda<D>& a = agenda_[i];
   if (q == a.count) return;
-  std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
+  std::uint32_t* const list = start_of(a);
   if (q < a.same) {
     list[q] = list[--a.same];
     q = a.same;
@@ -338,13 +357,13 @@ void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
   for (int k = 0; k < D; ++k) a.where.centre[k] += boxes[k] * box_.edges[k];
   const std::int32_t linear = packing_.linear(boxes);
   boxes_[i] += linear;
-  std::uint32_t* const list = &pool_[std::size_t{8} * a.list];
+  std::uint32_t* const list = start_of(a);
   for (unsigned q = 0; q < a.count; ++q) {
     const std::uint32_t old = list[q], own = packing_.reversed(i, old);
     const Slot j = packing_.slot(old);
     list[q] = packing_.pack(j, packing_.linear(old) - linear);
     Agenda<D>& other = agenda_[j];
-    std::uint32_t* const others = &pool_[std::size_t{8} * other.list];
+    std::uint32_t* const others = start_of(other);
     for (unsigned p = 0; p < other.count; ++p)
       if (others[p] == own) {
         others[p] = packing_.reversed(i, list[q]);

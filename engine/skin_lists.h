@@ -24,7 +24,7 @@ class SkinLists {
             double skin, PageVector<Agenda<D>>& agenda);
 
   double skin() const { return skin_; }
-  const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{8} * a.list]; }
+  const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
 
   /// Makes all lists for spheres at x, by slot.
   void build(std::span<const Record<D>> records, const Extent<D>& extent);
@@ -59,6 +59,7 @@ class SkinLists {
   unsigned surround(Slot i, const Vec<D>& x);
   void look_into(const Level& level, Slot i, const Vec<D>& x, unsigned& found);
   void assign(Slot i, unsigned n);
+  std::uint32_t* start_of(const Agenda<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
   bool same_box(std::uint32_t candidate) const { return packing_.linear(candidate) == 0; }
   void divide(Agenda<D>& a);
   void add(Slot i, std::uint32_t candidate);
@@ -70,6 +71,7 @@ class SkinLists {
   Box<D> box_;
   Packing<D> packing_;
   const ScanKernels& kernels_;
+  const unsigned lanes_;  // lists start and end at multiples of so many candidates
   std::span<const double> radius_;
   double skin_;
   PageVector<Agenda<D>>& agenda_;
@@ -77,6 +79,7 @@ class SkinLists {
   std::vector<std::uint8_t> level_;                 // by slot; empty where there is one level
   PageVector<std::int32_t> boxes_;                  // by slot: the box of the region's centre, as a linear image
   PageVector<std::uint32_t> pool_;                  // the lists
+  std::size_t used_ = 0;                            // of the pool
   std::vector<std::vector<std::uint32_t>> unused_;  // lists given back, by capacity
 
   std::array<std::vector<CellView>, D> views_;
