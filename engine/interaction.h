@@ -6,6 +6,7 @@
 // the particles. Positions are passed in as arrays in id order; contributions to one particle are summed in the order
 // of the partner's id, so that the sum does not depend on how the pairs were found.
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -14,6 +15,7 @@
 
 #include "engine/box.h"
 #include "engine/exact_sum.h"
+#include "engine/histories.h"
 #include "engine/parameters.h"
 #include "engine/particles.h"
 
@@ -29,6 +31,18 @@ struct PotentialSums {
   ExactSum energy;     ///< V [energy]
   ExactSum magnitude;  ///< Σ|V| over pairs and particles [energy]
   ExactSum virial;     ///< Σ d·F over pairs, d = x_i − x_j, F the force on i [energy]; external fields add nothing
+};
+
+/// What a term has found out about the pairs of a slab, kept from sweep to sweep.
+template <int D>
+struct PairMemory {
+  std::vector<Vec<D>> impulse;  ///< given to the lower id, of each pair in the order of the loop
+};
+
+/// How much of a term was evaluated.
+struct PairCounts {
+  std::uint64_t evaluations = 0;  ///< of pair forces
+  std::uint64_t pairs = 0;        ///< that these belong to
 };
 
 template <int D>
@@ -48,6 +62,26 @@ class Interaction {
 
   /// out += V″(x) w.
   virtual void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const = 0;
+
+  /// Fixes the pairs of a slab that starts at x and in which nobody strays farther than `margin` from x. The three
+  /// functions below speak of this slab and take positions from histories; each pair keeps the periodic image it has at
+  /// the start.
+  virtual void begin_slab(Positions<D> /*x*/, double /*margin*/) const {}
+
+  /// impulse[n] += what interval n receives when everybody moves on chords: over each stretch of a pair its duration
+  /// times the mean force between the separations at the stretch's ends. Whatever the nodes, Σ impulse·chord is then
+  /// the change of −V over the slab. Pairs of particles without inner nodes of which neither is `changed` are
+  /// remembered.
+  virtual PairCounts add_impulses(const Histories<D>& paths, std::span<const char> changed, PairMemory<D>& memory,
+                                  Vectors<D> impulse) const = 0;
+
+  /// What particle i receives from the start of its last interval to `end`, by the trapezoidal rule on the stretches of
+  /// its pairs, and −∂V/∂x_i at `end`, everybody moving on parabolas. Returns how many pair forces were evaluated.
+  virtual std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
+                                       Vec<D>& force) const = 0;
+
+  /// Calls visit(j) for every particle that this term may couple to i within the slab.
+  virtual void for_each_partner(Id /*i*/, const std::function<void(Id)>& /*visit*/) const {}
 
   /// How many pairs (or particles, for a field) one evaluation visits within reach: the unit of `force_passes`.
   virtual std::uint64_t interacting_pairs(Positions<D> x) const = 0;

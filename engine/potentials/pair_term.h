@@ -77,6 +77,84 @@ class PairTerm final : public Interaction<D> {
     });
   }
 
+  void begin_slab(Positions<D> x, double margin) const override { pairs_.begin_slab(x, margin); }
+
+  PairCounts add_impulses(const Histories<D>& paths, std::span<const char> changed, PairMemory<D>& memory,
+                          Vectors<D> impulse) const override {
+    PairCounts counts;
+    std::size_t pair = 0;
+    // The impulse of one stretch on i; moves d on to its end.
+    auto over = [&](Id i, Id j, Vec<D>& d, const Vec<D>& u, double time) -> Vec<D> {
+      const Vec<D> d_new = d + time * u, sum = d + d_new;
+      const double rho = d.squaredNorm(), rho_new = d_new.squaredNorm();
+      d = d_new;
+      if (out_of_reach(rho) && out_of_reach(rho_new)) return Vec<D>::Zero();
+      ++counts.evaluations;
+      return (-time * weight_(i, j) * potential_.quotient(rho, rho_new)) * sum;
+    };
+    pairs_.for_each_in_slab(paths.x, [&](Id i, Id j, const auto& shift) {
+      const std::uint64_t before = counts.evaluations;
+      const bool simple = paths.simple(i) && paths.simple(j);
+      if constexpr (Pairs::kRemembered)
+        if (pair == memory.impulse.size()) memory.impulse.emplace_back();
+      if (simple && Pairs::kRemembered && !changed[i] && !changed[j]) {
+        impulse[i] += memory.impulse[pair];
+        impulse[j] -= memory.impulse[pair];
+      } else {
+        Vec<D> d = separation<D>(paths.x[i], paths.x[j], shift);
+        if (simple) {
+          const Vec<D> given = over(i, j, d, paths.chord[i] - paths.chord[j], paths.length);
+          impulse[i] += given;
+          impulse[j] -= given;
+          if constexpr (Pairs::kRemembered) memory.impulse[pair] = given;
+        } else {
+          paths.for_each_stretch(i, j, [&](std::uint32_t m, std::uint32_t n, double from, double to) {
+            const Vec<D> given = over(i, j, d, paths.chord[m] - paths.chord[n], to - from);
+            impulse[m] += given;
+            impulse[n] -= given;
+          });
+        }
+      }
+      ++pair;
+      counts.pairs += counts.evaluations > before ? 1 : 0;
+    });
+    return counts;
+  }
+
+  std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
+                               Vec<D>& force) const override {
+    std::uint64_t evaluations = 0;
+    const std::uint32_t m = paths.last[i];
+    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id j, const auto& shift) {
+      // In the order of ids, as everywhere, so that both partners find the same bits.
+      auto on_i = [&](std::uint32_t n, double t) -> Vec<D> {
+        const Vec<D> x_i = paths.position_in(m, t), x_j = paths.position_in(n, t);
+        const Vec<D> d = i < j ? separation<D>(x_i, x_j, shift) : separation<D>(x_j, x_i, shift);
+        const double rho = d.squaredNorm();
+        if (out_of_reach(rho)) return Vec<D>::Zero();
+        ++evaluations;
+        return ((i < j ? -2.0 : 2.0) * weight_(i, j) * potential_.derivative(rho)) * d;
+      };
+      double from = paths.start[m];
+      std::uint32_t n = paths.at(j, from);
+      Vec<D> before = on_i(n, from);
+      for (bool more = true; more; n = more ? paths.next[n] : n) {
+        more = paths.next[n] != Histories<D>::kNone && paths.start[paths.next[n]] < end;
+        const double to = more ? paths.start[paths.next[n]] : end;
+        const Vec<D> after = on_i(more ? paths.next[n] : n, to);
+        impulse += (0.5 * (to - from)) * (before + after);
+        before = after;
+        from = to;
+      }
+      force += before;
+    });
+    return evaluations;
+  }
+
+  void for_each_partner(Id i, const std::function<void(Id)>& visit) const override {
+    pairs_.for_each_partner(i, visit);
+  }
+
   void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
     for_each_within_reach(x, [&](Id i, Id j, const Vec<D>& d, double rho) {
       const Vec<D> u = w[i] - w[j];
