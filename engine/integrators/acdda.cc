@@ -32,8 +32,8 @@ constexpr int kMostPieces = 1 << 14;
 constexpr double kWorstContraction = 0.5;
 // What may be left of a particle's impulse, as a velocity and relative to the system's. In intervals before an inner
 // node it enters the energy to first order, in last ones, whose ends are given with the newest impulses, to second.
-constexpr double kInner = 1e-14, kLastAtMost = 1e-12, kLastAtLeast = 1e-15, kRounding = 1e-16;
-constexpr double kStalled = 1e-12;  // where increments stop shrinking below this, rounding is amplified by collisions
+constexpr double kInner = 2e-16, kLastAtMost = 1e-12, kLastAtLeast = 1e-15, kRounding = 1e-16;
+constexpr double kStalled = 1e-13;  // where increments stop shrinking below this, rounding is amplified by collisions
 
 /// Mean accelerations of past slabs, and what they let expect of the next.
 template <int D>
