@@ -100,6 +100,7 @@ struct InteractionContext {
   const Box<D>& box;
   const Particles<D>& particles;
   const std::vector<std::string>& species;  ///< names, in the order of Particles::species
+  bool placed = true;                       ///< whether positions are known; else only the parameters count
 };
 
 /// The declaration of one type of interaction; engine/potentials/registry.cc lists them all.
