@@ -180,6 +180,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     for (Id i = 0; i < n; ++i) margin = std::max(margin, length * (p.v[i].norm() + 0.5 * length * first_[i].norm()));
     begin(system, kRoom * margin);
     extra_.clear();
+    tolerance_ = kLastAtLeast;
     const Histories<D>* before = nullptr;
     double last_change = 0;
     int tries = 0, slow = 0, since = 0;  // since: sweeps since the last node was added
@@ -294,8 +295,11 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
         const double d = difference(i, n, paths.duration(n));
         change.largest = d > change.largest || std::isnan(d) ? d : change.largest;
       }
-    const double ratio = last_change > 0 ? change.largest / last_change : 1.0;
-    const double last = std::clamp(kRounding / ratio, kLastAtLeast, kLastAtMost) * change.speed;
+    // What the newest impulses still lack is the change times the contraction, this change over the last. It is known
+    // best while nobody has settled.
+    if (last_change > 0)
+      tolerance_ = std::max(tolerance_, std::min(kRounding * last_change / change.largest, kLastAtMost));
+    const double last = tolerance_ * change.speed;
     for (Id i = 0; i < particles; ++i)
       for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
         const double time = paths.duration(n), inner = kInner * change.speed;
@@ -354,6 +358,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   std::vector<PairMemory<D>> memories_;
   std::vector<ExtraNode> extra_;
   std::uint64_t pairs_ = 0;  // within reach
+  double tolerance_ = 0;     // of last intervals, relative
   double last_piece_ = 0;
   Counters* counters_ = nullptr;
 };
