@@ -6,7 +6,6 @@
 // the particles. Positions are passed in as arrays in id order; contributions to one particle are summed in the order
 // of the partner's id, so that the sum does not depend on how the pairs were found.
 
-#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -80,8 +79,10 @@ class Interaction {
   virtual std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
                                        Vec<D>& force) const = 0;
 
-  /// Calls visit(j) for every particle that this term may couple to i within the slab.
-  virtual void for_each_partner(Id /*i*/, const std::function<void(Id)>& /*visit*/) const {}
+  /// For particle i, which has inner nodes: adds to impulse[j], i and its partners among the j, by how much the rule
+  /// above on j's last interval differs from ½h (f(0) + f(h)), the trapezoid without nodes. A pair of particles that
+  /// both have inner nodes is done with the lower id. Returns how many pair forces were evaluated.
+  virtual std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const = 0;
 
   /// How many pairs (or particles, for a field) one evaluation visits within reach: the unit of `force_passes`.
   virtual std::uint64_t interacting_pairs(Positions<D> x) const = 0;

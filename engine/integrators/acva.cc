@@ -23,17 +23,15 @@ class TrapezoidRule : public NodeRule<D> {
   explicit TrapezoidRule(const System<D>& system) : system_(system) {}
 
   void node(const Histories<D>& paths, Id i, double t, const EventKey<D>&, Vec<D>& v, Vec<D>& a) override {
-    const auto [impulse, force] = received(paths, i, t);
+    Vec<D> impulse = Vec<D>::Zero(), force = Vec<D>::Zero();
+    for (const auto& term : system_.interactions) evaluations_ += term->add_trapezoids(paths, i, t, impulse, force);
     v = paths.v[paths.last[i]] + impulse / system_.particles.mass[i];
     a = force / system_.particles.mass[i];
   }
 
-  /// The impulse on particle i from its last node to time t, and the force on it at t.
-  std::pair<Vec<D>, Vec<D>> received(const Histories<D>& paths, Id i, double t) {
-    std::pair<Vec<D>, Vec<D>> sums = {Vec<D>::Zero(), Vec<D>::Zero()};
-    for (const auto& term : system_.interactions)
-      evaluations_ += term->add_trapezoids(paths, i, t, sums.first, sums.second);
-    return sums;
+  /// See Interaction::add_corrections.
+  void correct(const Histories<D>& paths, Id i, std::vector<Vec<D>>& impulse) {
+    for (const auto& term : system_.interactions) evaluations_ += term->add_corrections(paths, i, impulse);
   }
 
   std::uint64_t evaluations() const { return evaluations_; }
@@ -111,24 +109,17 @@ class AsynchronousCollisionVerlet : public Integrator<D> {
   void finish(System<D>& system, Counters& counters) {
     auto& p = system.particles;
     const auto n = static_cast<Id>(p.size());
-    // Who has inner nodes, or a partner with such, sums up over stretches; for all others that is half a kick.
-    near_.assign(n, 0);
-    for (Id i = 0; i < n; ++i) {
-      if (paths_.simple(i)) continue;
-      near_[i] = 1;
-      for (const auto& term : system.interactions) term->for_each_partner(i, [&](Id j) { near_[j] = 1; });
-    }
-    kick_.assign(n, Vec<D>::Zero());
+    correction_.assign(n, Vec<D>::Zero());
     for (Id i = 0; i < n; ++i)
-      if (near_[i]) kick_[i] = rule_->received(paths_, i, paths_.length).first / p.mass[i];
-    first_ = accelerations_.a;
+      if (!paths_.simple(i)) rule_->correct(paths_, i, correction_);
     for (Id i = 0; i < n; ++i) p.x[i] = paths_.position_in(paths_.last[i], paths_.length);
+    first_.swap(accelerations_.a);
     accelerations_.update(system, counters);
     for (Id i = 0; i < n; ++i) {
-      if (!near_[i]) kick_[i] = (0.5 * paths_.length) * (first_[i] + accelerations_.a[i]);
-      if (paths_.simple(i))
-        kick_[i] += (0.5 * paths_.length) * (flight_[i] - first_[i]);  // the hold of resting contacts
-      p.v[i] = paths_.v[paths_.last[i]] + kick_[i];
+      // The first half of the kick without what presses resting contacts together.
+      const Vec<D>& before = paths_.simple(i) ? flight_[i] : first_[i];
+      p.v[i] = paths_.v[paths_.last[i]] + (0.5 * paths_.length) * (before + accelerations_.a[i]) +
+               correction_[i] / p.mass[i];
     }
     if (!scan_->resting().empty()) scan_->stop_approach(p.x, p.v);
   }
@@ -142,8 +133,7 @@ class AsynchronousCollisionVerlet : public Integrator<D> {
   std::optional<TrapezoidRule<D>> rule_;
   Accelerations<D> accelerations_;
   Histories<D> paths_;
-  std::vector<Vec<D>> flight_, first_, kick_;
-  std::vector<char> near_;
+  std::vector<Vec<D>> flight_, first_, correction_;
   std::uint64_t pairs_ = 0;
 };
 

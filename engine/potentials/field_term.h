@@ -54,6 +54,13 @@ class FieldTerm final : public Interaction<D> {
     force -= after;
     return 2;
   }
+  std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const override {
+    const std::uint32_t n = paths.last[i];
+    const Vec<D> first = field_.gradient(i, paths.x[i]), before = field_.gradient(i, paths.x[n]);
+    const Vec<D> after = field_.gradient(i, paths.position_in(n, paths.length));
+    impulse[i] += (0.5 * paths.length) * (first + after) - (0.5 * paths.duration(n)) * (before + after);
+    return 3;
+  }
   std::uint64_t interacting_pairs(Positions<D> x) const override { return x.size(); }
   const Vec<D>* common_acceleration() const override {
     if constexpr (requires { field_.acceleration(); })

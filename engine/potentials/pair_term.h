@@ -126,33 +126,46 @@ class PairTerm final : public Interaction<D> {
     std::uint64_t evaluations = 0;
     const std::uint32_t m = paths.last[i];
     pairs_.for_each_partner_in_slab(paths.x, i, [&](Id j, const auto& shift) {
-      // In the order of ids, as everywhere, so that both partners find the same bits.
       auto on_i = [&](std::uint32_t n, double t) -> Vec<D> {
-        const Vec<D> x_i = paths.position_in(m, t), x_j = paths.position_in(n, t);
-        const Vec<D> d = i < j ? separation<D>(x_i, x_j, shift) : separation<D>(x_j, x_i, shift);
-        const double rho = d.squaredNorm();
-        if (out_of_reach(rho)) return Vec<D>::Zero();
-        ++evaluations;
-        return ((i < j ? -2.0 : 2.0) * weight_(i, j) * potential_.derivative(rho)) * d;
+        const Vec<D> on_lower = i < j ? force_at(paths, i, j, m, n, t, shift, evaluations)
+                                      : force_at(paths, j, i, n, m, t, shift, evaluations);
+        return i < j ? on_lower : -on_lower;
       };
       double from = paths.start[m];
       std::uint32_t n = paths.at(j, from);
       Vec<D> before = on_i(n, from);
-      for (bool more = true; more; n = more ? paths.next[n] : n) {
-        more = paths.next[n] != Histories<D>::kNone && paths.start[paths.next[n]] < end;
-        const double to = more ? paths.start[paths.next[n]] : end;
-        const Vec<D> after = on_i(more ? paths.next[n] : n, to);
+      while (from < end) {
+        const double to = std::min(paths.end(n), end);
+        const Vec<D> after = on_i(n, to);
         impulse += (0.5 * (to - from)) * (before + after);
         before = after;
         from = to;
+        if (to < end) n = paths.next[n];
       }
       force += before;
     });
     return evaluations;
   }
 
-  void for_each_partner(Id i, const std::function<void(Id)>& visit) const override {
-    pairs_.for_each_partner(i, visit);
+  std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const override {
+    std::uint64_t evaluations = 0;
+    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id partner, const auto& shift) {
+      if (partner < i && !paths.simple(partner)) return;
+      const Id lo = std::min(i, partner), hi = std::max(i, partner);
+      const Vec<D> first = force_at(paths, lo, hi, lo, hi, 0, shift, evaluations);
+      Vec<D> before = first, on_lo = Vec<D>::Zero(), on_hi = Vec<D>::Zero();
+      paths.for_each_stretch(lo, hi, [&](std::uint32_t m, std::uint32_t n, double from, double to) {
+        const Vec<D> after = force_at(paths, lo, hi, m, n, to, shift, evaluations);
+        const Vec<D> given = (0.5 * (to - from)) * (before + after);
+        if (paths.next[m] == Histories<D>::kNone) on_lo += given;
+        if (paths.next[n] == Histories<D>::kNone) on_hi -= given;
+        before = after;
+      });
+      const Vec<D> whole = (0.5 * paths.length) * (first + before);
+      impulse[lo] += on_lo - whole;
+      impulse[hi] += on_hi + whole;
+    });
+    return evaluations;
   }
 
   void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
@@ -181,6 +194,17 @@ class PairTerm final : public Interaction<D> {
       return rho >= potential_.cutoff_squared();
     else
       return false;
+  }
+
+  /// The force on i of the pair (i, j), i < j, at time t, which belongs to the intervals m of i and n of j.
+  template <class Shift>
+  Vec<D> force_at(const Histories<D>& paths, Id i, Id j, std::uint32_t m, std::uint32_t n, double t, const Shift& shift,
+                  std::uint64_t& evaluations) const {
+    const Vec<D> d = separation<D>(paths.position_in(m, t), paths.position_in(n, t), shift);
+    const double rho = d.squaredNorm();
+    if (out_of_reach(rho)) return Vec<D>::Zero();
+    ++evaluations;
+    return (-2 * weight_(i, j) * potential_.derivative(rho)) * d;
   }
 
   template <class Visit>

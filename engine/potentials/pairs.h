@@ -11,7 +11,6 @@
 //   for_each_partner_in_slab(x, i, visit)         calls visit(j, shift) for the pairs of i, in the order (j, image);
 //   the
 //                                                 shift is that of the pair (lower id, higher id)
-//   for_each_partner(i, visit)                    calls visit(j)
 //   kRemembered                                   whether it pays to keep what was found for a pair
 
 #include <cmath>
@@ -78,10 +77,6 @@ class Bonds {
       visit(j, box_.shift(box_.nearest_image(x[lo] - x[hi])));
     }
   }
-  template <class Visit>
-  void for_each_partner(Id i, Visit&& visit) const {
-    for (const auto& [j, pair] : partners_.of(i)) visit(j);
-  }
 
   template <class Visit>
   void for_each(Positions<D> x, Positions<D> /*x_new*/, Visit&& visit) const {
@@ -124,12 +119,8 @@ class AllPairs {
   }
   template <class Visit>
   void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
-    for_each_partner(i, [&](Id j) { visit(j, NoShift{}); });
-  }
-  template <class Visit>
-  void for_each_partner(Id i, Visit&& visit) const {
     for (Id j = 0; j < particles_; ++j)
-      if (j != i && species_.contains(i, j)) visit(j);
+      if (j != i && species_.contains(i, j)) visit(j, NoShift{});
   }
 
   template <class Visit>
@@ -171,10 +162,6 @@ class PairsWithinCutoff {
   template <class Visit>
   void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
     for (const auto& [j, pair] : partners().of(i)) visit(j, box_.shift(in_slab_[pair].image));
-  }
-  template <class Visit>
-  void for_each_partner(Id i, Visit&& visit) const {
-    for (const auto& [j, pair] : partners().of(i)) visit(j);
   }
 
  private:
