@@ -7,10 +7,6 @@
 
 namespace carom {
 
-namespace {
-constexpr Id kNobody = 0xffffffff;  // the partner in an extra node
-}
-
 template <int D>
 void SlabCore<D>::begin(Positions<D> x, double margin) {
   margin_ = margin;
@@ -45,10 +41,7 @@ SlabRun<D> SlabCore<D>::run(Histories<D>& paths, NodeRule<D>& rule, std::span<co
   for (Id i = 0; i < n; ++i) farthest = std::max(farthest, reach_[i] = reach(paths, i));
   if (farthest > margin_) return {.end = End::strayed, .margin = farthest};
   predict_first(paths);
-  for (const auto& [who, time] : extra) {
-    EventKey<D> key{.time = time, .kind = EventKind::wall, .lo = who, .hi = kNobody};
-    plan({key, 0, 0, true});
-  }
+  for (const ExtraNode& node : extra) plan({extra_node_key<D>(node), 0, 0, true});
   while (!queue_.empty()) {
     std::pop_heap(queue_.begin(), queue_.end());
     const Planned event = queue_.back();

@@ -35,6 +35,16 @@ struct ExtraNode {
   double time;
 };
 
+/// The event that stands for an extra node in histories: a wall that is none.
+template <int D>
+EventKey<D> extra_node_key(const ExtraNode& node) {
+  return {.time = node.time, .kind = EventKind::wall, .lo = node.who, .hi = 2 * D};
+}
+template <int D>
+bool is_extra(const EventKey<D>& key) {
+  return key.kind == EventKind::wall && key.hi == 2 * D;
+}
+
 /// How a run of the core ended.
 template <int D>
 struct SlabRun {

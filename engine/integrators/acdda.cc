@@ -182,7 +182,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     extra_.clear();
     tolerance_ = kLastAtLeast;
     const Histories<D>* before = nullptr;
-    double last_change = 0;
+    double last_change = 0, last_unsettled = 0, earlier_unsettled = 0;
     int tries = 0, slow = 0, since = 0;  // since: sweeps since the last node was added
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
       Histories<D>& paths = paths_[sweep % 2];
@@ -204,15 +204,19 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       now_ = &paths;
       if (change.settled) return {.settled = true};
       if (!std::isfinite(change.largest)) return {};
-      const bool flips = before != nullptr && ++since > kPatience && separate(paths, *before);
-      if (flips) {
-        since = 0;
-        slow = 0;
+      const bool patient = ++since > kPatience;
+      const bool crawls = since > 2 && change.unsettled > kWorstContraction * kWorstContraction * earlier_unsettled;
+      if (crawls && change.unsettled <= kStalled * change.speed) return {.settled = true};
+      slow = crawls ? slow + 1 : 0;
+      const bool parted = (patient || slow > 2) && before != nullptr && separate(paths, *before);
+      if (parted || (slow > 2 && steady(p, paths, change))) {
+        since = slow = 0;
         if (++tries > kMostTries) return {};
-      } else if (sweep > 2 && change.largest > kWorstContraction * last_change) {
-        if (change.largest <= kStalled * change.speed) return {.settled = true};
-        if (++slow > 3) return {};
+      } else if (slow > 2) {
+        return {};
       }
+      earlier_unsettled = last_unsettled;
+      last_unsettled = change.unsettled;
       last_change = change.largest;
       before = &paths;
     }
@@ -273,8 +277,9 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   }
 
   struct Change {
-    double largest = 0;  ///< of an impulse from the one flown on, as a velocity
-    double speed = 0;    ///< of the system
+    double largest = 0;    ///< of an impulse from the one flown on, as a velocity
+    double unsettled = 0;  ///< the same among those who have not settled
+    double speed = 0;      ///< of the system
     bool settled = true;
   };
 
@@ -303,7 +308,9 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     for (Id i = 0; i < particles; ++i)
       for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
         const double time = paths.duration(n), inner = kInner * change.speed;
-        if (difference(i, n, time) <= (paths.next[n] == Histories<D>::kNone ? last : inner)) continue;
+        const double d = difference(i, n, time);
+        if (d <= (paths.next[n] == Histories<D>::kNone ? last : inner)) continue;
+        change.unsettled = std::max(change.unsettled, d);
         paths.a[n] = impulse_[n] / (p.mass[i] * time);
         change.settled = false;
       }
@@ -323,6 +330,27 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       if (m == kNone && n == kNone) continue;
       const double time = std::min(m == kNone ? kNever : paths.start[m], n == kNone ? kNever : before.start[n]);
       extra_.push_back({i, time});
+    }
+    return extra_.size() > known;
+  }
+
+  /// Gives colliders whose impulses change slowly a node a little before their first collision, so that the force on
+  /// the way to it hardly depends on when it comes; whether there was anyone. (A grazing contact moves much with the
+  /// force.) `paths` have their new accelerations already: where these differ, the chord tells.
+  bool steady(const Particles<D>& p, const Histories<D>& paths, const Change& change) {
+    constexpr double kBefore = 0.1;  // in parts of the way
+    const std::size_t known = extra_.size();
+    for (Id i = 0; i < paths.particles(); ++i) {
+      if (paths.simple(i)) continue;
+      double moved = 0;
+      std::uint32_t first = Histories<D>::kNone;
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
+        moved = std::max(moved, (impulse_[n] / p.mass[i] - 2 * (paths.chord[n] - paths.v[n])).norm());
+        const std::uint32_t next = paths.next[n];
+        if (first == Histories<D>::kNone && next != Histories<D>::kNone && !is_extra(paths.opening[next])) first = n;
+      }
+      if (first != Histories<D>::kNone && moved > 0.1 * change.unsettled)
+        extra_.push_back({i, paths.end(first) - kBefore * paths.duration(first)});
     }
     return extra_.size() > known;
   }
