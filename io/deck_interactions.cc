@@ -95,7 +95,7 @@ void make_interactions(const Deck::Source& source, const std::vector<bool>& skip
             config.at,
             std::string(source.integrator->name) + " cannot carry the interaction '" + std::string(config.info->name) +
                 "'",
-            "it knows no forces but a uniform-field; leave the interaction out, or take psa, cva, mcva or cdda");
+            "it knows no forces but a uniform-field; leave the interaction out, or take psa, acva, acdda or their relatives");
       system.interactions.push_back(std::move(term));
     } catch (const Error& e) {  // its message has the form "what; what to do"
       const std::string message = e.what();
