@@ -5,7 +5,7 @@
 // arrives, with which acceleration it goes on. A collision is a node of the colliders only and costs what their
 // surroundings cost. Pairs out of reach until the slab's end are never predicted: the queue holds only what can happen.
 //
-//   core.begin(x, length, margin);           // pairs that may meet while nobody strays farther than margin
+//   core.begin(x, margin);                   // pairs that may meet while nobody strays farther than margin
 //   histories.reset(length, x, v, a);        // first flights
 //   const auto run = core.run(histories, rule, extra_nodes);
 //
@@ -65,6 +65,7 @@ class SlabCore {
   SlabCore(const System<D>& system, ContactScan<D>& scan, std::uint64_t max_events)
       : box_(system.box), particles_(system.particles), scan_(scan), max_events_(max_events) {}
 
+  /// The pairs of a slab from x in which nobody strays farther than `margin`.
   void begin(Positions<D> x, double margin);
 
   /// Runs from the first intervals in `paths` to the end of the slab. Call close() on them before use.
@@ -72,12 +73,6 @@ class SlabCore {
 
   /// The collisions of the last run, in the order of their keys.
   std::span<const Contact<D>> contacts() const { return contacts_; }
-
-  /// Calls visit(j) for all who may touch i within the slab.
-  template <class Visit>
-  void for_each_near(Id i, Visit&& visit) {
-    for (const auto& [j, pair] : partners().of(i)) visit(j, pairs_[pair].image);
-  }
 
  private:
   struct Planned {
