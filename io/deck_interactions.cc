@@ -91,11 +91,11 @@ void make_interactions(const Deck::Source& source, const std::vector<bool>& skip
     try {
       auto term = config.info->make<D>(config.parameters, {system.box, system.particles, system.species, placed});
       if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
-        problems.error(
-            config.at,
-            std::string(source.integrator->name) + " cannot carry the interaction '" + std::string(config.info->name) +
-                "'",
-            "it knows no forces but a uniform-field; leave the interaction out, or take psa, acva, acdda or their relatives");
+        problems.error(config.at,
+                       std::string(source.integrator->name) + " cannot carry the interaction '" +
+                           std::string(config.info->name) + "'",
+                       "it knows no forces but a uniform-field; leave the interaction out, or take psa, acva, acdda or "
+                       "their relatives");
       system.interactions.push_back(std::move(term));
     } catch (const Error& e) {  // its message has the form "what; what to do"
       const std::string message = e.what();
