@@ -79,10 +79,29 @@ double ContactScan<D>::normal_speed(const Touch<D>& touch, Positions<D> v) const
 
 template <int D>
 void ContactScan<D>::count_event(const EventKey<D>& key) {
-  if (++events_ > max_events_)
-    throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(max_events_) +
-                                        " collisions in one step, the last between " + partners(key) +
-                                        "; use a smaller step or raise integrator.max_events_per_step");
+  if (++events_ > max_events_) too_many(key);
+}
+
+template <int D>
+void ContactScan<D>::too_many(const EventKey<D>& key) const {
+  throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(max_events_) +
+                                      " collisions in one step, the last between " + partners(key) +
+                                      "; use a smaller step or raise integrator.max_events_per_step");
+}
+
+template <int D>
+void ContactScan<D>::commit(double time, std::span<const Contact<D>> executed) {
+  for (Contact<D> contact : executed) {
+    count_event(contact.key);
+    contact.key.time += time;
+    if (contact.key.kind == EventKind::pair) {
+      ++counters_->sphere_sphere;
+      counters_->collision_virial.add((contact.x_lo - contact.x_hi).dot(contact.impulse));
+    } else {
+      ++counters_->sphere_wall;
+    }
+    if (contacts_) contacts_->push_back(contact);
+  }
 }
 
 template <int D>

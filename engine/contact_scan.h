@@ -62,6 +62,9 @@ class ContactScan {
   /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, Positions<D> x_new) { return list_.cover(x, x_new); }
 
+  /// The candidates while nobody strays farther than `margin` from x.
+  std::span<const NeighbourPair<D>> candidates(Positions<D> x, double margin) { return list_.cover(x, margin); }
+
   double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
   double tolerance(double sigma) const { return gap_tolerance(sigma, largest_edge_); }
   /// The least gap a piece may end with, for a contact that touches at its start: one that rounding has left at the
@@ -75,6 +78,10 @@ class ContactScan {
 
   /// Counts one more contact or empty piece; throws when the slab needs more than max_events.
   void count_event(const EventKey<D>& key);
+  [[noreturn]] void too_many(const EventKey<D>& last) const;
+
+  /// Counts and logs contacts that were found and executed elsewhere, since `time` in the slab.
+  void commit(double time, std::span<const Contact<D>> executed);
 
   /// Approach of a contact slower than this is rounding [length/time].
   double resting_speed() const { return resting_speed_; }

@@ -14,6 +14,7 @@
 
 #include "engine/box.h"
 #include "engine/exact_sum.h"
+#include "engine/histories.h"
 #include "engine/parameters.h"
 #include "engine/particles.h"
 
@@ -29,6 +30,18 @@ struct PotentialSums {
   ExactSum energy;     ///< V [energy]
   ExactSum magnitude;  ///< Σ|V| over pairs and particles [energy]
   ExactSum virial;     ///< Σ d·F over pairs, d = x_i − x_j, F the force on i [energy]; external fields add nothing
+};
+
+/// What a term has found out about the pairs of a slab, kept from sweep to sweep.
+template <int D>
+struct PairMemory {
+  std::vector<Vec<D>> impulse;  ///< given to the lower id, of each pair in the order of the loop
+};
+
+/// How much of a term was evaluated.
+struct PairCounts {
+  std::uint64_t evaluations = 0;  ///< of pair forces
+  std::uint64_t pairs = 0;        ///< that these belong to
 };
 
 template <int D>
@@ -49,6 +62,28 @@ class Interaction {
   /// out += V″(x) w.
   virtual void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const = 0;
 
+  /// Fixes the pairs of a slab that starts at x and in which nobody strays farther than `margin` from x. The three
+  /// functions below speak of this slab and take positions from histories; each pair keeps the periodic image it has at
+  /// the start.
+  virtual void begin_slab(Positions<D> /*x*/, double /*margin*/) const {}
+
+  /// impulse[n] += what interval n receives when everybody moves on chords: over each stretch of a pair its duration
+  /// times the mean force between the separations at the stretch's ends. Whatever the nodes, Σ impulse·chord is then
+  /// the change of −V over the slab. Pairs of particles without inner nodes of which neither is `changed` are
+  /// remembered.
+  virtual PairCounts add_impulses(const Histories<D>& paths, std::span<const char> changed, PairMemory<D>& memory,
+                                  Vectors<D> impulse) const = 0;
+
+  /// What particle i receives from the start of its last interval to `end`, by the trapezoidal rule on the stretches of
+  /// its pairs, and −∂V/∂x_i at `end`, everybody moving on parabolas. Returns how many pair forces were evaluated.
+  virtual std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
+                                       Vec<D>& force) const = 0;
+
+  /// For particle i, which has inner nodes: adds to impulse[j], i and its partners among the j, by how much the rule
+  /// above on j's last interval differs from ½h (f(0) + f(h)), the trapezoid without nodes. A pair of particles that
+  /// both have inner nodes is done with the lower id. Returns how many pair forces were evaluated.
+  virtual std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const = 0;
+
   /// How many pairs (or particles, for a field) one evaluation visits within reach: the unit of `force_passes`.
   virtual std::uint64_t interacting_pairs(Positions<D> x) const = 0;
 
@@ -66,6 +101,7 @@ struct InteractionContext {
   const Box<D>& box;
   const Particles<D>& particles;
   const std::vector<std::string>& species;  ///< names, in the order of Particles::species
+  bool placed = true;                       ///< whether positions are known; else only the parameters count
 };
 
 /// The declaration of one type of interaction; engine/potentials/registry.cc lists them all.

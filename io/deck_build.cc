@@ -112,7 +112,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck) {
   give_velocities(source, *system);
 
   Problems problems;
-  make_interactions(source, {}, *system, problems);
+  make_interactions(source, {}, *system, true, problems);
   problems.throw_errors(Failure::deck);
   complete_values(deck, *system);
   check_output(deck, *system, problems);

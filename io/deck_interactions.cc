@@ -50,7 +50,7 @@ template <int D>
 void try_interactions(const Deck::Source& source, const std::vector<bool>& skip, Problems& problems) {
   System<D> system;
   fill_system(source, system);
-  make_interactions(source, skip, system, problems);
+  make_interactions(source, skip, system, false, problems);
 }
 
 }  // namespace
@@ -83,19 +83,19 @@ void read_interactions(Deck::Source& source, std::size_t dimension, Problems& pr
 }
 
 template <int D>
-void make_interactions(const Deck::Source& source, const std::vector<bool>& skip, System<D>& system,
+void make_interactions(const Deck::Source& source, const std::vector<bool>& skip, System<D>& system, bool placed,
                        Problems& problems) {
   for (std::size_t n = 0; n < source.interactions.size(); ++n) {
     const InteractionConfig& config = source.interactions[n];
     if (n < skip.size() && skip[n]) continue;
     try {
-      auto term = config.info->make<D>(config.parameters, {system.box, system.particles, system.species});
+      auto term = config.info->make<D>(config.parameters, {system.box, system.particles, system.species, placed});
       if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
-        problems.error(
-            config.at,
-            std::string(source.integrator->name) + " cannot carry the interaction '" + std::string(config.info->name) +
-                "'",
-            "it knows no forces but a uniform-field; leave the interaction out, or take psa, cva, mcva or cdda");
+        problems.error(config.at,
+                       std::string(source.integrator->name) + " cannot carry the interaction '" +
+                           std::string(config.info->name) + "'",
+                       "it knows no forces but a uniform-field; leave the interaction out, or take psa, acva, acdda or "
+                       "their relatives");
       system.interactions.push_back(std::move(term));
     } catch (const Error& e) {  // its message has the form "what; what to do"
       const std::string message = e.what();
@@ -106,7 +106,7 @@ void make_interactions(const Deck::Source& source, const std::vector<bool>& skip
   }
 }
 
-template void make_interactions(const Deck::Source&, const std::vector<bool>&, System<2>&, Problems&);
-template void make_interactions(const Deck::Source&, const std::vector<bool>&, System<3>&, Problems&);
+template void make_interactions(const Deck::Source&, const std::vector<bool>&, System<2>&, bool, Problems&);
+template void make_interactions(const Deck::Source&, const std::vector<bool>&, System<3>&, bool, Problems&);
 
 }  // namespace carom

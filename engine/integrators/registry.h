@@ -11,6 +11,8 @@ IntegratorInfo psa();
 IntegratorInfo cva();
 IntegratorInfo mcva();
 IntegratorInfo cdda();
+IntegratorInfo acva();
+IntegratorInfo acdda();
 
 /// The factory of an integrator template that is made from its parameters.
 template <template <int> class T, int D>

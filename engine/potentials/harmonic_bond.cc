@@ -11,7 +11,7 @@ using Range = Parameter::Range;
 
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
-  Bonds<D> bonds(context.box, options::bonds("harmonic-bond", p, context.particles.size()));
+  Bonds<D> bonds(context.box, options::bonds<D>("harmonic-bond", p, context));
   return std::make_unique<PairTerm<D, HarmonicBond, UnitWeight, Bonds<D>>>(
       HarmonicBond(p.real("stiffness"), p.real("rest_length")), UnitWeight{}, std::move(bonds));
 }
@@ -24,6 +24,9 @@ InteractionInfo harmonic_bond() {
       .kind = InteractionInfo::Kind::bonded,
       .parameters = {{"pairs", Type::pair_list, "none", "-", "the bonded pairs of particles, by number from 0"},
                      {"chain", Type::boolean, "false", "-", "bond each particle to the next, instead of giving pairs"},
+                     {"within", Type::real, "none", "length",
+                      "bond the pairs that stand no farther apart than this at the start, instead of giving pairs",
+                      Range::positive},
                      {"stiffness", Type::real, "", "energy/length^2", "k", Range::non_negative},
                      {"rest_length", Type::real, "", "length", "L, where the spring is slack", Range::non_negative}},
       .formula = "sum over bonds of k/2 (r - L)^2",

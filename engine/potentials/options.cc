@@ -65,9 +65,10 @@ std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters&
 
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles) {
   const bool chain = parameters.has("chain") && parameters.flag("chain");
-  if (chain == parameters.has("pairs"))
-    refuse(type, chain ? "both 'pairs' and 'chain = true' are given; give one of them"
-                       : "no bonds are given; give 'pairs = [[0, 1], …]' or 'chain = true'");
+  const int given = (chain ? 1 : 0) + (parameters.has("pairs") ? 1 : 0) + (parameters.has("within") ? 1 : 0);
+  if (given == 0) refuse(type, "no bonds are given; give 'pairs = [[0, 1], …]', 'chain = true' or 'within'");
+  if (given > 1) refuse(type, "bonds are given twice, by two of 'pairs', 'chain' and 'within'; give one of them");
+  if (parameters.has("within")) return {};
   PairList list;
   if (chain) {
     for (Id i = 1; i < particles; ++i) list.push_back({i - 1, i});

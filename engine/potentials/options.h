@@ -28,8 +28,24 @@ std::vector<Parameter> with_pair_options(std::vector<Parameter> own);
 std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters& parameters,
                                         const std::vector<std::string>& known);
 
-/// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending.
+/// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending; none for `within`.
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
+
+/// The bonds that `pairs`, `chain` or `within` describe, i < j, ascending.
+template <int D>
+PairList bonds(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
+  const auto& x = context.particles.x;
+  PairList list = bonds(type, parameters, context.particles.size());
+  if (!parameters.has("within") || !context.placed) return list;
+  const double distance = parameters.real("within");
+  NeighbourList<D> near(context.box, std::vector<double>(x.size(), 0.5 * distance));
+  for (const auto& [i, j, image] : near.cover(x)) {
+    const bool known = !list.empty() && list.back() == PairList::value_type{i, j};  // through another image
+    if (!known && (x[i] - x[j] + context.box.shift(image)).norm() <= distance) list.push_back({i, j});
+  }
+  if (list.empty()) refuse(type, "no particles stand within " + std::to_string(distance) + "; give a larger 'within'");
+  return list;
+}
 
 /// A vector given as a list of D numbers.
 template <int D>

@@ -77,6 +77,97 @@ class PairTerm final : public Interaction<D> {
     });
   }
 
+  void begin_slab(Positions<D> x, double margin) const override { pairs_.begin_slab(x, margin); }
+
+  PairCounts add_impulses(const Histories<D>& paths, std::span<const char> changed, PairMemory<D>& memory,
+                          Vectors<D> impulse) const override {
+    PairCounts counts;
+    std::size_t pair = 0;
+    // The impulse of one stretch on i; moves d on to its end.
+    auto over = [&](Id i, Id j, Vec<D>& d, const Vec<D>& u, double time) -> Vec<D> {
+      const Vec<D> d_new = d + time * u, sum = d + d_new;
+      const double rho = d.squaredNorm(), rho_new = d_new.squaredNorm();
+      d = d_new;
+      if (out_of_reach(rho) && out_of_reach(rho_new)) return Vec<D>::Zero();
+      ++counts.evaluations;
+      return (-time * weight_(i, j) * potential_.quotient(rho, rho_new)) * sum;
+    };
+    pairs_.for_each_in_slab(paths.x, [&](Id i, Id j, const auto& shift) {
+      const std::uint64_t before = counts.evaluations;
+      const bool simple = paths.simple(i) && paths.simple(j);
+      if constexpr (Pairs::kRemembered)
+        if (pair == memory.impulse.size()) memory.impulse.emplace_back();
+      if (simple && Pairs::kRemembered && !changed[i] && !changed[j]) {
+        impulse[i] += memory.impulse[pair];
+        impulse[j] -= memory.impulse[pair];
+      } else {
+        Vec<D> d = separation<D>(paths.x[i], paths.x[j], shift);
+        if (simple) {
+          const Vec<D> given = over(i, j, d, paths.chord[i] - paths.chord[j], paths.length);
+          impulse[i] += given;
+          impulse[j] -= given;
+          if constexpr (Pairs::kRemembered) memory.impulse[pair] = given;
+        } else {
+          paths.for_each_stretch(i, j, [&](std::uint32_t m, std::uint32_t n, double from, double to) {
+            const Vec<D> given = over(i, j, d, paths.chord[m] - paths.chord[n], to - from);
+            impulse[m] += given;
+            impulse[n] -= given;
+          });
+        }
+      }
+      ++pair;
+      counts.pairs += counts.evaluations > before ? 1 : 0;
+    });
+    return counts;
+  }
+
+  std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
+                               Vec<D>& force) const override {
+    std::uint64_t evaluations = 0;
+    const std::uint32_t m = paths.last[i];
+    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id j, const auto& shift) {
+      auto on_i = [&](std::uint32_t n, double t) -> Vec<D> {
+        const Vec<D> on_lower = i < j ? force_at(paths, i, j, m, n, t, shift, evaluations)
+                                      : force_at(paths, j, i, n, m, t, shift, evaluations);
+        return i < j ? on_lower : -on_lower;
+      };
+      double from = paths.start[m];
+      std::uint32_t n = paths.at(j, from);
+      Vec<D> before = on_i(n, from);
+      while (from < end) {
+        const double to = std::min(paths.end(n), end);
+        const Vec<D> after = on_i(n, to);
+        impulse += (0.5 * (to - from)) * (before + after);
+        before = after;
+        from = to;
+        if (to < end) n = paths.next[n];
+      }
+      force += before;
+    });
+    return evaluations;
+  }
+
+  std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const override {
+    std::uint64_t evaluations = 0;
+    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id partner, const auto& shift) {
+      if (partner < i && !paths.simple(partner)) return;
+      const Id lo = std::min(i, partner), hi = std::max(i, partner);
+      const Vec<D> first = force_at(paths, lo, hi, lo, hi, 0, shift, evaluations);
+      Vec<D> before = first, on_lo = Vec<D>::Zero(), on_hi = Vec<D>::Zero();
+      paths.for_each_stretch(lo, hi, [&](std::uint32_t m, std::uint32_t n, double from, double to) {
+        const Vec<D> after = force_at(paths, lo, hi, m, n, to, shift, evaluations);
+        const Vec<D> given = (0.5 * (to - from)) * (before + after);
+        if (paths.next[m] == Histories<D>::kNone) on_lo += given;
+        if (paths.next[n] == Histories<D>::kNone) on_hi -= given;
+        before = after;
+      });
+      const Vec<D> whole = (0.5 * paths.length) * (first + before);
+      impulse[lo] += on_lo - whole;
+      impulse[hi] += on_hi + whole;
+    });
+    return evaluations;
+  }
+
   void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
     for_each_within_reach(x, [&](Id i, Id j, const Vec<D>& d, double rho) {
       const Vec<D> u = w[i] - w[j];
@@ -103,6 +194,17 @@ class PairTerm final : public Interaction<D> {
       return rho >= potential_.cutoff_squared();
     else
       return false;
+  }
+
+  /// The force on i of the pair (i, j), i < j, at time t, which belongs to the intervals m of i and n of j.
+  template <class Shift>
+  Vec<D> force_at(const Histories<D>& paths, Id i, Id j, std::uint32_t m, std::uint32_t n, double t, const Shift& shift,
+                  std::uint64_t& evaluations) const {
+    const Vec<D> d = separation<D>(paths.position_in(m, t), paths.position_in(n, t), shift);
+    const double rho = d.squaredNorm();
+    if (out_of_reach(rho)) return Vec<D>::Zero();
+    ++evaluations;
+    return (-2 * weight_(i, j) * potential_.derivative(rho)) * d;
   }
 
   template <class Visit>

@@ -5,6 +5,13 @@
 //   for_each(x, x_new, visit)   calls visit(i, j, shift) for its pairs in the order (i, j, image), i < j; the pair's
 //                               separation is separation(x[i], x[j], shift), at x_new with the same shift
 //   count()                     how many pairs there are, where that does not depend on positions
+// and for a slab in which nobody strays farther than `margin` from its start x
+//   begin_slab(x, margin)
+//   for_each_in_slab(x, visit)                    as for_each
+//   for_each_partner_in_slab(x, i, visit)         calls visit(j, shift) for the pairs of i, in the order (j, image);
+//   the
+//                                                 shift is that of the pair (lower id, higher id)
+//   kRemembered                                   whether it pays to keep what was found for a pair
 
 #include <cmath>
 #include <string>
@@ -13,6 +20,7 @@
 #include "engine/error.h"
 #include "engine/interaction.h"
 #include "engine/neighbour_list.h"
+#include "engine/partners.h"
 
 namespace carom {
 
@@ -52,7 +60,23 @@ class SpeciesPair {
 template <int D>
 class Bonds {
  public:
+  static constexpr bool kRemembered = true;
   Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {}
+
+  void begin_slab(Positions<D> x, double /*margin*/) const {
+    if (partners_.empty()) partners_.build(x.size(), pairs_.size(), [&](std::size_t k) { return pairs_[k]; });
+  }
+  template <class Visit>
+  void for_each_in_slab(Positions<D> x, Visit&& visit) const {
+    for_each(x, x, visit);
+  }
+  template <class Visit>
+  void for_each_partner_in_slab(Positions<D> x, Id i, Visit&& visit) const {
+    for (const auto& [j, pair] : partners_.of(i)) {
+      const auto& [lo, hi] = pairs_[pair];
+      visit(j, box_.shift(box_.nearest_image(x[lo] - x[hi])));
+    }
+  }
 
   template <class Visit>
   void for_each(Positions<D> x, Positions<D> /*x_new*/, Visit&& visit) const {
@@ -75,6 +99,7 @@ class Bonds {
 
   const Box<D>& box_;
   PairList pairs_;
+  mutable Partners partners_;  // a cache
 };
 
 /// All pairs of `particles` particles, in a box without periodic axes; nothing is stored.
@@ -84,6 +109,18 @@ class AllPairs {
   AllPairs(std::size_t particles, SpeciesPair species) : particles_(static_cast<Id>(particles)), species_(species) {
     for (Id i = 0; i < particles_; ++i)
       for (Id j = i + 1; j < particles_; ++j) count_ += species_.contains(i, j) ? 1 : 0;
+  }
+
+  static constexpr bool kRemembered = false;  // who collides changes the path of everybody
+  void begin_slab(Positions<D>, double) const {}
+  template <class Visit>
+  void for_each_in_slab(Positions<D> x, Visit&& visit) const {
+    for_each(x, x, visit);
+  }
+  template <class Visit>
+  void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
+    for (Id j = 0; j < particles_; ++j)
+      if (j != i && species_.contains(i, j)) visit(j, NoShift{});
   }
 
   template <class Visit>
@@ -112,14 +149,41 @@ class PairsWithinCutoff {
     for (const NeighbourPair<D>& pair : list_.cover(x, x_new)) visit(pair.i, pair.j, box_.shift(pair.image));
   }
 
+  static constexpr bool kRemembered = true;
+  void begin_slab(Positions<D> x, double margin) const {
+    in_slab_ = list_.cover(x, margin);
+    particles_ = x.size();
+    partners_.clear();
+  }
+  template <class Visit>
+  void for_each_in_slab(Positions<D>, Visit&& visit) const {
+    for (const NeighbourPair<D>& pair : in_slab_) visit(pair.i, pair.j, box_.shift(pair.image));
+  }
+  template <class Visit>
+  void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
+    for (const auto& [j, pair] : partners().of(i)) visit(j, box_.shift(in_slab_[pair].image));
+  }
+
  private:
   static std::function<bool(Id, Id)> wanted(SpeciesPair species) {
     if (species.all()) return {};
     return [species](Id i, Id j) { return species.contains(i, j); };
   }
 
+  const Partners& partners() const {
+    if (partners_.empty())
+      partners_.build(particles_, in_slab_.size(), [&](std::size_t k) {
+        return std::array<Id, 2>{in_slab_[k].i, in_slab_[k].j};
+      });
+    return partners_;
+  }
+
   const Box<D>& box_;
-  mutable NeighbourList<D> list_;  // a cache: its state never shows in the sums
+  // Caches: their state never shows in the sums.
+  mutable NeighbourList<D> list_;
+  mutable std::span<const NeighbourPair<D>> in_slab_;
+  mutable std::size_t particles_ = 0;
+  mutable Partners partners_;
 };
 
 }  // namespace carom

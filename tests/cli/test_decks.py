@@ -21,7 +21,7 @@ DECKS = sorted((ROOT / "inputs").glob("*.toml"))
 # Largest |H − H₁| / E_ref allowed over the shortened run: rounding for the exact methods; what is left are methods of
 # first and second order, at steps their decks chose well.
 EXACT, APPROXIMATE = 1e-12, 1e-2
-EXACT_METHODS = {"free-flight", "cdda"}
+EXACT_METHODS = {"free-flight", "cdda", "acdda"}
 
 pytestmark = pytest.mark.skipif("CAROM" not in os.environ, reason="needs the command: CAROM=build/release/io/carom")
 

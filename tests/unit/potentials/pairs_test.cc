@@ -91,6 +91,15 @@ TEST(Pairs, ABondReachesAcrossThePeriodicEdge) {
   EXPECT_EQ(forces(*bond, scene.particles.x)[0], Vec<2>(-2, 0));
 }
 
+TEST(Pairs, BondsWithinADistanceJoinTheNeighboursOfALattice) {
+  Scene<2> scene(16, 8, Boundary::periodic, 0.5);
+  for (int i = 0; i < 16; ++i) scene.particles.x[i] = Vec<2>(0.5 + 2 * (i / 4), 0.5 + 2 * (i % 4));
+  const Given lattice = {{"within", 2.1}, {"stiffness", 2.0}, {"rest_length", 1.0}};
+  const auto bonds = scene.make("harmonic-bond", lattice);
+  EXPECT_EQ(bonds->interacting_pairs(scene.particles.x), 32u);  // two a particle, across the edges too
+  EXPECT_DOUBLE_EQ(energy(*bonds, scene.particles.x), 32);
+}
+
 TEST(Pairs, SpeciesSelectWhoFeelsATerm) {
   Scene<2> scene(3, 10, Boundary::open, 0.5);
   scene.particles.x = {Vec<2>(0, 0), Vec<2>(1, 0), Vec<2>(0, 1)};
@@ -123,6 +132,9 @@ TEST(Refused, BondsThatCannotBe) {
   both.emplace_back("pairs", PairList{{0, 1}});
   both.emplace_back("chain", true);
   expect_contains(refusal(scene, "harmonic-bond", both), "give one of them");
+  Given apart = spring;
+  apart.emplace_back("within", 0.4);
+  expect_contains(refusal(scene, "harmonic-bond", apart), "give a larger 'within'");
 }
 
 TEST(Refused, UnknownSpecies) {

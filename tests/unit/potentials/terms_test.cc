@@ -142,6 +142,149 @@ TYPED_TEST(InDimension, MeanForcesDoExactlyTheWorkOfTheEnergyDifference) {
   });
 }
 
+/// A slab in which most particles have inner nodes of their own, at random times and with random kinks.
+template <int D>
+Histories<D> random_histories(Scene<D>& scene, double length) {
+  const auto& x = scene.particles.x;
+  Histories<D> paths;
+  paths.reset(length, x, scene.random_vectors(0.3), scene.random_vectors(0.3));
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (Id i = 0; i < x.size(); ++i)
+    for (double t = length * uniform(scene.random); t < 0.6 * length; t += 0.5 * length * uniform(scene.random))
+      paths.append(i, t, {}, scene.random_vectors(0.3)[i], scene.random_vectors(0.3)[i]);
+  paths.close();
+  return paths;
+}
+
+template <int D>
+std::vector<Vec<D>> impulses(const Interaction<D>& term, const Histories<D>& paths, const std::vector<char>& changed,
+                             PairMemory<D>& memory) {
+  std::vector<Vec<D>> impulse(paths.intervals(), Vec<D>::Zero());
+  term.add_impulses(paths, changed, memory, impulse);
+  return impulse;
+}
+
+TYPED_TEST(InDimension, ImpulsesKeepTheEnergyAndTheMomentumOnAnyMeshes) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const auto& x = scene.particles.x;
+    const Histories<D> paths = random_histories(scene, 1.0);
+    ASSERT_GT(paths.intervals(), x.size() + x.size() / 2);
+    term.begin_slab(x, 1.0);
+    PairMemory<D> memory;
+    const auto impulse = impulses(term, paths, std::vector<char>(x.size(), 1), memory);
+    auto x_new = x;
+    ExactSum work;
+    std::array<ExactSum, D> total;
+    const auto before = test::sums(term, x);
+    double scale = before.magnitude.value(), given = 0;
+    for (Id i = 0; i < x.size(); ++i)
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
+        x_new[i] += paths.duration(n) * paths.chord[n];
+        work.add(impulse[n].dot(paths.chord[n]));
+        for (int k = 0; k < D; ++k) total[k].add(impulse[n][k]);
+        given += impulse[n].norm();
+      }
+    const auto after = test::sums(term, x_new);
+    scale += after.magnitude.value() + given * scene.box.edges.norm();
+    EXPECT_NEAR(work.value(), before.energy.value() - after.energy.value(), 2e-15 * scale);
+    if (!term.keeps_momentum()) return;
+    for (int k = 0; k < D; ++k) EXPECT_NEAR(total[k].value(), 0, 1e-15 * given);
+  });
+}
+
+TYPED_TEST(InDimension, ImpulsesWithoutNodesAreThoseOfTheMeanForces) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const auto& x = scene.particles.x;
+    Histories<D> paths;
+    paths.reset(0.5, x, scene.random_vectors(0.3), std::vector<Vec<D>>(x.size(), Vec<D>::Zero()));
+    paths.close();
+    term.begin_slab(x, 1.0);
+    PairMemory<D> memory;
+    const auto impulse = impulses(term, paths, std::vector<char>(x.size(), 1), memory);
+    const auto f = mean_forces(term, x, displaced(x, paths.v, 0.5));
+    for (std::size_t i = 0; i < x.size(); ++i)
+      EXPECT_LE((impulse[i] - 0.5 * f[i]).norm(), 1e-13 * (1 + f[i].norm())) << "particle " << i;
+  });
+}
+
+TYPED_TEST(InDimension, WhatIsRememberedOfPairsIsWhatTheyGive) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const auto& x = scene.particles.x;
+    std::vector<char> changed(x.size(), 1);
+    Histories<D> paths;
+    paths.reset(0.5, x, scene.random_vectors(0.3), std::vector<Vec<D>>(x.size(), Vec<D>::Zero()));
+    paths.close();
+    term.begin_slab(x, 1.0);
+    PairMemory<D> memory;
+    impulses(term, paths, changed, memory);
+    changed.assign(x.size(), 0);
+    for (const Id i : {1u, 4u, 5u}) {
+      paths.a[i] = Vec<D>::Constant(0.2);
+      changed[i] = 1;
+    }
+    paths.append(2, 0.2, {}, Vec<D>::Constant(0.1), Vec<D>::Zero());
+    paths.close();
+    const auto again = impulses(term, paths, changed, memory);
+    PairMemory<D> fresh;
+    const auto expected = impulses(term, paths, std::vector<char>(x.size(), 1), fresh);
+    for (std::size_t n = 0; n < paths.intervals(); ++n) EXPECT_EQ(again[n], expected[n]) << "interval " << n;
+  });
+}
+
+TYPED_TEST(InDimension, TrapezoidsGiveAndTakeTheSameAndStartFromNodes) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
+    const auto& x = scene.particles.x;
+    const Histories<D> whole = random_histories(scene, 0.5);
+    term.begin_slab(x, 1.0);
+    // Build the same histories again, in the order of time, and take what each node receives.
+    Histories<D> paths;
+    paths.reset(0.5, x, std::span(whole.v).first(x.size()), std::span(whole.a).first(x.size()));
+    std::vector<std::uint32_t> nodes;
+    for (Id i = 0; i < x.size(); ++i)
+      for (std::uint32_t n = whole.next[i]; n != Histories<D>::kNone; n = whole.next[n]) nodes.push_back(n);
+    std::vector<Id> owner(whole.intervals());
+    for (Id i = 0; i < x.size(); ++i)
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = whole.next[n]) owner[n] = i;
+    std::ranges::sort(nodes, {}, [&](std::uint32_t n) { return whole.start[n]; });
+    std::vector<Vec<D>> received(x.size(), Vec<D>::Zero()), correction = received, x_end = x;
+    for (const std::uint32_t n : nodes) {
+      Vec<D> force = Vec<D>::Zero(), impulse = Vec<D>::Zero();
+      const Id i = owner[n];
+      term.add_trapezoids(paths, i, whole.start[n], impulse, force);
+      received[i] += impulse;
+      paths.append(i, whole.start[n], {}, whole.v[n], whole.a[n]);
+      auto at_node = x;
+      for (Id j = 0; j < x.size(); ++j) at_node[j] = paths.position_in(paths.at(j, whole.start[n]), whole.start[n]);
+      const Vec<D> expected = forces(term, at_node)[i];
+      EXPECT_LE((force - expected).norm(), 1e-12 * (1 + expected.norm()));
+      term.begin_slab(x, 1.0);  // the forces had the list for themselves
+    }
+    for (Id i = 0; i < x.size(); ++i) {
+      if (!paths.simple(i)) term.add_corrections(paths, i, correction);
+      x_end[i] = paths.position_in(paths.last[i], paths.length);
+    }
+    const auto first = forces(term, x), last = forces(term, x_end);
+    // The last intervals as a rule of their own, from nodes to the end.
+    term.begin_slab(x, 1.0);
+    Vec<D> total = Vec<D>::Zero();
+    double given = 0;
+    for (Id i = 0; i < x.size(); ++i) {
+      const Vec<D> by_correction = 0.25 * (first[i] + last[i]) + correction[i];
+      Vec<D> force = Vec<D>::Zero(), impulse = Vec<D>::Zero();
+      term.add_trapezoids(paths, i, paths.length, impulse, force);
+      EXPECT_LE((impulse - by_correction).norm(), 1e-12 * (1 + first[i].norm() + last[i].norm())) << "particle " << i;
+      total += received[i] + by_correction;
+      given += received[i].norm() + by_correction.norm() + first[i].norm() + last[i].norm();
+    }
+    if (!term.keeps_momentum()) return;
+    EXPECT_LE(total.norm(), 1e-14 * given);
+  });
+}
+
 TYPED_TEST(InDimension, MeanForcesOfNoStepAreTheForces) {
   constexpr int D = TypeParam::value;
   this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
