@@ -201,7 +201,7 @@ class CellTable {
 
  private:
   static constexpr double kFarthest = 1 << 28;  // cells: what an integer holds
-  const CellGrid<D>& grid_;
+  CellGrid<D> grid_;
   std::vector<std::size_t> start_;
   std::vector<Id> who_;
   std::vector<Image<D>> boxes_;

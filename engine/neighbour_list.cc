@@ -1,6 +1,8 @@
 #include "engine/neighbour_list.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <numeric>
 
 #include "engine/cell_grid.h"
@@ -12,6 +14,17 @@ namespace {
 constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
 constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
 }  // namespace
+
+/// Cells for particles of one size.
+template <int D>
+struct SizeClass {
+  SizeClass(const Box<D>& box, double largest_reach, double skin, std::span<const Vec<D>> x, std::vector<Id> members)
+      : largest(largest_reach), table(CellGrid<D>(box, 2 * largest_reach + skin, x), x), ids(std::move(members)) {}
+  Id id(Id member) const { return ids.empty() ? member : ids[member]; }
+  double largest;  ///< reach
+  CellTable<D> table;
+  std::vector<Id> ids;  ///< of the members; empty: everybody
+};
 
 template <int D>
 NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::function<bool(Id, Id)> wanted)
@@ -75,20 +88,43 @@ void NeighbourList<D>::build(std::span<const Vec<D>> x) {
   ++rebuilds_;
   built_at_.assign(x.begin(), x.end());
   pairs_.clear();
-  const double largest = reach_.empty() ? 0 : *std::ranges::max_element(reach_);
-  const CellGrid<D> grid(box_, 2 * largest + skin_, x);
-  const CellTable<D> table(grid, x);
+  const std::vector<SizeClass<D>> sizes = group(x);
   for (std::size_t i = 0; i < x.size(); ++i) {
     const std::size_t first = pairs_.size();
-    table.for_each_near(x[i], 2 * largest + skin_, [&](Id j, const Image<D>& image) {
-      if (j <= i) return;
-      const Vec<D> d = x[i] - x[j] + box_.shift(image);
-      const double reach = reach_[i] + reach_[j] + skin_;
-      if (d.squaredNorm() <= reach * reach && (!wanted_ || wanted_(static_cast<Id>(i), j)))
-        pairs_.push_back({static_cast<Id>(i), j, image});
-    });
+    for (const SizeClass<D>& size : sizes)
+      size.table.for_each_near(x[i], reach_[i] + size.largest + skin_, [&](Id member, const Image<D>& image) {
+        const Id j = size.id(member);
+        if (j <= i) return;
+        const Vec<D> d = x[i] - x[j] + box_.shift(image);
+        const double reach = reach_[i] + reach_[j] + skin_;
+        if (d.squaredNorm() <= reach * reach && (!wanted_ || wanted_(static_cast<Id>(i), j)))
+          pairs_.push_back({static_cast<Id>(i), j, image});
+      });
     std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
   }
+}
+
+/// Particles of similar reach, an octave each, in cells of their own: cells for the largest would hold thousands of
+/// small ones.
+template <int D>
+std::vector<SizeClass<D>> NeighbourList<D>::group(std::span<const Vec<D>> x) const {
+  std::vector<SizeClass<D>> sizes;
+  if (x.empty()) return sizes;
+  const auto [least, most] = std::ranges::minmax_element(reach_);
+  if (!(*least > 0) || *most < 2 * *least) {
+    sizes.emplace_back(box_, *most, skin_, x, std::vector<Id>{});
+    return sizes;
+  }
+  std::map<int, std::vector<Id>> octaves;
+  for (Id i = 0; i < x.size(); ++i) octaves[std::ilogb(*most / reach_[i])].push_back(i);
+  std::vector<Vec<D>> at;
+  for (auto& [octave, ids] : octaves) {
+    at.clear();
+    double largest = 0;
+    for (const Id i : ids) at.push_back(x[i]), largest = std::max(largest, reach_[i]);
+    sizes.emplace_back(box_, largest, skin_, at, std::move(ids));
+  }
+  return sizes;
 }
 
 template class NeighbourList<2>;

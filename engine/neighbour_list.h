@@ -24,6 +24,9 @@ struct NeighbourPair {
 };
 
 template <int D>
+struct SizeClass;  // neighbour_list.cc
+
+template <int D>
 class NeighbourList {
  public:
   /// Lists pairs (i, j) whose distance can fall to reach(i) + reach(j).
@@ -40,6 +43,7 @@ class NeighbourList {
 
  private:
   void build(std::span<const Vec<D>> x);
+  std::vector<SizeClass<D>> group(std::span<const Vec<D>> x) const;
   void follow_wraps(std::span<const Vec<D>> x);
 
   const Box<D>& box_;

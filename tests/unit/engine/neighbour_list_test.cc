@@ -14,7 +14,8 @@ namespace {
 
 /// Every pair and image within reach, by trying all of them.
 template <int D>
-std::set<NeighbourPair<D>> brute_force(const Box<D>& box, const std::vector<Vec<D>>& x, double reach) {
+std::set<NeighbourPair<D>> brute_force(const Box<D>& box, const std::vector<Vec<D>>& x,
+                                       const std::vector<double>& reach) {
   std::set<NeighbourPair<D>> pairs;
   Image<D> image;
   const int images = 27;  // offsets −1…1 per axis, as digits of base 3; boxes here are wider than half the reach
@@ -28,13 +29,13 @@ std::set<NeighbourPair<D>> brute_force(const Box<D>& box, const std::vector<Vec<
           allowed = allowed && (image[k] == 0 || box.periodic(k));
         }
         if (digits != 0 || !allowed) continue;
-        if ((x[i] - x[j] + box.shift(image)).norm() <= reach) pairs.insert({i, j, image});
+        if ((x[i] - x[j] + box.shift(image)).norm() <= reach[i] + reach[j]) pairs.insert({i, j, image});
       }
   return pairs;
 }
 
 template <int D>
-void expect_covered(const Box<D>& box, const std::vector<Vec<D>>& x, double reach,
+void expect_covered(const Box<D>& box, const std::vector<Vec<D>>& x, const std::vector<double>& reach,
                     std::span<const NeighbourPair<D>> pairs) {
   const std::set<NeighbourPair<D>> listed(pairs.begin(), pairs.end());
   ASSERT_EQ(listed.size(), pairs.size()) << "a pair is listed twice";
@@ -62,10 +63,11 @@ void walk(Boundary boundary, double edge, double reach) {
     for (auto& p : moved)
       for (int k = 0; k < D; ++k) p[k] += step(random);
     const auto pairs = list.cover(x, moved);
-    expect_covered<D>(box, x, reach, pairs);
+    expect_covered<D>(box, x, std::vector<double>(x.size(), reach / 2), pairs);
     // At the end of the step positions are not wrapped yet: the list's images are those of the start.
     std::set<NeighbourPair<D>> listed(pairs.begin(), pairs.end());
-    for (const auto& pair : brute_force<D>(box, moved, reach)) EXPECT_TRUE(listed.contains(pair));
+    for (const auto& pair : brute_force<D>(box, moved, std::vector<double>(x.size(), reach / 2)))
+      EXPECT_TRUE(listed.contains(pair));
     x = moved;
     for (std::size_t i = 0; i < x.size(); ++i) box.wrap(x[i], image[i]);
   }
@@ -113,6 +115,33 @@ TEST(NeighbourList, LeavesOutWhatIsNotWanted) {
   ASSERT_EQ(pairs.size(), 2u);
   EXPECT_EQ(pairs[0].j, 1u);
   EXPECT_EQ(pairs[1].i, 1u);
+}
+
+template <int D>
+void list_unequal(Boundary boundary) {
+  Box<D> box;
+  box.edges = Vec<D>::Constant(14);
+  box.boundary.fill(boundary);
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> uniform(0, 14), octave(-4, 1);
+  std::vector<Vec<D>> x(90);
+  std::vector<double> reach;
+  for (auto& p : x) {
+    for (int k = 0; k < D; ++k) p[k] = uniform(random);
+    reach.push_back(1.5 * std::exp2(octave(random)));
+  }
+  NeighbourList<D> list(box, reach);
+  const auto pairs = list.cover(x);
+  expect_covered<D>(box, x, reach, pairs);
+  for (const auto& pair : pairs)  // and no more than the skin wants
+    EXPECT_LT((x[pair.i] - x[pair.j] + box.shift(pair.image)).norm(), reach[pair.i] + reach[pair.j] + 1);
+}
+
+TEST(NeighbourList, CoversParticlesOfVeryDifferentSizes) {
+  for (const Boundary boundary : {Boundary::periodic, Boundary::wall, Boundary::open}) {
+    list_unequal<2>(boundary);
+    list_unequal<3>(boundary);
+  }
 }
 
 }  // namespace
