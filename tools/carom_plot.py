@@ -13,14 +13,22 @@ import matplotlib.pyplot as plt
 
 
 @contextlib.contextmanager
-def picture(file, **labels):
-    """Axes to draw on; the picture is written at the end, with a legend where anything has a label."""
-    figure, axes = plt.subplots(figsize=(6.4, 4.8))
-    yield axes
-    axes.set(**labels)
-    axes.grid(True, alpha=0.3)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend()
+def panels(file, *labels):
+    """Axes side by side, one for each dictionary of labels; written at the end, with a legend where anything has a label."""
+    figure, row = plt.subplots(ncols=len(labels), figsize=(6.4 * len(labels), 4.8), squeeze=False)
+    yield row[0]
+    for axes, named in zip(row[0], labels):
+        axes.set(**named)
+        axes.grid(True, alpha=0.3)
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend()
     figure.tight_layout()
-    figure.savefig(file, dpi=150)
+    figure.savefig(file, dpi=150 / len(labels))
     plt.close(figure)
+
+
+@contextlib.contextmanager
+def picture(file, **labels):
+    """One panel: axes to draw on."""
+    with panels(file, labels) as (axes,):
+        yield axes

@@ -24,6 +24,8 @@ InteractionInfo harmonic_bond() {
       .kind = InteractionInfo::Kind::bonded,
       .parameters = {{"pairs", Type::pair_list, "none", "-", "the bonded pairs of particles, by number from 0"},
                      {"chain", Type::boolean, "false", "-", "bond each particle to the next, instead of giving pairs"},
+                     {"chain_length", Type::integer, "none", "-",
+                      "particles in each chain, in id order; absent: a single chain of all", Range::positive},
                      {"within", Type::real, "none", "length",
                       "bond the pairs that stand no farther apart than this at the start, instead of giving pairs",
                       Range::positive},

@@ -68,10 +68,15 @@ PairList bonds(std::string_view type, const Parameters& parameters, std::size_t 
   const int given = (chain ? 1 : 0) + (parameters.has("pairs") ? 1 : 0) + (parameters.has("within") ? 1 : 0);
   if (given == 0) refuse(type, "no bonds are given; give 'pairs = [[0, 1], …]', 'chain = true' or 'within'");
   if (given > 1) refuse(type, "bonds are given twice, by two of 'pairs', 'chain' and 'within'; give one of them");
+  if (parameters.has("chain_length") && !chain)
+    refuse(type, "'chain_length' is given without a chain; add 'chain = true'");
   if (parameters.has("within")) return {};
   PairList list;
   if (chain) {
-    for (Id i = 1; i < particles; ++i) list.push_back({i - 1, i});
+    const std::size_t length =
+        parameters.has("chain_length") ? static_cast<std::size_t>(parameters.integer("chain_length")) : particles;
+    for (Id i = 1; i < particles; ++i)
+      if (i % length != 0) list.push_back({i - 1, i});
     return list;
   }
   list = parameters.get<PairList>("pairs");

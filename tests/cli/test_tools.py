@@ -1,4 +1,4 @@
-"""The Python tools against files whose contents are known, and energy_study.py against the command itself ($CAROM)."""
+"""The Python tools against files whose contents are known, and the studies against the command itself ($CAROM)."""
 
 import csv
 import os
@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 
 import check_h5md
 import compare
+import cost_study
 import energy_study
 import movie
 import plot_energy
@@ -263,3 +264,23 @@ def test_energy_study(tmp_path, capsys):
     assert orders["psa"] == pytest.approx(1.0, abs=0.5)
     assert orders["cva"] == pytest.approx(2.0, abs=0.5)
     assert max(float(row["relative_energy_error"]) for row in rows if row["method"] == "cdda") < 1e-12
+
+
+@pytest.mark.skipif("CAROM" not in os.environ, reason="needs the command: CAROM=build/release/io/carom")
+def test_cost_study(tmp_path, capsys):
+    cost_study.main([str(ROOT / "inputs" / "five-springs.toml"), "--methods", "cva,cdda,acva,acdda", "--steps", "0.02,0.01",
+                     "--end-time", "3", "--repeats", "1", "-o", str(tmp_path)])
+    with open(tmp_path / "work.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 4 * 2
+    for coarse, fine in zip(rows[::2], rows[1::2]):
+        assert float(coarse["position_error"]) / float(fine["position_error"]) == pytest.approx(4, rel=0.5)
+        assert float(fine["energy_error"]) < (1e-12 if fine["method"].endswith("dda") else 1e-3)
+    cost_study.main([str(ROOT / "inputs" / "spring-lattice.toml"), "--methods", "cdda,acdda", "--counts", "16,144",
+                     "--end-time", "1", "--repeats", "1", "-o", str(tmp_path)])
+    with open(tmp_path / "cost.csv", newline="") as file:
+        passes = [float(row["passes_per_step"]) for row in csv.DictReader(file)]
+    assert passes[1] > 3 * passes[0]  # all of a system's collisions cut everybody's step
+    assert passes[3] == pytest.approx(passes[2], rel=0.3)
+    for name in ("work.png", "cost.png"):
+        assert (tmp_path / name).stat().st_size > 1000

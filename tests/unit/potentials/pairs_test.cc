@@ -80,6 +80,11 @@ TEST(Pairs, AreCounted) {
   EXPECT_EQ(
       scene.make("harmonic-bond", {{"chain", true}, {"stiffness", 1.0}, {"rest_length", 1.0}})->interacting_pairs(x),
       11u);
+  EXPECT_EQ(scene
+                .make("harmonic-bond",
+                      {{"chain", true}, {"chain_length", std::int64_t{4}}, {"stiffness", 1.0}, {"rest_length", 1.0}})
+                ->interacting_pairs(x),
+            9u);
   EXPECT_EQ(scene.make("harmonic-trap", {{"stiffness", 1.0}})->interacting_pairs(x), 12u);
 }
 
@@ -132,6 +137,10 @@ TEST(Refused, BondsThatCannotBe) {
   both.emplace_back("pairs", PairList{{0, 1}});
   both.emplace_back("chain", true);
   expect_contains(refusal(scene, "harmonic-bond", both), "give one of them");
+  Given length = spring;
+  length.emplace_back("chain_length", std::int64_t{2});
+  length.emplace_back("within", 3.0);
+  expect_contains(refusal(scene, "harmonic-bond", length), "'chain_length' is given without a chain");
   Given apart = spring;
   apart.emplace_back("within", 0.4);
   expect_contains(refusal(scene, "harmonic-bond", apart), "give a larger 'within'");
