@@ -14,8 +14,9 @@ struct Counters {
   std::uint64_t sphere_wall = 0;    ///< executed wall collisions
   double force_passes = 0;   ///< pair evaluations of forces and their kin / interacting pairs; energies not counted
   std::uint64_t sweeps = 0;  ///< iterations of implicit solves
+  std::uint64_t pieces = 0;  ///< acdda: in which slabs were solved; more than the steps where one was cut
   std::uint64_t slabs_halved = 0;
-  std::uint64_t fallbacks = 0;  ///< mcva: plain elastic impulses; cdda: Newton–Krylov solves
+  std::uint64_t fallbacks = 0;  ///< mcva: plain elastic impulses; acdda: solves that took acceleration
   double max_overlap = 0;       ///< deepest overlap met, relative to the contact distance
   ExactSum collision_virial;    ///< Σ d·impulse over pair collisions [mass·length²/time]
   EventCounts events;           ///< of the event core, at the end of the last slab; 0 where a method has none

@@ -52,6 +52,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"mean_free_path", number_or_null(s.mean_free_path)},
       {"force_passes", s.force_passes},
       {"sweeps", c.sweeps},
+      {"pieces", c.pieces},
       {"slabs_halved", c.slabs_halved},
       {"fallbacks", c.fallbacks},
       {"wall_seconds", s.wall_seconds},

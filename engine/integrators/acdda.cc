@@ -13,6 +13,7 @@
 // event on parabolas with the mean forces of sweep k − 1, which end where the chords end, and computes the impulses on
 // the chords. (With straight flights pairs that bounce again and again make the sweeps diverge.)
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -30,55 +31,124 @@ constexpr int kPatience = 5;   // sweeps after which who has other partners than
 constexpr int kMostTries = 4;  // of such nodes, before the slab is halved
 constexpr int kMostPieces = 1 << 14;
 constexpr double kWorstContraction = 0.5;
+constexpr double kMixed = 0.2;  // contraction from which on sweeps are mixed
 // What may be left of a particle's impulse, as a velocity and relative to the system's. In intervals before an inner
 // node it enters the energy to first order, in last ones, whose ends are given with the newest impulses, to second.
 constexpr double kInner = 2e-16, kLastAtMost = 1e-12, kLastAtLeast = 1e-15, kRounding = 1e-16;
 constexpr double kStalled = 1e-13;  // where increments stop shrinking below this, rounding is amplified by collisions
 
-/// Mean accelerations of past slabs, and what they let expect of the next.
+/// Mean accelerations of past pieces, and what they let expect of the next.
 template <int D>
 class Extrapolation {
  public:
   void start(const std::vector<Vec<D>>& a) {
     for (auto& past : past_) past = a;
-    age_.assign(a.size(), 1);
+    age_.assign(a.size(), 0);
+    time_.assign(a.size(), 0.0);
+    length_.fill(0);
   }
-  /// Forgets all but the last slab: the next one has another length.
-  void restart() { std::ranges::fill(age_, std::uint8_t{1}); }
-  /// The mean acceleration of a slab is known; `kinked` where it was not smooth within.
-  void add(Id i, const Vec<D>& a, bool kinked) {
+  /// A piece of this length is done; then add() for everybody.
+  void pass(double length) {
+    std::ranges::rotate(length_, length_.end() - 1);
+    length_[0] = length;
+  }
+  /// The mean acceleration over the last part of a piece, a time long; the whole piece where it was smooth.
+  void add(Id i, const Vec<D>& a, double time) {
     for (std::size_t k = kOrder; k > 0; --k) past_[k][i] = past_[k - 1][i];
     past_[0][i] = a;
-    age_[i] = kinked ? 1 : std::min<std::uint8_t>(age_[i] + 1, kOrder + 1);
+    age_[i] = time < length_[0] ? 1 : std::min<std::uint8_t>(age_[i] + 1, kOrder + 1);
+    time_[i] = time;
   }
-  void expect(std::vector<Vec<D>>& a) const {
+  /// The mean accelerations of a piece of this length: of the polynomial that had the means known.
+  void expect(double length, std::vector<Vec<D>>& a) {
+    if (length > kMostGrowth * length_[0])
+      for (auto& age : age_) age = std::min<std::uint8_t>(age, 1);
+    const auto weight = weights(length);
     a.resize(age_.size());
-    const auto& p = past_;
-    for (std::size_t i = 0; i < a.size(); ++i) switch (age_[i]) {
-        case 1:
-          a[i] = p[0][i];
-          break;
-        case 2:
-          a[i] = 2 * p[0][i] - p[1][i];
-          break;
-        case 3:
-          a[i] = 3 * (p[0][i] - p[1][i]) + p[2][i];
-          break;
-        default:
-          a[i] = 4 * (p[0][i] + p[2][i]) - 6 * p[1][i] - p[3][i];
-      }
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      a[i] = weight[age_[i]][0] * past_[0][i];
+      for (std::size_t k = 1; k < age_[i]; ++k) a[i] += weight[age_[i]][k] * past_[k][i];
+    }
   }
+  /// The last ones, and over which times.
+  const std::vector<Vec<D>>& last() const { return past_[0]; }
+  const std::vector<double>& time() const { return time_; }
 
  private:
   static constexpr std::size_t kOrder = 3;
+  static constexpr double kMostGrowth = 3;  // of pieces; beyond it only the last one counts
+
+  /// [age][piece]. The integral of the acceleration is known at the pieces' ends, −s_k before now, and continued by
+  /// Lagrange's polynomial.
+  std::array<std::array<double, kOrder + 1>, kOrder + 2> weights(double length) const {
+    std::array<std::array<double, kOrder + 1>, kOrder + 2> weight{};
+    weight[0][0] = 1;
+    std::array<double, kOrder + 2> s{};
+    for (std::size_t k = 0; k <= kOrder; ++k) s[k + 1] = s[k] + length_[k];
+    for (std::size_t age = 1; age <= kOrder + 1 && length_[age - 1] > 0; ++age) {
+      double sum = 0;
+      for (std::size_t k = age; k > 0; --k) {
+        double basis = 1;
+        for (std::size_t l = 0; l <= age; ++l)
+          if (l != k) basis *= (length + s[l]) / (s[l] - s[k]);
+        sum += basis;
+        weight[age][k - 1] = -sum * length_[k - 1] / length;
+      }
+    }
+    return weight;
+  }
+
   std::array<std::vector<Vec<D>>, kOrder + 1> past_;
-  std::vector<std::uint8_t> age_;  // how many of them belong together
+  std::array<double, kOrder + 1> length_{};
+  std::vector<std::uint8_t> age_;  // how many of them belong together; 0: an acceleration at an instant
+  std::vector<double> time_;
+};
+
+/// Anderson acceleration: the last few iterates, mixed so that what they lack would vanish as far as it can were it
+/// linear in them. (Anderson, J. ACM 12 (1965) 547; for linear problems GMRES.)
+class Mixing {
+ public:
+  void clear() { columns_ = 0; }
+  /// Takes an iterate and what the next plain one would add to it; what else is to be added is left in correction().
+  void add(const Eigen::VectorXd& iterate, const Eigen::VectorXd& lacking) {
+    correction_.setZero(iterate.size());
+    if (columns_ == 0) {
+      moves_.resize(iterate.size(), kDepth);
+      changes_.resize(iterate.size(), kDepth);
+    } else {
+      const Eigen::Index at = (columns_ - 1) % kDepth, known = std::min(columns_, kDepth);
+      moves_.col(at) = iterate - iterate_;
+      changes_.col(at) = lacking - lacking_;
+      const Eigen::VectorXd share = changes_.leftCols(known).colPivHouseholderQr().solve(lacking);
+      correction_ = -(moves_.leftCols(known) + changes_.leftCols(known)) * share;
+    }
+    iterate_ = iterate;
+    lacking_ = lacking;
+    ++columns_;
+  }
+  const Eigen::VectorXd& correction() const { return correction_; }
+
+ private:
+  static constexpr Eigen::Index kDepth = 6;
+
+  Eigen::Index columns_ = 0;
+  Eigen::MatrixXd moves_, changes_;
+  Eigen::VectorXd iterate_, lacking_, correction_;
 };
 
 /// Whether two events have the same partners, whenever they happen.
 template <int D>
 bool same_partners(const EventKey<D>& a, const EventKey<D>& b) {
   return a.kind == b.kind && a.lo == b.lo && a.hi == b.hi && a.image == b.image;
+}
+
+/// Whether everybody has the same partners in two sweeps, met in the same order.
+template <int D>
+bool same_meetings(const Histories<D>& a, const Histories<D>& b) {
+  if (a.next != b.next) return false;
+  for (std::size_t n = a.particles(); n < a.intervals(); ++n)
+    if (!same_partners(a.opening[n], b.opening[n])) return false;
+  return true;
 }
 
 /// Flights of a sweep: on the mean forces of the same interval in the sweep before.
@@ -111,7 +181,9 @@ template <int D>
 class AsynchronousDiscreteDerivative : public Integrator<D> {
  public:
   explicit AsynchronousDiscreteDerivative(const Parameters& parameters)
-      : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
+      : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))),
+        accepted_(parameters.has("tolerance") ? parameters.real("tolerance") : 0),
+        adaptive_(parameters.has("adaptive") ? parameters.real("adaptive") : 0) {}
 
   void start(System<D>& system, Counters& counters) override {
     scan_.emplace(system, max_events_);
@@ -126,16 +198,14 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
-    extrapolation_.expect(first_);
-    scan_->begin_slab(report.counters, report.contacts, first_, slab.length);
+    scan_->begin_slab(report.counters, report.contacts, extrapolation_.last(), slab.length);
     auto& p = system.particles;
     auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, p); };
     double done = 0, longest = slab.length;
     while (done < slab.length) {
       scan_->resolve(done, p.x, p.v, elastic);
-      const double rest = slab.length - done, piece = std::min(rest, longest);
-      if (piece != last_piece_) extrapolation_.restart();
-      last_piece_ = piece;
+      const double rest = slab.length - done;
+      const double piece = std::min(longest, rest / std::max(1.0, std::ceil(rest / wanted_)));
       const Solution solution = solve(system, piece);
       if (!solution.settled) {
         longest = solution.cut > 0 ? solution.cut : 0.5 * piece;
@@ -151,7 +221,9 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
                                               std::to_string(slab.length));
         continue;
       }
+      if (adaptive_ > 0 && !fits(p, piece, slab.length)) continue;
       finish(p);
+      ++report.counters.pieces;
       scan_->commit(done, core_->contacts());
       if (!scan_->resting().empty()) scan_->slide(p.x, p.v);
       done = piece == rest ? slab.length : done + piece;
@@ -169,20 +241,49 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     EventKey<D> key{};
   };
 
+  /// Whether the path of a piece is as good as asked; sets the length to try next.
+  bool fits(const Particles<D>& p, double piece, double slab_length) {
+    const double error = path_error(p), best = 0.9 * piece * std::cbrt(adaptive_ / error);
+    const bool good = error <= adaptive_ || piece * kMostPieces < slab_length;
+    wanted_ = good ? std::min(best, 2 * std::max(piece, std::min(wanted_, slab_length))) : std::max(best, 0.2 * piece);
+    return good;
+  }
+
+  /// The largest error of a position over a piece. Where the acceleration changes at the rate j, seen from one interval
+  /// to the next, the parabola on its mean leaves the path by j s³/12 in a time s.
+  double path_error(const Particles<D>& p) const {
+    const Histories<D>& paths = *now_;
+    double largest = 0;
+    for (Id i = 0; i < p.size(); ++i) {
+      double error = 0, before = extrapolation_.time()[i];
+      Vec<D> a_before = extrapolation_.last()[i];
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
+        const double s = paths.duration(n);
+        const Vec<D> a = impulse_[n] / (p.mass[i] * s);
+        error += (a - a_before).norm() / (0.5 * (before + s)) * (s * s * s / 12);
+        a_before = a;
+        before = s;
+      }
+      largest = std::max(largest, error);
+    }
+    return largest;
+  }
+
   /// Sweeps over a slab from the present positions until impulses and paths agree; leaves them in paths_ and impulse_.
   Solution solve(const System<D>& system, double length) {
     using End = typename SlabRun<D>::End;
     const Stopwatch watch(counters_->seconds.sweep);
     const auto& p = system.particles;
     const std::size_t n = p.size();
-    extrapolation_.expect(first_);
+    extrapolation_.expect(length, first_);
     double margin = 0;
     for (Id i = 0; i < n; ++i) margin = std::max(margin, length * (p.v[i].norm() + 0.5 * length * first_[i].norm()));
     begin(system, kRoom * margin);
     extra_.clear();
-    tolerance_ = kLastAtLeast;
+    tolerance_ = std::max(kLastAtLeast, accepted_);
+    bool mixes = false;
     const Histories<D>* before = nullptr;
-    double last_change = 0, last_unsettled = 0, earlier_unsettled = 0;
+    double last_change = 0, last_unsettled = 0, earlier_unsettled = 0, last_smooth = 0, earlier_smooth = 0;
     int tries = 0, slow = 0, since = 0;  // since: sweeps since the last node was added
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
       Histories<D>& paths = paths_[sweep % 2];
@@ -200,7 +301,9 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       paths.close();
       mark_changed(paths, before);
       evaluate(system, paths);
-      const Change change = compare(p, paths, last_change);
+      const bool alike = before != nullptr && same_meetings(paths, *before);
+      if (mixes) mix(p, paths, alike);
+      const Change change = compare(p, paths, mixes ? 0 : last_change, mixes);
       now_ = &paths;
       if (change.settled) return {.settled = true};
       if (!std::isfinite(change.largest)) return {};
@@ -208,6 +311,13 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       const bool crawls = since > 2 && change.unsettled > kWorstContraction * kWorstContraction * earlier_unsettled;
       if (crawls && change.unsettled <= kStalled * change.speed) return {.settled = true};
       slow = crawls ? slow + 1 : 0;
+      if (!mixes && alike && since > 2 &&
+          change.smooth > std::max(kMixed * kMixed * earlier_smooth, 0.1 * change.unsettled)) {
+        mixes = true;
+        since = slow = 0;
+        mixing_.clear();
+        ++counters_->fallbacks;
+      }
       const bool parted = (patient || slow > 2) && before != nullptr && separate(paths, *before);
       if (parted || (slow > 2 && steady(p, paths, change))) {
         since = slow = 0;
@@ -217,6 +327,8 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       }
       earlier_unsettled = last_unsettled;
       last_unsettled = change.unsettled;
+      earlier_smooth = last_smooth;
+      last_smooth = change.smooth;
       last_change = change.largest;
       before = &paths;
     }
@@ -276,16 +388,30 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     }
   }
 
+  /// Accelerates the sweeps, in terms of the velocities that impulses give, as long as everybody meets the same.
+  void mix(const Particles<D>& p, const Histories<D>& paths, bool alike) {
+    if (!alike) mixing_.clear();
+    const auto size = static_cast<Eigen::Index>(D * paths.intervals());
+    Eigen::VectorXd flown(size), lacking(size);
+    for (Id i = 0; i < paths.particles(); ++i)
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
+        flown.segment<D>(D * n) = paths.duration(n) * paths.a[n];
+        lacking.segment<D>(D * n) = impulse_[n] / p.mass[i] - paths.duration(n) * paths.a[n];
+      }
+    mixing_.add(flown, lacking);
+  }
+
   struct Change {
     double largest = 0;    ///< of an impulse from the one flown on, as a velocity
     double unsettled = 0;  ///< the same among those who have not settled
+    double smooth = 0;     ///< and have no inner nodes
     double speed = 0;      ///< of the system
     bool settled = true;
   };
 
   /// Compares the impulses with those flown on, and replaces the accelerations of paths by the new ones where there is
   /// a difference that matters: who has settled keeps his path bit for bit.
-  Change compare(const Particles<D>& p, Histories<D>& paths, double last_change) {
+  Change compare(const Particles<D>& p, Histories<D>& paths, double last_change, bool mixes) {
     Change change;
     const auto particles = static_cast<Id>(paths.particles());
     for (Id i = 0; i < particles; ++i)
@@ -307,11 +433,13 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     const double last = tolerance_ * change.speed;
     for (Id i = 0; i < particles; ++i)
       for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
-        const double time = paths.duration(n), inner = kInner * change.speed;
+        const double time = paths.duration(n), inner = std::max(kInner, accepted_) * change.speed;
         const double d = difference(i, n, time);
         if (d <= (paths.next[n] == Histories<D>::kNone ? last : inner)) continue;
         change.unsettled = std::max(change.unsettled, d);
+        if (paths.simple(i)) change.smooth = std::max(change.smooth, d);
         paths.a[n] = impulse_[n] / (p.mass[i] * time);
+        if (mixes) paths.a[n] += mixing_.correction().template segment<D>(D * n) / time;
         change.settled = false;
       }
     return change;
@@ -359,6 +487,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   /// theirs is added to the last velocity, so that no momentum is lost.
   void finish(Particles<D>& p) {
     const Histories<D>& paths = *now_;
+    extrapolation_.pass(paths.length);
     for (Id i = 0; i < p.size(); ++i) {
       const double mass = p.mass[i];
       Vec<D> lacking = Vec<D>::Zero();
@@ -368,13 +497,16 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       const double time = paths.duration(n);
       p.x[i] = paths.x[n] + time * (paths.v[n] + impulse_[n] / (2 * mass));
       p.v[i] = paths.v[n] + impulse_[n] / mass + lacking;
-      extrapolation_.add(i, impulse_[n] / (mass * time), !paths.simple(i));
+      extrapolation_.add(i, impulse_[n] / (mass * time), time);
     }
   }
 
   static constexpr double kRoom = 1.25;  // margins in units of the farthest path
 
   std::uint64_t max_events_;
+  double accepted_;  // for what the sweeps may leave, relative; 0: rounding
+  double adaptive_;  // local error of paths that pieces are fitted to; 0: they are not
+  double wanted_ = std::numeric_limits<double>::infinity();  // length of the next piece
   std::optional<ContactScan<D>> scan_;
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> extrapolation_;
@@ -387,7 +519,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   std::vector<ExtraNode> extra_;
   std::uint64_t pairs_ = 0;  // within reach
   double tolerance_ = 0;     // of last intervals, relative
-  double last_piece_ = 0;
+  Mixing mixing_;
   Counters* counters_ = nullptr;
 };
 
@@ -399,11 +531,28 @@ IntegratorInfo acdda() {
       .title = "Asynchronous Collision Discrete Derivative Algorithm",
       .order = "2",
       .conserves = "energy and linear momentum to rounding, for any step; angular momentum in slabs without collisions",
-      .parameters = {parameter::step(), parameter::max_events_per_step()},
+      .parameters = {parameter::step(),
+                     {.name = "tolerance",
+                      .type = Parameter::Type::real,
+                      .fallback = "none",
+                      .unit = "-",
+                      .meaning =
+                          "what sweeps may leave of an impulse, as a velocity and relative to the fastest; trades "
+                          "exact energy for fewer force passes; absent: rounding",
+                      .range = Parameter::Range::positive},
+                     {.name = "adaptive",
+                      .type = Parameter::Type::real,
+                      .fallback = "none",
+                      .unit = "length",
+                      .meaning = "cuts steps into pieces so short that the estimated error of a position in a piece "
+                                 "stays below this; absent: steps are not cut",
+                      .range = Parameter::Range::positive},
+                     parameter::max_events_per_step()},
       .documentation =
           "Discrete-gradient steps in which each particle has a time mesh of its own: a collision cuts the step of "
           "the colliders only, and the energy is exact for any meshes. Steps are solved by sweeps, each of which "
-          "costs a force pass at most and its collisions, whatever the number of particles.",
+          "costs a force pass at most and its collisions, whatever the number of particles. Where the forces are stiff "
+          "the sweeps are mixed (Anderson 1965).",
       .source =
           "this project; relatives: Lew, Marsden, Ortiz, West, Arch. Ration. Mech. Anal. 167 (2003) 85; Logg, SIAM "
           "J. Sci. Comput. 24 (2003) 1879; Gonzalez, J. Nonlinear Sci. 6 (1996) 449",

@@ -20,7 +20,7 @@ pytestmark = needs_carom
 
 PROMISED = """status deck integrator dimension particles ranks steps end_time events.sphere_sphere events.sphere_wall
 energy.initial energy.after_first_step energy.final energy.reference energy.max_abs_error shadow_energy.max_abs_error
-momentum.max_abs_error max_overlap pressure collision_rate mean_free_time mean_free_path force_passes sweeps slabs_halved fallbacks wall_seconds
+momentum.max_abs_error max_overlap pressure collision_rate mean_free_time mean_free_path force_passes sweeps pieces slabs_halved fallbacks wall_seconds
 collisions_per_second peak_memory_bytes""".split()
 
 

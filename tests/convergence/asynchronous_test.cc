@@ -37,8 +37,8 @@ Collisions<D> collisions(std::unique_ptr<System<D>> system, const char* method, 
 }
 
 /// Discs on a square lattice of this many rows, springs between neighbours, temperature 1, periodic.
-std::unique_ptr<System<2>> spring_lattice(int rows) {
-  const double spacing = 1.5, edge = spacing * rows;
+std::unique_ptr<System<2>> spring_lattice(int rows, double stiffness = 1.0, double spacing = 1.5) {
+  const double edge = spacing * rows;
   std::vector<Vec<2>> x;
   PairList bonds;
   const auto id = [&](int a, int b) { return static_cast<Id>((a + rows) % rows * rows + (b + rows) % rows); };
@@ -53,7 +53,8 @@ std::unique_ptr<System<2>> spring_lattice(int rows) {
   std::vector<Id> all(n);
   for (Id i = 0; i < n; ++i) all[i] = i;
   draw_velocities<2>(system->particles, all, std::vector<double>(n, 1.0), 5);
-  test::add_interaction(*system, "harmonic-bond", {{"pairs", bonds}, {"stiffness", 1.0}, {"rest_length", 1.5}});
+  test::add_interaction(*system, "harmonic-bond",
+                        {{"pairs", bonds}, {"stiffness", stiffness}, {"rest_length", spacing}});
   return system;
 }
 
@@ -264,6 +265,114 @@ TEST(Asynchronous, TheEnergyErrorGrowsNoFasterThanTheRootOfTheSteps) {
     // A random walk has 0.5; with 16 starts the fitted exponent scatters by about 0.1. A bias would give 1.
     EXPECT_LE(test::fitted_order(steps, rms), 0.5 + 0.25);
     EXPECT_LE(rms.back(), 1e-12);
+  }
+}
+
+TEST(Asynchronous, TheToleranceTradesEnergyForForcePasses) {
+  const auto exact = test::run_steps<2>(spring_lattice(12), "acdda", 0.05, 100);
+  double last_passes = exact->statistics().force_passes, last_error = 0;
+  for (const double tolerance : {1e-9, 1e-6, 1e-3}) {
+    const auto run = test::run_steps<2>(spring_lattice(12), "acdda", 0.05, 100, {{"tolerance", tolerance}});
+    const auto& s = run->statistics();
+    EXPECT_LE(s.max_energy_error, 10 * tolerance * s.energy_reference) << tolerance;
+    EXPECT_GT(s.max_energy_error, 30 * last_error) << tolerance;
+    EXPECT_LT(s.force_passes, 0.9 * last_passes) << tolerance;
+    EXPECT_LE(*s.max_momentum_error, 1e-11) << tolerance;  // whatever the sweeps leave
+    last_passes = s.force_passes;
+    last_error = s.max_energy_error;
+  }
+}
+
+/// Two bodies that gravitate, a = 1, at the pericentre of an orbit of this eccentricity.
+std::unique_ptr<System<2>> kepler(double eccentricity) {
+  const double near = 1 - eccentricity, speed = std::sqrt((1 + eccentricity) / (1 - eccentricity));
+  auto system = test::make_system<2>({10, 10}, Boundary::open, {{5 - 0.5 * near, 5}, {5 + 0.5 * near, 5}},
+                                     {{0, -0.5 * speed}, {0, 0.5 * speed}}, {0.01, 0.01}, {0.5, 0.5});
+  test::add_interaction(*system, "gravity", {{"constant", 1.0}});
+  return system;
+}
+
+TEST(Asynchronous, AnAdaptiveStepTakesFewerPiecesForTheSamePath) {
+  const double end = 8;  // the period is 2π; the first piece tried is six times the time of a close passage
+  auto run = [&](double h, const test::Given& given) {
+    return test::run_until<2>(kepler(0.9), "acdda", h, end, given);
+  };
+  const auto reference = run(end / 200000, {});
+  auto error = [&](const Simulation<2>& other) {
+    return test::largest_difference<2>(other.system().particles.x, reference->system().particles.x);
+  };
+  const auto fixed = run(end / 4000, {});
+  const auto adaptive = run(end / 40, {{"adaptive", 1e-7}});
+  const auto& s = adaptive->statistics();
+  EXPECT_LT(error(*adaptive), 1e-3);
+  EXPECT_GT(error(*fixed), error(*adaptive));
+  EXPECT_EQ(fixed->statistics().counters.pieces, 4000u);
+  EXPECT_LT(s.counters.pieces, 1000u);
+  EXPECT_LT(s.force_passes, 0.5 * fixed->statistics().force_passes);
+  EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);
+}
+
+TEST(Asynchronous, AnAdaptiveStepKeepsTheEnergyThroughCollisions) {
+  const auto fixed = test::run_until<2>(test::nine_gravity(), "acdda", 0.1, 6);
+  const auto adaptive = test::run_until<2>(test::nine_gravity(), "acdda", 0.1, 6, {{"adaptive", 1e-6}});
+  const auto& s = adaptive->statistics();
+  EXPECT_GT(s.counters.sphere_sphere, 5u);
+  EXPECT_GT(s.counters.pieces, 2 * fixed->statistics().counters.pieces);
+  EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);
+  const auto reference = test::run_until<2>(test::nine_gravity(), "acdda", 0.001, 6);
+  const auto error = [&](const Simulation<2>& run) {
+    return test::largest_difference<2>(run.system().particles.x, reference->system().particles.x);
+  };
+  EXPECT_LT(error(*adaptive), 0.2 * error(*fixed));
+}
+
+TEST(Asynchronous, StiffSpringsTakeNoHalvings) {
+  // Plain sweeps contract by no more than h² k/m = 0.8.
+  for (const double spacing : {1.5, 1.06}) {  // without collisions and with a few
+    const auto run = test::run_steps<2>(spring_lattice(12, 2000, spacing), "acdda", 0.02, 100);
+    const auto& s = run->statistics();
+    EXPECT_EQ(s.counters.slabs_halved, 0u) << spacing;
+    EXPECT_EQ(s.counters.pieces, 100u) << spacing;
+    EXPECT_EQ(s.counters.fallbacks, 100u) << spacing;
+    EXPECT_LE(s.counters.sweeps, 3000u) << spacing;  // plain ones would be 150 a step
+    EXPECT_LE(s.max_energy_error, 1e-13 * s.energy_reference) << spacing;
+  }
+  const auto soft = test::run_steps<2>(spring_lattice(12), "acdda", 0.02, 100);
+  EXPECT_EQ(soft->statistics().counters.fallbacks, 0u);
+}
+
+TEST(Asynchronous, ListsOfAnyWidthGiveTheSameBits) {
+  // A sphere far away that nothing acts on widens the lists of contacts; a slab begun with a wide margin those of
+  // forces.
+  auto run = [](const char* method, bool wide) {
+    auto system = charged_spheres();
+    auto& p = system->particles;
+    system->box.boundary.fill(Boundary::open);
+    if (wide) {
+      p.x.push_back({1000, 0, 0});
+      p.v.push_back(Vec<3>::Zero());
+      p.radius.push_back(100);
+      p.mass.push_back(1);
+      p.charge.push_back(0);
+      p.species.push_back(0);
+      p.image.emplace_back();
+      system->interactions.clear();
+      test::add_interaction(
+          *system, "coulomb",
+          {{"constant", 1.0}, {"form", std::string("damped-shifted")}, {"damping", 0.8}, {"cutoff", 2.2}});
+      system->interactions[0]->begin_slab(p.x, 1.0);
+    }
+    return test::run_steps<3>(std::move(system), method, 0.02, 30);
+  };
+  for (const char* method : {"acva", "acdda"}) {
+    const auto narrow = run(method, false), wide = run(method, true);
+    EXPECT_GT(narrow->statistics().counters.sphere_sphere, 30u) << method;
+    EXPECT_EQ(narrow->statistics().counters.sphere_sphere, wide->statistics().counters.sphere_sphere) << method;
+    const auto &p = narrow->system().particles, &q = wide->system().particles;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      EXPECT_EQ(p.x[i], q.x[i]) << method << " " << i;
+      EXPECT_EQ(p.v[i], q.v[i]) << method << " " << i;
+    }
   }
 }
 

@@ -106,6 +106,7 @@ TEST(Summary, HasEveryPromisedName) {
                            "/mean_free_path",
                            "/force_passes",
                            "/sweeps",
+                           "/pieces",
                            "/slabs_halved",
                            "/fallbacks",
                            "/wall_seconds",
