@@ -193,7 +193,7 @@ class LinkedCells {
     for (unsigned q = 0; q < found.count; ++q) {
       const Image<D> theirs = packing_.image(packing_.pack(0, boxes_[packing_.slot(found.packed[q])]));
       for (int k = 0; k < D; ++k)
-        if (std::abs(theirs[k] - own[k]) + 1 > packing_.largest() + 1) throw_too_far();
+        if (std::abs(theirs[k] - own[k]) + 1 > packing_.largest()) throw_too_far();  // 1: seen through a face
     }
   }
 
@@ -204,8 +204,8 @@ class LinkedCells {
   std::vector<HeadStep> steps_[D - 1];  // to the cells −1 … count along each axis but the last
   std::int32_t one_[D];                 // a box along each axis, as a linear image
   bool periodic_[D];
-  PageVector<std::uint32_t>
-      first_;  // of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kNobody
+  // Of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kNobody.
+  PageVector<std::uint32_t> first_;
   PageVector<std::uint32_t> link_;  // by slot: who is behind it in its cell, as first_ has it
   PageVector<std::int32_t> boxes_;  // by slot: of its place
   std::uint32_t here_;              // a candidate in the same box, but for its slot

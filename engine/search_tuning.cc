@@ -8,7 +8,7 @@ namespace carom {
 namespace {
 
 // Instructions, as callgrind counts them.
-constexpr double kPrediction = 400, kCandidate = 32;         // on a list
+constexpr double kPrediction = 400, kCandidate = 32;        // on a list
 constexpr double kRenewal = 4500;                           // of a list
 constexpr double kCellHead = 9, kCellCandidate = 60;        // a prediction on cells: for each cell and each candidate
 constexpr double kCrossing = 550;                           // into another cell, beside the cells and candidates ahead

@@ -1,7 +1,6 @@
 #include "engine/skin_lists.h"
 
 #include <cmath>
-#include <cstring>
 
 namespace carom {
 namespace {

@@ -224,7 +224,8 @@ void say(const std::string& text) {
 std::string heading(const BenchOptions& options) {
   return "carom " + version_string() + "\n" + compiler_string() + "\n" +
          fmt::format(
-             "Hard spheres in a periodic box, free-flight, one core. Equilibrated for {} epochs of about forty mean free "
+             "Hard spheres in a periodic box, free-flight, one core. Equilibrated for {} epochs of about forty mean "
+             "free "
              "times,\n"
              "then measured {} times over at least {} collisions (whole epochs). B/part.: peak resident memory above\n"
              "that before the state was made. Z = pV/NkT. Events, predictions and entries scheduled: a collision;\n"

@@ -18,8 +18,8 @@ void place_particles(const Deck::Source& source, System<D>& system);
 std::vector<std::vector<double>> read_positions(const std::filesystem::path& file, std::size_t dimension);
 
 /// Forty mean free times of the fluid that the state would be (Enskog's theory), at most the time to fly 300
-/// diameters or to cross the box four times, rounded to two digits; 1 if nothing moves. Longer epochs cost digits: times
-/// and unwrapped positions grow in them.
+/// diameters or to cross the box four times, rounded to two digits; 1 if nothing moves. Longer epochs cost digits:
+/// times and unwrapped positions grow in them.
 template <int D>
 double default_epoch(const System<D>& system);
 

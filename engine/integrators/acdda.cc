@@ -13,13 +13,14 @@
 // event on parabolas with the mean forces of sweep k − 1, which end where the chords end, and computes the impulses on
 // the chords. (With straight flights pairs that bounce again and again make the sweeps diverge.)
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "engine/error.h"
 #include "engine/forces.h"
+#include "engine/integrators/extrapolation.h"
+#include "engine/integrators/mixing.h"
 #include "engine/integrators/registry.h"
 #include "engine/slab_core.h"
 
@@ -36,105 +37,6 @@ constexpr double kMixed = 0.2;  // contraction from which on sweeps are mixed
 // node it enters the energy to first order, in last ones, whose ends are given with the newest impulses, to second.
 constexpr double kInner = 2e-16, kLastAtMost = 1e-12, kLastAtLeast = 1e-15, kRounding = 1e-16;
 constexpr double kStalled = 1e-13;  // where increments stop shrinking below this, rounding is amplified by collisions
-
-/// Mean accelerations of past pieces, and what they let expect of the next.
-template <int D>
-class Extrapolation {
- public:
-  void start(const std::vector<Vec<D>>& a) {
-    for (auto& past : past_) past = a;
-    age_.assign(a.size(), 0);
-    time_.assign(a.size(), 0.0);
-    length_.fill(0);
-  }
-  /// A piece of this length is done; then add() for everybody.
-  void pass(double length) {
-    std::ranges::rotate(length_, length_.end() - 1);
-    length_[0] = length;
-  }
-  /// The mean acceleration over the last part of a piece, a time long; the whole piece where it was smooth.
-  void add(Id i, const Vec<D>& a, double time) {
-    for (std::size_t k = kOrder; k > 0; --k) past_[k][i] = past_[k - 1][i];
-    past_[0][i] = a;
-    age_[i] = time < length_[0] ? 1 : std::min<std::uint8_t>(age_[i] + 1, kOrder + 1);
-    time_[i] = time;
-  }
-  /// The mean accelerations of a piece of this length: of the polynomial that had the means known.
-  void expect(double length, std::vector<Vec<D>>& a) {
-    if (length > kMostGrowth * length_[0])
-      for (auto& age : age_) age = std::min<std::uint8_t>(age, 1);
-    const auto weight = weights(length);
-    a.resize(age_.size());
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      a[i] = weight[age_[i]][0] * past_[0][i];
-      for (std::size_t k = 1; k < age_[i]; ++k) a[i] += weight[age_[i]][k] * past_[k][i];
-    }
-  }
-  /// The last ones, and over which times.
-  const std::vector<Vec<D>>& last() const { return past_[0]; }
-  const std::vector<double>& time() const { return time_; }
-
- private:
-  static constexpr std::size_t kOrder = 3;
-  static constexpr double kMostGrowth = 3;  // of pieces; beyond it only the last one counts
-
-  /// [age][piece]. The integral of the acceleration is known at the pieces' ends, −s_k before now, and continued by
-  /// Lagrange's polynomial.
-  std::array<std::array<double, kOrder + 1>, kOrder + 2> weights(double length) const {
-    std::array<std::array<double, kOrder + 1>, kOrder + 2> weight{};
-    weight[0][0] = 1;
-    std::array<double, kOrder + 2> s{};
-    for (std::size_t k = 0; k <= kOrder; ++k) s[k + 1] = s[k] + length_[k];
-    for (std::size_t age = 1; age <= kOrder + 1 && length_[age - 1] > 0; ++age) {
-      double sum = 0;
-      for (std::size_t k = age; k > 0; --k) {
-        double basis = 1;
-        for (std::size_t l = 0; l <= age; ++l)
-          if (l != k) basis *= (length + s[l]) / (s[l] - s[k]);
-        sum += basis;
-        weight[age][k - 1] = -sum * length_[k - 1] / length;
-      }
-    }
-    return weight;
-  }
-
-  std::array<std::vector<Vec<D>>, kOrder + 1> past_;
-  std::array<double, kOrder + 1> length_{};
-  std::vector<std::uint8_t> age_;  // how many of them belong together; 0: an acceleration at an instant
-  std::vector<double> time_;
-};
-
-/// Anderson acceleration: the last few iterates, mixed so that what they lack would vanish as far as it can were it
-/// linear in them. (Anderson, J. ACM 12 (1965) 547; for linear problems GMRES.)
-class Mixing {
- public:
-  void clear() { columns_ = 0; }
-  /// Takes an iterate and what the next plain one would add to it; what else is to be added is left in correction().
-  void add(const Eigen::VectorXd& iterate, const Eigen::VectorXd& lacking) {
-    correction_.setZero(iterate.size());
-    if (columns_ == 0) {
-      moves_.resize(iterate.size(), kDepth);
-      changes_.resize(iterate.size(), kDepth);
-    } else {
-      const Eigen::Index at = (columns_ - 1) % kDepth, known = std::min(columns_, kDepth);
-      moves_.col(at) = iterate - iterate_;
-      changes_.col(at) = lacking - lacking_;
-      const Eigen::VectorXd share = changes_.leftCols(known).colPivHouseholderQr().solve(lacking);
-      correction_ = -(moves_.leftCols(known) + changes_.leftCols(known)) * share;
-    }
-    iterate_ = iterate;
-    lacking_ = lacking;
-    ++columns_;
-  }
-  const Eigen::VectorXd& correction() const { return correction_; }
-
- private:
-  static constexpr Eigen::Index kDepth = 6;
-
-  Eigen::Index columns_ = 0;
-  Eigen::MatrixXd moves_, changes_;
-  Eigen::VectorXd iterate_, lacking_, correction_;
-};
 
 /// Whether two events have the same partners, whenever they happen.
 template <int D>

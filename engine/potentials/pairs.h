@@ -7,11 +7,11 @@
 //   count()                     how many pairs there are, where that does not depend on positions
 // and for a slab in which nobody strays farther than `margin` from its start x
 //   begin_slab(x, margin)
-//   for_each_in_slab(x, visit)                    as for_each
-//   for_each_partner_in_slab(x, i, visit)         calls visit(j, shift) for the pairs of i, in the order (j, image);
-//   the
-//                                                 shift is that of the pair (lower id, higher id)
-//   kRemembered                                   whether it pays to keep what was found for a pair
+//   for_each_in_slab(x, visit)              as for_each
+//   for_each_partner_in_slab(x, i, visit)   calls visit(j, shift) for the pairs of i, in the order (j, image); the
+//   shift
+//                                           is that of the pair (lower id, higher id)
+//   kRemembered                             whether it pays to keep what was found for a pair
 
 #include <cmath>
 #include <string>

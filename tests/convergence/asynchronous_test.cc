@@ -36,6 +36,18 @@ Collisions<D> collisions(std::unique_ptr<System<D>> system, const char* method, 
   return seen;
 }
 
+/// The same pairs, one after the other, at the same times.
+template <int D>
+void expect_same_collisions(const Collisions<D>& mine, const Collisions<D>& theirs, double tolerance) {
+  ASSERT_EQ(mine.keys.size(), theirs.keys.size());
+  EXPECT_TRUE(mine.ordered);
+  for (std::size_t k = 0; k < mine.keys.size(); ++k) {
+    EXPECT_EQ(mine.keys[k].lo, theirs.keys[k].lo);
+    EXPECT_EQ(mine.keys[k].hi, theirs.keys[k].hi);
+    EXPECT_NEAR(mine.times[k], theirs.times[k], tolerance);
+  }
+}
+
 /// Discs on a square lattice of this many rows, springs between neighbours, temperature 1, periodic.
 std::unique_ptr<System<2>> spring_lattice(int rows, double stiffness = 1.0, double spacing = 1.5) {
   const double edge = spacing * rows;
@@ -73,13 +85,8 @@ TEST(Asynchronous, TheCollisionsAreThoseOfTheRelatives) {
     const auto mine = collisions<2>(test::nine_gravity(), method, 0.001, 8);
     const auto theirs = collisions<2>(test::nine_gravity(), relative, 0.001, 8);
     ASSERT_GE(theirs.keys.size(), 10u);
-    ASSERT_EQ(mine.keys.size(), theirs.keys.size()) << method;
-    EXPECT_TRUE(mine.ordered);
-    for (std::size_t k = 0; k < mine.keys.size(); ++k) {
-      EXPECT_EQ(mine.keys[k].lo, theirs.keys[k].lo);
-      EXPECT_EQ(mine.keys[k].hi, theirs.keys[k].hi);
-      EXPECT_NEAR(mine.times[k], theirs.times[k], 1e-4);
-    }
+    SCOPED_TRACE(method);
+    expect_same_collisions(mine, theirs, 1e-4);
   }
 }
 
@@ -149,13 +156,8 @@ TEST(Asynchronous, WithoutForcesCollisionsAreThoseOfTheEventCore) {
       const auto mine = collisions<2>(test::hard_spheres<2>(4, packing), method, 0.5, 1);
       const auto theirs = collisions<2>(test::hard_spheres<2>(4, packing), "free-flight", 0.5, 1);
       ASSERT_GT(theirs.keys.size(), 16u);
-      ASSERT_EQ(mine.keys.size(), theirs.keys.size()) << method << " " << packing;
-      EXPECT_TRUE(mine.ordered);
-      for (std::size_t k = 0; k < mine.keys.size(); ++k) {
-        EXPECT_EQ(mine.keys[k].lo, theirs.keys[k].lo);
-        EXPECT_EQ(mine.keys[k].hi, theirs.keys[k].hi);
-        EXPECT_NEAR(mine.times[k], theirs.times[k], 1e-9);
-      }
+      SCOPED_TRACE(method);
+      expect_same_collisions(mine, theirs, 1e-9);
     }
 }
 
