@@ -1,0 +1,34 @@
+#pragma once
+// How the ranks of a run talk to each other, as far as the engine knows: bytes, sums and maxima.
+//
+// A process alone is a team of one. parallel/ has the one for MPI. Every call is collective: all ranks make the same
+// calls in the same order.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace carom {
+
+using Bytes = std::vector<std::byte>;
+
+class Exchange {
+ public:
+  virtual ~Exchange() = default;
+  virtual int rank() const { return 0; }
+  virtual int size() const { return 1; }
+
+  /// Sends outgoing[r] to rank r and returns what each rank has sent here, by rank. Nothing goes where there is nothing
+  /// to say.
+  virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing) { return outgoing; }
+  /// What every rank has to say, by rank.
+  virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
+  /// Makes each value the largest among all ranks.
+  virtual void largest(std::span<double> /*values*/) {}
+  /// Makes each value the sum over all ranks.
+  virtual void sum(std::span<std::uint64_t> /*values*/) {}
+};
+
+}  // namespace carom
