@@ -10,6 +10,7 @@
 
 #include "engine/contact_log.h"
 #include "engine/counters.h"
+#include "engine/exchange.h"
 #include "engine/parameters.h"
 #include "engine/system.h"
 
@@ -40,6 +41,10 @@ class Integrator {
  public:
   virtual ~Integrator() = default;
 
+  /// Called before start(), where there are several ranks and IntegratorInfo::shared says so: every rank has the same
+  /// system and makes the same calls; the work of a slab is to be shared among them. `ranks` outlives the integrator.
+  virtual void share(Exchange& /*ranks*/) {}
+
   /// Called once before the first slab.
   virtual void start(System<D>&, Counters&) {}
 
@@ -63,6 +68,7 @@ struct IntegratorInfo {
   bool hard_cores = true;          ///< spheres collide; false: points
   bool stepping = true;  ///< advances by steps of fixed length and observes at their ends; false: exact at any time
   bool smooth_forces = true;  ///< knows any interaction; false: none but a common acceleration
+  bool shared = false;        ///< the ranks of a run share its work; false: one rank does it all
   bool shadow = false;        ///< a Verlet type: report the shadow energy S_h
   std::unique_ptr<Integrator<2>> (*in_2d)(const Parameters&) = nullptr;
   std::unique_ptr<Integrator<3>> (*in_3d)(const Parameters&) = nullptr;
