@@ -1,42 +1,51 @@
 #pragma once
-// The ranks of a run: MPI started and ended with the life of one object, and rules for how ranks fail together.
+// The ranks of a run: MPI started and ended with the life of one object.
 //
-//   Communicator ranks;
-//   return ranks.on_first([&] { return simulate(deck); });
+//   Communicator ranks(600);
+//   return ranks.on_all([&] { return simulate(deck, exchange); });
 //
 // Works under mpirun and as a single process alike. The engine knows nothing of it.
 
 #include <mpi.h>
 
 #include <functional>
-#include <string>
+#include <memory>
+
+#include "parallel/watch.h"
 
 namespace carom {
 
 class Communicator {
  public:
-  /// Starts MPI (MPI_THREAD_FUNNELED) and duplicates the world communicator. One object a process, once.
-  Communicator();
+  /// Starts MPI (MPI_THREAD_FUNNELED) and duplicates the world communicator. One object a process, once. `silence`:
+  /// seconds after which ranks that work together give up those of which nothing is heard; 0: never.
+  explicit Communicator(double silence = 0);
   ~Communicator();
   Communicator(const Communicator&) = delete;
   Communicator& operator=(const Communicator&) = delete;
 
+  /// Whether a launcher (mpirun, srun) has started this process, perhaps with others.
+  static bool launched();
+
   int rank() const { return rank_; }
   int size() const { return size_; }
   MPI_Comm handle() const { return world_; }
+  /// To wait by; only where there are several ranks.
+  Watch& watch() const { return *watch_; }
 
-  /// Runs `work` on rank 0, while the others sleep. Returns its exit code on every rank. An Error that `work` throws is
-  /// told on stderr and becomes its exit code; any other exception ends all ranks by abort() (or is thrown on, where
-  /// there is one rank only).
+  /// Runs `work` on all ranks, which may talk to each other in it. Returns the exit code of all: what it returns, or
+  /// that of the first failure. An exception is told on stderr, once where all ranks meet the same Error, else with
+  /// the names of the ranks; ranks that cannot learn of it are ended (MPI_Abort).
+  int on_all(const std::function<int()>& work) const;
+
+  /// Runs `work` on rank 0, while the others sleep. Otherwise the same.
   int on_first(const std::function<int()>& work) const;
-
-  /// Ends all ranks at once with a message that names this one. For failures the other ranks cannot know of.
-  [[noreturn]] void abort(int exit_code, const std::string& message) const;
 
  private:
   MPI_Comm world_ = MPI_COMM_NULL;
   int rank_ = 0;
   int size_ = 1;
+  std::unique_ptr<Watch> watch_;
 };
 
 }  // namespace carom

@@ -1,22 +1,155 @@
-// Ranks that fail, for tests/mpi/CMakeLists.txt: `communicator_ranks WHAT`.
-//   ok      rank 0 returns 7: so do all
-//   error   rank 0 throws an Error of exit code 4: all end with it
-//   bug     rank 0 throws something else: all are ended, with a message that names the rank
-//   abort   rank 1 gives up while the others wait for ever
+// Ranks that work together and fail, for tests/mpi/CMakeLists.txt: `communicator_ranks WHAT [SILENCE]`.
+//
+// On rank 0 while the others sleep:
+//   ok        returns 7: so do all
+//   error     throws an Error of exit code 4: all end with it
+//   bug       throws something else: all are ended
+// On all ranks:
+//   alike     all throw the same Error, one after the other
+//   one       rank 1 throws something, the others wait for it in a call
+//   memory    rank 1 has no memory left
+//   first     rank 0 throws an Error, the others wait
+//   busy      rank 1 throws an Error, the others compute for ever
+//   killed    rank 1 is killed
+//   stopped   rank 1 is stopped
+//   late      rank 1 computes longer than the silence and is given up
+//   suspended all are stopped, for longer than the silence, and go on: nothing has happened
+//   calls     the calls of MpiExchange give what they should
+//   latency   microseconds of the calls, beside MPI_Allreduce
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
 #include <iostream>
+#include <limits>
+#include <new>
 #include <string>
 #include <thread>
 
 #include "engine/error.h"
-#include "parallel/communicator.h"
+#include "parallel/mpi_exchange.h"
 
 namespace {
 
-int work(const std::string& what) {
-  if (what == "error") throw carom::Error(carom::Failure::numerical, "a numerical failure");
+using carom::Bytes;
+using carom::Error;
+using carom::Failure;
+using carom::MpiExchange;
+
+void sleep(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
+
+int first(const std::string& what) {
+  if (what == "error") throw Error(Failure::numerical, "a numerical failure");
   if (what == "bug") throw std::logic_error("a bug");
+  return 7;
+}
+
+void require(bool holds, const char* what) {
+  if (!holds) throw std::logic_error(std::string("wrong: ") + what);
+}
+
+Bytes filled(std::size_t size, int from, int to) {
+  Bytes bytes(size);
+  for (std::size_t k = 0; k < size; ++k)
+    bytes[k] = static_cast<std::byte>(31 * from + 17 * to + static_cast<int>(k % 251));
+  return bytes;
+}
+
+/// Everything an Exchange promises, for messages of all sizes.
+void check_calls(MpiExchange& ranks) {
+  const int rank = ranks.rank(), size = ranks.size();
+  for (const std::size_t length : {std::size_t{0}, std::size_t{1}, std::size_t{1000}, std::size_t{3000000}}) {
+    // Rank a says something to b where a + b is not a multiple of 3.
+    const auto says = [](int a, int b) { return (a + b) % 3 != 0; };
+    std::vector<Bytes> outgoing(static_cast<std::size_t>(size));
+    for (int r = 0; r < size; ++r)
+      if (says(rank, r)) outgoing[static_cast<std::size_t>(r)] = filled(length + static_cast<std::size_t>(r), rank, r);
+    const auto incoming = ranks.swap(std::move(outgoing));
+    require(incoming.size() == static_cast<std::size_t>(size), "number of messages");
+    for (int r = 0; r < size; ++r)
+      require(incoming[static_cast<std::size_t>(r)] ==
+                  (says(r, rank) ? filled(length + static_cast<std::size_t>(rank), r, rank) : Bytes{}),
+              "swap");
+    const auto all = ranks.gather(filled(length * static_cast<std::size_t>(rank), rank, 0));
+    for (int r = 0; r < size; ++r)
+      require(all[static_cast<std::size_t>(r)] == filled(length * static_cast<std::size_t>(r), r, 0), "gather");
+  }
+  std::vector<double> values = {static_cast<double>(rank), -static_cast<double>(rank), rank == 1 ? 0.0 : -0.0,
+                                rank == 1 ? std::numeric_limits<double>::infinity() : 5.0};
+  ranks.largest(values);
+  require(values[0] == size - 1 && values[1] == 0 && std::isinf(values[3]), "largest");
+  Bytes bits(sizeof values[2]);
+  std::memcpy(bits.data(), &values[2], bits.size());
+  for (const Bytes& theirs : ranks.gather(bits)) require(theirs == bits, "the same bits everywhere");
+  std::vector<std::uint64_t> counts = {1, static_cast<std::uint64_t>(rank) << 60};
+  ranks.sum(counts);
+  std::uint64_t high = 0;
+  for (int r = 0; r < size; ++r) high += static_cast<std::uint64_t>(r) << 60;
+  require(counts[0] == static_cast<std::uint64_t>(size) && counts[1] == high, "sum");
+}
+
+void measure(MpiExchange& ranks, MPI_Comm world) {
+  const auto show = [&](const char* name, const auto& call) {
+    std::vector<double> times;
+    for (int k = 0; k < 101; ++k) {
+      MPI_Barrier(world);
+      const double start = MPI_Wtime();
+      for (int i = 0; i < 1000; ++i) call();
+      times.push_back(1e3 * (MPI_Wtime() - start));
+    }
+    std::sort(times.begin(), times.end());
+    if (ranks.rank() == 0) std::printf("%-28s %8.2f µs, at best %.2f\n", name, times[50], times[0]);
+  };
+  double value = 1, most = 0;
+  show("MPI_Allreduce, 1 double", [&] { MPI_Allreduce(&value, &most, 1, MPI_DOUBLE, MPI_MAX, world); });
+  show("largest, 1 double", [&] { ranks.largest({&value, 1}); });
+  const std::vector<Bytes> nothing(static_cast<std::size_t>(ranks.size()));
+  show("swap, nothing", [&] { ranks.swap(nothing); });
+  const std::vector<Bytes> some(static_cast<std::size_t>(ranks.size()), Bytes(1000));
+  show("swap, 1000 bytes each", [&] { ranks.swap(some); });
+}
+
+int all(const std::string& what, MpiExchange& ranks, MPI_Comm world) {
+  const auto meet = [&] {
+    double value = 0;
+    ranks.largest({&value, 1});
+  };
+  for (int k = 0; k < 3; ++k) meet();
+  const bool is_one = ranks.rank() == 1;
+  if (what == "calls") check_calls(ranks);
+  if (what == "latency") measure(ranks, world);
+  if (what == "alike") {
+    sleep(0.3 * ranks.rank());
+    throw Error(Failure::numerical, "nobody can do this");
+  }
+  if (what == "one" && is_one) throw std::logic_error("a bug");
+  if (what == "memory" && is_one) throw std::bad_alloc();
+  if (what == "first" && ranks.rank() == 0) throw Error(Failure::file, "a full disk");
+  if (what == "busy") {
+    if (is_one) throw Error(Failure::numerical, "it alone cannot do this");
+    for (;;) sleep(1);
+  }
+  if (what == "killed" && is_one) std::raise(SIGKILL);
+  if (what == "stopped" && is_one) std::raise(SIGSTOP);
+  if (what == "late" && is_one) sleep(60);
+  if (what == "suspended") {
+    // Stops this process in the midst of a wait for rank 0, or rank 0 itself.
+    const pid_t me = getpid();
+    if (fork() == 0) {
+      sleep(0.3);
+      kill(me, SIGSTOP);
+      sleep(4);
+      kill(me, SIGCONT);
+      _exit(0);
+    }
+    for (int k = 0; k < 10 && ranks.rank() == 0; ++k) sleep(0.1);
+  }
+  meet();
   return 7;
 }
 
@@ -24,12 +157,11 @@ int work(const std::string& what) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "ok";
-  const carom::Communicator ranks;
-  if (what == "abort") {
-    if (ranks.rank() == 1) ranks.abort(5, "a full disk");
-    for (;;) std::this_thread::sleep_for(std::chrono::seconds(1));
-  }
-  const int code = ranks.on_first([&] { return work(what); });
+  const carom::Communicator ranks(argc > 2 ? std::stod(argv[2]) : 0);
+  MpiExchange exchange(ranks);
+  const bool alone = what == "ok" || what == "error" || what == "bug";
+  const int code = alone ? ranks.on_first([&] { return first(what); })
+                         : ranks.on_all([&] { return all(what, exchange, ranks.handle()); });
   std::cout << "rank of " + std::to_string(ranks.size()) + " ends with " + std::to_string(code) + "\n" << std::flush;
   return code;
 }

@@ -1,6 +1,6 @@
 #!/bin/sh
 # expect.sh SETTINGS CODE WORDS RANKS PROGRAM [ARGUMENT…]: runs the program on that many ranks (0: without mpirun) and
-# succeeds if it ends with the exit code and says the words.
+# succeeds if it ends with the exit code and says the words (a regular expression, any case; with ^ and $ once only).
 . "$1"
 code=$2 words=$3 ranks=$4
 shift 4
@@ -12,10 +12,12 @@ if [ "$got" != "$code" ]; then
   echo "exit code $got instead of $code"
   exit 1
 fi
-case $said in
-  *"$words"*) ;;
-  *)
-    echo "it does not say: $words"
-    exit 1
-    ;;
+times=$(printf '%s\n' "$said" | grep -ci -- "$words")
+case $words in
+  ^*$) wanted=1 ;;
+  *) wanted=$((times > 0 ? times : 1)) ;;
 esac
+if [ "$times" != "$wanted" ]; then
+  echo "it says $times times: $words"
+  exit 1
+fi

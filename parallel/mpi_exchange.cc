@@ -1,0 +1,116 @@
+#include "parallel/mpi_exchange.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+namespace carom {
+
+namespace {
+
+constexpr std::size_t kPiece = std::size_t{1} << 30;  // bytes of one message, at most
+enum Tag : int { data, fold, step };
+
+int bytes(std::size_t count) { return static_cast<int>(count); }
+
+/// Starts to send or receive a message in as many pieces as it takes.
+template <class Start>
+void in_pieces(std::size_t size, Start&& start) {
+  for (std::size_t at = 0; at < size; at += kPiece) start(at, bytes(std::min(kPiece, size - at)));
+}
+
+}  // namespace
+
+/// Combines the values of all ranks by recursive doubling: log2 P messages, each of which is waited for with an eye on
+/// failures. (MPI_Allreduce cannot be left; MPI_Iallreduce takes thrice as long.) The value of the lower rank comes
+/// first, so that all get the same bits.
+template <class T, class Combine>
+void MpiExchange::combine_all(std::span<T> values, Combine combine) {
+  ranks_.watch().begin_call();
+  const int rank = ranks_.rank(), size = ranks_.size(), length = bytes(values.size_bytes());
+  theirs_.resize(values.size_bytes());
+  const auto swap_with = [&](int partner, Tag tag, bool sends, bool receives) {
+    std::array<MPI_Request, 2> requests = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
+    if (receives) MPI_Irecv(theirs_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &requests[0]);
+    if (sends) MPI_Isend(values.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &requests[1]);
+    ranks_.watch().wait(requests);
+  };
+  const auto take_in = [&](bool mine_first) {
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      T theirs;
+      std::memcpy(&theirs, theirs_.data() + k * sizeof(T), sizeof(T));
+      values[k] = mine_first ? combine(values[k], theirs) : combine(theirs, values[k]);
+    }
+  };
+  // Ranks beyond the largest power of two give their values to one below, and get the result from it.
+  int whole = 1;
+  while (2 * whole <= size) whole *= 2;
+  if (rank >= whole) {
+    swap_with(rank - whole, fold, true, false);
+    swap_with(rank - whole, fold, false, true);
+    std::memcpy(values.data(), theirs_.data(), theirs_.size());
+    return;
+  }
+  if (rank + whole < size) {
+    swap_with(rank + whole, fold, false, true);
+    take_in(true);
+  }
+  for (int bit = 1; bit < whole; bit *= 2) {
+    swap_with(rank ^ bit, step, true, true);
+    take_in((rank & bit) == 0);
+  }
+  if (rank + whole < size) swap_with(rank + whole, fold, true, false);
+}
+
+std::vector<Bytes> MpiExchange::trade(const std::function<const Bytes&(std::size_t)>& outgoing) {
+  ranks_.watch().begin_call();
+  const auto p = static_cast<std::size_t>(size());
+  leaving_.resize(p);
+  coming_.resize(p);
+  for (std::size_t r = 0; r < p; ++r) leaving_[r] = outgoing(r).size();
+  MPI_Request sizes = MPI_REQUEST_NULL;
+  MPI_Ialltoall(leaving_.data(), 1, MPI_UINT64_T, coming_.data(), 1, MPI_UINT64_T, ranks_.handle(), &sizes);
+  ranks_.watch().wait({&sizes, 1});
+
+  incoming_.assign(p, {});
+  std::vector<MPI_Request> requests;
+  const auto next = [&] { return &requests.emplace_back(MPI_REQUEST_NULL); };
+  for (std::size_t r = 0; r < p; ++r) {
+    const int other = static_cast<int>(r);
+    if (other == rank()) continue;
+    incoming_[r].resize(coming_[r]);
+    in_pieces(coming_[r], [&](std::size_t at, int count) {
+      MPI_Irecv(incoming_[r].data() + at, count, MPI_BYTE, other, data, ranks_.handle(), next());
+    });
+    in_pieces(leaving_[r], [&](std::size_t at, int count) {
+      MPI_Isend(outgoing(r).data() + at, count, MPI_BYTE, other, data, ranks_.handle(), next());
+    });
+  }
+  if (!requests.empty()) ranks_.watch().wait(requests);
+  return std::move(incoming_);
+}
+
+std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing) {
+  outgoing_ = std::move(outgoing);
+  auto incoming = trade([this](std::size_t r) -> const Bytes& { return outgoing_[r]; });
+  const auto self = static_cast<std::size_t>(rank());
+  incoming[self] = std::move(outgoing_[self]);
+  outgoing_.clear();
+  return incoming;
+}
+
+std::vector<Bytes> MpiExchange::gather(const Bytes& mine) {
+  auto incoming = trade([&mine](std::size_t) -> const Bytes& { return mine; });
+  incoming[static_cast<std::size_t>(rank())] = mine;
+  return incoming;
+}
+
+void MpiExchange::largest(std::span<double> values) {
+  combine_all(values, [](double a, double b) { return std::max(a, b); });
+}
+
+void MpiExchange::sum(std::span<std::uint64_t> values) {
+  combine_all(values, [](std::uint64_t a, std::uint64_t b) { return a + b; });
+}
+
+}  // namespace carom

@@ -1,0 +1,37 @@
+#pragma once
+// Exchange among the ranks of a Communicator, by MPI.
+//
+// Waits look for failures of others (parallel/watch.h) and throw RankFailure or SilentRanks; messages may arrive after
+// that, so the object must outlive Communicator::on_all(). They may be of any length: MPI's limit of 2^31 bytes does
+// not show.
+
+#include "engine/exchange.h"
+#include "parallel/communicator.h"
+
+namespace carom {
+
+class MpiExchange : public Exchange {
+ public:
+  /// Keeps a reference. There are several ranks.
+  explicit MpiExchange(const Communicator& ranks) : ranks_(ranks) {}
+
+  int rank() const override { return ranks_.rank(); }
+  int size() const override { return ranks_.size(); }
+  std::vector<Bytes> swap(std::vector<Bytes> outgoing) override;
+  std::vector<Bytes> gather(const Bytes& mine) override;
+  void largest(std::span<double> values) override;
+  void sum(std::span<std::uint64_t> values) override;
+
+ private:
+  std::vector<Bytes> trade(const std::function<const Bytes&(std::size_t)>& outgoing);
+  template <class T, class Combine>
+  void combine_all(std::span<T> values, Combine combine);
+
+  const Communicator& ranks_;
+  // Where messages arrive; what leaves in swap().
+  std::vector<std::uint64_t> leaving_, coming_;
+  std::vector<Bytes> incoming_, outgoing_;
+  Bytes theirs_;
+};
+
+}  // namespace carom

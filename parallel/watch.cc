@@ -1,0 +1,284 @@
+#include "parallel/watch.h"
+
+#include <sched.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+#include <limits>
+#include <thread>
+
+namespace carom {
+
+namespace {
+
+constexpr int kSpins = 200;           // polls before anything else is looked at
+constexpr double kShortRest = 1e-3;   // seconds, while others work
+constexpr double kLongRest = 50e-3;   // while there is nothing left to do
+constexpr double kAskAgain = 0.1;     // seconds between questions to those who have not ended
+constexpr double kTimeToAnswer = 2;   // seconds
+constexpr double kLongestNotice = 1;  // seconds between two polls; more, and the process was not running
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+void say(const std::string& message) {
+  std::fprintf(stderr, "%s\n", message.c_str());
+  std::fflush(stderr);
+}
+
+void flush_all() {
+  std::cout.flush();
+  std::fflush(nullptr);
+}
+
+}  // namespace
+
+double Patience::waited() {
+  const double time = now();
+  if (last_ >= 0) waited_ += std::min(time - last_, kLongestNotice);
+  last_ = time;
+  return waited_;
+}
+
+void Patience::rest(double longest) const {
+  const double seconds = std::min(waited_ / 100, longest);
+  if (seconds < 1e-5)
+    sched_yield();
+  else
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+Watch::Watch(MPI_Comm world, double silence) : silence_(silence) {
+  MPI_Comm_dup(world, &side_);
+  MPI_Comm_rank(side_, &rank_);
+  MPI_Comm_size(side_, &size_);
+  words_.resize(static_cast<std::size_t>(size_));
+  receive_next();
+}
+
+Watch::~Watch() {
+  MPI_Cancel(&receive_);
+  MPI_Wait(&receive_, MPI_STATUS_IGNORE);
+  for (Sent& sent : sent_) MPI_Wait(&sent.request, MPI_STATUS_IGNORE);
+  MPI_Comm_free(&side_);
+}
+
+// ---- Notices ----
+
+void Watch::receive_next() { MPI_Irecv(&incoming_, sizeof incoming_, MPI_BYTE, MPI_ANY_SOURCE, 0, side_, &receive_); }
+
+void Watch::send(int to, Kind kind, const Outcome& outcome) {
+  sent_.remove_if([](Sent& sent) {
+    int done = 0;
+    MPI_Test(&sent.request, &done, MPI_STATUS_IGNORE);
+    return done != 0;
+  });
+  Sent& sent = sent_.emplace_back(Sent{{kind, outcome.code, calls_}});
+  const std::size_t length = std::min(outcome.failure.size(), sent.notice.failure.size() - 1);
+  std::copy_n(outcome.failure.begin(), length, sent.notice.failure.begin());
+  MPI_Isend(&sent.notice, static_cast<int>(offsetof(Notice, failure) + length + 1), MPI_BYTE, to, 0, side_,
+            &sent.request);
+}
+
+void Watch::listen() {
+  for (;;) {
+    int arrived = 0;
+    MPI_Status status;
+    MPI_Test(&receive_, &arrived, &status);
+    if (arrived == 0) return;
+    const Notice notice = incoming_;
+    receive_next();
+    heard(status.MPI_SOURCE, notice);
+  }
+}
+
+void Watch::heard(int from, const Notice& notice) {
+  Word& word = words_[static_cast<std::size_t>(from)];
+  word.calls = notice.calls;
+  switch (notice.kind) {
+    case Kind::question:
+      send(from, Kind::answer);
+      break;
+    case Kind::answer:
+      word.answered = true;
+      break;
+    case Kind::ended:
+      word.outcome = Outcome{notice.code, notice.failure.data()};
+      if (!failed_ && !word.outcome->failure.empty()) failed_ = from;
+      break;
+    case Kind::verdict:
+      verdict_ = notice.code;
+      break;
+  }
+}
+
+/// Asks all that have not ended.
+void Watch::ask() {
+  for (int r = 0; r < size_; ++r)
+    if (r != rank_ && !words_[static_cast<std::size_t>(r)].outcome) send(r, Kind::question);
+}
+
+// ---- Waiting ----
+
+void Watch::wait(std::span<MPI_Request> requests) {
+  const auto complete = [&] {
+    int done = 0;
+    MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
+    return done != 0;
+  };
+  for (int i = 0; i < kSpins; ++i)
+    if (complete()) return;
+  Patience patience, since_failure;
+  while (!complete()) {
+    listen();
+    if (failed_) {
+      // Who has failed after this call lets it complete.
+      const Word& word = words_[static_cast<std::size_t>(*failed_)];
+      if (word.calls < calls_ || since_failure.waited() > kGrace)
+        throw RankFailure(names({&*failed_, 1}) + ": " + word.outcome->failure);
+    }
+    if (const double waited = patience.waited(); silence_ > 0 && waited > silence_) {
+      if (const std::string silence = silence_of(complete); !silence.empty()) throw SilentRanks(silence);
+      return;
+    }
+    patience.rest(kShortRest);
+  }
+}
+
+/// Who is silent, in words; empty where the wait is over while it asks.
+std::string Watch::silence_of(const std::function<bool()>& is_over) {
+  for (Word& word : words_) word.answered = false;
+  ask();
+  std::vector<int> silent;
+  for (Patience patience; patience.waited() < kTimeToAnswer; patience.rest(kShortRest)) {
+    if (is_over()) return {};
+    listen();
+    silent.clear();
+    for (int r = 0; r < size_; ++r)
+      if (const Word& word = words_[static_cast<std::size_t>(r)]; r != rank_ && !word.answered && !word.outcome)
+        silent.push_back(r);
+    if (silent.empty()) break;
+  }
+  char seconds[32];
+  std::snprintf(seconds, sizeof seconds, "%g", silence_);
+  if (silent.empty())
+    return "all ranks have waited for each other for " + std::string(seconds) + " s: a fault of the program";
+  return "nothing was heard of " + names(silent) + " for " + seconds +
+         " s: stopped, cut off or still at work; --silence allows longer waits";
+}
+
+// ---- Ending ----
+
+int Watch::settle(const Outcome& mine, bool alone) {
+  // Everything must be said before the others know: the first of them to end with an error makes mpirun end the rest.
+  flush_all();
+  return rank_ == 0 ? settle_first(mine, alone) : settle_other(mine, alone);
+}
+
+int Watch::settle_first(const Outcome& mine, bool alone) {
+  const auto end = [this](const Outcome& outcome) {
+    words_[0] = {.calls = calls_, .outcome = outcome};
+    if (!failed_ && !outcome.failure.empty()) failed_ = 0;
+  };
+  end(mine);
+  Patience patience, since_failure;
+  double ask_next = 0;
+  const auto all_ended = [&] {
+    return std::all_of(words_.begin(), words_.end(), [](const Word& word) { return word.outcome.has_value(); });
+  };
+  for (Word& word : words_) word.answered = false;
+  for (listen(); !all_ended() && !mine.left; listen()) {
+    if (failed_) {
+      const double waited = since_failure.waited();
+      if (somebody_waits_in_vain() || waited > kGrace) break;
+      if (waited >= ask_next) {
+        ask();
+        ask_next = waited + kAskAgain;
+      }
+    } else if (silence_ > 0 && patience.waited() > silence_) {
+      const std::string silence = silence_of(all_ended);
+      if (silence.empty()) continue;
+      end({kFault, silence});
+      break;
+    }
+    patience.waited();
+    patience.rest(kLongRest);
+  }
+
+  const int code = words_[static_cast<std::size_t>(failed_.value_or(0))].outcome->code;
+  if (!all_ended() || mine.left) abort(code, account(alone));
+  if (failed_) say(account(alone));
+  for (Word& word : words_) word = {};
+  failed_.reset();
+  for (int r = 1; r < size_; ++r) send(r, Kind::verdict, {code});
+  return code;
+}
+
+int Watch::settle_other(const Outcome& mine, bool alone) {
+  verdict_.reset();
+  send(0, Kind::ended, mine);
+  Patience patience;
+  for (listen(); !verdict_; listen()) {
+    const double waited = patience.waited();
+    if (!mine.failure.empty()) {
+      if (waited > 2 * kGrace) abort(mine.code, "carom: " + names({&rank_, 1}) + ": " + mine.failure);
+    } else if (!alone && silence_ > 0 && waited > silence_) {
+      const std::string silence = silence_of([&] { return verdict_.has_value(); });
+      if (!silence.empty()) abort(kFault, "carom: " + names({&rank_, 1}) + ": " + silence);
+    }
+    patience.rest(kLongRest);
+  }
+  return *verdict_;
+}
+
+/// Whether a rank is in a call that one of the failed has not made.
+bool Watch::somebody_waits_in_vain() const {
+  auto last_call = std::numeric_limits<std::uint64_t>::max();
+  for (const Word& word : words_)
+    if (word.outcome && !word.outcome->failure.empty()) last_call = std::min(last_call, word.calls);
+  return std::any_of(words_.begin(), words_.end(),
+                     [&](const Word& word) { return !word.outcome && word.answered && word.calls > last_call; });
+}
+
+/// What has failed, a line each; ranks that have failed alike in one.
+std::string Watch::account(bool alone) const {
+  const auto beginning = [](const std::string& text) {
+    return text.substr(0, std::tuple_size_v<decltype(Notice::failure)> - 1);
+  };
+  std::string text;
+  std::vector<bool> done(words_.size());
+  for (std::size_t r = 0; r < words_.size(); ++r) {
+    const auto& outcome = words_[r].outcome;
+    if (done[r] || !outcome || outcome->failure.empty()) continue;
+    std::vector<int> alike;
+    for (std::size_t s = r; s < words_.size(); ++s)
+      if (const auto& other = words_[s].outcome; other && beginning(other->failure) == beginning(outcome->failure)) {
+        alike.push_back(static_cast<int>(s));
+        done[s] = true;
+      }
+    if (!text.empty()) text += "\n";
+    if (!alone && static_cast<int>(alike.size()) < size_) text += "carom: " + names(alike) + ": ";
+    text += outcome->failure;
+  }
+  return text;
+}
+
+/// "rank 1 of 4", "ranks 1, 3 of 4"
+std::string Watch::names(std::span<const int> ranks) const {
+  std::string text = ranks.size() == 1 ? "rank" : "ranks";
+  for (std::size_t k = 0; k < ranks.size(); ++k) text += (k > 0 ? ", " : " ") + std::to_string(ranks[k]);
+  return text + " of " + std::to_string(size_);
+}
+
+void Watch::abort(int code, const std::string& message) const {
+  say(message);
+  flush_all();
+  MPI_Abort(side_, code);
+  std::abort();  // MPI_Abort does not return; the compiler cannot know
+}
+
+}  // namespace carom
