@@ -1,17 +1,41 @@
 #include "io/deck.h"
 
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+#include "io/deck_build.h"
 #include "io/deck_interpret.h"
 #include "io/deck_toml.h"
 
 namespace carom {
 
-Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides) {
+std::optional<std::string> read_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
+  if (!in || std::filesystem::is_directory(file)) return {};
+  return text.str();
+}
+
+Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides, const TextReader& reader) {
+  const auto text = reader(file);
+  if (!text)
+    throw Error(Failure::file, file.string() + ": error: cannot read this deck; check the path and its permissions");
   Problems problems;
-  const DeckToml toml = load_deck(file, overrides, problems);
+  const DeckToml toml = parse_deck(file, *text, overrides, problems);
   Deck deck;
   deck.file = file;
   interpret(read_values(toml, problems), deck, problems);
   problems.throw_errors(Failure::deck);
+  PlacementConfig& placement = deck.source->placement;
+  const auto& all = deck.source->species;
+  if (placement.type == "file" && std::any_of(all.begin(), all.end(), [](const auto& some) { return some.placed; })) {
+    const auto table = reader(placement.file);
+    if (!table)
+      throw Error(Failure::file, placement.file.string() + ": error: cannot read the positions; check placement.file");
+    placement.positions = positions_in(*table, placement.file, static_cast<std::size_t>(deck.dimension));
+  }
   deck.warnings = problems.warnings();
   deck.toml_text = write_deck(deck.source->values);
   return deck;

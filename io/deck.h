@@ -6,6 +6,7 @@
 //   Error(initial_state)
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -51,8 +52,16 @@ class DeckError : public Error {
   explicit DeckError(const std::string& all) : Error(Failure::deck, all) {}
 };
 
-/// Reads, applies `table.key=value` overrides, validates against the schema, resolves defaults.
-Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides);
+/// How the texts are read of which a run is made: the deck, and the positions it may name. Nothing: it cannot be read.
+using TextReader = std::function<std::optional<std::string>(const std::filesystem::path&)>;
+
+/// Reads a whole file.
+std::optional<std::string> read_text(const std::filesystem::path& file);
+
+/// Reads, applies `table.key=value` overrides, validates against the schema, resolves defaults. The reader is called
+/// for the deck, then for the positions.
+Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides,
+               const TextReader& reader = read_text);
 
 /// Puts the results elsewhere than the deck says; the resolved deck says so too.
 void set_output_directory(Deck& deck, const std::filesystem::path& directory);

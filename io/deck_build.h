@@ -13,9 +13,10 @@ void fill_system(const Deck::Source& source, System<D>& system);
 template <int D>
 void place_particles(const Deck::Source& source, System<D>& system);
 
-/// Positions from a table of numbers: `dimension` a line, separated by commas or blanks; # begins a comment, and the
-/// first line may be a heading. Throws Error(Failure::file) and DeckError.
-std::vector<std::vector<double>> read_positions(const std::filesystem::path& file, std::size_t dimension);
+/// Positions from the text of a table of numbers: `dimension` a line, separated by commas or blanks; # begins a
+/// comment, and the first line may be a heading. Throws DeckError.
+std::vector<std::vector<double>> positions_in(const std::string& text, const std::filesystem::path& file,
+                                              std::size_t dimension);
 
 /// Forty mean free times of the fluid that the state would be (Enskog's theory), at most the time to fly 300
 /// diameters or to cross the box four times, rounded to two digits; 1 if nothing moves. Longer epochs cost digits:

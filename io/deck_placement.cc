@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <sstream>
 
 #include "engine/compression.h"
@@ -33,7 +32,7 @@ std::optional<std::vector<double>> numbers(std::string line) {
 
 template <int D>
 void place_from_file(const Deck::Source& source, const std::vector<Id>& placed, System<D>& system) {
-  const auto positions = read_positions(source.placement.file, D);
+  const auto& positions = source.placement.positions;
   if (positions.size() != placed.size()) {
     Problems problems;
     problems.error({source.placement.file.string()},
@@ -114,10 +113,9 @@ void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& sy
 
 }  // namespace
 
-std::vector<std::vector<double>> read_positions(const std::filesystem::path& file, std::size_t dimension) {
-  std::ifstream in(file);
-  if (!in || std::filesystem::is_directory(file))
-    throw Error(Failure::file, file.string() + ": error: cannot read the positions; check placement.file");
+std::vector<std::vector<double>> positions_in(const std::string& text, const std::filesystem::path& file,
+                                              std::size_t dimension) {
+  std::istringstream in(text);
   std::vector<std::vector<double>> positions;
   Problems problems;
   std::string line;

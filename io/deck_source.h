@@ -24,6 +24,7 @@ struct PlacementConfig {
   std::optional<double> packing_fraction;
   std::uint64_t seed = 1;
   std::filesystem::path file;
+  std::vector<std::vector<double>> positions;  ///< those of the file
   double growth_rate = 0, max_collisions = 0;  ///< compressed: engine/compression.h
 };
 

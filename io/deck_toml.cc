@@ -2,20 +2,9 @@
 
 #include <algorithm>
 #include <charconv>
-#include <fstream>
-#include <sstream>
 
 namespace carom {
 namespace {
-
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
-  if (!in || std::filesystem::is_directory(file))
-    throw Error(Failure::file, file.string() + ": error: cannot read this deck; check the path and its permissions");
-  return text.str();
-}
 
 /// The value of an override: TOML, or a bare word, which stands for itself.
 toml::table parse_value(const std::string& text) {
@@ -112,10 +101,10 @@ Place DeckToml::place(const toml::key& key, const toml::node& node) const {
   return {file, static_cast<int>(key.source().begin.line), static_cast<int>(key.source().begin.column)};
 }
 
-DeckToml load_deck(const std::filesystem::path& file, std::span<const std::string> overrides, Problems& problems) {
+DeckToml parse_deck(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
+                    Problems& problems) {
   DeckToml deck;
   deck.file = file.string();
-  const std::string text = read_text(file);
   try {
     deck.root = toml::parse(text);
   } catch (const toml::parse_error& e) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 
 #include "io/deck_problems.h"
@@ -22,8 +23,9 @@ struct DeckToml {
   Place place(const toml::key& key, const toml::node& node) const;
 };
 
-/// Reads and parses. Throws Error(Failure::file) for an unreadable file and DeckError for malformed TOML; what is wrong
-/// with the overrides (`table.key=value`, `list.0.key=value`) goes to `problems`.
-DeckToml load_deck(const std::filesystem::path& file, std::span<const std::string> overrides, Problems& problems);
+/// Parses the text of a deck. Throws DeckError for malformed TOML; what is wrong with the overrides (`table.key=value`,
+/// `list.0.key=value`) goes to `problems`.
+DeckToml parse_deck(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
+                    Problems& problems);
 
 }  // namespace carom

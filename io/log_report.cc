@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 #include "io/progress.h"
 #include "io/version.h"
@@ -28,27 +30,37 @@ std::string ends_at(const Plan& plan) {
   return text;
 }
 
-std::string breakdown_text(const Statistics& s) {
-  const Counters::Seconds& t = s.counters.seconds;
-  const std::array<std::pair<const char*, double>, 7> parts = {{{"predict", t.predict},
-                                                                {"queue", t.queue},
-                                                                {"collide", t.collide},
-                                                                {"force", t.force},
-                                                                {"sweep", t.sweep},
-                                                                {"communicate", t.communicate},
-                                                                {"output", t.output}}};
-  const double whole = std::max(s.wall_seconds, 1e-9);
-  double rest = s.wall_seconds;
-  std::string text = fmt::format("{:<12}{:>12}{:>9}", "part", "seconds", "share");
-  auto line = [&](const char* name, double seconds) {
-    text += fmt::format("\n{:<12}{:>12.3f}{:>8.1f}%", name, seconds, 100 * seconds / whole);
-  };
-  for (const auto& [name, seconds] : parts) {
-    line(name, seconds);
-    rest -= seconds;
+/// The parts of a rank's time, as named below; the last two are what is left and the whole.
+std::array<double, 9> parts_of(const RankAccount& rank) {
+  const Counters::Seconds& t = rank.seconds;
+  std::array<double, 9> parts = {t.predict, t.queue, t.collide, t.force, t.sweep, t.communicate, t.output};
+  parts[7] = std::max(0.0, rank.wall_seconds - std::accumulate(parts.begin(), parts.begin() + 7, 0.0));
+  parts[8] = rank.wall_seconds;
+  return parts;
+}
+
+/// Shares are of the mean.
+std::string breakdown_text(std::span<const RankAccount> ranks) {
+  constexpr std::array names = {"predict",     "queue",  "collide", "force", "sweep",
+                                "communicate", "output", "other",   "total"};
+  std::vector<std::array<double, 9>> parts;
+  std::array<double, 9> mean{};
+  for (const RankAccount& rank : ranks) {
+    parts.push_back(parts_of(rank));
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += parts.back()[k] / static_cast<double>(ranks.size());
   }
-  line("other", std::max(0.0, rest));
-  line("total", s.wall_seconds);
+  std::string text = ranks.size() == 1 ? fmt::format("{:<12}{:>12}{:>9}", "part", "seconds", "share")
+                                       : fmt::format("{:<12}{:>12}{:>12}{:>12}{:>9}", "part of ranks", "least", "mean",
+                                                     "most", "share");
+  for (std::size_t k = 0; k < mean.size(); ++k) {
+    const auto less = [k](const auto& a, const auto& b) { return a[k] < b[k]; };
+    const auto [least, most] = std::minmax_element(parts.begin(), parts.end(), less);
+    text += fmt::format("\n{:<12}", names[k]);
+    if (ranks.size() > 1) text += fmt::format("{:>12.3f}", (*least)[k]);
+    text += fmt::format("{:>12.3f}", mean[k]);
+    if (ranks.size() > 1) text += fmt::format("{:>12.3f}", (*most)[k]);
+    if (k + 1 < mean.size()) text += fmt::format("{:>8.1f}%", 100 * mean[k] / std::max(mean.back(), 1e-9));
+  }
   return text;
 }
 
@@ -69,7 +81,7 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
       ends_at(deck.plan), deck.output.directory.string());
 }
 
-std::string report_text(const Deck& deck, const Statistics& s) {
+std::string report_text(const Deck& deck, const Statistics& s, std::span<const RankAccount> ranks) {
   const Counters& c = s.counters;
   const double scale = s.energy_reference > 0 ? s.energy_reference : 1;
   std::string text = fmt::format(
@@ -88,7 +100,7 @@ std::string report_text(const Deck& deck, const Statistics& s) {
   if (s.force_passes > 0)
     text += fmt::format("\n{:.6g} force passes, {} sweeps, {} steps halved, {} fallbacks", s.force_passes, c.sweeps,
                         c.slabs_halved, c.fallbacks);
-  return text + "\n" + breakdown_text(s) + "\nfiles in " + deck.output.directory.string();
+  return text + "\n" + breakdown_text(ranks) + "\nfiles in " + deck.output.directory.string();
 }
 
 template <int D>

@@ -1,19 +1,21 @@
 #pragma once
 // What stands in run.log beside the warnings: the banner, the thermo table, the final report with the timing breakdown.
 
+#include <span>
 #include <string>
 
 #include "engine/simulation.h"
 #include "io/deck.h"
 #include "io/log.h"
+#include "io/rank_account.h"
 
 namespace carom {
 
 /// Who runs what, where and with which libraries. `particles`: their number; `ranks`: of MPI.
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 
-/// How the run ended, what it found and where its time went.
-std::string report_text(const Deck& deck, const Statistics& statistics);
+/// How the run ended, what it found and where the time of the ranks went: of several, least, mean and most.
+std::string report_text(const Deck& deck, const Statistics& statistics, std::span<const RankAccount> ranks);
 
 /// Writes thermo rows into the log as a table for human eyes.
 template <int D>

@@ -8,6 +8,7 @@
 // early.
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <iostream>
 
 #include "engine/error.h"
@@ -16,11 +17,11 @@
 #include "io/info.h"
 #include "io/options.h"
 #include "io/run.h"
+#include "parallel/communicator.h"
 
 namespace {
 
 constexpr int usage_error = 2;
-constexpr int internal_error = 70;  // EX_SOFTWARE: a fault of the program, not of the deck
 
 /// Each --set takes one value; what has commas or brackets in it is not split.
 void add_set(CLI::App& command, std::vector<std::string>& set) {
@@ -61,6 +62,12 @@ void add_bench(CLI::App& app, carom::BenchOptions& options) {
       ->excludes(dimension);
 }
 
+/// One process does it, however many a launcher has started.
+int once(const std::function<int()>& work) {
+  if (!carom::Communicator::launched()) return work();
+  return carom::Communicator().on_first(work);
+}
+
 int carom_main(int argc, char** argv) {
   // 1. What can be asked.
   CLI::App app{"Carom: event-driven molecular dynamics with smooth forces"};
@@ -78,6 +85,11 @@ int carom_main(int argc, char** argv) {
   };
   run.add_option_function<std::string>("--max-wall", wall_time, "Stop after this wall time with exit code 75")
       ->type_name("HH:MM:SS");
+  run.add_option("--silence", options.silence,
+                 "Of several ranks: give up after so many seconds without a word from one; 0: never")
+      ->capture_default_str()
+      ->type_name("SECONDS")
+      ->check(CLI::NonNegativeNumber);
   run.add_flag("--quiet", options.quiet, "No banner and no progress line");
 
   std::filesystem::path deck, file;
@@ -101,16 +113,18 @@ int carom_main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : usage_error;
+    return once([&] { return app.exit(e) == 0 ? 0 : usage_error; });
   }
 
   // 3. Do it.
   if (run.parsed()) return carom::run_command(options);
-  if (validate.parsed()) return carom::validate_command(deck, set);
-  if (schema.parsed()) return carom::schema_command(markdown);
-  if (methods.parsed()) return carom::methods_command();
-  if (info.parsed()) return carom::info_command(file);
-  return carom::bench_command(bench);
+  return once([&] {
+    if (validate.parsed()) return carom::validate_command(deck, set);
+    if (schema.parsed()) return carom::schema_command(markdown);
+    if (methods.parsed()) return carom::methods_command();
+    if (info.parsed()) return carom::info_command(file);
+    return carom::bench_command(bench);
+  });
 }
 
 }  // namespace
@@ -123,6 +137,6 @@ int main(int argc, char** argv) {
     return e.exit_code();
   } catch (const std::exception& e) {
     std::cerr << "internal error: " << e.what() << '\n';
-    return internal_error;
+    return carom::kFault;
   }
 }

@@ -15,7 +15,8 @@ struct RunOptions {
   std::optional<std::filesystem::path> output;   ///< instead of output.directory; relative to the working directory
   std::optional<std::filesystem::path> restart;  ///< a checkpoint to go on from
   std::optional<double> max_wall_seconds;        ///< stop early after this much wall time
-  bool quiet = false;                            ///< no progress line, no banner
+  double silence = 600;  ///< seconds after which ranks of which nothing is heard are given up; 0: never
+  bool quiet = false;    ///< no progress line, no banner
 };
 
 /// Seconds of wall time written hh:mm:ss, mm:ss or ss, fractions allowed; nothing if it is not such a text.

@@ -19,7 +19,7 @@
 #include "io/run_files.h"
 #include "io/summary.h"
 #include "io/text_file.h"
-#include "parallel/communicator.h"
+#include "parallel/mpi_exchange.h"
 
 namespace carom {
 
@@ -31,9 +31,16 @@ constexpr int kDone = 0, kStoppedEarly = 75;
 class Deadline {
  public:
   explicit Deadline(std::optional<double> seconds) : seconds_(seconds) {}
-  bool passed() const { return seconds_ && std::chrono::duration<double>(Clock::now() - start_).count() >= *seconds_; }
+  /// Rank 0 decides for all.
+  bool passed(Exchange& ranks) const {
+    if (!seconds_) return false;
+    double answer = ranks.rank() == 0 && elapsed() >= *seconds_ ? 1 : 0;
+    ranks.largest({&answer, 1});
+    return answer > 0;
+  }
 
  private:
+  double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
   using Clock = std::chrono::steady_clock;
   Clock::time_point start_ = Clock::now();
   std::optional<double> seconds_;
@@ -54,24 +61,44 @@ void at_best(Action&& action) {
   }
 }
 
-/// Runs a deck in D dimensions on this rank.
+/// Reads a file on rank 0, for all: the others may not see it.
+TextReader reader_for(Exchange& ranks) {
+  return [&ranks](const std::filesystem::path& file) -> std::optional<std::string> {
+    auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
+    if (text) text->push_back('.');  // it can be read, and may be empty
+    const auto bytes = std::as_bytes(std::span(text ? std::string_view(*text) : std::string_view()));
+    const Bytes told = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
+    if (told.empty()) return {};
+    return std::string(reinterpret_cast<const char*>(told.data()), told.size() - 1);
+  };
+}
+
 template <int D>
-int run_deck(Deck& deck, const RunOptions& options, int ranks, const Deadline& deadline) {
+Simulation<D> simulation_of(Deck& deck, Exchange& ranks) {
   const IntegratorInfo& info = integrator_named(deck.integrator);
   auto system = build_system<D>(deck);
+  auto integrator = info.make<D>(deck.integrator_parameters);
+  if (ranks.size() > 1) integrator->share(ranks);
+  return Simulation<D>(std::move(system), info, std::move(integrator), deck.plan);
+}
+
+/// Runs a deck in D dimensions and writes its files. `at_work`: the ranks that share the work, of all that there are.
+template <int D>
+int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks, const Deadline& deadline) {
+  auto simulation = simulation_of<D>(deck, at_work);
+  const Statistics& statistics = simulation.statistics();
   const auto& directory = deck.output.directory;
   const auto backup = prepare_output_directory(directory);
   RunLog log(directory / run_file::log, options.quiet);
-  RunOutcome outcome{
-      .status = "done", .error = "", .particles = system->particles.size(), .ranks = ranks, .contact_values = {}};
+  RunOutcome outcome{.status = "done", .particles = simulation.system().particles.size(), .ranks = ranks};
   log.say(banner_text(deck, outcome.particles, ranks));
   for (const std::string& warning : deck.warnings) log.warn(warning);
-  if (ranks > 1) log.warn(fmt::format("warning: this version uses one rank; the other {} wait", ranks - 1));
+  if (at_work.size() < ranks)
+    log.warn(fmt::format("warning: {} does not share its work among ranks yet; one works, the other {} wait",
+                         deck.integrator, ranks - 1));
   if (backup) log.warn("warning: the files of an earlier run in this directory are now in " + backup->string());
   write_file_atomically(directory / run_file::deck, deck.toml_text);
 
-  Simulation<D> simulation(std::move(system), info, info.make<D>(deck.integrator_parameters), deck.plan);
-  const Statistics& statistics = simulation.statistics();
   const auto summary = [&] {
     write_file_atomically(directory / run_file::summary, summary_text(deck, outcome, statistics));
   };
@@ -83,12 +110,14 @@ int run_deck(Deck& deck, const RunOptions& options, int ranks, const Deadline& d
     files->add_to(simulation);
     simulation.add(table);
     if (!options.quiet) simulation.add(progress);
-    simulation.run([&] { return deadline.passed(); });
+    simulation.run([&] { return deadline.passed(at_work); });
     progress.end_line();
+    const auto accounts = accounts_of_all(at_work, statistics);
     files->close();
     outcome.contact_values = files->contact_values();
+    outcome.peak_memory_bytes = peak_memory_bytes(accounts);
     if (statistics.stopped_early) outcome.status = "stopped";
-    log.say(report_text(deck, statistics));
+    log.say(report_text(deck, statistics, accounts));
     if (statistics.stopped_early)
       log.warn("warning: stopped by --max-wall; this version writes no checkpoint, so the run cannot be continued");
     log.close();
@@ -103,7 +132,22 @@ int run_deck(Deck& deck, const RunOptions& options, int ranks, const Deadline& d
     at_best([&] { log.error(e.what()); });
     throw;
   }
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw Error(Failure::file, "standard output: cannot write to it; the files of the run are complete in " +
+                                   deck.output.directory.string());
   return statistics.stopped_early ? kStoppedEarly : kDone;
+}
+
+/// The same run on a rank other than 0, which shows nothing of it.
+template <int D>
+int run_beside(Deck& deck, Exchange& at_work, const Deadline& deadline) {
+  auto simulation = simulation_of<D>(deck, at_work);
+  std::vector<Onlooker<D>> onlookers;
+  for (const Sampling& sampling : samplings(deck.output)) onlookers.emplace_back(sampling);
+  for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
+  simulation.run([&] { return deadline.passed(at_work); });
+  accounts_of_all(at_work, simulation.statistics());
+  return simulation.statistics().stopped_early ? kStoppedEarly : kDone;
 }
 
 }  // namespace
@@ -114,16 +158,28 @@ int run_command(const RunOptions& options) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   hdf5::start_library();
-  const Communicator ranks;
-  return ranks.on_first([&] {
-    Deck deck = read_deck(options.deck, options.set);
+  const Communicator ranks(options.silence);
+  Exchange alone;
+  std::optional<MpiExchange> team;
+  if (ranks.size() > 1) team.emplace(ranks);
+  Exchange& all = team ? *team : alone;
+
+  Deck deck;
+  const int failure = ranks.on_all([&] {
+    deck = read_deck(options.deck, options.set, reader_for(all));
     if (options.output) set_output_directory(deck, *options.output);
-    const int code = deck.dimension == 2 ? run_deck<2>(deck, options, ranks.size(), deadline)
-                                         : run_deck<3>(deck, options, ranks.size(), deadline);
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
-      throw Error(Failure::file, "standard output: cannot write to it; the files of the run are complete in " +
-                                     deck.output.directory.string());
-    return code;
+    return 0;
+  });
+  if (failure != 0) return failure;
+  const bool flat = deck.dimension == 2;
+  const auto run = [&](Exchange& at_work) {
+    return flat ? run_deck<2>(deck, options, at_work, ranks.size(), deadline)
+                : run_deck<3>(deck, options, at_work, ranks.size(), deadline);
+  };
+  if (!integrator_named(deck.integrator).shared) return ranks.on_first([&] { return run(alone); });
+  return ranks.on_all([&] {
+    if (all.rank() == 0) return run(all);
+    return flat ? run_beside<2>(deck, all, deadline) : run_beside<3>(deck, all, deadline);
   });
 }
 

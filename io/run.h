@@ -1,8 +1,9 @@
 #pragma once
 // `carom run`: from a deck to the files of a run.
 //
-// Rank 0 reads the deck, builds the state, runs it and writes; this version uses one rank, the others wait. All ranks
-// end with the same exit code.
+// Rank 0 reads the deck for all. Where the integrator shares its work, every rank builds the same state and makes the
+// same run, and rank 0 alone writes; where it does not, rank 0 does it all and the others sleep. All ranks end with the
+// same exit code.
 //
 // What an earlier run left in the output directory is never overwritten: its files move to `backup.1`, `backup.2`, … in
 // the same directory first, and the log says so. Other files there are left alone.

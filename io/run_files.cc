@@ -6,6 +6,13 @@
 
 namespace carom {
 
+namespace {
+Sampling rdf_sampling(const OutputConfig& output) { return {output.rdf_interval, output.sample_start}; }
+Sampling msd_sampling(const OutputConfig& output) { return {output.msd_interval, output.sample_start}; }
+}  // namespace
+
+std::vector<Sampling> samplings(const OutputConfig& output) { return {rdf_sampling(output), msd_sampling(output)}; }
+
 template <int D>
 RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system)
     : trajectory_(deck.output.directory / run_file::trajectory, deck, system),
@@ -15,11 +22,9 @@ RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system)
   if (output.rdf_interval > 0)
     rdf_ = std::make_unique<RdfWriter<D>>(
         output.directory / run_file::rdf, system,
-        RadialDistributionOptions{
-            {output.rdf_interval, output.sample_start}, output.rdf_range.value(), output.rdf_bins});
+        RadialDistributionOptions{rdf_sampling(output), output.rdf_range.value(), output.rdf_bins});
   if (output.msd_interval > 0)
-    msd_ = std::make_unique<MsdWriter<D>>(output.directory / run_file::msd, system,
-                                          Sampling{output.msd_interval, output.sample_start});
+    msd_ = std::make_unique<MsdWriter<D>>(output.directory / run_file::msd, system, msd_sampling(output));
 }
 
 template <int D>

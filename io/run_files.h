@@ -14,6 +14,20 @@
 
 namespace carom {
 
+/// The times at which the files want to see the particles, besides frames and rows.
+std::vector<Sampling> samplings(const OutputConfig& output);
+
+/// Looks at the particles when the files of another rank do, so that all ranks stop at the same times.
+template <int D>
+class Onlooker : public Observer<D> {
+ public:
+  explicit Onlooker(const Sampling& sampling) : sampling_(sampling) {}
+  Sampling sampling() const override { return sampling_; }
+
+ private:
+  Sampling sampling_;
+};
+
 template <int D>
 class RunFiles {
  public:

@@ -1,9 +1,9 @@
 #include "io/summary.h"
 
-#include <sys/resource.h>
-
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "io/rank_account.h"
 #include "io/version.h"
 
 namespace carom {
@@ -15,12 +15,6 @@ using Json = nlohmann::ordered_json;
 Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 }  // namespace
-
-std::uint64_t peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Statistics& s) {
   const Counters& c = s.counters;
@@ -57,7 +51,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"fallbacks", c.fallbacks},
       {"wall_seconds", s.wall_seconds},
       {"collisions_per_second", rate},
-      {"peak_memory_bytes", peak_memory_bytes()},
+      {"peak_memory_bytes", std::max(outcome.peak_memory_bytes, peak_memory_bytes())},
   };
   for (const ContactValue& value : outcome.contact_values)
     json["contact_value"].push_back({{"species", {value.first, value.second}}, {"g", value.g}});

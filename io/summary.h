@@ -14,17 +14,15 @@ namespace carom {
 
 /// What the run's statistics do not know.
 struct RunOutcome {
-  std::string status;  ///< "done", "stopped" (early, by request), "failed"
-  std::string error;   ///< why it failed; empty otherwise
+  std::string status;   ///< "done", "stopped" (early, by request), "failed"
+  std::string error{};  ///< why it failed; empty otherwise
   std::size_t particles = 0;
   int ranks = 1;
   std::vector<ContactValue> contact_values{};  ///< of g(r), where it was taken
+  std::uint64_t peak_memory_bytes = 0;         ///< of a rank, at most; 0: of this one
 };
 
 /// The summary as JSON text; names as in the manual. What a method does not have is null.
 std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Statistics& statistics);
-
-/// Largest resident memory of this process so far [bytes].
-std::uint64_t peak_memory_bytes();
 
 }  // namespace carom

@@ -250,7 +250,7 @@ def test_ranks(tmp_path):
     done = subprocess.run(mpirun + command(deck, tmp_path / "three"), env=mpi_environment(), capture_output=True,
                           text=True)
     assert done.returncode == 0, done.stderr
-    assert "this version uses one rank; the other 2 wait" in done.stderr
+    assert "free-flight does not share its work among ranks yet; one works, the other 2 wait" in done.stderr
     assert summary(tmp_path / "three")["ranks"] == 3
     one, three = (data_sets(tmp_path / name / "trajectory.h5md") for name in ("one", "three"))
     for sets in (one, three):

@@ -1,0 +1,27 @@
+#pragma once
+// What each rank tells rank 0 at the end of a run: where its time went, how much memory it took.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/exchange.h"
+#include "engine/simulation.h"
+
+namespace carom {
+
+struct RankAccount {
+  Counters::Seconds seconds;
+  double wall_seconds = 0;
+  std::uint64_t peak_memory_bytes = 0;
+};
+
+/// Collective: the accounts of all ranks at work, by rank.
+std::vector<RankAccount> accounts_of_all(Exchange& at_work, const Statistics& mine);
+
+/// Largest resident memory of this process so far [bytes].
+std::uint64_t peak_memory_bytes();
+/// The largest of all.
+std::uint64_t peak_memory_bytes(std::span<const RankAccount> accounts);
+
+}  // namespace carom
