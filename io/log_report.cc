@@ -49,9 +49,9 @@ std::string breakdown_text(std::span<const RankAccount> ranks) {
     parts.push_back(parts_of(rank));
     for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += parts.back()[k] / static_cast<double>(ranks.size());
   }
-  std::string text = ranks.size() == 1 ? fmt::format("{:<12}{:>12}{:>9}", "part", "seconds", "share")
-                                       : fmt::format("{:<12}{:>12}{:>12}{:>12}{:>9}", "part of ranks", "least", "mean",
-                                                     "most", "share");
+  std::string text = ranks.size() == 1
+                         ? fmt::format("{:<12}{:>12}{:>9}", "part", "seconds", "share")
+                         : fmt::format("{:<12}{:>12}{:>12}{:>12}{:>9}", "part", "least", "mean", "most", "share");
   for (std::size_t k = 0; k < mean.size(); ++k) {
     const auto less = [k](const auto& a, const auto& b) { return a[k] < b[k]; };
     const auto [least, most] = std::minmax_element(parts.begin(), parts.end(), less);
