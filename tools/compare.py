@@ -72,7 +72,7 @@ def compare(a, b, tolerance=None, last=False):
     lines += [f"thermo.csv, {line}" for line in differences(read_thermo(a), read_thermo(b), tolerance)]
     if (a / "events.h5").exists() and (b / "events.h5").exists():
         with h5py.File(a / "events.h5", "r") as left, h5py.File(b / "events.h5", "r") as right:
-            lines += [f"events.h5, {line}" for line in differences(data_sets(left), data_sets(right), tolerance)]
+            lines += [f"events.h5, {line}" for line in differences(data_sets(left, ["events"]), data_sets(right, ["events"]), tolerance)]
     return lines
 
 

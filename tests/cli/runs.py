@@ -124,3 +124,14 @@ def same(one, other):
     """Whether two dictionaries of arrays are equal bit by bit."""
     return one.keys() == other.keys() and all(
         np.asarray(one[k]).tobytes() == np.asarray(other[k]).tobytes() for k in one)
+
+
+def frames_are_sound(output):
+    """Every frame that is in the file is whole and the same as in a run on an empty disk."""
+    sets, rows = data_sets(output / "trajectory.h5md"), thermo(output)
+    n = len(sets["particles/trajectory/position/value"])
+    lengths = {len(v) for k, v in sets.items() if k.split("/")[-1] in ("value", "step", "time")}
+    assert lengths == {n}
+    assert np.array_equal(sets["particles/trajectory/position/time"], rows["time"][:n])
+    assert np.array_equal(sets["observables/kinetic_energy/value"], rows["kinetic"][:n])
+    return n

@@ -4,10 +4,10 @@ import os
 import shutil
 import subprocess
 
-import numpy as np
 import pytest
 
-from runs import CAROM, ROOT, SPHERES, SPRINGS, command, data_sets, needs_carom, run, same, summary, thermo, write_deck
+from runs import (SPHERES, SPRINGS, command, data_sets, frames_are_sound, needs_carom, run, same, summary, thermo,
+                  write_deck)
 
 pytestmark = needs_carom
 
@@ -23,17 +23,6 @@ def in_mount(options, target, arguments, keep=None):
     script += 'if [ -n "$keep" ]; then cp -r "$target" "$keep"; fi; exit $code'
     return subprocess.run(UNSHARE + ["sh", "-c", script, "sh", options, str(target), str(keep or ""), *arguments],
                           capture_output=True, text=True, timeout=120)
-
-
-def frames_are_sound(output):
-    """Every frame that is in the file is whole and the same as in a run on an empty disk."""
-    sets, rows = data_sets(output / "trajectory.h5md"), thermo(output)
-    n = len(sets["particles/trajectory/position/value"])
-    lengths = {len(v) for k, v in sets.items() if k.split("/")[-1] in ("value", "step", "time")}
-    assert lengths == {n}
-    assert np.array_equal(sets["particles/trajectory/position/time"], rows["time"][:n])
-    assert np.array_equal(sets["observables/kinetic_energy/value"], rows["kinetic"][:n])
-    return n
 
 
 @needs_mount

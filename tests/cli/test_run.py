@@ -1,7 +1,6 @@
-"""`carom run`: the files it leaves, that observing changes nothing, ranks, early stops and kills."""
+"""`carom run`: the files it leaves, that observing changes nothing, early stops and kills."""
 
 import os
-import pathlib
 import pty
 import random
 import re
@@ -13,8 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from runs import (CAROM, SPHERES, SPRINGS, command, data_sets, mpi_environment, needs_carom, run, same, summary, thermo,
-                  write_deck)
+from runs import SPHERES, SPRINGS, command, data_sets, needs_carom, run, same, summary, thermo, write_deck
 
 pytestmark = needs_carom
 
@@ -241,55 +239,3 @@ def test_a_kill_leaves_readable_files(seed, tmp_path):
 def test_one_rank_needs_no_temporary_directory(tmp_path):
     (tmp_path / "file").write_text("x")
     run(write_deck(tmp_path, SPRINGS), tmp_path / "out", env=os.environ | {"TMPDIR": str(tmp_path / "file" / "tmp")})
-
-
-def test_ranks(tmp_path):
-    deck = write_deck(tmp_path, SPHERES)
-    run(deck, tmp_path / "one")
-    mpirun = ["timeout", "-k", "10", "120", "mpirun", "--timeout", "100", "-n", "3"]
-    done = subprocess.run(mpirun + command(deck, tmp_path / "three"), env=mpi_environment(), capture_output=True,
-                          text=True)
-    assert done.returncode == 0, done.stderr
-    assert "free-flight does not share its work among ranks yet; one works, the other 2 wait" in done.stderr
-    assert summary(tmp_path / "three")["ranks"] == 3
-    one, three = (data_sets(tmp_path / name / "trajectory.h5md") for name in ("one", "three"))
-    for sets in (one, three):
-        del sets["parameters/deck"]
-    assert same(one, three)
-
-
-def idle_seconds(output):
-    """Processor time so far of each rank other than 0 of the run that writes there."""
-    seconds = []
-    for process in pathlib.Path("/proc").glob("[0-9]*"):
-        try:
-            arguments = (process / "cmdline").read_bytes().split(b"\0")
-            rank = re.search(rb"(?:^|\0)OMPI_COMM_WORLD_RANK=(\d+)", (process / "environ").read_bytes())
-            times = (process / "stat").read_text().rsplit(")", 1)[1].split()[11:13]
-        except OSError:  # it has just ended, or is somebody else's
-            continue
-        if rank and int(rank[1]) > 0 and str(output).encode() in arguments:
-            seconds.append(sum(map(int, times)) / os.sysconf("SC_CLK_TCK"))
-    return seconds
-
-
-def test_idle_ranks_sleep_and_share_the_exit_code(tmp_path):
-    mpirun = ["timeout", "-k", "10", "120", "mpirun", "--timeout", "100", "-n", "4"]
-    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
-    endless = command(deck, out, ["run.steps=100000000", "output.frame_interval=0.0"], ("--quiet",))
-    job = subprocess.Popen(mpirun + endless, env=mpi_environment(), stderr=subprocess.DEVNULL)
-    while not (out / "thermo.csv").exists():
-        assert job.poll() is None
-        time.sleep(0.01)
-    before = idle_seconds(out)
-    time.sleep(2)
-    after = idle_seconds(out)
-    job.terminate()
-    job.wait()
-    assert len(before) == len(after) == 3
-    assert sum(after) - sum(before) < 0.3  # together; ranks that spin would take what the cores can give
-    stopped = subprocess.run(mpirun + endless + ["--max-wall", "00:00:01"], env=mpi_environment(), capture_output=True)
-    assert stopped.returncode == 75
-    missing = subprocess.run(mpirun + [CAROM, "run", str(tmp_path / "missing.toml")], env=mpi_environment(),
-                             capture_output=True, text=True)
-    assert missing.returncode == 5 and missing.stderr.count("cannot read this deck") == 1

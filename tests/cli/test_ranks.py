@@ -1,0 +1,255 @@
+"""`mpirun carom run`: the same files on any number of ranks; what happens when one of them fails."""
+
+import filecmp
+import os
+import pathlib
+import re
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, data_sets, frames_are_sound, mpi_environment, needs_carom, run,
+                  same, summary, thermo, write_deck)
+
+sys.path.insert(0, str(ROOT / "tools"))
+import compare
+
+pytestmark = needs_carom
+METHODS = subprocess.run([CAROM, "methods"], capture_output=True, text=True).stdout if CAROM else ""
+shared = pytest.mark.skipif("share its work" not in METHODS.split("verlet –")[0], reason="free-flight is not shared yet")
+MPIRUN = ["timeout", "-k", "10", "120", "mpirun", "--timeout", "100", "-n"]
+
+# Discs of two sizes between walls, falling.
+DISCS = """
+format = 1
+[system]
+dimension = 2
+box = [30.0, 20.0]
+boundary = ["periodic", "wall"]
+[[particles]]
+name = "large"
+count = 120
+temperature = 1.0
+radius = 0.6
+mass = 2.0
+[[particles]]
+name = "small"
+count = 80
+temperature = 1.0
+radius = 0.4
+[placement]
+type = "random"
+seed = 3
+[[interaction]]
+type = "uniform-field"
+acceleration = [0.0, -0.2]
+[integrator]
+type = "free-flight"
+step = 2.0
+[run]
+collisions = 1500
+[output]
+directory = "unused"
+frame_interval = 0.7
+thermo_interval = 0.3
+"""
+# No end of it, and little to see.
+ENDLESS = ["run.end_time=1e7", "integrator.step=1.0", "output.frame_interval=10.0", "output.thermo_interval=10.0"]
+
+
+def mpirun(ranks, arguments, code=0, **options):
+    done = subprocess.run(MPIRUN + [str(ranks)] + [str(argument) for argument in arguments], env=mpi_environment(),
+                          capture_output=True, text=True, **options)
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def start(ranks, arguments):
+    return subprocess.Popen(MPIRUN + [str(ranks)] + [str(argument) for argument in arguments], env=mpi_environment(),
+                            stderr=subprocess.PIPE, text=True)
+
+
+def running(output):
+    """The processes of the run that writes there, by rank."""
+    found = {}
+    for process in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            arguments = (process / "cmdline").read_bytes().split(b"\0")
+            rank = re.search(rb"(?:^|\0)OMPI_COMM_WORLD_RANK=(\d+)", (process / "environ").read_bytes())
+        except OSError:  # it has just ended, or is somebody else's
+            continue
+        if rank and str(output).encode() in arguments and arguments[0] == CAROM.encode():
+            found[int(rank[1])] = int(process.name)
+    return found
+
+
+def when_it_has_ended(output):
+    """mpirun does not wait for those it kills."""
+    for _ in range(1000):
+        if not running(output):
+            return
+        time.sleep(0.01)
+    raise AssertionError("processes are left")
+
+
+def when_it_runs(job, output):
+    """The processes, by rank, once some rows are written."""
+    while not (output / "thermo.csv").exists() or len((output / "thermo.csv").read_text().splitlines()) < 4:
+        assert job.poll() is None, job.stderr.read()
+        time.sleep(0.01)
+    return running(output)
+
+
+@pytest.mark.parametrize("text", [SPHERES, DISCS], ids=["spheres", "discs"])
+@shared
+def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
+    output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11"]
+    run(write_deck(tmp_path, text), tmp_path / "plain", output)
+    assert summary(tmp_path / "plain")["events"]["sphere_sphere"] >= 1500
+    for ranks in 1, 2, 3, 4:
+        out = tmp_path / str(ranks)
+        # Only rank 0 finds the deck.
+        done = mpirun(ranks, ["sh", "-c", 'if [ $OMPI_COMM_WORLD_RANK != 0 ]; then cd /; fi; exec "$@"', "sh"]
+                      + command("input.toml", out, output), cwd=tmp_path)
+        assert done.stderr == ""
+        assert compare.compare(tmp_path / "plain", out) == []
+        assert (out / "events.h5").exists()
+        for name in "thermo.csv", "rdf.csv", "msd.csv":
+            assert filecmp.cmp(tmp_path / "plain" / name, out / name, shallow=False)
+        assert sorted(path.name for path in out.iterdir()) == sorted(path.name for path in (tmp_path / "plain").iterdir())
+        assert summary(out)["ranks"] == ranks
+        assert ("least" in (out / "run.log").read_text()) == (ranks > 1)
+
+
+@shared
+def test_positions_from_a_file_that_rank_0_sees(tmp_path):
+    (tmp_path / "places").write_text("".join(f"{2 * n} 1 1\n" for n in range(9)))
+    deck = SPHERES.replace("[placement]", "[placement]\nfile = \"places\"").replace("packing_fraction = 0.3\n", "")
+    deck = deck.replace("fcc", "file").replace("108", "9").replace("3\nboundary", "3\nbox = [18.0, 3.0, 3.0]\nboundary")
+    run(write_deck(tmp_path, deck), tmp_path / "plain")
+    mpirun(2, ["sh", "-c", 'if [ $OMPI_COMM_WORLD_RANK != 0 ]; then cd /; fi; exec "$@"', "sh"]
+           + command("input.toml", tmp_path / "two"), cwd=tmp_path)
+    assert compare.compare(tmp_path / "plain", tmp_path / "two") == []
+
+
+def test_a_method_that_does_not_share_its_work(tmp_path):
+    deck = write_deck(tmp_path, SPRINGS)
+    run(deck, tmp_path / "one")
+    done = mpirun(3, command(deck, tmp_path / "three"))
+    assert "cdda does not share its work among ranks yet; one works, the other 2 wait" in done.stderr
+    assert summary(tmp_path / "three")["ranks"] == 3
+    assert compare.compare(tmp_path / "one", tmp_path / "three") == []
+
+
+def idle_seconds(output):
+    """Processor time so far of each rank other than 0 of the run that writes there."""
+    seconds = []
+    for rank, pid in running(output).items():
+        times = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]
+        if rank > 0:
+            seconds.append(sum(map(int, times)) / os.sysconf("SC_CLK_TCK"))
+    return seconds
+
+
+def test_idle_ranks_sleep_and_share_the_exit_code(tmp_path):
+    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
+    endless = command(deck, out, ["run.steps=100000000", "output.frame_interval=0.0"])
+    job = start(4, endless)
+    when_it_runs(job, out)
+    before = idle_seconds(out)
+    time.sleep(2)
+    after = idle_seconds(out)
+    job.terminate()
+    job.wait()
+    assert len(before) == len(after) == 3
+    assert sum(after) - sum(before) < 0.3  # together; ranks that spin would take what the cores can give
+    mpirun(4, endless + ["--max-wall", "00:00:01"], code=75)
+
+
+@shared
+def test_rank_0_stops_all(tmp_path):
+    out = tmp_path / "out"
+    mpirun(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--max-wall", "00:00:01")), code=75)
+    assert summary(out)["status"] == "stopped" and summary(out)["steps"] > 0
+    assert frames_are_sound(out) > 0
+
+
+@pytest.mark.parametrize("change, code, words", [
+    ("integrator.stpe=0.1", 2, "stpe"),
+    ("placement.packing_fraction=0.9", 3, "overlap"),
+    ("integrator.max_events_per_step=1", 4, "max_events_per_step"),
+])
+@shared
+def test_an_error_of_all_ranks_is_told_once(change, code, words, tmp_path):
+    deck, out = write_deck(tmp_path, SPHERES), tmp_path / "out"
+    told = run(deck, tmp_path / "plain", [change], code=code).stderr
+    done = mpirun(3, command(deck, out, [change]), code=code)
+    assert words in told
+    assert done.stderr.count(told.strip()) == 1 and done.stderr.count(words) == told.count(words)
+    assert "carom: rank" not in done.stderr and "MPI_ABORT" not in done.stderr
+    assert out.exists() == (tmp_path / "plain").exists() == (code == 4)
+    assert code != 4 or summary(out)["status"] == "failed"
+
+
+def test_other_commands_speak_once(tmp_path):
+    deck = write_deck(tmp_path, SPHERES)
+    for arguments, code, words in [(["validate", deck], 0, "valid"), (["validate", tmp_path / "missing"], 5, "cannot read"),
+                                   (["run", tmp_path / "missing"], 5, "cannot read"), (["--version"], 0, "compiler:"),
+                                   (["run", deck, "--nonsense"], 2, "--nonsense")]:
+        done = mpirun(3, [CAROM, *arguments], code=code)
+        assert (done.stdout + done.stderr).count(words) == 1
+
+
+@shared
+def test_a_killed_rank(tmp_path):
+    out = tmp_path / "out"
+    job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS))
+    os.kill(when_it_runs(job, out)[1], signal.SIGKILL)
+    told = job.communicate(timeout=60)[1]
+    assert job.returncode != 0 and "rank 1" in told and "Killed" in told
+    when_it_has_ended(out)
+    assert len(data_sets(out / "trajectory.h5md")["particles/trajectory/position/step"]) >= 3
+    assert len(thermo(out)["time"]) >= 3
+
+
+@shared
+def test_a_stopped_rank(tmp_path):
+    out = tmp_path / "out"
+    job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--silence", "2")))
+    os.kill(when_it_runs(job, out)[1], signal.SIGSTOP)
+    told = job.communicate(timeout=60)[1]
+    assert job.returncode == 70 and "nothing was heard of rank 1 of 3 for 2 s" in told
+    assert summary(out)["status"] == "failed" and "rank 1 of 3" in summary(out)["error"]
+    assert frames_are_sound(out) >= 3
+
+
+@shared
+def test_rank_0_cannot_write(tmp_path):
+    out = tmp_path / "out"
+    often = ["output.frame_interval=1.0", "output.thermo_interval=1.0"]
+    job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS[:2] + often))
+    rank_0 = when_it_runs(job, out)[0]
+    room = (out / "trajectory.h5md").stat().st_size + 1000000
+    resource.prlimit(rank_0, resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
+    told = job.communicate(timeout=60)[1]
+    assert job.returncode == 5 and "carom: rank 0 of 3: " in told and "File too large" in told
+    assert summary(out)["status"] == "failed" and "File too large" in summary(out)["error"]
+    assert frames_are_sound(out) >= 3
+
+
+@shared
+def test_a_rank_without_memory(tmp_path):
+    out = tmp_path / "out"
+    job = start(2, command(write_deck(tmp_path, SPHERES), out, ENDLESS))
+    status = pathlib.Path(f"/proc/{when_it_runs(job, out)[1]}/status").read_text()
+    job.terminate()
+    job.communicate()
+    # What a small run takes, and a little; a sphere takes some 300 bytes.
+    limit = int(re.search(r"VmPeak:\s+(\d+) kB", status)[1]) + 20000
+    limited = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = 1 ]; then ulimit -v {limit}; fi; exec "$@"', "sh"]
+    done = mpirun(2, limited + command(tmp_path / "input.toml", tmp_path / "large", ["particles.0.count=256000"]), code=70)
+    assert "carom: rank 1 of 2: out of memory" in done.stderr
