@@ -160,8 +160,15 @@ int main(int argc, char** argv) {
   const carom::Communicator ranks(argc > 2 ? std::stod(argv[2]) : 0);
   MpiExchange exchange(ranks);
   const bool alone = what == "ok" || what == "error" || what == "bug";
-  const int code = alone ? ranks.on_first([&] { return first(what); })
-                         : ranks.on_all([&] { return all(what, exchange, ranks.handle()); });
+  const auto together = [&] {
+    try {
+      return all(what, exchange, ranks.handle());
+    } catch (const carom::RankFailure& e) {
+      std::cout << "told: " << e.what() << std::endl;
+      throw;
+    }
+  };
+  const int code = alone ? ranks.on_first([&] { return first(what); }) : ranks.on_all(together);
   std::cout << "rank of " + std::to_string(ranks.size()) + " ends with " + std::to_string(code) + "\n" << std::flush;
   return code;
 }
