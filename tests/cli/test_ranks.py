@@ -125,6 +125,23 @@ def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
         assert ("least" in (out / "run.log").read_text()) == (ranks > 1)
 
 
+NODES = ROOT / "tools" / "simulated-nodes"
+can_simulate = subprocess.run([NODES, "1", "1", "true"], capture_output=True).returncode == 0 if CAROM else False
+
+
+@shared
+@pytest.mark.skipif(not can_simulate, reason="may not make network namespaces here (not root, no user namespaces)")
+def test_nodes(tmp_path):
+    deck = write_deck(tmp_path, SPHERES)
+    run(deck, tmp_path / "plain", ["output.events=true"])
+    job = ["timeout", "-k", "10", "100", NODES, "3", "2"] + command(deck, tmp_path / "nodes", ["output.events=true"])
+    done = subprocess.run(job, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "host node1, " in (tmp_path / "nodes" / "run.log").read_text()
+    assert summary(tmp_path / "nodes")["ranks"] == 6
+    assert compare.compare(tmp_path / "plain", tmp_path / "nodes") == []
+
+
 @shared
 def test_positions_from_a_file_that_rank_0_sees(tmp_path):
     (tmp_path / "places").write_text("".join(f"{2 * n} 1 1\n" for n in range(9)))
