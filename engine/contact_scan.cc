@@ -13,6 +13,7 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
     : box_(system.box),
       particles_(system.particles),
       largest_edge_(system.box.edges.maxCoeff()),
+      least_tolerance_(gap_tolerance(0, largest_edge_)),
       list_(system.box, system.particles.radius),
       max_events_(max_events) {}
 

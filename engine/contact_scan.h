@@ -62,11 +62,13 @@ class ContactScan {
   /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, Positions<D> x_new) { return list_.cover(x, x_new); }
 
-  /// The candidates while nobody strays farther than `margin` from x.
+  /// The candidates while nobody strays farther than `margin` from x. They are the same pairs in the same order, with
+  /// other images at most, as long as rebuilds() is the same.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, double margin) { return list_.cover(x, margin); }
+  std::uint64_t rebuilds() const { return list_.rebuilds(); }
 
   double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
-  double tolerance(double sigma) const { return gap_tolerance(sigma, largest_edge_); }
+  double tolerance(double sigma) const { return std::max(1e-13 * sigma, least_tolerance_); }  // gap_tolerance()
   /// The least gap a piece may end with, for a contact that touches at its start: one that rounding has left at the
   /// edge of the tolerance must be able to depart.
   double floor(double gap_at_start, double tolerance) const {
@@ -92,7 +94,7 @@ class ContactScan {
 
   const Box<D>& box_;
   const Particles<D>& particles_;
-  double largest_edge_;
+  double largest_edge_, least_tolerance_;
   NeighbourList<D> list_;
   std::uint64_t max_events_;
   std::uint64_t events_ = 0, events_at_last_cut_ = 0;

@@ -35,7 +35,12 @@ struct PotentialSums {
 /// What a term has found out about the pairs of a slab, kept from sweep to sweep.
 template <int D>
 struct PairMemory {
-  std::vector<Vec<D>> impulse;  ///< given to the lower id, of each pair in the order of the loop
+  /// Given to the lower id, of each pair in the order of the loop. Where a partner has inner nodes: first component,
+  /// where in `stretches` those of its stretches stand.
+  std::vector<Vec<D>> impulse;
+  std::vector<Vec<D>> stretches, stretches_before;
+
+  void clear() { impulse.clear(), stretches.clear(); }
 };
 
 /// How much of a term was evaluated.
@@ -69,10 +74,17 @@ class Interaction {
 
   /// impulse[n] += what interval n receives when everybody moves on chords: over each stretch of a pair its duration
   /// times the mean force between the separations at the stretch's ends. Whatever the nodes, Σ impulse·chord is then
-  /// the change of −V over the slab. Pairs of particles without inner nodes of which neither is `changed` are
-  /// remembered.
-  virtual PairCounts add_impulses(const Histories<D>& paths, std::span<const char> changed, PairMemory<D>& memory,
-                                  Vectors<D> impulse) const = 0;
+  /// the change of −V over the slab. Pairs of which neither particle has changed are remembered.
+  virtual PairCounts add_impulses(const Histories<D>& paths, PairMemory<D>& memory, Vectors<D> impulse) const = 0;
+
+  /// Where few have changed: renew_impulses() evaluates their pairs into the memory and appends their partners to
+  /// `partners`; add_impulses_on() then adds what the intervals of particle i receive, bit for bit what the function
+  /// above would. Only for terms that remember pairs.
+  virtual bool remembers() const = 0;
+  virtual std::uint64_t renew_impulses(const Histories<D>& paths, std::span<const Id> changed, PairMemory<D>& memory,
+                                       std::vector<Id>& partners) const = 0;
+  virtual void add_impulses_on(const Histories<D>& paths, Id i, const PairMemory<D>& memory,
+                               Vectors<D> impulse) const = 0;
 
   /// What particle i receives from the start of its last interval to `end`, by the trapezoidal rule on the stretches of
   /// its pairs, and −∂V/∂x_i at `end`, everybody moving on parabolas. Returns how many pair forces were evaluated.

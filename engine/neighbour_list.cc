@@ -74,9 +74,8 @@ void NeighbourList<D>::follow_wraps(std::span<const Vec<D>> x) {
     built_at_[i] -= box_.shift(jump);
   }
   if (crossed.empty()) return;
-  for (auto& pair : pairs_)
+  for (auto& pair : pairs_)  // the images of two particles all change by as much: their order stays
     for (int k = 0; k < D; ++k) pair.image[k] += crossed[pair.i][k] - crossed[pair.j][k];
-  std::ranges::sort(pairs_);  // the order names images, and these have changed
 }
 
 template <int D>

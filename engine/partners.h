@@ -24,23 +24,22 @@ class Partners {
   /// ids(k) gives the two ids of pair k.
   template <class Ids>
   void build(std::size_t particles, std::size_t pairs, Ids&& ids) {
-    start_.assign(particles + 1, 0);
+    start_.assign(particles + 2, 0);  // while filling, start_[i + 1] is where the next partner of i goes
     for (std::size_t k = 0; k < pairs; ++k)
-      for (const Id id : ids(k)) ++start_[id + 1];
-    for (std::size_t i = 0; i < particles; ++i) start_[i + 1] += start_[i];
+      for (const Id id : ids(k)) ++start_[id + 2];
+    for (std::size_t i = 0; i < particles; ++i) start_[i + 2] += start_[i + 1];
     partner_.resize(2 * pairs);
-    fill_.assign(start_.begin(), start_.end());
     for (std::size_t k = 0; k < pairs; ++k) {
       const auto [i, j] = ids(k);
-      partner_[fill_[i]++] = {j, static_cast<std::uint32_t>(k)};
-      partner_[fill_[j]++] = {i, static_cast<std::uint32_t>(k)};
+      partner_[start_[i + 1]++] = {j, static_cast<std::uint32_t>(k)};
+      partner_[start_[j + 1]++] = {i, static_cast<std::uint32_t>(k)};
     }
   }
 
   std::span<const Partner> of(Id i) const { return {partner_.data() + start_[i], start_[i + 1] - start_[i]}; }
 
  private:
-  std::vector<std::size_t> start_, fill_;
+  std::vector<std::uint32_t> start_;
   std::vector<Partner> partner_;
 };
 

@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "engine/error.h"
@@ -44,38 +45,42 @@ bool same_partners(const EventKey<D>& a, const EventKey<D>& b) {
   return a.kind == b.kind && a.lo == b.lo && a.hi == b.hi && a.image == b.image;
 }
 
-/// Whether everybody has the same partners in two sweeps, met in the same order.
+/// Whether particle i has the same partners as in the sweep before, met in the same order.
 template <int D>
-bool same_meetings(const Histories<D>& a, const Histories<D>& b) {
-  if (a.next != b.next) return false;
-  for (std::size_t n = a.particles(); n < a.intervals(); ++n)
-    if (!same_partners(a.opening[n], b.opening[n])) return false;
-  return true;
+bool same_meetings(const Histories<D>& paths, Id i) {
+  std::uint32_t m = paths.next[i], n = paths.past[i];
+  for (; m != Histories<D>::kNone && n != Histories<D>::kNone; m = paths.next[m], n = paths.next[n])
+    if (!same_partners(paths.opening(m), paths.opening(n))) return false;
+  return m == n;
 }
 
 /// Flights of a sweep: on the mean forces of the same interval in the sweep before.
 template <int D>
 class SweepRule : public NodeRule<D> {
  public:
-  /// Null: no sweep before.
-  void follow(const Histories<D>* before, std::size_t particles) {
-    before_ = before;
+  /// Before everybody is run. `first`: there was no sweep before.
+  void follow(bool first, std::size_t particles) {
+    first_ = first;
     interval_.resize(particles);
-    for (std::uint32_t i = 0; i < particles; ++i) interval_[i] = i;
+    std::iota(interval_.begin(), interval_.end(), 0);
+  }
+  void woken(Id i, std::uint32_t past) override {
+    first_ = false;
+    interval_[i] = past;
   }
   void node(const Histories<D>& paths, Id i, double t, const EventKey<D>& key, Vec<D>& v, Vec<D>& a) override {
     const std::uint32_t m = paths.last[i];
     v = paths.velocity_in(m, t);
     a = paths.a[m];
-    if (before_ == nullptr) return;
-    const std::uint32_t expected = before_->next[interval_[i]];
-    const bool same = expected != Histories<D>::kNone && same_partners(before_->opening[expected], key);
-    interval_[i] = same ? expected : before_->at(i, t);
-    a = before_->a[interval_[i]];
+    if (first_) return;
+    const std::uint32_t expected = interval_[i] == i ? paths.past[i] : paths.next[interval_[i]];
+    const bool same = expected != Histories<D>::kNone && same_partners(paths.opening(expected), key);
+    interval_[i] = same ? expected : paths.past_at(i, t);
+    a = paths.a[interval_[i]];
   }
 
  private:
-  const Histories<D>* before_ = nullptr;
+  bool first_ = true;
   std::vector<std::uint32_t> interval_;  // of the sweep before, where each particle is
 };
 
@@ -91,11 +96,12 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     scan_.emplace(system, max_events_);
     core_.emplace(system, *scan_, max_events_);
     const auto& mass = system.particles.mass;
-    first_.resize(mass.size());
-    evaluate_forces<D>(system, system.particles.x, first_, counters);
-    for (std::size_t i = 0; i < mass.size(); ++i) first_[i] /= mass[i];
-    extrapolation_.start(first_);
+    std::vector<Vec<D>> a(mass.size());
+    evaluate_forces<D>(system, system.particles.x, a, counters);
+    for (std::size_t i = 0; i < mass.size(); ++i) a[i] /= mass[i];
+    extrapolation_.start(a);
     memories_.resize(system.interactions.size());
+    for (const auto& term : system.interactions) remembers_ = remembers_ && term->remembers();
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
@@ -154,7 +160,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   /// The largest error of a position over a piece. Where the acceleration changes at the rate j, seen from one interval
   /// to the next, the parabola on its mean leaves the path by j s³/12 in a time s.
   double path_error(const Particles<D>& p) const {
-    const Histories<D>& paths = *now_;
+    const Histories<D>& paths = paths_;
     double largest = 0;
     for (Id i = 0; i < p.size(); ++i) {
       double error = 0, before = extrapolation_.time()[i];
@@ -177,36 +183,54 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     const Stopwatch watch(counters_->seconds.sweep);
     const auto& p = system.particles;
     const std::size_t n = p.size();
-    extrapolation_.expect(length, first_);
+    Histories<D>& paths = paths_;
+    auto reset = [&] {
+      paths.reset(length, p.x, p.v);
+      extrapolation_.expect(length, paths.a);
+    };
+    reset();
     double margin = 0;
-    for (Id i = 0; i < n; ++i) margin = std::max(margin, length * (p.v[i].norm() + 0.5 * length * first_[i].norm()));
+    for (Id i = 0; i < n; ++i) margin = std::max(margin, length * (p.v[i].norm() + 0.5 * length * paths.a[i].norm()));
     begin(system, kRoom * margin);
     extra_.clear();
     tolerance_ = std::max(kLastAtLeast, accepted_);
-    bool mixes = false;
-    const Histories<D>* before = nullptr;
+    bool mixes = false, first = true;
     double last_change = 0, last_unsettled = 0, earlier_unsettled = 0, last_smooth = 0, earlier_smooth = 0;
+    std::size_t nodes_flown = 0;
     int tries = 0, slow = 0, since = 0;  // since: sweeps since the last node was added
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-      Histories<D>& paths = paths_[sweep % 2];
-      paths.reset(length, p.x, p.v, before ? std::span<const Vec<D>>(before->a.data(), n) : first_);
-      rule_.follow(before, n);
-      const SlabRun<D> run = core_->run(paths, rule_, extra_);
+      const std::size_t nodes = extra_.size();
+      bool late = !first && !mixes && remembers_ && scan_->resting().empty() && nodes == nodes_flown &&
+                  kFew * unsettled_.size() <= n;
+      SlabRun<D> run;
+      if (late) {
+        run = core_->repair(paths, rule_, extra_, unsettled_);
+        late = run.end != End::lost;
+      }
+      if (!late) {
+        rule_.follow(first, n);
+        run = core_->run(paths, rule_, extra_);
+      }
       if (run.end == End::cut) return {.cut = run.time, .key = run.key};
       if (run.end == End::crowded) return {.crowd = true, .key = run.key};
       if (run.end == End::strayed) {
         if (!std::isfinite(run.margin)) return {};
         begin(system, kRoom * run.margin);
-        before = nullptr;
+        reset();
+        first = true;
         continue;
       }
-      paths.close();
-      mark_changed(paths, before);
-      evaluate(system, paths);
-      const bool alike = before != nullptr && same_meetings(paths, *before);
-      if (mixes) mix(p, paths, alike);
-      const Change change = compare(p, paths, mixes ? 0 : last_change, mixes);
-      now_ = &paths;
+      nodes_flown = nodes;
+      const bool alike = !first && all_alike(paths, late);
+      Change change;
+      if (late) {
+        reevaluate(system);
+        change = compare_some(p);
+      } else {
+        evaluate(system);
+        if (mixes) mix(p, alike);
+        change = compare_all(p, mixes ? 0 : last_change, mixes);
+      }
       if (change.settled) return {.settled = true};
       if (!std::isfinite(change.largest)) return {};
       const bool patient = ++since > kPatience;
@@ -220,8 +244,8 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
         mixing_.clear();
         ++counters_->fallbacks;
       }
-      const bool parted = (patient || slow > 2) && before != nullptr && separate(paths, *before);
-      if (parted || (slow > 2 && steady(p, paths, change))) {
+      const bool parted = (patient || slow > 2) && !first && separate(late);
+      if (parted || (slow > 2 && steady(p, change))) {
         since = slow = 0;
         if (++tries > kMostTries) return {};
       } else if (slow > 2) {
@@ -232,7 +256,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       earlier_smooth = last_smooth;
       last_smooth = change.smooth;
       last_change = change.largest;
-      before = &paths;
+      first = false;
     }
     return {};
   }
@@ -240,33 +264,55 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   void begin(const System<D>& system, double margin) {
     core_->begin(system.particles.x, margin);
     for (const auto& term : system.interactions) term->begin_slab(system.particles.x, margin);
-    for (auto& memory : memories_) memory.impulse.clear();
+    for (auto& memory : memories_) memory.clear();
     pairs_ = 0;
   }
 
-  /// Whose path is not, bit for bit, that of the sweep before.
-  void mark_changed(const Histories<D>& paths, const Histories<D>* before) {
-    const std::size_t n = paths.particles();
-    changed_.assign(n, 1);
-    if (before == nullptr) return;
-    for (Id i = 0; i < n; ++i)
-      changed_[i] = !(paths.simple(i) && before->simple(i) && paths.chord[i] == before->chord[i]);
+  /// Whether everybody has the same partners as in the sweep before; after a repair the others have anyway.
+  bool all_alike(const Histories<D>& paths, bool repaired) const {
+    const auto same = [&](Id i) { return same_meetings(paths, i); };
+    if (repaired) return std::ranges::all_of(core_->awake(), same);
+    return std::ranges::all_of(paths.noded(), same) && std::ranges::all_of(paths.had_nodes(), same);
   }
 
   /// impulse_[n]: what interval n receives on these paths.
-  void evaluate(const System<D>& system, const Histories<D>& paths) {
+  void evaluate(const System<D>& system) {
     const Stopwatch watch(counters_->seconds.force);
-    impulse_.assign(paths.intervals(), Vec<D>::Zero());
+    impulse_.assign(paths_.intervals(), Vec<D>::Zero());
     PairCounts counts;
     for (std::size_t k = 0; k < memories_.size(); ++k) {
-      const PairCounts more = system.interactions[k]->add_impulses(paths, changed_, memories_[k], impulse_);
+      const PairCounts more = system.interactions[k]->add_impulses(paths_, memories_[k], impulse_);
       counts.evaluations += more.evaluations;
       counts.pairs += more.pairs;
     }
     pairs_ = std::max(pairs_, counts.pairs);  // in the first sweep nothing is remembered
-    if (pairs_ > 0) counters_->force_passes += static_cast<double>(counts.evaluations) / static_cast<double>(pairs_);
+    count(counts.evaluations);
+    if (!scan_->resting().empty()) hold(system, paths_);
+  }
+
+  /// The same after a repair: only of those who have changed, and their partners.
+  void reevaluate(const System<D>& system) {
+    const Stopwatch watch(counters_->seconds.force);
+    impulse_.resize(paths_.intervals(), Vec<D>::Zero());
+    changed_.clear();
+    for (const Id i : core_->awake())
+      if (paths_.changed[i]) changed_.push_back(i);
+    affected_.assign(core_->awake().begin(), core_->awake().end());  // their intervals may stand in other places
+    std::uint64_t evaluations = 0;
+    for (std::size_t k = 0; k < memories_.size(); ++k)
+      evaluations += system.interactions[k]->renew_impulses(paths_, changed_, memories_[k], affected_);
+    std::ranges::sort(affected_);
+    affected_.erase(std::ranges::unique(affected_).begin(), affected_.end());
+    for (const Id i : affected_)
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) impulse_[n].setZero();
+    for (std::size_t k = 0; k < memories_.size(); ++k)
+      for (const Id i : affected_) system.interactions[k]->add_impulses_on(paths_, i, memories_[k], impulse_);
+    count(evaluations);
+  }
+
+  void count(std::uint64_t evaluations) {
+    if (pairs_ > 0) counters_->force_passes += static_cast<double>(evaluations) / static_cast<double>(pairs_);
     ++counters_->sweeps;
-    if (!scan_->resting().empty()) hold(system, paths);
   }
 
   /// Adds the reactions λ(d + d') of resting contacts, which do no work because they hold |d'| = |d|. Who rests has no
@@ -291,14 +337,16 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   }
 
   /// Accelerates the sweeps, in terms of the velocities that impulses give, as long as everybody meets the same.
-  void mix(const Particles<D>& p, const Histories<D>& paths, bool alike) {
+  void mix(const Particles<D>& p, bool alike) {
     if (!alike) mixing_.clear();
-    const auto size = static_cast<Eigen::Index>(D * paths.intervals());
+    Eigen::Index size = 0, at = 0;
+    for (Id i = 0; i < paths_.particles(); ++i)
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) size += D;
     Eigen::VectorXd flown(size), lacking(size);
-    for (Id i = 0; i < paths.particles(); ++i)
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
-        flown.segment<D>(D * n) = paths.duration(n) * paths.a[n];
-        lacking.segment<D>(D * n) = impulse_[n] / p.mass[i] - paths.duration(n) * paths.a[n];
+    for (Id i = 0; i < paths_.particles(); ++i)
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n], at += D) {
+        flown.segment<D>(at) = paths_.duration(n) * paths_.a[n];
+        lacking.segment<D>(at) = impulse_[n] / p.mass[i] - paths_.duration(n) * paths_.a[n];
       }
     mixing_.add(flown, lacking);
   }
@@ -309,78 +357,113 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     double smooth = 0;     ///< and have no inner nodes
     double speed = 0;      ///< of the system
     bool settled = true;
+    void note(double difference) { largest = difference > largest || std::isnan(difference) ? difference : largest; }
   };
 
+  double difference(const Particles<D>& p, Id i, std::uint32_t n) const {
+    return (impulse_[n] / p.mass[i] - paths_.duration(n) * paths_.a[n]).norm();
+  }
+
   /// Compares the impulses with those flown on, and replaces the accelerations of paths by the new ones where there is
-  /// a difference that matters: who has settled keeps his path bit for bit.
-  Change compare(const Particles<D>& p, Histories<D>& paths, double last_change, bool mixes) {
+  /// a difference that matters: who has settled keeps his path bit for bit. Who has not is left in unsettled_.
+  Change compare_all(const Particles<D>& p, double last_change, bool mixes) {
     Change change;
-    const auto particles = static_cast<Id>(paths.particles());
-    for (Id i = 0; i < particles; ++i)
-      change.speed =
-          std::max({change.speed, paths.v[i].squaredNorm(), impulse_[i].squaredNorm() / (p.mass[i] * p.mass[i])});
-    change.speed = std::sqrt(change.speed);
-    auto difference = [&](Id i, std::uint32_t n, double time) {
-      return (impulse_[n] / p.mass[i] - time * paths.a[n]).norm();
-    };
-    for (Id i = 0; i < particles; ++i)
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
-        const double d = difference(i, n, paths.duration(n));
-        change.largest = d > change.largest || std::isnan(d) ? d : change.largest;
-      }
+    const auto particles = static_cast<Id>(paths_.particles());
+    double squared_speed = 0;
+    differences_.resize(particles);
+    for (Id i = 0; i < particles; ++i) {
+      squared_speed =
+          std::max({squared_speed, paths_.v[i].squaredNorm(), impulse_[i].squaredNorm() / (p.mass[i] * p.mass[i])});
+      change.note(differences_[i] = difference(p, i, i));
+    }
+    for (const Id i : paths_.noded())
+      for (std::uint32_t n = paths_.next[i]; n != Histories<D>::kNone; n = paths_.next[n])
+        change.note(difference(p, i, n));
+    speed_ = std::sqrt(squared_speed);
     // What the newest impulses still lack is the change times the contraction, this change over the last. It is known
     // best while nobody has settled.
     if (last_change > 0)
       tolerance_ = std::max(tolerance_, std::min(kRounding * last_change / change.largest, kLastAtMost));
-    const double last = tolerance_ * change.speed;
-    for (Id i = 0; i < particles; ++i)
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
-        const double time = paths.duration(n), inner = std::max(kInner, accepted_) * change.speed;
-        const double d = difference(i, n, time);
-        if (d <= (paths.next[n] == Histories<D>::kNone ? last : inner)) continue;
-        change.unsettled = std::max(change.unsettled, d);
-        if (paths.simple(i)) change.smooth = std::max(change.smooth, d);
-        paths.a[n] = impulse_[n] / (p.mass[i] * time);
-        if (mixes) paths.a[n] += mixing_.correction().template segment<D>(D * n) / time;
-        change.settled = false;
-      }
+    unsettled_.clear();
+    Eigen::Index at = 0;
+    for (Id i = 0; i < particles; ++i) settle(p, i, differences_[i], mixes ? &at : nullptr, change);
+    change.speed = speed_;
     return change;
   }
 
+  /// The same after a repair.
+  Change compare_some(const Particles<D>& p) {
+    Change change{.speed = speed_};
+    unsettled_.clear();
+    for (const Id i : affected_) {
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) change.note(difference(p, i, n));
+      settle(p, i, difference(p, i, i), nullptr, change);
+    }
+    return change;
+  }
+
+  /// `first`: the difference of the first interval; `mixed`: where the correction of i by mixing stands, if there is
+  /// one; moved on to that of the next particle.
+  void settle(const Particles<D>& p, Id i, double first, Eigen::Index* mixed, Change& change) {
+    const double last = tolerance_ * speed_, inner = std::max(kInner, accepted_) * speed_;
+    bool settled = true;
+    for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) {
+      const double d = n == i ? first : difference(p, i, n);
+      if (!(d <= (paths_.next[n] == Histories<D>::kNone ? last : inner))) {
+        const double time = paths_.duration(n);
+        change.unsettled = std::max(change.unsettled, d);
+        if (paths_.simple(i)) change.smooth = std::max(change.smooth, d);
+        paths_.a[n] = impulse_[n] / (p.mass[i] * time);
+        if (mixed) paths_.a[n] += mixing_.correction().template segment<D>(*mixed) / time;
+        settled = false;
+      }
+      if (mixed) *mixed += D;
+    }
+    if (!settled) unsettled_.push_back(i);
+    change.settled = change.settled && settled;
+  }
+
   /// Gives everybody whose partners differ from sweep to sweep a node where they first do; whether there was anyone.
-  bool separate(const Histories<D>& paths, const Histories<D>& before) {
+  bool separate(bool repaired) {
     const std::size_t known = extra_.size();
     constexpr auto kNone = Histories<D>::kNone;
-    for (Id i = 0; i < paths.particles(); ++i) {
-      std::uint32_t m = paths.next[i], n = before.next[i];
-      while (m != kNone && n != kNone && same_partners(paths.opening[m], before.opening[n])) {
-        m = paths.next[m];
-        n = before.next[n];
+    auto part = [&](Id i) {
+      std::uint32_t m = paths_.next[i], n = paths_.past[i];
+      while (m != kNone && n != kNone && same_partners(paths_.opening(m), paths_.opening(n))) {
+        m = paths_.next[m];
+        n = paths_.next[n];
       }
-      if (m == kNone && n == kNone) continue;
-      const double time = std::min(m == kNone ? kNever : paths.start[m], n == kNone ? kNever : before.start[n]);
+      if (m == kNone && n == kNone) return;
+      const double time = std::min(m == kNone ? kNever : paths_.start[m], n == kNone ? kNever : paths_.start[n]);
       extra_.push_back({i, time});
+    };
+    if (repaired) {
+      for (const Id i : core_->awake()) part(i);
+    } else {
+      for (const Id i : paths_.had_nodes()) part(i);
+      for (const Id i : paths_.noded())
+        if (paths_.past[i] == kNone) part(i);
     }
     return extra_.size() > known;
   }
 
   /// Gives colliders whose impulses change slowly a node a little before their first collision, so that the force on
   /// the way to it hardly depends on when it comes; whether there was anyone. (A grazing contact moves much with the
-  /// force.) `paths` have their new accelerations already: where these differ, the chord tells.
-  bool steady(const Particles<D>& p, const Histories<D>& paths, const Change& change) {
+  /// force.) Paths have their new accelerations already: where these differ, the chord tells.
+  bool steady(const Particles<D>& p, const Change& change) {
     constexpr double kBefore = 0.1;  // in parts of the way
     const std::size_t known = extra_.size();
-    for (Id i = 0; i < paths.particles(); ++i) {
-      if (paths.simple(i)) continue;
+    for (const Id i : paths_.noded()) {
+      if (paths_.simple(i)) continue;
       double moved = 0;
       std::uint32_t first = Histories<D>::kNone;
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
-        moved = std::max(moved, (impulse_[n] / p.mass[i] - 2 * (paths.chord[n] - paths.v[n])).norm());
-        const std::uint32_t next = paths.next[n];
-        if (first == Histories<D>::kNone && next != Histories<D>::kNone && !is_extra(paths.opening[next])) first = n;
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) {
+        moved = std::max(moved, (impulse_[n] / p.mass[i] - 2 * (paths_.chord[n] - paths_.v[n])).norm());
+        const std::uint32_t next = paths_.next[n];
+        if (first == Histories<D>::kNone && next != Histories<D>::kNone && !is_extra(paths_.opening(next))) first = n;
       }
       if (first != Histories<D>::kNone && moved > 0.1 * change.unsettled)
-        extra_.push_back({i, paths.end(first) - kBefore * paths.duration(first)});
+        extra_.push_back({i, paths_.end(first) - kBefore * paths_.duration(first)});
     }
     return extra_.size() > known;
   }
@@ -388,7 +471,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   /// Moves the particles to the end of the slab: last intervals with the newest impulses. What inner ones lack of
   /// theirs is added to the last velocity, so that no momentum is lost.
   void finish(Particles<D>& p) {
-    const Histories<D>& paths = *now_;
+    const Histories<D>& paths = paths_;
     extrapolation_.pass(paths.length);
     for (Id i = 0; i < p.size(); ++i) {
       const double mass = p.mass[i];
@@ -403,7 +486,8 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     }
   }
 
-  static constexpr double kRoom = 1.25;  // margins in units of the farthest path
+  static constexpr std::size_t kFew = 8;  // a repair pays where no more than one in so many changes
+  static constexpr double kRoom = 1.25;   // margins in units of the farthest path
 
   std::uint64_t max_events_;
   double accepted_;  // for what the sweeps may leave, relative; 0: rounding
@@ -413,14 +497,17 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> extrapolation_;
   SweepRule<D> rule_;
-  Histories<D> paths_[2];
-  const Histories<D>* now_ = nullptr;
-  std::vector<Vec<D>> first_, impulse_, mean_;
-  std::vector<char> changed_;
+  Histories<D> paths_;
+  std::vector<Vec<D>> impulse_, mean_;
+  std::vector<double> differences_;     // of first intervals, from what was flown on
+  std::vector<Id> unsettled_;           // after a sweep
+  std::vector<Id> changed_, affected_;  // by a repair; affected: with the partners of the changed
+  bool remembers_ = true;               // what pairs receive: every interaction
   std::vector<PairMemory<D>> memories_;
   std::vector<ExtraNode> extra_;
   std::uint64_t pairs_ = 0;  // within reach
   double tolerance_ = 0;     // of last intervals, relative
+  double speed_ = 0;         // of the system, at the last sweep of everybody
   Mixing mixing_;
   Counters* counters_ = nullptr;
 };

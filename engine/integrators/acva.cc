@@ -93,7 +93,8 @@ class AsynchronousCollisionVerlet : public Integrator<D> {
       for (const auto& term : system.interactions) term->begin_slab(p.x, kRoom * margin);
       SlabRun<D> run;
       do {
-        paths_.reset(length, p.x, p.v, flight_);
+        paths_.reset(length, p.x, p.v);
+        std::ranges::copy(flight_, paths_.a.begin());
         run = core_->run(paths_, *rule_);
         if (run.end != End::cut) break;
         scan_->count_event(run.key);

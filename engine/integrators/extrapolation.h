@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/vec.h"
+#include "engine/interaction.h"
 
 namespace carom::integrator {
 
@@ -23,21 +23,20 @@ class Extrapolation {
   /// A piece of this length is done; then add() for everybody.
   void pass(double length) {
     std::ranges::rotate(length_, length_.end() - 1);
+    std::ranges::rotate(past_, past_.end() - 1);
     length_[0] = length;
   }
   /// The mean acceleration over the last part of a piece, a time long; the whole piece where it was smooth.
   void add(Id i, const Vec<D>& a, double time) {
-    for (std::size_t k = kOrder; k > 0; --k) past_[k][i] = past_[k - 1][i];
     past_[0][i] = a;
     age_[i] = time < length_[0] ? 1 : std::min<std::uint8_t>(age_[i] + 1, kOrder + 1);
     time_[i] = time;
   }
   /// The mean accelerations of a piece of this length: of the polynomial that had the means known.
-  void expect(double length, std::vector<Vec<D>>& a) {
+  void expect(double length, Vectors<D> a) {
     if (length > kMostGrowth * length_[0])
       for (auto& age : age_) age = std::min<std::uint8_t>(age, 1);
     const auto weight = weights(length);
-    a.resize(age_.size());
     for (std::size_t i = 0; i < a.size(); ++i) {
       a[i] = weight[age_[i]][0] * past_[0][i];
       for (std::size_t k = 1; k < age_[i]; ++k) a[i] += weight[age_[i]][k] * past_[k][i];

@@ -35,16 +35,25 @@ class FieldTerm final : public Interaction<D> {
   void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
     for (Id i = 0; i < x.size(); ++i) out[i] += field_.hessian_product(i, x[i], w[i]);
   }
-  PairCounts add_impulses(const Histories<D>& paths, std::span<const char>, PairMemory<D>&,
-                          Vectors<D> impulse) const override {
+  PairCounts add_impulses(const Histories<D>& paths, PairMemory<D>& memory, Vectors<D> impulse) const override {
     const auto particles = static_cast<Id>(paths.particles());
     PairCounts counts{.pairs = particles};
-    for (Id i = 0; i < particles; ++i)
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n], ++counts.evaluations) {
-        const double time = paths.duration(n);
-        impulse[n] -= time * field_.mean_gradient(i, paths.x[n], paths.x[n] + time * paths.chord[n]);
-      }
+    for (Id i = 0; i < particles; ++i) {
+      add_impulses_on(paths, i, memory, impulse);
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) ++counts.evaluations;
+    }
     return counts;
+  }
+  bool remembers() const override { return true; }
+  std::uint64_t renew_impulses(const Histories<D>&, std::span<const Id> changed, PairMemory<D>&,
+                               std::vector<Id>&) const override {
+    return changed.size();
+  }
+  void add_impulses_on(const Histories<D>& paths, Id i, const PairMemory<D>&, Vectors<D> impulse) const override {
+    for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
+      const double time = paths.duration(n);
+      impulse[n] -= time * field_.mean_gradient(i, paths.x[n], paths.x[n] + time * paths.chord[n]);
+    }
   }
   std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
                                Vec<D>& force) const override {

@@ -79,53 +79,91 @@ class PairTerm final : public Interaction<D> {
 
   void begin_slab(Positions<D> x, double margin) const override { pairs_.begin_slab(x, margin); }
 
-  PairCounts add_impulses(const Histories<D>& paths, std::span<const char> changed, PairMemory<D>& memory,
-                          Vectors<D> impulse) const override {
+  PairCounts add_impulses(const Histories<D>& paths, PairMemory<D>& memory, Vectors<D> impulse) const override {
+    const bool first = memory.impulse.empty();
+    if constexpr (Pairs::kRemembered) memory.impulse.resize(pairs_.pairs_in_slab());
+    memory.stretches.swap(memory.stretches_before);
+    memory.stretches.clear();
     PairCounts counts;
     std::size_t pair = 0;
-    // The impulse of one stretch on i; moves d on to its end.
-    auto over = [&](Id i, Id j, Vec<D>& d, const Vec<D>& u, double time) -> Vec<D> {
-      const Vec<D> d_new = d + time * u, sum = d + d_new;
-      const double rho = d.squaredNorm(), rho_new = d_new.squaredNorm();
-      d = d_new;
-      if (out_of_reach(rho) && out_of_reach(rho_new)) return Vec<D>::Zero();
-      ++counts.evaluations;
-      return (-time * weight_(i, j) * potential_.quotient(rho, rho_new)) * sum;
-    };
+    Vec<D> unremembered;
     pairs_.for_each_in_slab(paths.x, [&](Id i, Id j, const auto& shift) {
+      Vec<D>& kept = Pairs::kRemembered ? memory.impulse[pair++] : unremembered;
+      const bool known = Pairs::kRemembered && !first && !paths.changed[i] && !paths.changed[j];
       const std::uint64_t before = counts.evaluations;
-      const bool simple = paths.simple(i) && paths.simple(j);
-      if constexpr (Pairs::kRemembered)
-        if (pair == memory.impulse.size()) memory.impulse.emplace_back();
-      if (simple && Pairs::kRemembered && !changed[i] && !changed[j]) {
-        impulse[i] += memory.impulse[pair];
-        impulse[j] -= memory.impulse[pair];
+      if (paths.simple(i) && paths.simple(j)) {
+        if (!known) kept = impulse_on_lower(paths, i, j, shift, counts.evaluations);
+        impulse[i] += kept;
+        impulse[j] -= kept;
       } else {
-        Vec<D> d = separation<D>(paths.x[i], paths.x[j], shift);
-        if (simple) {
-          const Vec<D> given = over(i, j, d, paths.chord[i] - paths.chord[j], paths.length);
-          impulse[i] += given;
-          impulse[j] -= given;
-          if constexpr (Pairs::kRemembered) memory.impulse[pair] = given;
+        const auto fresh = static_cast<std::ptrdiff_t>(memory.stretches.size());
+        if (known) {
+          const auto from = memory.stretches_before.begin() + static_cast<std::ptrdiff_t>(kept[0]);
+          paths.for_each_stretch(i, j, [&, at = from](auto...) mutable { memory.stretches.push_back(*at++); });
         } else {
-          paths.for_each_stretch(i, j, [&](std::uint32_t m, std::uint32_t n, double from, double to) {
-            const Vec<D> given = over(i, j, d, paths.chord[m] - paths.chord[n], to - from);
-            impulse[m] += given;
-            impulse[n] -= given;
-          });
+          push_stretches(paths, i, j, shift, memory.stretches, counts.evaluations);
         }
+        kept[0] = static_cast<double>(fresh);
+        auto at = memory.stretches.begin() + fresh;
+        paths.for_each_stretch(i, j, [&](std::uint32_t m, std::uint32_t n, double, double) {
+          impulse[m] += *at;
+          impulse[n] -= *at++;
+        });
+        if constexpr (!Pairs::kRemembered) memory.stretches.clear();
       }
-      ++pair;
       counts.pairs += counts.evaluations > before ? 1 : 0;
     });
     return counts;
+  }
+
+  bool remembers() const override { return Pairs::kRemembered; }
+
+  std::uint64_t renew_impulses(const Histories<D>& paths, std::span<const Id> changed, PairMemory<D>& memory,
+                               std::vector<Id>& partners) const override {
+    std::uint64_t evaluations = 0;
+    for (const Id i : changed)
+      pairs_.for_each_partner_in_slab(paths.x, i, [&](Id partner, const auto& shift, std::uint32_t pair) {
+        partners.push_back(partner);
+        if (partner < i && paths.changed[partner]) return;
+        const Id lo = std::min(i, partner), hi = std::max(i, partner);
+        Vec<D>& kept = memory.impulse[pair];
+        if (paths.simple(lo) && paths.simple(hi)) {
+          kept = impulse_on_lower(paths, lo, hi, shift, evaluations);
+        } else {
+          kept[0] = static_cast<double>(memory.stretches.size());
+          push_stretches(paths, lo, hi, shift, memory.stretches, evaluations);
+        }
+      });
+    return evaluations;
+  }
+
+  void add_impulses_on(const Histories<D>& paths, Id i, const PairMemory<D>& memory,
+                       Vectors<D> impulse) const override {
+    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id partner, const auto&, std::uint32_t pair) {
+      const Vec<D>& kept = memory.impulse[pair];
+      if (paths.simple(i) && paths.simple(partner)) {
+        if (i < partner)
+          impulse[i] += kept;
+        else
+          impulse[i] -= kept;
+        return;
+      }
+      auto at = memory.stretches.begin() + static_cast<std::ptrdiff_t>(kept[0]);
+      paths.for_each_stretch(std::min(i, partner), std::max(i, partner),
+                             [&](std::uint32_t m, std::uint32_t n, double, double) {
+                               if (i < partner)
+                                 impulse[m] += *at++;
+                               else
+                                 impulse[n] -= *at++;
+                             });
+    });
   }
 
   std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
                                Vec<D>& force) const override {
     std::uint64_t evaluations = 0;
     const std::uint32_t m = paths.last[i];
-    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id j, const auto& shift) {
+    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id j, const auto& shift, std::uint32_t) {
       auto on_i = [&](std::uint32_t n, double t) -> Vec<D> {
         const Vec<D> on_lower = i < j ? force_at(paths, i, j, m, n, t, shift, evaluations)
                                       : force_at(paths, j, i, n, m, t, shift, evaluations);
@@ -149,7 +187,7 @@ class PairTerm final : public Interaction<D> {
 
   std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const override {
     std::uint64_t evaluations = 0;
-    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id partner, const auto& shift) {
+    pairs_.for_each_partner_in_slab(paths.x, i, [&](Id partner, const auto& shift, std::uint32_t) {
       if (partner < i && !paths.simple(partner)) return;
       const Id lo = std::min(i, partner), hi = std::max(i, partner);
       const Vec<D> first = force_at(paths, lo, hi, lo, hi, 0, shift, evaluations);
@@ -194,6 +232,30 @@ class PairTerm final : public Interaction<D> {
       return rho >= potential_.cutoff_squared();
     else
       return false;
+  }
+
+  /// The impulse on i of the pair (i, j), i < j, over a stretch that begins at separation d; moves d on to its end.
+  Vec<D> over_stretch(Id i, Id j, Vec<D>& d, const Vec<D>& u, double time, std::uint64_t& evaluations) const {
+    const Vec<D> d_new = d + time * u, sum = d + d_new;
+    const double rho = d.squaredNorm(), rho_new = d_new.squaredNorm();
+    d = d_new;
+    if (out_of_reach(rho) && out_of_reach(rho_new)) return Vec<D>::Zero();
+    ++evaluations;
+    return (-time * weight_(i, j) * potential_.quotient(rho, rho_new)) * sum;
+  }
+  /// Over the whole slab, where neither has inner nodes.
+  template <class Shift>
+  Vec<D> impulse_on_lower(const Histories<D>& paths, Id i, Id j, const Shift& shift, std::uint64_t& evaluations) const {
+    Vec<D> d = separation<D>(paths.x[i], paths.x[j], shift);
+    return over_stretch(i, j, d, paths.chord[i] - paths.chord[j], paths.length, evaluations);
+  }
+  template <class Shift>
+  void push_stretches(const Histories<D>& paths, Id i, Id j, const Shift& shift, std::vector<Vec<D>>& stretches,
+                      std::uint64_t& evaluations) const {
+    Vec<D> d = separation<D>(paths.x[i], paths.x[j], shift);
+    paths.for_each_stretch(i, j, [&](std::uint32_t m, std::uint32_t n, double from, double to) {
+      stretches.push_back(over_stretch(i, j, d, paths.chord[m] - paths.chord[n], to - from, evaluations));
+    });
   }
 
   /// The force on i of the pair (i, j), i < j, at time t, which belongs to the intervals m of i and n of j.

@@ -8,9 +8,10 @@
 // and for a slab in which nobody strays farther than `margin` from its start x
 //   begin_slab(x, margin)
 //   for_each_in_slab(x, visit)              as for_each
-//   for_each_partner_in_slab(x, i, visit)   calls visit(j, shift) for the pairs of i, in the order (j, image); the
-//   shift
-//                                           is that of the pair (lower id, higher id)
+//   for_each_partner_in_slab(x, i, visit)   calls visit(j, shift, pair) for the pairs of i, in the order (j, image);
+//                                           the shift is that of the pair (lower id, higher id), `pair` its place in
+//                                           the loop over all
+//   pairs_in_slab()                         how many these are
 //   kRemembered                             whether it pays to keep what was found for a pair
 
 #include <cmath>
@@ -65,16 +66,32 @@ class Bonds {
 
   void begin_slab(Positions<D> x, double /*margin*/) const {
     if (partners_.empty()) partners_.build(x.size(), pairs_.size(), [&](std::size_t k) { return pairs_[k]; });
+    wrapped_.clear();
+    std::uint32_t pair = 0;
+    for_each(x, x, [&](Id, Id, const Vec<D>& shift) {
+      if (shift != Vec<D>::Zero()) wrapped_.push_back({pair, shift});
+      ++pair;
+    });
   }
+  std::size_t pairs_in_slab() const { return pairs_.size(); }
   template <class Visit>
-  void for_each_in_slab(Positions<D> x, Visit&& visit) const {
-    for_each(x, x, visit);
+  void for_each_in_slab(Positions<D>, Visit&& visit) const {
+    const std::size_t pairs = pairs_.size();
+    std::size_t pair = 0;
+    const Vec<D> none = Vec<D>::Zero();
+    for (std::size_t k = 0; k <= wrapped_.size(); ++k) {
+      for (const std::size_t end = k < wrapped_.size() ? wrapped_[k].pair : pairs; pair < end; ++pair)
+        visit(pairs_[pair][0], pairs_[pair][1], none);
+      if (pair == pairs) return;
+      visit(pairs_[pair][0], pairs_[pair][1], wrapped_[k].shift);
+      ++pair;
+    }
   }
   template <class Visit>
   void for_each_partner_in_slab(Positions<D> x, Id i, Visit&& visit) const {
     for (const auto& [j, pair] : partners_.of(i)) {
       const auto& [lo, hi] = pairs_[pair];
-      visit(j, box_.shift(box_.nearest_image(x[lo] - x[hi])));
+      visit(j, box_.shift(box_.nearest_image(x[lo] - x[hi])), pair);
     }
   }
 
@@ -98,8 +115,13 @@ class Bonds {
   }
 
   const Box<D>& box_;
+  struct Wrapped {
+    std::uint32_t pair;
+    Vec<D> shift;
+  };
   PairList pairs_;
-  mutable Partners partners_;  // a cache
+  mutable Partners partners_;             // a cache
+  mutable std::vector<Wrapped> wrapped_;  // the bonds of the slab that span another image, in their order
 };
 
 /// All pairs of `particles` particles, in a box without periodic axes; nothing is stored.
@@ -117,10 +139,11 @@ class AllPairs {
   void for_each_in_slab(Positions<D> x, Visit&& visit) const {
     for_each(x, x, visit);
   }
+  std::size_t pairs_in_slab() const { return 0; }  // of those that are remembered
   template <class Visit>
   void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
     for (Id j = 0; j < particles_; ++j)
-      if (j != i && species_.contains(i, j)) visit(j, NoShift{});
+      if (j != i && species_.contains(i, j)) visit(j, NoShift{}, 0);
   }
 
   template <class Visit>
@@ -153,15 +176,17 @@ class PairsWithinCutoff {
   void begin_slab(Positions<D> x, double margin) const {
     in_slab_ = list_.cover(x, margin);
     particles_ = x.size();
-    partners_.clear();
+    if (rebuilds_ != list_.rebuilds()) partners_.clear();
+    rebuilds_ = list_.rebuilds();
   }
+  std::size_t pairs_in_slab() const { return in_slab_.size(); }
   template <class Visit>
   void for_each_in_slab(Positions<D>, Visit&& visit) const {
     for (const NeighbourPair<D>& pair : in_slab_) visit(pair.i, pair.j, box_.shift(pair.image));
   }
   template <class Visit>
   void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
-    for (const auto& [j, pair] : partners().of(i)) visit(j, box_.shift(in_slab_[pair].image));
+    for (const auto& [j, pair] : partners().of(i)) visit(j, box_.shift(in_slab_[pair].image), pair);
   }
 
  private:
@@ -184,6 +209,7 @@ class PairsWithinCutoff {
   mutable std::span<const NeighbourPair<D>> in_slab_;
   mutable std::size_t particles_ = 0;
   mutable Partners partners_;
+  mutable std::uint64_t rebuilds_ = 0;  // of the list that the partners are from
 };
 
 }  // namespace carom
