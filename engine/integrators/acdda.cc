@@ -15,7 +15,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include "engine/error.h"
@@ -23,6 +22,7 @@
 #include "engine/integrators/extrapolation.h"
 #include "engine/integrators/mixing.h"
 #include "engine/integrators/registry.h"
+#include "engine/integrators/sweep_rule.h"
 #include "engine/slab_core.h"
 
 namespace carom::integrator {
@@ -38,51 +38,6 @@ constexpr double kMixed = 0.2;  // contraction from which on sweeps are mixed
 // node it enters the energy to first order, in last ones, whose ends are given with the newest impulses, to second.
 constexpr double kInner = 2e-16, kLastAtMost = 1e-12, kLastAtLeast = 1e-15, kRounding = 1e-16;
 constexpr double kStalled = 1e-13;  // where increments stop shrinking below this, rounding is amplified by collisions
-
-/// Whether two events have the same partners, whenever they happen.
-template <int D>
-bool same_partners(const EventKey<D>& a, const EventKey<D>& b) {
-  return a.kind == b.kind && a.lo == b.lo && a.hi == b.hi && a.image == b.image;
-}
-
-/// Whether particle i has the same partners as in the sweep before, met in the same order.
-template <int D>
-bool same_meetings(const Histories<D>& paths, Id i) {
-  std::uint32_t m = paths.next[i], n = paths.past[i];
-  for (; m != Histories<D>::kNone && n != Histories<D>::kNone; m = paths.next[m], n = paths.next[n])
-    if (!same_partners(paths.opening(m), paths.opening(n))) return false;
-  return m == n;
-}
-
-/// Flights of a sweep: on the mean forces of the same interval in the sweep before.
-template <int D>
-class SweepRule : public NodeRule<D> {
- public:
-  /// Before everybody is run. `first`: there was no sweep before.
-  void follow(bool first, std::size_t particles) {
-    first_ = first;
-    interval_.resize(particles);
-    std::iota(interval_.begin(), interval_.end(), 0);
-  }
-  void woken(Id i, std::uint32_t past) override {
-    first_ = false;
-    interval_[i] = past;
-  }
-  void node(const Histories<D>& paths, Id i, double t, const EventKey<D>& key, Vec<D>& v, Vec<D>& a) override {
-    const std::uint32_t m = paths.last[i];
-    v = paths.velocity_in(m, t);
-    a = paths.a[m];
-    if (first_) return;
-    const std::uint32_t expected = interval_[i] == i ? paths.past[i] : paths.next[interval_[i]];
-    const bool same = expected != Histories<D>::kNone && same_partners(paths.opening(expected), key);
-    interval_[i] = same ? expected : paths.past_at(i, t);
-    a = paths.a[interval_[i]];
-  }
-
- private:
-  bool first_ = true;
-  std::vector<std::uint32_t> interval_;  // of the sweep before, where each particle is
-};
 
 template <int D>
 class AsynchronousDiscreteDerivative : public Integrator<D> {
