@@ -13,19 +13,16 @@ which makes the slope steeper. Errors at rounding level have none. Runs that fai
 rows without an error, and left out of the figure. The decks of all runs are left beside the CSV.
 """
 
-import argparse
 import concurrent.futures
-import csv
 import os
-import pathlib
 import sys
 import tempfile
-import tomllib
 
 import numpy as np
 
-from carom_files import RunFailed, find_carom, run_carom, toml_text
+from carom_files import RunFailed
 from carom_plot import picture
+from studies import parse, read_deck, relative_error, run_deck, study_parser, variant, with_markers, write_table
 
 ROUNDING = 1e-11  # relative to E_ref: below, an error is called rounding and given no order
 COLUMNS = ["method", "step", "start", "max_abs_energy_error", "energy_reference", "relative_energy_error",
@@ -34,40 +31,19 @@ COLUMNS = ["method", "step", "start", "max_abs_energy_error", "energy_reference"
 
 
 def parse_arguments(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("deck", type=pathlib.Path)
-    parser.add_argument("--methods", default="psa,cva,mcva,cdda", help="names, each with keys: cdda:order=4")
-    parser.add_argument("--steps", default="0.3,0.1,0.03,0.01,0.003,0.001")
-    parser.add_argument("--count", type=int, default=5000, help="steps a run")
-    parser.add_argument("--end-time", type=float, help="go to this time instead of making --count steps")
+    parser = study_parser(__doc__, "psa,cva,mcva,cdda")
+    parser.set_defaults(steps="0.3,0.1,0.03,0.01,0.003,0.001")
+    parser.add_argument("--count", type=int, default=5000, help="steps a run, without --end-time")
     parser.add_argument("--starts", type=int, default=1, help="how many initial states to average over")
     parser.add_argument("--perturbation", type=float, default=0.01,
                         help="half-width of the uniform perturbation of each coordinate and velocity")
     parser.add_argument("--seed", type=int, default=20070101)
     parser.add_argument("--fit-below", type=float, default=0.03, help="largest step that enters the order")
-    parser.add_argument("--carom", help="the command; default: $CAROM or the build of tools/run")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="runs at a time")
-    parser.add_argument("-o", "--output", type=pathlib.Path, help="directory; default: runs/energy-study-<deck>")
-    options = parser.parse_args(arguments)
-    options.methods = options.methods.split(",")
-    options.steps = sorted((float(step) for step in options.steps.split(",")), reverse=True)
-    options.output = options.output or pathlib.Path("runs") / f"energy-study-{options.deck.stem}"
-    if options.starts < 1 or min(options.steps) <= 0:
-        parser.error("--starts must be at least 1 and every step positive")
+    options = parse(parser, arguments, "energy-study")
+    if options.starts < 1:
+        parser.error("--starts must be at least 1")
     return options
-
-
-def integrator_table(method, step):
-    """The deck's [integrator] for a method given as name[:key=value…]."""
-    name, *keys = method.split(":")
-    table = {"type": name, "step": step}
-    for key in keys:
-        key, _, value = key.partition("=")
-        try:
-            table |= tomllib.loads(f"{key} = {value}")
-        except tomllib.TOMLDecodeError:  # a word without quotes
-            table[key] = value
-    return table
 
 
 def perturbed(deck, start, amplitude, seed):
@@ -87,27 +63,21 @@ def perturbed(deck, start, amplitude, seed):
     return deck | {"particles": tables}
 
 
-def run_one(options, carom, deck, method, step, start):
+def run_one(options, deck, method, step, start):
     """Runs one method at one step from one start; returns its row of the CSV."""
     name = f"{method.replace(':', '-').replace('=', '-')}-{step:g}-{start:02d}"
-    plan = {"end_time": options.end_time} if options.end_time else {"steps": options.count}
-    deck = perturbed(deck, start, options.perturbation, options.seed) | {
-        "integrator": integrator_table(method, step), "run": plan,
-        "output": {"frame_interval": 0.0, "thermo_interval": 0.0}}
-    file = options.output / "decks" / f"{name}.toml"
-    file.write_text(toml_text(deck))
+    deck = variant(perturbed(deck, start, options.perturbation, options.seed), method, step,
+                   {"end_time": options.end_time} if options.end_time else {"steps": options.count})
     row = dict.fromkeys(COLUMNS, "") | {"method": method, "step": step, "start": start}
     try:
         with tempfile.TemporaryDirectory() as directory:
-            summary = run_carom(carom, file, directory)
+            summary = run_deck(options, deck, options.output / "decks" / f"{name}.toml", directory)
     except RunFailed as failure:
-        if failure.code == 2:  # not a numerical failure: the question was wrong
-            raise SystemExit(str(failure)) from failure
         print(f"{name}: {failure}", file=sys.stderr)
         return row | {"status": f"failed ({failure.code})"}
-    error, reference = summary["energy"]["max_abs_error"], summary["energy"]["reference"]
     return row | {
-        "max_abs_energy_error": error, "energy_reference": reference, "relative_energy_error": error / reference,
+        "max_abs_energy_error": summary["energy"]["max_abs_error"], "energy_reference": summary["energy"]["reference"],
+        "relative_energy_error": relative_error(summary),
         "max_abs_shadow_energy_error": summary["shadow_energy"]["max_abs_error"],
         "max_overlap": summary["max_overlap"], "sphere_sphere": summary["events"]["sphere_sphere"],
         "sphere_wall": summary["events"]["sphere_wall"], "steps": summary["steps"],
@@ -146,25 +116,21 @@ def draw(rows, options, title, file):
     length = f"to t = {options.end_time:g}" if options.end_time else f"{options.count} steps"
     starts = f", {options.starts} starts" if options.starts > 1 else ""
     with picture(file, xlabel="step", ylabel=r"largest $|H - H_1|$", title=f"{title}\n{length}{starts}") as axes:
-        for method, marker in zip(options.methods, "osD^vPX*" * len(options.methods)):
+        for method, marker in with_markers(options.methods):
             steps, errors = curve(rows, method)
             axes.loglog(steps, errors, marker=marker, label=describe(rows, method, options))
 
 
 def main(arguments=None):
     options = parse_arguments(arguments)
-    carom = find_carom(options.carom)
-    deck = tomllib.loads(options.deck.read_text())
+    deck = read_deck(options)
     (options.output / "decks").mkdir(parents=True, exist_ok=True)
     cases = [(method, step, start) for method in options.methods for step in options.steps
              for start in range(options.starts)]
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        rows = list(pool.map(lambda case: run_one(options, carom, deck, *case), cases))
+        rows = list(pool.map(lambda case: run_one(options, deck, *case), cases))
     table, figure = options.output / "energy.csv", options.output / "energy.png"
-    with open(table, "w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(rows)
+    write_table(table, COLUMNS, rows)
     draw(rows, options, deck.get("title", options.deck.stem), figure)
     for method in options.methods:
         print(describe(rows, method, options).replace(r"$E_{\mathrm{ref}}$", "E_ref"))

@@ -21,6 +21,7 @@ import movie
 import plot_energy
 import plot_msd
 import plot_rdf
+import studies
 from carom_files import Trajectory, toml_text
 from synthetic_run import write_run
 
@@ -248,8 +249,8 @@ def test_perturbed_starts_are_seeded_and_bounded():
 
 
 def test_integrator_tables():
-    assert energy_study.integrator_table("cdda:order=4", 0.1) == {"type": "cdda", "step": 0.1, "order": 4}
-    assert energy_study.integrator_table("mcva:variant=restart", 1.0)["variant"] == "restart"
+    assert studies.integrator_table("cdda:order=4", 0.1) == {"type": "cdda", "step": 0.1, "order": 4}
+    assert studies.integrator_table("mcva:variant=restart", 1.0)["variant"] == "restart"
 
 
 @pytest.mark.skipif("CAROM" not in os.environ, reason="needs the command: CAROM=build/release/io/carom")

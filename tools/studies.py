@@ -1,0 +1,91 @@
+"""What energy_study.py and cost_study.py share: options, a deck for each run, runs, tables.
+
+    parser = study_parser(__doc__, "psa,cva,mcva,cdda")
+    parser.add_argument(...)
+    options = parse(parser, arguments, "energy-study")      # .deck, .methods, .steps, .set, .carom, .output
+    summary = run_deck(options, variant(deck, "cdda:order=4", 0.01, {"steps": 100}), "deck.toml", "runs/here")
+"""
+
+import argparse
+import csv
+import pathlib
+import tomllib
+
+from carom_files import RunFailed, find_carom, run_carom, toml_text
+
+
+def study_parser(description, methods):
+    """A parser of what every study is told; `methods` are the ones it compares unless told otherwise."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("deck", type=pathlib.Path)
+    parser.add_argument("--methods", default=methods, help="names, each with keys: cdda:order=4")
+    parser.add_argument("--steps", help="default: the deck's own")
+    parser.add_argument("--end-time", type=float, help="of every run")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="changes the deck, as in carom run")
+    parser.add_argument("--carom", help="the command; default: $CAROM or the build of tools/run")
+    parser.add_argument("-o", "--output", type=pathlib.Path, help="directory; default: runs/<study>-<deck>")
+    return parser
+
+
+def parse(parser, arguments, study):
+    """The options, lists split; steps fall."""
+    options = parser.parse_args(arguments)
+    options.methods = options.methods.split(",")
+    steps = options.steps.split(",") if options.steps else [read_deck(options)["integrator"]["step"]]
+    options.steps = sorted(map(float, steps), reverse=True)
+    options.output = options.output or pathlib.Path("runs") / f"{study}-{options.deck.stem}"
+    if options.steps[-1] <= 0:
+        parser.error("every step must be positive")
+    return options
+
+
+def read_deck(options):
+    return tomllib.loads(options.deck.read_text())
+
+
+def integrator_table(method, step):
+    """The deck's [integrator] for a method given as name[:key=value…]."""
+    name, *keys = method.split(":")
+    table = {"type": name, "step": step}
+    for key in keys:
+        key, _, value = key.partition("=")
+        try:
+            table |= tomllib.loads(f"{key} = {value}")
+        except tomllib.TOMLDecodeError:  # a word without quotes
+            table[key] = value
+    return table
+
+
+def variant(deck, method, step, plan):
+    """The deck with another method and [run], and nothing written but its ends."""
+    return deck | {"integrator": integrator_table(method, step), "run": plan,
+                   "output": {"frame_interval": 0.0, "thermo_interval": 0.0}}
+
+
+def run_deck(options, deck, file, directory, overrides=()):
+    """Writes a deck to a file and runs it; returns the summary. A run that fails numerically raises RunFailed; where the
+    question was wrong the study ends."""
+    pathlib.Path(file).write_text(toml_text(deck))
+    try:
+        return run_carom(find_carom(options.carom), file, directory, [*options.set, *overrides])
+    except RunFailed as failure:
+        if failure.code == 2:
+            raise SystemExit(str(failure)) from failure
+        raise
+
+
+def relative_error(summary):
+    """The largest |H − H₁| of a run over its E_ref."""
+    return summary["energy"]["max_abs_error"] / summary["energy"]["reference"]
+
+
+def write_table(file, columns, rows):
+    with open(file, "w", newline="") as stream:
+        writer = csv.DictWriter(stream, columns)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def with_markers(methods):
+    """(method, marker of its curve) for each."""
+    return zip(methods, "osD^vPX*" * len(methods))
