@@ -154,21 +154,29 @@ TEST(Asynchronous, APairMeetsAgainAndAgainWithinOneSlab) {
 
 TEST(Asynchronous, BouncesLowerThanTheLastBitOfAPositionKeepTheirTimes) {
   // A disc that leaves its contact at 1e-9 is drawn back from a height of 1e-18: when, only the knowledge that it
-  // touches tells.
-  for (const char* method : {"acva", "acdda"})
-    for (const bool wall : {false, true}) {
-      std::vector<Vec<2>> x = {{5, 3}, {6, 3}}, v = {{-5e-10, 0}, {5e-10, 0}};
-      if (wall) x = {{5.1, 0.5}}, v = {{0, 1e-9}};
-      auto system = test::make_system<2>({12, 6}, Boundary::wall, std::move(x), std::move(v));
-      if (wall)
-        test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0.0, -2.0}}});
-      else
-        test::add_interaction(*system, "gravity", {{"constant", 1.0}});
+  // touches tells. The gap that its coordinates give is off by more, in one direction or the other.
+  for (const char* method : {"acva", "acdda"}) {
+    auto bounces = [&](std::vector<Vec<2>> x, std::vector<Vec<2>> v, const char* force, const test::Given& given) {
+      auto system = test::make_system<2>({6, 6}, Boundary::wall, std::move(x), std::move(v));
+      test::add_interaction(*system, force, given);
       const auto run = test::run_steps<2>(std::move(system), method, 20.5e-9, 1);  // a bounce takes 1e-9
+      EXPECT_NEAR(run->system().particles.v[0].norm(), 0, 1e-12) << method;        // halfway
       const auto& counters = run->statistics().counters;
-      EXPECT_EQ(wall ? counters.sphere_wall : counters.sphere_sphere, 20u) << method << " " << wall;
-      EXPECT_NEAR(std::abs(run->system().particles.v[0][wall ? 1 : 0]), 0, 1e-12) << method << " " << wall;
+      return counters.sphere_sphere + counters.sphere_wall;
+    };
+    for (int k = 0; k < 16; ++k) {
+      const Vec<2> apart(std::cos(0.1 * k), std::sin(0.1 * k)), middle(3.1, 2.9);
+      EXPECT_EQ(bounces({middle + 0.5 * apart, middle - 0.5 * apart}, {0.5e-9 * apart, -0.5e-9 * apart}, "gravity",
+                        {{"constant", 1.0}}),
+                20u)
+          << method << " " << k;
     }
+    for (const double away : {-4, -1, 0, 1, 4})  // in last bits
+      EXPECT_EQ(bounces({{3, 5.5 + away * 8.9e-16}}, {{0, -1e-9}}, "uniform-field",
+                        {{"acceleration", std::vector<double>{0.0, 2.0}}}),
+                20u)
+          << method << " " << away;
+  }
 }
 
 TEST(Asynchronous, WithoutForcesCollisionsAreThoseOfTheEventCore) {
@@ -180,6 +188,55 @@ TEST(Asynchronous, WithoutForcesCollisionsAreThoseOfTheEventCore) {
       SCOPED_TRACE(method);
       expect_same_collisions(mine, theirs, 1e-9);
     }
+}
+
+TEST(Asynchronous, WhoIsHitMayGetFartherThanAnyoneWouldHave) {
+  // A heavy disc makes a light one twice as fast as itself, and a third comes from beyond what was looked at for that.
+  auto system = [] {
+    return test::make_system<2>({60, 10}, Boundary::open, {{2, 5}, {4, 5}, {31.5, 5}}, {{10, 0}, {0, 0}, {-10, 0}}, {},
+                                {1000, 1, 1});
+  };
+  const auto theirs = collisions<2>(system(), "free-flight", 1, 1);
+  ASSERT_GE(theirs.keys.size(), 2u);
+  for (const char* method : {"acva", "acdda"}) {
+    SCOPED_TRACE(method);
+    expect_same_collisions(collisions<2>(system(), method, 1, 1), theirs, 1e-9);
+  }
+}
+
+TEST(Asynchronous, WhoFallsFasterThanTheFirstSweepExpectsIsSeen) {
+  // From rest, on the force at the start, two discs would get 0.36 nearer to each other; their gap is 0.5.
+  auto system =
+      test::make_system<2>({10, 10}, Boundary::open, {{5, 5}, {6, 5}}, {{0, 0}, {0, 0}}, {0.25, 0.25}, {1, 1});
+  test::add_interaction(*system, "gravity", {{"constant", 1.0}});
+  const auto run = test::run_steps<2>(std::move(system), "acdda", 0.6, 1);
+  const auto& s = run->statistics();
+  EXPECT_EQ(s.counters.sphere_sphere, 1u);
+  EXPECT_EQ(s.counters.slabs_halved, 0u);
+  EXPECT_LE(s.counters.max_overlap, 1e-12);
+}
+
+TEST(Asynchronous, WhoArrivesPartingDoesNotCollide) {
+  // Flights on the weak force of the start touch; the force at contact has turned the velocities round by then.
+  auto pair = test::make_system<2>({10, 10}, Boundary::open, {{4, 5}, {5.3, 5}}, {{1, 0}, {-1, 0}});
+  test::add_interaction(*pair, "yukawa", {{"amplitude", 20 * std::exp(20.0)}, {"kappa", 20.0}, {"charges", false}});
+  auto wall = test::make_system<2>({6, 6}, Boundary::wall, {{3, 3}}, {{1, 0}});
+  test::add_interaction(*wall, "harmonic-trap", {{"stiffness", 1.0}});
+  for (auto* system : {&pair, &wall}) {
+    const auto run = test::run_steps<2>(std::move(*system), "acva", 3, 1);
+    const auto& counters = run->statistics().counters;
+    EXPECT_EQ(counters.sphere_sphere + counters.sphere_wall, 0u);
+    EXPECT_LE(counters.max_overlap, 1e-12);
+  }
+}
+
+TEST(Asynchronous, PairsThatMeetAsSlowlyAsRoundingDoNotPass) {
+  for (const char* method : {"acva", "acdda"}) {
+    auto system = test::make_system<2>({60, 10}, Boundary::open, {{2, 5}, {3 + 1e-8, 5}, {30, 2}},
+                                       {{0, 0}, {-1e-7, 0}, {0, 1e6}});
+    const auto run = test::run_steps<2>(std::move(system), method, 0.2, 3);
+    EXPECT_LE(run->statistics().counters.max_overlap, 1e-12) << method;
+  }
 }
 
 TEST(Asynchronous, ABlowThroughAChainIsToldInItsCausalOrder) {
