@@ -27,7 +27,8 @@ struct Box {
   Image<D> nearest_image(const Vec<D>& d) const {
     Image<D> image{};
     for (int k = 0; k < D; ++k)
-      if (periodic(k)) image[k] = -static_cast<std::int32_t>(std::nearbyint(d[k] / edges[k]));
+      if (periodic(k) && !(std::abs(d[k]) <= 0.5 * edges[k]))  // else the quotient rounds to zero
+        image[k] = -static_cast<std::int32_t>(std::nearbyint(d[k] / edges[k]));
     return image;
   }
 

@@ -169,17 +169,17 @@ template <int D>
 class CellTable {
  public:
   CellTable(const CellGrid<D>& grid, std::span<const Vec<D>> x)
-      : grid_(grid), start_(grid.cells() + 1), who_(x.size()), boxes_(x.size()) {
-    std::vector<std::size_t> at(x.size());
+      : grid_(grid), start_(grid.cells() + 2), who_(x.size()), boxes_(x.size()) {
+    std::vector<std::uint32_t> at(x.size());
     for (std::size_t i = 0; i < x.size(); ++i) {
       const Cell<D> c = grid.cell(x[i]);
-      at[i] = grid.index(c);
+      at[i] = static_cast<std::uint32_t>(grid.index(c));
       for (int k = 0; k < D; ++k) boxes_[i][k] = grid.boxes(k, c[k]);
-      ++start_[at[i] + 1];
+      ++start_[at[i] + 2];
     }
+    // While filling, start_[c + 1] is where the next one in cell c goes.
     for (std::size_t c = 0; c + 1 < start_.size(); ++c) start_[c + 1] += start_[c];
-    auto fill = start_;
-    for (std::size_t i = 0; i < x.size(); ++i) who_[fill[at[i]]++] = static_cast<Id>(i);
+    for (std::size_t i = 0; i < x.size(); ++i) who_[start_[at[i] + 1]++] = static_cast<Id>(i);
   }
 
   /// Calls visit(j, image) for every particle j (the one at `x` among them) whose image may lie within `reach` of x:
@@ -189,8 +189,21 @@ class CellTable {
     Cell<D> range;
     for (int k = 0; k < D; ++k)
       range[k] = std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid_.edge(k) - 1e-9), kFarthest)));
-    grid_.for_each_around(grid_.cell(x), range, [&](std::size_t cell, const Image<D>& away) {
-      for (std::size_t q = start_[cell]; q < start_[cell + 1]; ++q) {
+    const Cell<D> centre = grid_.cell(x);
+    bool inside = true;
+    for (int k = 0; k < D; ++k) inside = inside && centre[k] >= range[k] && centre[k] < grid_.count(k) - range[k];
+    if (inside) {  // no images, and the cells of a row stand together
+      Cell<D> row;
+      for (int k = 0; k < D; ++k) row[k] = centre[k] - range[k];
+      const auto length = static_cast<std::size_t>(2 * range[D - 1] + 1);
+      do {
+        const std::size_t first = grid_.index(row);
+        for (std::uint32_t q = start_[first]; q < start_[first + length]; ++q) visit(who_[q], boxes_[who_[q]]);
+      } while (next_row(row, centre, range));
+      return;
+    }
+    grid_.for_each_around(centre, range, [&](std::size_t cell, const Image<D>& away) {
+      for (std::uint32_t q = start_[cell]; q < start_[cell + 1]; ++q) {
         const Id j = who_[q];
         Image<D> image;
         for (int k = 0; k < D; ++k) image[k] = boxes_[j][k] - away[k];
@@ -201,8 +214,18 @@ class CellTable {
 
  private:
   static constexpr double kFarthest = 1 << 28;  // cells: what an integer holds
+
+  /// Moves on to the next row within `range` of the centre; false after the last.
+  static bool next_row(Cell<D>& row, const Cell<D>& centre, const Cell<D>& range) {
+    for (int k = D - 2; k >= 0; --k) {
+      if (++row[k] <= centre[k] + range[k]) return true;
+      row[k] = centre[k] - range[k];
+    }
+    return false;
+  }
+
   CellGrid<D> grid_;
-  std::vector<std::size_t> start_;
+  std::vector<std::uint32_t> start_;
   std::vector<Id> who_;
   std::vector<Image<D>> boxes_;
 };

@@ -37,15 +37,21 @@ NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, st
 template <int D>
 std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new,
                                                           double margin) {
-  follow_wraps(x);
   const bool known = built_at_.size() == x.size(), still = x.data() == x_new.data();
+  std::vector<Image<D>> crossed;
   double squared_from_build = 0, squared_step = 0;  // the largest distances: two bounds for everybody
   for (std::size_t i = 0; i < x.size(); ++i) {
-    if (known) squared_from_build = std::max(squared_from_build, (x[i] - built_at_[i]).squaredNorm());
+    if (known) {
+      follow_wrap(static_cast<Id>(i), x, crossed);
+      squared_from_build = std::max(squared_from_build, (x[i] - built_at_[i]).squaredNorm());
+    }
     if (still) continue;
     if (known) squared_from_build = std::max(squared_from_build, (x_new[i] - built_at_[i]).squaredNorm());
     squared_step = std::max(squared_step, (x_new[i] - x[i]).squaredNorm());
   }
+  if (!crossed.empty())
+    for (auto& pair : pairs_)  // the images of two particles all change by as much: their order stays
+      for (int k = 0; k < D; ++k) pair.image[k] += crossed[pair.i][k] - crossed[pair.j][k];
   const double step = std::sqrt(squared_step) + margin;
   const bool covers = known && std::sqrt(squared_from_build) + margin <= 0.5 * skin_;
   const double wanted = std::max(least_skin_, 4 * step);        // room for the step and for some more of its size
@@ -62,20 +68,14 @@ std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>
   return pairs_;
 }
 
+/// Where particle i has been wrapped since the last time: notes it and moves its position at the build along.
 template <int D>
-void NeighbourList<D>::follow_wraps(std::span<const Vec<D>> x) {
-  if (built_at_.size() != x.size()) return;
-  std::vector<Image<D>> crossed;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const Image<D> jump = box_.nearest_image(x[i] - built_at_[i]);
-    if (jump == Image<D>{}) continue;
-    if (crossed.empty()) crossed.resize(x.size());
-    crossed[i] = jump;
-    built_at_[i] -= box_.shift(jump);
-  }
-  if (crossed.empty()) return;
-  for (auto& pair : pairs_)  // the images of two particles all change by as much: their order stays
-    for (int k = 0; k < D; ++k) pair.image[k] += crossed[pair.i][k] - crossed[pair.j][k];
+void NeighbourList<D>::follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<Image<D>>& crossed) {
+  const Image<D> jump = box_.nearest_image(x[i] - built_at_[i]);
+  if (jump == Image<D>{}) return;
+  if (crossed.empty()) crossed.resize(x.size());
+  crossed[i] = jump;
+  built_at_[i] -= box_.shift(jump);
 }
 
 template <int D>

@@ -44,7 +44,7 @@ class NeighbourList {
  private:
   void build(std::span<const Vec<D>> x);
   std::vector<SizeClass<D>> group(std::span<const Vec<D>> x) const;
-  void follow_wraps(std::span<const Vec<D>> x);
+  void follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<Image<D>>& crossed);
 
   const Box<D>& box_;
   std::vector<double> reach_;

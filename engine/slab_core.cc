@@ -44,6 +44,7 @@ SlabRun<D> SlabCore<D>::run(Histories<D>& paths, NodeRule<D>& rule, std::span<co
   }
   repairs_ = false;
   queue_.clear();
+  serving_ = false;
   contacts_.clear();
   met_.clear();
   paths.forget();
@@ -65,6 +66,7 @@ SlabRun<D> SlabCore<D>::run(Histories<D>& paths, NodeRule<D>& rule, std::span<co
   for (const ExtraNode& node : extra) plan({extra_node_key<D>(node), 0, 0, true});
   const SlabRun<D> done = serve(paths, rule, extra);
   if (done.end == End::complete) {
+    paths.sort_noded();
     for (const Id i : paths.had_nodes()) paths.close(i);
     for (const Id i : paths.noded())
       if (paths.past[i] == Histories<D>::kNone) paths.close(i);
@@ -82,6 +84,7 @@ SlabRun<D> SlabCore<D>::repair(Histories<D>& paths, NodeRule<D>& rule, std::span
   awake_.clear();
   since_.clear();
   queue_.clear();
+  serving_ = false;
   const std::size_t known = contacts_.size();
   paths.forget();
   std::ranges::sort(met_);
@@ -164,15 +167,68 @@ void SlabCore<D>::sleep(Histories<D>& paths, bool restore) {
   }
 }
 
+/// The next event, if there is one. What was planned before the service began has been sorted once, so that it is known
+/// ahead which particles will be needed; what was planned since stands in the heap.
+template <int D>
+bool SlabCore<D>::next_event(const Histories<D>& paths, Planned& event) {
+  if (served_ < first_.size() && (queue_.empty() || first_[served_].key < queue_.front().key)) {
+    event = first_[served_++];
+    prefetch_upcoming(paths);
+    return true;
+  }
+  if (queue_.empty()) return false;
+  std::pop_heap(queue_.begin(), queue_.end());
+  event = queue_.back();
+  queue_.pop_back();
+  return true;
+}
+
+/// Fetches what events to come will need, while others are at work: events come in the order of time, so one has
+/// nothing to do in space with the next.
+template <int D>
+void SlabCore<D>::prefetch_upcoming(const Histories<D>& paths) const {
+  const auto state = [&](Id i) {
+    __builtin_prefetch(&paths.last[i]);
+    __builtin_prefetch(&paths.start[i]);
+    __builtin_prefetch(&paths.x[i]);
+    __builtin_prefetch(&paths.v[i]);
+    __builtin_prefetch(&paths.a[i]);
+    __builtin_prefetch(&paths.next[i]);
+    __builtin_prefetch(&version_[i]);
+    __builtin_prefetch(&particles_.radius[i]);
+  };
+  const auto at = [&](std::size_t ahead, auto&& visit) {
+    if (served_ + ahead >= first_.size()) return;
+    const EventKey<D>& key = first_[served_ + ahead].key;
+    visit(key.lo);
+    if (key.kind == EventKind::pair) visit(key.hi);
+  };
+  at(6, [&](Id i) { partners_.prefetch_place(i); });
+  at(4, [&](Id i) {
+    partners_.prefetch(i);
+    __builtin_prefetch(&paths.past[i]);
+    __builtin_prefetch(&particles_.mass[i]);
+  });
+  at(2, [&](Id i) {
+    for (const auto& [j, pair] : partners_.of(i)) {
+      state(j);
+      __builtin_prefetch(&pairs_[pair]);
+    }
+  });
+}
+
 /// Serves the queue until it is empty.
 template <int D>
 SlabRun<D> SlabCore<D>::serve(Histories<D>& paths, NodeRule<D>& rule, std::span<const ExtraNode> extra) {
   using End = typename SlabRun<D>::End;
   EventKey<D> latest{.time = -1};
-  while (!queue_.empty()) {
-    std::pop_heap(queue_.begin(), queue_.end());
-    const Planned event = queue_.back();
-    queue_.pop_back();
+  first_.swap(queue_);
+  queue_.clear();
+  std::ranges::sort(first_, {}, &Planned::key);
+  served_ = 0;
+  serving_ = true;
+  if (!first_.empty()) partners();
+  for (Planned event; next_event(paths, event);) {
     if (stale(event)) continue;
     const EventKey<D>& key = event.key;
     if (!(key.time > 0)) continue;  // rounding: resolve() has seen to what touches at the start
@@ -234,7 +290,7 @@ bool SlabCore<D>::stale(const Planned& event) const {
 template <int D>
 void SlabCore<D>::plan(const Planned& event) {
   queue_.push_back(event);
-  std::push_heap(queue_.begin(), queue_.end());
+  if (serving_) std::push_heap(queue_.begin(), queue_.end());
 }
 
 /// 1 + the generation of a node at the same time, else 0: keeps what happens at one instant in its causal order.

@@ -102,6 +102,8 @@ class SlabCore {
 
   const Partners& partners();
   void plan(const Planned& event);
+  bool next_event(const Histories<D>& paths, Planned& event);
+  void prefetch_upcoming(const Histories<D>& paths) const;
   SlabRun<D> serve(Histories<D>& paths, NodeRule<D>& rule, std::span<const ExtraNode> extra);
   bool wake(Histories<D>& paths, NodeRule<D>& rule, std::span<const Id> who, std::span<const ExtraNode> extra,
             const EventKey<D>* now);
@@ -138,7 +140,10 @@ class SlabCore {
   std::vector<Id> beyond_;  // who flies farther
   std::vector<std::uint32_t> version_;
   std::vector<char> held_;
-  std::vector<Planned> queue_;
+  std::vector<Planned> first_;  // planned before the service began, sorted
+  std::size_t served_ = 0;      // of these
+  std::vector<Planned> queue_;  // a heap of what was planned since
+  bool serving_ = false;
   std::vector<Contact<D>> contacts_;
   // Of repairs:
   bool repairs_ = false, lost_ = false;
