@@ -142,25 +142,37 @@ TYPED_TEST(InDimension, MeanForcesDoExactlyTheWorkOfTheEnergyDifference) {
   });
 }
 
-/// A slab in which most particles have inner nodes of their own, at random times and with random kinks.
+/// One interval a particle, from x with v and a.
 template <int D>
-Histories<D> random_histories(Scene<D>& scene, double length) {
-  const auto& x = scene.particles.x;
+Histories<D> histories(double length, std::span<const Vec<D>> x, std::span<const Vec<D>> v, std::span<const Vec<D>> a) {
   Histories<D> paths;
-  paths.reset(length, x, scene.random_vectors(0.3), scene.random_vectors(0.3));
-  std::uniform_real_distribution<double> uniform(0, 1);
-  for (Id i = 0; i < x.size(); ++i)
-    for (double t = length * uniform(scene.random); t < 0.6 * length; t += 0.5 * length * uniform(scene.random))
-      paths.append(i, t, {}, scene.random_vectors(0.3)[i], scene.random_vectors(0.3)[i]);
-  paths.close();
+  paths.reset(length, x, v);
+  std::ranges::copy(a, paths.a.begin());
   return paths;
 }
 
 template <int D>
-std::vector<Vec<D>> impulses(const Interaction<D>& term, const Histories<D>& paths, const std::vector<char>& changed,
-                             PairMemory<D>& memory) {
+void close(Histories<D>& paths) {
+  for (Id i = 0; i < paths.particles(); ++i) paths.close(i);
+}
+
+/// A slab in which most particles have inner nodes of their own, at random times and with random kinks.
+template <int D>
+Histories<D> random_histories(Scene<D>& scene, double length) {
+  const auto& x = scene.particles.x;
+  Histories<D> paths = histories<D>(length, x, scene.random_vectors(0.3), scene.random_vectors(0.3));
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (Id i = 0; i < x.size(); ++i)
+    for (double t = length * uniform(scene.random); t < 0.6 * length; t += 0.5 * length * uniform(scene.random))
+      paths.append(i, t, {}, scene.random_vectors(0.3)[i], scene.random_vectors(0.3)[i]);
+  close(paths);
+  return paths;
+}
+
+template <int D>
+std::vector<Vec<D>> impulses(const Interaction<D>& term, const Histories<D>& paths, PairMemory<D>& memory) {
   std::vector<Vec<D>> impulse(paths.intervals(), Vec<D>::Zero());
-  term.add_impulses(paths, changed, memory, impulse);
+  term.add_impulses(paths, memory, impulse);
   return impulse;
 }
 
@@ -172,7 +184,7 @@ TYPED_TEST(InDimension, ImpulsesKeepTheEnergyAndTheMomentumOnAnyMeshes) {
     ASSERT_GT(paths.intervals(), x.size() + x.size() / 2);
     term.begin_slab(x, 1.0);
     PairMemory<D> memory;
-    const auto impulse = impulses(term, paths, std::vector<char>(x.size(), 1), memory);
+    const auto impulse = impulses(term, paths, memory);
     auto x_new = x;
     ExactSum work;
     std::array<ExactSum, D> total;
@@ -197,12 +209,11 @@ TYPED_TEST(InDimension, ImpulsesWithoutNodesAreThoseOfTheMeanForces) {
   constexpr int D = TypeParam::value;
   this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
     const auto& x = scene.particles.x;
-    Histories<D> paths;
-    paths.reset(0.5, x, scene.random_vectors(0.3), std::vector<Vec<D>>(x.size(), Vec<D>::Zero()));
-    paths.close();
+    Histories<D> paths = histories<D>(0.5, x, scene.random_vectors(0.3), std::vector<Vec<D>>(x.size(), Vec<D>::Zero()));
+    close(paths);
     term.begin_slab(x, 1.0);
     PairMemory<D> memory;
-    const auto impulse = impulses(term, paths, std::vector<char>(x.size(), 1), memory);
+    const auto impulse = impulses(term, paths, memory);
     const auto f = mean_forces(term, x, displaced(x, paths.v, 0.5));
     for (std::size_t i = 0; i < x.size(); ++i)
       EXPECT_LE((impulse[i] - 0.5 * f[i]).norm(), 1e-13 * (1 + f[i].norm())) << "particle " << i;
@@ -213,23 +224,18 @@ TYPED_TEST(InDimension, WhatIsRememberedOfPairsIsWhatTheyGive) {
   constexpr int D = TypeParam::value;
   this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
     const auto& x = scene.particles.x;
-    std::vector<char> changed(x.size(), 1);
-    Histories<D> paths;
-    paths.reset(0.5, x, scene.random_vectors(0.3), std::vector<Vec<D>>(x.size(), Vec<D>::Zero()));
-    paths.close();
+    Histories<D> paths = histories<D>(0.5, x, scene.random_vectors(0.3), std::vector<Vec<D>>(x.size(), Vec<D>::Zero()));
+    close(paths);
     term.begin_slab(x, 1.0);
     PairMemory<D> memory;
-    impulses(term, paths, changed, memory);
-    changed.assign(x.size(), 0);
-    for (const Id i : {1u, 4u, 5u}) {
-      paths.a[i] = Vec<D>::Constant(0.2);
-      changed[i] = 1;
-    }
+    impulses(term, paths, memory);
+    for (const Id i : {1u, 4u, 5u}) paths.a[i] = Vec<D>::Constant(0.2);
     paths.append(2, 0.2, {}, Vec<D>::Constant(0.1), Vec<D>::Zero());
-    paths.close();
-    const auto again = impulses(term, paths, changed, memory);
+    close(paths);
+    EXPECT_EQ(std::ranges::count(paths.changed, 1), 4);
+    const auto again = impulses(term, paths, memory);
     PairMemory<D> fresh;
-    const auto expected = impulses(term, paths, std::vector<char>(x.size(), 1), fresh);
+    const auto expected = impulses(term, paths, fresh);
     for (std::size_t n = 0; n < paths.intervals(); ++n) EXPECT_EQ(again[n], expected[n]) << "interval " << n;
   });
 }
@@ -241,8 +247,7 @@ TYPED_TEST(InDimension, TrapezoidsGiveAndTakeTheSameAndStartFromNodes) {
     const Histories<D> whole = random_histories(scene, 0.5);
     term.begin_slab(x, 1.0);
     // Build the same histories again, in the order of time, and take what each node receives.
-    Histories<D> paths;
-    paths.reset(0.5, x, std::span(whole.v).first(x.size()), std::span(whole.a).first(x.size()));
+    Histories<D> paths = histories<D>(0.5, x, std::span(whole.v).first(x.size()), std::span(whole.a).first(x.size()));
     std::vector<std::uint32_t> nodes;
     for (Id i = 0; i < x.size(); ++i)
       for (std::uint32_t n = whole.next[i]; n != Histories<D>::kNone; n = whole.next[n]) nodes.push_back(n);
