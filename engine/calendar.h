@@ -29,9 +29,10 @@ static_assert(sizeof(CalendarEntry) == 12);  // there are some for every particl
 /// Serves entries by time; the order of equal times is the caller's business.
 class Calendar {
  public:
-  /// Empties the calendar and sets it up for times in [0, horizon), for about `alive` entries at a time, which will be
+  /// Empties the calendar and sets it up for times in [now, horizon), for about `alive` entries at a time, which will be
   /// spread about like the `sample`. `entries_per_bin` forces the size of bins (0: about right).
-  void reset(double horizon, std::size_t alive, double entries_per_bin = 0, std::vector<double> sample = {}) {
+  void reset(double horizon, std::size_t alive, double entries_per_bin = 0, std::vector<double> sample = {},
+             double now = 0) {
     horizon_ = horizon;
     forced_ = entries_per_bin > 0;
     wanted_ = forced_ ? entries_per_bin : std::clamp(static_cast<double>(alive) / 256, 8.0, 2048.0);
@@ -52,7 +53,7 @@ class Calendar {
       std::nth_element(sample.begin(), sample.begin() + static_cast<std::ptrdiff_t>(few - 1), sample.end());
       end = std::min(end, sample[few - 1]);
     }
-    lay_out(0, end * wanted_ / (each * static_cast<double>(std::max<std::size_t>(few, 1))));
+    lay_out(now, (end - now) * wanted_ / (each * static_cast<double>(std::max<std::size_t>(few, 1))));
   }
 
   /// Schedules an entry; times at or beyond the horizon are not kept.

@@ -19,6 +19,25 @@ std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
   return code;
 }
 
+/// The numbers of n places x(i) in the order of a space-filling curve.
+template <int D, class Place>
+std::vector<std::uint32_t> along_curve(std::size_t n, Place&& x) {
+  std::vector<std::uint32_t> order(n);
+  if (n == 0) return order;
+  Vec<D> low = x(0), high = low;
+  for (std::size_t i = 0; i < n; ++i) low = low.cwiseMin(x(i)).eval(), high = high.cwiseMax(x(i)).eval();
+  const double scale = ((1 << 20) - 1) / std::max((high - low).maxCoeff(), 1e-300);
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> places(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::array<std::uint32_t, D> place;
+    for (int k = 0; k < D; ++k) place[k] = static_cast<std::uint32_t>((x(i)[k] - low[k]) * scale);
+    places[i] = {interleave<D>(place), static_cast<std::uint32_t>(i)};
+  }
+  std::sort(places.begin(), places.end());
+  for (std::size_t i = 0; i < n; ++i) order[i] = places[i].second;
+  return order;
+}
+
 }  // namespace
 
 template <int D>
@@ -30,29 +49,24 @@ EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles, const 
 template <int D>
 EventCore<D>::~EventCore() = default;
 
-/// Gives the particles slots in the order of a space-filling curve.
 template <int D>
-void EventCore<D>::sort(const Particles<D>& particles) {
-  const std::size_t n = particles.size();
-  Vec<D> low = particles.x[0], high = low;
-  for (const auto& x : particles.x) low = low.cwiseMin(x), high = high.cwiseMax(x);
-  const double scale = ((1 << 20) - 1) / std::max((high - low).maxCoeff(), 1e-300);
-  std::vector<std::pair<std::uint64_t, Id>> places(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    std::array<std::uint32_t, D> place;
-    for (int k = 0; k < D; ++k) place[k] = static_cast<std::uint32_t>((particles.x[i][k] - low[k]) * scale);
-    places[i] = {interleave<D>(place), static_cast<Id>(i)};
-  }
-  std::sort(places.begin(), places.end());
-  std::vector<Id> order(n);
-  for (std::size_t i = 0; i < n; ++i) order[i] = places[i].second;
-  flights_.assign(order);
-  since_sort_ = 0;
+void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  plan(read(particles, g, horizon, growth), 0);
 }
 
 template <int D>
-void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
-  plan(read(particles, g, horizon, growth));
+void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now) {
+  const auto order = along_curve<D>(records.size(), [&](std::size_t i) -> const Vec<D>& { return records[i].x; });
+  std::vector<Record<D>> sorted(records.size());
+  for (std::size_t i = 0; i < records.size(); ++i) sorted[i] = records[order[i]];
+  std::vector<Record<D>>().swap(records);
+  events_ = since_sort_ = 0;
+  now_ = now;
+  tied_ = {};
+  free_.clear();
+  lists_.reset();
+  flights_.load(sorted, particles_, g, horizon);
+  plan(true, now);
 }
 
 template <int D>
@@ -60,7 +74,7 @@ void EventCore<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon
   const bool anew = read(particles, g, horizon, growth);
   std::vector<Vec<D>>().swap(particles.x);
   std::vector<Vec<D>>().swap(particles.v);
-  plan(anew);
+  plan(anew, 0);
 }
 
 template <int D>
@@ -80,7 +94,9 @@ bool EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double h
       flights_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
   if (anew) {
     lists_.reset();
-    sort(particles);
+    free_.clear();
+    flights_.assign(along_curve<D>(n, [&](std::size_t i) -> const Vec<D>& { return particles.x[i]; }));
+    since_sort_ = 0;
   }
   flights_.load(particles, g, horizon, growth);
   return anew;
@@ -88,37 +104,41 @@ bool EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double h
 
 /// Plans everybody's first event.
 template <int D>
-void EventCore<D>::plan(bool anew) {
+void EventCore<D>::plan(bool anew, double now) {
   const std::size_t n = flights_.size();
-  packing_ = Packing<D>(n);
+  packing_ = Packing<D>(flights_.room());
   setting_ = flights_.setting(packing_);
   std::vector<double> radii = flights_.radii(flights_.horizon());
   if (lists_ && !anew && radii_ == radii) {  // lists outlive a slab while they are good for its radii
     lists_->follow(flights_.records());
     for (auto& a : agenda_) a.version = 0;
   } else {
+    agenda_.clear();
+    agenda_.reserve(flights_.room());
     agenda_.assign(n, Agenda<D>{});
     radii_ = std::move(radii);
-    choose_search();
+    choose_search(now);
   }
-  for (std::size_t i = 0; i < n; ++i) foresee(static_cast<Slot>(i), 0.0);
+  for (std::size_t i = 0; i < n; ++i) foresee(static_cast<Slot>(i), now);
   constexpr std::size_t kSample = 8192;
   std::vector<double> some;
   for (std::size_t i = 0; i < n; i += n / kSample + 1) some.push_back(agenda_[i].due());
-  calendar_.reset(flights_.horizon(), n, options_.entries_per_bin, std::move(some));
+  calendar_.reset(flights_.horizon(), n, options_.entries_per_bin, std::move(some), now);
   for (std::size_t i = 0; i < n; ++i) schedule(static_cast<Slot>(i));
 }
 
 template <int D>
-void EventCore<D>::choose_search() {
-  const auto n = static_cast<double>(flights_.size()), each = n / static_cast<double>(radii_.size());
+void EventCore<D>::choose_search(double now) {
+  // A region is as dense as the whole, of which it has a part only.
+  const auto n = static_cast<double>(particles_.radius.size()), each = n / static_cast<double>(radii_.size());
   double largest = 0, sum = 0, sum_of_powers = 0;
   for (const double r : radii_) {
     largest = std::max(largest, r);
     sum += each * r;
     sum_of_powers += each * std::pow(r, D);
   }
-  const Extent<D> extent = flights_.extent();
+  Extent<D> extent = flights_.extent();
+  extent.particles = particles_.radius.size();
   double volume = 1;
   for (int k = 0; k < D; ++k) {
     const bool open = box_.boundary[k] == Boundary::open;  // as far as there are spheres
@@ -131,7 +151,7 @@ void EventCore<D>::choose_search() {
     lists_.reset();
     cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, kernels_, tuning_.cell(), extent);
     for (Slot i = 0; i < flights_.size(); ++i) {
-      agenda_[i].where.cell = cells_->place(flights_[i].x);
+      agenda_[i].where.cell = cells_->place(flights_.at(i, now).x);
       cells_->insert(i, agenda_[i].where.cell);
     }
     return;
@@ -141,7 +161,7 @@ void EventCore<D>::choose_search() {
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
   lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, skin, agenda_);
-  lists_->build(flights_.records(), extent);
+  lists_->build(flights_, now, extent);
 }
 
 template <int D>
@@ -551,17 +571,32 @@ void EventCore<D>::cross(Slot i, double now) {
   schedule(i);
 }
 
+/// Writes down what a sphere was before its first event of the window, which is about to happen.
+template <int D>
+void EventCore<D>::trace(Trace<D>& trace, Slot i) const {
+  if (trace.before(flights_[i])) trace.starts.push_back({i, flights_[i]});
+}
+
 template <int D>
 void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, const Report& report) {
   Agenda<D>& agenda = agenda_[i];
   const Slot j = packing_.slot(agenda.partner);
   EventKey<D> key;
-  if (report.contacts) key = key_of(i);
+  if (report.contacts || report.trace) key = key_of(i);
+  if (report.trace) {
+    trace(*report.trace, i);
+    trace(*report.trace, j);
+  }
   Vec<D> shift = Vec<D>::Zero();
   if (packing_.linear(agenda.partner) != 0) shift = box_.shift(packing_.image(agenda.partner));
   const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
   ++agenda.version;
   ++agenda_[j].version;
+  if (report.trace) {
+    const double virial = blow.d.dot(blow.impulse);
+    for (const Slot who : {i, j}) report.trace->nodes.push_back({who, {flights_[who], key, virial, blow.overlap}});
+    return;
+  }
   ++report.counters.sphere_sphere;
   report.counters.collision_virial.add(blow.d.dot(blow.impulse));
   report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
@@ -577,14 +612,90 @@ template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = key_of(i);
   const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
+  if (report.trace) trace(*report.trace, i);
   const Blow<D> blow = flights_.bounce(i, axis, side, time, generation);
   ++agenda_[i].version;
+  if (report.trace) {
+    report.trace->nodes.push_back({i, {flights_[i], key, 0, blow.overlap}});
+    return;
+  }
   ++report.counters.sphere_wall;
   report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
   if (!report.contacts) return;
   Contact<D> contact{key, flights_[i].x, flights_[i].x, blow.impulse};
   contact.x_hi[axis] = side == 0 ? 0.0 : box_.edges[axis];
   report.contacts->push_back(contact);
+}
+
+template <int D>
+bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
+  if (!free_.empty()) {
+    slot = free_.back();
+    free_.pop_back();
+  } else {
+    if (flights_.size() == flights_.room()) return false;
+    slot = static_cast<Slot>(flights_.size());
+  }
+  const double radius = particles_.radius[r.id];
+  flights_.admit(slot, r, radius, particles_.mass[r.id]);
+  if (slot == agenda_.size()) {
+    agenda_.emplace_back();
+    if (radii_.size() > 1) radii_.push_back(radius);
+  } else if (radii_.size() > 1) {
+    radii_[slot] = radius;
+  }
+  ++agenda_[slot].version;
+  setting_ = flights_.setting(packing_);
+  const Vec<D> x = flights_.at(slot, now).x;
+  if (lists_) {
+    lists_->admit(slot, x, radii_);
+  } else {
+    agenda_[slot].where.cell = cells_->place(x);
+    cells_->admit(slot, agenda_[slot].where.cell);
+  }
+  predict(slot, now);
+  return true;
+}
+
+template <int D>
+void EventCore<D>::dismiss(Slot i) {
+  Agenda<D>& a = agenda_[i];
+  ++a.version;  // whoever plans a contact with it looks again
+  a.contact = a.update = kNever;
+  if (lists_)
+    lists_->dismiss(i);
+  else
+    cells_->remove(i, a.where.cell);
+  free_.push_back(i);
+}
+
+template <int D>
+void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, double now) {
+  for (const auto& [i, r] : records) {
+    flights_.set(i, r);
+    ++agenda_[i].version;
+  }
+  for (const auto& [i, r] : records) {
+    const Vec<D> x = flights_.at(i, now).x;
+    if (lists_) {
+      lists_->move(i, x);
+    } else {
+      CellPlace<D>& cell = agenda_[i].where.cell;
+      cells_->remove(i, cell);
+      cell = cells_->place(x);
+      cells_->admit(i, cell);
+    }
+  }
+  for (const auto& [i, r] : records) predict(i, now);
+}
+
+template <int D>
+void EventCore<D>::find_near(Slot i, double astray, std::vector<std::uint32_t>& found) const {
+  found.clear();
+  if (lists_)
+    lists_->find_near(i, astray, found);
+  else
+    cells_->find_near(agenda_[i].where.cell, radii_[0] + radii_[0] + 2 * astray, found);
 }
 
 template class EventCore<2>;

@@ -32,6 +32,7 @@
 #include "engine/particles.h"
 #include "engine/search_tuning.h"
 #include "engine/skin_lists.h"
+#include "engine/trace.h"
 
 namespace carom {
 
@@ -44,6 +45,7 @@ class EventCore {
     std::vector<Contact<D>>* contacts = nullptr;
     std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();  ///< of counters.sphere_sphere
     std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();       ///< contacts since load()
+    Trace<D>* trace = nullptr;  ///< where to write down paths; then contacts are not counted, they may be revoked
   };
 
   /// Masses and radii are read from `particles`, which outlives the core; they change between slabs only.
@@ -77,6 +79,23 @@ class EventCore {
   /// Since the core was made.
   const EventCounts& counts() const { return counts_; }
 
+  // For a core that runs a part of a larger system (engine/region.h). All of this happens at a time `now` that no event
+  // precedes any more.
+
+  /// Starts with these spheres only; no record is of a later time than `now`.
+  void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now);
+  const Flights<D>& flights() const { return flights_; }
+  const Packing<D>& packing() const { return packing_; }
+  /// Takes a sphere in; false: there is no room left, load anew.
+  bool admit(const Record<D>& r, double now, Slot& slot);
+  /// Forgets a sphere; its slot will be given to another one.
+  void dismiss(Slot i);
+  /// These spheres have other records than this core thought.
+  void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
+  /// Candidates for contacts of a sphere, itself among them: whoever may touch it where each of the two has come up to
+  /// `astray` from where the core knows it to be.
+  void find_near(Slot i, double astray, std::vector<std::uint32_t>& found) const;
+
  private:
   /// An event among several at one time, with what it was when it was found there.
   struct Tied {
@@ -89,10 +108,9 @@ class EventCore {
     bool operator==(const Tied& other) const { return rank == other.rank && key == other.key; }
   };
 
-  void sort(const Particles<D>& particles);
   bool read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
-  void plan(bool anew);
-  void choose_search();
+  void plan(bool anew, double now);
+  void choose_search(double now);
   void prefetch_upcoming() const;
   bool mirrored(Slot i, Slot j) const;
   bool next_event(double end, Slot& slot, double& time);
@@ -116,6 +134,7 @@ class EventCore {
   void update(Slot i, double now);
   void cross(Slot i, double now);
 
+  void trace(Trace<D>& trace, Slot i) const;
   void collide_pair(Slot i, double time, std::uint32_t generation, const Report& report);
   void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
 
@@ -126,6 +145,7 @@ class EventCore {
   const ScanKernels& kernels_;
   bool walled_ = false;
   PageVector<Agenda<D>> agenda_;
+  std::vector<Slot> free_;  // slots of those who have been dismissed
   std::vector<double> radii_;  // that lists or cells are made for; one where all are equal
   Packing<D> packing_;
   ScanSetting setting_;

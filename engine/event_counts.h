@@ -13,6 +13,17 @@ struct EventCounts {
   std::uint64_t rebuilds = 0;   ///< neighbour lists made anew (0 where the core works on cells alone)
   std::uint64_t scheduled = 0;  ///< entries put into the calendar
   std::uint64_t dropped = 0;    ///< of these, met when they no longer held
+
+  EventCounts& operator+=(const EventCounts& other) {
+    predictions += other.predictions;
+    candidates += other.candidates;
+    stale += other.stale;
+    crossings += other.crossings;
+    rebuilds += other.rebuilds;
+    scheduled += other.scheduled;
+    dropped += other.dropped;
+    return *this;
+  }
 };
 
 }  // namespace carom

@@ -22,6 +22,7 @@ template <int D>
 void Flights<D>::assign(std::span<const Id> order) {
   records_.resize(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) records_[i].id = order[i];
+  room_ = order.size();
 }
 
 template <int D>
@@ -86,15 +87,38 @@ void Flights<D>::advance(Record<D>& r, double t) const {
 }
 
 template <int D>
-Record<D> Flights<D>::at(Slot i, double t) const {
-  Record<D> r = records_[i];
-  advance(r, t);
-  return r;
+void Flights<D>::load(std::span<const Record<D>> records, const Particles<D>& particles, const Vec<D>& g,
+                      double horizon) {
+  g_ = g;
+  field_ = g != Vec<D>::Zero();
+  growth_ = 0;
+  horizon_ = horizon;
+  common_radius_ = common(particles.radius);
+  common_mass_ = common(particles.mass);
+  room_ = records.size() + records.size() / 4 + 256;
+  records_.clear();
+  records_.reserve(room_);
+  radius_.clear();
+  mass_.clear();
+  for (const Record<D>& r : records)
+    admit(static_cast<Slot>(records_.size()), r, particles.radius[r.id], particles.mass[r.id]);
 }
 
 template <int D>
-double Flights<D>::pair_contact(Slot i, Slot j, const Vec<D>& shift) const {
-  const Record<D>&a = records_[i], &b = records_[j];
+void Flights<D>::admit(Slot i, const Record<D>& r, double radius, double mass) {
+  if (i == records_.size()) {
+    records_.push_back(r);
+    if (common_radius_ == 0) radius_.push_back(radius);
+    if (common_mass_ == 0) mass_.push_back(mass);
+    return;
+  }
+  records_[i] = r;
+  if (common_radius_ == 0) radius_[i] = radius;
+  if (common_mass_ == 0) mass_[i] = mass;
+}
+
+template <int D>
+double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const {
   const double now = std::max(a.t, b.t);
   const double s_a = now - a.t, s_b = now - b.t;
   Vec<D> d = (a.x + s_a * a.v) - (b.x + s_b * b.v);
@@ -111,8 +135,7 @@ double Flights<D>::pair_contact(Slot i, Slot j, const Vec<D>& shift) const {
 }
 
 template <int D>
-double Flights<D>::wall_contact(Slot i, int axis, int side) const {
-  const Record<D>& r = records_[i];
+double Flights<D>::wall_contact(Slot i, const Record<D>& r, int axis, int side) const {
   const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
   const double inward = side == 0 ? 1.0 : -1.0;
   const double gap = side == 0 ? r.x[axis] - at_record : box_.edges[axis] - at_record - r.x[axis];
@@ -130,8 +153,8 @@ double Flights<D>::wall_contact(Slot i, int axis, int side) const {
 }
 
 template <int D>
-Blow<D> Flights<D>::collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
-  Record<D>&a = records_[i], &b = records_[j];
+Blow<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                            std::uint32_t generation) const {
   advance(a, t);
   advance(b, t);
   const Vec<D> d = a.x - b.x + shift;
@@ -150,8 +173,7 @@ Blow<D> Flights<D>::collide(Slot i, Slot j, const Vec<D>& shift, double t, std::
 }
 
 template <int D>
-Blow<D> Flights<D>::bounce(Slot i, int axis, int side, double t, std::uint32_t generation) {
-  Record<D>& r = records_[i];
+Blow<D> Flights<D>::bounce(Slot i, Record<D>& r, int axis, int side, double t, std::uint32_t generation) const {
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
   const double after = (side == 0 ? 2 * rate : -2 * rate) - r.v[axis];

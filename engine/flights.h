@@ -36,7 +36,11 @@ class Flights {
   /// Starts a slab: everybody at time 0, in the slots given before.
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
 
+  /// The same for records of other times, in their order; with room for more that come meanwhile.
+  void load(std::span<const Record<D>> records, const Particles<D>& particles, const Vec<D>& g, double horizon);
+
   std::size_t size() const { return records_.size(); }
+  std::size_t room() const { return room_; }
   const Record<D>& operator[](Slot i) const { return records_[i]; }
   std::span<const Record<D>> records() const { return records_; }
   const Vec<D>& g() const { return g_; }
@@ -51,21 +55,44 @@ class Flights {
   ScanSetting setting(const Packing<D>& packing) const;
 
   /// The record as it is at time t.
-  Record<D> at(Slot i, double t) const;
+  Record<D> at(Slot i, double t) const { return at(records_[i], t); }
+  Record<D> at(Record<D> r, double t) const {
+    advance(r, t);
+    return r;
+  }
   /// 1 + the generation of the record where it is of this very time, else 0 (EventKey).
-  std::uint32_t generation_at(Slot i, double t) const { return records_[i].t == t ? records_[i].generation + 1u : 0u; }
+  static std::uint32_t generation_at(const Record<D>& r, double t) { return r.t == t ? r.generation + 1u : 0u; }
+  std::uint32_t generation_at(Slot i, double t) const { return generation_at(records_[i], t); }
 
   /// The time at which the two next touch, x_i − x_j taken with `shift`; infinite: never. Exchanging the two gives the
   /// same bits, because every difference only changes its sign.
-  double pair_contact(Slot i, Slot j, const Vec<D>& shift) const;
+  double pair_contact(Slot i, Slot j, const Vec<D>& shift) const {
+    return pair_contact(i, records_[i], j, records_[j], shift);
+  }
   /// The same for a sphere and the lower (side 0) or upper wall of an axis. Throws Error(Failure::numerical) for a
   /// sphere that rests there under the field.
-  double wall_contact(Slot i, int axis, int side) const;
+  double wall_contact(Slot i, int axis, int side) const { return wall_contact(i, records_[i], axis, side); }
 
   /// The two collide at time t.
-  Blow<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation);
+  Blow<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
+    return collide(i, records_[i], j, records_[j], shift, t, generation);
+  }
   /// The sphere collides with a wall at time t; the second "centre" is the point touched.
-  Blow<D> bounce(Slot i, int axis, int side, double t, std::uint32_t generation);
+  Blow<D> bounce(Slot i, int axis, int side, double t, std::uint32_t generation) {
+    return bounce(i, records_[i], axis, side, t, generation);
+  }
+
+  // The same for spheres with other records than their present ones.
+  double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
+  double wall_contact(Slot i, const Record<D>& r, int axis, int side) const;
+  Blow<D> collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                  std::uint32_t generation) const;
+  Blow<D> bounce(Slot i, Record<D>& r, int axis, int side, double t, std::uint32_t generation) const;
+
+  /// Replaces a record.
+  void set(Slot i, const Record<D>& r) { records_[i] = r; }
+  /// Gives a sphere the slot `i`, one of those there are or the next.
+  void admit(Slot i, const Record<D>& r, double radius, double mass);
 
  private:
   void advance(Record<D>& r, double t) const;
@@ -78,6 +105,7 @@ class Flights {
   bool field_ = false;
   double growth_ = 0, horizon_ = 0;
   PageVector<Record<D>> records_;      // by slot
+  std::size_t room_ = 0;               // that there may be
   std::vector<double> radius_, mass_;  // by slot; empty where all are equal
   double common_radius_ = 0, common_mass_ = 0;
 };

@@ -72,6 +72,13 @@ class LinkedCells {
         __builtin_prefetch(first + x[a].offset + (D == 3 ? y[b].offset : 0));
   }
 
+  /// The same for a sphere that comes in later.
+  void admit(Slot i, const Place& place) {
+    if (i >= link_.size()) link_.resize(i + 1), boxes_.resize(i + 1);
+    for (const std::int32_t b : packing_.image(packing_.pack(0, place.boxes))) widest_ = std::max(widest_, std::abs(b));
+    if (widest_ > packing_.largest()) throw_too_far();
+    insert(i, place);
+  }
   void insert(Slot i, const Place& place) {
     std::uint32_t& first = first_[index(place)];
     link_[i] = first;
@@ -105,6 +112,25 @@ class LinkedCells {
       place.boxes += step * one_[axis];
     }
     insert(i, place);
+  }
+
+  /// Everybody in the cells that may hold places up to `reach` from those in a sphere's cell, itself among them.
+  void find_near(const Place& place, double reach, std::vector<std::uint32_t>& found) const {
+    Cell<D> cell, range;
+    for (int k = 0; k < D; ++k) {
+      cell[k] = place.unwrapped[k];
+      range[k] = static_cast<std::int32_t>(std::ceil(reach / grid_.edge(k)));
+    }
+    grid_.for_each_around(cell, range, [&](std::size_t at, const Image<D>& away) {
+      const auto count = static_cast<std::size_t>(grid_.count(D - 1));
+      const std::size_t row = at / count, in_row = at % count;
+      std::uint32_t next = first_[row * (count + 2) + in_row + 1];
+      while (next != kNobody) {
+        const Slot j = packing_.slot(next & ~kMore);
+        found.push_back(packing_.pack(j, boxes_[j] - packing_.linear(away)));
+        next = (next & kMore) != 0 ? link_[j] : kNobody;
+      }
+    });
   }
 
   /// Everybody in the sphere's cell and those around it, itself among them.

@@ -34,13 +34,18 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
   if (radius.size() > 1) {
     level_.resize(radius.size());
     for (std::size_t i = 0; i < radius.size(); ++i)
-      level_[i] = static_cast<std::uint8_t>(std::clamp(std::floor(std::log2(largest / radius[i])), 0.0, 30.0));
+      level_[i] = octave(largest, radius[i]);
   }
 }
 
 template <int D>
-void SkinLists<D>::build(std::span<const Record<D>> records, const Extent<D>& extent) {
-  const std::size_t n = records.size();
+std::uint8_t SkinLists<D>::octave(double largest, double radius) {
+  return static_cast<std::uint8_t>(std::clamp(std::floor(std::log2(largest / radius)), 0.0, 30.0));
+}
+
+template <int D>
+void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>& extent) {
+  const std::size_t n = flights.size();
   // 1. Cells for each size.
   levels_.clear();
   const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
@@ -54,7 +59,9 @@ void SkinLists<D>::build(std::span<const Record<D>> records, const Extent<D>& ex
       if (level_[i] == l) largest = std::max(largest, radius_[i]), ++members;
     // Places are rounded down to 1024ths: two of them may come out nearer or farther by one in each direction.
     const double reach = 2 * (std::max(largest, 1e-300) + skin_) * (1 + 2 * std::sqrt(D) / kPlaces);
-    const double roomy = std::pow(kMembers * volume / static_cast<double>(std::max<std::size_t>(members, 1)), 1.0 / D);
+    // Of the whole system, where these are a part of it.
+    const double all = static_cast<double>(members) * static_cast<double>(extent.particles) / static_cast<double>(n);
+    const double roomy = std::pow(kMembers * volume / std::max(all, 1.0), 1.0 / D);
     const double edge = std::max(reach, roomy);
     Level level{
         .grid = CellGrid<D>(box_, edge, extent), .largest_radius = largest, .lines = {}, .next = {}, .steps = {}};
@@ -68,8 +75,9 @@ void SkinLists<D>::build(std::span<const Record<D>> records, const Extent<D>& ex
   // 2. Everybody into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = records[i].x[k];
-    insert(static_cast<Slot>(i), records[i].x);
+    const Vec<D> x = flights.at(static_cast<Slot>(i), now).x;
+    for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[k];
+    insert(static_cast<Slot>(i), x);
   }
   // 3. Lists.
   pool_.clear();
@@ -78,7 +86,7 @@ void SkinLists<D>::build(std::span<const Record<D>> records, const Extent<D>& ex
   for (auto& unused : unused_) unused.clear();
   for (std::size_t i = 0; i < n; ++i) {
     agenda_[i].capacity = 0;
-    assign(static_cast<Slot>(i), surround(static_cast<Slot>(i), records[i].x));
+    assign(static_cast<Slot>(i), surround(static_cast<Slot>(i), centre(agenda_[i])));
   }
 }
 
@@ -389,6 +397,63 @@ void SkinLists<D>::follow(std::span<const Record<D>> records) {
   const double limit = skin_ * skin_ * 0.9;
   for (Slot i = 0; i < records.size(); ++i)
     if (!((records[i].x - centre(agenda_[i])).squaredNorm() < limit)) renew(i, records[i].x);
+}
+
+template <int D>
+void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> radius) {
+  radius_ = radius;
+  if (i == boxes_.size()) boxes_.push_back(0);
+  if (!level_.empty()) {
+    if (i == level_.size()) level_.push_back(0);
+    // The smallest level that can hold it: there may be none of its octave.
+    const auto level = std::find_if(levels_.rbegin(), levels_.rend(), [&](const Level& l) {
+      return l.largest_radius >= radius[i];
+    });
+    level_[i] = static_cast<std::uint8_t>(levels_.rend() - level - 1);
+  }
+  for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[k];
+  agenda_[i].count = agenda_[i].same = 0;
+  insert(i, x);
+  const unsigned n = surround(i, x);
+  assign(i, n);
+  const std::vector<std::uint32_t> list(found_.begin(), found_.begin() + n);
+  for (const std::uint32_t candidate : list) add(packing_.slot(candidate), packing_.reversed(i, candidate));
+}
+
+template <int D>
+void SkinLists<D>::dismiss(Slot i) {
+  Agenda<D>& a = agenda_[i];
+  remove(i, centre(a));
+  const std::uint32_t* const list = candidates(a);
+  for (unsigned q = 0; q < a.count; ++q) drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
+  found_.resize(std::max<std::size_t>(found_.size(), 1));
+  assign(i, 0);
+}
+
+template <int D>
+void SkinLists<D>::move(Slot i, const Vec<D>& x) {
+  const double limit = skin_ * (1 - 1e-6);
+  if (!((x - centre(agenda_[i])).squaredNorm() < limit * limit)) renew(i, x);
+}
+
+template <int D>
+void SkinLists<D>::find_near(Slot i, double astray, std::vector<std::uint32_t>& found) const {
+  const Vec<D> x = centre(agenda_[i]);
+  for (const Level& level : levels_) {
+    const double within = radius(i) + level.largest_radius + 2 * (skin_ + astray);
+    const Cell<D> cell = level.grid.cell(x);
+    Cell<D> range;
+    for (int k = 0; k < D; ++k) range[k] = static_cast<std::int32_t>(std::ceil(within / level.grid.edge(k)));
+    level.grid.for_each_around(cell, range, [&](std::size_t first, const Image<D>& away) {
+      for (auto line = static_cast<std::uint32_t>(first); line != kNobody; line = level.next[line])
+        for (const Slot j : level.lines[line].slot) {
+          if (j == kNobody) continue;
+          const std::uint32_t candidate = packing_.pack(j, boxes_[j] - packing_.linear(away));
+          const Vec<D> d = x - centre(agenda_[j]) + box_.shift(packing_.image(candidate));
+          if (d.squaredNorm() <= within * within) found.push_back(candidate);
+        }
+    });
+  }
 }
 
 template class SkinLists<2>;

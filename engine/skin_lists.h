@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/agenda.h"
+#include "engine/flights.h"
 #include "engine/pages.h"
 #include "engine/scan.h"
 
@@ -26,8 +27,8 @@ class SkinLists {
   double skin() const { return skin_; }
   const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
 
-  /// Makes all lists for spheres at x, by slot.
-  void build(std::span<const Record<D>> records, const Extent<D>& extent);
+  /// Makes all lists for spheres where they are at time `now`.
+  void build(const Flights<D>& flights, double now, const Extent<D>& extent);
 
   /// The sphere is now at x: makes its list anew and mends those of its neighbours. Returns who is new in it, padded
   /// like a list; good until the next call.
@@ -36,6 +37,15 @@ class SkinLists {
   /// The spheres have moved since, and been wrapped into the box: mends images and renews the lists of those that have
   /// left their regions.
   void follow(std::span<const Record<D>> records);
+
+  /// Takes in a sphere at x, in a slot that had nobody; `radius` as in the constructor.
+  void admit(Slot i, const Vec<D>& x, std::span<const double> radius);
+  /// Forgets a sphere.
+  void dismiss(Slot i);
+  /// The sphere is now at x: renews its list where that is no longer good.
+  void move(Slot i, const Vec<D>& x);
+  /// Finds everybody whom a sphere may touch where both have come up to `astray` from their regions, itself among them.
+  void find_near(Slot i, double astray, std::vector<std::uint32_t>& found) const;
 
  private:
   struct Level {  // spheres of similar size
@@ -49,6 +59,7 @@ class SkinLists {
   };
   using Place = std::array<std::int32_t, D>;  // in 1024ths of a cell
 
+  static std::uint8_t octave(double largest, double radius);
   std::size_t level_of(Slot i) const { return level_.empty() ? 0 : level_[i]; }
   double radius(Slot i) const { return radius_[level_.empty() ? 0 : i]; }
   void lay_steps(Level& level);

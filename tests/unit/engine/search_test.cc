@@ -3,22 +3,16 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstdlib>
-#include <cstring>
 
 #include "engine/contact.h"
 #include "engine/error.h"
 #include "engine/event_core.h"
-#include "engine/placement.h"
-#include "engine/random.h"
 #include "engine/scan_kernel.h"
-#include "tests/support/experiments.h"
+#include "tests/unit/engine/event_cases.h"
 
 namespace carom {
 namespace {
-
-constexpr Boundary W = Boundary::wall, P = Boundary::periodic, O = Boundary::open;
 
 /// Sets an environment variable for a while.
 class Environment {
@@ -43,25 +37,9 @@ bool machine_has(const char* simd) {
 }
 
 template <int D>
-struct Case {
-  std::unique_ptr<System<D>> system;
-  Vec<D> g = Vec<D>::Zero();
-  double growth = 0;
-  double slab = 1;
-  int slabs = 3;
-};
-
-/// What a run leaves: every contact and the last state.
-template <int D>
-struct Trace {
-  std::vector<Contact<D>> contacts;
-  Particles<D> particles;
-};
-
-template <int D>
-Trace<D> run(const Case<D>& c, const SearchOptions& options, const char* simd = nullptr) {
+Outcome<D> run(const Case<D>& c, const SearchOptions& options, const char* simd = nullptr) {
   const Environment environment("CAROM_SIMD", simd);
-  Trace<D> trace;
+  Outcome<D> trace;
   trace.particles = c.system->particles;
   Particles<D>& p = trace.particles;
   EventCore<D> core(c.system->box, p, options);
@@ -75,30 +53,6 @@ Trace<D> run(const Case<D>& c, const SearchOptions& options, const char* simd = 
   }
   EXPECT_LT(counters.max_overlap, 1e-12);
   return trace;
-}
-
-template <int D>
-std::uint64_t bits_of(const std::vector<Vec<D>>& x) {
-  std::uint64_t sum = 0;
-  for (const auto& v : x)
-    for (int k = 0; k < D; ++k) {
-      std::uint64_t bits;
-      std::memcpy(&bits, &v[k], sizeof bits);
-      sum = sum * 0x100000001b3 + bits;
-    }
-  return sum;
-}
-
-template <int D>
-void expect_same(const Trace<D>& a, const Trace<D>& b, const std::string& what) {
-  ASSERT_EQ(a.contacts.size(), b.contacts.size()) << what;
-  for (std::size_t k = 0; k < a.contacts.size(); ++k) {
-    ASSERT_TRUE(a.contacts[k].key == b.contacts[k].key) << what << ", contact " << k;
-    ASSERT_EQ(a.contacts[k].impulse, b.contacts[k].impulse) << what << ", contact " << k;
-    ASSERT_EQ(a.contacts[k].x_lo, b.contacts[k].x_lo) << what << ", contact " << k;
-  }
-  EXPECT_EQ(bits_of<D>(a.particles.x), bits_of<D>(b.particles.x)) << what;
-  EXPECT_EQ(bits_of<D>(a.particles.v), bits_of<D>(b.particles.v)) << what;
 }
 
 using Method = SearchOptions::Method;
@@ -126,26 +80,6 @@ void expect_the_same_whatever_the_search(const Case<D>& c, std::size_t at_least)
     expect_same(reference, run(c, {.method = Method::lists}, simd), simd);
     expect_same(reference, run(c, {.method = Method::cells}, simd), simd);
   }
-}
-
-/// Spheres at random places in a box, with radii between those given.
-template <int D>
-std::unique_ptr<System<D>> random_system(int n, const Vec<D>& edges, std::array<Boundary, D> boundary, double smallest,
-                                         double largest, std::uint64_t seed) {
-  std::vector<double> radius(n), mass(n);
-  for (int i = 0; i < n; ++i) {
-    radius[i] = smallest * std::pow(largest / smallest, static_cast<double>(i) / std::max(n - 1, 1));
-    mass[i] = std::pow(radius[i] / largest, D);
-  }
-  if (smallest == largest) mass.assign(n, 1.0);
-  std::vector<Vec<D>> x(n, Vec<D>::Zero()), v(n, Vec<D>::Zero());
-  auto system = test::make_system<D>(edges, P, x, v, radius, mass);
-  system->box.boundary = boundary;
-  std::vector<Id> everybody(n);
-  for (int i = 0; i < n; ++i) everybody[i] = static_cast<Id>(i);
-  EXPECT_EQ(insert_at_random<D>(system->box, system->particles.x, radius, everybody, seed), everybody.size());
-  draw_velocities<D>(system->particles, everybody, std::vector<double>(n, 1.0), seed);
-  return system;
 }
 
 TEST(Search, DenseFluid) {

@@ -1,0 +1,101 @@
+#pragma once
+// Free flight of a system divided into regions: several on one process, or on many ranks, with the bits of one core.
+//
+// Time goes in windows (engine/region.h). In each no sphere may come farther than `stray` from where it was at its
+// start, so that a region needs to know those only that start within a diameter and two strays of it; where somebody is
+// faster than was thought the window is cut to the time at which it would have mattered. A sphere belongs to the region
+// that it is in at a window's start, which everybody who knows it computes alike.
+//
+//   Domains<3> domains(box, particles, exchange, 4 * exchange.size());
+//   domains.take(particles, g, horizon);
+//   domains.run(end, report);
+//   domains.give_back(end, particles);
+//
+// All of it is collective. At the start and the end of an epoch every rank has all particles.
+
+#include <optional>
+
+#include "engine/division.h"
+#include "engine/exchange.h"
+#include "engine/region.h"
+
+namespace carom {
+
+/// What agreement between regions took, on this rank, since the domains were made.
+struct DomainCounts {
+  std::uint64_t windows = 0;
+  std::uint64_t rounds = 0;          ///< of exchange and repair
+  std::uint64_t cut = 0;             ///< windows that were cut because somebody was too fast
+  std::uint64_t events = 0;          ///< of own spheres, as they are in the end
+  std::uint64_t run_events = 0;      ///< in first runs, those of ghosts among them
+  std::uint64_t redone_events = 0;   ///< in repairs
+};
+
+template <int D>
+class Domains {
+ public:
+  using Report = typename EventCore<D>::Report;
+
+  /// `particles` tells masses and radii, and outlives the domains. `window` forces the length of windows [time].
+  Domains(const Box<D>& box, const Particles<D>& particles, Exchange& exchange, std::size_t regions,
+          const SearchOptions& options = {}, std::function<double()> window = {});
+
+  /// As EventCore::take(), load() and so on.
+  void take(Particles<D>& particles, const Vec<D>& g, double horizon);
+  double run(double end, const Report& report);
+  void fly_to(double time, Particles<D>& copies) const;
+  void give_back(double time, Particles<D>& particles);
+  double now() const { return now_; }
+
+  /// Of event cores that were given back, on this rank.
+  const EventCounts& counts() const { return past_; }
+  const DomainCounts& domain_counts() const { return counts_; }
+
+ private:
+  /// A region of this rank.
+  struct Local {
+    std::uint32_t number = 0;
+    std::unique_ptr<Region<D>> region;
+    std::vector<std::uint32_t> neighbours;
+    std::vector<std::uint64_t> holders;  // by slot: of an own sphere, which neighbours have it as a ghost
+  };
+  /// What a window brought, of own spheres.
+  struct Harvest {
+    std::uint64_t collisions = 0, bounces = 0;
+    ExactSum virial;
+    double overlap = 0, speed = 0;
+  };
+
+  std::size_t first_region(int rank) const;
+  int rank_of(std::uint32_t region) const;
+  void reload(double now);
+  void load(std::span<const Record<D>> records, double now);
+  void sort_out();
+  void agree();
+  void send_paths(std::vector<Bytes>& outgoing) const;
+  double window_end(double end);
+  Harvest harvest(std::vector<Contact<D>>* contacts) const;
+  std::optional<EventKey<D>> key_of_collision(std::uint64_t number) const;
+  Contact<D> contact_of(const Region<D>& region, Slot lo, std::size_t k) const;
+
+  const Box<D>& box_;
+  const Particles<D>& particles_;
+  Exchange& exchange_;
+  std::size_t regions_;
+  SearchOptions options_;
+  std::function<double()> forced_window_;
+  std::optional<Division<D>> division_;
+  std::vector<Local> local_;
+  Vec<D> g_ = Vec<D>::Zero();
+  double horizon_ = 0, now_ = 0;
+  double diameter_ = 0;         // the largest
+  double stray_ = 0;            // how far anyone comes in a window
+  double fastest_ = 0;          // that anyone is expected to be
+  double pace_ = 0;             // time in which a sphere collides kCollisions times; 0: not known yet
+  bool fresh_ = false;          // loaded at now_
+  std::uint64_t events_ = 0;    // contacts since take()
+  EventCounts past_;
+  DomainCounts counts_;
+};
+
+}  // namespace carom

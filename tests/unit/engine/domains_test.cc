@@ -1,0 +1,171 @@
+// A system divided into regions has the bits of one that is not, whatever the regions and the windows.
+
+#include "engine/domains.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/engine/event_cases.h"
+
+namespace carom {
+namespace {
+
+/// How a run is divided.
+struct Way {
+  std::size_t regions = 1;
+  SearchOptions::Method method = SearchOptions::Method::automatic;
+  std::function<double()> window{};
+  std::uint64_t limit = std::numeric_limits<std::uint64_t>::max();
+};
+
+template <int D>
+Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std::uint64_t>::max(),
+                 Counters* counted = nullptr) {
+  Outcome<D> out;
+  out.particles = c.system->particles;
+  Particles<D>& p = out.particles;
+  EventCore<D> core(c.system->box, p);
+  Counters counters;
+  for (int k = 0; k < c.slabs && counters.sphere_sphere < limit; ++k) {
+    core.load(p, c.g, c.slab);
+    const double reached = core.run(
+        c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = limit});
+    core.fly_to(reached, p);
+    for (std::size_t i = 0; i < p.size(); ++i) c.system->box.wrap(p.x[i], p.image[i]);
+  }
+  if (counted) *counted = counters;
+  return out;
+}
+
+template <int D>
+Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr, DomainCounts* domains_counted = nullptr) {
+  Outcome<D> out;
+  out.particles = c.system->particles;
+  Particles<D>& p = out.particles;
+  Exchange alone;
+  Domains<D> domains(c.system->box, p, alone, way.regions, {.method = way.method}, way.window);
+  Counters counters;
+  for (int k = 0; k < c.slabs && counters.sphere_sphere < way.limit; ++k) {
+    domains.take(p, c.g, c.slab);
+    const double reached = domains.run(
+        c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = way.limit});
+    domains.give_back(reached, p);
+    for (std::size_t i = 0; i < p.size(); ++i) c.system->box.wrap(p.x[i], p.image[i]);
+  }
+  if (counted) *counted = counters;
+  if (domains_counted) *domains_counted = domains.domain_counts();
+  return out;
+}
+
+template <int D>
+void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
+  Counters one, many;
+  const auto reference = whole(c, std::numeric_limits<std::uint64_t>::max(), &one);
+  ASSERT_GE(reference.contacts.size(), at_least);
+  using Method = SearchOptions::Method;
+  for (const std::size_t regions : {1, 2, 3, 4, 8})
+    for (const Method method : {Method::lists, Method::cells}) {
+      DomainCounts counts;
+      const std::string what = std::to_string(regions) + (method == Method::lists ? " lists" : " cells");
+      expect_same(reference, divided(c, {.regions = regions, .method = method}, &many, &counts), what);
+      if (testing::Test::HasFailure()) return;
+      EXPECT_EQ(one.sphere_sphere, many.sphere_sphere) << what;
+      EXPECT_EQ(one.sphere_wall, many.sphere_wall) << what;
+      EXPECT_EQ(one.collision_virial.value(), many.collision_virial.value()) << what;
+      EXPECT_EQ(one.max_overlap, many.max_overlap) << what;
+      if (getenv("SHOW")) std::cerr << what << ": windows " << counts.windows << " rounds " << counts.rounds << " cut " << counts.cut
+                << " events " << counts.events << " run " << counts.run_events << " redone " << counts.redone_events
+                << "\n";
+    }
+}
+
+TEST(Domains, Fluids) {
+  expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.49), .slab = 0.3, .slabs = 2}, 4000);
+  expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.3), .slab = 0.8, .slabs = 2}, 2000);
+  expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.1), .slab = 2, .slabs = 2}, 700);
+  expect_the_same_however_divided<2>({.system = test::hard_spheres<2>(14, 0.69), .slab = 0.4, .slabs = 2}, 1000);
+  expect_the_same_however_divided<2>({.system = test::hard_spheres<2>(10, 0.1), .slab = 5, .slabs = 2}, 300);
+}
+
+TEST(Domains, Crystals) {
+  expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(4, 0.7), .slab = 0.04, .slabs = 2}, 3000);
+  expect_the_same_however_divided<2>({.system = test::hard_spheres<2>(8, 0.8), .slab = 0.1, .slabs = 2}, 400);
+}
+
+TEST(Domains, ManySizes) {
+  expect_the_same_however_divided<3>(
+      {.system = random_system<3>(300, {7, 7, 7}, {P, P, P}, 0.1, 1.0, 3), .slab = 0.05, .slabs = 2}, 700);
+  expect_the_same_however_divided<2>(
+      {.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3, .slabs = 2}, 200);
+}
+
+TEST(Domains, WallsAndFields) {
+  expect_the_same_however_divided<3>({.system = random_system<3>(150, {7, 6, 6}, {W, P, W}, 0.5, 0.5, 5), .slab = 1},
+                                     1000);
+  expect_the_same_however_divided<3>(
+      {.system = random_system<3>(150, {6, 6, 9}, {P, P, W}, 0.5, 0.5, 7), .g = {0.1, 0, -1}, .slab = 1}, 1000);
+  expect_the_same_however_divided<2>(
+      {.system = random_system<2>(40, {7, 12}, {W, W}, 0.3, 0.5, 8), .g = {0, -0.5}, .slab = 1}, 200);
+}
+
+TEST(Domains, OpenSpace) {
+  expect_the_same_however_divided<3>(
+      {.system = random_system<3>(200, {8, 8, 8}, {O, O, P}, 0.5, 0.5, 9), .slab = 4, .slabs = 4}, 150);
+}
+
+TEST(Domains, TinyPeriodicBoxes) {  // regions border on themselves, and spheres meet through several images
+  expect_the_same_however_divided<3>(
+      {.system = random_system<3>(24, {3.1, 2.9, 3.3}, {P, P, P}, 0.4, 0.4, 10), .slab = 2}, 400);
+  expect_the_same_however_divided<2>({.system = random_system<2>(16, {4.2, 5.6}, {P, P}, 0.5, 0.5, 11), .slab = 5},
+                                     300);
+}
+
+/// Rows and columns of spheres at exact places with speeds of −1, 0 and 1: many collisions at one instant, chains of them.
+TEST(Domains, ExactTies) {
+  const int n = 6;
+  std::vector<Vec<3>> x, v;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < n; ++k) {
+        x.push_back({2.0 * i, 2.0 * j, 2.0 * k});
+        const int which = static_cast<int>(x.size() * 2654435761u >> 7) % 6;
+        Vec<3> speed = Vec<3>::Zero();
+        speed[which / 2] = which % 2 == 0 ? 1 : -1;
+        v.push_back(speed);
+      }
+  auto system = test::make_system<3>({12, 12, 12}, P, x, v, std::vector<double>(x.size(), 0.5),
+                                     std::vector<double>(x.size(), 1.0));
+  expect_the_same_however_divided<3>({.system = std::move(system), .slab = 4, .slabs = 3}, 1000);
+}
+
+/// A bullet would cross many regions in a window that suits the others.
+TEST(Domains, OneFastSphere) {
+  Case<3> c{.system = random_system<3>(200, {9, 9, 9}, {P, P, P}, 0.4, 0.4, 12), .slab = 1, .slabs = 2};
+  c.system->particles.v[17] = {300, 20, 1};
+  expect_the_same_however_divided<3>(c, 2000);
+}
+
+TEST(Domains, RandomWindows) {
+  const Case<3> c{.system = test::hard_spheres<3>(5, 0.3), .slab = 0.8, .slabs = 2};
+  const auto reference = whole(c);
+  for (std::uint64_t seed : {1, 2, 3}) {
+    std::uint64_t state = seed;
+    const auto window = [&] {
+      state = state * 6364136223846793005u + 1442695040888963407u;
+      return 1e-4 * std::pow(1000.0, static_cast<double>(state >> 33) / 2147483648.0);
+    };
+    expect_same(reference, divided(c, {.regions = 4, .window = window}), "seed " + std::to_string(seed));
+  }
+}
+
+TEST(Domains, EndsAtACollision) {
+  const Case<3> c{.system = test::hard_spheres<3>(5, 0.3), .slab = 0.8, .slabs = 3};
+  for (const std::uint64_t limit : {1, 2, 777, 1500}) {
+    const auto reference = whole(c, limit);
+    ASSERT_EQ(reference.contacts.size(), limit);
+    for (const std::size_t regions : {1, 3, 8})
+      expect_same(reference, divided(c, {.regions = regions, .limit = limit}), std::to_string(limit));
+  }
+}
+
+}  // namespace
+}  // namespace carom
