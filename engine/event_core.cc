@@ -137,6 +137,8 @@ void EventCore<D>::choose_search(double now) {
     sum += each * r;
     sum_of_powers += each * std::pow(r, D);
   }
+  if (radii_.size() > 1 && flights_.size() < particles_.radius.size())  // others may come
+    largest = std::max(largest, *std::max_element(particles_.radius.begin(), particles_.radius.end()));
   Extent<D> extent = flights_.extent();
   extent.particles = particles_.radius.size();
   double volume = 1;
@@ -160,7 +162,7 @@ void EventCore<D>::choose_search(double now) {
   double skin = tuning_.skin();
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
-  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, skin, agenda_);
+  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, largest, skin, agenda_);
   lists_->build(flights_, now, extent);
 }
 

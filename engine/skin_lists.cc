@@ -20,15 +20,15 @@ Vec<D> centre(const Agenda<D>& a) {
 
 template <int D>
 SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels,
-                        std::span<const double> radius, double skin, PageVector<Agenda<D>>& agenda)
+                        std::span<const double> radius, double largest, double skin, PageVector<Agenda<D>>& agenda)
     : box_(box),
       packing_(packing),
       kernels_(kernels),
       lanes_(kernels.lanes),
       radius_(radius),
+      largest_(largest),
       skin_(skin),
       agenda_(agenda) {
-  const double largest = *std::max_element(radius.begin(), radius.end());
   exact_ =
       radius.size() > 1 || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
   if (radius.size() > 1) {
@@ -53,7 +53,7 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
   for (int k = 0; k < D; ++k)
     volume *= box_.boundary[k] == Boundary::open ? extent.high[k] - extent.low[k] : box_.edges[k];
   for (std::size_t l = 0; l < levels; ++l) {
-    double largest = level_.empty() ? radius_[0] : 0;
+    double largest = l == 0 ? largest_ : 0;
     std::size_t members = level_.empty() ? n : 0;
     for (std::size_t i = 0; i < level_.size(); ++i)
       if (level_[i] == l) largest = std::max(largest, radius_[i]), ++members;

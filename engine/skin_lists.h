@@ -20,9 +20,10 @@ namespace carom {
 template <int D>
 class SkinLists {
  public:
-  /// `radius` by slot, the largest one they will have; one entry where all are equal.
+  /// `radius` by slot, the largest one they will have; one entry where all are equal. Nobody who comes later is larger
+  /// than `largest`.
   SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> radius,
-            double skin, PageVector<Agenda<D>>& agenda);
+            double largest, double skin, PageVector<Agenda<D>>& agenda);
 
   double skin() const { return skin_; }
   const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
@@ -84,7 +85,7 @@ class SkinLists {
   const ScanKernels& kernels_;
   const unsigned lanes_;  // lists start and end at multiples of so many candidates
   std::span<const double> radius_;
-  double skin_;
+  double largest_, skin_;
   PageVector<Agenda<D>>& agenda_;
   std::vector<Level> levels_;
   std::vector<std::uint8_t> level_;                 // by slot; empty where there is one level

@@ -79,7 +79,7 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
 }
 
 TEST(Domains, Fluids) {
-  expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.49), .slab = 0.3, .slabs = 2}, 4000);
+  expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.49), .slab = 0.3, .slabs = 2}, 3900);
   expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.3), .slab = 0.8, .slabs = 2}, 2000);
   expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.1), .slab = 2, .slabs = 2}, 700);
   expect_the_same_however_divided<2>({.system = test::hard_spheres<2>(14, 0.69), .slab = 0.4, .slabs = 2}, 1000);
@@ -87,7 +87,7 @@ TEST(Domains, Fluids) {
 }
 
 TEST(Domains, Crystals) {
-  expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(4, 0.7), .slab = 0.04, .slabs = 2}, 3000);
+  expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(4, 0.7), .slab = 0.04, .slabs = 2}, 1800);
   expect_the_same_however_divided<2>({.system = test::hard_spheres<2>(8, 0.8), .slab = 0.1, .slabs = 2}, 400);
 }
 
@@ -134,7 +134,7 @@ TEST(Domains, ExactTies) {
       }
   auto system = test::make_system<3>({12, 12, 12}, P, x, v, std::vector<double>(x.size(), 0.5),
                                      std::vector<double>(x.size(), 1.0));
-  expect_the_same_however_divided<3>({.system = std::move(system), .slab = 4, .slabs = 3}, 1000);
+  expect_the_same_however_divided<3>({.system = std::move(system), .slab = 4, .slabs = 3}, 600);
 }
 
 /// A bullet would cross many regions in a window that suits the others.
