@@ -29,8 +29,8 @@ static_assert(sizeof(CalendarEntry) == 12);  // there are some for every particl
 /// Serves entries by time; the order of equal times is the caller's business.
 class Calendar {
  public:
-  /// Empties the calendar and sets it up for times in [now, horizon), for about `alive` entries at a time, which will be
-  /// spread about like the `sample`. `entries_per_bin` forces the size of bins (0: about right).
+  /// Empties the calendar and sets it up for times in [now, horizon), for about `alive` entries at a time, which will
+  /// be spread about like the `sample`. `entries_per_bin` forces the size of bins (0: about right).
   void reset(double horizon, std::size_t alive, double entries_per_bin = 0, std::vector<double> sample = {},
              double now = 0) {
     horizon_ = horizon;

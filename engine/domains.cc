@@ -8,9 +8,9 @@
 namespace carom {
 namespace {
 
-constexpr double kCollisions = 0.3;                    // of a sphere in a window, about
+constexpr double kCollisions = 0.3;                                              // of a sphere in a window, about
 constexpr double kFirstStray = 0.3, kLargestStray = 1.0, kSmallestStray = 0.02;  // in diameters
-constexpr std::size_t kFewest = 8;                     // spheres a region
+constexpr std::size_t kFewest = 8;                                               // spheres a region
 
 template <class T>
 void put(Bytes& to, const T& value) {

@@ -24,11 +24,11 @@ namespace carom {
 /// What agreement between regions took, on this rank, since the domains were made.
 struct DomainCounts {
   std::uint64_t windows = 0;
-  std::uint64_t rounds = 0;          ///< of exchange and repair
-  std::uint64_t cut = 0;             ///< windows that were cut because somebody was too fast
-  std::uint64_t events = 0;          ///< of own spheres, as they are in the end
-  std::uint64_t run_events = 0;      ///< in first runs, those of ghosts among them
-  std::uint64_t redone_events = 0;   ///< in repairs
+  std::uint64_t rounds = 0;         ///< of exchange and repair
+  std::uint64_t cut = 0;            ///< windows that were cut because somebody was too fast
+  std::uint64_t events = 0;         ///< of own spheres, as they are in the end
+  std::uint64_t run_events = 0;     ///< in first runs, those of ghosts among them
+  std::uint64_t redone_events = 0;  ///< in repairs
 };
 
 template <int D>
@@ -88,12 +88,12 @@ class Domains {
   std::vector<Local> local_;
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
-  double diameter_ = 0;         // the largest
-  double stray_ = 0;            // how far anyone comes in a window
-  double fastest_ = 0;          // that anyone is expected to be
-  double pace_ = 0;             // time in which a sphere collides kCollisions times; 0: not known yet
-  bool fresh_ = false;          // loaded at now_
-  std::uint64_t events_ = 0;    // contacts since take()
+  double diameter_ = 0;       // the largest
+  double stray_ = 0;          // how far anyone comes in a window
+  double fastest_ = 0;        // that anyone is expected to be
+  double pace_ = 0;           // time in which a sphere collides kCollisions times; 0: not known yet
+  bool fresh_ = false;        // loaded at now_
+  std::uint64_t events_ = 0;  // contacts since take()
   EventCounts past_;
   DomainCounts counts_;
 };

@@ -145,7 +145,7 @@ class EventCore {
   const ScanKernels& kernels_;
   bool walled_ = false;
   PageVector<Agenda<D>> agenda_;
-  std::vector<Slot> free_;  // slots of those who have been dismissed
+  std::vector<Slot> free_;     // slots of those who have been dismissed
   std::vector<double> radii_;  // that lists or cells are made for; one where all are equal
   Packing<D> packing_;
   ScanSetting setting_;

@@ -164,9 +164,15 @@ void Region<D>::repair() {
     const Task task = tasks_.top();
     tasks_.pop();
     switch (task.kind) {
-      case Task::Kind::contact: contact(task); break;
-      case Task::Kind::script: script(task); break;
-      case Task::Kind::check: check(task); break;
+      case Task::Kind::contact:
+        contact(task);
+        break;
+      case Task::Kind::script:
+        script(task);
+        break;
+      case Task::Kind::check:
+        check(task);
+        break;
       case Task::Kind::seed:
         if (mended(task.a)) break;
         Mended& m = mend(task.a, task.key);
@@ -183,8 +189,8 @@ void Region<D>::repair() {
   }
 }
 
-/// Where what was seen of a ghost differs from its script, and the ghost is to blame, it must be mended from there. What
-/// it does with own spheres of this region is not its owner's to know first.
+/// Where what was seen of a ghost differs from its script, and the ghost is to blame, it must be mended from there.
+/// What it does with own spheres of this region is not its owner's to know first.
 template <int D>
 void Region<D>::seed(Slot g) {
   const auto seen = path(g);
@@ -221,8 +227,7 @@ typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
   }
   for (const Node<D>& node : m.old) {
     const auto partner = slot_.find(node.partner());
-    if (partner != slot_.end())
-      tasks_.push({.kind = Task::Kind::check, .key = node.key, .a = i, .b = partner->second});
+    if (partner != slot_.end()) tasks_.push({.kind = Task::Kind::check, .key = node.key, .a = i, .b = partner->second});
   }
   return m;
 }
@@ -325,8 +330,8 @@ void Region<D>::contact(const Task& task) {
   }
   Mended& b = mended(task.b) ? repairs_[mended_of_[task.b]] : mend(task.b, key);
   Node<D> of_a{a.now, key}, of_b{b.now, key};
-  const Blow<D> blow = core_.flights().collide(a.slot, of_a.after, b.slot, of_b.after, box_.shift(task.image), key.time,
-                                               key.generation);
+  const Blow<D> blow =
+      core_.flights().collide(a.slot, of_a.after, b.slot, of_b.after, box_.shift(task.image), key.time, key.generation);
   of_a.virial = of_b.virial = blow.d.dot(blow.impulse);
   of_a.overlap = of_b.overlap = blow.overlap;
   append(a, of_a);

@@ -100,7 +100,7 @@ class Region {
     EventKey<D> key;
     Slot a = 0, b = 0;  // b: of a contact with a sphere, and of a check
     std::uint32_t version_a = 0, version_b = 0;
-    Image<D> image{};  // of a contact, seen from a
+    Image<D> image{};                          // of a contact, seen from a
     bool operator<(const Task& other) const {  // std::priority_queue keeps the largest on top
       if (other.key < key) return true;
       if (key < other.key) return false;
@@ -132,21 +132,21 @@ class Region {
   EventCore<D> core_;
   double end_ = 0, astray_ = 0;  // of the window
   std::unordered_map<Id, Slot> slot_;
-  std::vector<Role> role_;          // by slot
+  std::vector<Role> role_;  // by slot
   std::vector<Slot> own_, ghosts_;
 
   Trace<D> trace_;
-  std::vector<Record<D>> start_;                // at the start of the window, of those who had events
-  Nodes nodes_;                                 // of the first run, by sphere
-  std::vector<std::uint32_t> first_, length_;   // by slot: in nodes_
-  std::vector<std::uint32_t> start_of_;         // by slot: in start_, or kNone
+  std::vector<Record<D>> start_;               // at the start of the window, of those who had events
+  Nodes nodes_;                                // of the first run, by sphere
+  std::vector<std::uint32_t> first_, length_;  // by slot: in nodes_
+  std::vector<std::uint32_t> start_of_;        // by slot: in start_, or kNone
   std::vector<Slot> touched_, changed_;
-  std::unordered_map<Slot, Nodes> rewritten_;   // paths that have been mended
-  std::unordered_map<Slot, Nodes> script_;      // of ghosts
+  std::unordered_map<Slot, Nodes> rewritten_;      // paths that have been mended
+  std::unordered_map<Slot, Nodes> script_;         // of ghosts
   std::vector<std::pair<Slot, Record<D>>> other_;  // records that the core is told
 
   std::deque<Mended> repairs_;
-  std::vector<std::uint32_t> mended_of_;        // by slot: in repairs_, or kNone
+  std::vector<std::uint32_t> mended_of_;  // by slot: in repairs_, or kNone
   std::priority_queue<Task> tasks_;
   std::vector<std::uint32_t> near_;
   std::uint64_t run_events_ = 0, redone_events_ = 0;

@@ -33,8 +33,7 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
       radius.size() > 1 || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
   if (radius.size() > 1) {
     level_.resize(radius.size());
-    for (std::size_t i = 0; i < radius.size(); ++i)
-      level_[i] = octave(largest, radius[i]);
+    for (std::size_t i = 0; i < radius.size(); ++i) level_[i] = octave(largest, radius[i]);
   }
 }
 
@@ -406,9 +405,8 @@ void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> radius
   if (!level_.empty()) {
     if (i == level_.size()) level_.push_back(0);
     // The smallest level that can hold it: there may be none of its octave.
-    const auto level = std::find_if(levels_.rbegin(), levels_.rend(), [&](const Level& l) {
-      return l.largest_radius >= radius[i];
-    });
+    const auto level =
+        std::find_if(levels_.rbegin(), levels_.rend(), [&](const Level& l) { return l.largest_radius >= radius[i]; });
     level_[i] = static_cast<std::uint8_t>(levels_.rend() - level - 1);
   }
   for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[k];

@@ -3,8 +3,10 @@
 // The slab is an epoch: at its end all records are flown to one time and wrapped, so that times stay small and their
 // last digits fine. Between events x(t) = x + v s + ½ g s² holds exactly; there is no step and no truncation error.
 
+#include <cstdlib>
 #include <optional>
 
+#include "engine/domains.h"
 #include "engine/error.h"
 #include "engine/event_core.h"
 #include "engine/integrators/registry.h"
@@ -18,8 +20,14 @@ class FreeFlight : public Integrator<D> {
   explicit FreeFlight(const Parameters& parameters)
       : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
 
+  void share(Exchange& ranks) override { ranks_ = &ranks; }
+
   void start(System<D>& system, Counters&) override {
-    core_.emplace(system.box, system.particles);
+    const std::size_t regions = regions_a_rank(system.particles.size());
+    if (ranks_->size() > 1 || regions > 1)
+      domains_.emplace(system.box, system.particles, *ranks_, regions * static_cast<std::size_t>(ranks_->size()));
+    else
+      core_.emplace(system.box, system.particles);
     for (const auto& term : system.interactions) {
       if (!term->common_acceleration())
         throw Error(Failure::deck, "free-flight knows no forces but a uniform-field; use psa, cva, mcva or cdda");
@@ -28,46 +36,59 @@ class FreeFlight : public Integrator<D> {
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
-    try {
-      run_epoch(system, slab, report);
-    } catch (...) {
-      if (system.particles.x.empty()) core_->give_back(core_->now(), system.particles);
-      throw;
-    }
+    if (core_)
+      run_epoch(*core_, system, slab, report);
+    else
+      run_epoch(*domains_, system, slab, report);
   }
 
  private:
-  void run_epoch(System<D>& system, const Slab& slab, SlabReport<D>& report) {
+  /// `flight`: an EventCore, or Domains.
+  template <class Flight>
+  void run_epoch(Flight& flight, System<D>& system, const Slab& slab, SlabReport<D>& report) {
     const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
                                                max_events_ * system.particles.size()};
+    const auto run = [&](double end) {
+      const Stopwatch watch(report.counters.seconds.queue);
+      return flight.run(end, events);
+    };
     {
       const Stopwatch watch(report.counters.seconds.predict);
-      core_->take(system.particles, g_, slab.length);
+      flight.take(system.particles, g_, slab.length);
     }
-    report.reached = slab.length;
-    for (double due : report.observe) {
-      report.reached = run(due, events);
-      if (report.reached < due) break;
-      if (copies_.mass.empty()) copies_ = system.particles;
-      core_->fly_to(due, copies_);
-      copies_.image = system.particles.image;
-      for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
-      report.observer(due, copies_);
+    try {
+      report.reached = slab.length;
+      for (double due : report.observe) {
+        report.reached = run(due);
+        if (report.reached < due) break;
+        if (copies_.mass.empty()) copies_ = system.particles;
+        flight.fly_to(due, copies_);
+        copies_.image = system.particles.image;
+        for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
+        report.observer(due, copies_);
+      }
+      if (report.observe.empty() || report.reached == report.observe.back()) report.reached = run(slab.length);
+    } catch (...) {
+      if (ranks_->size() == 1) flight.give_back(flight.now(), system.particles);
+      throw;
     }
-    if (report.observe.empty() || report.reached == report.observe.back()) report.reached = run(slab.length, events);
-    core_->give_back(report.reached, system.particles);
-    report.counters.events = core_->counts();
+    flight.give_back(report.reached, system.particles);
+    report.counters.events = flight.counts();
     system.wrap();
   }
 
-  double run(double end, const typename EventCore<D>::Report& events) {
-    const Stopwatch watch(events.counters.seconds.queue);
-    return core_->run(end, events);
+  /// More than one lets each fit the cache; CAROM_REGIONS forces a number.
+  std::size_t regions_a_rank(std::size_t) const {
+    if (const char* const forced = std::getenv("CAROM_REGIONS")) return std::max(1, std::atoi(forced));
+    return 1;
   }
 
   std::uint64_t max_events_;
   Vec<D> g_ = Vec<D>::Zero();
-  std::optional<EventCore<D>> core_;
+  Exchange alone_;
+  Exchange* ranks_ = &alone_;
+  std::optional<EventCore<D>> core_;  // one of the two
+  std::optional<Domains<D>> domains_;
   Particles<D> copies_;
 };
 
@@ -95,6 +116,7 @@ IntegratorInfo free_flight() {
           "Lubachevsky, J. Comput. Phys. 94 (1991) 255",
       .stepping = false,
       .smooth_forces = false,
+      .shared = true,
       .in_2d = make<FreeFlight, 2>,
       .in_3d = make<FreeFlight, 3>};
 }

@@ -27,8 +27,8 @@ Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std
   Counters counters;
   for (int k = 0; k < c.slabs && counters.sphere_sphere < limit; ++k) {
     core.load(p, c.g, c.slab);
-    const double reached = core.run(
-        c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = limit});
+    const double reached =
+        core.run(c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = limit});
     core.fly_to(reached, p);
     for (std::size_t i = 0; i < p.size(); ++i) c.system->box.wrap(p.x[i], p.image[i]);
   }
@@ -37,7 +37,8 @@ Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std
 }
 
 template <int D>
-Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr, DomainCounts* domains_counted = nullptr) {
+Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr,
+                   DomainCounts* domains_counted = nullptr) {
   Outcome<D> out;
   out.particles = c.system->particles;
   Particles<D>& p = out.particles;
@@ -46,8 +47,8 @@ Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr
   Counters counters;
   for (int k = 0; k < c.slabs && counters.sphere_sphere < way.limit; ++k) {
     domains.take(p, c.g, c.slab);
-    const double reached = domains.run(
-        c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = way.limit});
+    const double reached =
+        domains.run(c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = way.limit});
     domains.give_back(reached, p);
     for (std::size_t i = 0; i < p.size(); ++i) c.system->box.wrap(p.x[i], p.image[i]);
   }
@@ -72,9 +73,10 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
       EXPECT_EQ(one.sphere_wall, many.sphere_wall) << what;
       EXPECT_EQ(one.collision_virial.value(), many.collision_virial.value()) << what;
       EXPECT_EQ(one.max_overlap, many.max_overlap) << what;
-      if (getenv("SHOW")) std::cerr << what << ": windows " << counts.windows << " rounds " << counts.rounds << " cut " << counts.cut
-                << " events " << counts.events << " run " << counts.run_events << " redone " << counts.redone_events
-                << "\n";
+      if (getenv("SHOW"))
+        std::cerr << what << ": windows " << counts.windows << " rounds " << counts.rounds << " cut " << counts.cut
+                  << " events " << counts.events << " run " << counts.run_events << " redone " << counts.redone_events
+                  << "\n";
     }
 }
 
@@ -119,7 +121,8 @@ TEST(Domains, TinyPeriodicBoxes) {  // regions border on themselves, and spheres
                                      300);
 }
 
-/// Rows and columns of spheres at exact places with speeds of −1, 0 and 1: many collisions at one instant, chains of them.
+/// Rows and columns of spheres at exact places with speeds of −1, 0 and 1: many collisions at one instant, chains of
+/// them.
 TEST(Domains, ExactTies) {
   const int n = 6;
   std::vector<Vec<3>> x, v;
