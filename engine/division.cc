@@ -25,6 +25,8 @@ Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t 
 template <int D>
 std::int32_t Division<D>::divide(std::span<Vec<D>> x, Part part, std::size_t regions) {
   if (regions == 1) {
+    part.centre = 0.5 * (part.low + part.high);
+    part.half = 0.5 * (part.high - part.low);
     parts_.push_back(part);
     return ~static_cast<std::int32_t>(parts_.size() - 1);
   }
@@ -66,16 +68,6 @@ std::uint32_t Division<D>::owner(const Vec<D>& x) const {
   return static_cast<std::uint32_t>(~node);
 }
 
-template <int D>
-Vec<D> Division<D>::wrapped(Vec<D> x) const {
-  for (int k = 0; k < D; ++k) {
-    if (!box_.periodic(k) || (x[k] >= 0 && x[k] < box_.edges[k])) continue;
-    x[k] -= std::floor(x[k] / box_.edges[k]) * box_.edges[k];
-    if (!(x[k] >= 0 && x[k] < box_.edges[k])) x[k] = 0;
-  }
-  return x;
-}
-
 /// Between two stretches of an axis.
 template <int D>
 double Division<D>::gap(int axis, double low, double high, double other_low, double other_high) const {
@@ -89,13 +81,15 @@ double Division<D>::gap(int axis, double low, double high, double other_low, dou
 }
 
 template <int D>
-double Division<D>::squared_distance(const Part& part, const Vec<D>& x) const {
-  double sum = 0;
+double Division<D>::depth(std::uint32_t region, const Vec<D>& x) const {
+  const Part& part = parts_[region];
+  const Vec<D> at = wrapped(x);
+  double least = kInfinite;
   for (int k = 0; k < D; ++k) {
-    const double d = gap(k, part.low[k], part.high[k], x[k], x[k]);
-    sum += d * d;
+    if (box_.periodic(k) && part.low[k] == 0 && part.high[k] == box_.edges[k]) continue;
+    least = std::min({least, at[k] - part.low[k], part.high[k] - at[k]});
   }
-  return sum;
+  return least;
 }
 
 template <int D>

@@ -3,6 +3,7 @@
 //
 // Which region owns a sphere never reaches the physics; all that matters is that everybody computes the same.
 
+#include <algorithm>
 #include <limits>
 #include <span>
 #include <vector>
@@ -30,12 +31,15 @@ class Division {
   bool near(std::uint32_t region, const Vec<D>& x, double reach) const {
     return squared_distance(parts_[region], wrapped(x)) <= reach * reach;
   }
+  /// How far a place in a region is from its faces; infinite where it has none.
+  double depth(std::uint32_t region, const Vec<D>& x) const;
   /// The regions that are nearer than `reach` to a region, without itself.
   std::vector<std::uint32_t> neighbours(std::uint32_t region, double reach) const;
 
  private:
   struct Part {
-    Vec<D> low, high;  // infinite where the box has a wall or an open end
+    Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();     // infinite where the box has a wall or an open end
+    Vec<D> centre = Vec<D>::Zero(), half = Vec<D>::Zero();  // along periodic axes
   };
   struct Cut {
     int axis;
@@ -44,8 +48,28 @@ class Division {
   };
 
   std::int32_t divide(std::span<Vec<D>> x, Part part, std::size_t regions);
-  Vec<D> wrapped(Vec<D> x) const;
-  double squared_distance(const Part& part, const Vec<D>& x) const;
+  Vec<D> wrapped(Vec<D> x) const {
+    for (int k = 0; k < D; ++k) {
+      if (!box_.periodic(k) || (x[k] >= 0 && x[k] < box_.edges[k])) continue;
+      x[k] -= std::floor(x[k] / box_.edges[k]) * box_.edges[k];
+      if (!(x[k] >= 0 && x[k] < box_.edges[k])) x[k] = 0;
+    }
+    return x;
+  }
+  double squared_distance(const Part& part, const Vec<D>& x) const {
+    double sum = 0;
+    for (int k = 0; k < D; ++k) {
+      double d = 0;
+      if (box_.periodic(k)) {
+        const double away = std::abs(x[k] - part.centre[k]);
+        d = std::max(std::min(away, box_.edges[k] - away) - part.half[k], 0.0);
+      } else {
+        d = std::max({part.low[k] - x[k], x[k] - part.high[k], 0.0});
+      }
+      sum += d * d;
+    }
+    return sum;
+  }
   double gap(int axis, double low, double high, double other_low, double other_high) const;
 
   Box<D> box_;

@@ -8,9 +8,11 @@
 namespace carom {
 namespace {
 
-constexpr double kCollisions = 0.3;                                              // of a sphere in a window, about
-constexpr double kFirstStray = 0.3, kLargestStray = 1.0, kSmallestStray = 0.02;  // in diameters
-constexpr std::size_t kFewest = 8;                                               // spheres a region
+constexpr double kCollisions = 0.3;                           // of a sphere in a window, about
+constexpr double kLargestStray = 1.0, kSmallestStray = 0.02;  // in diameters
+constexpr std::size_t kFewest = 8;                            // spheres a region
+constexpr double kFaster = 1.15;                              // than anyone is, somebody may come to be
+constexpr double kSlack = 8;                                  // windows between looks at who is at the border
 
 template <class T>
 void put(Bytes& to, const T& value) {
@@ -47,7 +49,6 @@ Domains<D>::Domains(const Box<D>& box, const Particles<D>& particles, Exchange& 
       options_(options),
       forced_window_(std::move(window)) {
   diameter_ = 2 * *std::max_element(particles.radius.begin(), particles.radius.end());
-  stray_ = kFirstStray * diameter_;
 }
 
 /// Regions go to ranks in their order, as evenly as may be.
@@ -70,9 +71,19 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
   horizon_ = horizon;
   events_ = 0;
   fastest_ = 0;
-  for (const Vec<D>& v : particles.v) fastest_ = std::max(fastest_, v.norm());
-  fastest_ = 1.05 * fastest_ + g_.norm() * horizon_;
-  if (pace_ > 0) stray_ = std::clamp(1.05 * pace_ * fastest_, kSmallestStray * diameter_, kLargestStray * diameter_);
+  double squares = 0;
+  for (const Vec<D>& v : particles.v) {
+    fastest_ = std::max(fastest_, v.norm());
+    squares += v.squaredNorm();
+  }
+  if (pace_ == 0 && squares > 0) {
+    Extent<D> extent;
+    for (const Vec<D>& x : particles.x) extent.add(x);
+    const double thermal = std::sqrt(squares / static_cast<double>(D * particles.size()));
+    pace_ = kCollisions / (contacts_a_length(situation_of<D>(box_, particles_.radius, extent)) * thermal);
+  }
+  fastest_ = kFaster * fastest_ + g_.norm() * horizon_;
+  stray_ = std::clamp(1.05 * pace_ * fastest_, kSmallestStray * diameter_, kLargestStray * diameter_);
   division_.emplace(box_, particles.x, regions_);
   std::vector<Record<D>> records(particles.size());
   for (std::size_t i = 0; i < records.size(); ++i)
@@ -105,8 +116,9 @@ void Domains<D>::load(std::span<const Record<D>> records, double now) {
     local.neighbours = division_->neighbours(local.number, reach);
     if (local.neighbours.size() > 64)
       throw Error(Failure::deck, "a region has more than 64 neighbours; use fewer ranks for this box");
-    local.region->load(std::move(own[local.number]), ghosts[local.number], g_, horizon_, now);
+    local.region->load(std::move(own[local.number]), ghosts[local.number], g_, horizon_, now, stray_);
     local.holders.clear();
+    local.unwatched = std::numeric_limits<double>::infinity();
   }
   now_ = now;
   fresh_ = false;
@@ -136,13 +148,19 @@ void Domains<D>::sort_out() {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
   for (Local& local : local_) {
     Region<D>& region = *local.region;
-    const std::vector<Slot> before(region.own().begin(), region.own().end());
+    if (local.unwatched += stray_; local.unwatched > kSlack * stray_) {
+      local.unwatched = 0;
+      region.watch(now_,
+                   [&](const Vec<D>& x) { return division_->depth(local.number, x) <= reach + (kSlack + 1) * stray_; });
+    }
+    const std::vector<Slot> before(region.border().begin(), region.border().end());
     region.sort_out(
         now_, [&](const Vec<D>& x) { return division_->owner(x) == local.number; },
         [&](const Vec<D>& x) { return division_->near(local.number, x, reach); });
     local.holders.resize(region.flights().size());
-    std::vector<std::uint64_t> holders(local.holders.size());
-    for (const Slot i : region.own()) {
+    for (const Slot i : before)
+      if (!region.owns(i)) local.holders[i] = 0;
+    for (const Slot i : region.border()) {
       const Vec<D> x = region.flights().at(i, now_).x;
       std::uint64_t now = 0;
       for (std::size_t k = 0; k < local.neighbours.size(); ++k) {
@@ -153,9 +171,8 @@ void Domains<D>::sort_out() {
         put(to, local.neighbours[k]);
         put(to, region.flights()[i]);
       }
-      holders[i] = now;
+      local.holders[i] = now;
     }
-    local.holders.swap(holders);  // whoever is no longer its own is held by nobody
   }
   double full = 0;
   for (const Bytes& bytes : exchange_.swap(std::move(outgoing)))
@@ -190,7 +207,7 @@ double Domains<D>::run(double end, const Report& report) {
     if (!fresh_) sort_out();
     fresh_ = false;
     double stop = window_end(end);
-    for (Local& local : local_) local.region->run(now_, stop, 2 * stray_);
+    for (Local& local : local_) local.region->run(now_, stop);
     ++counts_.windows;
     agree();
     // Was anyone too fast?
@@ -199,7 +216,7 @@ double Domains<D>::run(double end, const Report& report) {
     exchange_.largest({&fastest, 1});
     bool whole = true;
     if (fastest > fastest_) {
-      fastest_ = 1.05 * fastest;
+      fastest_ = kFaster * fastest;
       const double most = now_ + stray_ / fastest_;
       if (most < stop) {
         ++counts_.cut;

@@ -58,6 +58,7 @@ class Domains {
     std::unique_ptr<Region<D>> region;
     std::vector<std::uint32_t> neighbours;
     std::vector<std::uint64_t> holders;  // by slot: of an own sphere, which neighbours have it as a ghost
+    double unwatched = 0;                // how far spheres may have come since the border was laid
   };
   /// What a window brought, of own spheres.
   struct Harvest {

@@ -1,7 +1,6 @@
 #include "engine/event_core.h"
 
 #include <bit>
-#include <numbers>
 #include <string>
 
 #include "engine/contact.h"
@@ -55,11 +54,13 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
 }
 
 template <int D>
-void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now) {
+void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double astray) {
   const auto order = along_curve<D>(records.size(), [&](std::size_t i) -> const Vec<D>& { return records[i].x; });
   std::vector<Record<D>> sorted(records.size());
   for (std::size_t i = 0; i < records.size(); ++i) sorted[i] = records[order[i]];
   std::vector<Record<D>>().swap(records);
+  astray_ = astray;
+  at_border_.clear();
   events_ = since_sort_ = 0;
   now_ = now;
   tied_ = {};
@@ -129,26 +130,15 @@ void EventCore<D>::plan(bool anew, double now) {
 
 template <int D>
 void EventCore<D>::choose_search(double now) {
-  // A region is as dense as the whole, of which it has a part only.
-  const auto n = static_cast<double>(particles_.radius.size()), each = n / static_cast<double>(radii_.size());
-  double largest = 0, sum = 0, sum_of_powers = 0;
-  for (const double r : radii_) {
-    largest = std::max(largest, r);
-    sum += each * r;
-    sum_of_powers += each * std::pow(r, D);
-  }
-  if (radii_.size() > 1 && flights_.size() < particles_.radius.size())  // others may come
-    largest = std::max(largest, *std::max_element(particles_.radius.begin(), particles_.radius.end()));
+  // A region is as dense as the whole, of which it has a part only, and larger spheres may come.
+  largest_ = *std::max_element(radii_.begin(), radii_.end());
+  if (radii_.size() > 1 && flights_.size() < particles_.radius.size())
+    largest_ = std::max(largest_, *std::max_element(particles_.radius.begin(), particles_.radius.end()));
   Extent<D> extent = flights_.extent();
   extent.particles = particles_.radius.size();
-  double volume = 1;
-  for (int k = 0; k < D; ++k) {
-    const bool open = box_.boundary[k] == Boundary::open;  // as far as there are spheres
-    const double edge = open ? extent.high[k] - extent.low[k] + 2 * largest : box_.edges[k];
-    volume *= edge;
-  }
-  const double filled = (D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * sum_of_powers / volume;
-  tuning_.choose({D, n / volume, filled, 2 * sum / n, 2 * largest}, counts_);
+  SearchSituation situation = situation_of<D>(box_, radii_, extent);
+  situation.largest = 2 * largest_;
+  tuning_.choose(situation, counts_);
   if (!tuning_.lists()) {
     lists_.reset();
     cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, kernels_, tuning_.cell(), extent);
@@ -162,8 +152,8 @@ void EventCore<D>::choose_search(double now) {
   double skin = tuning_.skin();
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
-  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, largest, skin, agenda_);
-  lists_->build(flights_, now, extent);
+  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, largest_, skin, agenda_);
+  lists_->build(flights_, now, extent, astray_);
 }
 
 template <int D>
@@ -466,7 +456,7 @@ void EventCore<D>::predict_leaving(Slot i, double now) {
   Agenda<D>& a = agenda_[i];
   Vec<D> e;
   for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
-  const double skin = lists_->skin() * (1 - 1e-6);
+  const double skin = room(i) * (1 - 1e-6);
   if (!flights_.field()) {
     if (a.contact < kNever && (e + (a.contact - r.t) * r.v).squaredNorm() < skin * skin) {
       a.update = kNever;  // not before its contact: a straight way between two places of a ball stays in it
@@ -546,7 +536,7 @@ void EventCore<D>::update(Slot i, double now) {
   if (flights_.field()) {  // it may still be far from where its list ends
     Vec<D> e;
     for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
-    if (e.norm() < 0.7 * lists_->skin()) {
+    if (e.norm() < 0.7 * room(i)) {
       predict_leaving(i, now);
       schedule(i);
       return;
@@ -596,7 +586,7 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
   ++agenda_[j].version;
   if (report.trace) {
     const double virial = blow.d.dot(blow.impulse);
-    for (const Slot who : {i, j}) report.trace->nodes.push_back({who, {flights_[who], key, virial, blow.overlap}});
+    for (const Slot who : {i, j}) report.trace->nodes.push_back({flights_[who], key, virial, blow.overlap, who});
     return;
   }
   ++report.counters.sphere_sphere;
@@ -618,7 +608,7 @@ void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, c
   const Blow<D> blow = flights_.bounce(i, axis, side, time, generation);
   ++agenda_[i].version;
   if (report.trace) {
-    report.trace->nodes.push_back({i, {flights_[i], key, 0, blow.overlap}});
+    report.trace->nodes.push_back({flights_[i], key, 0, blow.overlap, i});
     return;
   }
   ++report.counters.sphere_wall;
@@ -649,6 +639,7 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
   ++agenda_[slot].version;
   setting_ = flights_.setting(packing_);
   const Vec<D> x = flights_.at(slot, now).x;
+  if (!at_border_.empty()) at_border_[slot] = lists_ && lists_->skin() >= 3 * astray_ ? 1 : 0;
   if (lists_) {
     lists_->admit(slot, x, radii_);
   } else {
@@ -680,7 +671,7 @@ void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, doub
   for (const auto& [i, r] : records) {
     const Vec<D> x = flights_.at(i, now).x;
     if (lists_) {
-      lists_->move(i, x);
+      lists_->move(i, x, room(i));
     } else {
       CellPlace<D>& cell = agenda_[i].where.cell;
       cells_->remove(i, cell);
@@ -692,12 +683,36 @@ void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, doub
 }
 
 template <int D>
-void EventCore<D>::find_near(Slot i, double astray, std::vector<std::uint32_t>& found) const {
-  found.clear();
-  if (lists_)
-    lists_->find_near(i, astray, found);
-  else
-    cells_->find_near(agenda_[i].where.cell, radii_[0] + radii_[0] + 2 * astray, found);
+std::span<const std::uint32_t> EventCore<D>::find_near(Slot i) {
+  if (lists_) return lists_->find_near(i, astray_);
+  cells_->find_near(agenda_[i].where.cell, 2 * (largest_ + astray_), near_);
+  return near_;
+}
+
+template <int D>
+std::span<const std::uint32_t> EventCore<D>::find_near_at_border(Slot i) {
+  if (!lists_ || room(i) == lists_->skin()) return find_near(i);
+  return {lists_->candidates(agenda_[i]), agenda_[i].count};
+}
+
+template <int D>
+void EventCore<D>::set_border(std::span<const Slot> border, std::span<const Slot> ghosts, double now) {
+  at_border_.assign(flights_.room(), 0);
+  if (!lists_ || lists_->skin() < 3 * astray_) return;
+  for (const auto slots : {border, ghosts})
+    for (const Slot i : slots) {
+      at_border_[i] = 1;
+      if (lists_->move(i, flights_.at(i, now).x, room(i)))
+        predict(i, now);
+      else
+        predict_leaving(i, now), schedule(i);
+    }
+}
+
+/// How far a sphere may go from the centre of its region.
+template <int D>
+double EventCore<D>::room(Slot i) const {
+  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? astray_ : 0);
 }
 
 template class EventCore<2>;

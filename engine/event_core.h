@@ -82,8 +82,8 @@ class EventCore {
   // For a core that runs a part of a larger system (engine/region.h). All of this happens at a time `now` that no event
   // precedes any more.
 
-  /// Starts with these spheres only; no record is of a later time than `now`.
-  void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now);
+  /// Starts with these spheres only; no record is of a later time than `now`. find_near() will be asked for `astray`.
+  void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double astray);
   const Flights<D>& flights() const { return flights_; }
   const Packing<D>& packing() const { return packing_; }
   /// Takes a sphere in; false: there is no room left, load anew.
@@ -92,9 +92,14 @@ class EventCore {
   void dismiss(Slot i);
   /// These spheres have other records than this core thought.
   void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
-  /// Candidates for contacts of a sphere, itself among them: whoever may touch it where each of the two has come up to
-  /// `astray` from where the core knows it to be.
-  void find_near(Slot i, double astray, std::vector<std::uint32_t>& found) const;
+  /// Says which spheres are at the border of a region: lists of theirs are good for each other wherever they come in a
+  /// window, and need not be searched for.
+  void set_border(std::span<const Slot> border, std::span<const Slot> ghosts, double now);
+  /// Candidates for contacts of a sphere: whoever may touch it where each of the two has come up to `astray` (load)
+  /// from where the core knows it to be. Good until the next call.
+  std::span<const std::uint32_t> find_near(Slot i);
+  /// The same for one at the border, where only others at the border matter.
+  std::span<const std::uint32_t> find_near_at_border(Slot i);
 
  private:
   /// An event among several at one time, with what it was when it was found there.
@@ -126,6 +131,7 @@ class EventCore {
   void predict_pairs(const ScanTask& task, bool latest);
   void predict_pairs_one_by_one(const ScanTask& task);
   void predict_walls(Slot i);
+  double room(Slot i) const;
   void predict_update(Slot i, double now);
   void predict_leaving(Slot i, double now);
   void predict_crossing(Slot i, double now);
@@ -145,8 +151,11 @@ class EventCore {
   const ScanKernels& kernels_;
   bool walled_ = false;
   PageVector<Agenda<D>> agenda_;
-  std::vector<Slot> free_;     // slots of those who have been dismissed
-  std::vector<double> radii_;  // that lists or cells are made for; one where all are equal
+  std::vector<std::uint32_t> near_;
+  double astray_ = 0, largest_ = 0;      // how far spheres may be from where they are thought; largest radius
+  std::vector<std::uint8_t> at_border_;  // by slot; empty where nobody is
+  std::vector<Slot> free_;               // slots of those who have been dismissed
+  std::vector<double> radii_;            // that lists or cells are made for; one where all are equal
   Packing<D> packing_;
   ScanSetting setting_;
   Calendar calendar_;

@@ -116,6 +116,7 @@ class LinkedCells {
 
   /// Everybody in the cells that may hold places up to `reach` from those in a sphere's cell, itself among them.
   void find_near(const Place& place, double reach, std::vector<std::uint32_t>& found) const {
+    found.clear();
     Cell<D> cell, range;
     for (int k = 0; k < D; ++k) {
       cell[k] = place.unwrapped[k];

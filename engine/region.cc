@@ -6,7 +6,10 @@ namespace carom {
 
 template <int D>
 void Region<D>::load(std::vector<Record<D>> own, const std::vector<Record<D>>& ghosts, const Vec<D>& g, double horizon,
-                     double now) {
+                     double now, double stray) {
+  stray_ = stray;
+  rewritten_.clear();
+  script_.clear();
   slot_.clear();
   role_.clear();
   first_.clear();
@@ -15,9 +18,9 @@ void Region<D>::load(std::vector<Record<D>> own, const std::vector<Record<D>>& g
   mended_of_.clear();
   for (const Record<D>& r : ghosts) slot_[r.id] = kNone;
   own.insert(own.end(), ghosts.begin(), ghosts.end());
-  core_.load(std::move(own), g, horizon, now);
+  core_.load(std::move(own), g, horizon, now, 2 * stray);
   const auto n = static_cast<Slot>(core_.flights().size());
-  own_.clear();
+  border_.clear();
   ghosts_.clear();
   for (Slot i = 0; i < n; ++i) {
     const Id id = core_.flights()[i].id;
@@ -26,8 +29,6 @@ void Region<D>::load(std::vector<Record<D>> own, const std::vector<Record<D>>& g
   touched_.clear();
   changed_.clear();
   start_.clear();
-  rewritten_.clear();
-  script_.clear();
 }
 
 template <int D>
@@ -35,32 +36,35 @@ void Region<D>::enlist(Slot i, Id id, Role role) {
   slot_[id] = i;
   if (role_.size() <= i) role_.resize(i + 1, Role::nobody);
   role_[i] = role;
-  (role == Role::own ? own_ : ghosts_).push_back(i);
+  (role == Role::own ? border_ : ghosts_).push_back(i);
   first_.resize(role_.size());
   length_.resize(role_.size(), 0);
   start_of_.resize(role_.size(), kNone);
   mended_of_.resize(role_.size(), kNone);
+  rewritten_.resize(role_.size());
+  script_.resize(role_.size());
 }
 
 template <int D>
-void Region<D>::sort_out(double now, const std::function<bool(const Vec<D>&)>& owns,
-                         const std::function<bool(const Vec<D>&)>& wants) {
-  std::vector<Slot> all;
-  all.swap(own_);
-  all.insert(all.end(), ghosts_.begin(), ghosts_.end());
-  ghosts_.clear();
-  for (const Slot i : all) {
-    const Vec<D> x = core_.flights().at(i, now).x;
-    const Id id = core_.flights()[i].id;
-    if (owns(x) || wants(x)) {
-      role_[i] = owns(x) ? Role::own : Role::ghost;
-      (role_[i] == Role::own ? own_ : ghosts_).push_back(i);
-      continue;
-    }
-    role_[i] = Role::nobody;
-    slot_.erase(id);
-    core_.dismiss(i);
-  }
+void Region<D>::forget(Slot i) {
+  role_[i] = Role::nobody;
+  slot_.erase(core_.flights()[i].id);
+  core_.dismiss(i);
+}
+
+template <int D>
+std::vector<Slot> Region<D>::own() const {
+  std::vector<Slot> own;
+  for (Slot i = 0; i < role_.size(); ++i)
+    if (role_[i] == Role::own) own.push_back(i);
+  return own;
+}
+
+template <int D>
+void Region<D>::watch(double now, const std::function<bool(const Vec<D>&)>& near) {
+  border_ = own();
+  std::erase_if(border_, [&](Slot i) { return !near(core_.flights().at(i, now).x); });
+  core_.set_border(border_, ghosts_, now);
 }
 
 template <int D>
@@ -73,9 +77,8 @@ bool Region<D>::admit(const Record<D>& r, double now) {
 }
 
 template <int D>
-void Region<D>::run(double now, double end, double astray) {
+void Region<D>::run(double now, double end) {
   end_ = end;
-  astray_ = astray;
   trace_.clear(now);
   Counters unused;
   core_.run(end, {.counters = unused, .trace = &trace_});
@@ -95,7 +98,7 @@ void Region<D>::index() {
     touched_.push_back(slot);
     if (role_[slot] == Role::own) changed_.push_back(slot);
   }
-  for (const auto& [slot, node] : trace_.nodes) ++length_[slot];
+  for (const Node<D>& node : trace_.nodes) ++length_[node.slot];
   std::uint32_t at = 0;
   for (const Slot i : touched_) {
     first_[i] = at;
@@ -103,13 +106,12 @@ void Region<D>::index() {
     length_[i] = 0;
   }
   nodes_.resize(trace_.nodes.size());
-  for (const auto& [slot, node] : trace_.nodes) nodes_[first_[slot] + length_[slot]++] = node;
+  for (const Node<D>& node : trace_.nodes) nodes_[first_[node.slot] + length_[node.slot]++] = node;
 }
 
 template <int D>
 std::span<const Node<D>> Region<D>::path(Slot i) const {
-  if (!rewritten_.empty())
-    if (const auto it = rewritten_.find(i); it != rewritten_.end()) return it->second;
+  if (rewritten_.has(i)) return rewritten_.at(i);
   return length_[i] == 0 ? std::span<const Node<D>>{} : std::span<const Node<D>>(&nodes_[first_[i]], length_[i]);
 }
 
@@ -131,22 +133,17 @@ bool Region<D>::is_own(Id id) const {
 }
 
 template <int D>
-std::span<const Node<D>> Region<D>::script_of(Slot g) const {
-  const auto it = script_.find(g);
-  return it == script_.end() ? std::span<const Node<D>>{} : std::span<const Node<D>>(it->second);
-}
-
-template <int D>
 std::vector<Node<D>>& Region<D>::rewritten(Slot i) {
-  const auto it = rewritten_.find(i);
-  if (it != rewritten_.end()) return it->second;
+  if (rewritten_.has(i)) return rewritten_[i];
   const auto old = path(i);
   if (start_of_[i] == kNone) {  // it had no event until now
     start_of_[i] = static_cast<std::uint32_t>(start_.size());
     start_.push_back(core_.flights()[i]);
     touched_.push_back(i);
   }
-  return rewritten_.emplace(i, Nodes(old.begin(), old.end())).first->second;
+  Nodes& path = rewritten_[i];
+  path.assign(old.begin(), old.end());
+  return path;
 }
 
 template <int D>
@@ -157,9 +154,9 @@ void Region<D>::follow(Id id, Nodes script) {
 template <int D>
 void Region<D>::repair() {
   repairs_.clear();
-  for (const auto& [slot, script] : script_) seed(slot);
+  for (const Slot g : script_.who()) seed(g);
   for (const Slot i : touched_)
-    if (role_[i] == Role::ghost && !script_.contains(i)) seed(i);
+    if (role_[i] == Role::ghost && !script_.has(i)) seed(i);
   while (!tasks_.empty()) {
     const Task task = tasks_.top();
     tasks_.pop();
@@ -194,7 +191,7 @@ void Region<D>::repair() {
 template <int D>
 void Region<D>::seed(Slot g) {
   const auto seen = path(g);
-  const auto script = script_of(g);
+  const auto script = script_.at(g);
   std::size_t k = 0;
   while (k < seen.size() && k < script.size() && seen[k] == script[k]) ++k;
   if (k == seen.size() && k == script.size()) return;
@@ -221,7 +218,7 @@ typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
   path.erase(from, path.end());
   m.now = before(i, m.kept);
   if (role_[i] == Role::ghost) {
-    const auto script = script_of(i);
+    const auto script = script_.at(i);
     m.script = m.kept;
     m.strays = m.kept > script.size() || !std::equal(path.begin(), path.end(), script.begin());
   }
@@ -234,7 +231,7 @@ typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
 
 template <int D>
 void Region<D>::plan_script(Mended& m) {
-  const auto script = script_of(m.slot);
+  const auto script = script_.at(m.slot);
   if (m.strays || m.script >= script.size()) return;
   tasks_.push({.kind = Task::Kind::script,
                .key = script[m.script].key,
@@ -245,11 +242,11 @@ void Region<D>::plan_script(Mended& m) {
 /// Plans all contacts that a mended sphere may have from `now` on.
 template <int D>
 void Region<D>::predict(Mended& m, const EventKey<D>& now) {
-  core_.find_near(m.slot, astray_, near_);
   const Packing<D>& packing = core_.packing();
-  for (const std::uint32_t candidate : near_) {
+  const bool ghost = role_[m.slot] == Role::ghost;
+  for (const std::uint32_t candidate : ghost ? core_.find_near_at_border(m.slot) : core_.find_near(m.slot)) {
     const Slot j = packing.slot(candidate);
-    if (j == m.slot || (role_[j] == Role::ghost && role_[m.slot] == Role::ghost)) continue;
+    if (j == m.slot || (ghost && role_[j] == Role::ghost)) continue;
     meet(m, j, packing.image(candidate), now);
   }
   predict_walls(m);
@@ -347,7 +344,7 @@ void Region<D>::append(Mended& m, const Node<D>& node) {
   m.now = node.after;
   ++m.version;
   if (role_[m.slot] != Role::ghost || m.strays) return;
-  const auto script = script_of(m.slot);
+  const auto script = script_.at(m.slot);
   m.strays = m.script >= script.size() || !(script[m.script] == node);
   ++m.script;
   plan_script(m);
@@ -358,7 +355,7 @@ template <int D>
 void Region<D>::script(const Task& task) {
   Mended& m = repairs_[mended_of_[task.a]];
   if (m.strays || m.script != task.version_a) return;
-  const Node<D>& node = script_of(task.a)[m.script];
+  const Node<D>& node = script_.at(task.a)[m.script];
   if (is_own(node.partner())) {  // who knows better: they did not meet
     m.strays = true;
     return;
@@ -379,7 +376,7 @@ void Region<D>::check(const Task& task) {
 template <int D>
 bool Region<D>::agrees() const {
   return std::all_of(ghosts_.begin(), ghosts_.end(), [&](Slot g) {
-    const auto seen = path(g), script = script_of(g);
+    const auto seen = path(g), script = script_.at(g);
     return std::equal(seen.begin(), seen.end(), script.begin(), script.end());
   });
 }
@@ -395,7 +392,7 @@ void Region<D>::cut(const EventKey<D>& last) {
 template <int D>
 void Region<D>::commit() {
   other_.clear();
-  for (const auto& [slot, path] : rewritten_) {
+  for (const Slot slot : rewritten_.who()) {
     const Record<D>& now = after(slot);
     const Record<D>& known = core_.flights()[slot];
     if (now.t != known.t || now.x != known.x || now.v != known.v || now.generation != known.generation)

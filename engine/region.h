@@ -9,8 +9,8 @@
 // has it, and since a contact is a pure function of two records, all is as in a run by one core. (The smallest key at
 // which anybody is wrong grows with each round.)
 //
-//   region.load(own, ghosts, g, horizon, now);
-//   region.run(now, end, astray);
+//   region.load(own, ghosts, g, horizon, now, stray);
+//   region.run(now, end);
 //   while (…) { region.follow(id, script); …; region.repair(); … region.changed() … }
 //   region.commit();
 
@@ -32,30 +32,51 @@ class Region {
   Region(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options)
       : box_(box), core_(box, particles, options) {}
 
-  /// Starts anew at time `now` with own spheres and ghosts.
+  /// Starts anew at time `now` with own spheres and ghosts. In no window will anyone come farther than `stray`.
   void load(std::vector<Record<D>> own, const std::vector<Record<D>>& ghosts, const Vec<D>& g, double horizon,
-            double now);
+            double now, double stray);
 
   // Between windows, at a time `now` that no event precedes any more.
 
-  std::span<const Slot> own() const { return own_; }
-  std::span<const Slot> ghosts() const { return ghosts_; }
+  /// Own spheres, all of them.
+  std::vector<Slot> own() const;
+  /// Those of them that may leave, or that others may see: the last word of watch().
+  std::span<const Slot> border() const { return border_; }
   const Flights<D>& flights() const { return core_.flights(); }
   bool has(Id id) const { return slot_.contains(id); }
   bool owns(Slot i) const { return role_[i] == Role::own; }
   Slot slot_of(Id id) const { return slot_.at(id); }
-  /// Says anew who is whose: owns(x) and wants(x) tell, of a position at `now`, whether a sphere there is this region's
-  /// own, or one of its ghosts. Others are forgotten.
-  void sort_out(double now, const std::function<bool(const Vec<D>&)>& owns,
-                const std::function<bool(const Vec<D>&)>& wants);
+  /// Says anew who of the border and the ghosts is whose: owns(x) and wants(x) tell, of a position at `now`, whether a
+  /// sphere there is this region's own, or one of its ghosts. Others are forgotten.
+  template <class Owns, class Wants>
+  void sort_out(double now, Owns&& owns, Wants&& wants) {
+    all_.swap(border_);
+    all_.insert(all_.end(), ghosts_.begin(), ghosts_.end());
+    border_.clear();
+    ghosts_.clear();
+    for (const Slot i : all_) {
+      const Vec<D> x = core_.flights().at(i, now).x;
+      if (owns(x)) {
+        role_[i] = Role::own;
+        border_.push_back(i);
+      } else if (wants(x)) {
+        role_[i] = Role::ghost;
+        ghosts_.push_back(i);
+      } else {
+        forget(i);
+      }
+    }
+  }
+  /// Says anew who is at the border: near(x) tells it, of a position at `now`.
+  void watch(double now, const std::function<bool(const Vec<D>&)>& near);
   /// Takes in a ghost; false: load anew, there is no room left.
   bool admit(const Record<D>& r, double now);
 
   // In a window.
 
-  /// Runs from `now` to `end`. Nobody may be farther than `astray` from where he was at `now`, or the window must be
-  /// cut before that.
-  void run(double now, double end, double astray);
+  /// Runs from `now` to `end`. Whoever comes farther than the stray from where he was at `now` makes it of no use: cut
+  /// it before that.
+  void run(double now, double end);
   /// What a ghost did according to its owner.
   void follow(Id id, Nodes script);
   /// Mends the window after scripts have come.
@@ -82,7 +103,37 @@ class Region {
   std::uint64_t redone_events() const { return redone_events_; }  ///< in repairs
 
  private:
+  static constexpr std::uint32_t kNone = 0xffffffff;
   enum class Role : std::uint8_t { nobody, own, ghost };
+
+  /// Paths of a few spheres.
+  class Store {
+   public:
+    void resize(std::size_t slots) { index_.resize(slots, kNone); }
+    bool has(Slot i) const { return index_[i] != kNone; }
+    Nodes& operator[](Slot i) {
+      if (!has(i)) {
+        index_[i] = static_cast<std::uint32_t>(who_.size());
+        who_.push_back(i);
+        if (paths_.size() < who_.size()) paths_.emplace_back();
+        paths_[index_[i]].clear();
+      }
+      return paths_[index_[i]];
+    }
+    std::span<const Node<D>> at(Slot i) const {
+      return has(i) ? std::span<const Node<D>>(paths_[index_[i]]) : std::span<const Node<D>>();
+    }
+    std::span<const Slot> who() const { return who_; }
+    void clear() {
+      for (const Slot i : who_) index_[i] = kNone;
+      who_.clear();
+    }
+
+   private:
+    std::vector<std::uint32_t> index_;  // by slot
+    std::vector<Slot> who_;
+    std::deque<Nodes> paths_;  // kept for their memory
+  };
 
   /// A sphere whose path is being mended.
   struct Mended {
@@ -109,6 +160,7 @@ class Region {
   };
 
   void enlist(Slot i, Id id, Role role);
+  void forget(Slot i);
   void index();
   bool mended(Slot i) const { return mended_of_[i] != kNone; }
   Mended& mend(Slot i, const EventKey<D>& key);
@@ -123,17 +175,14 @@ class Region {
   void plan_script(Mended& m);
   std::uint32_t version(Slot i) const { return mended(i) ? repairs_[mended_of_[i]].version : 0; }
   bool is_own(Id id) const;
-  std::span<const Node<D>> script_of(Slot g) const;
   Nodes& rewritten(Slot i);
-
-  static constexpr std::uint32_t kNone = 0xffffffff;
 
   const Box<D>& box_;
   EventCore<D> core_;
-  double end_ = 0, astray_ = 0;  // of the window
+  double end_ = 0, stray_ = 0;  // of the window
   std::unordered_map<Id, Slot> slot_;
   std::vector<Role> role_;  // by slot
-  std::vector<Slot> own_, ghosts_;
+  std::vector<Slot> border_, ghosts_, all_;
 
   Trace<D> trace_;
   std::vector<Record<D>> start_;               // at the start of the window, of those who had events
@@ -141,14 +190,13 @@ class Region {
   std::vector<std::uint32_t> first_, length_;  // by slot: in nodes_
   std::vector<std::uint32_t> start_of_;        // by slot: in start_, or kNone
   std::vector<Slot> touched_, changed_;
-  std::unordered_map<Slot, Nodes> rewritten_;      // paths that have been mended
-  std::unordered_map<Slot, Nodes> script_;         // of ghosts
+  Store rewritten_;                                // paths that have been mended
+  Store script_;                                   // of ghosts
   std::vector<std::pair<Slot, Record<D>>> other_;  // records that the core is told
 
   std::deque<Mended> repairs_;
   std::vector<std::uint32_t> mended_of_;  // by slot: in repairs_, or kNone
   std::priority_queue<Task> tasks_;
-  std::vector<std::uint32_t> near_;
   std::uint64_t run_events_ = 0, redone_events_ = 0;
 };
 

@@ -18,16 +18,6 @@ constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02;  // in mean diameters
 /// Packing fraction from which on lists are faster, as measured for equal spheres and discs.
 double dense(int dimension) { return dimension == 2 ? 0.55 : 0.32; }
 
-/// Contacts of a sphere while a thermal sphere flies the length 1 (Enskog, with the contact values of Henderson and of
-/// Carnahan and Starling).
-double contacts_a_length(const SearchSituation& s) {
-  const double filled = std::min(s.filled, 0.8), empty = 1 - filled;
-  const double contact_value =
-      s.dimension == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
-  const double cross_section = s.dimension == 2 ? 2 * s.largest : 4 * s.largest * s.largest;
-  return std::sqrt(std::numbers::pi) * s.density * cross_section * contact_value;
-}
-
 /// The edge of cells that costs least: small ones are crossed often, large ones hold many candidates.
 double best_cell(const SearchSituation& s) {
   const double around = s.dimension == 2 ? 9 : 27, ahead = around / 3;
@@ -44,6 +34,35 @@ double best_cell(const SearchSituation& s) {
 }
 
 }  // namespace
+
+// With the contact values of Henderson and of Carnahan and Starling.
+double contacts_a_length(const SearchSituation& s) {
+  const double filled = std::min(s.filled, 0.8), empty = 1 - filled;
+  const double contact_value =
+      s.dimension == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
+  const double cross_section = s.dimension == 2 ? 2 * s.largest : 4 * s.largest * s.largest;
+  return std::sqrt(std::numbers::pi) * s.density * cross_section * contact_value;
+}
+
+template <int D>
+SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, const Extent<D>& extent) {
+  const auto n = static_cast<double>(extent.particles), each = n / static_cast<double>(radii.size());
+  double largest = 0, sum = 0, sum_of_powers = 0;
+  for (const double r : radii) {
+    largest = std::max(largest, r);
+    sum += each * r;
+    sum_of_powers += each * std::pow(r, D);
+  }
+  double volume = 1;
+  for (int k = 0; k < D; ++k) {
+    const bool open = box.boundary[k] == Boundary::open;  // as far as there are spheres
+    volume *= open ? extent.high[k] - extent.low[k] + 2 * largest : box.edges[k];
+  }
+  const double filled = (D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * sum_of_powers / volume;
+  return {D, n / volume, filled, 2 * sum / n, 2 * largest};
+}
+template SearchSituation situation_of<2>(const Box<2>&, std::span<const double>, const Extent<2>&);
+template SearchSituation situation_of<3>(const Box<3>&, std::span<const double>, const Extent<3>&);
 
 void SearchTuning::choose(const SearchSituation& situation, const EventCounts& counts) {
   if (!chosen_) {

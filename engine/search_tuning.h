@@ -6,6 +6,9 @@
 // cells or regions between two contacts, so cells win there, which look at few new ones; in a dense fluid lists win,
 // because a region is left once in many contacts.
 
+#include <span>
+
+#include "engine/cell_grid.h"
 #include "engine/event_counts.h"
 
 namespace carom {
@@ -27,6 +30,13 @@ struct SearchSituation {
   double filled = 0;             ///< packing fraction
   double mean = 0, largest = 0;  ///< diameters
 };
+
+/// For so many particles as `extent` has, with radii like these.
+template <int D>
+SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, const Extent<D>& extent);
+
+/// Contacts of a sphere while a thermal sphere flies the length 1, about (Enskog).
+double contacts_a_length(const SearchSituation& situation);
 
 class SearchTuning {
  public:

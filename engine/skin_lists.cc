@@ -43,7 +43,7 @@ std::uint8_t SkinLists<D>::octave(double largest, double radius) {
 }
 
 template <int D>
-void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>& extent) {
+void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>& extent, double astray) {
   const std::size_t n = flights.size();
   // 1. Cells for each size.
   levels_.clear();
@@ -70,7 +70,7 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
     levels_.push_back(std::move(level));
   }
   widest_ = 0;
-  for (Level& level : levels_) lay_steps(level);
+  for (Level& level : levels_) lay_steps(level, astray);
   // 2. Everybody into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -91,9 +91,9 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
 
 /// Tabulates the steps to all cells that the spheres of a level can be seen from.
 template <int D>
-void SkinLists<D>::lay_steps(Level& level) {
+void SkinLists<D>::lay_steps(Level& level, double astray) {
   for (int k = 0; k < D; ++k) {
-    const double places = most_places(levels_[0].largest_radius, level);
+    const double places = most_places(levels_[0].largest_radius, level, astray);
     level.margin = std::max(level.margin, static_cast<std::int32_t>(std::ceil(places / level.grid.edge(k))));
   }
   for (int k = 0; k < D; ++k) {
@@ -110,8 +110,8 @@ void SkinLists<D>::lay_steps(Level& level) {
 
 /// How far a sphere sees spheres of a level, with room for places that are rounded.
 template <int D>
-double SkinLists<D>::most_places(double radius, const Level& level) const {
-  return (radius + level.largest_radius + 2 * skin_) * (1 + 2 * std::sqrt(D) / kPlaces);
+double SkinLists<D>::most_places(double radius, const Level& level, double astray) const {
+  return (radius + level.largest_radius + 2 * (skin_ + astray)) * (1 + 2 * std::sqrt(D) / kPlaces);
 }
 
 template <int D>
@@ -182,14 +182,14 @@ void SkinLists<D>::remove(Slot i, const Vec<D>& x) {
 
 /// Fills found_ with the candidates of a sphere at x; returns how many.
 template <int D>
-unsigned SkinLists<D>::surround(Slot i, const Vec<D>& x) {
+unsigned SkinLists<D>::surround(Slot i, const Vec<D>& x, double astray) {
   unsigned found = 0;
-  for (const Level& level : levels_) look_into(level, i, x, found);
+  for (const Level& level : levels_) look_into(level, i, x, astray, found);
   return found;
 }
 
 template <int D>
-void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsigned& found) {
+void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double astray, unsigned& found) {
   static constexpr CellView kHere{};
   Place place;
   const Cell<D> cell = locate(level, x, place);
@@ -197,7 +197,7 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsign
   NearTask task{};
   task.lines = level.lines.data();
   task.next = level.next.data();
-  const double places = most_places(radius(i), level);
+  const double places = most_places(radius(i), level, astray);
   double rounding = 0;
   std::size_t cells = 1, images = 1;  // images: how often a cell may be seen
   for (int k = 0; k < D; ++k) {
@@ -223,7 +223,7 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsign
     images *= 1 + 2 * static_cast<std::size_t>(range) / static_cast<std::size_t>(count);
   }
   if constexpr (D == 2) task.view[2] = &kHere, task.views[2] = 1;
-  const double limit = (radius(i) + level.largest_radius + 2 * skin_ + std::sqrt(rounding)) * (1 + 1e-5);
+  const double limit = (radius(i) + level.largest_radius + 2 * (skin_ + astray) + std::sqrt(rounding)) * (1 + 1e-5);
   task.limit_squared = static_cast<float>(limit * limit);
   // Lines beyond the first of their cells may all be here.
   const std::size_t most = 8 * (cells + (level.lines.size() - level.grid.cells()) * images);
@@ -244,7 +244,7 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, unsign
     const std::uint32_t candidate = packing_.pack(j, boxes_[j] - away_[q] - carried);
     if (exact_) {
       const Vec<D> d = x - centre(agenda_[j]) + box_.shift(packing_.image(candidate));
-      const double within = radius(i) + radius(j) + 2 * skin_;
+      const double within = radius(i) + radius(j) + 2 * (skin_ + astray);
       if (!(d.squaredNorm() < within * within)) continue;
     }
     found_[found] = candidate;
@@ -429,29 +429,17 @@ void SkinLists<D>::dismiss(Slot i) {
 }
 
 template <int D>
-void SkinLists<D>::move(Slot i, const Vec<D>& x) {
-  const double limit = skin_ * (1 - 1e-6);
-  if (!((x - centre(agenda_[i])).squaredNorm() < limit * limit)) renew(i, x);
+bool SkinLists<D>::move(Slot i, const Vec<D>& x, double room) {
+  const double limit = room * (1 - 1e-6);
+  if ((x - centre(agenda_[i])).squaredNorm() < limit * limit) return false;
+  renew(i, x);
+  return true;
 }
 
 template <int D>
-void SkinLists<D>::find_near(Slot i, double astray, std::vector<std::uint32_t>& found) const {
-  const Vec<D> x = centre(agenda_[i]);
-  for (const Level& level : levels_) {
-    const double within = radius(i) + level.largest_radius + 2 * (skin_ + astray);
-    const Cell<D> cell = level.grid.cell(x);
-    Cell<D> range;
-    for (int k = 0; k < D; ++k) range[k] = static_cast<std::int32_t>(std::ceil(within / level.grid.edge(k)));
-    level.grid.for_each_around(cell, range, [&](std::size_t first, const Image<D>& away) {
-      for (auto line = static_cast<std::uint32_t>(first); line != kNobody; line = level.next[line])
-        for (const Slot j : level.lines[line].slot) {
-          if (j == kNobody) continue;
-          const std::uint32_t candidate = packing_.pack(j, boxes_[j] - packing_.linear(away));
-          const Vec<D> d = x - centre(agenda_[j]) + box_.shift(packing_.image(candidate));
-          if (d.squaredNorm() <= within * within) found.push_back(candidate);
-        }
-    });
-  }
+std::span<const std::uint32_t> SkinLists<D>::find_near(Slot i, double astray) {
+  const unsigned n = surround(i, centre(agenda_[i]), astray);
+  return {found_.data(), n};
 }
 
 template class SkinLists<2>;

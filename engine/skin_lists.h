@@ -28,8 +28,8 @@ class SkinLists {
   double skin() const { return skin_; }
   const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
 
-  /// Makes all lists for spheres where they are at time `now`.
-  void build(const Flights<D>& flights, double now, const Extent<D>& extent);
+  /// Makes all lists for spheres where they are at time `now`. find_near() will be asked for `astray`.
+  void build(const Flights<D>& flights, double now, const Extent<D>& extent, double astray = 0);
 
   /// The sphere is now at x: makes its list anew and mends those of its neighbours. Returns who is new in it, padded
   /// like a list; good until the next call.
@@ -43,10 +43,11 @@ class SkinLists {
   void admit(Slot i, const Vec<D>& x, std::span<const double> radius);
   /// Forgets a sphere.
   void dismiss(Slot i);
-  /// The sphere is now at x: renews its list where that is no longer good.
-  void move(Slot i, const Vec<D>& x);
-  /// Finds everybody whom a sphere may touch where both have come up to `astray` from their regions, itself among them.
-  void find_near(Slot i, double astray, std::vector<std::uint32_t>& found) const;
+  /// The sphere is now at x: renews its list where that is farther than `room` from the centre of its region; whether
+  /// it was.
+  bool move(Slot i, const Vec<D>& x, double room);
+  /// Everybody whom a sphere may touch where both have come up to `astray` from their regions.
+  std::span<const std::uint32_t> find_near(Slot i, double astray);
 
  private:
   struct Level {  // spheres of similar size
@@ -63,13 +64,13 @@ class SkinLists {
   static std::uint8_t octave(double largest, double radius);
   std::size_t level_of(Slot i) const { return level_.empty() ? 0 : level_[i]; }
   double radius(Slot i) const { return radius_[level_.empty() ? 0 : i]; }
-  void lay_steps(Level& level);
-  double most_places(double radius, const Level& level) const;
+  void lay_steps(Level& level, double astray);
+  double most_places(double radius, const Level& level, double astray) const;
   Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
   void insert(Slot i, const Vec<D>& x);
   void remove(Slot i, const Vec<D>& x);
-  unsigned surround(Slot i, const Vec<D>& x);
-  void look_into(const Level& level, Slot i, const Vec<D>& x, unsigned& found);
+  unsigned surround(Slot i, const Vec<D>& x, double astray = 0);
+  void look_into(const Level& level, Slot i, const Vec<D>& x, double astray, unsigned& found);
   void assign(Slot i, unsigned n);
   std::uint32_t* start_of(const Agenda<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
   bool same_box(std::uint32_t candidate) const { return packing_.linear(candidate) == 0; }

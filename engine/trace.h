@@ -16,6 +16,7 @@ struct Node {
   EventKey<D> key;
   double virial = 0;   ///< d·impulse of a pair collision [mass·length²/time]
   double overlap = 0;  ///< at contact, relative to the contact distance
+  Slot slot = 0;       ///< of the sphere, where the node was written down
 
   /// The other sphere's id; kNoPartner at a wall.
   static constexpr Id kNoPartner = std::numeric_limits<Id>::max();
@@ -41,7 +42,7 @@ struct Trace {
   };
   double start = 0;  ///< of the window, since that of the epoch
   std::vector<Start> starts;
-  std::vector<std::pair<Slot, Node<D>>> nodes;
+  std::vector<Node<D>> nodes;
 
   /// Whether a record is from before the window.
   bool before(const Record<D>& r) const { return r.t < start || (r.t == 0 && r.generation == 0); }
