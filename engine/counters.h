@@ -21,6 +21,8 @@ struct Counters {
   ExactSum collision_virial;    ///< Σ d·impulse over pair collisions [mass·length²/time]
   EventCounts events;           ///< of the event core, at the end of the last slab; 0 where a method has none
 
+  DomainCounts domains;         ///< of the regions of this rank; 0 where there is one
+
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;
   } seconds;

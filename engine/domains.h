@@ -21,16 +21,6 @@
 
 namespace carom {
 
-/// What agreement between regions took, on this rank, since the domains were made.
-struct DomainCounts {
-  std::uint64_t windows = 0;
-  std::uint64_t rounds = 0;         ///< of exchange and repair
-  std::uint64_t cut = 0;            ///< windows that were cut because somebody was too fast
-  std::uint64_t events = 0;         ///< of own spheres, as they are in the end
-  std::uint64_t run_events = 0;     ///< in first runs, those of ghosts among them
-  std::uint64_t redone_events = 0;  ///< in repairs
-};
-
 template <int D>
 class Domains {
  public:
@@ -50,6 +40,7 @@ class Domains {
   /// Of event cores that were given back, on this rank.
   const EventCounts& counts() const { return past_; }
   const DomainCounts& domain_counts() const { return counts_; }
+  double seconds_waited() const { return exchange_.seconds(); }  ///< for other ranks, since the domains were made
 
  private:
   /// A region of this rank.
@@ -81,7 +72,7 @@ class Domains {
 
   const Box<D>& box_;
   const Particles<D>& particles_;
-  Exchange& exchange_;
+  mutable TimedExchange exchange_;
   std::size_t regions_;
   SearchOptions options_;
   std::function<double()> forced_window_;

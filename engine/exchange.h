@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "engine/counters.h"
+
 namespace carom {
 
 using Bytes = std::vector<std::byte>;
@@ -29,6 +31,35 @@ class Exchange {
   virtual void largest(std::span<double> /*values*/) {}
   /// Makes each value the sum over all ranks.
   virtual void sum(std::span<std::uint64_t> /*values*/) {}
+};
+
+/// Another one, and the time that is spent in it.
+class TimedExchange final : public Exchange {
+ public:
+  explicit TimedExchange(Exchange& ranks) : ranks_(ranks) {}
+  int rank() const override { return ranks_.rank(); }
+  int size() const override { return ranks_.size(); }
+  std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
+    const Stopwatch watch(seconds_);
+    return ranks_.swap(std::move(outgoing));
+  }
+  std::vector<Bytes> gather(const Bytes& mine) override {
+    const Stopwatch watch(seconds_);
+    return ranks_.gather(mine);
+  }
+  void largest(std::span<double> values) override {
+    const Stopwatch watch(seconds_);
+    ranks_.largest(values);
+  }
+  void sum(std::span<std::uint64_t> values) override {
+    const Stopwatch watch(seconds_);
+    ranks_.sum(values);
+  }
+  double seconds() const { return seconds_; }
+
+ private:
+  Exchange& ranks_;
+  double seconds_ = 0;
 };
 
 }  // namespace carom

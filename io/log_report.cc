@@ -64,6 +64,27 @@ std::string breakdown_text(std::span<const RankAccount> ranks) {
   return text;
 }
 
+/// What agreement between regions took; nothing where there is one region.
+std::string domains_text(std::span<const RankAccount> ranks) {
+  DomainCounts all;
+  std::uint64_t most = 0;
+  for (const RankAccount& rank : ranks) {
+    all.windows = rank.domains.windows;  // the same everywhere, like rounds
+    all.rounds = rank.domains.rounds;
+    all.events += rank.domains.events;
+    all.run_events += rank.domains.run_events;
+    all.redone_events += rank.domains.redone_events;
+    most = std::max(most, rank.domains.events);
+  }
+  if (all.windows == 0) return "";
+  const double events = std::max(static_cast<double>(all.events), 1.0);
+  return fmt::format(
+      "\n{} windows, {:.2f} rounds each; events at borders run twice {:.1f}%, redone {:.2f}%, imbalance {:.1f}%",
+      all.windows, static_cast<double>(all.rounds) / static_cast<double>(all.windows),
+      100 * (static_cast<double>(all.run_events) / events - 1), 100 * static_cast<double>(all.redone_events) / events,
+      100 * (static_cast<double>(most) * static_cast<double>(ranks.size()) / events - 1));
+}
+
 }  // namespace
 
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
@@ -100,6 +121,7 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
   if (s.force_passes > 0)
     text += fmt::format("\n{:.6g} force passes, {} sweeps, {} steps halved, {} fallbacks", s.force_passes, c.sweeps,
                         c.slabs_halved, c.fallbacks);
+  text += domains_text(ranks);
   return text + "\n" + breakdown_text(ranks) + "\nfiles in " + deck.output.directory.string();
 }
 

@@ -12,6 +12,7 @@ namespace carom {
 
 struct RankAccount {
   Counters::Seconds seconds;
+  DomainCounts domains;
   double wall_seconds = 0;
   std::uint64_t peak_memory_bytes = 0;
 };

@@ -49,8 +49,14 @@ class FreeFlight : public Integrator<D> {
     const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
                                                max_events_ * system.particles.size()};
     const auto run = [&](double end) {
-      const Stopwatch watch(report.counters.seconds.queue);
-      return flight.run(end, events);
+      auto& seconds = report.counters.seconds;
+      const Stopwatch watch(seconds.queue);
+      const double before = seconds_waited();
+      const double reached = flight.run(end, events);
+      const double waited = seconds_waited() - before;
+      seconds.communicate += waited;
+      seconds.queue -= waited;
+      return reached;
     };
     {
       const Stopwatch watch(report.counters.seconds.predict);
@@ -74,8 +80,11 @@ class FreeFlight : public Integrator<D> {
     }
     flight.give_back(report.reached, system.particles);
     report.counters.events = flight.counts();
+    if (domains_) report.counters.domains = domains_->domain_counts();
     system.wrap();
   }
+
+  double seconds_waited() const { return domains_ ? domains_->seconds_waited() : 0; }
 
   /// More than one lets each fit the cache; CAROM_REGIONS forces a number.
   std::size_t regions_a_rank(std::size_t) const {
