@@ -210,23 +210,20 @@ double Domains<D>::run(double end, const Report& report) {
     for (Local& local : local_) local.region->run(now_, stop);
     ++counts_.windows;
     agree();
-    // Was anyone too fast?
-    Harvest got = harvest(nullptr);
-    double fastest = got.speed + g_.norm() * horizon_;
-    exchange_.largest({&fastest, 1});
+    // Was anyone so fast that he may have come too far?
+    Harvest got = harvest(stop, nullptr);
+    std::array<double, 2> worst{got.speed + g_.norm() * horizon_, -got.astray};
+    exchange_.largest(worst);
     bool whole = true;
-    if (fastest > fastest_) {
-      fastest_ = kFaster * fastest;
-      const double most = now_ + stray_ / fastest_;
-      if (most < stop) {
-        ++counts_.cut;
-        whole = false;
-        stop = most;
-        EventKey<D> last{.time = most};
-        for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
-        for (Local& local : local_) local.region->cut(last);
-        got = harvest(nullptr);
-      }
+    if (worst[0] > fastest_) fastest_ = kFaster * worst[0];
+    if (-worst[1] < stop) {
+      ++counts_.cut;
+      whole = false;
+      stop = -worst[1];
+      EventKey<D> last{.time = stop};
+      for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
+      for (Local& local : local_) local.region->cut(last);
+      got = harvest(stop, nullptr);
     }
     // Are there enough?
     std::uint64_t count = got.collisions;
@@ -234,12 +231,12 @@ double Domains<D>::run(double end, const Report& report) {
     if (collisions + count >= report.collision_limit) {
       const EventKey<D> last = *key_of_collision(report.collision_limit - collisions);
       for (Local& local : local_) local.region->cut(last);
-      got = harvest(nullptr);
+      got = harvest(last.time, nullptr);
       count = report.collision_limit - collisions;
       whole = false;
       reached = stop = last.time;
     }
-    if (report.contacts) harvest(&contacts);
+    if (report.contacts) harvest(stop, &contacts);
     sum.collisions += got.collisions;
     sum.bounces += got.bounces;
     sum.virial.add(got.virial);
@@ -328,15 +325,18 @@ void Domains<D>::send_paths(std::vector<Bytes>& outgoing) const {
 
 /// What own spheres did in this window; each collision counts where its lower id is at home.
 template <int D>
-typename Domains<D>::Harvest Domains<D>::harvest(std::vector<Contact<D>>* contacts) const {
+typename Domains<D>::Harvest Domains<D>::harvest(double end, std::vector<Contact<D>>* contacts) const {
   Harvest got;
   for (const Local& local : local_)
     for (const Slot i : local.region->touched()) {
       if (!local.region->owns(i)) continue;
       const auto path = local.region->path(i);
+      double speed = 0;
+      for (const Node<D>& node : path) speed = std::max(speed, node.after.v.norm());
+      if (speed + g_.norm() * horizon_ > fastest_) got.astray = std::min(got.astray, astray_at(*local.region, i, end));
+      got.speed = std::max(got.speed, speed);
       for (std::size_t k = 0; k < path.size(); ++k) {
         const Node<D>& node = path[k];
-        got.speed = std::max(got.speed, node.after.v.norm());
         if (node.key.lo != node.after.id) continue;
         const bool pair = node.key.kind == EventKind::pair;
         ++(pair ? got.collisions : got.bounces);
@@ -346,6 +346,21 @@ typename Domains<D>::Harvest Domains<D>::harvest(std::vector<Contact<D>>* contac
       }
     }
   return got;
+}
+
+/// When a sphere may have come farther than the stray in the window, by the length of its path; infinite: never.
+template <int D>
+double Domains<D>::astray_at(const Region<D>& region, Slot i, double end) const {
+  const auto path = region.path(i);
+  double now = now_, left = stray_;
+  for (std::size_t k = 0; k <= path.size(); ++k) {
+    const double speed = region.before(i, k).v.norm() + g_.norm() * horizon_;
+    const double until = k < path.size() ? path[k].key.time : end;
+    if (speed * (until - now) > left) return now + left / speed;
+    left -= speed * (until - now);
+    now = until;
+  }
+  return std::numeric_limits<double>::infinity();
 }
 
 /// The contact that node k of a path stands for, as EventCore writes it down.

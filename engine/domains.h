@@ -56,6 +56,7 @@ class Domains {
     std::uint64_t collisions = 0, bounces = 0;
     ExactSum virial;
     double overlap = 0, speed = 0;
+    double astray = std::numeric_limits<double>::infinity();  // when somebody came farther than the stray
   };
 
   std::size_t first_region(int rank) const;
@@ -66,7 +67,8 @@ class Domains {
   void agree();
   void send_paths(std::vector<Bytes>& outgoing) const;
   double window_end(double end);
-  Harvest harvest(std::vector<Contact<D>>* contacts) const;
+  Harvest harvest(double end, std::vector<Contact<D>>* contacts) const;
+  double astray_at(const Region<D>& region, Slot i, double end) const;
   std::optional<EventKey<D>> key_of_collision(std::uint64_t number) const;
   Contact<D> contact_of(const Region<D>& region, Slot lo, std::size_t k) const;
 
