@@ -149,7 +149,7 @@ void Watch::wait(std::span<MPI_Request> requests) {
   }
 }
 
-/// Who is silent, in words; empty where the wait is over while it asks.
+/// Who is silent, in words; empty where the wait is over while it asks: those who answer may have come just now.
 std::string Watch::silence_of(const std::function<bool()>& is_over) {
   for (Word& word : words_) word.answered = false;
   ask();
@@ -161,7 +161,6 @@ std::string Watch::silence_of(const std::function<bool()>& is_over) {
     for (int r = 0; r < size_; ++r)
       if (const Word& word = words_[static_cast<std::size_t>(r)]; r != rank_ && !word.answered && !word.outcome)
         silent.push_back(r);
-    if (silent.empty()) break;
   }
   char seconds[32];
   std::snprintf(seconds, sizeof seconds, "%g", silence_);
