@@ -3,6 +3,7 @@
 
 #include <compare>
 #include <string>
+#include <utility>
 
 #include "engine/vec.h"
 
@@ -22,6 +23,16 @@ struct EventKey {
   Image<D> image{};
   auto operator<=>(const EventKey&) const = default;
 };
+
+/// The key of a contact between two spheres, the first at x_first − x_second + shift(image) from the second.
+template <int D>
+EventKey<D> pair_key(double time, std::uint32_t generation, Id first, Id second, Image<D> image) {
+  if (second < first) {
+    std::swap(first, second);
+    for (auto& k : image) k = -k;
+  }
+  return {.time = time, .generation = generation, .lo = first, .hi = second, .image = image};
+}
 
 /// Names the partners for messages: "particles 3 and 7", "particle 3 and the upper wall of axis 1".
 template <int D>

@@ -20,7 +20,6 @@ struct Counters {
   double max_overlap = 0;       ///< deepest overlap met, relative to the contact distance
   ExactSum collision_virial;    ///< Σ d·impulse over pair collisions [mass·length²/time]
   EventCounts events;           ///< of the event core, at the end of the last slab; 0 where a method has none
-
   DomainCounts domains;         ///< of the regions of this rank; 0 where there is one
 
   struct Seconds {

@@ -18,7 +18,6 @@ class Division {
   /// Regions for spheres at x.
   Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions);
 
-  std::size_t size() const { return parts_.size(); }
   /// The region that a place belongs to, in whatever box it is.
   std::uint32_t owner(const Vec<D>& x) const;
   /// Calls visit(region) for all regions that a place is nearer to than `reach`, its own among them.

@@ -1,7 +1,6 @@
 #include "engine/domains.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "engine/error.h"
 
@@ -14,29 +13,6 @@ constexpr std::size_t kFewest = 8;                            // spheres a regio
 constexpr double kFaster = 1.15;                              // than anyone is, somebody may come to be
 constexpr double kSlack = 8;                                  // windows between looks at who is at the border
 
-template <class T>
-void put(Bytes& to, const T& value) {
-  const auto* const bytes = reinterpret_cast<const std::byte*>(&value);
-  to.insert(to.end(), bytes, bytes + sizeof(T));
-}
-
-/// Reads what put() wrote.
-class Reader {
- public:
-  explicit Reader(const Bytes& bytes) : at_(bytes.data()), end_(bytes.data() + bytes.size()) {}
-  bool more() const { return at_ < end_; }
-  template <class T>
-  T get() {
-    T value;
-    std::memcpy(static_cast<void*>(&value), at_, sizeof(T));
-    at_ += sizeof(T);
-    return value;
-  }
-
- private:
-  const std::byte *at_, *end_;
-};
-
 }  // namespace
 
 template <int D>
@@ -46,9 +22,13 @@ Domains<D>::Domains(const Box<D>& box, const Particles<D>& particles, Exchange& 
       particles_(particles),
       exchange_(exchange),
       regions_(std::clamp<std::size_t>(regions, 1, std::max<std::size_t>(particles.radius.size() / kFewest, 1))),
-      options_(options),
       forced_window_(std::move(window)) {
   diameter_ = 2 * *std::max_element(particles.radius.begin(), particles.radius.end());
+  for (std::size_t r = first_region(exchange_.rank()); r < first_region(exchange_.rank() + 1); ++r)
+    local_.push_back({.number = static_cast<std::uint32_t>(r),
+                      .region = std::make_unique<Region<D>>(box, particles, options),
+                      .neighbours = {},
+                      .holders = {}});
 }
 
 /// Regions go to ranks in their order, as evenly as may be.
@@ -90,12 +70,6 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
     records[i] = {particles.x[i], particles.v[i], 0.0, static_cast<Id>(i), 0, particles.species[i]};
   std::vector<Vec<D>>().swap(particles.x);
   std::vector<Vec<D>>().swap(particles.v);
-  local_.clear();
-  for (std::size_t r = first_region(exchange_.rank()); r < first_region(exchange_.rank() + 1); ++r) {
-    Local& local = local_.emplace_back();
-    local.number = static_cast<std::uint32_t>(r);
-    local.region = std::make_unique<Region<D>>(box_, particles_, options_);
-  }
   load(records, 0);
 }
 
@@ -323,87 +297,6 @@ void Domains<D>::send_paths(std::vector<Bytes>& outgoing) const {
       }
 }
 
-/// What own spheres did in this window; each collision counts where its lower id is at home.
-template <int D>
-typename Domains<D>::Harvest Domains<D>::harvest(double end, std::vector<Contact<D>>* contacts) const {
-  Harvest got;
-  for (const Local& local : local_)
-    for (const Slot i : local.region->touched()) {
-      if (!local.region->owns(i)) continue;
-      const auto path = local.region->path(i);
-      double speed = 0;
-      for (const Node<D>& node : path) speed = std::max(speed, node.after.v.norm());
-      if (speed + g_.norm() * horizon_ > fastest_) got.astray = std::min(got.astray, astray_at(*local.region, i, end));
-      got.speed = std::max(got.speed, speed);
-      for (std::size_t k = 0; k < path.size(); ++k) {
-        const Node<D>& node = path[k];
-        if (node.key.lo != node.after.id) continue;
-        const bool pair = node.key.kind == EventKind::pair;
-        ++(pair ? got.collisions : got.bounces);
-        if (pair) got.virial.add(node.virial);
-        got.overlap = std::max(got.overlap, node.overlap);
-        if (contacts) contacts->push_back(contact_of(*local.region, i, k));
-      }
-    }
-  return got;
-}
-
-/// When a sphere may have come farther than the stray in the window, by the length of its path; infinite: never.
-template <int D>
-double Domains<D>::astray_at(const Region<D>& region, Slot i, double end) const {
-  const auto path = region.path(i);
-  double now = now_, left = stray_;
-  for (std::size_t k = 0; k <= path.size(); ++k) {
-    const double speed = region.before(i, k).v.norm() + g_.norm() * horizon_;
-    const double until = k < path.size() ? path[k].key.time : end;
-    if (speed * (until - now) > left) return now + left / speed;
-    left -= speed * (until - now);
-    now = until;
-  }
-  return std::numeric_limits<double>::infinity();
-}
-
-/// The contact that node k of a path stands for, as EventCore writes it down.
-template <int D>
-Contact<D> Domains<D>::contact_of(const Region<D>& region, Slot lo, std::size_t k) const {
-  const EventKey<D>& key = region.path(lo)[k].key;
-  const Flights<D>& flights = region.flights();
-  Record<D> a = region.before(lo, k);
-  if (key.kind == EventKind::wall) {
-    const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
-    const Blow<D> blow = flights.bounce(lo, a, axis, side, key.time, key.generation);
-    Contact<D> contact{key, a.x, a.x, blow.impulse};
-    contact.x_hi[axis] = side == 0 ? 0.0 : box_.edges[axis];
-    return contact;
-  }
-  const Slot hi = region.slot_of(key.hi);
-  const auto path = region.path(hi);
-  std::size_t m = 0;
-  while (path[m].key != key) ++m;
-  Record<D> b = region.before(hi, m);
-  const Vec<D> shift = box_.shift(key.image);
-  const Blow<D> blow = flights.collide(lo, a, hi, b, shift, key.time, key.generation);
-  return {key, a.x, b.x - shift, blow.impulse};
-}
-
-/// The key of the n-th pair collision of the window.
-template <int D>
-std::optional<EventKey<D>> Domains<D>::key_of_collision(std::uint64_t number) const {
-  Bytes mine;
-  for (const Local& local : local_)
-    for (const Slot i : local.region->touched()) {
-      if (!local.region->owns(i)) continue;
-      for (const Node<D>& node : local.region->path(i))
-        if (node.key.kind == EventKind::pair && node.key.lo == node.after.id) put(mine, node.key);
-    }
-  std::vector<EventKey<D>> keys;
-  for (const Bytes& bytes : exchange_.gather(mine))
-    for (Reader reader(bytes); reader.more();) keys.push_back(reader.get<EventKey<D>>());
-  if (number == 0 || number > keys.size()) return std::nullopt;
-  std::nth_element(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(number - 1), keys.end());
-  return keys[number - 1];
-}
-
 template <int D>
 void Domains<D>::fly_to(double time, Particles<D>& copies) const {
   struct Place {
@@ -429,12 +322,23 @@ void Domains<D>::fly_to(double time, Particles<D>& copies) const {
 template <int D>
 void Domains<D>::give_back(double time, Particles<D>& particles) {
   fly_to(time, particles);
+}
+
+template <int D>
+EventCounts Domains<D>::counts() const {
+  EventCounts all;
+  for (const Local& local : local_) all += local.region->counts();
+  return all;
+}
+
+template <int D>
+DomainCounts Domains<D>::domain_counts() const {
+  DomainCounts all = counts_;
   for (const Local& local : local_) {
-    past_ += local.region->counts();
-    counts_.run_events += local.region->run_events();
-    counts_.redone_events += local.region->redone_events();
+    all.run_events += local.region->run_events();
+    all.redone_events += local.region->redone_events();
   }
-  local_.clear();
+  return all;
 }
 
 template class Domains<2>;

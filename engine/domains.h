@@ -37,9 +37,9 @@ class Domains {
   void give_back(double time, Particles<D>& particles);
   double now() const { return now_; }
 
-  /// Of event cores that were given back, on this rank.
-  const EventCounts& counts() const { return past_; }
-  const DomainCounts& domain_counts() const { return counts_; }
+  /// Of all regions of this rank, since they were made.
+  EventCounts counts() const;
+  DomainCounts domain_counts() const;
   double seconds_waited() const { return exchange_.seconds(); }  ///< for other ranks, since the domains were made
 
  private:
@@ -76,7 +76,6 @@ class Domains {
   const Particles<D>& particles_;
   mutable TimedExchange exchange_;
   std::size_t regions_;
-  SearchOptions options_;
   std::function<double()> forced_window_;
   std::optional<Division<D>> division_;
   std::vector<Local> local_;
@@ -85,10 +84,9 @@ class Domains {
   double diameter_ = 0;       // the largest
   double stray_ = 0;          // how far anyone comes in a window
   double fastest_ = 0;        // that anyone is expected to be
-  double pace_ = 0;           // time in which a sphere collides kCollisions times; 0: not known yet
+  double pace_ = 0;           // time in which a sphere collides kCollisions times, about
   bool fresh_ = false;        // loaded at now_
   std::uint64_t events_ = 0;  // contacts since take()
-  EventCounts past_;
   DomainCounts counts_;
 };
 

@@ -7,38 +7,6 @@
 #include "engine/error.h"
 
 namespace carom {
-namespace {
-
-/// Interleaves the bits of D numbers: places near on this curve are near in space (Morton).
-template <int D>
-std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
-  std::uint64_t code = 0;
-  for (int bit = 20; bit >= 0; --bit)
-    for (int k = 0; k < D; ++k) code = code << 1 | (place[k] >> bit & 1);
-  return code;
-}
-
-/// The numbers of n places x(i) in the order of a space-filling curve.
-template <int D, class Place>
-std::vector<std::uint32_t> along_curve(std::size_t n, Place&& x) {
-  std::vector<std::uint32_t> order(n);
-  if (n == 0) return order;
-  Vec<D> low = x(0), high = low;
-  for (std::size_t i = 0; i < n; ++i) low = low.cwiseMin(x(i)).eval(), high = high.cwiseMax(x(i)).eval();
-  const double scale = ((1 << 20) - 1) / std::max((high - low).maxCoeff(), 1e-300);
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> places(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    std::array<std::uint32_t, D> place;
-    for (int k = 0; k < D; ++k) place[k] = static_cast<std::uint32_t>((x(i)[k] - low[k]) * scale);
-    places[i] = {interleave<D>(place), static_cast<std::uint32_t>(i)};
-  }
-  std::sort(places.begin(), places.end());
-  for (std::size_t i = 0; i < n; ++i) order[i] = places[i].second;
-  return order;
-}
-
-}  // namespace
-
 template <int D>
 EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options)
     : box_(box), particles_(particles), flights_(box), options_(options), kernels_(scan_kernels()), tuning_(options) {
@@ -47,114 +15,6 @@ EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles, const 
 
 template <int D>
 EventCore<D>::~EventCore() = default;
-
-template <int D>
-void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
-  plan(read(particles, g, horizon, growth), 0);
-}
-
-template <int D>
-void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double astray) {
-  const auto order = along_curve<D>(records.size(), [&](std::size_t i) -> const Vec<D>& { return records[i].x; });
-  std::vector<Record<D>> sorted(records.size());
-  for (std::size_t i = 0; i < records.size(); ++i) sorted[i] = records[order[i]];
-  std::vector<Record<D>>().swap(records);
-  astray_ = astray;
-  at_border_.clear();
-  events_ = since_sort_ = 0;
-  now_ = now;
-  tied_ = {};
-  free_.clear();
-  lists_.reset();
-  flights_.load(sorted, particles_, g, horizon);
-  plan(true, now);
-}
-
-template <int D>
-void EventCore<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
-  const bool anew = read(particles, g, horizon, growth);
-  std::vector<Vec<D>>().swap(particles.x);
-  std::vector<Vec<D>>().swap(particles.v);
-  plan(anew, 0);
-}
-
-template <int D>
-void EventCore<D>::give_back(double time, Particles<D>& particles) {
-  calendar_ = Calendar();  // makes room
-  fly_to(time, particles);
-}
-
-/// Takes over the records; tells whether the slots have changed.
-template <int D>
-bool EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
-  const std::size_t n = particles.size();
-  events_ = 0;
-  now_ = 0;
-  tied_ = {};
-  const bool anew =
-      flights_.size() != n || static_cast<double>(since_sort_) > options_.sort_interval * static_cast<double>(n);
-  if (anew) {
-    lists_.reset();
-    free_.clear();
-    flights_.assign(along_curve<D>(n, [&](std::size_t i) -> const Vec<D>& { return particles.x[i]; }));
-    since_sort_ = 0;
-  }
-  flights_.load(particles, g, horizon, growth);
-  return anew;
-}
-
-/// Plans everybody's first event.
-template <int D>
-void EventCore<D>::plan(bool anew, double now) {
-  const std::size_t n = flights_.size();
-  packing_ = Packing<D>(flights_.room());
-  setting_ = flights_.setting(packing_);
-  std::vector<double> radii = flights_.radii(flights_.horizon());
-  if (lists_ && !anew && radii_ == radii) {  // lists outlive a slab while they are good for its radii
-    lists_->follow(flights_.records());
-    for (auto& a : agenda_) a.version = 0;
-  } else {
-    agenda_.clear();
-    agenda_.reserve(flights_.room());
-    agenda_.assign(n, Agenda<D>{});
-    radii_ = std::move(radii);
-    choose_search(now);
-  }
-  for (std::size_t i = 0; i < n; ++i) foresee(static_cast<Slot>(i), now);
-  constexpr std::size_t kSample = 8192;
-  std::vector<double> some;
-  for (std::size_t i = 0; i < n; i += n / kSample + 1) some.push_back(agenda_[i].due());
-  calendar_.reset(flights_.horizon(), n, options_.entries_per_bin, std::move(some), now);
-  for (std::size_t i = 0; i < n; ++i) schedule(static_cast<Slot>(i));
-}
-
-template <int D>
-void EventCore<D>::choose_search(double now) {
-  // A region is as dense as the whole, of which it has a part only, and larger spheres may come.
-  largest_ = *std::max_element(radii_.begin(), radii_.end());
-  if (radii_.size() > 1 && flights_.size() < particles_.radius.size())
-    largest_ = std::max(largest_, *std::max_element(particles_.radius.begin(), particles_.radius.end()));
-  Extent<D> extent = flights_.extent();
-  extent.particles = particles_.radius.size();
-  SearchSituation situation = situation_of<D>(box_, radii_, extent);
-  situation.largest = 2 * largest_;
-  tuning_.choose(situation, counts_);
-  if (!tuning_.lists()) {
-    lists_.reset();
-    cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, kernels_, tuning_.cell(), extent);
-    for (Slot i = 0; i < flights_.size(); ++i) {
-      agenda_[i].where.cell = cells_->place(flights_.at(i, now).x);
-      cells_->insert(i, agenda_[i].where.cell);
-    }
-    return;
-  }
-  cells_.reset();
-  double skin = tuning_.skin();
-  for (int k = 0; k < D; ++k)
-    if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
-  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, largest_, skin, agenda_);
-  lists_->build(flights_, now, extent, astray_);
-}
 
 template <int D>
 bool EventCore<D>::stale(const Agenda<D>& a) const {
@@ -174,26 +34,10 @@ template <int D>
 EventKey<D> EventCore<D>::key_of(Slot i) const {
   const Agenda<D>& a = agenda_[i];
   const Record<D>& r = flights_[i];
-  EventKey<D> key;
-  key.time = a.contact;
-  key.kind = a.kind;
-  key.generation = generation_of(i);
-  if (a.kind == EventKind::wall) {
-    key.lo = r.id;
-    key.hi = a.partner;
-    return key;
-  }
-  const Record<D>& other = flights_[packing_.slot(a.partner)];
-  key.image = packing_.image(a.partner);
-  if (r.id < other.id) {
-    key.lo = r.id;
-    key.hi = other.id;
-  } else {
-    key.lo = other.id;
-    key.hi = r.id;
-    for (auto& k : key.image) k = -k;
-  }
-  return key;
+  if (a.kind == EventKind::wall)
+    return {.time = a.contact, .generation = generation_of(i), .kind = a.kind, .lo = r.id, .hi = a.partner};
+  const Id other = flights_[packing_.slot(a.partner)].id;
+  return pair_key<D>(a.contact, generation_of(i), r.id, other, packing_.image(a.partner));
 }
 
 template <int D>
@@ -449,6 +293,12 @@ void EventCore<D>::predict_update(Slot i, double now) {
     predict_crossing(i, now);
 }
 
+/// How far a sphere may go from the centre of its region.
+template <int D>
+double EventCore<D>::room(Slot i) const {
+  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? astray_ : 0);
+}
+
 /// When does the sphere leave the region its list is good for? Its contact has been planned.
 template <int D>
 void EventCore<D>::predict_leaving(Slot i, double now) {
@@ -592,12 +442,7 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
   ++report.counters.sphere_sphere;
   report.counters.collision_virial.add(blow.d.dot(blow.impulse));
   report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
-  if (!report.contacts) return;
-  const Record<D>&a = flights_[i], &b = flights_[j];
-  if (a.id < b.id)
-    report.contacts->push_back({key, a.x, b.x - shift, blow.impulse});
-  else
-    report.contacts->push_back({key, b.x, a.x + shift, -blow.impulse});
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, blow));
 }
 
 template <int D>
@@ -613,106 +458,7 @@ void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, c
   }
   ++report.counters.sphere_wall;
   report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
-  if (!report.contacts) return;
-  Contact<D> contact{key, flights_[i].x, flights_[i].x, blow.impulse};
-  contact.x_hi[axis] = side == 0 ? 0.0 : box_.edges[axis];
-  report.contacts->push_back(contact);
-}
-
-template <int D>
-bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
-  if (!free_.empty()) {
-    slot = free_.back();
-    free_.pop_back();
-  } else {
-    if (flights_.size() == flights_.room()) return false;
-    slot = static_cast<Slot>(flights_.size());
-  }
-  const double radius = particles_.radius[r.id];
-  flights_.admit(slot, r, radius, particles_.mass[r.id]);
-  if (slot == agenda_.size()) {
-    agenda_.emplace_back();
-    if (radii_.size() > 1) radii_.push_back(radius);
-  } else if (radii_.size() > 1) {
-    radii_[slot] = radius;
-  }
-  ++agenda_[slot].version;
-  setting_ = flights_.setting(packing_);
-  const Vec<D> x = flights_.at(slot, now).x;
-  if (!at_border_.empty()) at_border_[slot] = lists_ && lists_->skin() >= 3 * astray_ ? 1 : 0;
-  if (lists_) {
-    lists_->admit(slot, x, radii_);
-  } else {
-    agenda_[slot].where.cell = cells_->place(x);
-    cells_->admit(slot, agenda_[slot].where.cell);
-  }
-  predict(slot, now);
-  return true;
-}
-
-template <int D>
-void EventCore<D>::dismiss(Slot i) {
-  Agenda<D>& a = agenda_[i];
-  ++a.version;  // whoever plans a contact with it looks again
-  a.contact = a.update = kNever;
-  if (lists_)
-    lists_->dismiss(i);
-  else
-    cells_->remove(i, a.where.cell);
-  free_.push_back(i);
-}
-
-template <int D>
-void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, double now) {
-  for (const auto& [i, r] : records) {
-    flights_.set(i, r);
-    ++agenda_[i].version;
-  }
-  for (const auto& [i, r] : records) {
-    const Vec<D> x = flights_.at(i, now).x;
-    if (lists_) {
-      lists_->move(i, x, room(i));
-    } else {
-      CellPlace<D>& cell = agenda_[i].where.cell;
-      cells_->remove(i, cell);
-      cell = cells_->place(x);
-      cells_->admit(i, cell);
-    }
-  }
-  for (const auto& [i, r] : records) predict(i, now);
-}
-
-template <int D>
-std::span<const std::uint32_t> EventCore<D>::find_near(Slot i) {
-  if (lists_) return lists_->find_near(i, astray_);
-  cells_->find_near(agenda_[i].where.cell, 2 * (largest_ + astray_), near_);
-  return near_;
-}
-
-template <int D>
-std::span<const std::uint32_t> EventCore<D>::find_near_at_border(Slot i) {
-  if (!lists_ || room(i) == lists_->skin()) return find_near(i);
-  return {lists_->candidates(agenda_[i]), agenda_[i].count};
-}
-
-template <int D>
-void EventCore<D>::set_border(std::span<const Slot> border, std::span<const Slot> ghosts, double now) {
-  at_border_.assign(flights_.room(), 0);
-  if (!lists_ || lists_->skin() < 3 * astray_) return;
-  for (const auto slots : {border, ghosts})
-    for (const Slot i : slots) {
-      at_border_[i] = 1;
-      if (lists_->move(i, flights_.at(i, now).x, room(i)))
-        predict(i, now);
-      else
-        predict_leaving(i, now), schedule(i);
-    }
-}
-
-/// How far a sphere may go from the centre of its region.
-template <int D>
-double EventCore<D>::room(Slot i) const {
-  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? astray_ : 0);
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], blow));
 }
 
 template class EventCore<2>;

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <utility>
 #include <vector>
@@ -15,6 +16,30 @@
 namespace carom {
 
 using Bytes = std::vector<std::byte>;
+
+/// Appends a value, byte by byte: all ranks are the same program.
+template <class T>
+void put(Bytes& to, const T& value) {
+  const auto* const bytes = reinterpret_cast<const std::byte*>(&value);
+  to.insert(to.end(), bytes, bytes + sizeof(T));
+}
+
+/// Reads what put() wrote, in its order.
+class Reader {
+ public:
+  explicit Reader(const Bytes& bytes) : at_(bytes.data()), end_(bytes.data() + bytes.size()) {}
+  bool more() const { return at_ < end_; }
+  template <class T>
+  T get() {
+    T value;
+    std::memcpy(static_cast<void*>(&value), at_, sizeof(T));
+    at_ += sizeof(T);
+    return value;
+  }
+
+ private:
+  const std::byte *at_, *end_;
+};
 
 class Exchange {
  public:

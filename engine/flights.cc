@@ -186,6 +186,20 @@ Blow<D> Flights<D>::bounce(Slot i, Record<D>& r, int axis, int side, double t, s
   return blow;
 }
 
+template <int D>
+Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
+                                  const Blow<D>& blow) const {
+  if (a.id < b.id) return {key, a.x, b.x - shift, blow.impulse};
+  return {key, b.x, a.x + shift, -blow.impulse};
+}
+
+template <int D>
+Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const {
+  Contact<D> contact{key, r.x, r.x, blow.impulse};
+  contact.x_hi[key.hi / 2] = key.hi % 2 == 0 ? 0.0 : box_.edges[key.hi / 2];
+  return contact;
+}
+
 template class Flights<2>;
 template class Flights<3>;
 

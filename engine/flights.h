@@ -94,6 +94,14 @@ class Flights {
   /// Gives a sphere the slot `i`, one of those there are or the next.
   void admit(Slot i, const Record<D>& r, double radius, double mass);
 
+  /// What observers see of a collision between the two, or with a wall, after it.
+  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
+                        const Blow<D>& blow) const;
+  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const;
+
+  /// Whether all spheres have one radius.
+  bool equal() const { return common_radius_ != 0; }
+
  private:
   void advance(Record<D>& r, double t) const;
   double grown(double length, double t) const { return length * (1 + growth_ * t); }

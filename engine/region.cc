@@ -82,7 +82,7 @@ void Region<D>::run(double now, double end) {
   trace_.clear(now);
   Counters unused;
   core_.run(end, {.counters = unused, .trace = &trace_});
-  run_events_ += trace_.nodes.size() / 2;
+  run_events_ += std::ranges::count_if(trace_.nodes, [](const Node<D>& n) { return n.key.lo == n.after.id; });
   index();
 }
 
@@ -257,13 +257,8 @@ void Region<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>
   const Flights<D>& flights = core_.flights();
   const Vec<D> shift = box_.shift(image);
   const auto key_at = [&](const Record<D>& other, double t) {
-    EventKey<D> key{.time = t, .kind = EventKind::pair, .lo = m.now.id, .hi = other.id, .image = image};
-    key.generation = std::max(Flights<D>::generation_at(m.now, t), Flights<D>::generation_at(other, t));
-    if (key.hi < key.lo) {
-      std::swap(key.lo, key.hi);
-      for (auto& k : key.image) k = -k;
-    }
-    return key;
+    const auto generation = std::max(Flights<D>::generation_at(m.now, t), Flights<D>::generation_at(other, t));
+    return pair_key<D>(t, generation, m.now.id, other.id, image);
   };
   const auto plan = [&](const EventKey<D>& key) {
     tasks_.push({.kind = Task::Kind::contact,

@@ -20,18 +20,19 @@ Vec<D> centre(const Agenda<D>& a) {
 
 template <int D>
 SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels,
-                        std::span<const double> radius, double largest, double skin, PageVector<Agenda<D>>& agenda)
+                        std::span<const double> radius, bool equal, double largest, double skin,
+                        PageVector<Agenda<D>>& agenda)
     : box_(box),
       packing_(packing),
       kernels_(kernels),
       lanes_(kernels.lanes),
       radius_(radius),
+      equal_(equal),
       largest_(largest),
       skin_(skin),
       agenda_(agenda) {
-  exact_ =
-      radius.size() > 1 || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
-  if (radius.size() > 1) {
+  exact_ = !equal || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
+  if (!equal) {
     level_.resize(radius.size());
     for (std::size_t i = 0; i < radius.size(); ++i) level_[i] = octave(largest, radius[i]);
   }
@@ -53,13 +54,14 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
     volume *= box_.boundary[k] == Boundary::open ? extent.high[k] - extent.low[k] : box_.edges[k];
   for (std::size_t l = 0; l < levels; ++l) {
     double largest = l == 0 ? largest_ : 0;
-    std::size_t members = level_.empty() ? n : 0;
+    std::size_t members = equal_ ? n : 0;
     for (std::size_t i = 0; i < level_.size(); ++i)
       if (level_[i] == l) largest = std::max(largest, radius_[i]), ++members;
     // Places are rounded down to 1024ths: two of them may come out nearer or farther by one in each direction.
     const double reach = 2 * (std::max(largest, 1e-300) + skin_) * (1 + 2 * std::sqrt(D) / kPlaces);
     // Of the whole system, where these are a part of it.
-    const double all = static_cast<double>(members) * static_cast<double>(extent.particles) / static_cast<double>(n);
+    const double all =
+        static_cast<double>(members) * static_cast<double>(extent.particles) / std::max(static_cast<double>(n), 1.0);
     const double roomy = std::pow(kMembers * volume / std::max(all, 1.0), 1.0 / D);
     const double edge = std::max(reach, roomy);
     Level level{
@@ -402,7 +404,7 @@ template <int D>
 void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> radius) {
   radius_ = radius;
   if (i == boxes_.size()) boxes_.push_back(0);
-  if (!level_.empty()) {
+  if (!equal_) {
     if (i == level_.size()) level_.push_back(0);
     // The smallest level that can hold it: there may be none of its octave.
     const auto level =
@@ -424,7 +426,6 @@ void SkinLists<D>::dismiss(Slot i) {
   remove(i, centre(a));
   const std::uint32_t* const list = candidates(a);
   for (unsigned q = 0; q < a.count; ++q) drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
-  found_.resize(std::max<std::size_t>(found_.size(), 1));
   assign(i, 0);
 }
 

@@ -20,10 +20,10 @@ namespace carom {
 template <int D>
 class SkinLists {
  public:
-  /// `radius` by slot, the largest one they will have; one entry where all are equal. Nobody who comes later is larger
-  /// than `largest`.
+  /// `radius` by slot, the largest one they will have; where all are `equal`, for ever, of the first one alone. Nobody
+  /// who comes later is larger than `largest`.
   SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> radius,
-            double largest, double skin, PageVector<Agenda<D>>& agenda);
+            bool equal, double largest, double skin, PageVector<Agenda<D>>& agenda);
 
   double skin() const { return skin_; }
   const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
@@ -62,8 +62,8 @@ class SkinLists {
   using Place = std::array<std::int32_t, D>;  // in 1024ths of a cell
 
   static std::uint8_t octave(double largest, double radius);
-  std::size_t level_of(Slot i) const { return level_.empty() ? 0 : level_[i]; }
-  double radius(Slot i) const { return radius_[level_.empty() ? 0 : i]; }
+  std::size_t level_of(Slot i) const { return equal_ ? 0 : level_[i]; }
+  double radius(Slot i) const { return radius_[equal_ ? 0 : i]; }
   void lay_steps(Level& level, double astray);
   double most_places(double radius, const Level& level, double astray) const;
   Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
@@ -86,10 +86,11 @@ class SkinLists {
   const ScanKernels& kernels_;
   const unsigned lanes_;  // lists start and end at multiples of so many candidates
   std::span<const double> radius_;
+  bool equal_;
   double largest_, skin_;
   PageVector<Agenda<D>>& agenda_;
   std::vector<Level> levels_;
-  std::vector<std::uint8_t> level_;                 // by slot; empty where there is one level
+  std::vector<std::uint8_t> level_;                 // by slot; empty where all are equal
   PageVector<std::int32_t> boxes_;                  // by slot: the box of the region's centre, as a linear image
   PageVector<std::uint32_t> pool_;                  // the lists
   std::size_t used_ = 0;                            // of the pool

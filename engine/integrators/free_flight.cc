@@ -3,8 +3,10 @@
 // The slab is an epoch: at its end all records are flown to one time and wrapped, so that times stay small and their
 // last digits fine. Between events x(t) = x + v s + ½ g s² holds exactly; there is no step and no truncation error.
 
+#include <charconv>
 #include <cstdlib>
 #include <optional>
+#include <string_view>
 
 #include "engine/domains.h"
 #include "engine/error.h"
@@ -23,7 +25,7 @@ class FreeFlight : public Integrator<D> {
   void share(Exchange& ranks) override { ranks_ = &ranks; }
 
   void start(System<D>& system, Counters&) override {
-    const std::size_t regions = regions_a_rank(system.particles.size());
+    const std::size_t regions = regions_a_rank();
     if (ranks_->size() > 1 || regions > 1)
       domains_.emplace(system.box, system.particles, *ranks_, regions * static_cast<std::size_t>(ranks_->size()));
     else
@@ -86,10 +88,17 @@ class FreeFlight : public Integrator<D> {
 
   double seconds_waited() const { return domains_ ? domains_->seconds_waited() : 0; }
 
-  /// More than one lets each fit the cache; CAROM_REGIONS forces a number.
-  std::size_t regions_a_rank(std::size_t) const {
-    if (const char* const forced = std::getenv("CAROM_REGIONS")) return std::max(1, std::atoi(forced));
-    return 1;
+  /// What CAROM_REGIONS says; else one.
+  static std::size_t regions_a_rank() {
+    const char* const forced = std::getenv("CAROM_REGIONS");
+    if (!forced) return 1;
+    const std::string_view text(forced);
+    std::size_t regions = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), regions);
+    if (error != std::errc{} || end != text.data() + text.size() || regions == 0)
+      throw Error(Failure::deck,
+                  "CAROM_REGIONS=" + std::string(text) + ": give the number of regions a rank, 1 or more");
+    return regions;
   }
 
   std::uint64_t max_events_;
