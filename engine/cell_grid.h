@@ -123,24 +123,20 @@ class CellGrid {
   /// `boxes` is how many boxes away the visited cell lies. Cells beyond walls and open ends do not exist.
   template <class Visit>
   void for_each_between(Cell<D> low, Cell<D> high, Visit&& visit) const {
-    struct Place {
-      std::size_t offset;
-      std::int32_t boxes;
-    };
-    std::array<boost::container::small_vector<Place, 4>, D> places;  // of each axis
+    std::array<boost::container::small_vector<Step, 4>, D> places;  // of each axis
     for (int k = 0; k < D; ++k) {
       if (!box_.periodic(k)) low[k] = std::max(low[k], 0), high[k] = std::min(high[k], count_[k] - 1);
       for (std::int32_t c = low[k]; c <= high[k]; ++c) {
-        const std::int32_t w = wrapped(k, c);
-        places[k].push_back({stride_[k] * static_cast<std::size_t>(w), (c - w) / count_[k]});
+        Step to;
+        if (step(k, c, to)) places[k].push_back(to);
       }
     }
-    for (const Place& p : places[0])
-      for (const Place& q : places[1])
+    for (const Step& p : places[0])
+      for (const Step& q : places[1])
         if constexpr (D == 2)
           visit(p.offset + q.offset, Image<D>{p.boxes, q.boxes});
         else
-          for (const Place& r : places[2]) visit(p.offset + q.offset + r.offset, Image<D>{p.boxes, q.boxes, r.boxes});
+          for (const Step& r : places[2]) visit(p.offset + q.offset + r.offset, Image<D>{p.boxes, q.boxes, r.boxes});
   }
 
   /// The same for every stored cell within `range` cells of `centre`.

@@ -13,7 +13,7 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
     : box_(system.box),
       particles_(system.particles),
       largest_edge_(system.box.edges.maxCoeff()),
-      least_tolerance_(gap_tolerance(0, largest_edge_)),
+      tolerance_(largest_edge_),
       list_(system.box, system.particles.radius),
       max_events_(max_events) {}
 
@@ -52,8 +52,8 @@ void ContactScan<D>::collect(double time, Positions<D> x, Positions<D> v) {
   key.time = time;
   for (const auto& pair : list_.cover(x)) {
     const Vec<D> d = x[pair.i] - x[pair.j] + box_.shift(pair.image);
-    const double sigma = contact_distance(pair.i, pair.j), reach = sigma + tolerance(sigma);
-    if (d.squaredNorm() > reach * reach) continue;
+    const double sigma = contact_distance(pair.i, pair.j);
+    if (!touches(d, sigma)) continue;
     key.lo = pair.i;
     key.hi = pair.j;
     key.image = pair.image;
@@ -137,10 +137,7 @@ void ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
 
 template <int D>
 bool ContactScan<D>::rests(const EventKey<D>& key) const {
-  return std::ranges::any_of(resting_, [&](const auto& contact) {
-    return contact.key.kind == key.kind && contact.key.lo == key.lo && contact.key.hi == key.hi &&
-           contact.key.image == key.image;
-  });
+  return std::ranges::any_of(resting_, [&](const auto& contact) { return same_partners(contact.key, key); });
 }
 
 template <int D>
@@ -212,14 +209,12 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   };
   for (const auto& pair : list_.cover(x, path)) {
     const Vec<D> d = x[pair.i] - x[pair.j] + box_.shift(pair.image);
-    const double sigma = contact_distance(pair.i, pair.j), gap_squared = d.squaredNorm() - sigma * sigma;
-    const double touching_reach = sigma + tolerance(sigma);
-    const bool touching = gap_squared <= touching_reach * touching_reach - sigma * sigma;
+    const double sigma = contact_distance(pair.i, pair.j);
     key.lo = pair.i;
     key.hi = pair.j;
     key.image = pair.image;
-    key.time =
-        contact_time<D>(d, v[pair.i] - v[pair.j], a[pair.i] - a[pair.j], sigma, rest, touching, sigma * resting_speed_);
+    key.time = contact_time<D>(d, v[pair.i] - v[pair.j], a[pair.i] - a[pair.j], sigma, rest, touches(d, sigma),
+                               sigma * resting_speed_);
     if (key.time < kNever) offer(d);
   }
   key.kind = EventKind::wall;

@@ -62,13 +62,17 @@ class ContactScan {
   /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, Positions<D> x_new) { return list_.cover(x, x_new); }
 
-  /// The candidates while nobody strays farther than `margin` from x. They are the same pairs in the same order, with
-  /// other images at most, as long as rebuilds() is the same.
+  /// The candidates while nobody strays farther than `margin` from x; and for each particle its partners among them.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, double margin) { return list_.cover(x, margin); }
-  std::uint64_t rebuilds() const { return list_.rebuilds(); }
+  const Partners& candidate_partners() { return list_.partners(); }
 
   double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
-  double tolerance(double sigma) const { return std::max(1e-13 * sigma, least_tolerance_); }  // gap_tolerance()
+  double tolerance(double sigma) const { return tolerance_(sigma); }
+  /// Whether spheres at separation d touch.
+  bool touches(const Vec<D>& d, double sigma) const {
+    const double reach = sigma + tolerance(sigma);
+    return d.squaredNorm() <= reach * reach;
+  }
   /// The least gap a piece may end with, for a contact that touches at its start: one that rounding has left at the
   /// edge of the tolerance must be able to depart.
   double floor(double gap_at_start, double tolerance) const {
@@ -94,7 +98,8 @@ class ContactScan {
 
   const Box<D>& box_;
   const Particles<D>& particles_;
-  double largest_edge_, least_tolerance_;
+  double largest_edge_;
+  GapTolerance tolerance_;
   NeighbourList<D> list_;
   std::uint64_t max_events_;
   std::uint64_t events_ = 0, events_at_last_cut_ = 0;

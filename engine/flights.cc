@@ -140,7 +140,7 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, int axis, int side) 
   const double inward = side == 0 ? 1.0 : -1.0;
   const double gap = side == 0 ? r.x[axis] - at_record : box_.edges[axis] - at_record - r.x[axis];
   const double opening = inward * r.v[axis] - rate;
-  const double tolerance = gap_tolerance(2 * at_record, box_.edges[axis]);
+  const double tolerance = GapTolerance(box_.edges[axis])(2 * at_record);
   const double slack = approach_slack(1.0, r.v.norm(), rate);
   const bool touching = gap <= tolerance;
   const double s = wall_contact_time(gap, opening, inward * g_[axis], horizon_ - r.t, touching, slack);

@@ -68,6 +68,15 @@ std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>
   return pairs_;
 }
 
+template <int D>
+const Partners& NeighbourList<D>::partners() {
+  if (partners_.empty())
+    partners_.build(reach_.size(), pairs_.size(), [&](std::size_t k) {
+      return std::array<Id, 2>{pairs_[k].i, pairs_[k].j};
+    });
+  return partners_;
+}
+
 /// Where particle i has been wrapped since the last time: notes it and moves its position at the build along.
 template <int D>
 void NeighbourList<D>::follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<Image<D>>& crossed) {
@@ -87,6 +96,7 @@ void NeighbourList<D>::build(std::span<const Vec<D>> x) {
   ++rebuilds_;
   built_at_.assign(x.begin(), x.end());
   pairs_.clear();
+  partners_.clear();
   const std::vector<SizeClass<D>> sizes = group(x);
   for (std::size_t i = 0; i < x.size(); ++i) {
     const std::size_t first = pairs_.size();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/box.h"
+#include "engine/partners.h"
 #include "engine/vec.h"
 
 namespace carom {
@@ -39,6 +40,9 @@ class NeighbourList {
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new, double margin = 0);
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, double margin = 0) { return cover(x, x, margin); }
 
+  /// For each particle its partners among the pairs that cover() gave last, and where they stand there.
+  const Partners& partners();
+
   std::uint64_t rebuilds() const { return rebuilds_; }
 
  private:
@@ -52,6 +56,7 @@ class NeighbourList {
   double least_skin_, skin_;
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
   std::vector<NeighbourPair<D>> pairs_;
+  Partners partners_;  // empty: not asked for since the last build
   std::uint64_t rebuilds_ = 0;
 };
 

@@ -180,6 +180,7 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
   Overlaps found;
   if (x.empty()) return found;
   PlacementGrid<D> grid(box, radius);
+  const GapTolerance tolerance(box.edges.maxCoeff());
   double worst = 1;
   for (Id i = 0; i < x.size(); ++i) {
     Vec<D> inside = x[i];
@@ -190,7 +191,7 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
       Image<D> ignored{};
       box.wrap(other, ignored);
       const double distance = (inside - other - shift).norm(), contact = radius[i] + radius[j];
-      if (distance >= contact - gap_tolerance(contact, box.edges.maxCoeff())) return;
+      if (distance >= contact - tolerance(contact)) return;
       ++found.pairs;
       if (distance / contact >= worst) return;
       worst = distance / contact;
@@ -207,12 +208,13 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
 template <int D>
 Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius) {
   Outsiders found;
+  const GapTolerance tolerance(box.edges.maxCoeff());
   for (Id i = 0; i < x.size(); ++i) {
     bool outside = false;
     for (int k = 0; k < D; ++k) {
       if (!box.walled(k)) continue;
       const double depth = std::max(radius[i] - x[i][k], x[i][k] + radius[i] - box.edges[k]);
-      if (depth <= gap_tolerance(radius[i], box.edges.maxCoeff())) continue;
+      if (depth <= tolerance(radius[i])) continue;
       outside = true;
       if (depth <= found.depth) continue;
       found.worst = i;

@@ -18,18 +18,7 @@ template <int D>
 void SlabCore<D>::begin(Positions<D> x, double margin) {
   margin_ = margin;
   pairs_ = scan_.candidates(x, margin);
-  if (rebuilds_ != scan_.rebuilds()) partners_.clear();
-  rebuilds_ = scan_.rebuilds();
   near_known_ = false;
-}
-
-template <int D>
-const Partners& SlabCore<D>::partners() {
-  if (partners_.empty())
-    partners_.build(particles_.size(), pairs_.size(), [&](std::size_t k) {
-      return std::array<Id, 2>{pairs_[k].i, pairs_[k].j};
-    });
-  return partners_;
 }
 
 template <int D>
@@ -53,7 +42,7 @@ SlabRun<D> SlabCore<D>::run(Histories<D>& paths, NodeRule<D>& rule, std::span<co
   if (!near_known_) reach_.resize(n);
   beyond_.clear();
   for (Id i = 0; i < n; ++i) {
-    const double far = reach_in(paths, i);
+    const double far = reach(paths, i);
     farthest = std::max(farthest, far);
     if (!near_known_)
       reach_[i] = kRoom * far;
@@ -63,7 +52,7 @@ SlabRun<D> SlabCore<D>::run(Histories<D>& paths, NodeRule<D>& rule, std::span<co
   }
   if (!(farthest <= margin_)) return {.end = End::strayed, .margin = farthest};
   predict_first(paths);
-  for (const ExtraNode& node : extra) plan({extra_node_key<D>(node), 0, 0, true});
+  for (const ExtraNode& node : extra) plan({extra_node_key<D>(node)});
   const SlabRun<D> done = serve(paths, rule, extra);
   if (done.end == End::complete) {
     paths.sort_noded();
@@ -91,7 +80,7 @@ SlabRun<D> SlabCore<D>::repair(Histories<D>& paths, NodeRule<D>& rule, std::span
   met_before_ = met_.size();
   SlabRun<D> done;
   for (const Id i : seeds)
-    if (const double far = reach_in(paths, i); !(far <= margin_)) return {.end = End::strayed, .margin = far};
+    if (const double far = reach(paths, i); !(far <= margin_)) return {.end = End::strayed, .margin = far};
   if (wake(paths, rule, seeds, extra, nullptr)) done = serve(paths, rule, extra);
   if (lost_) {
     contacts_.resize(known);
@@ -154,7 +143,7 @@ bool SlabCore<D>::wake(Histories<D>& paths, NodeRule<D>& rule, std::span<const I
   for (std::size_t k = first; k < awake_.size(); ++k) predict_all(paths, awake_[k]);
   for (const ExtraNode& node : extra) {
     const EventKey<D> key = extra_node_key<D>(node);
-    if (waking_[node.who] > first && since < key) plan({key, 0, 0, true});
+    if (waking_[node.who] > first && since < key) plan({key});
   }
   return !lost_;
 }
@@ -203,14 +192,15 @@ void SlabCore<D>::prefetch_upcoming(const Histories<D>& paths) const {
     visit(key.lo);
     if (key.kind == EventKind::pair) visit(key.hi);
   };
-  at(6, [&](Id i) { partners_.prefetch_place(i); });
+  const Partners& partners = scan_.candidate_partners();
+  at(6, [&](Id i) { partners.prefetch_place(i); });
   at(4, [&](Id i) {
-    partners_.prefetch(i);
+    partners.prefetch(i);
     __builtin_prefetch(&paths.past[i]);
     __builtin_prefetch(&particles_.mass[i]);
   });
   at(2, [&](Id i) {
-    for (const auto& [j, pair] : partners_.of(i)) {
+    for (const auto& [j, pair] : partners.of(i)) {
       state(j);
       __builtin_prefetch(&pairs_[pair]);
     }
@@ -227,12 +217,11 @@ SlabRun<D> SlabCore<D>::serve(Histories<D>& paths, NodeRule<D>& rule, std::span<
   std::ranges::sort(first_, {}, &Planned::key);
   served_ = 0;
   serving_ = true;
-  if (!first_.empty()) partners();
   for (Planned event; next_event(paths, event);) {
     if (stale(event)) continue;
     const EventKey<D>& key = event.key;
     if (!(key.time > 0)) continue;  // rounding: resolve() has seen to what touches at the start
-    const bool pair = key.kind == EventKind::pair;
+    const bool pair = key.kind == EventKind::pair, extra_node = is_extra(key);
     if (repairs_) {
       lost_ = lost_ || key < latest;
       latest = key;
@@ -242,10 +231,8 @@ SlabRun<D> SlabCore<D>::serve(Histories<D>& paths, NodeRule<D>& rule, std::span<
     }
     if (!held_.empty() && (held_[key.lo] || (pair && held_[key.hi])))
       return {.end = End::cut, .time = key.time, .key = key};
-    if (!event.extra) {
-      Vec<D> normal;
-      if (approach(paths, key, normal) >= -scan_.resting_speed())
-        return {.end = End::cut, .time = key.time, .key = key};
+    if (!extra_node) {
+      if (approach(paths, key) >= -scan_.resting_speed()) return {.end = End::cut, .time = key.time, .key = key};
       if (contacts_.size() >= max_events_) {
         lost_ = repairs_;  // some of them may be gone
         return {.end = End::crowded, .key = key};
@@ -253,14 +240,14 @@ SlabRun<D> SlabCore<D>::serve(Histories<D>& paths, NodeRule<D>& rule, std::span<
     }
     open(paths, rule, key.lo, key);
     if (pair) open(paths, rule, key.hi, key);
-    if (!event.extra) collide(paths, key);
+    if (!extra_node) collide(paths, key);
     if (pair) met_.insert(met_.end(), {{key.lo, key.hi}, {key.hi, key.lo}});
     for (const Id who : {key.lo, key.hi}) {
       if (who != key.lo && !pair) continue;
       const std::uint32_t at = paths.last[who];
-      const double strays = (paths.x[at] - paths.x[who]).norm() + reach(paths, who);
+      const double strays = (paths.x[at] - paths.x[who]).norm() + reach(paths, at);
       if (!(strays <= margin_)) return {.end = End::strayed, .margin = strays};
-      paths.generation(at) = event.extra ? 0 : key.generation;
+      paths.generation(at) = extra_node ? 0 : key.generation;
       ++version_[who];
     }
     predict_all(paths, key.lo);
@@ -269,20 +256,16 @@ SlabRun<D> SlabCore<D>::serve(Histories<D>& paths, NodeRule<D>& rule, std::span<
   return {};
 }
 
-/// How far particle i may get on its last flight.
+/// How far interval n may lead from where it starts.
 template <int D>
-double SlabCore<D>::reach(const Histories<D>& paths, Id i) const {
-  return reach_in(paths, paths.last[i]);
-}
-template <int D>
-double SlabCore<D>::reach_in(const Histories<D>& paths, std::uint32_t n) const {
+double SlabCore<D>::reach(const Histories<D>& paths, std::uint32_t n) const {
   const double rest = paths.length - paths.start[n];
   return rest * (paths.v[n].norm() + 0.5 * rest * paths.a[n].norm());
 }
 
 template <int D>
 bool SlabCore<D>::stale(const Planned& event) const {
-  if (event.extra) return false;
+  if (is_extra(event.key)) return false;
   return event.version_lo != version_[event.key.lo] ||
          (event.key.kind == EventKind::pair && event.version_hi != version_[event.key.hi]);
 }
@@ -315,7 +298,7 @@ void SlabCore<D>::predict_first(const Histories<D>& paths) {
   }
   for (const std::uint32_t k : near_) predict_pair(paths, pairs_[k].i, pairs_[k].j, pairs_[k].image);
   for (const Id i : beyond_)
-    for (const auto& [j, pair] : partners().of(i))
+    for (const auto& [j, pair] : scan_.candidate_partners().of(i))
       predict_pair(paths, std::min(i, j), std::max(i, j), pairs_[pair].image);
   if (walls_)
     for (Id i = 0; i < paths.particles(); ++i) predict_walls(paths, i);
@@ -323,7 +306,7 @@ void SlabCore<D>::predict_first(const Histories<D>& paths) {
 
 template <int D>
 void SlabCore<D>::predict_all(const Histories<D>& paths, Id i) {
-  for (const auto& [j, pair] : partners().of(i))
+  for (const auto& [j, pair] : scan_.candidate_partners().of(i))
     predict_pair(paths, std::min(i, j), std::max(i, j), pairs_[pair].image);
   if (walls_) predict_walls(paths, i);
 }
@@ -351,8 +334,7 @@ bool SlabCore<D>::predict_between(const Histories<D>& paths, Id i, Id j, std::ui
   const double t = std::max(paths.start[m], paths.start[n]), sigma = scan_.contact_distance(i, j);
   const Vec<D> d = paths.position_in(m, t) - paths.position_in(n, t) + box_.shift(image);
   const Vec<D> v = paths.velocity_in(m, t) - paths.velocity_in(n, t), a = paths.a[m] - paths.a[n];
-  const double touching_reach = sigma + scan_.tolerance(sigma);
-  const bool touching = d.squaredNorm() <= touching_reach * touching_reach;
+  const bool touching = scan_.touches(d, sigma);
   // What several events at one node did one after the other is not recorded.
   if (touching && ((asleep(i) && m != i && paths.start[m] == t) || (asleep(j) && n != j && paths.start[n] == t)))
     lost_ = true;
@@ -363,7 +345,7 @@ bool SlabCore<D>::predict_between(const Histories<D>& paths, Id i, Id j, std::ui
   for (const std::uint32_t each : {m, n})
     if (paths.next[each] != Histories<D>::kNone && !(key < paths.opening(paths.next[each]))) return false;
   if (!held_.empty() && scan_.rests(key)) return false;
-  plan({key, version_[i], version_[j], false});
+  plan({key, version_[i], version_[j]});
   return true;
 }
 
@@ -381,22 +363,21 @@ void SlabCore<D>::predict_walls(const Histories<D>& paths, Id i) {
     EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = static_cast<Id>(wall)};
     key.generation = generation(paths, i, n, key.time);
     if (!held_.empty() && scan_.rests(key)) continue;
-    plan({key, version_[i], 0, false});
+    plan({key, version_[i]});
   }
 }
 
-/// The normal speed with which the flights meet, negative where they approach; and the normal.
+/// The normal speed with which the flights meet, negative where they approach.
 template <int D>
-double SlabCore<D>::approach(const Histories<D>& paths, const EventKey<D>& key, Vec<D>& normal) const {
+double SlabCore<D>::approach(const Histories<D>& paths, const EventKey<D>& key) const {
   const std::uint32_t m = paths.last[key.lo];
   const Vec<D> v = paths.velocity_in(m, key.time);
   if (key.kind == EventKind::wall) {
-    const int axis = static_cast<int>(key.hi / 2);
-    normal = ContactScan<D>::inward(static_cast<int>(key.hi)) * Vec<D>::Unit(axis);
-    return normal.dot(v);
+    const int wall = static_cast<int>(key.hi);
+    return ContactScan<D>::inward(wall) * v[wall / 2];
   }
   const std::uint32_t n = paths.last[key.hi];
-  normal = paths.position_in(m, key.time) - paths.position_in(n, key.time) + box_.shift(key.image);
+  const Vec<D> normal = paths.position_in(m, key.time) - paths.position_in(n, key.time) + box_.shift(key.image);
   return normal.dot(v - paths.velocity_in(n, key.time)) / normal.norm();
 }
 

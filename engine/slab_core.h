@@ -23,7 +23,6 @@
 
 #include "engine/contact_scan.h"
 #include "engine/histories.h"
-#include "engine/partners.h"
 
 namespace carom {
 
@@ -95,12 +94,10 @@ class SlabCore {
  private:
   struct Planned {
     EventKey<D> key;
-    std::uint32_t version_lo, version_hi;
-    bool extra;
+    std::uint32_t version_lo = 0, version_hi = 0;  ///< of the flights that it is planned for; extra nodes: of none
     bool operator<(const Planned& other) const { return other.key < key; }  // the standard heap serves the largest
   };
 
-  const Partners& partners();
   void plan(const Planned& event);
   bool next_event(const Histories<D>& paths, Planned& event);
   void prefetch_upcoming(const Histories<D>& paths) const;
@@ -117,11 +114,10 @@ class SlabCore {
   bool near(const Histories<D>& paths, const NeighbourPair<D>& pair, double path) const;
   bool stale(const Planned& event) const;
   void open(Histories<D>& paths, NodeRule<D>& rule, Id i, const EventKey<D>& key);
-  double approach(const Histories<D>& paths, const EventKey<D>& key, Vec<D>& normal) const;
+  double approach(const Histories<D>& paths, const EventKey<D>& key) const;
   void collide(Histories<D>& paths, const EventKey<D>& key);
   std::uint32_t generation(const Histories<D>& paths, Id i, std::uint32_t n, double t) const;
-  double reach(const Histories<D>& paths, Id i) const;
-  double reach_in(const Histories<D>& paths, std::uint32_t n) const;
+  double reach(const Histories<D>& paths, std::uint32_t n) const;
 
   static constexpr double kRoom = 1.25;  // for first flights that change, in parts of their reach
 
@@ -130,8 +126,6 @@ class SlabCore {
   ContactScan<D>& scan_;
   std::uint64_t max_events_;
   std::span<const NeighbourPair<D>> pairs_;
-  Partners partners_;
-  std::uint64_t rebuilds_ = 0;  // of the list that the partners are from
   double margin_ = 0;
   bool walls_;
   std::vector<double> reach_;        // the farthest first flights for which `near_` holds

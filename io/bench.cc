@@ -225,8 +225,7 @@ std::string heading(const BenchOptions& options) {
   return "carom " + version_string() + "\n" + compiler_string() + "\n" +
          fmt::format(
              "Hard spheres in a periodic box, free-flight, one core. Equilibrated for {} epochs of about forty mean "
-             "free "
-             "times,\n"
+             "free times,\n"
              "then measured {} times over at least {} collisions (whole epochs). B/part.: peak resident memory above\n"
              "that before the state was made. Z = pV/NkT. Events, predictions and entries scheduled: a collision;\n"
              "cand.: pairs evaluated a prediction; dropped: entries of these that no longer held, a scheduled one.\n\n",

@@ -150,6 +150,12 @@ int run_beside(Deck& deck, Exchange& at_work, const Deadline& deadline) {
   return simulation.statistics().stopped_early ? kStoppedEarly : kDone;
 }
 
+template <int D>
+int run_on_rank(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks, const Deadline& deadline) {
+  return at_work.rank() == 0 ? run_deck<D>(deck, options, at_work, ranks, deadline)
+                             : run_beside<D>(deck, at_work, deadline);
+}
+
 }  // namespace
 
 int run_command(const RunOptions& options) {
@@ -171,16 +177,12 @@ int run_command(const RunOptions& options) {
     return 0;
   });
   if (failure != 0) return failure;
-  const bool flat = deck.dimension == 2;
   const auto run = [&](Exchange& at_work) {
-    return flat ? run_deck<2>(deck, options, at_work, ranks.size(), deadline)
-                : run_deck<3>(deck, options, at_work, ranks.size(), deadline);
+    return deck.dimension == 2 ? run_on_rank<2>(deck, options, at_work, ranks.size(), deadline)
+                               : run_on_rank<3>(deck, options, at_work, ranks.size(), deadline);
   };
   if (!integrator_named(deck.integrator).shared) return ranks.on_first([&] { return run(alone); });
-  return ranks.on_all([&] {
-    if (all.rank() == 0) return run(all);
-    return flat ? run_beside<2>(deck, all, deadline) : run_beside<3>(deck, all, deadline);
-  });
+  return ranks.on_all([&] { return run(all); });
 }
 
 }  // namespace carom

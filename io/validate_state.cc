@@ -37,7 +37,7 @@ void check_box(const Deck::Source& source, const System<D>& system, Problems& pr
   const double diameter = 2 * *std::max_element(radius.begin(), radius.end());
   for (int k = 0; k < D; ++k) {
     const double edge = system.box.edges[k];
-    if (!system.box.periodic(k) || edge >= diameter - gap_tolerance(diameter, system.box.edges.maxCoeff())) continue;
+    if (!system.box.periodic(k) || edge >= diameter - GapTolerance(system.box.edges.maxCoeff())(diameter)) continue;
     problems.error(source.box,
                    say("the periodic box is ", edge, " long on axis ", k, ", less than a diameter of ", diameter),
                    "enlarge the box; a sphere must not touch itself");

@@ -8,12 +8,6 @@
 
 namespace carom::integrator {
 
-/// Whether two events have the same partners, whenever they happen.
-template <int D>
-bool same_partners(const EventKey<D>& a, const EventKey<D>& b) {
-  return a.kind == b.kind && a.lo == b.lo && a.hi == b.hi && a.image == b.image;
-}
-
 /// Whether particle i has the same partners as in the sweep before, met in the same order.
 template <int D>
 bool same_meetings(const Histories<D>& paths, Id i) {

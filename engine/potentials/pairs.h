@@ -175,9 +175,6 @@ class PairsWithinCutoff {
   static constexpr bool kRemembered = true;
   void begin_slab(Positions<D> x, double margin) const {
     in_slab_ = list_.cover(x, margin);
-    particles_ = x.size();
-    if (rebuilds_ != list_.rebuilds()) partners_.clear();
-    rebuilds_ = list_.rebuilds();
   }
   std::size_t pairs_in_slab() const { return in_slab_.size(); }
   template <class Visit>
@@ -186,7 +183,7 @@ class PairsWithinCutoff {
   }
   template <class Visit>
   void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
-    for (const auto& [j, pair] : partners().of(i)) visit(j, box_.shift(in_slab_[pair].image), pair);
+    for (const auto& [j, pair] : list_.partners().of(i)) visit(j, box_.shift(in_slab_[pair].image), pair);
   }
 
  private:
@@ -195,21 +192,10 @@ class PairsWithinCutoff {
     return [species](Id i, Id j) { return species.contains(i, j); };
   }
 
-  const Partners& partners() const {
-    if (partners_.empty())
-      partners_.build(particles_, in_slab_.size(), [&](std::size_t k) {
-        return std::array<Id, 2>{in_slab_[k].i, in_slab_[k].j};
-      });
-    return partners_;
-  }
-
   const Box<D>& box_;
   // Caches: their state never shows in the sums.
   mutable NeighbourList<D> list_;
   mutable std::span<const NeighbourPair<D>> in_slab_;
-  mutable std::size_t particles_ = 0;
-  mutable Partners partners_;
-  mutable std::uint64_t rebuilds_ = 0;  // of the list that the partners are from
 };
 
 }  // namespace carom

@@ -1,11 +1,12 @@
 """Runs the real command on bad decks: each problem has its exit code, its place and its remedy."""
 
-import os
 import subprocess
 
 import pytest
 
-CAROM = os.environ["CAROM"]
+from runs import CAROM, needs_carom
+
+pytestmark = needs_carom
 
 GOOD = """\
 format = 1

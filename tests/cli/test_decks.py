@@ -3,14 +3,13 @@
 Each must end well, keep its energy, leave a sound file, and not care how it is observed.
 """
 
-import os
-import pathlib
 import sys
 import tomllib
 
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from runs import ROOT, needs_carom
+
 sys.path.insert(0, str(ROOT / "tools"))
 
 import check_h5md
@@ -25,7 +24,7 @@ EXACT_METHODS = {"free-flight", "cdda", "acdda"}
 # Those of ten thousand particles under forces are run with fewer.
 FEWER = {"yukawa-fluid": ["particles.count=256"], "charged-mixture": ["particles.0.count=128", "particles.1.count=128"]}
 
-pytestmark = pytest.mark.skipif("CAROM" not in os.environ, reason="needs the command: CAROM=build/release/io/carom")
+pytestmark = needs_carom
 
 
 def shortened(file):

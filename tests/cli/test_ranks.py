@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 
 import pytest
 
@@ -17,46 +18,25 @@ from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, data_sets, frames_are_
 
 sys.path.insert(0, str(ROOT / "tools"))
 import compare
+from carom_files import toml_text
 
 pytestmark = needs_carom
-METHODS = subprocess.run([CAROM, "methods"], capture_output=True, text=True).stdout if CAROM else ""
-shared = pytest.mark.skipif("share its work" not in METHODS.split("verlet –")[0], reason="free-flight is not shared yet")
 MPIRUN = ["timeout", "-k", "10", "120", "mpirun", "--timeout", "100", "-n"]
 
+# Before a command: only rank 0 finds files by their names alone.
+RANK_0_AT_HOME = ["sh", "-c", 'if [ $OMPI_COMM_WORLD_RANK != 0 ]; then cd /; fi; exec "$@"', "sh"]
+
 # Discs of two sizes between walls, falling.
-DISCS = """
-format = 1
-[system]
-dimension = 2
-box = [30.0, 20.0]
-boundary = ["periodic", "wall"]
-[[particles]]
-name = "large"
-count = 120
-temperature = 1.0
-radius = 0.6
-mass = 2.0
-[[particles]]
-name = "small"
-count = 80
-temperature = 1.0
-radius = 0.4
-[placement]
-type = "random"
-seed = 3
-[[interaction]]
-type = "uniform-field"
-acceleration = [0.0, -0.2]
-[integrator]
-type = "free-flight"
-step = 2.0
-[run]
-collisions = 1500
-[output]
-directory = "unused"
-frame_interval = 0.7
-thermo_interval = 0.3
-"""
+DISCS = toml_text(tomllib.loads(SPHERES) | {
+    "title": "discs",
+    "system": {"dimension": 2, "box": [30.0, 20.0], "boundary": ["periodic", "wall"]},
+    "particles": [{"name": "large", "count": 120, "temperature": 1.0, "radius": 0.6, "mass": 2.0},
+                  {"name": "small", "count": 80, "temperature": 1.0, "radius": 0.4}],
+    "placement": {"type": "random", "seed": 3},
+    "interaction": [{"type": "uniform-field", "acceleration": [0.0, -0.2]}],
+    "integrator": {"type": "free-flight", "step": 2.0},
+    "run": {"collisions": 1500},
+    "output": {"directory": "unused", "frame_interval": 0.7, "thermo_interval": 0.3}})
 # No end of it, and little to see.
 ENDLESS = ["run.end_time=1e7", "integrator.step=1.0", "output.frame_interval=10.0", "output.thermo_interval=10.0"]
 
@@ -105,18 +85,15 @@ def when_it_runs(job, output):
 
 
 @pytest.mark.parametrize("text", [SPHERES, DISCS], ids=["spheres", "discs"])
-@shared
 def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
     output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11"]
     if text is SPHERES:
         output += ["particles.0.count=500", "run.end_time=1.0"]
     run(write_deck(tmp_path, text), tmp_path / "plain", output)
     assert summary(tmp_path / "plain")["events"]["sphere_sphere"] >= 1500
-    for ranks in 1, 2, 3, 4:
+    for ranks in 1, 2, 3, 4, 8:
         out = tmp_path / str(ranks)
-        # Only rank 0 finds the deck.
-        done = mpirun(ranks, ["sh", "-c", 'if [ $OMPI_COMM_WORLD_RANK != 0 ]; then cd /; fi; exec "$@"', "sh"]
-                      + command("input.toml", out, output), cwd=tmp_path)
+        done = mpirun(ranks, RANK_0_AT_HOME + command("input.toml", out, output), cwd=tmp_path)
         assert done.stderr == ""
         assert compare.compare(tmp_path / "plain", out) == []
         assert (out / "events.h5").exists()
@@ -131,7 +108,6 @@ NODES = ROOT / "tools" / "simulated-nodes"
 can_simulate = subprocess.run([NODES, "1", "1", "true"], capture_output=True).returncode == 0 if CAROM else False
 
 
-@shared
 @pytest.mark.skipif(not can_simulate, reason="may not make network namespaces here (not root, no user namespaces)")
 def test_nodes(tmp_path):
     deck = write_deck(tmp_path, SPHERES)
@@ -144,14 +120,12 @@ def test_nodes(tmp_path):
     assert compare.compare(tmp_path / "plain", tmp_path / "nodes") == []
 
 
-@shared
 def test_positions_from_a_file_that_rank_0_sees(tmp_path):
     (tmp_path / "places").write_text("".join(f"{2 * n} 1 1\n" for n in range(9)))
     deck = SPHERES.replace("[placement]", "[placement]\nfile = \"places\"").replace("packing_fraction = 0.3\n", "")
     deck = deck.replace("fcc", "file").replace("108", "9").replace("3\nboundary", "3\nbox = [18.0, 3.0, 3.0]\nboundary")
     run(write_deck(tmp_path, deck), tmp_path / "plain")
-    mpirun(2, ["sh", "-c", 'if [ $OMPI_COMM_WORLD_RANK != 0 ]; then cd /; fi; exec "$@"', "sh"]
-           + command("input.toml", tmp_path / "two"), cwd=tmp_path)
+    mpirun(2, RANK_0_AT_HOME + command("input.toml", tmp_path / "two"), cwd=tmp_path)
     assert compare.compare(tmp_path / "plain", tmp_path / "two") == []
 
 
@@ -189,7 +163,6 @@ def test_idle_ranks_sleep_and_share_the_exit_code(tmp_path):
     mpirun(4, endless + ["--max-wall", "00:00:01"], code=75)
 
 
-@shared
 def test_rank_0_stops_all(tmp_path):
     out = tmp_path / "out"
     mpirun(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--max-wall", "00:00:01")), code=75)
@@ -202,7 +175,6 @@ def test_rank_0_stops_all(tmp_path):
     ("placement.packing_fraction=0.9", 3, "overlap"),
     ("integrator.max_events_per_step=1", 4, "max_events_per_step"),
 ])
-@shared
 def test_an_error_of_all_ranks_is_told_once(change, code, words, tmp_path):
     deck, out = write_deck(tmp_path, SPHERES), tmp_path / "out"
     told = run(deck, tmp_path / "plain", [change], code=code).stderr
@@ -225,7 +197,6 @@ def test_other_commands_speak_once(tmp_path):
         assert (done.stdout + done.stderr).count(words) == 1
 
 
-@shared
 def test_a_killed_rank(tmp_path):
     out = tmp_path / "out"
     job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS))
@@ -237,7 +208,6 @@ def test_a_killed_rank(tmp_path):
     assert len(thermo(out)["time"]) >= 3
 
 
-@shared
 def test_a_stopped_rank(tmp_path):
     out = tmp_path / "out"
     job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--silence", "2")))
@@ -248,7 +218,6 @@ def test_a_stopped_rank(tmp_path):
     assert frames_are_sound(out) >= 3
 
 
-@shared
 def test_rank_0_cannot_write(tmp_path):
     out = tmp_path / "out"
     often = ["output.frame_interval=1.0", "output.thermo_interval=1.0"]
@@ -262,7 +231,6 @@ def test_rank_0_cannot_write(tmp_path):
     assert frames_are_sound(out) >= 3
 
 
-@shared
 def test_a_rank_without_memory(tmp_path):
     out = tmp_path / "out"
     job = start(2, command(write_deck(tmp_path, SPHERES), out, ENDLESS))

@@ -1,8 +1,6 @@
 """The Python tools against files whose contents are known, and the studies against the command itself ($CAROM)."""
 
 import csv
-import os
-import pathlib
 import sys
 import tomllib
 
@@ -10,7 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from runs import ROOT, needs_carom
+
 sys.path.insert(0, str(ROOT / "tools"))
 
 import check_h5md
@@ -253,35 +252,35 @@ def test_integrator_tables():
     assert studies.integrator_table("mcva:variant=restart", 1.0)["variant"] == "restart"
 
 
-@pytest.mark.skipif("CAROM" not in os.environ, reason="needs the command: CAROM=build/release/io/carom")
+def rows_of(study, table, directory, deck, *options):
+    """What a study of a deck of inputs/ writes, drawn too."""
+    study.main([str(ROOT / "inputs" / f"{deck}.toml"), *options, "-o", str(directory)])
+    assert (directory / f"{table}.png").stat().st_size > 1000
+    with open(directory / f"{table}.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@needs_carom
 def test_energy_study(tmp_path, capsys):
-    energy_study.main([str(ROOT / "inputs" / "five-springs.toml"), "--methods", "psa,cva,cdda", "--steps", "0.1,0.05,0.025",
-                       "--end-time", "6", "--starts", "4", "-o", str(tmp_path)])
-    with open(tmp_path / "energy.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(energy_study, "energy", tmp_path, "five-springs", "--methods", "psa,cva,cdda",
+                   "--steps", "0.1,0.05,0.025", "--end-time", "6", "--starts", "4")
     assert len(rows) == 3 * 3 * 4 and {row["status"] for row in rows} == {"done"}
-    assert (tmp_path / "energy.png").stat().st_size > 1000
     orders = {method: energy_study.fitted_order(*energy_study.curve(rows, method), 0.1) for method in ("psa", "cva")}
     assert orders["psa"] == pytest.approx(1.0, abs=0.5)
     assert orders["cva"] == pytest.approx(2.0, abs=0.5)
     assert max(float(row["relative_energy_error"]) for row in rows if row["method"] == "cdda") < 1e-12
 
 
-@pytest.mark.skipif("CAROM" not in os.environ, reason="needs the command: CAROM=build/release/io/carom")
+@needs_carom
 def test_cost_study(tmp_path, capsys):
-    cost_study.main([str(ROOT / "inputs" / "five-springs.toml"), "--methods", "cva,cdda,acva,acdda", "--steps", "0.02,0.01",
-                     "--end-time", "3", "--repeats", "1", "-o", str(tmp_path)])
-    with open(tmp_path / "work.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(cost_study, "work", tmp_path, "five-springs", "--methods", "cva,cdda,acva,acdda",
+                   "--steps", "0.02,0.01", "--end-time", "3", "--repeats", "1")
     assert len(rows) == 4 * 2
     for coarse, fine in zip(rows[::2], rows[1::2]):
         assert float(coarse["position_error"]) / float(fine["position_error"]) == pytest.approx(4, rel=0.5)
         assert float(fine["energy_error"]) < (1e-12 if fine["method"].endswith("dda") else 1e-3)
-    cost_study.main([str(ROOT / "inputs" / "spring-lattice.toml"), "--methods", "cdda,acdda", "--counts", "16,144",
-                     "--end-time", "1", "--repeats", "1", "-o", str(tmp_path)])
-    with open(tmp_path / "cost.csv", newline="") as file:
-        passes = [float(row["passes_per_step"]) for row in csv.DictReader(file)]
+    rows = rows_of(cost_study, "cost", tmp_path, "spring-lattice", "--methods", "cdda,acdda", "--counts", "16,144",
+                   "--end-time", "1", "--repeats", "1")
+    passes = [float(row["passes_per_step"]) for row in rows]
     assert passes[1] > 3 * passes[0]  # all of a system's collisions cut everybody's step
     assert passes[3] == pytest.approx(passes[2], rel=0.3)
-    for name in ("work.png", "cost.png"):
-        assert (tmp_path / name).stat().st_size > 1000
