@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <utility>
 
 #include "engine/event_counts.h"
 #include "engine/exact_sum.h"
@@ -27,16 +28,26 @@ struct Counters {
   } seconds;
 };
 
-/// Adds the time of its own life to a total.
+/// Adds the time of its own life to a total, but for what others have measured meanwhile.
 class Stopwatch {
  public:
-  explicit Stopwatch(double& total) : total_(total), start_(std::chrono::steady_clock::now()) {}
+  explicit Stopwatch(double& total)
+      : total_(total), outer_(std::exchange(running_, this)), start_(std::chrono::steady_clock::now()) {}
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
-  ~Stopwatch() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  ~Stopwatch() {
+    const double life = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    total_ += life - within_;
+    if (outer_) outer_->within_ += life;
+    running_ = outer_;
+  }
 
  private:
+  inline static thread_local Stopwatch* running_ = nullptr;
+
   double& total_;
+  double within_ = 0;  // measured by others
+  Stopwatch* outer_;
   std::chrono::steady_clock::time_point start_;
 };
 

@@ -20,8 +20,9 @@ using Bytes = std::vector<std::byte>;
 /// Appends a value, byte by byte: all ranks are the same program.
 template <class T>
 void put(Bytes& to, const T& value) {
-  const auto* const bytes = reinterpret_cast<const std::byte*>(&value);
-  to.insert(to.end(), bytes, bytes + sizeof(T));
+  const std::size_t at = to.size();
+  to.resize(at + sizeof(T));
+  std::memcpy(to.data() + at, &value, sizeof(T));
 }
 
 /// Reads what put() wrote, in its order.

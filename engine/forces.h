@@ -14,6 +14,7 @@ void force_pass(const System<D>& system, Vectors<D> out, Counters& counters, Add
   const Stopwatch watch(counters.seconds.force);
   for (auto& f : out) f.setZero();
   for (const auto& term : system.interactions) add(*term);
+  if (system.part) system.part->refresh(out);
   counters.force_passes += 1;
 }
 
@@ -42,7 +43,12 @@ template <int D>
 PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
   PotentialSums sums;
   for (const auto& term : system.interactions) term->add_energy(x, sums);
-  return sums;
+  if (!system.part) return sums;
+  Bytes mine;
+  put(mine, sums);
+  PotentialSums all;
+  for (const Bytes& bytes : system.part->gather(mine)) all.add(Reader(bytes).get<PotentialSums>());
+  return all;
 }
 
 /// Σ ½ m v²; an exact sum.

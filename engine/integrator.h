@@ -41,11 +41,7 @@ class Integrator {
  public:
   virtual ~Integrator() = default;
 
-  /// Called before start(), where there are several ranks and IntegratorInfo::shared says so: every rank has the same
-  /// system and makes the same calls; the work of a slab is to be shared among them. `ranks` outlives the integrator.
-  virtual void share(Exchange& /*ranks*/) {}
-
-  /// Called once before the first slab.
+  /// Called once before the first slab. Where the system has several ranks each of them makes the same calls.
   virtual void start(System<D>&, Counters&) {}
 
   /// Advances the system from the start to the end of the slab; afterwards all particles are at its end, wrapped.
@@ -68,7 +64,6 @@ struct IntegratorInfo {
   bool hard_cores = true;          ///< spheres collide; false: points
   bool stepping = true;  ///< advances by steps of fixed length and observes at their ends; false: exact at any time
   bool smooth_forces = true;  ///< knows any interaction; false: none but a common acceleration
-  bool shared = false;        ///< the ranks of a run share its work; false: one rank does it all
   bool shadow = false;        ///< a Verlet type: report the shadow energy S_h
   std::unique_ptr<Integrator<2>> (*in_2d)(const Parameters&) = nullptr;
   std::unique_ptr<Integrator<3>> (*in_3d)(const Parameters&) = nullptr;

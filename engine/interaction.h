@@ -5,6 +5,9 @@
 // external field. It offers V, its gradient, its discrete gradient and its second derivative, each as a whole loop over
 // the particles. Positions are passed in as arrays in id order; contributions to one particle are summed in the order
 // of the partner's id, so that the sum does not depend on how the pairs were found.
+//
+// Where several ranks share a system (engine/part.h) sums over the system are over what this rank owns: its particles,
+// and the pairs whose lower id it owns. What acts on a ghost is left incomplete.
 
 #include <memory>
 #include <span>
@@ -30,6 +33,12 @@ struct PotentialSums {
   ExactSum energy;     ///< V [energy]
   ExactSum magnitude;  ///< Σ|V| over pairs and particles [energy]
   ExactSum virial;     ///< Σ d·F over pairs, d = x_i − x_j, F the force on i [energy]; external fields add nothing
+
+  void add(const PotentialSums& other) {
+    energy.add(other.energy);
+    magnitude.add(other.magnitude);
+    virial.add(other.virial);
+  }
 };
 
 /// What a term has found out about the pairs of a slab, kept from sweep to sweep.
@@ -96,7 +105,8 @@ class Interaction {
   /// both have inner nodes is done with the lower id. Returns how many pair forces were evaluated.
   virtual std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const = 0;
 
-  /// How many pairs (or particles, for a field) one evaluation visits within reach: the unit of `force_passes`.
+  /// How many pairs (or particles, for a field) of this rank one evaluation visits within reach: the unit of
+  /// `force_passes`.
   virtual std::uint64_t interacting_pairs(Positions<D> x) const = 0;
 
   /// The constant acceleration, the same for every particle, that this term gives; null where it gives anything else.

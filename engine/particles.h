@@ -17,8 +17,10 @@ struct Particles {
   std::vector<double> charge;          ///< [charge]
   std::vector<std::uint16_t> species;  ///< index into System::species
   std::vector<Image<D>> image;  ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
+  std::vector<char> ghost;      ///< 1: another rank owns it (engine/part.h); empty: there are no others
 
   std::size_t size() const { return x.size(); }
+  bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
 };
 
 }  // namespace carom

@@ -8,6 +8,9 @@
 namespace carom {
 
 namespace {
+/// How long particles that move about belong to the same ranks.
+constexpr std::int64_t kSlabsBetweenDivisions = 64;
+
 /// Output intervals shorter than this share of a step are refused: there would be no end to counting them.
 constexpr double kLeastInterval = 1e-6;
 
@@ -46,6 +49,9 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     const auto* state = integrator_->energy_state();
     return state ? *state : system_->particles;
   };
+  auto& part = system_->part;
+  if (system_->ranks && info_.smooth_forces)
+    part = std::make_unique<Part<D>>(system_->box, system_->particles, *system_->ranks);
   integrator_->start(*system_, s.counters);
   monitor.start(nodes());
 
@@ -56,6 +62,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       break;
     }
     const Slab slab = next_slab(monitor.time_slack());
+    if (part && slab.index % kSlabsBetweenDivisions == 0) part->divide();
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor.due_within(slab);
     contacts.clear();
     SlabReport<D> report{.counters = s.counters, .contacts = plan_.events ? &contacts : nullptr, .observe = due};
@@ -67,6 +74,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     s.end_time = report.reached < slab.length ? slab.start + report.reached
                  : slab.length == plan_.step  ? static_cast<double>(s.steps) * plan_.step
                                               : *plan_.end_time;
+    if (part) s.counters.seconds.communicate = part->seconds_waited();
     s.force_passes = s.counters.force_passes;
     s.fraction_done = fraction_done();
     s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();

@@ -7,6 +7,7 @@
 
 #include "engine/box.h"
 #include "engine/interaction.h"
+#include "engine/part.h"
 #include "engine/particles.h"
 
 namespace carom {
@@ -22,6 +23,8 @@ struct System {
   Particles<D> particles;
   std::vector<std::string> species;
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
+  Exchange* ranks = nullptr;      ///< that advance this system together, each with the same state; null: one
+  std::unique_ptr<Part<D>> part;  ///< where they share the work on forces
 
   /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
   void wrap();

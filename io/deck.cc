@@ -47,4 +47,6 @@ void set_output_directory(Deck& deck, const std::filesystem::path& directory) {
   deck.toml_text = write_deck(deck.source->values);
 }
 
+std::size_t particle_count(const Deck& deck) { return deck.source->particles(); }
+
 }  // namespace carom

@@ -66,6 +66,9 @@ Deck read_deck(const std::filesystem::path& file, std::span<const std::string> o
 /// Puts the results elsewhere than the deck says; the resolved deck says so too.
 void set_output_directory(Deck& deck, const std::filesystem::path& directory);
 
+/// How many particles it has.
+std::size_t particle_count(const Deck& deck);
+
 /// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
 /// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards.
 template <int D>

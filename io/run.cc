@@ -46,6 +46,9 @@ class Deadline {
   std::optional<double> seconds_;
 };
 
+/// Forces on fewer particles than these are done sooner than told.
+constexpr std::size_t kFewestToShare = 64;
+
 const IntegratorInfo& integrator_named(const std::string& name) {
   for (const IntegratorInfo& info : integrators())
     if (info.name == name) return info;
@@ -78,7 +81,7 @@ Simulation<D> simulation_of(Deck& deck, Exchange& ranks) {
   const IntegratorInfo& info = integrator_named(deck.integrator);
   auto system = build_system<D>(deck);
   auto integrator = info.make<D>(deck.integrator_parameters);
-  if (ranks.size() > 1) integrator->share(ranks);
+  if (ranks.size() > 1) system->ranks = &ranks;
   return Simulation<D>(std::move(system), info, std::move(integrator), deck.plan);
 }
 
@@ -94,8 +97,9 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
   log.say(banner_text(deck, outcome.particles, ranks));
   for (const std::string& warning : deck.warnings) log.warn(warning);
   if (at_work.size() < ranks)
-    log.warn(fmt::format("warning: {} does not share its work among ranks yet; one works, the other {} wait",
-                         deck.integrator, ranks - 1));
+    log.warn(
+        fmt::format("warning: {} particles under forces are too few to be shared; one rank works, the other {} wait",
+                    outcome.particles, ranks - 1));
   if (backup) log.warn("warning: the files of an earlier run in this directory are now in " + backup->string());
   write_file_atomically(directory / run_file::deck, deck.toml_text);
 
@@ -181,7 +185,8 @@ int run_command(const RunOptions& options) {
     return deck.dimension == 2 ? run_on_rank<2>(deck, options, at_work, ranks.size(), deadline)
                                : run_on_rank<3>(deck, options, at_work, ranks.size(), deadline);
   };
-  if (!integrator_named(deck.integrator).shared) return ranks.on_first([&] { return run(alone); });
+  const bool few = integrator_named(deck.integrator).smooth_forces && particle_count(deck) < kFewestToShare;
+  if (few) return ranks.on_first([&] { return run(alone); });
   return ranks.on_all([&] { return run(all); });
 }
 

@@ -121,7 +121,7 @@ std::string methods_page() {
   for (const IntegratorInfo& info : integrators()) {
     out << info.name << " – " << info.title << "\n  order:     " << info.order
         << "\n  conserves: " << wrapped(std::string(info.conserves), 13)
-        << "\n  ranks:     " << (info.shared ? "share its work" : "one works, others wait") << '\n';
+        << '\n';
     out << "  " << wrapped(std::string(info.documentation), 2) << "\n  parameters:\n";
     plain_keys(out, table_schema("integrator").variant(info.name)->keys, 4);
     out << "  source: " << wrapped(std::string(info.source), 10) << "\n\n";

@@ -14,6 +14,7 @@
 // the chords. (With straight flights pairs that bounce again and again make the sweeps diverge.)
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -240,6 +241,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       counts.evaluations += more.evaluations;
       counts.pairs += more.pairs;
     }
+    if (system.part) refresh(*system.part, system.part->everybody(), counts);
     pairs_ = std::max(pairs_, counts.pairs);  // in the first sweep nothing is remembered
     count(counts.evaluations);
     if (!scan_->resting().empty()) hold(system, paths_);
@@ -253,16 +255,28 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     for (const Id i : core_->awake())
       if (paths_.changed[i]) changed_.push_back(i);
     affected_.assign(core_->awake().begin(), core_->awake().end());  // their intervals may stand in other places
-    std::uint64_t evaluations = 0;
+    PairCounts counts;
     for (std::size_t k = 0; k < memories_.size(); ++k)
-      evaluations += system.interactions[k]->renew_impulses(paths_, changed_, memories_[k], affected_);
+      counts.evaluations += system.interactions[k]->renew_impulses(paths_, changed_, memories_[k], affected_);
     std::ranges::sort(affected_);
     affected_.erase(std::ranges::unique(affected_).begin(), affected_.end());
     for (const Id i : affected_)
       for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) impulse_[n].setZero();
     for (std::size_t k = 0; k < memories_.size(); ++k)
-      for (const Id i : affected_) system.interactions[k]->add_impulses_on(paths_, i, memories_[k], impulse_);
-    count(evaluations);
+      for (const Id i : affected_)
+        if (system.particles.owns(i)) system.interactions[k]->add_impulses_on(paths_, i, memories_[k], impulse_);
+    if (system.part) refresh(*system.part, affected_, counts);
+    count(counts.evaluations);
+  }
+
+  /// Of several ranks: ghosts get the impulses of their owners, and everybody the counts of all.
+  void refresh(Part<D>& part, std::span<const Id> who, PairCounts& counts) {
+    part.refresh(who, [&](Id i, auto&& visit) {
+      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) visit(impulse_[n]);
+    });
+    std::array<std::uint64_t, 2> totals{counts.evaluations, counts.pairs};
+    part.sum(totals);
+    counts = {totals[0], totals[1]};
   }
 
   void count(std::uint64_t evaluations) {

@@ -22,9 +22,8 @@ class FreeFlight : public Integrator<D> {
   explicit FreeFlight(const Parameters& parameters)
       : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
 
-  void share(Exchange& ranks) override { ranks_ = &ranks; }
-
   void start(System<D>& system, Counters&) override {
+    if (system.ranks) ranks_ = system.ranks;
     const std::size_t regions = regions_a_rank();
     if (ranks_->size() > 1 || regions > 1)
       domains_.emplace(system.box, system.particles, *ranks_, regions * static_cast<std::size_t>(ranks_->size()));
@@ -55,9 +54,7 @@ class FreeFlight : public Integrator<D> {
       const Stopwatch watch(seconds.queue);
       const double before = seconds_waited();
       const double reached = flight.run(end, events);
-      const double waited = seconds_waited() - before;
-      seconds.communicate += waited;
-      seconds.queue -= waited;
+      seconds.communicate += seconds_waited() - before;
       return reached;
     };
     {
@@ -134,7 +131,6 @@ IntegratorInfo free_flight() {
           "Lubachevsky, J. Comput. Phys. 94 (1991) 255",
       .stepping = false,
       .smooth_forces = false,
-      .shared = true,
       .in_2d = make<FreeFlight, 2>,
       .in_3d = make<FreeFlight, 3>};
 }

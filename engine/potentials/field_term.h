@@ -8,6 +8,7 @@
 //   hessian_product(i, x, w)       V_i″ w
 // and, where it accelerates everybody alike, acceleration().
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/interaction.h"
@@ -17,10 +18,12 @@ namespace carom {
 template <int D, class Field>
 class FieldTerm final : public Interaction<D> {
  public:
-  explicit FieldTerm(Field field) : field_(std::move(field)) {}
+  /// `particles` tells who is a ghost, and outlives the term.
+  FieldTerm(const Particles<D>& particles, Field field) : particles_(particles), field_(std::move(field)) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override {
     for (Id i = 0; i < x.size(); ++i) {
+      if (!particles_.owns(i)) continue;
       const double v = field_.value(i, x[i]);
       sums.energy.add(v);
       sums.magnitude.add(std::abs(v));
@@ -37,9 +40,11 @@ class FieldTerm final : public Interaction<D> {
   }
   PairCounts add_impulses(const Histories<D>& paths, PairMemory<D>& memory, Vectors<D> impulse) const override {
     const auto particles = static_cast<Id>(paths.particles());
-    PairCounts counts{.pairs = particles};
+    PairCounts counts;
     for (Id i = 0; i < particles; ++i) {
       add_impulses_on(paths, i, memory, impulse);
+      if (!particles_.owns(i)) continue;
+      ++counts.pairs;
       for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) ++counts.evaluations;
     }
     return counts;
@@ -47,7 +52,7 @@ class FieldTerm final : public Interaction<D> {
   bool remembers() const override { return true; }
   std::uint64_t renew_impulses(const Histories<D>&, std::span<const Id> changed, PairMemory<D>&,
                                std::vector<Id>&) const override {
-    return changed.size();
+    return static_cast<std::uint64_t>(std::ranges::count_if(changed, [&](Id i) { return particles_.owns(i); }));
   }
   void add_impulses_on(const Histories<D>& paths, Id i, const PairMemory<D>&, Vectors<D> impulse) const override {
     for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
@@ -70,7 +75,11 @@ class FieldTerm final : public Interaction<D> {
     impulse[i] += (0.5 * paths.length) * (first + after) - (0.5 * paths.duration(n)) * (before + after);
     return 3;
   }
-  std::uint64_t interacting_pairs(Positions<D> x) const override { return x.size(); }
+  std::uint64_t interacting_pairs(Positions<D> x) const override {
+    std::uint64_t owned = 0;
+    for (Id i = 0; i < x.size(); ++i) owned += particles_.owns(i) ? 1 : 0;
+    return owned;
+  }
   const Vec<D>* common_acceleration() const override {
     if constexpr (requires { field_.acceleration(); })
       return &field_.acceleration();
@@ -80,6 +89,7 @@ class FieldTerm final : public Interaction<D> {
   bool keeps_momentum() const override { return false; }
 
  private:
+  const Particles<D>& particles_;
   Field field_;
 };
 

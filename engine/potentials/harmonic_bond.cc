@@ -13,7 +13,7 @@ template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   Bonds<D> bonds(context.box, options::bonds<D>("harmonic-bond", p, context));
   return std::make_unique<PairTerm<D, HarmonicBond, UnitWeight, Bonds<D>>>(
-      HarmonicBond(p.real("stiffness"), p.real("rest_length")), UnitWeight{}, std::move(bonds));
+      context.particles, HarmonicBond(p.real("stiffness"), p.real("rest_length")), UnitWeight{}, std::move(bonds));
 }
 
 }  // namespace

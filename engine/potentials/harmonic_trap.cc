@@ -32,7 +32,8 @@ std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionConte
   if (options::any_periodic(context.box))
     options::refuse(type, "has no single-valued potential in a periodic box; make the boundaries 'wall' or 'open'");
   const Vec<D> centre = p.has("centre") ? options::vector<D>(type, p, "centre") : Vec<D>(0.5 * context.box.edges);
-  return std::make_unique<FieldTerm<D, HarmonicTrap<D>>>(HarmonicTrap<D>(p.real("stiffness"), centre));
+  return std::make_unique<FieldTerm<D, HarmonicTrap<D>>>(context.particles,
+                                                         HarmonicTrap<D>(p.real("stiffness"), centre));
 }
 
 }  // namespace

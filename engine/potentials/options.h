@@ -78,7 +78,7 @@ std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, We
   const SpeciesPair species = species_filter(type, parameters, context);
   if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
   AllPairs<D> pairs(context.particles.size(), species);
-  return std::make_unique<PairTerm<D, P, Weight, AllPairs<D>>>(potential, weight, std::move(pairs));
+  return std::make_unique<PairTerm<D, P, Weight, AllPairs<D>>>(context.particles, potential, weight, std::move(pairs));
 }
 
 /// A term over the pairs within the reach of a potential that ends by itself.
@@ -88,7 +88,8 @@ std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential,
   const SpeciesPair species = species_filter(type, parameters, context);
   const double reach = std::sqrt(potential.cutoff_squared()) * (1 + 1e-15);
   PairsWithinCutoff<D> pairs(context.box, context.particles.size(), reach, species);
-  return std::make_unique<PairTerm<D, P, Weight, PairsWithinCutoff<D>>>(potential, weight, std::move(pairs));
+  return std::make_unique<PairTerm<D, P, Weight, PairsWithinCutoff<D>>>(context.particles, potential, weight,
+                                                                        std::move(pairs));
 }
 
 /// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.

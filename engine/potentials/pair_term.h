@@ -32,8 +32,9 @@ class ProductWeight {
 template <int D, Potential P, class Weight, class Pairs>
 class PairTerm final : public Interaction<D> {
  public:
-  PairTerm(P potential, Weight weight, Pairs pairs)
-      : potential_(std::move(potential)), weight_(weight), pairs_(std::move(pairs)) {}
+  /// `particles` tells who is a ghost, and outlives the term.
+  PairTerm(const Particles<D>& particles, P potential, Weight weight, Pairs pairs)
+      : particles_(particles), potential_(std::move(potential)), weight_(weight), pairs_(std::move(pairs)) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override {
     // Pairs come with ascending i: what belongs to one i is summed in that order, and exactly from there on.
@@ -48,6 +49,7 @@ class PairTerm final : public Interaction<D> {
       partial = {};
     };
     for_each_within_reach(x, [&](Id i, Id j, const Vec<D>&, double rho) {
+      if (!particles_.owns(i)) return;
       if (i != owner) pass_on();
       owner = i;
       const double weight = weight_(i, j), v = weight * potential_.value(rho);
@@ -68,6 +70,7 @@ class PairTerm final : public Interaction<D> {
 
   void add_mean_forces(Positions<D> x, Positions<D> x_new, Vectors<D> force) const override {
     pairs_.for_each(x, x_new, [&](Id i, Id j, const auto& shift) {
+      if (foreign(i, j)) return;
       const Vec<D> d = separation<D>(x[i], x[j], shift), d_new = separation<D>(x_new[i], x_new[j], shift);
       const double rho = d.squaredNorm(), rho_new = d_new.squaredNorm();
       if (out_of_reach(rho) && out_of_reach(rho_new)) return;
@@ -89,10 +92,11 @@ class PairTerm final : public Interaction<D> {
     Vec<D> unremembered;
     pairs_.for_each_in_slab(paths.x, [&](Id i, Id j, const auto& shift) {
       Vec<D>& kept = Pairs::kRemembered ? memory.impulse[pair++] : unremembered;
+      if (foreign(i, j)) return;
       const bool known = Pairs::kRemembered && !first && !paths.changed[i] && !paths.changed[j];
-      const std::uint64_t before = counts.evaluations;
+      std::uint64_t evaluations = 0;
       if (paths.simple(i) && paths.simple(j)) {
-        if (!known) kept = impulse_on_lower(paths, i, j, shift, counts.evaluations);
+        if (!known) kept = impulse_on_lower(paths, i, j, shift, evaluations);
         impulse[i] += kept;
         impulse[j] -= kept;
       } else {
@@ -101,7 +105,7 @@ class PairTerm final : public Interaction<D> {
           const auto from = memory.stretches_before.begin() + static_cast<std::ptrdiff_t>(kept[0]);
           paths.for_each_stretch(i, j, [&, at = from](auto...) mutable { memory.stretches.push_back(*at++); });
         } else {
-          push_stretches(paths, i, j, shift, memory.stretches, counts.evaluations);
+          push_stretches(paths, i, j, shift, memory.stretches, evaluations);
         }
         kept[0] = static_cast<double>(fresh);
         auto at = memory.stretches.begin() + fresh;
@@ -111,7 +115,9 @@ class PairTerm final : public Interaction<D> {
         });
         if constexpr (!Pairs::kRemembered) memory.stretches.clear();
       }
-      counts.pairs += counts.evaluations > before ? 1 : 0;
+      if (evaluations == 0 || !particles_.owns(i)) return;
+      counts.evaluations += evaluations;
+      ++counts.pairs;
     });
     return counts;
   }
@@ -120,12 +126,13 @@ class PairTerm final : public Interaction<D> {
 
   std::uint64_t renew_impulses(const Histories<D>& paths, std::span<const Id> changed, PairMemory<D>& memory,
                                std::vector<Id>& partners) const override {
-    std::uint64_t evaluations = 0;
+    std::uint64_t owned = 0;
     for (const Id i : changed)
       pairs_.for_each_partner_in_slab(paths.x, i, [&](Id partner, const auto& shift, std::uint32_t pair) {
         partners.push_back(partner);
-        if (partner < i && paths.changed[partner]) return;
+        if ((partner < i && paths.changed[partner]) || foreign(i, partner)) return;
         const Id lo = std::min(i, partner), hi = std::max(i, partner);
+        std::uint64_t evaluations = 0;
         Vec<D>& kept = memory.impulse[pair];
         if (paths.simple(lo) && paths.simple(hi)) {
           kept = impulse_on_lower(paths, lo, hi, shift, evaluations);
@@ -133,8 +140,9 @@ class PairTerm final : public Interaction<D> {
           kept[0] = static_cast<double>(memory.stretches.size());
           push_stretches(paths, lo, hi, shift, memory.stretches, evaluations);
         }
+        if (particles_.owns(lo)) owned += evaluations;
       });
-    return evaluations;
+    return owned;
   }
 
   void add_impulses_on(const Histories<D>& paths, Id i, const PairMemory<D>& memory,
@@ -217,16 +225,15 @@ class PairTerm final : public Interaction<D> {
   }
 
   std::uint64_t interacting_pairs(Positions<D> x) const override {
-    if constexpr (requires { pairs_.count(); }) {
-      return pairs_.count();
-    } else {
-      std::uint64_t within = 0;
-      for_each_within_reach(x, [&](Id, Id, const Vec<D>&, double) { ++within; });
-      return within;
-    }
+    std::uint64_t within = 0;
+    for_each_within_reach(x, [&](Id i, Id, const Vec<D>&, double) { within += particles_.owns(i) ? 1 : 0; });
+    return within;
   }
 
  private:
+  /// Whether a pair is nobody's whom this rank owns.
+  bool foreign(Id i, Id j) const { return !particles_.owns(i) && !particles_.owns(j); }
+
   bool out_of_reach(double rho) const {
     if constexpr (ShortRanged<P>)
       return rho >= potential_.cutoff_squared();
@@ -274,10 +281,11 @@ class PairTerm final : public Interaction<D> {
     pairs_.for_each(x, x, [&](Id i, Id j, const auto& shift) {
       const Vec<D> d = separation<D>(x[i], x[j], shift);
       const double rho = d.squaredNorm();
-      if (!out_of_reach(rho)) visit(i, j, d, rho);
+      if (!out_of_reach(rho) && !foreign(i, j)) visit(i, j, d, rho);
     });
   }
 
+  const Particles<D>& particles_;
   P potential_;
   Weight weight_;
   Pairs pairs_;

@@ -4,7 +4,6 @@
 // Each source offers
 //   for_each(x, x_new, visit)   calls visit(i, j, shift) for its pairs in the order (i, j, image), i < j; the pair's
 //                               separation is separation(x[i], x[j], shift), at x_new with the same shift
-//   count()                     how many pairs there are, where that does not depend on positions
 // and for a slab in which nobody strays farther than `margin` from its start x
 //   begin_slab(x, margin)
 //   for_each_in_slab(x, visit)              as for_each
@@ -13,6 +12,8 @@
 //                                           the loop over all
 //   pairs_in_slab()                         how many these are
 //   kRemembered                             whether it pays to keep what was found for a pair
+//
+// Where ranks share a system, pairs of two ghosts are visited like any other; the loops of PairTerm pass over them.
 
 #include <cmath>
 #include <string>
@@ -103,7 +104,6 @@ class Bonds {
       visit(i, j, shift);
     }
   }
-  std::uint64_t count() const { return pairs_.size(); }
 
  private:
   void check_length(Id i, Id j, const Vec<D>& d) const {
@@ -128,10 +128,7 @@ class Bonds {
 template <int D>
 class AllPairs {
  public:
-  AllPairs(std::size_t particles, SpeciesPair species) : particles_(static_cast<Id>(particles)), species_(species) {
-    for (Id i = 0; i < particles_; ++i)
-      for (Id j = i + 1; j < particles_; ++j) count_ += species_.contains(i, j) ? 1 : 0;
-  }
+  AllPairs(std::size_t particles, SpeciesPair species) : particles_(static_cast<Id>(particles)), species_(species) {}
 
   static constexpr bool kRemembered = false;  // who collides changes the path of everybody
   void begin_slab(Positions<D>, double) const {}
@@ -152,12 +149,10 @@ class AllPairs {
       for (Id j = i + 1; j < particles_; ++j)
         if (species_.contains(i, j)) visit(i, j, NoShift{});
   }
-  std::uint64_t count() const { return count_; }
 
  private:
   Id particles_;
   SpeciesPair species_;
-  std::uint64_t count_ = 0;
 };
 
 /// The pairs within a cutoff, and some beyond: whoever visits them looks at the distance.
@@ -173,9 +168,7 @@ class PairsWithinCutoff {
   }
 
   static constexpr bool kRemembered = true;
-  void begin_slab(Positions<D> x, double margin) const {
-    in_slab_ = list_.cover(x, margin);
-  }
+  void begin_slab(Positions<D> x, double margin) const { in_slab_ = list_.cover(x, margin); }
   std::size_t pairs_in_slab() const { return in_slab_.size(); }
   template <class Visit>
   void for_each_in_slab(Positions<D>, Visit&& visit) const {

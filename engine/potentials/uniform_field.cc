@@ -32,7 +32,7 @@ std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionConte
       options::refuse("uniform-field", "'acceleration' has a component along axis " + std::to_string(k) +
                                            ", which is periodic: there its potential is not unique; make that boundary "
                                            "'wall' or 'open', or that component 0");
-  return std::make_unique<FieldTerm<D, UniformField<D>>>(UniformField<D>(context.particles.mass, g));
+  return std::make_unique<FieldTerm<D, UniformField<D>>>(context.particles, UniformField<D>(context.particles.mass, g));
 }
 
 }  // namespace

@@ -129,11 +129,24 @@ def test_positions_from_a_file_that_rank_0_sees(tmp_path):
     assert compare.compare(tmp_path / "plain", tmp_path / "two") == []
 
 
-def test_a_method_that_does_not_share_its_work(tmp_path):
+@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "acva", "acdda"])
+def test_forces_are_shared(method, tmp_path):
+    deck = ROOT / "inputs" / "yukawa-fluid.toml"
+    shorter = ["particles.count=108", "run.steps=20", "output.events=true", f"integrator.type={method}", "integrator.step=0.01",
+               "output.frame_interval=0.1", "output.rdf_interval=0.07"]
+    run(deck, tmp_path / "plain", shorter)
+    assert summary(tmp_path / "plain")["events"]["sphere_sphere"] > 0
+    for ranks in 2, 3:
+        done = mpirun(ranks, command(deck, tmp_path / str(ranks), shorter))
+        assert done.stderr == ""
+        assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
+
+
+def test_too_few_particles_to_share(tmp_path):
     deck = write_deck(tmp_path, SPRINGS)
     run(deck, tmp_path / "one")
     done = mpirun(3, command(deck, tmp_path / "three"))
-    assert "cdda does not share its work among ranks yet; one works, the other 2 wait" in done.stderr
+    assert "5 particles under forces are too few to be shared; one rank works, the other 2 wait" in done.stderr
     assert summary(tmp_path / "three")["ranks"] == 3
     assert compare.compare(tmp_path / "one", tmp_path / "three") == []
 

@@ -1,0 +1,106 @@
+#pragma once
+// Ranks that are threads of one process, for tests.
+
+#include <condition_variable>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "engine/error.h"
+#include "engine/exchange.h"
+
+namespace carom::test {
+
+class ThreadRanks {
+ public:
+  explicit ThreadRanks(int size) : post_(static_cast<std::size_t>(size)), failures_(static_cast<std::size_t>(size)) {}
+
+  /// Does this on all ranks. Where it throws on any of them all end, and the first one's exception is thrown.
+  void run(const std::function<void(Exchange&)>& work) {
+    std::vector<std::thread> threads;
+    for (std::size_t rank = 0; rank < post_.size(); ++rank)
+      threads.emplace_back([&, rank] {
+        Rank exchange(*this, rank);
+        try {
+          work(exchange);
+        } catch (...) {
+          failures_[rank] = std::current_exception();
+          give_up();
+        }
+      });
+    for (auto& thread : threads) thread.join();
+    if (first_failed_ < failures_.size()) std::rethrow_exception(failures_[first_failed_]);
+  }
+
+ private:
+  class Rank final : public Exchange {
+   public:
+    Rank(ThreadRanks& team, std::size_t rank) : team_(team), rank_(rank) {}
+    int rank() const override { return static_cast<int>(rank_); }
+    int size() const override { return static_cast<int>(team_.post_.size()); }
+    std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
+      team_.post_[rank_] = std::move(outgoing);
+      team_.meet(rank_);
+      std::vector<Bytes> incoming;
+      for (auto& from : team_.post_) incoming.push_back(from[rank_]);
+      team_.meet(rank_);
+      return incoming;
+    }
+    std::vector<Bytes> gather(const Bytes& mine) override { return swap(std::vector<Bytes>(team_.post_.size(), mine)); }
+    void largest(std::span<double> values) override {
+      combine(values, [](double a, double b) { return std::max(a, b); });
+    }
+    void sum(std::span<std::uint64_t> values) override {
+      combine(values, [](std::uint64_t a, std::uint64_t b) { return a + b; });
+    }
+
+   private:
+    template <class T, class Combine>
+    void combine(std::span<T> values, Combine&& combine) {
+      Bytes mine;
+      for (const T& value : values) put(mine, value);
+      bool first = true;
+      for (const Bytes& bytes : gather(mine)) {
+        Reader reader(bytes);
+        for (T& value : values) {
+          const T theirs = reader.get<T>();
+          value = first ? theirs : combine(value, theirs);
+        }
+        first = false;
+      }
+    }
+    ThreadRanks& team_;
+    std::size_t rank_;
+  };
+
+  void meet(std::size_t rank) {
+    std::unique_lock lock(mutex_);
+    const std::uint64_t round = round_;
+    if (++waiting_ == post_.size()) {
+      waiting_ = 0;
+      ++round_;
+      all_there_.notify_all();
+    }
+    all_there_.wait(lock, [&] { return round_ != round || first_failed_ < post_.size(); });
+    if (round_ == round) throw Error(Failure::numerical, "rank " + std::to_string(rank) + " was left alone");
+  }
+  void give_up() {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t rank = 0; rank < failures_.size() && first_failed_ == kNobody; ++rank)
+      if (failures_[rank]) first_failed_ = rank;
+    all_there_.notify_all();
+  }
+
+  static constexpr std::size_t kNobody = ~std::size_t{0};
+
+  std::vector<std::vector<Bytes>> post_;
+  std::mutex mutex_;
+  std::condition_variable all_there_;
+  std::size_t waiting_ = 0, first_failed_ = kNobody;
+  std::uint64_t round_ = 0;
+  std::vector<std::exception_ptr> failures_;
+};
+
+}  // namespace carom::test

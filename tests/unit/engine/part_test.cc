@@ -1,0 +1,161 @@
+// Methods that share their work among ranks, against themselves on one: every bit.
+
+#include "engine/part.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/simulation.h"
+#include "tests/support/experiments.h"
+#include "tests/support/thread_ranks.h"
+
+namespace carom {
+namespace {
+
+using test::Given;
+
+/// All that a run shows.
+template <int D>
+struct Account : Observer<D> {
+  void frame(const Snapshot<D>& shot) override { frames.push_back(*shot.particles), note(shot); }
+  void thermo(const Snapshot<D>& shot) override { note(shot); }
+  void contacts(double start, std::span<const Contact<D>> all) override {
+    for (const auto& contact : all) {
+      events.push_back(contact.key);
+      values.push_back(start);
+      for (int k = 0; k < D; ++k) values.insert(values.end(), {contact.x_lo[k], contact.x_hi[k], contact.impulse[k]});
+    }
+  }
+  void note(const Snapshot<D>& s) {
+    values.insert(values.end(), {s.time, s.kinetic, s.potential, std::isnan(s.shadow) ? 0 : s.shadow, s.pressure});
+    for (int k = 0; k < D; ++k) values.push_back(s.momentum[k]);
+  }
+  std::vector<Particles<D>> frames;
+  std::vector<EventKey<D>> events;
+  std::vector<double> values;
+  Statistics statistics;
+};
+
+template <int D>
+using Scene = std::function<std::unique_ptr<System<D>>()>;
+
+template <int D>
+Account<D> run(const Scene<D>& scene, const std::string& method, const Plan& plan, const Given& given,
+               Exchange* ranks) {
+  auto system = scene();
+  system->ranks = ranks;
+  auto simulation = test::make_run<D>(std::move(system), method, plan, given);
+  Account<D> account;
+  simulation->add(account);
+  simulation->run();
+  account.statistics = simulation->statistics();
+  return account;
+}
+
+template <int D>
+void expect_same(const Account<D>& one, const Account<D>& other) {
+  ASSERT_EQ(one.frames.size(), other.frames.size());
+  for (std::size_t k = 0; k < one.frames.size(); ++k) {
+    EXPECT_EQ(one.frames[k].x, other.frames[k].x) << "frame " << k;
+    EXPECT_EQ(one.frames[k].v, other.frames[k].v) << "frame " << k;
+    EXPECT_EQ(one.frames[k].image, other.frames[k].image) << "frame " << k;
+  }
+  EXPECT_EQ(one.events, other.events);
+  EXPECT_EQ(one.values, other.values);
+  const Statistics &a = one.statistics, &b = other.statistics;
+  EXPECT_EQ(a.max_energy_error, b.max_energy_error);
+  EXPECT_EQ(a.mean_pressure, b.mean_pressure);
+  EXPECT_EQ(a.force_passes, b.force_passes);
+  EXPECT_EQ(a.counters.sphere_sphere, b.counters.sphere_sphere);
+  EXPECT_EQ(a.counters.sphere_wall, b.counters.sphere_wall);
+  EXPECT_EQ(a.counters.sweeps, b.counters.sweeps);
+  EXPECT_EQ(a.counters.slabs_halved, b.counters.slabs_halved);
+  EXPECT_EQ(a.counters.fallbacks, b.counters.fallbacks);
+}
+
+/// `contacts`: how many collisions there must be at least for the test to tell anything.
+template <int D>
+Statistics compare(const Scene<D>& scene, const std::string& method, double step, std::int64_t steps, std::uint64_t contacts,
+             const Given& given = {}) {
+  SCOPED_TRACE(method);
+  const Plan plan{
+      .step = step, .steps = steps, .frame_interval = 7 * step, .thermo_interval = 3 * step, .events = true};
+  const Account<D> alone = run<D>(scene, method, plan, given, nullptr);
+  EXPECT_GE(alone.statistics.counters.sphere_sphere + alone.statistics.counters.sphere_wall, contacts);
+  for (const int ranks : {1, 2, 3, 4, 8}) {
+    SCOPED_TRACE(ranks);
+    std::vector<Account<D>> all(static_cast<std::size_t>(ranks));
+    test::ThreadRanks(ranks).run([&](Exchange& exchange) {
+      all[static_cast<std::size_t>(exchange.rank())] = run<D>(scene, method, plan, given, &exchange);
+    });
+    for (const Account<D>& account : all) expect_same(alone, account);
+    if (::testing::Test::HasFailure()) break;
+  }
+  return alone.statistics;
+}
+
+/// A fluid of spheres that repel each other beyond contact.
+Scene<3> yukawa(double packing_fraction) {
+  return [=] {
+    auto system = test::hard_spheres<3>(3, packing_fraction);
+    test::add_interaction(*system, "yukawa",
+                          {{"amplitude", 2.0}, {"kappa", 2.0}, {"charges", false}, {"cutoff", 1.8}, {"cut", std::string("smooth")}});
+    return system;
+  };
+}
+
+/// Discs on a lattice, each joined to its neighbours by springs across the edges of the box.
+std::unique_ptr<System<2>> springs() {
+  auto system = test::hard_spheres<2>(7, 0.5);
+  test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}});
+  return system;
+}
+
+/// Spheres of several sizes and masses that attract each other between walls.
+std::unique_ptr<System<3>> cloud() {
+  std::vector<Vec<3>> x, v;
+  std::vector<double> radius, mass;
+  for (int k = 0; k < 60; ++k) {
+    x.push_back({1.0 + 1.7 * (k % 4), 1.0 + 1.7 * (k / 4 % 4), 1.0 + 1.7 * (k / 16)});
+    v.push_back({0.8 * (k % 7 - 3), 0.8 * (k % 5 - 2), 0.8 * (k % 3 - 1)});
+    radius.push_back(0.4 + 0.1 * (k % 3));
+    mass.push_back(1.0 + 0.5 * (k % 4));
+  }
+  auto system = test::make_system<3>({8, 8, 8}, Boundary::wall, x, v, radius, mass);
+  test::add_interaction(*system, "gravity", {{"constant", 0.05}});
+  test::add_interaction(*system, "harmonic-trap", {{"stiffness", 0.3}});
+  return system;
+}
+
+const std::vector<std::pair<std::string, Given>> kMethods = {{"psa", {}},
+                                                             {"cva", {}},
+                                                             {"mcva", {}},
+                                                             {"mcva", {{"variant", std::string("restart")}}},
+                                                             {"cdda", {}},
+                                                             {"cdda", {{"order", std::int64_t{4}}}},
+                                                             {"acva", {}},
+                                                             {"acdda", {}},
+                                                             {"acdda", {{"adaptive", 1e-6}}}};
+
+TEST(Part, Springs) {
+  for (const auto& [method, given] : kMethods) compare<2>(springs, method, 0.02, 25, 20, given);
+}
+TEST(Part, Fluid) {
+  for (const auto& [method, given] : kMethods) compare<3>(yukawa(0.35), method, 0.01, 12, 15, given);
+}
+TEST(Part, Cloud) {
+  for (const auto& [method, given] : kMethods) compare<3>(cloud, method, 0.02, 30, 5, given);
+}
+TEST(Part, WithoutCores) {
+  for (const auto& scene : {yukawa(0.1), yukawa(0.3)}) compare<3>(scene, "verlet", 0.01, 150, 0);
+}
+TEST(Part, SlowSweepsAreMixed) {
+  const Scene<2> stiff = [] {
+    auto system = test::hard_spheres<2>(7, 0.5);
+    test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 300.0}, {"rest_length", 1.0}});
+    return system;
+  };
+  EXPECT_GT(compare<2>(stiff, "acdda", 0.05, 12, 0).counters.fallbacks, 0u);
+}
+
+}  // namespace
+}  // namespace carom
