@@ -132,7 +132,7 @@ def test_positions_from_a_file_that_rank_0_sees(tmp_path):
 @pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "acva", "acdda"])
 def test_forces_are_shared(method, tmp_path):
     deck = ROOT / "inputs" / "yukawa-fluid.toml"
-    shorter = ["particles.count=108", "run.steps=20", "output.events=true", f"integrator.type={method}", "integrator.step=0.01",
+    shorter = ["particles.count=256", "interaction.0.cutoff=2.5", "run.steps=20", "output.events=true", f"integrator.type={method}", "integrator.step=0.01",
                "output.frame_interval=0.1", "output.rdf_interval=0.07"]
     run(deck, tmp_path / "plain", shorter)
     assert summary(tmp_path / "plain")["events"]["sphere_sphere"] > 0
@@ -146,7 +146,7 @@ def test_too_few_particles_to_share(tmp_path):
     deck = write_deck(tmp_path, SPRINGS)
     run(deck, tmp_path / "one")
     done = mpirun(3, command(deck, tmp_path / "three"))
-    assert "5 particles under forces are too few to be shared; one rank works, the other 2 wait" in done.stderr
+    assert "4 particles under forces are too few to be shared; one rank works, the other 2 wait" in done.stderr
     assert summary(tmp_path / "three")["ranks"] == 3
     assert compare.compare(tmp_path / "one", tmp_path / "three") == []
 
