@@ -1,10 +1,14 @@
 #pragma once
 // A collision as observers see it.
 
+#include <algorithm>
 #include <compare>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "engine/exchange.h"
 #include "engine/vec.h"
 
 namespace carom {
@@ -57,5 +61,16 @@ struct Contact {
                       ///< point touched
   Vec<D> impulse;     ///< given to `lo`, taken from `hi` [mass·length/time]
 };
+
+/// Appends the contacts of all ranks, in the order of their keys.
+template <int D>
+void gather_contacts(Exchange& ranks, std::span<const Contact<D>> mine, std::vector<Contact<D>>& to) {
+  Bytes bytes;
+  for (const Contact<D>& contact : mine) put(bytes, contact);
+  const auto before = static_cast<std::ptrdiff_t>(to.size());
+  for (const Bytes& each : ranks.gather(bytes))
+    for (Reader reader(each); reader.more();) to.push_back(reader.get<Contact<D>>());
+  std::sort(to.begin() + before, to.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
+}
 
 }  // namespace carom

@@ -5,6 +5,7 @@
 
 #include "engine/collision.h"
 #include "engine/error.h"
+#include "engine/part.h"
 
 namespace carom {
 
@@ -12,6 +13,7 @@ template <int D>
 ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
     : box_(system.box),
       particles_(system.particles),
+      part_(system.part),
       largest_edge_(system.box.edges.maxCoeff()),
       tolerance_(largest_edge_),
       list_(system.box, system.particles.radius),
@@ -26,6 +28,10 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   double fastest = 0, strongest = 0;
   for (const auto& v : particles_.v) fastest = std::max(fastest, v.squaredNorm());
   for (const auto& each : a) strongest = std::max(strongest, each.squaredNorm());
+  if (part_) {
+    fastest = part_->largest(fastest);
+    strongest = part_->largest(strongest);
+  }
   resting_speed_ = kRestingSpeed * (std::sqrt(fastest) + length * std::sqrt(strongest));
 }
 

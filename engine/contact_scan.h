@@ -39,6 +39,12 @@ class ContactScan {
   /// Error(Failure::numerical) beyond max_events.
   void resolve(double time, Positions<D> x, Vectors<D> v, const std::function<void(const Touch<D>&)>& impulse);
 
+  /// Whether nobody touches and approaches, or rests in contact.
+  bool quiet(Positions<D> x, Positions<D> v) {
+    collect(0, x, v);
+    return approaching_.empty() && resting_.empty();
+  }
+
   /// The contacts that the last resolve() found at rest, without any approach left.
   std::span<RestingContact<D>> resting() { return resting_; }
   bool rests(const EventKey<D>& key) const;
@@ -98,6 +104,7 @@ class ContactScan {
 
   const Box<D>& box_;
   const Particles<D>& particles_;
+  Part<D>* part_;
   double largest_edge_;
   GapTolerance tolerance_;
   NeighbourList<D> list_;

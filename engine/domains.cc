@@ -240,13 +240,7 @@ double Domains<D>::run(double end, const Report& report) {
   put(mine, sum.virial);
   for (const Bytes& bytes : exchange_.gather(mine)) report.counters.collision_virial.add(Reader(bytes).get<ExactSum>());
   if (report.contacts) {
-    Bytes all;
-    for (const Contact<D>& c : contacts) put(all, c);
-    contacts.clear();
-    for (const Bytes& bytes : exchange_.gather(all))
-      for (Reader reader(bytes); reader.more();) contacts.push_back(reader.get<Contact<D>>());
-    std::sort(contacts.begin(), contacts.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
-    report.contacts->insert(report.contacts->end(), contacts.begin(), contacts.end());
+    gather_contacts<D>(exchange_, contacts, *report.contacts);
   }
   if (events_ += totals[0] + totals[1]; events_ > report.max_events)
     throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +

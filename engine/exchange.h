@@ -30,6 +30,8 @@ class Reader {
  public:
   explicit Reader(const Bytes& bytes) : at_(bytes.data()), end_(bytes.data() + bytes.size()) {}
   bool more() const { return at_ < end_; }
+  std::size_t left() const { return static_cast<std::size_t>(end_ - at_); }
+  void skip(std::size_t bytes) { at_ += bytes; }
   template <class T>
   T get() {
     T value;
@@ -58,6 +60,16 @@ class Exchange {
   /// Makes each value the sum over all ranks.
   virtual void sum(std::span<std::uint64_t> /*values*/) {}
 };
+
+/// The sum over all ranks of what has a function add().
+template <class Sums>
+Sums sum_of_all(Exchange& ranks, const Sums& mine) {
+  Bytes bytes;
+  put(bytes, mine);
+  Sums all;
+  for (const Bytes& each : ranks.gather(bytes)) all.add(Reader(each).get<Sums>());
+  return all;
+}
 
 /// Another one, and the time that is spent in it.
 class TimedExchange final : public Exchange {

@@ -1,9 +1,11 @@
 #pragma once
 // Sums over all interactions of a system.
 
+#include <array>
 #include <span>
 
 #include "engine/counters.h"
+#include "engine/part.h"
 #include "engine/system.h"
 
 namespace carom {
@@ -44,30 +46,34 @@ PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
   PotentialSums sums;
   for (const auto& term : system.interactions) term->add_energy(x, sums);
   if (!system.part) return sums;
-  Bytes mine;
-  put(mine, sums);
-  PotentialSums all;
-  for (const Bytes& bytes : system.part->gather(mine)) all.add(Reader(bytes).get<PotentialSums>());
-  return all;
+  return sum_of_all(system.part->ranks(), sums);
 }
 
-/// Σ ½ m v²; an exact sum.
+/// Exact sums over all particles.
 template <int D>
-double kinetic_energy(const Particles<D>& particles) {
-  ExactSum sum;
-  for (std::size_t i = 0; i < particles.size(); ++i) sum.add(0.5 * particles.mass[i] * particles.v[i].squaredNorm());
-  return sum.value();
-}
+struct MotionSums {
+  ExactSum kinetic;                  ///< ½ m v² [energy]
+  ExactSum speed;                    ///< |v| [length/time]
+  std::array<ExactSum, D> momentum;  ///< m v [mass·length/time]
 
-/// Σ m v; exact sums.
+  void add(const MotionSums& other) {
+    kinetic.add(other.kinetic);
+    speed.add(other.speed);
+    for (int k = 0; k < D; ++k) momentum[k].add(other.momentum[k]);
+  }
+};
+
+/// Of all particles of a system, at velocities other than its own.
 template <int D>
-Vec<D> total_momentum(const Particles<D>& particles) {
-  std::array<ExactSum, D> sum;
-  for (std::size_t i = 0; i < particles.size(); ++i)
-    for (int k = 0; k < D; ++k) sum[k].add(particles.mass[i] * particles.v[i][k]);
-  Vec<D> momentum;
-  for (int k = 0; k < D; ++k) momentum[k] = sum[k].value();
-  return momentum;
+MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& at) {
+  MotionSums<D> sums;
+  for (Id i = 0; i < at.size(); ++i) {
+    if (!system.particles.owns(i)) continue;
+    sums.kinetic.add(0.5 * at.mass[i] * at.v[i].squaredNorm());
+    sums.speed.add(at.v[i].norm());
+    for (int k = 0; k < D; ++k) sums.momentum[k].add(at.mass[i] * at.v[i][k]);
+  }
+  return system.part ? sum_of_all(system.part->ranks(), sums) : sums;
 }
 
 /// G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet follows to second order:
@@ -78,10 +84,12 @@ double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D>
                    Counters& counters) {
   evaluate_hessian_product<D>(system, at.x, at.v, scratch, counters);
   ExactSum sum;
-  for (std::size_t i = 0; i < at.size(); ++i) {
+  for (Id i = 0; i < at.size(); ++i) {
+    if (!system.particles.owns(i)) continue;
     sum.add(at.v[i].dot(scratch[i]) / 12);
     sum.add(-force[i].squaredNorm() / (24 * at.mass[i]));
   }
+  if (system.part) sum = sum_of_all(system.part->ranks(), sum);
   return sum.value();
 }
 

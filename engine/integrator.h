@@ -10,8 +10,8 @@
 
 #include "engine/contact_log.h"
 #include "engine/counters.h"
-#include "engine/exchange.h"
 #include "engine/parameters.h"
+#include "engine/part.h"
 #include "engine/system.h"
 
 namespace carom {
@@ -34,19 +34,21 @@ struct SlabReport {
   std::function<void(double, const Particles<D>&)> observer{};  ///< given copies flown to each of these times
   double reached =
       0;  ///< set by the integrator: the time within the slab it came to; less than its length only at collision_limit
+  bool unsure = false;  ///< set by the integrator: the particles that this rank knows were not enough, nothing is done
 };
 
 template <int D>
-class Integrator {
+class Integrator : public Luggage<D> {
  public:
-  virtual ~Integrator() = default;
-
   /// Called once before the first slab. Where the system has several ranks each of them makes the same calls.
   virtual void start(System<D>&, Counters&) {}
 
   /// Advances the system from the start to the end of the slab; afterwards all particles are at its end, wrapped.
   /// Throws Error(Failure::numerical) with the particles' names where a step cannot be done.
   virtual void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) = 0;
+
+  /// Whether it can do with the particles near those that a rank owns (engine/part.h).
+  virtual bool local() const { return false; }
 
   /// The state at which energies are to be measured, where this is not the system itself (mcva, variant restart).
   virtual const Particles<D>* energy_state() const { return nullptr; }

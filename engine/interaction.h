@@ -105,6 +105,12 @@ class Interaction {
   /// both have inner nodes is done with the lower id. Returns how many pair forces were evaluated.
   virtual std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const = 0;
 
+  /// The same term for some of the particles it was made for, with their new numbers; `some` tells whom, and outlives
+  /// it. Null where they are not enough for those of them that are owned.
+  virtual std::unique_ptr<Interaction> among(const Particles<D>& all, const Particles<D>& some) const = 0;
+  /// How far it reaches from positions x [length]; infinite: it needs everybody.
+  virtual double reach(Positions<D> x) const = 0;
+
   /// How many pairs (or particles, for a field) of this rank one evaluation visits within reach: the unit of
   /// `force_passes`.
   virtual std::uint64_t interacting_pairs(Positions<D> x) const = 0;

@@ -14,13 +14,6 @@ namespace {
 /// S_h costs two passes over all pairs. Systems larger than this are measured at thermo rows and frames only.
 constexpr std::size_t kShadowAtEveryStep = 100;
 
-/// The mean of |v|; an exact sum.
-template <int D>
-double mean_speed(const Particles<D>& particles) {
-  ExactSum sum;
-  for (const Vec<D>& v : particles.v) sum.add(v.norm());
-  return sum.value() / static_cast<double>(std::max<std::size_t>(1, particles.size()));
-}
 }  // namespace
 
 template <int D>
@@ -39,21 +32,26 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
   if (momentum_kept) statistics.max_momentum_error = 0;
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
-  if (info.hard_cores) touching_.emplace(system.box, system.particles.radius);
-  if (!info.shadow) return;
-  statistics.max_shadow_energy_error = 0;
-  force_.resize(system.particles.size());
-  scratch_.resize(system.particles.size());
+  if (info.shadow) statistics.max_shadow_energy_error = 0;
+  regroup();
+}
+
+template <int D>
+void Monitor<D>::regroup() {
+  const Particles<D>& p = known().particles;
+  if (info_.hard_cores) touching_.emplace(system_.box, p.radius);
+  if (!info_.shadow) return;
+  force_.resize(p.size());
+  scratch_.resize(p.size());
 }
 
 template <int D>
 void Monitor<D>::start(const Particles<D>& nodes) {
-  shot_ = measure(0, system_.particles, nodes, info_.shadow);
+  shot_ = measure(0, known().particles, nodes, info_.shadow);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   first_momentum_ = shot_.momentum;
-  speed_ = mean_speed(nodes);
   count_from(shot_);
-  sample(0, system_.particles);
+  sample(0, known().particles);
   show(shot_, true);
 }
 
@@ -92,7 +90,7 @@ void Monitor<D>::sample(double time, const Particles<D>& state) {
   for (Sampler& sampler : samplers_) {
     if (sampler.due.due() > time + time_slack()) continue;
     const Stopwatch watch(statistics_.counters.seconds.output);
-    sampler.observer->sample(time, state);
+    sampler.observer->sample(time, system_.part && &state == &known().particles ? collected() : state);
     sampler.due.pass(time + time_slack());
   }
 }
@@ -101,8 +99,9 @@ template <int D>
 void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool last) {
   Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
-  const bool with_shadow = info_.shadow && (due || s.steps == 1 || nodes.size() <= kShadowAtEveryStep);
-  shot_ = measure(s.end_time, system_.particles, nodes, with_shadow);
+  const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.particles.size() <= kShadowAtEveryStep);
+  const double speed = speed_;
+  shot_ = measure(s.end_time, known().particles, nodes, with_shadow);
   s.energy_final = shot_.total();
   if (s.steps == 1 && info_.stepping) count_from(shot_);
   s.max_energy_error = std::max(s.max_energy_error, std::abs(shot_.total() - first_energy_));
@@ -117,13 +116,12 @@ void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool las
     s.collision_rate = 2.0 * static_cast<double>(s.counters.sphere_sphere) /
                        (static_cast<double>(system_.particles.size()) * s.end_time);
   }
-  const double speed = mean_speed(nodes);
-  path_ += elapsed * 0.5 * (std::exchange(speed_, speed) + speed);
+  path_ += elapsed * 0.5 * (speed + speed_);
   if (s.collision_rate > 0) {
     s.mean_free_time = 1 / s.collision_rate;
     s.mean_free_path = path_ / s.end_time / s.collision_rate;
   }
-  sample(s.end_time, system_.particles);
+  sample(s.end_time, known().particles);
   show(shot_, last);
 }
 
@@ -135,19 +133,24 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Pa
   shot.step = statistics_.steps;
   shot.collisions = statistics_.counters.sphere_sphere;
   shot.particles = &state;
-  const PotentialSums sums = evaluate_energy<D>(system_, nodes.x);
-  shot.kinetic = kinetic_energy(nodes);
+  const PotentialSums sums = evaluate_energy<D>(known(), nodes.x);
+  const auto total = static_cast<double>(system_.particles.size());
+  const MotionSums<D> motion = evaluate_motion(known(), nodes);
+  shot.kinetic = motion.kinetic.value();
   shot.potential = sums.energy.value();
   magnitude_ = shot.kinetic + sums.magnitude.value();
   virial_ = 2 * shot.kinetic + sums.virial.value();
   if (with_shadow) {
     Counters uncounted;
-    evaluate_forces<D>(system_, nodes.x, force_, uncounted);
-    const double g = shadow_term<D>(system_, nodes, force_, scratch_, uncounted);
+    evaluate_forces<D>(known(), nodes.x, force_, uncounted);
+    const double g = shadow_term<D>(known(), nodes, force_, scratch_, uncounted);
     shot.shadow = shot.total() + plan_.step * plan_.step * g;
   }
-  shot.momentum = total_momentum(state);
-  if (state.size() > 0) shot.temperature = 2 * shot.kinetic / (D * static_cast<double>(state.size()));
+  for (int k = 0; k < D; ++k) shot.momentum[k] = motion.momentum[k].value();
+  if (total > 0) {
+    shot.temperature = 2 * shot.kinetic / (D * total);
+    speed_ = motion.speed.value() / total;
+  }
   if (!std::isfinite(shot.total()))
     throw Error(Failure::numerical, "the energy is not finite at step " + std::to_string(shot.step) + ", time " +
                                         std::to_string(time) + "; use a smaller integrator.step");
@@ -174,6 +177,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
     last_row_virial_ = collision_virial;
   }
   if (frame) {
+    if (system_.part && shot.particles == &known().particles) shot.particles = &collected();
     for (auto* observer : observers_) observer->frame(shot);
     frames_.pass(now);
     last_frame_ = shot.time;
@@ -184,14 +188,22 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
 /// missed. 0 where none overlap.
 template <int D>
 double Monitor<D>::deepest_overlap() {
-  const auto& p = system_.particles;
+  const auto& p = known().particles;
   double deepest = 0;
   for (const auto& pair : touching_->cover(p.x)) {
+    if (!p.owns(pair.i)) continue;
     const double sigma = p.radius[pair.i] + p.radius[pair.j];
     const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
     if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
   }
-  return deepest;
+  return system_.part ? system_.part->largest(deepest) : deepest;
+}
+
+/// Everybody, where the system shares its particles among ranks.
+template <int D>
+const Particles<D>& Monitor<D>::collected() {
+  system_.part->collect();
+  return system_.particles;
 }
 
 template class Monitor<2>;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/neighbour_list.h"
+#include "engine/part.h"
 #include "engine/simulation.h"
 
 namespace carom {
@@ -52,6 +53,9 @@ class Monitor {
   /// Shows the last state again to those who have not seen it.
   void finish() { show(shot_, true); }
 
+  /// The ranks have divided the particles anew.
+  void regroup();
+
   /// Due times and ends are met up to this [time].
   double time_slack() const { return 1e-9 * plan_.step; }
 
@@ -67,6 +71,8 @@ class Monitor {
   void show(Snapshot<D> shot, bool last);
   void count_from(const Snapshot<D>& shot);
   double deepest_overlap();
+  const Particles<D>& collected();
+  const System<D>& known() const { return system_.part ? system_.part->known() : system_; }
 
   const System<D>& system_;
   const IntegratorInfo& info_;

@@ -1,59 +1,114 @@
 #pragma once
 // What one rank does of a system that several ranks advance together.
 //
-// Every particle is owned by one rank, by where it is; the others have copies of it, ghosts (Particles::ghost). What
-// acts on a particle is computed by its owner, with all its pairs in the order of their ids, and told to the others:
-// the sums are those of one rank alone, bit for bit. What is cheap beside that everybody does for everybody.
+// Every particle is owned by one rank, by where it is; others have copies of it, ghosts (Particles::ghost). What acts
+// on a particle is computed by its owner, with all its pairs in the order of their ids, and told to the others: the
+// sums are those of one rank alone, bit for bit. What is cheap beside that everybody does for the particles he knows.
+//
+// A rank knows either everybody, or its own particles and those near them. For methods that can do with these
+// (Integrator::local()) it runs its ghosts like its own particles; those at the rim of what it knows may go wrong, for
+// they miss partners, so it is checked that those near enough to matter did what they did at their owners'. If they did
+// not, the slab is done again with everybody known. Between looks at who is where nobody may come farther than slack().
 
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "engine/box.h"
 #include "engine/exchange.h"
-#include "engine/particles.h"
+#include "engine/system.h"
 
 namespace carom {
+
+/// What a method keeps of each particle from slab to slab, and has to take along when it is to work for others.
+template <int D>
+class Luggage {
+ public:
+  virtual ~Luggage() = default;
+  virtual void pack(Id /*i*/, Bytes& /*to*/) const {}
+  /// It works for the particles of this system from now on; unpack() follows, for each of them.
+  virtual void regroup(System<D>& /*system*/) {}
+  virtual void unpack(Id /*i*/, Reader& /*from*/) {}
+};
+
+template <int D>
+class Division;
 
 template <int D>
 class Part {
  public:
-  /// Every rank has the same particles; they, the box and `ranks` outlive the part.
-  Part(const Box<D>& box, Particles<D>& particles, Exchange& ranks);
+  /// Every rank has the same system; it and `ranks` outlive the part. Everybody is known at first.
+  Part(System<D>& whole, Exchange& ranks);
+  ~Part();
+  Part(const Part&) = delete;
+  Part& operator=(const Part&) = delete;
 
-  /// Says anew who owns whom, by where everybody is.
-  void divide();
+  /// The particles that this rank knows.
+  System<D>& known() { return some_ ? *some_ : whole_; }
+  bool knows_everybody() const { return !some_; }
 
-  /// The vectors of each of `who` become those that its owner has; of(i, visit) calls visit(vector) for each of
-  /// particle i. The ranks speak of the same particles.
-  template <class Of>
-  void refresh(std::span<const Id> who, Of&& of) {
-    Bytes mine;
-    for (const Id i : who)
-      if (particles_.owns(i)) of(i, [&](const Vec<D>& vector) { put(mine, vector); });
-    const std::vector<Bytes> all = ranks_.gather(mine);
-    std::vector<Reader> from(all.begin(), all.end());
-    for (const Id i : who)
-      if (!particles_.owns(i)) of(i, [&](Vec<D>& vector) { vector = from[owner_[i]].template get<Vec<D>>(); });
+  /// At the start of a slab: says anew who owns whom, by where everybody is, and whom this rank knows, if it is time
+  /// for that; returns whether it was. `local`: those are enough that own particles may meet.
+  bool divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, double slab_length);
+  /// Those who are known were not enough for a slab.
+  void know_everybody(Luggage<D>& luggage, std::int64_t slab);
+  /// Ghosts went wrong that matter: next time more of them are to be known.
+  void deepen() { depth_ *= 2; }
+  /// Brings positions, velocities and images of the whole system up to date, on all ranks.
+  void collect();
+
+  /// How far anybody may come in a slab [length].
+  double largest_path() const { return path_; }
+  /// Whether what a ghost does matters to own particles.
+  bool matters(Id i) const { return matters_.empty() || matters_[i] != 0; }
+
+  /// Tells the others about own particles that they know: pack(i, bytes), there unpack(i, reader).
+  template <class Pack, class Unpack>
+  void tell(Pack&& pack, Unpack&& unpack) {
+    std::vector<Bytes> outgoing(holders_.size());
+    for (std::size_t rank = 0; rank < holders_.size(); ++rank)
+      for (const Id i : holders_[rank]) pack(i, outgoing[rank]);
+    const std::vector<Bytes> incoming = ranks_.swap(std::move(outgoing));
+    for (std::size_t rank = 0; rank < incoming.size(); ++rank) {
+      Reader from(incoming[rank]);
+      for (const Id i : ghosts_[rank]) unpack(i, from);
+    }
   }
-  /// The same of one vector a particle, for everybody.
+  /// Ghosts get the vectors of their owners.
   void refresh(std::span<Vec<D>> vectors) {
-    refresh(everybody_, [&](Id i, auto&& visit) { visit(vectors[i]); });
+    tell([&](Id i, Bytes& to) { put(to, vectors[i]); },
+         [&](Id i, Reader& from) { vectors[i] = from.template get<Vec<D>>(); });
   }
 
-  /// Makes each count the sum over all ranks.
-  void sum(std::span<std::uint64_t> counts) { ranks_.sum(counts); }
-  /// What every rank has to say, by rank.
-  std::vector<Bytes> gather(const Bytes& mine) { return ranks_.gather(mine); }
-
-  const std::vector<Id>& everybody() const { return everybody_; }
+  Exchange& ranks() { return ranks_; }
+  double largest(double value) {
+    ranks_.largest({&value, 1});
+    return value;
+  }
   double seconds_waited() const { return ranks_.seconds(); }  ///< for other ranks
 
  private:
-  const Box<D>& box_;
-  Particles<D>& particles_;
+  /// Where in the messages of all ranks a particle's luggage is.
+  struct Place {
+    std::size_t rank, at;
+  };
+  std::vector<Bytes> gather_state(const Luggage<D>* luggage, std::vector<Place>* places);
+  void divide(Luggage<D>& luggage, bool everybody, double slab_length);
+  bool choose(const Division<D>& division, double slab_length);
+  void choose_everybody(const Division<D>& division);
+  bool outdated();
+  std::size_t total() const { return whole_.particles.size(); }
+
+  System<D>& whole_;
+  std::unique_ptr<System<D>> some_;
   TimedExchange ranks_;
-  std::vector<Id> everybody_;
-  std::vector<std::uint32_t> owner_;  // by particle: the rank
+  std::vector<std::vector<Id>> holders_, ghosts_;  // by rank: own particles that it knows, and ghosts of its particles
+  std::vector<char> matters_;
+  std::vector<Vec<D>> at_;  // where everybody was at the last division, images undone
+  double path_ = 0, slack_ = 0;
+  double depth_ = 3;       // of ghosts that do not matter [largest diameter]
+  std::int64_t next_ = 0;  // while everybody is known: the slab before which to divide
+  std::int64_t patience_ = 1;
 };
 
 }  // namespace carom

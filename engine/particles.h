@@ -1,5 +1,8 @@
 #pragma once
 // The particles of a run, in the order of their ids, as integrators and observers see them: everybody at the same time.
+//
+// Where several ranks share a system (engine/part.h) each has the particles it owns and copies of others, ghosts. It
+// may have only some of all then: their numbers here follow the order of their ids.
 
 #include <string>
 #include <vector>
@@ -17,10 +20,12 @@ struct Particles {
   std::vector<double> charge;          ///< [charge]
   std::vector<std::uint16_t> species;  ///< index into System::species
   std::vector<Image<D>> image;  ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
-  std::vector<char> ghost;      ///< 1: another rank owns it (engine/part.h); empty: there are no others
+  std::vector<char> ghost{};    ///< 1: another rank owns it; empty: there are no others
+  std::vector<Id> id{};         ///< ascending; empty: 0, 1, …
 
   std::size_t size() const { return x.size(); }
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
+  Id id_of(Id i) const { return id.empty() ? i : id[i]; }
 };
 
 }  // namespace carom

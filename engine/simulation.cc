@@ -8,9 +8,6 @@
 namespace carom {
 
 namespace {
-/// How long particles that move about belong to the same ranks.
-constexpr std::int64_t kSlabsBetweenDivisions = 64;
-
 /// Output intervals shorter than this share of a step are refused: there would be no end to counting them.
 constexpr double kLeastInterval = 1e-6;
 
@@ -45,13 +42,13 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);
+  std::optional<Part<D>> part;
+  if (system_->ranks && info_.smooth_forces) part.emplace(*system_, *system_->ranks);
+  const auto known = [&]() -> System<D>& { return part ? part->known() : *system_; };
   const auto nodes = [&]() -> const Particles<D>& {
     const auto* state = integrator_->energy_state();
-    return state ? *state : system_->particles;
+    return state ? *state : known().particles;
   };
-  auto& part = system_->part;
-  if (system_->ranks && info_.smooth_forces)
-    part = std::make_unique<Part<D>>(system_->box, system_->particles, *system_->ranks);
   integrator_->start(*system_, s.counters);
   monitor.start(nodes());
 
@@ -62,12 +59,20 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       break;
     }
     const Slab slab = next_slab(monitor.time_slack());
-    if (part && slab.index % kSlabsBetweenDivisions == 0) part->divide();
+    if (part && part->divide_if_due(*integrator_, integrator_->local(), slab.index, slab.length)) monitor.regroup();
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor.due_within(slab);
     contacts.clear();
     SlabReport<D> report{.counters = s.counters, .contacts = plan_.events ? &contacts : nullptr, .observe = due};
     report.observer = [&](double offset, const Particles<D>& copies) { monitor.observe(slab.start + offset, copies); };
-    integrator_->slab(*system_, slab, report);
+    const Counters before = s.counters;
+    integrator_->slab(known(), slab, report);
+    if (report.unsure) {
+      s.counters = before;
+      report.unsure = false;
+      part->know_everybody(*integrator_, slab.index);
+      monitor.regroup();
+      integrator_->slab(*system_, slab, report);
+    }
 
     ++s.steps;
     // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
@@ -86,6 +91,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     for (auto* observer : observers_) observer->progress(s);
   }
   if (s.stopped_early) monitor.finish();
+  if (part) part->collect();
   s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
 }
 

@@ -7,10 +7,13 @@
 
 #include "engine/box.h"
 #include "engine/interaction.h"
-#include "engine/part.h"
 #include "engine/particles.h"
 
 namespace carom {
+
+class Exchange;
+template <int D>
+class Part;
 
 /// Lives on the heap and is never moved: interactions refer to its box and particles.
 template <int D>
@@ -23,8 +26,8 @@ struct System {
   Particles<D> particles;
   std::vector<std::string> species;
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
-  Exchange* ranks = nullptr;      ///< that advance this system together, each with the same state; null: one
-  std::unique_ptr<Part<D>> part;  ///< where they share the work on forces
+  Exchange* ranks = nullptr;  ///< that advance this system together, each with the same state; null: one
+  Part<D>* part = nullptr;    ///< what this rank does of it, where they share the work on forces
 
   /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
   void wrap();

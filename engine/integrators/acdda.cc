@@ -17,11 +17,13 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <tuple>
 
 #include "engine/error.h"
 #include "engine/forces.h"
 #include "engine/integrators/extrapolation.h"
 #include "engine/integrators/mixing.h"
+#include "engine/integrators/part_sweeps.h"
 #include "engine/integrators/registry.h"
 #include "engine/integrators/sweep_rule.h"
 #include "engine/slab_core.h"
@@ -48,9 +50,20 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
         accepted_(parameters.has("tolerance") ? parameters.real("tolerance") : 0),
         adaptive_(parameters.has("adaptive") ? parameters.real("adaptive") : 0) {}
 
-  void start(System<D>& system, Counters& counters) override {
+  bool local() const override { return adaptive_ == 0; }
+  void pack(Id i, Bytes& to) const override { extrapolation_.pack(i, to); }
+  void unpack(Id i, Reader& from) override { extrapolation_.unpack(i, from); }
+  void regroup(System<D>& system) override {
     scan_.emplace(system, max_events_);
     core_.emplace(system, *scan_, max_events_);
+    others_ = PartSweeps<D>(system);
+    extrapolation_.resize(system.particles.size());
+    impulse_.clear();
+  }
+
+  void start(System<D>& system, Counters& counters) override {
+    regroup(system);
+    total_ = system.particles.size();
     const auto& mass = system.particles.mass;
     std::vector<Vec<D>> a(mass.size());
     evaluate_forces<D>(system, system.particles.x, a, counters);
@@ -66,6 +79,10 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     auto& p = system.particles;
     auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, p); };
     double done = 0, longest = slab.length;
+    if (others_) {
+      report.unsure = !advance_some(system, slab, report);
+      return;
+    }
     while (done < slab.length) {
       scan_->resolve(done, p.x, p.v, elastic);
       const double rest = slab.length - done;
@@ -103,6 +120,62 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     double cut = 0;      ///< > 0: the slab must end there for everybody, by this event
     bool crowd = false;  ///< there were too many events, this one among them
     EventKey<D> key{};
+  };
+
+  /// A slab in one piece, of the particles that this rank knows. False, and nothing has been done, where it takes more
+  /// than that: pieces, contacts at its start, acceleration, or more particles.
+  bool advance_some(System<D>& system, const Slab& slab, SlabReport<D>& report) {
+    auto& p = system.particles;
+    if (others_.any(!scan_->quiet(p.x, p.v))) return false;
+    if (!solve(system, slab.length).settled) return false;
+    PairTally tally;
+    std::vector<Contact<D>> own;
+    for (Contact<D> contact : core_->contacts()) {
+      if (!p.owns(contact.key.lo)) continue;
+      tally.add(contact);
+      contact.key.lo = p.id_of(contact.key.lo);
+      if (contact.key.kind == EventKind::pair) contact.key.hi = p.id_of(contact.key.hi);
+      if (report.contacts) own.push_back(contact);
+    }
+    tally = sum_of_all(system.part->ranks(), tally);
+    if (tally.pairs + tally.bounces > max_events_) return false;
+    counters_->sphere_sphere += tally.pairs;
+    counters_->sphere_wall += tally.bounces;
+    counters_->collision_virial.add(tally.virial);
+    if (report.contacts) gather_contacts<D>(system.part->ranks(), own, *report.contacts);
+    finish(p);
+    system.part->tell(
+        [&](Id i, Bytes& to) {
+          put(to, p.x[i]);
+          put(to, p.v[i]);
+          put(to, extrapolation_.last()[i]);
+          put(to, extrapolation_.time()[i]);
+        },
+        [&](Id i, Reader& from) {
+          p.x[i] = from.get<Vec<D>>();
+          p.v[i] = from.get<Vec<D>>();
+          const auto a = from.get<Vec<D>>();
+          extrapolation_.add(i, a, from.get<double>());
+        });
+    ++counters_->pieces;
+    system.wrap();
+    report.reached = slab.length;
+    return true;
+  }
+
+  struct PairTally {
+    std::uint64_t pairs = 0, bounces = 0;
+    ExactSum virial;
+    void add(const PairTally& other) {
+      pairs += other.pairs;
+      bounces += other.bounces;
+      virial.add(other.virial);
+    }
+    void add(const Contact<D>& contact) {
+      const bool pair = contact.key.kind == EventKind::pair;
+      ++(pair ? pairs : bounces);
+      if (pair) virial.add((contact.x_lo - contact.x_hi).dot(contact.impulse));
+    }
   };
 
   /// Whether the path of a piece is as good as asked; sets the length to try next.
@@ -147,18 +220,19 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     reset();
     double margin = 0;
     for (Id i = 0; i < n; ++i) margin = std::max(margin, length * (p.v[i].norm() + 0.5 * length * paths.a[i].norm()));
+    margin = others_.largest(margin);
+    if (others_ && !(kRoom * margin <= system.part->largest_path())) return {};
     begin(system, kRoom * margin);
     extra_.clear();
     tolerance_ = std::max(kLastAtLeast, accepted_);
     bool mixes = false, first = true;
     double last_change = 0, last_unsettled = 0, earlier_unsettled = 0, last_smooth = 0, earlier_smooth = 0;
-    std::size_t nodes_flown = 0;
+    bool more_nodes = false;             // than the sweep before had
     int tries = 0, slow = 0, since = 0;  // since: sweeps since the last node was added
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-      const std::size_t nodes = extra_.size();
-      bool late = !first && !mixes && remembers_ && scan_->resting().empty() && nodes == nodes_flown &&
-                  kFew * unsettled_.size() <= n;
+      bool late = !first && !mixes && remembers_ && scan_->resting().empty() && !more_nodes && few_;
       SlabRun<D> run;
+      const bool run_late = late;
       if (late) {
         run = core_->repair(paths, rule_, extra_, unsettled_);
         late = run.end != End::lost;
@@ -167,6 +241,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
         rule_.follow(first, n);
         run = core_->run(paths, rule_, extra_);
       }
+      if (others_ && others_.any(run.end != End::complete || late != run_late)) return {};
       if (run.end == End::cut) return {.cut = run.time, .key = run.key};
       if (run.end == End::crowded) return {.crowd = true, .key = run.key};
       if (run.end == End::strayed) {
@@ -176,8 +251,8 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
         first = true;
         continue;
       }
-      nodes_flown = nodes;
-      const bool alike = !first && all_alike(paths, late);
+      more_nodes = false;
+      const bool alike = !first && !others_.any(!all_alike(paths, late));
       Change change;
       if (late) {
         reevaluate(system);
@@ -187,6 +262,10 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
         if (mixes) mix(p, alike);
         change = compare_all(p, mixes ? 0 : last_change, mixes);
       }
+      if (change.lost) {
+        system.part->deepen();
+        return {};
+      }
       if (change.settled) return {.settled = true};
       if (!std::isfinite(change.largest)) return {};
       const bool patient = ++since > kPatience;
@@ -195,6 +274,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       slow = crawls ? slow + 1 : 0;
       if (!mixes && alike && since > 2 &&
           change.smooth > std::max(kMixed * kMixed * earlier_smooth, 0.1 * change.unsettled)) {
+        if (others_) return {};
         mixes = true;
         since = slow = 0;
         mixing_.clear();
@@ -202,6 +282,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       }
       const bool parted = (patient || slow > 2) && !first && separate(late);
       if (parted || (slow > 2 && steady(p, change))) {
+        more_nodes = true;
         since = slow = 0;
         if (++tries > kMostTries) return {};
       } else if (slow > 2) {
@@ -226,7 +307,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
 
   /// Whether everybody has the same partners as in the sweep before; after a repair the others have anyway.
   bool all_alike(const Histories<D>& paths, bool repaired) const {
-    const auto same = [&](Id i) { return same_meetings(paths, i); };
+    const auto same = [&](Id i) { return !others_.counts(i) || same_meetings(paths, i); };
     if (repaired) return std::ranges::all_of(core_->awake(), same);
     return std::ranges::all_of(paths.noded(), same) && std::ranges::all_of(paths.had_nodes(), same);
   }
@@ -241,7 +322,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       counts.evaluations += more.evaluations;
       counts.pairs += more.pairs;
     }
-    if (system.part) refresh(*system.part, system.part->everybody(), counts);
+    refresh(system, counts, false);
     pairs_ = std::max(pairs_, counts.pairs);  // in the first sweep nothing is remembered
     count(counts.evaluations);
     if (!scan_->resting().empty()) hold(system, paths_);
@@ -261,21 +342,28 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     std::ranges::sort(affected_);
     affected_.erase(std::ranges::unique(affected_).begin(), affected_.end());
     for (const Id i : affected_)
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) impulse_[n].setZero();
+      if (system.particles.owns(i))
+        for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) impulse_[n].setZero();
     for (std::size_t k = 0; k < memories_.size(); ++k)
       for (const Id i : affected_)
         if (system.particles.owns(i)) system.interactions[k]->add_impulses_on(paths_, i, memories_[k], impulse_);
-    if (system.part) refresh(*system.part, affected_, counts);
+    refresh(system, counts, true);
     count(counts.evaluations);
   }
 
-  /// Of several ranks: ghosts get the impulses of their owners, and everybody the counts of all.
-  void refresh(Part<D>& part, std::span<const Id> who, PairCounts& counts) {
-    part.refresh(who, [&](Id i, auto&& visit) {
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) visit(impulse_[n]);
-    });
+  /// Of several ranks: ghosts get the impulses of their owners and are affected where these are new, and everybody
+  /// gets the counts of all.
+  void refresh(const System<D>& system, PairCounts& counts, bool some) {
+    if (!system.part) return;
+    told_.clear();
+    agreed_ = others_.refresh(paths_, impulse_, told_);
+    if (some) {
+      affected_.insert(affected_.end(), told_.begin(), told_.end());
+      std::ranges::sort(affected_);
+      affected_.erase(std::ranges::unique(affected_).begin(), affected_.end());
+    }
     std::array<std::uint64_t, 2> totals{counts.evaluations, counts.pairs};
-    part.sum(totals);
+    system.part->ranks().sum(totals);
     counts = {totals[0], totals[1]};
   }
 
@@ -321,11 +409,13 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   }
 
   struct Change {
-    double largest = 0;    ///< of an impulse from the one flown on, as a velocity
-    double unsettled = 0;  ///< the same among those who have not settled
-    double smooth = 0;     ///< and have no inner nodes
-    double speed = 0;      ///< of the system
+    double largest = 0;       ///< of an impulse from the one flown on, as a velocity
+    double unsettled = 0;     ///< the same among those who have not settled
+    double smooth = 0;        ///< and have no inner nodes
+    double speed = 0;         ///< of the system
+    std::uint64_t count = 0;  ///< of those who have not settled
     bool settled = true;
+    bool lost = false;  ///< ghosts did not do what they should have
     void note(double difference) { largest = difference > largest || std::isnan(difference) ? difference : largest; }
   };
 
@@ -341,13 +431,18 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     double squared_speed = 0;
     differences_.resize(particles);
     for (Id i = 0; i < particles; ++i) {
+      differences_[i] = difference(p, i, i);
+      if (!others_.counts(i)) continue;
       squared_speed =
           std::max({squared_speed, paths_.v[i].squaredNorm(), impulse_[i].squaredNorm() / (p.mass[i] * p.mass[i])});
-      change.note(differences_[i] = difference(p, i, i));
+      change.note(differences_[i]);
     }
     for (const Id i : paths_.noded())
-      for (std::uint32_t n = paths_.next[i]; n != Histories<D>::kNone; n = paths_.next[n])
+      for (std::uint32_t n = paths_.next[i]; n != Histories<D>::kNone && others_.counts(i); n = paths_.next[n])
         change.note(difference(p, i, n));
+    std::array<double, 2> all{squared_speed, change.largest};
+    others_.largest(all);
+    std::tie(squared_speed, change.largest) = std::tie(all[0], all[1]);
     speed_ = std::sqrt(squared_speed);
     // What the newest impulses still lack is the change times the contraction, this change over the last. It is known
     // best while nobody has settled.
@@ -357,7 +452,22 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     Eigen::Index at = 0;
     for (Id i = 0; i < particles; ++i) settle(p, i, differences_[i], mixes ? &at : nullptr, change);
     change.speed = speed_;
+    agree_on(change);
     return change;
+  }
+
+  /// Makes a change that of all ranks.
+  void agree_on(Change& change) {
+    if (others_) {
+      std::array<double, 5> most{change.largest, change.unsettled, change.smooth, change.settled ? 0.0 : 1.0,
+                                 agreed_ ? 0.0 : 1.0};
+      others_.largest(most);
+      std::tie(change.largest, change.unsettled, change.smooth) = std::tie(most[0], most[1], most[2]);
+      change.settled = most[3] == 0;
+      change.lost = most[4] > 0;
+      others_.ranks().sum({&change.count, 1});
+    }
+    few_ = kFew * change.count <= total_;
   }
 
   /// The same after a repair.
@@ -365,9 +475,11 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     Change change{.speed = speed_};
     unsettled_.clear();
     for (const Id i : affected_) {
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths_.next[n]) change.note(difference(p, i, n));
+      for (std::uint32_t n = i; n != Histories<D>::kNone && others_.counts(i); n = paths_.next[n])
+        change.note(difference(p, i, n));
       settle(p, i, difference(p, i, i), nullptr, change);
     }
+    agree_on(change);
     return change;
   }
 
@@ -380,21 +492,26 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       const double d = n == i ? first : difference(p, i, n);
       if (!(d <= (paths_.next[n] == Histories<D>::kNone ? last : inner))) {
         const double time = paths_.duration(n);
-        change.unsettled = std::max(change.unsettled, d);
-        if (paths_.simple(i)) change.smooth = std::max(change.smooth, d);
+        if (others_.counts(i)) {
+          change.unsettled = std::max(change.unsettled, d);
+          if (paths_.simple(i)) change.smooth = std::max(change.smooth, d);
+        }
         paths_.a[n] = impulse_[n] / (p.mass[i] * time);
         if (mixed) paths_.a[n] += mixing_.correction().template segment<D>(*mixed) / time;
         settled = false;
       }
       if (mixed) *mixed += D;
     }
-    if (!settled) unsettled_.push_back(i);
-    change.settled = change.settled && settled;
+    if (settled) return;
+    unsettled_.push_back(i);
+    if (!others_.counts(i)) return;
+    ++change.count;
+    change.settled = false;
   }
 
   /// Gives everybody whose partners differ from sweep to sweep a node where they first do; whether there was anyone.
   bool separate(bool repaired) {
-    const std::size_t known = extra_.size();
+    bool parted = false;
     constexpr auto kNone = Histories<D>::kNone;
     auto part = [&](Id i) {
       std::uint32_t m = paths_.next[i], n = paths_.past[i];
@@ -405,6 +522,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       if (m == kNone && n == kNone) return;
       const double time = std::min(m == kNone ? kNever : paths_.start[m], n == kNone ? kNever : paths_.start[n]);
       extra_.push_back({i, time});
+      parted = parted || others_.counts(i);
     };
     if (repaired) {
       for (const Id i : core_->awake()) part(i);
@@ -413,7 +531,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
       for (const Id i : paths_.noded())
         if (paths_.past[i] == kNone) part(i);
     }
-    return extra_.size() > known;
+    return others_.any(parted);
   }
 
   /// Gives colliders whose impulses change slowly a node a little before their first collision, so that the force on
@@ -421,7 +539,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   /// force.) Paths have their new accelerations already: where these differ, the chord tells.
   bool steady(const Particles<D>& p, const Change& change) {
     constexpr double kBefore = 0.1;  // in parts of the way
-    const std::size_t known = extra_.size();
+    bool steadied = false;
     for (const Id i : paths_.noded()) {
       if (paths_.simple(i)) continue;
       double moved = 0;
@@ -431,10 +549,11 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
         const std::uint32_t next = paths_.next[n];
         if (first == Histories<D>::kNone && next != Histories<D>::kNone && !is_extra(paths_.opening(next))) first = n;
       }
-      if (first != Histories<D>::kNone && moved > 0.1 * change.unsettled)
-        extra_.push_back({i, paths_.end(first) - kBefore * paths_.duration(first)});
+      if (first == Histories<D>::kNone || !(moved > 0.1 * change.unsettled)) continue;
+      extra_.push_back({i, paths_.end(first) - kBefore * paths_.duration(first)});
+      steadied = steadied || others_.counts(i);
     }
-    return extra_.size() > known;
+    return others_.any(steadied);
   }
 
   /// Moves the particles to the end of the slab: last intervals with the newest impulses. What inner ones lack of
@@ -443,6 +562,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     const Histories<D>& paths = paths_;
     extrapolation_.pass(paths.length);
     for (Id i = 0; i < p.size(); ++i) {
+      if (!others_.counts(i)) continue;
       const double mass = p.mass[i];
       Vec<D> lacking = Vec<D>::Zero();
       std::uint32_t n = i;
@@ -471,7 +591,12 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   std::vector<double> differences_;     // of first intervals, from what was flown on
   std::vector<Id> unsettled_;           // after a sweep
   std::vector<Id> changed_, affected_;  // by a repair; affected: with the partners of the changed
-  bool remembers_ = true;               // what pairs receive: every interaction
+  PartSweeps<D> others_;
+  std::vector<Id> told_;     // ghosts whose impulses the last sweep changed
+  bool agreed_ = true;       // with the owners of ghosts, after the last sweep
+  bool few_ = false;         // of all have not settled
+  std::uint64_t total_ = 0;  // particles, of all ranks
+  bool remembers_ = true;    // what pairs receive: every interaction
   std::vector<PairMemory<D>> memories_;
   std::vector<ExtraNode> extra_;
   std::uint64_t pairs_ = 0;  // within reach

@@ -72,7 +72,7 @@ class AsynchronousCollisionVerlet : public Integrator<D> {
     if (slab.index % kCountPairs == 0 || pairs_ == 0) {
       pairs_ = 0;
       for (const auto& term : system.interactions) pairs_ += term->interacting_pairs(p.x);
-      if (system.part) system.part->sum({&pairs_, 1});
+      if (system.part) system.part->ranks().sum({&pairs_, 1});
     }
     if (pairs_ > 0)
       report.counters.force_passes += static_cast<double>(rule_->evaluations() - before) / static_cast<double>(pairs_);

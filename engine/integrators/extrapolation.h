@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/exchange.h"
 #include "engine/interaction.h"
 
 namespace carom::integrator {
@@ -19,6 +20,22 @@ class Extrapolation {
     age_.assign(a.size(), 0);
     time_.assign(a.size(), 0.0);
     length_.fill(0);
+  }
+  void resize(std::size_t particles) {
+    for (auto& past : past_) past.resize(particles);
+    age_.resize(particles);
+    time_.resize(particles);
+  }
+  /// What is known of a particle.
+  void pack(Id i, Bytes& to) const {
+    for (const auto& past : past_) put(to, past[i]);
+    put(to, age_[i]);
+    put(to, time_[i]);
+  }
+  void unpack(Id i, Reader& from) {
+    for (auto& past : past_) past[i] = from.get<Vec<D>>();
+    age_[i] = from.get<std::uint8_t>();
+    time_[i] = from.get<double>();
   }
   /// A piece of this length is done; then add() for everybody.
   void pass(double length) {

@@ -47,6 +47,12 @@ class ModifiedCollisionVerlet : public Integrator<D> {
   const Particles<D>* energy_state() const override { return restart_ ? &node_ : nullptr; }
 
  private:
+  static void take_motion(Particles<D>& to, const Particles<D>& from) {
+    to.x = from.x;
+    to.v = from.v;
+    to.image = from.image;
+  }
+
   /// On CVA's time grid: the pieces fill the slab.
   void grid_slab(System<D>& system, double length) {
     double done = 0;
@@ -64,7 +70,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
   /// the slab; what the system shows at the end of the slab is a side copy, carried on by a shorter step.
   void restart_slab(System<D>& system, double length) {
     auto& p = system.particles;
-    p = node_;
+    take_motion(p, node_);
     double node_time = -lag_;
     for (;;) {
       collide(system, node_time);
@@ -77,7 +83,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     }
     system.wrap();
     lag_ = length - node_time;
-    node_ = p;
+    take_motion(node_, p);
     if (lag_ <= 0) return;
     for (std::size_t i = 0; i < p.size(); ++i) {
       p.v[i] += (0.5 * lag_) * pieces_->flight()[i];

@@ -6,6 +6,7 @@
 //   gradient(i, x)                 ∇V_i
 //   mean_gradient(i, x, x_new)     a discrete gradient: · (x_new − x) = V_i(x_new) − V_i(x)
 //   hessian_product(i, x, w)       V_i″ w
+//   among(particles)               itself for other particles
 // and, where it accelerates everybody alike, acceleration().
 
 #include <algorithm>
@@ -87,6 +88,10 @@ class FieldTerm final : public Interaction<D> {
       return nullptr;
   }
   bool keeps_momentum() const override { return false; }
+  std::unique_ptr<Interaction<D>> among(const Particles<D>&, const Particles<D>& some) const override {
+    return std::make_unique<FieldTerm>(some, field_.among(some));
+  }
+  double reach(Positions<D>) const override { return 0; }
 
  private:
   const Particles<D>& particles_;

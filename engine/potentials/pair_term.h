@@ -17,6 +17,10 @@ namespace carom {
 /// w_ij = 1.
 struct UnitWeight {
   double operator()(Id, Id) const { return 1; }
+  template <int D>
+  UnitWeight among(const Particles<D>&, const Particles<D>&) const {
+    return {};
+  }
 };
 
 /// w_ij = m_i m_j or q_i q_j. The vector outlives the term.
@@ -24,6 +28,11 @@ class ProductWeight {
  public:
   explicit ProductWeight(const std::vector<double>& factor) : factor_(&factor) {}
   double operator()(Id i, Id j) const { return (*factor_)[i] * (*factor_)[j]; }
+  /// The same property of other particles.
+  template <int D>
+  ProductWeight among(const Particles<D>& all, const Particles<D>& some) const {
+    return ProductWeight(factor_ == &all.mass ? some.mass : some.charge);
+  }
 
  private:
   const std::vector<double>* factor_;
@@ -223,6 +232,13 @@ class PairTerm final : public Interaction<D> {
       out[j] -= product;
     });
   }
+
+  std::unique_ptr<Interaction<D>> among(const Particles<D>& all, const Particles<D>& some) const override {
+    auto pairs = pairs_.among(some);
+    if (!pairs) return nullptr;
+    return std::make_unique<PairTerm>(some, potential_, weight_.among(all, some), std::move(*pairs));
+  }
+  double reach(Positions<D> x) const override { return pairs_.reach(x); }
 
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t within = 0;

@@ -13,9 +13,15 @@
 //   pairs_in_slab()                         how many these are
 //   kRemembered                             whether it pays to keep what was found for a pair
 //
+//   reach(x)                                how far apart partners are at most; infinite: no end
+//   among(some)                             itself for some of the particles, if they are enough
+//
 // Where ranks share a system, pairs of two ghosts are visited like any other; the loops of PairTerm pass over them.
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +51,10 @@ class SpeciesPair {
   SpeciesPair(const std::vector<std::uint16_t>& species_of, std::uint16_t a, std::uint16_t b)
       : species_of_(&species_of), a_(a), b_(b) {}
 
+  template <int D>
+  SpeciesPair among(const Particles<D>& some) const {
+    return all() ? SpeciesPair() : SpeciesPair(some.species, a_, b_);
+  }
   bool all() const { return species_of_ == nullptr; }
   bool contains(Id i, Id j) const {
     if (all()) return true;
@@ -64,6 +74,29 @@ class Bonds {
  public:
   static constexpr bool kRemembered = true;
   Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {}
+
+  std::optional<Bonds> among(const Particles<D>& some) const {
+    constexpr Id kNobody = std::numeric_limits<Id>::max();
+    std::vector<Id> number(some.id.empty() ? 0 : some.id.back() + 1, kNobody);
+    for (Id i = 0; i < some.id.size(); ++i) number[some.id[i]] = i;
+    const auto of = [&](Id id) { return id < number.size() ? number[id] : kNobody; };
+    PairList known;
+    for (const auto& [a, b] : pairs_) {
+      const Id i = of(a), j = of(b);
+      if (i != kNobody && j != kNobody)
+        known.push_back({i, j});
+      else if ((i != kNobody && some.owns(i)) || (j != kNobody && some.owns(j)))
+        return std::nullopt;
+    }
+    return Bonds(box_, std::move(known));
+  }
+  double reach(Positions<D> x) const {
+    double longest = 0;
+    for_each(x, x, [&](Id i, Id j, const Vec<D>& shift) {
+      longest = std::max(longest, separation<D>(x[i], x[j], shift).norm());
+    });
+    return longest;
+  }
 
   void begin_slab(Positions<D> x, double /*margin*/) const {
     if (partners_.empty()) partners_.build(x.size(), pairs_.size(), [&](std::size_t k) { return pairs_[k]; });
@@ -130,6 +163,8 @@ class AllPairs {
  public:
   AllPairs(std::size_t particles, SpeciesPair species) : particles_(static_cast<Id>(particles)), species_(species) {}
 
+  std::optional<AllPairs> among(const Particles<D>&) const { return std::nullopt; }
+  double reach(Positions<D>) const { return std::numeric_limits<double>::infinity(); }
   static constexpr bool kRemembered = false;  // who collides changes the path of everybody
   void begin_slab(Positions<D>, double) const {}
   template <class Visit>
@@ -160,7 +195,15 @@ template <int D>
 class PairsWithinCutoff {
  public:
   PairsWithinCutoff(const Box<D>& box, std::size_t particles, double cutoff, SpeciesPair species)
-      : box_(box), list_(box, std::vector<double>(particles, 0.5 * cutoff), wanted(species)) {}
+      : box_(box),
+        cutoff_(cutoff),
+        species_(species),
+        list_(box, std::vector<double>(particles, 0.5 * cutoff), wanted(species)) {}
+
+  std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
+    return PairsWithinCutoff(box_, some.id.size(), cutoff_, species_.among(some));
+  }
+  double reach(Positions<D>) const { return cutoff_; }
 
   template <class Visit>
   void for_each(Positions<D> x, Positions<D> x_new, Visit&& visit) const {
@@ -186,6 +229,8 @@ class PairsWithinCutoff {
   }
 
   const Box<D>& box_;
+  double cutoff_;
+  SpeciesPair species_;
   // Caches: their state never shows in the sums.
   mutable NeighbourList<D> list_;
   mutable std::span<const NeighbourPair<D>> in_slab_;

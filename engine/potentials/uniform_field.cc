@@ -13,6 +13,7 @@ class UniformField {
  public:
   UniformField(const std::vector<double>& mass, const Vec<D>& g) : mass_(&mass), g_(g) {}
 
+  UniformField among(const Particles<D>& some) const { return {some.mass, g_}; }
   double value(Id i, const Vec<D>& x) const { return -(*mass_)[i] * g_.dot(x); }
   Vec<D> gradient(Id i, const Vec<D>&) const { return -(*mass_)[i] * g_; }
   Vec<D> mean_gradient(Id i, const Vec<D>& x, const Vec<D>&) const { return gradient(i, x); }
