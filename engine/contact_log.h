@@ -1,14 +1,10 @@
 #pragma once
 // A collision as observers see it.
 
-#include <algorithm>
 #include <compare>
-#include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
-#include "engine/exchange.h"
 #include "engine/vec.h"
 
 namespace carom {
@@ -57,20 +53,11 @@ std::string partners(const EventKey<D>& key) {
 template <int D>
 struct Contact {
   EventKey<D> key;
-  Vec<D> x_lo, x_hi;  ///< centres at contact [length]; x_hi is shifted to the image that is touched; at a wall: the
-                      ///< point touched
-  Vec<D> impulse;     ///< given to `lo`, taken from `hi` [mass·length/time]
+  Vec<D> x_lo, x_hi;   ///< centres at contact [length]; x_hi is shifted to the image that is touched; at a wall: the
+                       ///< point touched
+  Vec<D> impulse;      ///< given to `lo`, taken from `hi` [mass·length/time]
+  double virial = 0;   ///< (x_lo − x_hi)·impulse of a pair, as it was computed [energy]
+  double overlap = 0;  ///< at contact, relative to the contact distance; where the method knows it
 };
-
-/// Appends the contacts of all ranks, in the order of their keys.
-template <int D>
-void gather_contacts(Exchange& ranks, std::span<const Contact<D>> mine, std::vector<Contact<D>>& to) {
-  Bytes bytes;
-  for (const Contact<D>& contact : mine) put(bytes, contact);
-  const auto before = static_cast<std::ptrdiff_t>(to.size());
-  for (const Bytes& each : ranks.gather(bytes))
-    for (Reader reader(each); reader.more();) to.push_back(reader.get<Contact<D>>());
-  std::sort(to.begin() + before, to.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
-}
 
 }  // namespace carom

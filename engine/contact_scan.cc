@@ -103,7 +103,7 @@ void ContactScan<D>::commit(double time, std::span<const Contact<D>> executed) {
     contact.key.time += time;
     if (contact.key.kind == EventKind::pair) {
       ++counters_->sphere_sphere;
-      counters_->collision_virial.add((contact.x_lo - contact.x_hi).dot(contact.impulse));
+      counters_->collision_virial.add(contact.virial);
     } else {
       ++counters_->sphere_wall;
     }
@@ -128,7 +128,8 @@ void ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
       Contact<D> contact{touch.key, x[lo], x[lo], given};
       if (touch.pair()) {
         ++counters_->sphere_sphere;
-        counters_->collision_virial.add(touch.normal.dot(given));
+        contact.virial = touch.normal.dot(given);
+        counters_->collision_virial.add(contact.virial);
         contact.x_hi = x[hi] - box_.shift(touch.key.image);
       } else {
         ++counters_->sphere_wall;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/error.h"
+#include "engine/shared_contacts.h"
 
 namespace carom {
 namespace {

@@ -189,13 +189,13 @@ Blow<D> Flights<D>::bounce(Slot i, Record<D>& r, int axis, int side, double t, s
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
                                   const Blow<D>& blow) const {
-  if (a.id < b.id) return {key, a.x, b.x - shift, blow.impulse};
-  return {key, b.x, a.x + shift, -blow.impulse};
+  if (a.id < b.id) return {key, a.x, b.x - shift, blow.impulse, blow.d.dot(blow.impulse), blow.overlap};
+  return {key, b.x, a.x + shift, -blow.impulse, blow.d.dot(blow.impulse), blow.overlap};
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const {
-  Contact<D> contact{key, r.x, r.x, blow.impulse};
+  Contact<D> contact{key, r.x, r.x, blow.impulse, 0, blow.overlap};
   contact.x_hi[key.hi / 2] = key.hi % 2 == 0 ? 0.0 : box_.edges[key.hi / 2];
   return contact;
 }

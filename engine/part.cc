@@ -187,6 +187,14 @@ bool Part<D>::choose(const Division<D>& division, double slab_length) {
 }
 
 template <int D>
+bool Part<D>::covers(const Particles<D>& p, std::span<const Vec<D>> a, double length) {
+  if (!some_) return true;
+  double farthest = 0;
+  for (Id i = 0; i < p.size(); ++i) farthest = std::max(farthest, length * (p.v[i] + 0.5 * length * a[i]).norm());
+  return covers(farthest);
+}
+
+template <int D>
 bool Part<D>::outdated() {
   if (!some_) return false;
   const Particles<D>& p = some_->particles;

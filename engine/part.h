@@ -57,8 +57,10 @@ class Part {
   /// Brings positions, velocities and images of the whole system up to date, on all ranks.
   void collect();
 
-  /// How far anybody may come in a slab [length].
-  double largest_path() const { return path_; }
+  /// Whether the particles that are known are enough for paths so long in a slab [length].
+  bool covers(double path) { return !some_ || largest(path) <= path_; }
+  /// The same for a step of a kick-drift-kick method.
+  bool covers(const Particles<D>& p, std::span<const Vec<D>> a, double length);
   /// Whether what a ghost does matters to own particles.
   bool matters(Id i) const { return matters_.empty() || matters_[i] != 0; }
 

@@ -410,6 +410,7 @@ void SlabCore<D>::collide(Histories<D>& paths, const EventKey<D>& key) {
     const double g = collision_factor<D>(d, v, mass, mass_hi);
     contact.impulse = g * d;
     contact.x_hi = paths.x[n] - box_.shift(key.image);
+    contact.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse);
     paths.v[m] += (g / mass) * d;
     paths.v[n] -= (g / mass_hi) * d;
   }

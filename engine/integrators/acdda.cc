@@ -26,6 +26,7 @@
 #include "engine/integrators/part_sweeps.h"
 #include "engine/integrators/registry.h"
 #include "engine/integrators/sweep_rule.h"
+#include "engine/shared_contacts.h"
 #include "engine/slab_core.h"
 
 namespace carom::integrator {
@@ -128,21 +129,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     auto& p = system.particles;
     if (others_.any(!scan_->quiet(p.x, p.v))) return false;
     if (!solve(system, slab.length).settled) return false;
-    PairTally tally;
-    std::vector<Contact<D>> own;
-    for (Contact<D> contact : core_->contacts()) {
-      if (!p.owns(contact.key.lo)) continue;
-      tally.add(contact);
-      contact.key.lo = p.id_of(contact.key.lo);
-      if (contact.key.kind == EventKind::pair) contact.key.hi = p.id_of(contact.key.hi);
-      if (report.contacts) own.push_back(contact);
-    }
-    tally = sum_of_all(system.part->ranks(), tally);
-    if (tally.pairs + tally.bounces > max_events_) return false;
-    counters_->sphere_sphere += tally.pairs;
-    counters_->sphere_wall += tally.bounces;
-    counters_->collision_virial.add(tally.virial);
-    if (report.contacts) gather_contacts<D>(system.part->ranks(), own, *report.contacts);
+    if (!commit_contacts<D>(system, core_->contacts(), max_events_, *counters_, report.contacts)) return false;
     finish(p);
     system.part->tell(
         [&](Id i, Bytes& to) {
@@ -162,21 +149,6 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     report.reached = slab.length;
     return true;
   }
-
-  struct PairTally {
-    std::uint64_t pairs = 0, bounces = 0;
-    ExactSum virial;
-    void add(const PairTally& other) {
-      pairs += other.pairs;
-      bounces += other.bounces;
-      virial.add(other.virial);
-    }
-    void add(const Contact<D>& contact) {
-      const bool pair = contact.key.kind == EventKind::pair;
-      ++(pair ? pairs : bounces);
-      if (pair) virial.add((contact.x_lo - contact.x_hi).dot(contact.impulse));
-    }
-  };
 
   /// Whether the path of a piece is as good as asked; sets the length to try next.
   bool fits(const Particles<D>& p, double piece, double slab_length) {
@@ -221,7 +193,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
     double margin = 0;
     for (Id i = 0; i < n; ++i) margin = std::max(margin, length * (p.v[i].norm() + 0.5 * length * paths.a[i].norm()));
     margin = others_.largest(margin);
-    if (others_ && !(kRoom * margin <= system.part->largest_path())) return {};
+    if (others_ && !system.part->covers(kRoom * margin)) return {};
     begin(system, kRoom * margin);
     extra_.clear();
     tolerance_ = std::max(kLastAtLeast, accepted_);

@@ -9,6 +9,9 @@ template <int D>
 struct Accelerations {
   std::vector<Vec<D>> a;  ///< [length/time²]
 
+  void pack(Id i, Bytes& to) const { put(to, a[i]); }
+  void unpack(Id i, Reader& from) { a[i] = from.get<Vec<D>>(); }
+
   /// Evaluates a at the system's positions: one force pass.
   void update(const System<D>& system, Counters& counters) {
     a.resize(system.particles.size());

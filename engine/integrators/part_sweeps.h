@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/histories.h"
+#include "engine/integrators/digest.h"
 #include "engine/part.h"
 
 namespace carom::integrator {
@@ -72,23 +73,14 @@ class PartSweeps {
   std::uint64_t digest(const Histories<D>& paths, Id i) const {
     if (paths.simple(i)) return 0;
     std::uint64_t sum = 1;
-    const auto mix = [&sum](std::uint64_t word) {
-      sum = (sum ^ word) * 0x9e3779b97f4a7c15;
-      sum ^= sum >> 32;
-    };
-    std::uint32_t n = paths.next[i];
-    for (;; n = paths.next[n]) {
-      const EventKey<D>& key = paths.opening(n);
-      const bool pair = key.kind == EventKind::pair;
-      mix(std::bit_cast<std::uint64_t>(key.time));
-      mix(std::uint64_t{key.generation} << 1 | (pair ? 1 : 0));
-      mix(std::uint64_t{particles_->id_of(key.lo)} << 32 | (pair ? particles_->id_of(key.hi) : key.hi));
-      for (int k = 0; k < D; ++k) mix(static_cast<std::uint64_t>(key.image[k]));
-      if (paths.next[n] == Histories<D>::kNone) break;
+    std::uint32_t last = i;
+    for (std::uint32_t n = paths.next[i]; n != Histories<D>::kNone; n = paths.next[n]) {
+      mix(sum, paths.opening(n), *particles_);
+      last = n;
     }
     for (int k = 0; k < D; ++k) {
-      mix(std::bit_cast<std::uint64_t>(paths.x[n][k]));
-      mix(std::bit_cast<std::uint64_t>(paths.v[n][k]));
+      mix(sum, std::bit_cast<std::uint64_t>(paths.x[last][k]));
+      mix(sum, std::bit_cast<std::uint64_t>(paths.v[last][k]));
     }
     return sum;
   }

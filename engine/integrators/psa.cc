@@ -1,10 +1,13 @@
 // psa: K(h/2), then the drift D(h) resolved event by event, then K(h/2).
 
+#include <algorithm>
 #include <optional>
 
 #include "engine/event_core.h"
+#include "engine/integrators/digest.h"
 #include "engine/integrators/kicks.h"
 #include "engine/integrators/registry.h"
+#include "engine/shared_contacts.h"
 
 namespace carom::integrator {
 namespace {
@@ -20,19 +23,33 @@ class PrimitiveSplitting : public Integrator<D> {
     accelerations_.update(system, counters);
   }
 
+  bool local() const override { return true; }
+  void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
+  void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }
+  void regroup(System<D>& system) override {
+    core_.emplace(system.box, system.particles);
+    accelerations_.a.resize(system.particles.size());
+  }
+
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
+    const bool some = system.part && !system.part->knows_everybody();
+    if (some) before_ = p.v;
     kick(p, accelerations_.a, 0.5 * slab.length);
     {
       const Stopwatch watch(report.counters.seconds.predict);
       core_->load(p, Vec<D>::Zero(), slab.length);
     }
-    {
-      const Stopwatch watch(report.counters.seconds.queue);
-      core_->run(slab.length, {.counters = report.counters, .contacts = report.contacts, .max_events = max_events_});
+    if (!some) {
+      run(slab.length, report.counters, report.contacts);
+    } else if (!run_some(system, slab.length, report)) {
+      p.v.swap(before_);
+      report.unsure = true;
+      return;
     }
     core_->fly_to(slab.length, p);
     report.counters.events = core_->counts();
+    if (some) system.part->refresh(p.x), system.part->refresh(p.v);
     accelerations_.update(system, report.counters);
     kick(p, accelerations_.a, 0.5 * slab.length);
     system.wrap();
@@ -40,9 +57,45 @@ class PrimitiveSplitting : public Integrator<D> {
   }
 
  private:
+  void run(double length, Counters& counters, std::vector<Contact<D>>* contacts) {
+    const Stopwatch watch(counters.seconds.queue);
+    core_->run(length, {.counters = counters, .contacts = contacts, .max_events = max_events_});
+  }
+
+  /// Of the particles that this rank knows; false where more would have to be known.
+  bool run_some(const System<D>& system, double length, SlabReport<D>& report) {
+    Counters all;  // the ghosts' contacts among them
+    std::vector<Contact<D>> contacts;
+    run(length, all, &contacts);
+    report.counters.seconds.queue += all.seconds.queue;
+    // Nobody was faster than his first speed and all his blows together.
+    const auto& p = system.particles;
+    Digest<D> events(p);
+    std::vector<double> speed(p.size());
+    for (Id i = 0; i < p.size(); ++i) speed[i] = p.v[i].norm();
+    for (const Contact<D>& contact : contacts) {
+      const Id lo = contact.key.lo, hi = contact.key.hi;
+      events.add(contact.key);
+      speed[lo] += contact.impulse.norm() / p.mass[lo];
+      if (contact.key.kind == EventKind::pair) speed[hi] += contact.impulse.norm() / p.mass[hi];
+    }
+    Part<D>& part = *system.part;
+    bool agreed = true;
+    part.tell(
+        [&](Id i, Bytes& to) { put(to, events[i]); },
+        [&](Id i, Reader& from) { agreed = (from.get<std::uint64_t>() == events[i] || !part.matters(i)) && agreed; });
+    if (part.largest(agreed ? 0 : 1) > 0) {
+      part.deepen();
+      return false;
+    }
+    return part.covers(length * *std::ranges::max_element(speed)) &&
+           commit_contacts<D>(system, contacts, max_events_, report.counters, report.contacts);
+  }
+
   std::uint64_t max_events_;
   std::optional<EventCore<D>> core_;
   Accelerations<D> accelerations_;
+  std::vector<Vec<D>> before_;  // velocities at the start of the slab
 };
 
 }  // namespace

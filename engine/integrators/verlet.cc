@@ -14,8 +14,17 @@ class Verlet : public Integrator<D> {
 
   void start(System<D>& system, Counters& counters) override { accelerations_.update(system, counters); }
 
+  bool local() const override { return true; }
+  void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
+  void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }
+  void regroup(System<D>& system) override { accelerations_.a.resize(system.particles.size()); }
+
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
+    if (system.part && !system.part->covers(p, accelerations_.a, slab.length)) {
+      report.unsure = true;
+      return;
+    }
     kick(p, accelerations_.a, 0.5 * slab.length);
     for (std::size_t i = 0; i < p.size(); ++i) p.x[i] += slab.length * p.v[i];
     accelerations_.update(system, report.counters);
