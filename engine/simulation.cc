@@ -59,7 +59,10 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       break;
     }
     const Slab slab = next_slab(monitor.time_slack());
-    if (part && part->divide_if_due(*integrator_, integrator_->local(), slab.index, slab.length)) monitor.regroup();
+    if (part && part->divide_if_due(*integrator_, integrator_->local(), slab.index, slab.length)) {
+      ++s.counters.divisions;
+      monitor.regroup();
+    }
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor.due_within(slab);
     contacts.clear();
     SlabReport<D> report{.counters = s.counters, .contacts = plan_.events ? &contacts : nullptr, .observe = due};
@@ -68,6 +71,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     integrator_->slab(known(), slab, report);
     if (report.unsure) {
       s.counters = before;
+      ++s.counters.slabs_again;
       report.unsure = false;
       part->know_everybody(*integrator_, slab.index);
       monitor.regroup();

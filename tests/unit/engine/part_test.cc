@@ -81,6 +81,7 @@ Statistics compare(const Scene<D>& scene, const std::string& method, double step
       .step = step, .steps = steps, .frame_interval = 7 * step, .thermo_interval = 3 * step, .events = true};
   const Account<D> alone = run<D>(scene, method, plan, given, nullptr);
   EXPECT_GE(alone.statistics.counters.sphere_sphere + alone.statistics.counters.sphere_wall, contacts);
+  Statistics last;  // of the most ranks
   for (const int ranks : {1, 2, 3, 4, 8}) {
     SCOPED_TRACE(ranks);
     std::vector<Account<D>> all(static_cast<std::size_t>(ranks));
@@ -88,9 +89,10 @@ Statistics compare(const Scene<D>& scene, const std::string& method, double step
       all[static_cast<std::size_t>(exchange.rank())] = run<D>(scene, method, plan, given, &exchange);
     });
     for (const Account<D>& account : all) expect_same(alone, account);
+    last = all.front().statistics;
     if (::testing::Test::HasFailure()) break;
   }
-  return alone.statistics;
+  return last;
 }
 
 /// A fluid of spheres that repel each other beyond contact.
@@ -127,6 +129,25 @@ std::unique_ptr<System<3>> cloud() {
   return system;
 }
 
+/// A rod of spheres of several sizes, falling, between walls at its ends.
+std::unique_ptr<System<3>> rod() {
+  std::vector<Vec<3>> x, v;
+  std::vector<double> radius, mass;
+  for (int k = 0; k < 1024; ++k) {
+    x.push_back({0.7 + 1.25 * (k / 16), 0.6 + 1.25 * (k / 4 % 4), 0.6 + 1.25 * (k % 4)});
+    v.push_back({0.3 * (k % 7 - 3), 0.4 * (k % 5 - 2), 0.5 * (k % 3 - 1)});
+    radius.push_back(0.5 + 0.05 * (k % 3));
+    mass.push_back(1.0 + 0.5 * (k % 4));
+  }
+  auto system = test::make_system<3>({80.5, 5, 5}, Boundary::periodic, x, v, radius, mass);
+  system->box.boundary[0] = Boundary::wall;
+  test::add_interaction(
+      *system, "yukawa",
+      {{"amplitude", 2.0}, {"kappa", 2.0}, {"charges", false}, {"cutoff", 1.8}, {"cut", std::string("smooth")}});
+  test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{-1.0, 0.0, 0.0}}});
+  return system;
+}
+
 const std::vector<std::pair<std::string, Given>> kMethods = {{"psa", {}},
                                                              {"cva", {}},
                                                              {"mcva", {}},
@@ -151,16 +172,31 @@ TEST(Part, ManySprings) {
   for (const char* method : {"verlet", "psa", "acdda"})
     compare<2>([] { return springs(40); }, method, 0.02, 60, std::string(method) == "verlet" ? 0 : 400);
 }
+TEST(Part, Rod) {
+  for (const char* method : {"psa", "acdda"}) {
+    const Statistics s = compare<3>(rod, method, 0.01, 40, 60);
+    EXPECT_LT(s.counters.slabs_again, 5u) << method;
+  }
+}
+/// In such long steps a collision is felt farther away than a rank knows.
+TEST(Part, StepsThatTakeEverybody) {
+  EXPECT_GT(compare<2>([] { return springs(40); }, "psa", 0.3, 4, 1000).counters.slabs_again, 0u);
+}
 TEST(Part, WithoutCores) {
   for (const auto& scene : {yukawa(0.1), yukawa(0.3)}) compare<3>(scene, "verlet", 0.01, 150, 0);
 }
 TEST(Part, SlowSweepsAreMixed) {
-  const Scene<2> stiff = [] {
-    auto system = test::hard_spheres<2>(7, 0.5);
-    test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 300.0}, {"rest_length", 1.0}});
-    return system;
+  const auto stiff = [](int cells) {
+    return [=] {
+      auto system = test::hard_spheres<2>(cells, 0.5);
+      test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 300.0}, {"rest_length", 1.0}});
+      return system;
+    };
   };
-  EXPECT_GT(compare<2>(stiff, "acdda", 0.05, 12, 0).counters.fallbacks, 0u);
+  EXPECT_GT(compare<2>(stiff(7), "acdda", 0.05, 12, 0).counters.fallbacks, 0u);
+  const Counters many = compare<2>(stiff(30), "acdda", 0.05, 2, 0).counters;
+  EXPECT_GT(many.fallbacks, 0u);
+  EXPECT_GT(many.slabs_again, 0u);
 }
 
 }  // namespace
