@@ -216,8 +216,12 @@ std::span<const std::uint32_t> EventCore<D>::find_near(Slot i) {
 }
 
 template <int D>
-std::span<const std::uint32_t> EventCore<D>::find_near_at_border(Slot i) {
-  if (!lists_ || room(i) == lists_->skin()) return find_near(i);
+std::span<const std::uint32_t> EventCore<D>::find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high) {
+  if (!lists_) {
+    cells_->find_between(low, high, near_);
+    return near_;
+  }
+  if (room(i) == lists_->skin()) return find_near(i);
   return {lists_->candidates(agenda_[i]), agenda_[i].count};
 }
 
@@ -244,7 +248,7 @@ template void EventCore<2>::dismiss(Slot);
 template void EventCore<2>::put(std::span<const std::pair<Slot, Record<2>>>, double);
 template void EventCore<2>::set_border(std::span<const Slot>, std::span<const Slot>, double);
 template std::span<const std::uint32_t> EventCore<2>::find_near(Slot);
-template std::span<const std::uint32_t> EventCore<2>::find_near_at_border(Slot);
+template std::span<const std::uint32_t> EventCore<2>::find_near_at_border(Slot, const Vec<2>&, const Vec<2>&);
 template void EventCore<3>::load(const Particles<3>&, const Vec<3>&, double, double);
 template void EventCore<3>::load(std::vector<Record<3>>, const Vec<3>&, double, double, double);
 template void EventCore<3>::take(Particles<3>&, const Vec<3>&, double, double);
@@ -254,6 +258,6 @@ template void EventCore<3>::dismiss(Slot);
 template void EventCore<3>::put(std::span<const std::pair<Slot, Record<3>>>, double);
 template void EventCore<3>::set_border(std::span<const Slot>, std::span<const Slot>, double);
 template std::span<const std::uint32_t> EventCore<3>::find_near(Slot);
-template std::span<const std::uint32_t> EventCore<3>::find_near_at_border(Slot);
+template std::span<const std::uint32_t> EventCore<3>::find_near_at_border(Slot, const Vec<3>&, const Vec<3>&);
 
 }  // namespace carom

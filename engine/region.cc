@@ -5,158 +5,97 @@
 namespace carom {
 
 template <int D>
-void Region<D>::load(std::vector<Record<D>> own, const std::vector<Record<D>>& ghosts, const Vec<D>& g, double horizon,
-                     double now, double stray) {
-  stray_ = stray;
-  rewritten_.clear();
-  script_.clear();
-  slot_.clear();
-  role_.clear();
-  first_.clear();
-  length_.clear();
-  start_of_.clear();
-  mended_of_.clear();
-  for (const Record<D>& r : ghosts) slot_[r.id] = kNone;
-  own.insert(own.end(), ghosts.begin(), ghosts.end());
-  core_.load(std::move(own), g, horizon, now, 2 * stray);
-  const auto n = static_cast<Slot>(core_.flights().size());
-  border_.clear();
-  ghosts_.clear();
-  for (Slot i = 0; i < n; ++i) {
-    const Id id = core_.flights()[i].id;
-    enlist(i, id, slot_.contains(id) ? Role::ghost : Role::own);
-  }
-  touched_.clear();
-  changed_.clear();
-  start_.clear();
-}
-
-template <int D>
-void Region<D>::enlist(Slot i, Id id, Role role) {
-  slot_[id] = i;
-  if (role_.size() <= i) role_.resize(i + 1, Role::nobody);
-  role_[i] = role;
-  (role == Role::own ? border_ : ghosts_).push_back(i);
-  first_.resize(role_.size());
-  length_.resize(role_.size(), 0);
-  start_of_.resize(role_.size(), kNone);
-  mended_of_.resize(role_.size(), kNone);
-  rewritten_.resize(role_.size());
-  script_.resize(role_.size());
-}
-
-template <int D>
-void Region<D>::forget(Slot i) {
-  role_[i] = Role::nobody;
-  slot_.erase(core_.flights()[i].id);
-  core_.dismiss(i);
-}
-
-template <int D>
-std::vector<Slot> Region<D>::own() const {
-  std::vector<Slot> own;
-  for (Slot i = 0; i < role_.size(); ++i)
-    if (role_[i] == Role::own) own.push_back(i);
-  return own;
-}
-
-template <int D>
-void Region<D>::watch(double now, const std::function<bool(const Vec<D>&)>& near) {
-  border_ = own();
-  std::erase_if(border_, [&](Slot i) { return !near(core_.flights().at(i, now).x); });
-  core_.set_border(border_, ghosts_, now);
-}
-
-template <int D>
-bool Region<D>::admit(const Record<D>& r, double now) {
-  if (has(r.id)) return true;
-  Slot slot = 0;
-  if (!core_.admit(r, now, slot)) return false;
-  enlist(slot, r.id, Role::ghost);
-  return true;
-}
-
-template <int D>
-void Region<D>::run(double now, double end) {
+void Region<D>::run(double end) {
   end_ = end;
-  trace_.clear(now);
+  trace_.clear(core_.flights().room());
+  mended_fastest_squared_ = 0;
   Counters unused;
   core_.run(end, {.counters = unused, .trace = &trace_});
-  run_events_ += std::ranges::count_if(trace_.nodes, [](const Node<D>& n) { return n.key.lo == n.after.id; });
+  run_events_ += trace_.events().size();
   index();
 }
 
-/// Sorts the nodes of the first run by sphere.
+/// Reads the paths that others will ask for: of spheres that are ghosts here or elsewhere.
 template <int D>
 void Region<D>::index() {
-  touched_.clear();
   changed_.clear();
-  start_.clear();
-  for (const auto& [slot, record] : trace_.starts) {
-    start_of_[slot] = static_cast<std::uint32_t>(start_.size());
-    start_.push_back(record);
-    touched_.push_back(slot);
-    if (role_[slot] == Role::own) changed_.push_back(slot);
+  for (const auto& event : trace_.events())
+    for (const int which : {0, 1}) {
+      const Slot i = event.slot[which];
+      if (i == kNone || event.last[which] != kNone) continue;
+      if (role_[i] == Role::own) continue;
+      if (role_[i] == Role::seen) changed_.push_back(i);
+      path_of(i);
+    }
+}
+
+template <int D>
+typename Region<D>::Path& Region<D>::path_of(Slot i) {
+  if (paths_.has(i)) return paths_.at(i);
+  Path& path = paths_.add(i);
+  path.nodes.clear();
+  path.start = core_.flights()[i];
+  const auto shares = trace_.shares(i);
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    const auto& event = trace_.event_of(shares[k]);
+    if (k == 0) path.start = trace_.before(shares[k]);
+    Node<D>& node = path.nodes.emplace_back();
+    node.after = k + 1 < shares.size() ? trace_.before(shares[k + 1]) : core_.flights()[i];
+    node.key = key_of(event);
+    node.virial = event.virial;
+    node.overlap = event.overlap;
   }
-  for (const Node<D>& node : trace_.nodes) ++length_[node.slot];
-  std::uint32_t at = 0;
-  for (const Slot i : touched_) {
-    first_[i] = at;
-    at += length_[i];
-    length_[i] = 0;
-  }
-  nodes_.resize(trace_.nodes.size());
-  for (const Node<D>& node : trace_.nodes) nodes_[first_[node.slot] + length_[node.slot]++] = node;
-}
-
-template <int D>
-std::span<const Node<D>> Region<D>::path(Slot i) const {
-  if (rewritten_.has(i)) return rewritten_.at(i);
-  return length_[i] == 0 ? std::span<const Node<D>>{} : std::span<const Node<D>>(&nodes_[first_[i]], length_[i]);
-}
-
-template <int D>
-const Record<D>& Region<D>::before(Slot i, std::size_t k) const {
-  if (k > 0) return path(i)[k - 1].after;
-  return start_of_[i] == kNone ? core_.flights()[i] : start_[start_of_[i]];
-}
-
-template <int D>
-const Record<D>& Region<D>::after(Slot i) const {
-  return before(i, path(i).size());
-}
-
-template <int D>
-bool Region<D>::is_own(Id id) const {
-  const auto it = slot_.find(id);
-  return it != slot_.end() && role_[it->second] == Role::own;
-}
-
-template <int D>
-std::vector<Node<D>>& Region<D>::rewritten(Slot i) {
-  if (rewritten_.has(i)) return rewritten_[i];
-  const auto old = path(i);
-  if (start_of_[i] == kNone) {  // it had no event until now
-    start_of_[i] = static_cast<std::uint32_t>(start_.size());
-    start_.push_back(core_.flights()[i]);
-    touched_.push_back(i);
-  }
-  Nodes& path = rewritten_[i];
-  path.assign(old.begin(), old.end());
   return path;
 }
 
 template <int D>
-void Region<D>::follow(Id id, Nodes script) {
-  script_[slot_.at(id)] = std::move(script);
+EventKey<D> Region<D>::key_of(const typename Trace<D>::Event& event) const {
+  const Id lo = core_.flights()[event.slot[0]].id;
+  if (event.slot[1] == kNone)
+    return {.time = event.time, .generation = event.generation, .kind = EventKind::wall, .lo = lo, .hi = event.partner};
+  const Id hi = core_.flights()[event.slot[1]].id;
+  return pair_key<D>(event.time, event.generation, lo, hi, core_.packing().image(event.partner));
+}
+
+/// A path that is going to be changed.
+template <int D>
+typename Region<D>::Path& Region<D>::rewritten(Slot i) {
+  rewritten_[i] = 1;
+  return path_of(i);
+}
+
+template <int D>
+const Record<D>& Region<D>::after(Slot i) const {
+  if (!paths_.has(i)) return core_.flights()[i];
+  const Path& path = paths_.at(i);
+  return path.nodes.empty() ? path.start : path.nodes.back().after;
+}
+
+template <int D>
+bool Region<D>::is_own_id(Id id) const {
+  const Slot i = slots_.find(id);
+  return i != IdTable::kNowhere && is_own(i);
+}
+
+template <int D>
+void Region<D>::follow(Id id, const std::byte* script, std::size_t n) {
+  const Slot g = slots_.find(id);
+  Nodes& nodes = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
+  nodes.resize(n);
+  std::memcpy(static_cast<void*>(nodes.data()), script, n * sizeof(Node<D>));
+}
+
+template <int D>
+std::span<const Node<D>> Region<D>::script_of(Slot g) const {
+  return scripts_.has(g) ? std::span<const Node<D>>(scripts_.at(g)) : std::span<const Node<D>>();
 }
 
 template <int D>
 void Region<D>::repair() {
   repairs_.clear();
-  for (const Slot g : script_.who()) seed(g);
-  for (const Slot i : touched_)
-    if (role_[i] == Role::ghost && !script_.has(i)) seed(i);
+  for (const Slot g : scripts_.who()) seed(g);
+  for (const Slot i : paths_.who())
+    if (role_[i] == Role::ghost && !scripts_.has(i)) seed(i);
   while (!tasks_.empty()) {
     const Task task = tasks_.top();
     tasks_.pop();
@@ -180,7 +119,7 @@ void Region<D>::repair() {
   changed_.clear();
   for (const Mended& m : repairs_) {
     mended_of_[m.slot] = kNone;
-    if (role_[m.slot] != Role::own) continue;
+    if (!is_own(m.slot)) continue;
     const auto now = path(m.slot).subspan(m.kept);
     if (!std::equal(now.begin(), now.end(), m.old.begin(), m.old.end())) changed_.push_back(m.slot);
   }
@@ -191,13 +130,13 @@ void Region<D>::repair() {
 template <int D>
 void Region<D>::seed(Slot g) {
   const auto seen = path(g);
-  const auto script = script_.at(g);
+  const auto script = script_of(g);
   std::size_t k = 0;
   while (k < seen.size() && k < script.size() && seen[k] == script[k]) ++k;
   if (k == seen.size() && k == script.size()) return;
-  const bool sees = k < seen.size() && !is_own(seen[k].partner());
+  const bool sees = k < seen.size() && !is_own_id(seen[k].partner());
   if (k < script.size() && (k == seen.size() || script[k].key <= seen[k].key)) {
-    if (is_own(script[k].partner()) && !sees) return;
+    if (is_own_id(script[k].partner()) && !sees) return;
     tasks_.push({.kind = Task::Kind::seed, .key = script[k].key, .a = g});
   } else if (sees) {
     tasks_.push({.kind = Task::Kind::seed, .key = seen[k].key, .a = g});
@@ -207,7 +146,7 @@ void Region<D>::seed(Slot g) {
 /// Takes back what a sphere did from `key` on; who met it there must be looked at.
 template <int D>
 typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
-  Nodes& path = rewritten(i);
+  Nodes& path = rewritten(i).nodes;
   const auto from = std::find_if(path.begin(), path.end(), [&](const Node<D>& n) { return !(n.key < key); });
   mended_of_[i] = static_cast<std::uint32_t>(repairs_.size());
   Mended& m = repairs_.emplace_back();
@@ -218,20 +157,20 @@ typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
   path.erase(from, path.end());
   m.now = before(i, m.kept);
   if (role_[i] == Role::ghost) {
-    const auto script = script_.at(i);
+    const auto script = script_of(i);
     m.script = m.kept;
     m.strays = m.kept > script.size() || !std::equal(path.begin(), path.end(), script.begin());
   }
   for (const Node<D>& node : m.old) {
-    const auto partner = slot_.find(node.partner());
-    if (partner != slot_.end()) tasks_.push({.kind = Task::Kind::check, .key = node.key, .a = i, .b = partner->second});
+    const Slot partner = node.key.kind == EventKind::wall ? IdTable::kNowhere : slots_.find(node.partner());
+    if (partner != IdTable::kNowhere) tasks_.push({.kind = Task::Kind::check, .key = node.key, .a = i, .b = partner});
   }
   return m;
 }
 
 template <int D>
 void Region<D>::plan_script(Mended& m) {
-  const auto script = script_.at(m.slot);
+  const auto script = script_of(m.slot);
   if (m.strays || m.script >= script.size()) return;
   tasks_.push({.kind = Task::Kind::script,
                .key = script[m.script].key,
@@ -239,15 +178,35 @@ void Region<D>::plan_script(Mended& m) {
                .version_a = static_cast<std::uint32_t>(m.script)});
 }
 
+/// Where a ghost can meet own spheres, which are within a stray of the region, and are known where they come within
+/// another two: between two corners. False: nowhere.
+template <int D>
+bool Region<D>::meeting_place(const Mended& m, Vec<D>& low, Vec<D>& high) const {
+  const double time = end_ - m.now.t, way = (m.now.v.norm() + 0.5 * time * core_.flights().g().norm()) * time;
+  const Vec<D> at = division_->wrapped(m.now.x);
+  const double close = division_->reach() - stray_ + way;
+  if (division_->squared_distance(number_, at) > close * close) return false;
+  const Vec<D> room = Vec<D>::Constant(division_->reach() + way);
+  low = at - room;
+  high = at + room;
+  if (!division_->clip(number_, 3 * stray_, low, high)) return false;
+  low += m.now.x - at;
+  high += m.now.x - at;
+  return true;
+}
+
 /// Plans all contacts that a mended sphere may have from `now` on.
 template <int D>
 void Region<D>::predict(Mended& m, const EventKey<D>& now) {
   const Packing<D>& packing = core_.packing();
-  const bool ghost = role_[m.slot] == Role::ghost;
-  for (const std::uint32_t candidate : ghost ? core_.find_near_at_border(m.slot) : core_.find_near(m.slot)) {
-    const Slot j = packing.slot(candidate);
-    if (j == m.slot || (ghost && role_[j] == Role::ghost)) continue;
-    meet(m, j, packing.image(candidate), now);
+  if (role_[m.slot] == Role::ghost) {
+    Vec<D> low, high;
+    if (!meeting_place(m, low, high)) return;
+    for (const std::uint32_t candidate : core_.find_near_at_border(m.slot, low, high))
+      if (const Slot j = packing.slot(candidate); is_own(j)) meet(m, j, packing.image(candidate), now);
+  } else {
+    for (const std::uint32_t candidate : core_.find_near(m.slot))
+      if (const Slot j = packing.slot(candidate); j != m.slot) meet(m, j, packing.image(candidate), now);
   }
   predict_walls(m);
 }
@@ -276,11 +235,11 @@ void Region<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>
     return;
   }
   // Along its path: a contact counts only before the path turns.
-  const auto path = this->path(j);
+  const auto path = met_nobody(j) ? std::span<const Node<D>>() : this->path(j);
   std::size_t k = 0;
   while (k < path.size() && path[k].key < now) ++k;
   for (;; ++k) {
-    const Record<D>& other = before(j, k);
+    const Record<D>& other = path.empty() ? after(j) : before(j, k);
     const double t = flights.pair_contact(m.slot, m.now, j, other, shift);
     if (t < end_)
       if (const EventKey<D> key = key_at(other, t); k == path.size() || key <= path[k].key) return plan(key);
@@ -335,11 +294,12 @@ void Region<D>::contact(const Task& task) {
 /// Adds a node to a path. A ghost whose script has the same goes on with it.
 template <int D>
 void Region<D>::append(Mended& m, const Node<D>& node) {
-  rewritten(m.slot).push_back(node);
+  rewritten(m.slot).nodes.push_back(node);
   m.now = node.after;
+  mended_fastest_squared_ = std::max(mended_fastest_squared_, node.after.v.squaredNorm());
   ++m.version;
   if (role_[m.slot] != Role::ghost || m.strays) return;
-  const auto script = script_.at(m.slot);
+  const auto script = script_of(m.slot);
   m.strays = m.script >= script.size() || !(script[m.script] == node);
   ++m.script;
   plan_script(m);
@@ -350,8 +310,8 @@ template <int D>
 void Region<D>::script(const Task& task) {
   Mended& m = repairs_[mended_of_[task.a]];
   if (m.strays || m.script != task.version_a) return;
-  const Node<D>& node = script_.at(task.a)[m.script];
-  if (is_own(node.partner())) {  // who knows better: they did not meet
+  const Node<D>& node = script_of(task.a)[m.script];
+  if (is_own_id(node.partner())) {  // who knows better: they did not meet
     m.strays = true;
     return;
   }
@@ -369,17 +329,43 @@ void Region<D>::check(const Task& task) {
 }
 
 template <int D>
-bool Region<D>::agrees() const {
-  return std::all_of(ghosts_.begin(), ghosts_.end(), [&](Slot g) {
-    const auto seen = path(g), script = script_.at(g);
-    return std::equal(seen.begin(), seen.end(), script.begin(), script.end());
-  });
+bool Region<D>::agrees(double end) {
+  const auto agree = [&](Slot g) {
+    const auto until = [&](std::span<const Node<D>> nodes) {
+      while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
+      return nodes;
+    };
+    const auto seen = until(path(g)), script = until(script_of(g));
+    return role_[g] != Role::ghost || std::equal(seen.begin(), seen.end(), script.begin(), script.end());
+  };
+  return std::ranges::all_of(scripts_.who(), agree) && std::ranges::all_of(paths_.who(), agree);
+}
+
+template <int D>
+typename Region<D>::Tally Region<D>::tally() const {
+  Tally tally;
+  const auto count = [&](bool pair, double virial, double overlap) {
+    ++(pair ? tally.collisions : tally.bounces);
+    if (pair) tally.virial.add(virial);
+    tally.overlap = std::max(tally.overlap, overlap);
+  };
+  for (const auto& event : trace_.events())
+    if (const Slot lo = event.slot[0]; is_own(lo) && rewritten_[lo] == 0)
+      count(event.slot[1] != kNone, event.virial, event.overlap);
+  for (const Slot i : paths_.who()) {
+    if (!is_own(i) || rewritten_[i] == 0) continue;
+    for (const Node<D>& node : paths_.at(i).nodes)
+      if (node.key.lo == node.after.id) count(node.key.kind == EventKind::pair, node.virial, node.overlap);
+  }
+  return tally;
 }
 
 template <int D>
 void Region<D>::cut(const EventKey<D>& last) {
-  for (std::size_t q = 0; q < touched_.size(); ++q) {
-    Nodes& path = rewritten(touched_[q]);
+  std::vector<Slot> touched(paths_.who().begin(), paths_.who().end());
+  for_each_touched([&](Slot i) { touched.push_back(i); });
+  for (const Slot i : touched) {
+    Nodes& path = rewritten(i).nodes;
     path.erase(std::find_if(path.begin(), path.end(), [&](const Node<D>& n) { return last < n.key; }), path.end());
   }
 }
@@ -387,22 +373,18 @@ void Region<D>::cut(const EventKey<D>& last) {
 template <int D>
 void Region<D>::commit() {
   other_.clear();
-  for (const Slot slot : rewritten_.who()) {
+  for (const Slot slot : paths_.who()) {
+    if (rewritten_[slot] == 0) continue;
+    rewritten_[slot] = 0;
     const Record<D>& now = after(slot);
     const Record<D>& known = core_.flights()[slot];
     if (now.t != known.t || now.x != known.x || now.v != known.v || now.generation != known.generation)
       other_.emplace_back(slot, now);
   }
   core_.put(other_, end_);
-  for (const Slot i : touched_) {
-    length_[i] = 0;
-    start_of_[i] = kNone;
-  }
-  touched_.clear();
+  paths_.clear();
+  scripts_.clear();
   changed_.clear();
-  start_.clear();
-  rewritten_.clear();
-  script_.clear();
 }
 
 template class Region<2>;

@@ -1,0 +1,89 @@
+// Who is in a region, and who is at its border.
+
+#include "engine/region.h"
+
+namespace carom {
+
+template <int D>
+void Region<D>::load(std::vector<Record<D>> records, const Division<D>& division, std::uint32_t number, const Vec<D>& g,
+                     double horizon, double now, double stray) {
+  division_ = &division;
+  number_ = number;
+  stray_ = stray;
+  paths_.clear();
+  scripts_.clear();
+  changed_.clear();
+  role_.clear();
+  border_.clear();
+  ghosts_.clear();
+  core_.load(std::move(records), g, horizon, now, 2 * stray);
+  const std::size_t room = core_.flights().room();
+  slots_.clear(room);
+  trace_.clear(room);
+  paths_.resize(room);
+  scripts_.resize(room);
+  holders_.assign(room, 0);
+  rewritten_.assign(room, 0);
+  mended_of_.assign(room, kNone);
+  role_.assign(room, Role::nobody);
+  for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, core_.flights()[i].id, Role::own);
+  unwatched_ = std::numeric_limits<double>::infinity();
+}
+
+template <int D>
+void Region<D>::enlist(Slot i, Id id, Role role) {
+  slots_.add(id, i);
+  role_[i] = role;
+}
+
+template <int D>
+void Region<D>::forget(Slot i) {
+  role_[i] = Role::nobody;
+  slots_.remove(core_.flights()[i].id);
+  core_.dismiss(i);
+}
+
+template <int D>
+std::vector<Slot> Region<D>::own() const {
+  std::vector<Slot> own;
+  for (Slot i = 0; i < core_.flights().size(); ++i)
+    if (is_own(i)) own.push_back(i);
+  return own;
+}
+
+/// Finds out anew who may be at the border before this is called again.
+template <int D>
+void Region<D>::watch(double now) {
+  unwatched_ = 0;
+  const double reach = division_->reach() + (kSlack + 1) * stray_;
+  border_.clear();
+  for (Slot i = 0; i < core_.flights().size(); ++i)
+    if (is_own(i) && division_->depth(number_, division_->wrapped(core_.flights().at(i, now).x)) <= reach)
+      border_.push_back(i);
+  core_.set_border(border_, ghosts_, now);
+}
+
+template <int D>
+bool Region<D>::admit(const Record<D>& r, double now) {
+  if (slots_.find(r.id) != IdTable::kNowhere) return true;
+  Slot slot = 0;
+  if (!core_.admit(r, now, slot)) return false;
+  enlist(slot, r.id, Role::ghost);
+  ghosts_.push_back(slot);
+  return true;
+}
+
+template void Region<2>::load(std::vector<Record<2>>, const Division<2>&, std::uint32_t, const Vec<2>&, double, double,
+                              double);
+template void Region<2>::forget(Slot);
+template std::vector<Slot> Region<2>::own() const;
+template void Region<2>::watch(double);
+template bool Region<2>::admit(const Record<2>&, double);
+template void Region<3>::load(std::vector<Record<3>>, const Division<3>&, std::uint32_t, const Vec<3>&, double, double,
+                              double);
+template void Region<3>::forget(Slot);
+template std::vector<Slot> Region<3>::own() const;
+template void Region<3>::watch(double);
+template bool Region<3>::admit(const Record<3>&, double);
+
+}  // namespace carom
