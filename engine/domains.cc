@@ -12,13 +12,6 @@ constexpr double kCollisions = 0.3;                           // of a sphere in 
 constexpr double kLargestStray = 1.0, kSmallestStray = 0.02;  // in diameters
 constexpr std::size_t kFewest = 8;                            // spheres a region
 
-/// What comes before the nodes of a path in a message.
-struct PathHead {
-  std::uint32_t region;
-  Id id;
-  std::uint32_t nodes;
-};
-
 }  // namespace
 
 template <int D>
@@ -197,15 +190,16 @@ double Domains<D>::run(double end, const Report& report) {
 /// Sends paths and mends them until nothing changes.
 template <int D>
 void Domains<D>::agree() {
+  mail_.clear();
   for (double more = 1; more > 0;) {
     ++counts_.rounds;
     std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
     send_paths(outgoing);
-    for (const Bytes& bytes : exchange_.swap(std::move(outgoing)))
+    for (const Bytes& bytes : mail_.emplace_back(exchange_.swap(std::move(outgoing))))
       for (Reader reader(bytes); reader.more();) {
-        const auto head = reader.get<PathHead>();
-        local_[head.region - first_region(exchange_.rank())]->follow(head.id, reader.skip(head.nodes * sizeof(Node<D>)),
-                                                                     head.nodes);
+        const auto number = reader.get<std::uint32_t>();
+        const auto id = reader.get<Id>();
+        local_[number - first_region(exchange_.rank())]->follow(id, reader);
       }
     more = 0;
     for (const Local& region : local_) {
@@ -223,11 +217,10 @@ void Domains<D>::send_paths(std::vector<Bytes>& outgoing) const {
     for (const Slot i : region->changed())
       for (std::uint64_t holders = region->holders(i); holders != 0; holders &= holders - 1) {
         const std::uint32_t to = neighbours[static_cast<std::size_t>(std::countr_zero(holders))];
-        const auto path = region->path(i);
         Bytes& bytes = outgoing[static_cast<std::size_t>(rank_of(to))];
-        put(bytes, PathHead{to, region->flights()[i].id, static_cast<std::uint32_t>(path.size())});
-        const auto raw = std::as_bytes(path);
-        bytes.insert(bytes.end(), raw.begin(), raw.end());
+        put(bytes, to);
+        put(bytes, region->flights()[i].id);
+        region->write_path(i, bytes);
       }
   }
 }

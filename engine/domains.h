@@ -69,7 +69,8 @@ class Domains {
   std::size_t regions_;
   std::function<double()> forced_window_;
   std::optional<Division<D>> division_;
-  std::vector<Local> local_;  // the regions of this rank
+  std::vector<Local> local_;              // the regions of this rank
+  std::vector<std::vector<Bytes>> mail_;  // of the window: paths that were sent here
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
   double diameter_ = 0;       // the largest

@@ -15,37 +15,53 @@ void Region<D>::run(double end) {
   index();
 }
 
-/// Reads the paths that others will ask for: of spheres that are ghosts here or elsewhere.
+/// Finds out whose paths matter to others, or to whom others' paths do.
 template <int D>
 void Region<D>::index() {
   changed_.clear();
+  touched_ghosts_.clear();
+  ++window_;
   for (const auto& event : trace_.events())
     for (const int which : {0, 1}) {
       const Slot i = event.slot[which];
       if (i == kNone || event.last[which] != kNone) continue;
-      if (role_[i] == Role::own) continue;
       if (role_[i] == Role::seen) changed_.push_back(i);
-      path_of(i);
+      if (role_[i] == Role::ghost) touched_ghosts_.push_back(i);
     }
+}
+
+/// Node k of a path, as the trace has it, given the shares of the sphere.
+template <int D>
+Node<D> Region<D>::traced(Slot i, std::span<const std::uint32_t> shares, std::size_t k) const {
+  const auto& event = trace_.event_of(shares[k]);
+  return {.after = k + 1 < shares.size() ? trace_.before(shares[k + 1]) : core_.flights()[i],
+          .key = key_of(event),
+          .virial = event.virial,
+          .overlap = event.overlap};
 }
 
 template <int D>
 typename Region<D>::Path& Region<D>::path_of(Slot i) {
   if (paths_.has(i)) return paths_.at(i);
   Path& path = paths_.add(i);
-  path.nodes.clear();
-  path.start = core_.flights()[i];
   const auto shares = trace_.shares(i);
-  for (std::size_t k = 0; k < shares.size(); ++k) {
-    const auto& event = trace_.event_of(shares[k]);
-    if (k == 0) path.start = trace_.before(shares[k]);
-    Node<D>& node = path.nodes.emplace_back();
-    node.after = k + 1 < shares.size() ? trace_.before(shares[k + 1]) : core_.flights()[i];
-    node.key = key_of(event);
-    node.virial = event.virial;
-    node.overlap = event.overlap;
-  }
+  path.start = shares.empty() ? core_.flights()[i] : trace_.before(shares[0]);
+  path.nodes.clear();
+  for (std::size_t k = 0; k < shares.size(); ++k) path.nodes.push_back(traced(i, shares, k));
   return path;
+}
+
+template <int D>
+void Region<D>::write_path(Slot i, Bytes& to) const {
+  if (paths_.has(i)) {
+    const Nodes& nodes = paths_.at(i).nodes;
+    put(to, static_cast<std::uint32_t>(nodes.size()));
+    for (const Node<D>& node : nodes) put(to, node);
+    return;
+  }
+  const auto shares = trace_.shares(i);
+  put(to, static_cast<std::uint32_t>(shares.size()));
+  for (std::size_t k = 0; k < shares.size(); ++k) put(to, traced(i, shares, k));
 }
 
 template <int D>
@@ -61,6 +77,7 @@ EventKey<D> Region<D>::key_of(const typename Trace<D>::Event& event) const {
 template <int D>
 typename Region<D>::Path& Region<D>::rewritten(Slot i) {
   rewritten_[i] = 1;
+  agreed_[i] = 0;
   return path_of(i);
 }
 
@@ -78,24 +95,57 @@ bool Region<D>::is_own_id(Id id) const {
 }
 
 template <int D>
-void Region<D>::follow(Id id, const std::byte* script, std::size_t n) {
+void Region<D>::follow(Id id, Reader& message) {
   const Slot g = slots_.find(id);
-  Nodes& nodes = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
-  nodes.resize(n);
-  std::memcpy(static_cast<void*>(nodes.data()), script, n * sizeof(Node<D>));
+  Script& script = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
+  script.count = message.get<std::uint32_t>();
+  script.bytes = message.skip(script.count * sizeof(Node<D>));
+  script.nodes.clear();
+  agreed_[g] = 0;
 }
 
 template <int D>
-std::span<const Node<D>> Region<D>::script_of(Slot g) const {
-  return scripts_.has(g) ? std::span<const Node<D>>(scripts_.at(g)) : std::span<const Node<D>>();
+Node<D> Region<D>::Script::node(std::size_t k) const {
+  Node<D> node;
+  std::memcpy(static_cast<void*>(&node), bytes + k * sizeof node, sizeof node);
+  return node;
+}
+
+template <int D>
+std::span<const Node<D>> Region<D>::script_of(Slot g) {
+  if (!scripts_.has(g)) return {};
+  Script& script = scripts_.at(g);
+  while (script.nodes.size() < script.count) script.nodes.push_back(script.node(script.nodes.size()));
+  return script.nodes;
+}
+
+/// Whether a ghost did here what its script says.
+template <int D>
+bool Region<D>::matches(Slot g) {
+  if (agreed_[g] == window_) return true;
+  const std::size_t count = scripts_.has(g) ? scripts_.at(g).count : 0;
+  std::size_t k = 0;
+  if (paths_.has(g)) {
+    const Nodes& nodes = paths_.at(g).nodes;
+    if (nodes.size() != count) return false;
+    while (k < count && nodes[k] == scripts_.at(g).node(k)) ++k;
+  } else {
+    const auto shares = trace_.shares(g);
+    if (shares.size() != count) return false;
+    while (k < count && traced(g, shares, k) == scripts_.at(g).node(k)) ++k;
+  }
+  if (k == count) agreed_[g] = window_;
+  return k == count;
 }
 
 template <int D>
 void Region<D>::repair() {
   repairs_.clear();
   for (const Slot g : scripts_.who()) seed(g);
+  for (const Slot i : touched_ghosts_)
+    if (!scripts_.has(i)) seed(i);
   for (const Slot i : paths_.who())
-    if (role_[i] == Role::ghost && !scripts_.has(i)) seed(i);
+    if (role_[i] == Role::ghost && !scripts_.has(i) && !trace_.has(i)) seed(i);
   while (!tasks_.empty()) {
     const Task task = tasks_.top();
     tasks_.pop();
@@ -129,11 +179,10 @@ void Region<D>::repair() {
 /// What it does with own spheres of this region is not its owner's to know first.
 template <int D>
 void Region<D>::seed(Slot g) {
-  const auto seen = path(g);
-  const auto script = script_of(g);
+  if (matches(g)) return;
+  const auto seen = path(g), script = script_of(g);
   std::size_t k = 0;
   while (k < seen.size() && k < script.size() && seen[k] == script[k]) ++k;
-  if (k == seen.size() && k == script.size()) return;
   const bool sees = k < seen.size() && !is_own_id(seen[k].partner());
   if (k < script.size() && (k == seen.size() || script[k].key <= seen[k].key)) {
     if (is_own_id(script[k].partner()) && !sees) return;
@@ -330,15 +379,17 @@ void Region<D>::check(const Task& task) {
 
 template <int D>
 bool Region<D>::agrees(double end) {
-  const auto agree = [&](Slot g) {
-    const auto until = [&](std::span<const Node<D>> nodes) {
-      while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
-      return nodes;
-    };
-    const auto seen = until(path(g)), script = until(script_of(g));
-    return role_[g] != Role::ghost || std::equal(seen.begin(), seen.end(), script.begin(), script.end());
+  const auto until = [&](std::span<const Node<D>> nodes) {
+    while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
+    return nodes;
   };
-  return std::ranges::all_of(scripts_.who(), agree) && std::ranges::all_of(paths_.who(), agree);
+  const auto agree = [&](Slot g) {
+    if (role_[g] != Role::ghost || agreed_[g] == window_) return true;
+    const auto seen = until(path(g)), script = until(script_of(g));
+    return std::equal(seen.begin(), seen.end(), script.begin(), script.end());
+  };
+  return std::ranges::all_of(scripts_.who(), agree) && std::ranges::all_of(touched_ghosts_, agree) &&
+         std::ranges::all_of(paths_.who(), agree);
 }
 
 template <int D>

@@ -11,7 +11,7 @@
 //
 //   region.load(records, division, number, …);
 //   region.run(now, end);
-//   while (…) { region.follow(id, script, n); …; region.repair(); … region.changed() … }
+//   while (…) { region.follow(id, message); …; region.repair(); … region.changed() … }
 //   region.commit();
 //   region.sort_out(now, send); …; region.admit(record, now);
 
@@ -22,6 +22,7 @@
 #include "engine/division.h"
 #include "engine/event_core.h"
 #include "engine/exact_sum.h"
+#include "engine/exchange.h"
 #include "engine/id_table.h"
 
 namespace carom {
@@ -72,8 +73,10 @@ class Region {
   /// Runs to `end`. Whoever comes farther than the stray from where he was at the start makes the window of no use: cut
   /// it before that.
   void run(double end);
-  /// What a ghost did according to its owner: n nodes, byte by byte.
-  void follow(Id id, const std::byte* script, std::size_t n);
+  /// Appends the path of a sphere to a message.
+  void write_path(Slot i, Bytes& to) const;
+  /// Reads what a ghost did according to its owner; the message must stay until the end of the window.
+  void follow(Id id, Reader& message);
   /// Mends the window after scripts have come.
   void repair();
   /// What a sphere did in the window.
@@ -116,6 +119,13 @@ class Region {
     Record<D> start;  // at the start of the window
     Nodes nodes;
   };
+  /// Of a ghost. Most are compared with what was seen and never read.
+  struct Script {
+    const std::byte* bytes;
+    std::uint32_t count;
+    Nodes nodes;  // where they have been read
+    Node<D> node(std::size_t k) const;
+  };
 
   /// A sphere whose path is being mended.
   struct Mended {
@@ -151,7 +161,9 @@ class Region {
   Path& path_of(Slot i);
   Path& rewritten(Slot i);
   EventKey<D> key_of(const typename Trace<D>::Event& event) const;
-  std::span<const Node<D>> script_of(Slot g) const;
+  Node<D> traced(Slot i, std::span<const std::uint32_t> shares, std::size_t k) const;
+  std::span<const Node<D>> script_of(Slot g);
+  bool matches(Slot g);
   bool mended(Slot i) const { return mended_of_[i] != kNone; }
   Mended& mend(Slot i, const EventKey<D>& key);
   void seed(Slot g);
@@ -181,7 +193,10 @@ class Region {
   Trace<D> trace_;
   BySlot<Path> paths_;                   // those that are wanted
   std::vector<std::uint8_t> rewritten_;  // by slot: its path is not that of the trace
-  BySlot<Nodes> scripts_;                // of ghosts
+  BySlot<Script> scripts_;               // of ghosts
+  std::vector<Slot> touched_ghosts_;     // that had events in the first run
+  std::vector<std::uint32_t> agreed_;    // by slot: the window in which a ghost was found to do what its script says
+  std::uint32_t window_ = 0;             // its number
   std::vector<Slot> changed_;
   std::vector<std::pair<Slot, Record<D>>> other_;  // records that the core is told
   double mended_fastest_squared_ = 0;

@@ -24,6 +24,7 @@ void Region<D>::load(std::vector<Record<D>> records, const Division<D>& division
   scripts_.resize(room);
   holders_.assign(room, 0);
   rewritten_.assign(room, 0);
+  agreed_.assign(room, 0);
   mended_of_.assign(room, kNone);
   role_.assign(room, Role::nobody);
   for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, core_.flights()[i].id, Role::own);
