@@ -94,7 +94,7 @@ class EventCore {
   void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
   /// Says which spheres are at the border of a region: lists of theirs are good for each other wherever they come in a
   /// window, and need not be searched for.
-  void set_border(std::span<const Slot> border, std::span<const Slot> ghosts, double now);
+  void set_border(std::span<const Slot> slots, double now);
   /// Candidates for contacts of a sphere: whoever may touch it where each of the two has come up to `astray` (load)
   /// from where the core knows it to be. Good until the next call.
   std::span<const std::uint32_t> find_near(Slot i);

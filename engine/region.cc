@@ -244,6 +244,17 @@ bool Region<D>::meeting_place(const Mended& m, Vec<D>& low, Vec<D>& high) const 
   return true;
 }
 
+/// Whether two spheres can come together at all; the other is known where it comes within another two strays.
+template <int D>
+bool Region<D>::may_meet(const Mended& m, Slot j, const Image<D>& image) const {
+  const double time = end_ - m.now.t, way = (m.now.v.norm() + 0.5 * time * core_.flights().g().norm()) * time;
+  const double close = division_->reach() + way;
+  const Record<D>& r = core_.flights()[j];
+  const double s = end_ - r.t;
+  const Vec<D> d = m.now.x - (r.x + s * r.v + (0.5 * s * s) * core_.flights().g()) + box_.shift(image);
+  return d.squaredNorm() <= close * close;
+}
+
 /// Plans all contacts that a mended sphere may have from `now` on.
 template <int D>
 void Region<D>::predict(Mended& m, const EventKey<D>& now) {
@@ -252,10 +263,12 @@ void Region<D>::predict(Mended& m, const EventKey<D>& now) {
     Vec<D> low, high;
     if (!meeting_place(m, low, high)) return;
     for (const std::uint32_t candidate : core_.find_near_at_border(m.slot, low, high))
-      if (const Slot j = packing.slot(candidate); is_own(j)) meet(m, j, packing.image(candidate), now);
+      if (const Slot j = packing.slot(candidate); is_own(j) && may_meet(m, j, packing.image(candidate)))
+        meet(m, j, packing.image(candidate), now);
   } else {
     for (const std::uint32_t candidate : core_.find_near(m.slot))
-      if (const Slot j = packing.slot(candidate); j != m.slot) meet(m, j, packing.image(candidate), now);
+      if (const Slot j = packing.slot(candidate); j != m.slot && may_meet(m, j, packing.image(candidate)))
+        meet(m, j, packing.image(candidate), now);
   }
   predict_walls(m);
 }

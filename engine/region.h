@@ -115,6 +115,10 @@ class Region {
   static constexpr double kSlack = 8;                           // windows between looks at who is at the border
   enum class Role : std::uint8_t { nobody, own, seen, ghost };  // seen: own, and a ghost elsewhere
 
+  struct Edge {
+    Slot slot;
+    double quiet;  // how far it may come before it must be looked at again
+  };
   struct Path {
     Record<D> start;  // at the start of the window
     Nodes nodes;
@@ -156,6 +160,7 @@ class Region {
   void enlist(Slot i, Id id, Role role);
   void forget(Slot i);
   void watch(double now);
+  double look_at(Slot i, double now);
   void index();
   bool met_nobody(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
   Path& path_of(Slot i);
@@ -168,6 +173,7 @@ class Region {
   Mended& mend(Slot i, const EventKey<D>& key);
   void seed(Slot g);
   bool meeting_place(const Mended& m, Vec<D>& low, Vec<D>& high) const;
+  bool may_meet(const Mended& m, Slot j, const Image<D>& image) const;
   void predict(Mended& m, const EventKey<D>& now);
   void predict_walls(Mended& m);
   void meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>& now);
@@ -187,8 +193,7 @@ class Region {
   IdTable slots_;
   std::vector<Role> role_;              // by slot
   std::vector<std::uint64_t> holders_;  // by slot
-  std::vector<Slot> border_;            // own spheres that may leave, or that others may see
-  std::vector<Slot> ghosts_, all_;
+  std::vector<Edge> edge_;              // ghosts, and own spheres that may leave, or that others may see
 
   Trace<D> trace_;
   BySlot<Path> paths_;                   // those that are wanted
@@ -211,34 +216,20 @@ template <int D>
 template <class Send>
 void Region<D>::sort_out(double now, Send&& send) {
   if (unwatched_ += stray_; unwatched_ > kSlack * stray_) watch(now);
-  all_.swap(border_);
-  all_.insert(all_.end(), ghosts_.begin(), ghosts_.end());
-  border_.clear();
-  ghosts_.clear();
-  const auto neighbours = division_->neighbours(number_);
-  for (const Slot i : all_) {
-    const Vec<D> at = division_->wrapped(core_.flights().at(i, now).x);
-    const double depth = division_->depth(number_, at);
-    if (!(depth > 0) && division_->owner(at) != number_) {
-      holders_[i] = 0;
-      if (!division_->near(number_, at)) {
-        forget(i);
-        continue;
-      }
-      role_[i] = Role::ghost;
-      ghosts_.push_back(i);
-      continue;
+  std::size_t stay = 0;
+  for (Edge edge : edge_) {
+    edge.quiet -= stray_;
+    if (!(edge.quiet > 0)) {
+      const Slot i = edge.slot;
+      const std::uint64_t before = holders_[i];
+      edge.quiet = look_at(i, now);
+      if (role_[i] == Role::nobody) continue;
+      for (std::uint64_t fresh = holders_[i] & ~before; fresh != 0; fresh &= fresh - 1)
+        send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
     }
-    border_.push_back(i);
-    std::uint64_t holders = 0;
-    if (!division_->deep(depth))
-      for (std::size_t k = 0; k < neighbours.size(); ++k)
-        if (division_->near(neighbours[k], at)) holders |= std::uint64_t{1} << k;
-    role_[i] = holders == 0 ? Role::own : Role::seen;
-    for (std::uint64_t fresh = holders & ~holders_[i]; fresh != 0; fresh &= fresh - 1)
-      send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
-    holders_[i] = holders;
+    edge_[stay++] = edge;
   }
+  edge_.resize(stay);
 }
 
 template <int D>

@@ -14,8 +14,7 @@ void Region<D>::load(std::vector<Record<D>> records, const Division<D>& division
   scripts_.clear();
   changed_.clear();
   role_.clear();
-  border_.clear();
-  ghosts_.clear();
+  edge_.clear();
   core_.load(std::move(records), g, horizon, now, 2 * stray);
   const std::size_t room = core_.flights().room();
   slots_.clear(room);
@@ -52,16 +51,52 @@ std::vector<Slot> Region<D>::own() const {
   return own;
 }
 
-/// Finds out anew who may be at the border before this is called again.
+/// Finds out anew which own spheres may come to the border before this is called again.
 template <int D>
 void Region<D>::watch(double now) {
   unwatched_ = 0;
   const double reach = division_->reach() + (kSlack + 1) * stray_;
-  border_.clear();
+  std::erase_if(edge_, [&](const Edge& edge) { return role_[edge.slot] != Role::ghost; });
   for (Slot i = 0; i < core_.flights().size(); ++i)
     if (is_own(i) && division_->depth(number_, division_->wrapped(core_.flights().at(i, now).x)) <= reach)
-      border_.push_back(i);
-  core_.set_border(border_, ghosts_, now);
+      edge_.push_back({i, 0});
+  std::vector<Slot> slots;
+  for (const Edge& edge : edge_) slots.push_back(edge.slot);
+  core_.set_border(slots, now);
+}
+
+/// Says whose a sphere is and where it is a ghost, from where it is now. Returns how far it may come until something of
+/// that changes; others who know it find the same.
+template <int D>
+double Region<D>::look_at(Slot i, double now) {
+  const Vec<D> at = division_->wrapped(core_.flights().at(i, now).x);
+  const double depth = division_->depth(number_, at), reach = division_->reach();
+  if (division_->deep(depth)) {
+    role_[i] = Role::own;
+    holders_[i] = 0;
+    return depth - (1 + 1e-6) * reach;
+  }
+  holders_[i] = 0;
+  double quiet;
+  if (depth > 0 || division_->owner(at) == number_) {
+    quiet = depth;
+    const auto neighbours = division_->neighbours(number_);
+    for (std::size_t k = 0; k < neighbours.size(); ++k) {
+      const double squared = division_->squared_distance(neighbours[k], at);
+      if (squared <= reach * reach) holders_[i] |= std::uint64_t{1} << k;
+      quiet = std::min(quiet, std::abs(std::sqrt(squared) - reach));
+    }
+    role_[i] = holders_[i] == 0 ? Role::own : Role::seen;
+  } else {
+    const double squared = division_->squared_distance(number_, at), away = std::sqrt(squared);
+    if (squared > reach * reach) {
+      forget(i);
+      return 0;
+    }
+    role_[i] = Role::ghost;
+    quiet = std::min(away, reach - away);
+  }
+  return quiet - 1e-6 * reach;
 }
 
 template <int D>
@@ -70,7 +105,7 @@ bool Region<D>::admit(const Record<D>& r, double now) {
   Slot slot = 0;
   if (!core_.admit(r, now, slot)) return false;
   enlist(slot, r.id, Role::ghost);
-  ghosts_.push_back(slot);
+  edge_.push_back({slot, 0});
   return true;
 }
 
@@ -79,12 +114,14 @@ template void Region<2>::load(std::vector<Record<2>>, const Division<2>&, std::u
 template void Region<2>::forget(Slot);
 template std::vector<Slot> Region<2>::own() const;
 template void Region<2>::watch(double);
+template double Region<2>::look_at(Slot, double);
 template bool Region<2>::admit(const Record<2>&, double);
 template void Region<3>::load(std::vector<Record<3>>, const Division<3>&, std::uint32_t, const Vec<3>&, double, double,
                               double);
 template void Region<3>::forget(Slot);
 template std::vector<Slot> Region<3>::own() const;
 template void Region<3>::watch(double);
+template double Region<3>::look_at(Slot, double);
 template bool Region<3>::admit(const Record<3>&, double);
 
 }  // namespace carom
