@@ -151,7 +151,7 @@ double Domains<D>::run(double end, const Report& report) {
     if (cut_) reload();
     if (!sorted_) sort_out(false);
     double stop = window_end(end);
-    for (const Local& region : local_) region->run(stop);
+    for (const Local& region : local_) region->run(now_, stop);
     ++counts_.windows;
     agree();
     if (const double astray = first_astray(stop); astray < stop) stop = cut_at(astray);

@@ -5,8 +5,9 @@
 namespace carom {
 
 template <int D>
-void Region<D>::run(double end) {
+void Region<D>::run(double now, double end) {
   end_ = end;
+  length_ = end - now;
   trace_.clear(core_.flights().room());
   mended_fastest_squared_ = 0;
   Counters unused;
@@ -163,7 +164,7 @@ void Region<D>::repair() {
         if (mended(task.a)) break;
         Mended& m = mend(task.a, task.key);
         plan_script(m);
-        predict(m, task.key);
+        if (!follows_at_once(m, task.key)) predict(m, task.key);
     }
   }
   changed_.clear();
@@ -253,6 +254,13 @@ bool Region<D>::may_meet(const Mended& m, Slot j, const Image<D>& image) const {
   const double s = end_ - r.t;
   const Vec<D> d = m.now.x - (r.x + s * r.v + (0.5 * s * s) * core_.flights().g()) + box_.shift(image);
   return d.squaredNorm() <= close * close;
+}
+
+/// Whether what a ghost does next according to its script is at this very key.
+template <int D>
+bool Region<D>::follows_at_once(const Mended& m, const EventKey<D>& key) {
+  const auto script = script_of(m.slot);
+  return !m.strays && m.script < script.size() && script[m.script].key == key;
 }
 
 /// Plans all contacts that a mended sphere may have from `now` on.
@@ -375,6 +383,7 @@ void Region<D>::script(const Task& task) {
   const Node<D>& node = script_of(task.a)[m.script];
   if (is_own_id(node.partner())) {  // who knows better: they did not meet
     m.strays = true;
+    predict(m, task.key);
     return;
   }
   append(m, node);
@@ -443,7 +452,7 @@ void Region<D>::commit() {
     const Record<D>& now = after(slot);
     const Record<D>& known = core_.flights()[slot];
     if (now.t != known.t || now.x != known.x || now.v != known.v || now.generation != known.generation)
-      other_.emplace_back(slot, now);
+      other_.emplace_back(slot, now), disturbed_[slot] = 1;
   }
   core_.put(other_, end_);
   paths_.clear();

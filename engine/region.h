@@ -70,9 +70,9 @@ class Region {
 
   // In a window.
 
-  /// Runs to `end`. Whoever comes farther than the stray from where he was at the start makes the window of no use: cut
-  /// it before that.
-  void run(double end);
+  /// Runs from `now` to `end`. Whoever comes farther than the stray from where he was at the start makes the window of
+  /// no use: cut it before that.
+  void run(double now, double end);
   /// Appends the path of a sphere to a message.
   void write_path(Slot i, Bytes& to) const;
   /// Reads what a ghost did according to its owner; the message must stay until the end of the window.
@@ -112,12 +112,14 @@ class Region {
 
  private:
   static constexpr std::uint32_t kNone = Trace<D>::kNone;
-  static constexpr double kSlack = 8;                           // windows between looks at who is at the border
+  static constexpr double kUnknown = -1;
+  static constexpr double kSlack = 20;                           // windows between looks at who is at the border
   enum class Role : std::uint8_t { nobody, own, seen, ghost };  // seen: own, and a ghost elsewhere
 
   struct Edge {
     Slot slot;
-    double quiet;  // how far it may come before it must be looked at again
+    double quiet;             // how far it may come before it must be looked at again
+    double speed = kUnknown;  // until its next event; unknown: as large as anyone's
   };
   struct Path {
     Record<D> start;  // at the start of the window
@@ -160,7 +162,7 @@ class Region {
   void enlist(Slot i, Id id, Role role);
   void forget(Slot i);
   void watch(double now);
-  double look_at(Slot i, double now);
+  Edge look_at(Slot i, double now);
   void index();
   bool met_nobody(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
   Path& path_of(Slot i);
@@ -173,6 +175,7 @@ class Region {
   Mended& mend(Slot i, const EventKey<D>& key);
   void seed(Slot g);
   bool meeting_place(const Mended& m, Vec<D>& low, Vec<D>& high) const;
+  bool follows_at_once(const Mended& m, const EventKey<D>& key);
   bool may_meet(const Mended& m, Slot j, const Image<D>& image) const;
   void predict(Mended& m, const EventKey<D>& now);
   void predict_walls(Mended& m);
@@ -186,8 +189,8 @@ class Region {
 
   const Box<D>& box_;
   EventCore<D> core_;
-  double end_ = 0, stray_ = 0;  // of the window
-  double unwatched_ = 0;        // how far spheres may have come since watch()
+  double end_ = 0, length_ = 0, stray_ = 0;  // of the window
+  double unwatched_ = 0;                     // how far spheres may have come since watch()
   const Division<D>* division_ = nullptr;
   std::uint32_t number_ = 0;
   IdTable slots_;
@@ -204,6 +207,7 @@ class Region {
   std::uint32_t window_ = 0;             // its number
   std::vector<Slot> changed_;
   std::vector<std::pair<Slot, Record<D>>> other_;  // records that the core is told
+  std::vector<std::uint8_t> disturbed_;            // by slot: it is among them
   double mended_fastest_squared_ = 0;
 
   std::deque<Mended> repairs_;
@@ -218,17 +222,19 @@ void Region<D>::sort_out(double now, Send&& send) {
   if (unwatched_ += stray_; unwatched_ > kSlack * stray_) watch(now);
   std::size_t stay = 0;
   for (Edge edge : edge_) {
-    edge.quiet -= stray_;
+    const Slot i = edge.slot;
+    if (edge.speed >= 0 && (trace_.has(i) || disturbed_[i] != 0)) edge.speed = kUnknown;
+    edge.quiet -= edge.speed >= 0 ? edge.speed * length_ : stray_;
     if (!(edge.quiet > 0)) {
-      const Slot i = edge.slot;
       const std::uint64_t before = holders_[i];
-      edge.quiet = look_at(i, now);
+      edge = look_at(i, now);
       if (role_[i] == Role::nobody) continue;
       for (std::uint64_t fresh = holders_[i] & ~before; fresh != 0; fresh &= fresh - 1)
         send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
     }
     edge_[stay++] = edge;
   }
+  for (const auto& [slot, record] : other_) disturbed_[slot] = 0;
   edge_.resize(stay);
 }
 

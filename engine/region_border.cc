@@ -24,6 +24,8 @@ void Region<D>::load(std::vector<Record<D>> records, const Division<D>& division
   holders_.assign(room, 0);
   rewritten_.assign(room, 0);
   agreed_.assign(room, 0);
+  disturbed_.assign(room, 0);
+  other_.clear();
   mended_of_.assign(room, kNone);
   role_.assign(room, Role::nobody);
   for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, core_.flights()[i].id, Role::own);
@@ -65,16 +67,18 @@ void Region<D>::watch(double now) {
   core_.set_border(slots, now);
 }
 
-/// Says whose a sphere is and where it is a ghost, from where it is now. Returns how far it may come until something of
+/// Says whose a sphere is and where it is a ghost, from where it is now, and how far it may come until something of
 /// that changes; others who know it find the same.
 template <int D>
-double Region<D>::look_at(Slot i, double now) {
-  const Vec<D> at = division_->wrapped(core_.flights().at(i, now).x);
+typename Region<D>::Edge Region<D>::look_at(Slot i, double now) {
+  const Flights<D>& flights = core_.flights();
+  const Vec<D> at = division_->wrapped(flights.at(i, now).x);
+  const double speed = flights[i].v.norm() + flights.g().norm() * flights.horizon();
   const double depth = division_->depth(number_, at), reach = division_->reach();
   if (division_->deep(depth)) {
     role_[i] = Role::own;
     holders_[i] = 0;
-    return depth - (1 + 1e-6) * reach;
+    return {i, depth - (1 + 1e-6) * reach, (1 + 1e-6) * speed};
   }
   holders_[i] = 0;
   double quiet;
@@ -91,12 +95,12 @@ double Region<D>::look_at(Slot i, double now) {
     const double squared = division_->squared_distance(number_, at), away = std::sqrt(squared);
     if (squared > reach * reach) {
       forget(i);
-      return 0;
+      return {i, 0};
     }
     role_[i] = Role::ghost;
     quiet = std::min(away, reach - away);
   }
-  return quiet - 1e-6 * reach;
+  return {i, quiet - 1e-6 * reach, (1 + 1e-6) * speed};
 }
 
 template <int D>
@@ -114,14 +118,14 @@ template void Region<2>::load(std::vector<Record<2>>, const Division<2>&, std::u
 template void Region<2>::forget(Slot);
 template std::vector<Slot> Region<2>::own() const;
 template void Region<2>::watch(double);
-template double Region<2>::look_at(Slot, double);
+template typename Region<2>::Edge Region<2>::look_at(Slot, double);
 template bool Region<2>::admit(const Record<2>&, double);
 template void Region<3>::load(std::vector<Record<3>>, const Division<3>&, std::uint32_t, const Vec<3>&, double, double,
                               double);
 template void Region<3>::forget(Slot);
 template std::vector<Slot> Region<3>::own() const;
 template void Region<3>::watch(double);
-template double Region<3>::look_at(Slot, double);
+template typename Region<3>::Edge Region<3>::look_at(Slot, double);
 template bool Region<3>::admit(const Record<3>&, double);
 
 }  // namespace carom
