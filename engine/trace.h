@@ -49,6 +49,7 @@ class Trace {
     double time, virial, overlap;
     std::uint32_t generation;
     std::uint32_t partner;  ///< of the first, as the core has it (Agenda)
+    Id id[2];
     Slot slot[2];           ///< kNone: a wall
     std::uint32_t last[2];  ///< the share that the sphere had in an event before, or kNone
   };
@@ -69,8 +70,15 @@ class Trace {
 
   /// An event is about to happen to the sphere `i`, and to `j` unless that is kNone.
   void begin(Slot i, const Record<D>& a, Slot j, const Record<D>& b, std::uint32_t partner, std::uint32_t generation) {
-    events_.push_back(
-        {0, 0, 0, generation, partner, {i, j}, {take_share(i, 0), j == kNone ? kNone : take_share(j, 1)}});
+    Event& event = events_.emplace_back();
+    event.generation = generation;
+    event.partner = partner;
+    event.id[0] = a.id;
+    event.id[1] = b.id;
+    event.slot[0] = i;
+    event.slot[1] = j;
+    event.last[0] = take_share(i, 0);
+    event.last[1] = j == kNone ? kNone : take_share(j, 1);
     before_.push_back(a);
     before_.push_back(b);
   }
@@ -101,7 +109,7 @@ class Trace {
  private:
   std::uint32_t take_share(Slot i, std::uint32_t which) {
     const std::uint32_t last = has(i) ? latest_[i] - base_ : kNone;
-    latest_[i] = base_ + 2 * static_cast<std::uint32_t>(events_.size()) + which;
+    latest_[i] = base_ + 2 * static_cast<std::uint32_t>(events_.size() - 1) + which;
     return last;
   }
 
