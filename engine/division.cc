@@ -10,7 +10,8 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 }  // namespace
 
 template <int D>
-Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions) : box_(box) {
+Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach)
+    : box_(box), reach_(reach) {
   Part all;
   for (int k = 0; k < D; ++k) {
     all.low[k] = box.periodic(k) ? 0 : -kInfinite;
@@ -19,6 +20,7 @@ Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t 
   std::vector<Vec<D>> places(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) places[i] = wrapped(x[i]);
   root_ = divide(places, all, std::max<std::size_t>(regions, 1));
+  for (std::uint32_t r = 0; r < parts_.size(); ++r) neighbours_.push_back(neighbours_of(r));
 }
 
 /// Cuts a part across its longest edge; returns the cut, or the complement of the region's number.
@@ -27,6 +29,9 @@ std::int32_t Division<D>::divide(std::span<Vec<D>> x, Part part, std::size_t reg
   if (regions == 1) {
     part.centre = 0.5 * (part.low + part.high);
     part.half = 0.5 * (part.high - part.low);
+    for (int k = 0; k < D; ++k)
+      part.whole[k] = box_.periodic(k) ? part.low[k] == 0 && part.high[k] == box_.edges[k]
+                                       : !std::isfinite(part.low[k]) && !std::isfinite(part.high[k]);
     parts_.push_back(part);
     return ~static_cast<std::int32_t>(parts_.size() - 1);
   }
@@ -58,14 +63,33 @@ std::int32_t Division<D>::divide(std::span<Vec<D>> x, Part part, std::size_t reg
 }
 
 template <int D>
-std::uint32_t Division<D>::owner(const Vec<D>& x) const {
-  const Vec<D> at = wrapped(x);
+std::uint32_t Division<D>::owner(const Vec<D>& at) const {
   std::int32_t node = root_;
   while (node >= 0) {
     const Cut& cut = cuts_[static_cast<std::size_t>(node)];
     node = at[cut.axis] < cut.at ? cut.below : cut.above;
   }
   return static_cast<std::uint32_t>(~node);
+}
+
+template <int D>
+bool Division<D>::clip(std::uint32_t region, double margin, Vec<D>& low, Vec<D>& high) const {
+  const Part& part = parts_[region];
+  for (int k = 0; k < D; ++k) {
+    const double edge = box_.edges[k];
+    const bool images = box_.periodic(k);
+    if (part.whole[k] || (images && high[k] - low[k] > edge)) continue;
+    double least = kInfinite, most = -kInfinite;
+    for (int box = images ? -1 : 0; box <= (images ? 1 : 0); ++box) {
+      const double from = std::max(low[k], part.low[k] - margin + box * edge);
+      const double to = std::min(high[k], part.high[k] + margin + box * edge);
+      if (from <= to) least = std::min(least, from), most = std::max(most, to);
+    }
+    if (!(least <= most)) return false;
+    low[k] = least;
+    high[k] = most;
+  }
+  return true;
 }
 
 /// Between two stretches of an axis.
@@ -81,19 +105,7 @@ double Division<D>::gap(int axis, double low, double high, double other_low, dou
 }
 
 template <int D>
-double Division<D>::depth(std::uint32_t region, const Vec<D>& x) const {
-  const Part& part = parts_[region];
-  const Vec<D> at = wrapped(x);
-  double least = kInfinite;
-  for (int k = 0; k < D; ++k) {
-    if (box_.periodic(k) && part.low[k] == 0 && part.high[k] == box_.edges[k]) continue;
-    least = std::min({least, at[k] - part.low[k], part.high[k] - at[k]});
-  }
-  return least;
-}
-
-template <int D>
-std::vector<std::uint32_t> Division<D>::neighbours(std::uint32_t region, double reach) const {
+std::vector<std::uint32_t> Division<D>::neighbours_of(std::uint32_t region) const {
   std::vector<std::uint32_t> near;
   const Part& a = parts_[region];
   for (std::uint32_t r = 0; r < parts_.size(); ++r) {
@@ -103,7 +115,7 @@ std::vector<std::uint32_t> Division<D>::neighbours(std::uint32_t region, double 
       const double d = gap(k, a.low[k], a.high[k], b.low[k], b.high[k]);
       sum += d * d;
     }
-    if (r != region && sum <= reach * reach) near.push_back(r);
+    if (r != region && sum <= reach_ * reach_) near.push_back(r);
   }
   return near;
 }

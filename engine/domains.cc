@@ -1,9 +1,9 @@
 #include "engine/domains.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "engine/error.h"
-#include "engine/shared_contacts.h"
 
 namespace carom {
 namespace {
@@ -11,8 +11,6 @@ namespace {
 constexpr double kCollisions = 0.3;                           // of a sphere in a window, about
 constexpr double kLargestStray = 1.0, kSmallestStray = 0.02;  // in diameters
 constexpr std::size_t kFewest = 8;                            // spheres a region
-constexpr double kFaster = 1.15;                              // than anyone is, somebody may come to be
-constexpr double kSlack = 8;                                  // windows between looks at who is at the border
 
 }  // namespace
 
@@ -26,10 +24,7 @@ Domains<D>::Domains(const Box<D>& box, const Particles<D>& particles, Exchange& 
       forced_window_(std::move(window)) {
   diameter_ = 2 * *std::max_element(particles.radius.begin(), particles.radius.end());
   for (std::size_t r = first_region(exchange_.rank()); r < first_region(exchange_.rank() + 1); ++r)
-    local_.push_back({.number = static_cast<std::uint32_t>(r),
-                      .region = std::make_unique<Region<D>>(box, particles, options),
-                      .neighbours = {},
-                      .holders = {}});
+    local_.push_back(std::make_unique<Region<D>>(box, particles, options));
 }
 
 /// Regions go to ranks in their order, as evenly as may be.
@@ -65,7 +60,10 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
   }
   fastest_ = kFaster * fastest_ + g_.norm() * horizon_;
   stray_ = std::clamp(1.05 * pace_ * fastest_, kSmallestStray * diameter_, kLargestStray * diameter_);
-  division_.emplace(box_, particles.x, regions_);
+  division_.emplace(box_, particles.x, regions_, diameter_ + 2 * stray_);
+  for (std::uint32_t r = 0; r < regions_; ++r)
+    if (division_->neighbours(r).size() > 64)
+      throw Error(Failure::deck, "a region has more than 64 neighbours; use fewer ranks for this box");
   std::vector<Record<D>> records(particles.size());
   for (std::size_t i = 0; i < records.size(); ++i)
     records[i] = {particles.x[i], particles.v[i], 0.0, static_cast<Id>(i), 0, particles.species[i]};
@@ -76,90 +74,61 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
 
 template <int D>
 void Domains<D>::load(std::span<const Record<D>> records, double now) {
-  const double reach = diameter_ + 2 * stray_;
-  std::vector<std::vector<Record<D>>> own(regions_), ghosts(regions_);
-  const std::size_t first = first_region(exchange_.rank()), last = first_region(exchange_.rank() + 1);
+  const std::size_t first = first_region(exchange_.rank());
+  std::vector<std::vector<Record<D>>> near(local_.size());
   for (const Record<D>& r : records) {
-    Vec<D> x = r.x + (now - r.t) * r.v;
-    x += (0.5 * (now - r.t) * (now - r.t)) * g_;
-    const std::uint32_t owner = division_->owner(x);
-    division_->for_each_near(x, reach, [&](std::uint32_t q) {
-      if (q >= first && q < last) (q == owner ? own : ghosts)[q].push_back(r);
+    const double s = now - r.t;
+    Vec<D> x = r.x + s * r.v;  // as in Flights, bit for bit
+    if (g_ != Vec<D>::Zero()) x += (0.5 * s * s) * g_;
+    division_->for_each_near(division_->wrapped(x), [&](std::uint32_t q) {
+      if (q >= first && q < first + near.size()) near[q - first].push_back(r);
     });
   }
-  for (Local& local : local_) {
-    local.neighbours = division_->neighbours(local.number, reach);
-    if (local.neighbours.size() > 64)
-      throw Error(Failure::deck, "a region has more than 64 neighbours; use fewer ranks for this box");
-    local.region->load(std::move(own[local.number]), ghosts[local.number], g_, horizon_, now, stray_);
-    local.holders.clear();
-    local.unwatched = std::numeric_limits<double>::infinity();
-  }
+  for (std::size_t k = 0; k < local_.size(); ++k)
+    local_[k]->load(std::move(near[k]), *division_, static_cast<std::uint32_t>(first + k), g_, horizon_, now, stray_);
   now_ = now;
-  fresh_ = false;
-  sort_out();
-  fresh_ = true;
+  cut_ = false;
+  sort_out(true);
 }
 
 /// Starts all regions anew from what everybody knows.
 template <int D>
-void Domains<D>::reload(double now) {
+void Domains<D>::reload() {
   Bytes mine;
-  for (const Local& local : local_)
-    for (const Slot i : local.region->own()) put(mine, local.region->after(i));
+  for (const Local& region : local_)
+    for (const Slot i : region->own()) put(mine, region->after(i));
   std::vector<Record<D>> records(particles_.radius.size());
   for (const Bytes& bytes : exchange_.gather(mine))
     for (Reader reader(bytes); reader.more();) {
       const auto r = reader.get<Record<D>>();
       records[r.id] = r;
     }
-  load(records, now);
+  load(records, now_);
 }
 
-/// At the start of a window: says anew who is whose, and gives neighbours the ghosts that they do not have.
+/// At the start of a window: says anew who is whose, and gives neighbours the ghosts that they do not have. Where
+/// regions have just been loaded they have them all.
 template <int D>
-void Domains<D>::sort_out() {
-  const double reach = diameter_ + 2 * stray_;
+void Domains<D>::sort_out(bool loaded) {
+  sorted_ = true;
   std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
-  for (Local& local : local_) {
-    Region<D>& region = *local.region;
-    if (local.unwatched += stray_; local.unwatched > kSlack * stray_) {
-      local.unwatched = 0;
-      region.watch(now_,
-                   [&](const Vec<D>& x) { return division_->depth(local.number, x) <= reach + (kSlack + 1) * stray_; });
-    }
-    const std::vector<Slot> before(region.border().begin(), region.border().end());
-    region.sort_out(
-        now_, [&](const Vec<D>& x) { return division_->owner(x) == local.number; },
-        [&](const Vec<D>& x) { return division_->near(local.number, x, reach); });
-    local.holders.resize(region.flights().size());
-    for (const Slot i : before)
-      if (!region.owns(i)) local.holders[i] = 0;
-    for (const Slot i : region.border()) {
-      const Vec<D> x = region.flights().at(i, now_).x;
-      std::uint64_t now = 0;
-      for (std::size_t k = 0; k < local.neighbours.size(); ++k) {
-        if (!division_->near(local.neighbours[k], x, reach)) continue;
-        now |= std::uint64_t{1} << k;
-        if ((local.holders[i] >> k & 1) != 0) continue;
-        Bytes& to = outgoing[static_cast<std::size_t>(rank_of(local.neighbours[k]))];
-        put(to, local.neighbours[k]);
-        put(to, region.flights()[i]);
-      }
-      local.holders[i] = now;
-    }
-  }
+  for (const Local& region : local_)
+    region->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
+      if (loaded) return;
+      const std::uint32_t to = division_->neighbours(region->number())[neighbour];
+      put(outgoing[static_cast<std::size_t>(rank_of(to))], to);
+      put(outgoing[static_cast<std::size_t>(rank_of(to))], record);
+    });
+  if (loaded) return;
   double full = 0;
   for (const Bytes& bytes : exchange_.swap(std::move(outgoing)))
     for (Reader reader(bytes); reader.more();) {
       const auto number = reader.get<std::uint32_t>();
       const auto record = reader.get<Record<D>>();
-      Local& local = local_[number - first_region(exchange_.rank())];
-      if (!local.region->admit(record, now_)) full = 1;
+      if (!local_[number - first_region(exchange_.rank())]->admit(record, now_)) full = 1;
     }
-  for (Local& local : local_) local.holders.resize(local.region->flights().size());
   exchange_.largest({&full, 1});
-  if (full > 0) reload(now_);
+  if (full > 0) reload();
 }
 
 /// The end of the next window on the way to `end`.
@@ -174,122 +143,86 @@ double Domains<D>::window_end(double end) {
 
 template <int D>
 double Domains<D>::run(double end, const Report& report) {
-  Harvest sum;
+  typename Region<D>::Tally sum;
   std::vector<Contact<D>> contacts;
   std::uint64_t collisions = report.counters.sphere_sphere;
   double reached = end;
-  while (now_ < end) {
-    if (!fresh_) sort_out();
-    fresh_ = false;
+  while (now_ < end && reached == end) {
+    if (cut_) reload();
+    if (!sorted_) sort_out(false);
     double stop = window_end(end);
-    for (Local& local : local_) local.region->run(now_, stop);
+    for (const Local& region : local_) region->run(now_, stop);
     ++counts_.windows;
     agree();
-    // Was anyone so fast that he may have come too far?
-    Harvest got = harvest(stop, nullptr);
-    std::array<double, 2> worst{got.speed + g_.norm() * horizon_, -got.astray};
-    exchange_.largest(worst);
-    bool whole = true;
-    if (worst[0] > fastest_) fastest_ = kFaster * worst[0];
-    if (-worst[1] < stop) {
-      ++counts_.cut;
-      whole = false;
-      stop = -worst[1];
-      EventKey<D> last{.time = stop};
-      for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
-      for (Local& local : local_) local.region->cut(last);
-      got = harvest(stop, nullptr);
-    }
-    // Are there enough?
+    if (const double astray = first_astray(stop); astray < stop) stop = cut_at(astray);
+    for (const Local& region : local_)
+      if (!region->agrees(stop))
+        throw Error(Failure::numerical, "internal error: regions do not agree about a window; please report this");
+    typename Region<D>::Tally got = tally();
     std::uint64_t count = got.collisions;
     exchange_.sum({&count, 1});
-    if (collisions + count >= report.collision_limit) {
-      const EventKey<D> last = *key_of_collision(report.collision_limit - collisions);
-      for (Local& local : local_) local.region->cut(last);
-      got = harvest(last.time, nullptr);
+    if (collisions + count >= report.collision_limit) {  // there are enough
       count = report.collision_limit - collisions;
-      whole = false;
+      const EventKey<D> last = *key_of_collision(count);
+      for (const Local& region : local_) region->cut(last);
+      cut_ = true;
+      got = tally();
       reached = stop = last.time;
     }
-    if (report.contacts) harvest(stop, &contacts);
-    sum.collisions += got.collisions;
-    sum.bounces += got.bounces;
-    sum.virial.add(got.virial);
-    sum.overlap = std::max(sum.overlap, got.overlap);
+    if (report.contacts) add_contacts(contacts);
+    sum.add(got);
     counts_.events += got.collisions + got.bounces;
     collisions += count;
     const double length = stop - now_, n = static_cast<double>(particles_.radius.size());
-    if (whole) {
-      for (Local& local : local_) local.region->commit();
-      now_ = stop;
-      if (count > 0) {
-        const double pace = length * kCollisions * n / (2 * static_cast<double>(count));
-        pace_ = pace_ > 0 ? 0.9 * pace_ + 0.1 * pace : pace;
-      }
-    } else {
-      reload(stop);
+    now_ = stop;
+    sorted_ = false;
+    if (cut_) continue;
+    for (const Local& region : local_) region->commit();
+    if (count > 0) {
+      const double pace = length * kCollisions * n / (2 * static_cast<double>(count));
+      pace_ = pace_ > 0 ? 0.9 * pace_ + 0.1 * pace : pace;
     }
-    if (reached < end) break;
   }
-  std::array<std::uint64_t, 2> totals{sum.collisions, sum.bounces};
-  exchange_.sum(totals);
-  report.counters.sphere_sphere += totals[0];
-  report.counters.sphere_wall += totals[1];
-  exchange_.largest({&sum.overlap, 1});
-  report.counters.max_overlap = std::max(report.counters.max_overlap, sum.overlap);
-  Bytes mine;
-  put(mine, sum.virial);
-  for (const Bytes& bytes : exchange_.gather(mine)) report.counters.collision_virial.add(Reader(bytes).get<ExactSum>());
-  if (report.contacts) {
-    gather_contacts<D>(exchange_, contacts, *report.contacts);
-  }
-  if (events_ += totals[0] + totals[1]; events_ > report.max_events)
-    throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
-                                        " collisions in one step; use a smaller step or raise "
-                                        "integrator.max_events_per_step");
+  report_all(sum, contacts, report);
   return reached;
 }
 
 /// Sends paths and mends them until nothing changes.
 template <int D>
 void Domains<D>::agree() {
+  mail_.clear();
   for (double more = 1; more > 0;) {
     ++counts_.rounds;
     std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
     send_paths(outgoing);
-    for (const Bytes& bytes : exchange_.swap(std::move(outgoing)))
+    for (const Bytes& bytes : mail_.emplace_back(exchange_.swap(std::move(outgoing))))
       for (Reader reader(bytes); reader.more();) {
         const auto number = reader.get<std::uint32_t>();
         const auto id = reader.get<Id>();
-        typename Region<D>::Nodes path(reader.get<std::uint32_t>());
-        for (auto& node : path) node = reader.get<Node<D>>();
-        local_[number - first_region(exchange_.rank())].region->follow(id, std::move(path));
+        local_[number - first_region(exchange_.rank())]->follow(id, reader);
       }
     more = 0;
-    for (Local& local : local_) {
-      local.region->repair();
-      for (const Slot i : local.region->changed()) more = local.holders[i] != 0 ? 1 : more;
+    for (const Local& region : local_) {
+      region->repair();
+      for (const Slot i : region->changed()) more = region->holders(i) != 0 ? 1 : more;
     }
     exchange_.largest({&more, 1});
   }
-  for (const Local& local : local_)
-    if (!local.region->agrees())
-      throw Error(Failure::numerical, "internal error: regions do not agree about a window; please report this");
 }
 
 template <int D>
 void Domains<D>::send_paths(std::vector<Bytes>& outgoing) const {
-  for (const Local& local : local_)
-    for (const Slot i : local.region->changed())
-      for (std::size_t k = 0; k < local.neighbours.size(); ++k) {
-        if ((local.holders[i] >> k & 1) == 0) continue;
-        Bytes& to = outgoing[static_cast<std::size_t>(rank_of(local.neighbours[k]))];
-        const auto path = local.region->path(i);
-        put(to, local.neighbours[k]);
-        put(to, local.region->flights()[i].id);
-        put(to, static_cast<std::uint32_t>(path.size()));
-        for (const Node<D>& node : path) put(to, node);
+  for (const Local& region : local_) {
+    const auto neighbours = division_->neighbours(region->number());
+    for (const Slot i : region->changed())
+      for (std::uint64_t holders = region->holders(i); holders != 0; holders &= holders - 1) {
+        const std::uint32_t to = neighbours[static_cast<std::size_t>(std::countr_zero(holders))];
+        Bytes& bytes = outgoing[static_cast<std::size_t>(rank_of(to))];
+        put(bytes, to);
+        put(bytes, region->flights()[i].id);
+        region->write_path(i, bytes);
       }
+  }
 }
 
 template <int D>
@@ -299,9 +232,9 @@ void Domains<D>::fly_to(double time, Particles<D>& copies) const {
     Vec<D> x, v;
   };
   Bytes mine;
-  for (const Local& local : local_)
-    for (const Slot i : local.region->own()) {
-      const Record<D> r = local.region->flights().at(i, time);
+  for (const Local& region : local_)
+    for (const Slot i : region->own()) {
+      const Record<D> r = region->flights().at(region->after(i), time);
       put(mine, Place{r.id, r.x, r.v});
     }
   copies.x.resize(particles_.radius.size());
@@ -322,16 +255,16 @@ void Domains<D>::give_back(double time, Particles<D>& particles) {
 template <int D>
 EventCounts Domains<D>::counts() const {
   EventCounts all;
-  for (const Local& local : local_) all += local.region->counts();
+  for (const Local& region : local_) all += region->counts();
   return all;
 }
 
 template <int D>
 DomainCounts Domains<D>::domain_counts() const {
   DomainCounts all = counts_;
-  for (const Local& local : local_) {
-    all.run_events += local.region->run_events();
-    all.redone_events += local.region->redone_events();
+  for (const Local& region : local_) {
+    all.run_events += region->run_events();
+    all.redone_events += region->redone_events();
   }
   return all;
 }

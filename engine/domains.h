@@ -43,34 +43,25 @@ class Domains {
   double seconds_waited() const { return exchange_.seconds(); }  ///< for other ranks, since the domains were made
 
  private:
-  /// A region of this rank.
-  struct Local {
-    std::uint32_t number = 0;
-    std::unique_ptr<Region<D>> region;
-    std::vector<std::uint32_t> neighbours;
-    std::vector<std::uint64_t> holders;  // by slot: of an own sphere, which neighbours have it as a ghost
-    double unwatched = 0;                // how far spheres may have come since the border was laid
-  };
-  /// What a window brought, of own spheres.
-  struct Harvest {
-    std::uint64_t collisions = 0, bounces = 0;
-    ExactSum virial;
-    double overlap = 0, speed = 0;
-    double astray = std::numeric_limits<double>::infinity();  // when somebody came farther than the stray
-  };
+  using Local = std::unique_ptr<Region<D>>;
+  static constexpr double kFaster = 1.15;  // than anyone is, somebody may come to be
 
   std::size_t first_region(int rank) const;
   int rank_of(std::uint32_t region) const;
-  void reload(double now);
+  void reload();
   void load(std::span<const Record<D>> records, double now);
-  void sort_out();
+  void sort_out(bool loaded);
   void agree();
   void send_paths(std::vector<Bytes>& outgoing) const;
   double window_end(double end);
-  Harvest harvest(double end, std::vector<Contact<D>>* contacts) const;
-  double astray_at(const Region<D>& region, Slot i, double end) const;
+  double first_astray(double end);
+  double cut_at(double time);
+  typename Region<D>::Tally tally() const;
+  void add_contacts(std::vector<Contact<D>>& contacts) const;
+  void report_all(const typename Region<D>::Tally& sum, const std::vector<Contact<D>>& contacts, const Report& report);
+  double astray_at(Region<D>& region, Slot i, double end) const;
   std::optional<EventKey<D>> key_of_collision(std::uint64_t number) const;
-  Contact<D> contact_of(const Region<D>& region, Slot lo, std::size_t k) const;
+  Contact<D> contact_of(Region<D>& region, Slot lo, std::size_t k) const;
 
   const Box<D>& box_;
   const Particles<D>& particles_;
@@ -78,14 +69,16 @@ class Domains {
   std::size_t regions_;
   std::function<double()> forced_window_;
   std::optional<Division<D>> division_;
-  std::vector<Local> local_;
+  std::vector<Local> local_;              // the regions of this rank
+  std::vector<std::vector<Bytes>> mail_;  // of the window: paths that were sent here
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
   double diameter_ = 0;       // the largest
   double stray_ = 0;          // how far anyone comes in a window
   double fastest_ = 0;        // that anyone is expected to be
   double pace_ = 0;           // time in which a sphere collides kCollisions times, about
-  bool fresh_ = false;        // loaded at now_
+  bool sorted_ = false;       // everybody is known to be whose at now_
+  bool cut_ = false;          // the last window was, and regions must be loaded again
   std::uint64_t events_ = 0;  // contacts since take()
   DomainCounts counts_;
 };

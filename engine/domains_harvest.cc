@@ -3,37 +3,35 @@
 #include <algorithm>
 
 #include "engine/domains.h"
+#include "engine/shared_contacts.h"
 
 namespace carom {
 
-/// What own spheres did in this window; each collision counts where its lower id is at home.
+/// Of all regions of this rank.
 template <int D>
-typename Domains<D>::Harvest Domains<D>::harvest(double end, std::vector<Contact<D>>* contacts) const {
-  Harvest got;
-  for (const Local& local : local_)
-    for (const Slot i : local.region->touched()) {
-      if (!local.region->owns(i)) continue;
-      const auto path = local.region->path(i);
-      double speed = 0;
-      for (const Node<D>& node : path) speed = std::max(speed, node.after.v.norm());
-      if (speed + g_.norm() * horizon_ > fastest_) got.astray = std::min(got.astray, astray_at(*local.region, i, end));
-      got.speed = std::max(got.speed, speed);
-      for (std::size_t k = 0; k < path.size(); ++k) {
-        const Node<D>& node = path[k];
-        if (node.key.lo != node.after.id) continue;
-        const bool pair = node.key.kind == EventKind::pair;
-        ++(pair ? got.collisions : got.bounces);
-        if (pair) got.virial.add(node.virial);
-        got.overlap = std::max(got.overlap, node.overlap);
-        if (contacts) contacts->push_back(contact_of(*local.region, i, k));
-      }
-    }
-  return got;
+typename Region<D>::Tally Domains<D>::tally() const {
+  typename Region<D>::Tally all;
+  for (const Local& region : local_) all.add(region->tally());
+  return all;
+}
+
+/// When somebody may first have come farther than the stray in the window; infinite: never.
+template <int D>
+double Domains<D>::first_astray(double end) {
+  double speed = 0, first = std::numeric_limits<double>::infinity();
+  for (const Local& region : local_) speed = std::max(speed, region->fastest() + g_.norm() * horizon_);
+  if (speed > fastest_)
+    for (const Local& region : local_)
+      region->for_each_touched([&](Slot i) { first = std::min(first, astray_at(*region, i, end)); });
+  std::array<double, 2> worst{speed, -first};
+  exchange_.largest(worst);
+  if (worst[0] > fastest_) fastest_ = kFaster * worst[0];
+  return -worst[1];
 }
 
 /// When a sphere may have come farther than the stray in the window, by the length of its path; infinite: never.
 template <int D>
-double Domains<D>::astray_at(const Region<D>& region, Slot i, double end) const {
+double Domains<D>::astray_at(Region<D>& region, Slot i, double end) const {
   const auto path = region.path(i);
   double now = now_, left = stray_;
   for (std::size_t k = 0; k <= path.size(); ++k) {
@@ -46,10 +44,51 @@ double Domains<D>::astray_at(const Region<D>& region, Slot i, double end) const 
   return std::numeric_limits<double>::infinity();
 }
 
+/// Forgets what happened from a time on, and returns it.
+template <int D>
+double Domains<D>::cut_at(double time) {
+  ++counts_.cut;
+  cut_ = true;
+  EventKey<D> last{.time = time};
+  for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
+  for (const Local& region : local_) region->cut(last);
+  return time;
+}
+
+/// The contacts of the window.
+template <int D>
+void Domains<D>::add_contacts(std::vector<Contact<D>>& contacts) const {
+  for (const Local& region : local_)
+    region->for_each_touched([&](Slot i) {
+      const auto path = region->path(i);
+      for (std::size_t k = 0; k < path.size(); ++k)
+        if (path[k].key.lo == path[k].after.id) contacts.push_back(contact_of(*region, i, k));
+    });
+}
+
+/// Adds up what all ranks have to report of a run.
+template <int D>
+void Domains<D>::report_all(const typename Region<D>::Tally& sum, const std::vector<Contact<D>>& contacts,
+                            const Report& report) {
+  std::array<std::uint64_t, 2> totals{sum.collisions, sum.bounces};
+  exchange_.sum(totals);
+  report.counters.sphere_sphere += totals[0];
+  report.counters.sphere_wall += totals[1];
+  double overlap = sum.overlap;
+  exchange_.largest({&overlap, 1});
+  report.counters.max_overlap = std::max(report.counters.max_overlap, overlap);
+  report.counters.collision_virial.add(sum_of_all(exchange_, sum.virial));
+  if (report.contacts) gather_contacts<D>(exchange_, contacts, *report.contacts);
+  if (events_ += totals[0] + totals[1]; events_ > report.max_events)
+    throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
+                                        " collisions in one step; use a smaller step or raise "
+                                        "integrator.max_events_per_step");
+}
+
 /// The contact that node k of a path stands for.
 template <int D>
-Contact<D> Domains<D>::contact_of(const Region<D>& region, Slot lo, std::size_t k) const {
-  const EventKey<D>& key = region.path(lo)[k].key;
+Contact<D> Domains<D>::contact_of(Region<D>& region, Slot lo, std::size_t k) const {
+  const EventKey<D> key = region.path(lo)[k].key;
   const Flights<D>& flights = region.flights();
   Record<D> a = region.before(lo, k);
   if (key.kind == EventKind::wall) {
@@ -70,12 +109,11 @@ Contact<D> Domains<D>::contact_of(const Region<D>& region, Slot lo, std::size_t 
 template <int D>
 std::optional<EventKey<D>> Domains<D>::key_of_collision(std::uint64_t number) const {
   Bytes mine;
-  for (const Local& local : local_)
-    for (const Slot i : local.region->touched()) {
-      if (!local.region->owns(i)) continue;
-      for (const Node<D>& node : local.region->path(i))
+  for (const Local& region : local_)
+    region->for_each_touched([&](Slot i) {
+      for (const Node<D>& node : region->path(i))
         if (node.key.kind == EventKind::pair && node.key.lo == node.after.id) put(mine, node.key);
-    }
+    });
   std::vector<EventKey<D>> keys;
   for (const Bytes& bytes : exchange_.gather(mine))
     for (Reader reader(bytes); reader.more();) keys.push_back(reader.get<EventKey<D>>());
@@ -84,9 +122,17 @@ std::optional<EventKey<D>> Domains<D>::key_of_collision(std::uint64_t number) co
   return keys[number - 1];
 }
 
-template typename Domains<2>::Harvest Domains<2>::harvest(double, std::vector<Contact<2>>*) const;
+template typename Region<2>::Tally Domains<2>::tally() const;
+template double Domains<2>::first_astray(double);
+template double Domains<2>::cut_at(double);
+template void Domains<2>::add_contacts(std::vector<Contact<2>>&) const;
+template void Domains<2>::report_all(const Region<2>::Tally&, const std::vector<Contact<2>>&, const Report&);
 template std::optional<EventKey<2>> Domains<2>::key_of_collision(std::uint64_t) const;
-template typename Domains<3>::Harvest Domains<3>::harvest(double, std::vector<Contact<3>>*) const;
+template typename Region<3>::Tally Domains<3>::tally() const;
+template double Domains<3>::first_astray(double);
+template double Domains<3>::cut_at(double);
+template void Domains<3>::add_contacts(std::vector<Contact<3>>&) const;
+template void Domains<3>::report_all(const Region<3>::Tally&, const std::vector<Contact<3>>&, const Report&);
 template std::optional<EventKey<3>> Domains<3>::key_of_collision(std::uint64_t) const;
 
 }  // namespace carom

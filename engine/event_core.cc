@@ -413,32 +413,24 @@ void EventCore<D>::cross(Slot i, double now) {
   schedule(i);
 }
 
-/// Writes down what a sphere was before its first event of the window, which is about to happen.
-template <int D>
-void EventCore<D>::trace(Trace<D>& trace, Slot i) const {
-  if (trace.before(flights_[i])) trace.starts.push_back({i, flights_[i]});
-}
-
 template <int D>
 void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, const Report& report) {
   Agenda<D>& agenda = agenda_[i];
   const Slot j = packing_.slot(agenda.partner);
-  EventKey<D> key;
-  if (report.contacts || report.trace) key = key_of(i);
   if (report.trace) {
-    trace(*report.trace, i);
-    trace(*report.trace, j);
+    if (flights_[i].id < flights_[j].id)
+      report.trace->begin(i, flights_[i], j, flights_[j], agenda.partner, generation);
+    else
+      report.trace->begin(j, flights_[j], i, flights_[i], packing_.reversed(i, agenda.partner), generation);
   }
+  EventKey<D> key;
+  if (report.contacts) key = key_of(i);
   Vec<D> shift = Vec<D>::Zero();
   if (packing_.linear(agenda.partner) != 0) shift = box_.shift(packing_.image(agenda.partner));
   const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
   ++agenda.version;
   ++agenda_[j].version;
-  if (report.trace) {
-    const double virial = blow.d.dot(blow.impulse);
-    for (const Slot who : {i, j}) report.trace->nodes.push_back({flights_[who], key, virial, blow.overlap, who});
-    return;
-  }
+  if (report.trace) return report.trace->end(flights_[i], flights_[j], blow.d.dot(blow.impulse), blow.overlap);
   ++report.counters.sphere_sphere;
   report.counters.collision_virial.add(blow.d.dot(blow.impulse));
   report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
@@ -449,13 +441,10 @@ template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = key_of(i);
   const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
-  if (report.trace) trace(*report.trace, i);
+  if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
   const Blow<D> blow = flights_.bounce(i, axis, side, time, generation);
   ++agenda_[i].version;
-  if (report.trace) {
-    report.trace->nodes.push_back({flights_[i], key, 0, blow.overlap, i});
-    return;
-  }
+  if (report.trace) return report.trace->end(flights_[i], flights_[i], 0, blow.overlap);
   ++report.counters.sphere_wall;
   report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], blow));

@@ -94,12 +94,12 @@ class EventCore {
   void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
   /// Says which spheres are at the border of a region: lists of theirs are good for each other wherever they come in a
   /// window, and need not be searched for.
-  void set_border(std::span<const Slot> border, std::span<const Slot> ghosts, double now);
+  void set_border(std::span<const Slot> slots, double now);
   /// Candidates for contacts of a sphere: whoever may touch it where each of the two has come up to `astray` (load)
   /// from where the core knows it to be. Good until the next call.
   std::span<const std::uint32_t> find_near(Slot i);
-  /// The same for one at the border, where only others at the border matter.
-  std::span<const std::uint32_t> find_near_at_border(Slot i);
+  /// The same for one at the border, where only others matter that are at the border and between two corners.
+  std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high);
 
  private:
   /// An event among several at one time, with what it was when it was found there.
@@ -140,7 +140,6 @@ class EventCore {
   void update(Slot i, double now);
   void cross(Slot i, double now);
 
-  void trace(Trace<D>& trace, Slot i) const;
   void collide_pair(Slot i, double time, std::uint32_t generation, const Report& report);
   void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
 

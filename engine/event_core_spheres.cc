@@ -216,23 +216,26 @@ std::span<const std::uint32_t> EventCore<D>::find_near(Slot i) {
 }
 
 template <int D>
-std::span<const std::uint32_t> EventCore<D>::find_near_at_border(Slot i) {
-  if (!lists_ || room(i) == lists_->skin()) return find_near(i);
+std::span<const std::uint32_t> EventCore<D>::find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high) {
+  if (!lists_) {
+    cells_->find_between(low, high, near_);
+    return near_;
+  }
+  if (room(i) == lists_->skin()) return find_near(i);
   return {lists_->candidates(agenda_[i]), agenda_[i].count};
 }
 
 template <int D>
-void EventCore<D>::set_border(std::span<const Slot> border, std::span<const Slot> ghosts, double now) {
+void EventCore<D>::set_border(std::span<const Slot> slots, double now) {
   at_border_.assign(flights_.room(), 0);
   if (!lists_ || lists_->skin() < 3 * astray_) return;
-  for (const auto slots : {border, ghosts})
-    for (const Slot i : slots) {
-      at_border_[i] = 1;
-      if (lists_->move(i, flights_.at(i, now).x, room(i)))
-        predict(i, now);
-      else
-        predict_leaving(i, now), schedule(i);
-    }
+  for (const Slot i : slots) {
+    at_border_[i] = 1;
+    if (lists_->move(i, flights_.at(i, now).x, room(i)))
+      predict(i, now);
+    else
+      predict_leaving(i, now), schedule(i);
+  }
 }
 
 template void EventCore<2>::load(const Particles<2>&, const Vec<2>&, double, double);
@@ -242,9 +245,9 @@ template void EventCore<2>::give_back(double, Particles<2>&);
 template bool EventCore<2>::admit(const Record<2>&, double, Slot&);
 template void EventCore<2>::dismiss(Slot);
 template void EventCore<2>::put(std::span<const std::pair<Slot, Record<2>>>, double);
-template void EventCore<2>::set_border(std::span<const Slot>, std::span<const Slot>, double);
+template void EventCore<2>::set_border(std::span<const Slot>, double);
 template std::span<const std::uint32_t> EventCore<2>::find_near(Slot);
-template std::span<const std::uint32_t> EventCore<2>::find_near_at_border(Slot);
+template std::span<const std::uint32_t> EventCore<2>::find_near_at_border(Slot, const Vec<2>&, const Vec<2>&);
 template void EventCore<3>::load(const Particles<3>&, const Vec<3>&, double, double);
 template void EventCore<3>::load(std::vector<Record<3>>, const Vec<3>&, double, double, double);
 template void EventCore<3>::take(Particles<3>&, const Vec<3>&, double, double);
@@ -252,8 +255,8 @@ template void EventCore<3>::give_back(double, Particles<3>&);
 template bool EventCore<3>::admit(const Record<3>&, double, Slot&);
 template void EventCore<3>::dismiss(Slot);
 template void EventCore<3>::put(std::span<const std::pair<Slot, Record<3>>>, double);
-template void EventCore<3>::set_border(std::span<const Slot>, std::span<const Slot>, double);
+template void EventCore<3>::set_border(std::span<const Slot>, double);
 template std::span<const std::uint32_t> EventCore<3>::find_near(Slot);
-template std::span<const std::uint32_t> EventCore<3>::find_near_at_border(Slot);
+template std::span<const std::uint32_t> EventCore<3>::find_near_at_border(Slot, const Vec<3>&, const Vec<3>&);
 
 }  // namespace carom

@@ -39,6 +39,8 @@ class Reader {
     at_ += sizeof(T);
     return value;
   }
+  /// Where the next so many bytes stand, and goes on behind them.
+  const std::byte* skip(std::size_t bytes) { return std::exchange(at_, at_ + bytes); }
 
  private:
   const std::byte *at_, *end_;

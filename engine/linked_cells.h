@@ -117,21 +117,18 @@ class LinkedCells {
   /// Everybody in the cells that may hold places up to `reach` from those in a sphere's cell, itself among them.
   void find_near(const Place& place, double reach, std::vector<std::uint32_t>& found) const {
     found.clear();
-    Cell<D> cell, range;
+    Cell<D> low, high;
     for (int k = 0; k < D; ++k) {
-      cell[k] = place.unwrapped[k];
-      range[k] = static_cast<std::int32_t>(std::ceil(reach / grid_.edge(k)));
+      const auto range = static_cast<std::int32_t>(std::ceil(reach / grid_.edge(k)));
+      low[k] = place.unwrapped[k] - range;
+      high[k] = place.unwrapped[k] + range;
     }
-    grid_.for_each_around(cell, range, [&](std::size_t at, const Image<D>& away) {
-      const auto count = static_cast<std::size_t>(grid_.count(D - 1));
-      const std::size_t row = at / count, in_row = at % count;
-      std::uint32_t next = first_[row * (count + 2) + in_row + 1];
-      while (next != kNobody) {
-        const Slot j = packing_.slot(next & ~kMore);
-        found.push_back(packing_.pack(j, boxes_[j] - packing_.linear(away)));
-        next = (next & kMore) != 0 ? link_[j] : kNobody;
-      }
-    });
+    collect(low, high, found);
+  }
+  /// Everybody in the cells between two corners, as seen from the box that holds the origin.
+  void find_between(const Vec<D>& low, const Vec<D>& high, std::vector<std::uint32_t>& found) const {
+    found.clear();
+    collect(grid_.cell(low), grid_.cell(high), found);
   }
 
   /// Everybody in the sphere's cell and those around it, itself among them.
@@ -195,6 +192,28 @@ class LinkedCells {
     found.same = elsewhere ? 0 : found.count;
     if (elsewhere && 2 * widest_ + 1 > packing_.largest()) check(place, found);
     std::fill_n(found.packed.data() + found.count, 8, packing_.pack(self, 0));  // follow() may have moved them
+  }
+
+  /// Appends everybody in the cells between two, `at` and `away` being those of the axes before `axis`.
+  void collect(const Cell<D>& low, const Cell<D>& high, std::vector<std::uint32_t>& found, int axis = 0,
+               std::ptrdiff_t at = 1, std::int32_t away = 0) const {
+    const std::int32_t count = grid_.count(axis);
+    const std::int32_t first = periodic_[axis] ? low[axis] : std::max(low[axis], 0);
+    const std::int32_t last = periodic_[axis] ? high[axis] : std::min(high[axis], count - 1);
+    for (std::int32_t c = first; c <= last; ++c) {
+      const std::int32_t boxes = grid_.boxes(axis, c), seen = away + boxes * one_[axis];
+      const std::ptrdiff_t cell = at + (axis < D - 1 ? stride_[axis] : 1) * (c - boxes * count);
+      if (axis < D - 1) {
+        collect(low, high, found, axis + 1, cell, seen);
+        continue;
+      }
+      std::uint32_t next = first_[static_cast<std::size_t>(cell)];
+      while (next != kNobody) {
+        const Slot j = packing_.slot(next & ~kMore);
+        found.push_back(packing_.pack(j, boxes_[j] - seen));
+        next = (next & kMore) != 0 ? link_[j] : kNobody;
+      }
+    }
   }
 
   /// Appends those behind the first of their cells.

@@ -9,17 +9,21 @@
 // has it, and since a contact is a pure function of two records, all is as in a run by one core. (The smallest key at
 // which anybody is wrong grows with each round.)
 //
-//   region.load(own, ghosts, g, horizon, now, stray);
+//   region.load(records, division, number, …);
 //   region.run(now, end);
-//   while (…) { region.follow(id, script); …; region.repair(); … region.changed() … }
+//   while (…) { region.follow(id, message); …; region.repair(); … region.changed() … }
 //   region.commit();
+//   region.sort_out(now, send); …; region.admit(record, now);
 
 #include <deque>
-#include <functional>
 #include <queue>
-#include <unordered_map>
 
+#include "engine/by_slot.h"
+#include "engine/division.h"
 #include "engine/event_core.h"
+#include "engine/exact_sum.h"
+#include "engine/exchange.h"
+#include "engine/id_table.h"
 
 namespace carom {
 
@@ -28,71 +32,75 @@ class Region {
  public:
   using Nodes = std::vector<Node<D>>;
 
+  /// What own spheres did in a window; each collision counts where its lower id is at home.
+  struct Tally {
+    std::uint64_t collisions = 0, bounces = 0;
+    ExactSum virial;
+    double overlap = 0;
+
+    void add(const Tally& other) {
+      collisions += other.collisions;
+      bounces += other.bounces;
+      virial.add(other.virial);
+      overlap = std::max(overlap, other.overlap);
+    }
+  };
+
   /// `particles` tells masses and radii of everybody, by id.
   Region(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options)
       : box_(box), core_(box, particles, options) {}
 
-  /// Starts anew at time `now` with own spheres and ghosts. In no window will anyone come farther than `stray`.
-  void load(std::vector<Record<D>> own, const std::vector<Record<D>>& ghosts, const Vec<D>& g, double horizon,
-            double now, double stray);
+  /// Starts anew at time `now` as region `number` of a division, with all spheres that concern it. In no window will
+  /// anyone come farther than `stray`.
+  void load(std::vector<Record<D>> records, const Division<D>& division, std::uint32_t number, const Vec<D>& g,
+            double horizon, double now, double stray);
 
   // Between windows, at a time `now` that no event precedes any more.
 
+  std::uint32_t number() const { return number_; }
   /// Own spheres, all of them.
   std::vector<Slot> own() const;
-  /// Those of them that may leave, or that others may see: the last word of watch().
-  std::span<const Slot> border() const { return border_; }
   const Flights<D>& flights() const { return core_.flights(); }
-  bool has(Id id) const { return slot_.contains(id); }
-  bool owns(Slot i) const { return role_[i] == Role::own; }
-  Slot slot_of(Id id) const { return slot_.at(id); }
-  /// Says anew who of the border and the ghosts is whose: owns(x) and wants(x) tell, of a position at `now`, whether a
-  /// sphere there is this region's own, or one of its ghosts. Others are forgotten.
-  template <class Owns, class Wants>
-  void sort_out(double now, Owns&& owns, Wants&& wants) {
-    all_.swap(border_);
-    all_.insert(all_.end(), ghosts_.begin(), ghosts_.end());
-    border_.clear();
-    ghosts_.clear();
-    for (const Slot i : all_) {
-      const Vec<D> x = core_.flights().at(i, now).x;
-      if (owns(x)) {
-        role_[i] = Role::own;
-        border_.push_back(i);
-      } else if (wants(x)) {
-        role_[i] = Role::ghost;
-        ghosts_.push_back(i);
-      } else {
-        forget(i);
-      }
-    }
-  }
-  /// Says anew who is at the border: near(x) tells it, of a position at `now`.
-  void watch(double now, const std::function<bool(const Vec<D>&)>& near);
+  /// Says anew who is whose, who is a ghost here, and who elsewhere; others are forgotten. Calls send(k, record) for
+  /// spheres that the k-th neighbour does not have yet and must take in.
+  template <class Send>
+  void sort_out(double now, Send&& send);
   /// Takes in a ghost; false: load anew, there is no room left.
   bool admit(const Record<D>& r, double now);
 
   // In a window.
 
-  /// Runs from `now` to `end`. Whoever comes farther than the stray from where he was at `now` makes it of no use: cut
-  /// it before that.
+  /// Runs from `now` to `end`. Whoever comes farther than the stray from where he was at the start makes the window of
+  /// no use: cut it before that.
   void run(double now, double end);
-  /// What a ghost did according to its owner.
-  void follow(Id id, Nodes script);
+  /// Appends the path of a sphere to a message.
+  void write_path(Slot i, Bytes& to) const;
+  /// Reads what a ghost did according to its owner; the message must stay until the end of the window.
+  void follow(Id id, Reader& message);
   /// Mends the window after scripts have come.
   void repair();
   /// What a sphere did in the window.
-  std::span<const Node<D>> path(Slot i) const;
+  std::span<const Node<D>> path(Slot i) { return path_of(i).nodes; }
   /// The sphere before node k of its path.
-  const Record<D>& before(Slot i, std::size_t k) const;
+  const Record<D>& before(Slot i, std::size_t k) {
+    Path& path = path_of(i);
+    return k > 0 ? path.nodes[k - 1].after : path.start;
+  }
   /// The sphere after the last of them.
   const Record<D>& after(Slot i) const;
-  /// Spheres that had events at any time, ghosts among them.
-  std::span<const Slot> touched() const { return touched_; }
-  /// Own spheres whose paths are not what they were before the last run() or repair().
+  /// Calls visit(slot) for each own sphere that had events at any time.
+  template <class Visit>
+  void for_each_touched(Visit&& visit) const;
+  /// Own spheres that are ghosts elsewhere, whose paths are not what they were before the last run() or repair().
   std::span<const Slot> changed() const { return changed_; }
-  /// Whether all ghosts did here what they did at their owners'.
-  bool agrees() const;
+  /// Which neighbours have an own sphere as a ghost: a bit for each.
+  std::uint64_t holders(Slot i) const { return holders_[i]; }
+  Slot slot_of(Id id) const { return slots_.find(id); }
+  Tally tally() const;
+  /// The largest speed that anyone had after an event.
+  double fastest() const { return std::sqrt(std::max(trace_.fastest_squared(), mended_fastest_squared_)); }
+  /// Whether all ghosts did here, before a time, what they did at their owners'.
+  bool agrees(double end);
   /// Forgets all events after `last`. The core is of no use then; load() again.
   void cut(const EventKey<D>& last);
   /// Ends the window.
@@ -103,36 +111,26 @@ class Region {
   std::uint64_t redone_events() const { return redone_events_; }  ///< in repairs
 
  private:
-  static constexpr std::uint32_t kNone = 0xffffffff;
-  enum class Role : std::uint8_t { nobody, own, ghost };
+  static constexpr std::uint32_t kNone = Trace<D>::kNone;
+  static constexpr double kUnknown = -1;
+  static constexpr double kSlack = 20;                           // windows between looks at who is at the border
+  enum class Role : std::uint8_t { nobody, own, seen, ghost };  // seen: own, and a ghost elsewhere
 
-  /// Paths of a few spheres.
-  class Store {
-   public:
-    void resize(std::size_t slots) { index_.resize(slots, kNone); }
-    bool has(Slot i) const { return index_[i] != kNone; }
-    Nodes& operator[](Slot i) {
-      if (!has(i)) {
-        index_[i] = static_cast<std::uint32_t>(who_.size());
-        who_.push_back(i);
-        if (paths_.size() < who_.size()) paths_.emplace_back();
-        paths_[index_[i]].clear();
-      }
-      return paths_[index_[i]];
-    }
-    std::span<const Node<D>> at(Slot i) const {
-      return has(i) ? std::span<const Node<D>>(paths_[index_[i]]) : std::span<const Node<D>>();
-    }
-    std::span<const Slot> who() const { return who_; }
-    void clear() {
-      for (const Slot i : who_) index_[i] = kNone;
-      who_.clear();
-    }
-
-   private:
-    std::vector<std::uint32_t> index_;  // by slot
-    std::vector<Slot> who_;
-    std::deque<Nodes> paths_;  // kept for their memory
+  struct Edge {
+    Slot slot;
+    double quiet;             // how far it may come before it must be looked at again
+    double speed = kUnknown;  // until its next event; unknown: as large as anyone's
+  };
+  struct Path {
+    Record<D> start;  // at the start of the window
+    Nodes nodes;
+  };
+  /// Of a ghost. Most are compared with what was seen and never read.
+  struct Script {
+    const std::byte* bytes;
+    std::uint32_t count;
+    Nodes nodes;  // where they have been read
+    Node<D> node(std::size_t k) const;
   };
 
   /// A sphere whose path is being mended.
@@ -159,12 +157,26 @@ class Region {
     }
   };
 
+  bool is_own(Slot i) const { return role_[i] == Role::own || role_[i] == Role::seen; }
+  bool is_own_id(Id id) const;
   void enlist(Slot i, Id id, Role role);
   void forget(Slot i);
+  void watch(double now);
+  Edge look_at(Slot i, double now);
   void index();
+  bool met_nobody(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
+  Path& path_of(Slot i);
+  Path& rewritten(Slot i);
+  EventKey<D> key_of(const typename Trace<D>::Event& event) const;
+  Node<D> traced(Slot i, std::span<const std::uint32_t> shares, std::size_t k) const;
+  std::span<const Node<D>> script_of(Slot g);
+  bool matches(Slot g);
   bool mended(Slot i) const { return mended_of_[i] != kNone; }
   Mended& mend(Slot i, const EventKey<D>& key);
   void seed(Slot g);
+  bool meeting_place(const Mended& m, Vec<D>& low, Vec<D>& high) const;
+  bool follows_at_once(const Mended& m, const EventKey<D>& key);
+  bool may_meet(const Mended& m, Slot j, const Image<D>& image) const;
   void predict(Mended& m, const EventKey<D>& now);
   void predict_walls(Mended& m);
   void meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>& now);
@@ -174,30 +186,67 @@ class Region {
   void append(Mended& m, const Node<D>& node);
   void plan_script(Mended& m);
   std::uint32_t version(Slot i) const { return mended(i) ? repairs_[mended_of_[i]].version : 0; }
-  bool is_own(Id id) const;
-  Nodes& rewritten(Slot i);
 
   const Box<D>& box_;
   EventCore<D> core_;
-  double end_ = 0, stray_ = 0;  // of the window
-  std::unordered_map<Id, Slot> slot_;
-  std::vector<Role> role_;  // by slot
-  std::vector<Slot> border_, ghosts_, all_;
+  double end_ = 0, length_ = 0, stray_ = 0;  // of the window
+  double unwatched_ = 0;                     // how far spheres may have come since watch()
+  const Division<D>* division_ = nullptr;
+  std::uint32_t number_ = 0;
+  IdTable slots_;
+  std::vector<Role> role_;              // by slot
+  std::vector<std::uint64_t> holders_;  // by slot
+  std::vector<Edge> edge_;              // ghosts, and own spheres that may leave, or that others may see
 
   Trace<D> trace_;
-  std::vector<Record<D>> start_;               // at the start of the window, of those who had events
-  Nodes nodes_;                                // of the first run, by sphere
-  std::vector<std::uint32_t> first_, length_;  // by slot: in nodes_
-  std::vector<std::uint32_t> start_of_;        // by slot: in start_, or kNone
-  std::vector<Slot> touched_, changed_;
-  Store rewritten_;                                // paths that have been mended
-  Store script_;                                   // of ghosts
+  BySlot<Path> paths_;                   // those that are wanted
+  std::vector<std::uint8_t> rewritten_;  // by slot: its path is not that of the trace
+  BySlot<Script> scripts_;               // of ghosts
+  std::vector<Slot> touched_ghosts_;     // that had events in the first run
+  std::vector<std::uint32_t> agreed_;    // by slot: the window in which a ghost was found to do what its script says
+  std::uint32_t window_ = 0;             // its number
+  std::vector<Slot> changed_;
   std::vector<std::pair<Slot, Record<D>>> other_;  // records that the core is told
+  std::vector<std::uint8_t> disturbed_;            // by slot: it is among them
+  double mended_fastest_squared_ = 0;
 
   std::deque<Mended> repairs_;
   std::vector<std::uint32_t> mended_of_;  // by slot: in repairs_, or kNone
   std::priority_queue<Task> tasks_;
   std::uint64_t run_events_ = 0, redone_events_ = 0;
 };
+
+template <int D>
+template <class Send>
+void Region<D>::sort_out(double now, Send&& send) {
+  if (unwatched_ += stray_; unwatched_ > kSlack * stray_) watch(now);
+  std::size_t stay = 0;
+  for (Edge edge : edge_) {
+    const Slot i = edge.slot;
+    if (edge.speed >= 0 && (trace_.has(i) || disturbed_[i] != 0)) edge.speed = kUnknown;
+    edge.quiet -= edge.speed >= 0 ? edge.speed * length_ : stray_;
+    if (!(edge.quiet > 0)) {
+      const std::uint64_t before = holders_[i];
+      edge = look_at(i, now);
+      if (role_[i] == Role::nobody) continue;
+      for (std::uint64_t fresh = holders_[i] & ~before; fresh != 0; fresh &= fresh - 1)
+        send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
+    }
+    edge_[stay++] = edge;
+  }
+  for (const auto& [slot, record] : other_) disturbed_[slot] = 0;
+  edge_.resize(stay);
+}
+
+template <int D>
+template <class Visit>
+void Region<D>::for_each_touched(Visit&& visit) const {
+  for (const auto& event : trace_.events())
+    for (const int which : {0, 1})
+      if (event.last[which] == kNone && event.slot[which] != kNone && is_own(event.slot[which]))
+        visit(event.slot[which]);
+  for (std::size_t k = 0; k < paths_.who().size(); ++k)  // visit() may ask for more paths
+    if (const Slot i = paths_.who()[k]; is_own(i) && rewritten_[i] != 0 && !trace_.has(i)) visit(i);
+}
 
 }  // namespace carom
