@@ -42,12 +42,12 @@ def find_carom(given=None):
     return pathlib.Path(installed)
 
 
-def run_carom(carom, deck, directory, overrides=()):
-    """Runs a deck and returns its summary. Raises RunFailed."""
-    command = [str(carom), "run", str(deck), "-o", str(directory), "--quiet"]
+def run_carom(carom, deck, directory, overrides=(), launcher=(), environment=None):
+    """Runs a deck, by a launcher such as mpirun where one is given, and returns its summary. Raises RunFailed."""
+    command = [*launcher, str(carom), "run", str(deck), "-o", str(directory), "--quiet"]
     for override in overrides:
         command += ["--set", override]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
     if done.returncode != 0:
         raise RunFailed(done.returncode, (done.stderr or done.stdout).strip())
     return read_summary(directory)

@@ -15,7 +15,6 @@ left out.
 """
 
 import pathlib
-import resource
 import sys
 import tempfile
 
@@ -23,7 +22,8 @@ import numpy as np
 
 from carom_files import RunFailed, Trajectory
 from carom_plot import panels
-from studies import parse, read_deck, relative_error, run_deck, study_parser, variant, with_markers, write_table
+from studies import (parse, processor_seconds, read_deck, relative_error, run_deck, study_parser, variant, with_markers,
+                     write_table)
 
 COLUMNS = ["method", "particles", "step", "steps", "collisions", "passes_per_step", "seconds", "seconds_per_step",
            "energy_error", "position_error"]
@@ -41,12 +41,6 @@ def parse_arguments(arguments=None):
     if options.repeats < 1 or min(options.counts, default=1) <= 0:
         parser.error("--repeats must be at least 1, every count positive")
     return options
-
-
-def processor_seconds():
-    """Of all commands run so far."""
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
 
 
 def run_once(options, deck, method, step, overrides=()):

@@ -1,4 +1,4 @@
-"""What energy_study.py and cost_study.py share: options, a deck for each run, runs, tables.
+"""What energy_study.py, cost_study.py and rank_study.py share: options, a deck for each run, runs, tables.
 
     parser = study_parser(__doc__, "psa,cva,mcva,cdda")
     parser.add_argument(...)
@@ -9,6 +9,7 @@
 import argparse
 import csv
 import pathlib
+import resource
 import tomllib
 
 from carom_files import RunFailed, find_carom, run_carom, toml_text
@@ -62,16 +63,22 @@ def variant(deck, method, step, plan):
                    "output": {"frame_interval": 0.0, "thermo_interval": 0.0}}
 
 
-def run_deck(options, deck, file, directory, overrides=()):
+def run_deck(options, deck, file, directory, overrides=(), **how):
     """Writes a deck to a file and runs it; returns the summary. A run that fails numerically raises RunFailed; where the
-    question was wrong the study ends."""
+    question was wrong the study ends. `how`: launcher and environment, as for run_carom."""
     pathlib.Path(file).write_text(toml_text(deck))
     try:
-        return run_carom(find_carom(options.carom), file, directory, [*options.set, *overrides])
+        return run_carom(find_carom(options.carom), file, directory, [*options.set, *overrides], **how)
     except RunFailed as failure:
         if failure.code == 2:
             raise SystemExit(str(failure)) from failure
         raise
+
+
+def processor_seconds():
+    """Of all commands run so far."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def relative_error(summary):

@@ -20,6 +20,7 @@ import movie
 import plot_energy
 import plot_msd
 import plot_rdf
+import rank_study
 import studies
 from carom_files import Trajectory, toml_text
 from synthetic_run import write_run
@@ -284,3 +285,46 @@ def test_cost_study(tmp_path, capsys):
     passes = [float(row["passes_per_step"]) for row in rows]
     assert passes[1] > 3 * passes[0]  # all of a system's collisions cut everybody's step
     assert passes[3] == pytest.approx(passes[2], rel=0.3)
+
+
+def test_the_model_of_ranks_takes_from_counts_what_is_in_them(capsys):
+    log = ("pressure 2.28\n1795 windows, 2.02 rounds each; events at borders run twice 27.5%, redone 0.20%, "
+           "imbalance 1.0%\npart  seconds")
+    assert rank_study.counts_of(log) == pytest.approx(
+        {"windows": 1795, "rounds": 2.02, "twice": 0.275, "redone": 0.002, "imbalance": 0.01})
+    with pytest.raises(SystemExit):
+        rank_study.counts_of("done at time 50\n")
+    rows = [{"regions": P, "per_region": n, "windows": 30, "events": 0.15 * n, "rounds": 1 + 0.1 * np.log2(P * n ** (2 / 3)),
+             "twice": (1 + 1.5 * n ** (-1 / 3)) ** 3 - 1, "redone": 0.04 * n ** (-1 / 3),
+             "imbalance": 2 * np.sqrt(2 * np.log(P) / (4.5 * n))} for P in (8, 64) for n in (500, 4000)]
+    rows.append(rows[0] | {"regions": 2, "twice": 9.0})  # no neighbours on some sides: not in the fit
+    fitted = rank_study.fit(rows, 3)
+    assert fitted == pytest.approx({"dimension": 3, "h": 1.5, "r": 0.04, "a": 1.0, "b": 0.1, "events": 0.15, "imbalance": 2.0})
+    options = rank_study.parse_arguments(["--rate", "1e6", "--latency", "1e-5", "--overhead", "1e-6"])
+    row = rank_study.modelled(fitted, options, 1024, 10**6)
+    assert row["rounds"] == pytest.approx(1 + 0.1 * (10 + 2 / 3 * 6 * np.log2(10)))
+    messages = (row["rounds"] + 1 + 10 * (row["rounds"] + 3)) * 1e-5 + (row["rounds"] + 1) * 1024e-6
+    assert row["messages"] == pytest.approx(messages / 0.15)
+    assert row["efficiency"] == pytest.approx(
+        1 / (1.015**3 + 0.0004 + 2 * np.sqrt(2 * np.log(1024) / 0.15e6) + messages / 0.15))
+    assert row["efficiency"] < row["efficiency_neighbours"] < 1
+
+
+@needs_carom
+def test_rank_study(tmp_path, capsys):
+    rows = rows_of(rank_study, "ranks", tmp_path, "hard-sphere-fluid", "--ranks", "2,8,16", "--per-rank", "100,400",
+                   "--most", "3200", "--rate", "1e6")
+    assert [(int(row["regions"]), int(row["per_region"])) for row in rows] == [
+        (2, 100), (8, 100), (16, 100), (2, 400), (8, 400)]
+    for row in rows:
+        assert int(row["windows"]) > 20 and 1 <= float(row["rounds"]) < 4
+        events = float(row["events"]) * int(row["windows"]) * int(row["regions"])
+        assert events == pytest.approx(5 * int(row["particles"]))
+        assert 0 < float(row["redone"]) < 0.05
+    twice = [float(row["twice"]) for row in rows]
+    assert twice[0] < twice[1] and twice[4] < twice[1]  # more for regions with neighbours on all sides, and for small ones
+    told = capsys.readouterr().out
+    assert "One core: 1e+06 collisions/s (given)" in told
+    with open(tmp_path / "model.csv", newline="") as file:
+        model = {(int(row["regions"]), int(row["per_region"])): float(row["efficiency"]) for row in csv.DictReader(file)}
+    assert 0 < model[10000, 10**4] < model[64, 10**4] < model[64, 10**6] < 1

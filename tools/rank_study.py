@@ -1,0 +1,207 @@
+#!/usr/bin/python3
+"""What to expect of many ranks: counts of runs with many regions, and a model of the efficiency fitted to them.
+
+    tools/rank_study.py
+    tools/rank_study.py --ranks 8,64 --per-rank 500,2000 --collisions 20 --rate 1e6
+    tools/rank_study.py --mpirun --ranks 8,16,64 --per-rank 500,2000
+
+Measured, for a deck of free flight: windows, rounds a window, events run twice at borders, events redone, as run.log tells
+them. All regions are in one process (CAROM_REGIONS), with the windows and rounds of as many ranks; with --mpirun they are
+ranks, and the imbalance of the whole run is measured too. Spheres start at random places (--placement): cut between the
+layers of a crystal, regions get unequal shares until they are made anew.
+
+Fitted to the runs whose regions have neighbours on all sides, with s = (spheres a region)^(-1/D):
+events run twice (1 + h s)^D - 1, a shell around a cube; events redone r s, a surface; rounds a window a + b log2(spheres
+at all borders), a chain of repairs that gets longer by one with a probability.
+
+Modelled from that: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a region.
+The work is its collisions by --rate. The imbalance is that of independent events, sqrt(2 ln P / events), times
+--imbalance. Messages: a window has rounds + 1 exchanges and rounds + 3 reductions; a reduction takes
+log2 P times --latency, an exchange --latency and, as every rank tells every other how much will come, P times --overhead.
+The last column of the table has exchanges that reach neighbours only. Left out: volume of data, bookkeeping of windows,
+memory, and starts and ends of epochs and frames, at which every rank has all spheres.
+"""
+
+import argparse
+import os
+import pathlib
+import re
+import tempfile
+
+import numpy as np
+
+from carom_plot import panels
+from studies import processor_seconds, read_deck, run_deck, write_table
+
+COUNTS = re.compile(r"(\d+) windows, ([\d.]+) rounds each; events at borders run twice ([\d.]+)%, redone ([\d.]+)%, "
+                    r"imbalance ([\d.]+)%")
+COLUMNS = ["regions", "per_region", "particles", "windows", "events", "rounds", "twice", "redone", "redone_events",
+           "imbalance"]
+MODEL = ["regions", "per_region", "rounds", "twice", "redone", "imbalance", "messages", "efficiency",
+         "efficiency_neighbours"]
+RATE_COLLISIONS = 1_000_000
+
+
+def parse_arguments(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    default = pathlib.Path(__file__).resolve().parent.parent / "inputs" / "hard-sphere-fluid.toml"
+    parser.add_argument("deck", type=pathlib.Path, nargs="?", default=default, help="default: inputs/hard-sphere-fluid.toml")
+    parser.add_argument("--ranks", default="2,4,8,16,32,64", help="numbers of regions")
+    parser.add_argument("--per-rank", default="500,2000,10000", help="spheres a region")
+    parser.add_argument("--most", type=int, default=130000, help="spheres of a run; larger ones are left out")
+    parser.add_argument("--collisions", type=float, default=10, help="of a sphere in a run")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--regions", action="store_true", help="all in one process: the default")
+    how.add_argument("--mpirun", action="store_true", help="ranks; where they are more than cores, . tools/mpi-env.sh first")
+    parser.add_argument("--placement", default="random", help="of the spheres, instead of the deck's")
+    parser.add_argument("--imbalance", type=float,
+                        help="factor by which the imbalance exceeds that of independent events; default: fitted with "
+                             "--mpirun, else 1")
+    parser.add_argument("--rate", type=float, help="collisions a second of one core; default: measured without regions")
+    parser.add_argument("--latency", type=float, default=5e-6, help="of a message [s], an assumption")
+    parser.add_argument("--overhead", type=float, default=5e-7, help="of each further message of an exchange [s], likewise")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="changes the deck, as in carom run")
+    parser.add_argument("--carom", help="the command; default: $CAROM or the build of tools/run")
+    parser.add_argument("-o", "--output", type=pathlib.Path, help="directory; default: runs/rank-study-<deck>")
+    options = parser.parse_args(arguments)
+    options.output = options.output or pathlib.Path("runs") / f"rank-study-{options.deck.stem}"
+    options.ranks = sorted(map(int, options.ranks.split(",")))
+    options.per_rank = sorted(map(int, options.per_rank.split(",")))
+    if options.ranks[0] < 2 or options.per_rank[0] < 8:
+        parser.error("--ranks must be at least 2, --per-rank at least 8")
+    return options
+
+
+def counts_of(log):
+    """The line about regions in a run.log: windows, rounds a window, and the shares of events."""
+    found = COUNTS.search(log)
+    if not found:
+        raise SystemExit("run.log tells nothing of windows: is the deck one of free flight, and are there several regions?")
+    windows, rounds, *percent = found.groups()
+    return {"windows": int(windows), "rounds": float(rounds)} | {
+        name: float(value) / 100 for name, value in zip(("twice", "redone", "imbalance"), percent)}
+
+
+def run(options, deck, particles, collisions, **how):
+    """Summary, run.log and seconds of a run of which only the end is written."""
+    plan = {"end_time": 1e9, "collisions": int(collisions)}
+    deck = deck | {"run": plan, "output": {"frame_interval": 0.0, "thermo_interval": 0.0}}
+    before = processor_seconds()
+    with tempfile.TemporaryDirectory() as directory:
+        place = pathlib.Path(directory) / "run"
+        summary = run_deck(options, deck, f"{place}.toml", place,
+                           [f"particles.0.count={particles}", f"placement.type={options.placement}"], **how)
+        return summary, (place / "run.log").read_text(), min(summary["wall_seconds"], processor_seconds() - before)
+
+
+def measure(options, deck, regions, per_region):
+    """A row of the table of counts."""
+    particles = regions * per_region
+    environment = {name: value for name, value in os.environ.items() if name != "CAROM_REGIONS"}
+    if options.mpirun:
+        how = {"launcher": ["mpirun", "-n", str(regions)]}
+    else:
+        how, environment["CAROM_REGIONS"] = {}, str(regions)
+    summary, log, _ = run(options, deck, particles, particles * options.collisions / 2, environment=environment, **how)
+    row = counts_of(log) | {"regions": regions, "per_region": per_region, "particles": particles}
+    row["events"] = sum(summary["events"].values()) / row["windows"] / regions
+    row["redone_events"] = row["redone"] * row["events"]
+    if not options.mpirun:
+        row["imbalance"] = np.nan  # run.log has that of ranks
+    print("{regions:7} {per_region:10} {windows:8} {events:8.0f} {rounds:7.2f} {twice:8.1%} {redone:8.2%} "
+          "{redone_events:8.2f}".format(**row), f"{row['imbalance']:9.1%}" if options.mpirun else "        -", flush=True)
+    return row
+
+
+def measured_rate(options, deck):
+    """Collisions a second of one core, without regions, and the number of spheres."""
+    environment = {name: value for name, value in os.environ.items() if name != "CAROM_REGIONS"}
+    particles = options.per_rank[-1]
+    summary, _, seconds = run(options, deck, particles, RATE_COLLISIONS, environment=environment)
+    return summary["events"]["sphere_sphere"] / seconds, particles
+
+
+def border(regions, per_region, dimension):
+    """About how many spheres are at borders, as a logarithm."""
+    return np.log2(regions * per_region ** (1 - 1 / dimension))
+
+
+def fit(rows, dimension, imbalance=None):
+    """What the model takes from the counts."""
+    inner = [row for row in rows if row["regions"] >= 2**dimension]
+    if len({border(row["regions"], row["per_region"], dimension) for row in inner}) < 2:
+        raise SystemExit(f"The fit needs two runs of {2**dimension} or more regions.")
+    column = lambda name: np.array([row[name] for row in inner])
+    s = column("per_region") ** (-1 / dimension)
+    b, a = np.polyfit(border(column("regions"), column("per_region"), dimension), column("rounds"), 1)
+    if imbalance is None:
+        factors = column("imbalance") * np.sqrt(column("events") * column("windows") / (2 * np.log(column("regions"))))
+        imbalance = 1.0 if np.isnan(factors).any() else np.mean(factors)
+    return {"dimension": dimension, "h": np.mean(((1 + column("twice")) ** (1 / dimension) - 1) / s),
+            "r": np.mean(column("redone") / s), "a": a, "b": b,
+            "events": np.mean(column("events") / column("per_region")), "imbalance": imbalance}
+
+
+def modelled(fitted, options, regions, per_region):
+    """A row of the table of efficiencies; messages are in units of the work."""
+    dimension, s = fitted["dimension"], per_region ** (-1 / fitted["dimension"])
+    rounds = fitted["a"] + fitted["b"] * border(regions, per_region, dimension)
+    twice, redone = (1 + fitted["h"] * s) ** dimension - 1, fitted["r"] * s
+    events = fitted["events"] * per_region
+    imbalance = fitted["imbalance"] * np.sqrt(2 * np.log(regions) / events)
+    work = events / options.rate
+    least = ((rounds + 1) + (rounds + 3) * np.log2(regions)) * options.latency / work
+    messages = least + (rounds + 1) * options.overhead * regions / work
+    rest = 1 + twice + redone + imbalance
+    return {"regions": regions, "per_region": per_region, "rounds": rounds, "twice": twice, "redone": redone,
+            "imbalance": imbalance, "messages": messages, "efficiency": 1 / (rest + messages),
+            "efficiency_neighbours": 1 / (rest + least)}
+
+
+def draw(rows, fitted, options, title, file):
+    sizes = np.geomspace(min(row["per_region"] for row in rows), 1e6)
+    with panels(file, {"title": title, "xlabel": "spheres a region", "ylabel": "share of the events (points: measured)"},
+                {"title": "model", "xlabel": "spheres a region", "ylabel": "efficiency", "xscale": "log"}) as (left, right):
+        curves = [modelled(fitted, options, options.ranks[-1], size) for size in sizes]
+        for name, colour in (("twice", "C0"), ("redone", "C1")):
+            left.loglog([row["per_region"] for row in rows], [row[name] for row in rows], "o", color=colour)
+            left.loglog(sizes, [row[name] for row in curves], color=colour, label=name)
+        for regions in (64, 1000, 10000):
+            curves = [modelled(fitted, options, regions, size) for size in sizes]
+            line, = right.plot(sizes, [row["efficiency"] for row in curves], label=f"{regions} ranks")
+            right.plot(sizes, [row["efficiency_neighbours"] for row in curves], "--", color=line.get_color())
+
+
+def main(arguments=None):
+    options = parse_arguments(arguments)
+    deck = read_deck(options)
+    options.output.mkdir(parents=True, exist_ok=True)
+    print(f"Measured with {'ranks' if options.mpirun else 'regions of one process'}; events, and events redone, are of a "
+          "region in a window:")
+    print("regions per region  windows   events  rounds    twice   redone   events imbalance")
+    rows = [measure(options, deck, regions, per_region) for per_region in options.per_rank for regions in options.ranks
+            if regions * per_region <= options.most]
+    fitted = fit(rows, deck["system"]["dimension"], options.imbalance)
+    how = "given"
+    if options.rate is None:
+        options.rate, particles = measured_rate(options, deck)
+        how = f"measured with {particles} spheres"
+    print("Fitted: h {h:.2f}, r {r:.3f}, rounds {a:.2f} + {b:.3f} log2(border), {events:.3f} events a sphere and window, "
+          "imbalance {imbalance:.2f} of independent events".format(**fitted))
+    print(f"One core: {options.rate:.3g} collisions/s ({how}). Assumed: {options.latency:.1e} s a message, "
+          f"{options.overhead:.1e} s each further one")
+    print("Modelled:\nregions per region  rounds    twice   redone imbalance messages efficiency neighbours only")
+    model = [modelled(fitted, options, regions, per_region) for per_region in (10**4, 10**5, 10**6)
+             for regions in (64, 1000, 10000)]
+    for row in model:
+        print("{regions:7} {per_region:10} {rounds:7.2f} {twice:8.1%} {redone:8.2%} {imbalance:9.1%} {messages:8.1%} "
+              "{efficiency:10.2f} {efficiency_neighbours:15.2f}".format(**row))
+    table, prediction, figure = (options.output / name for name in ("ranks.csv", "model.csv", "ranks.png"))
+    write_table(table, COLUMNS, rows)
+    write_table(prediction, MODEL, model)
+    draw(rows, fitted, options, deck.get("title", options.deck.stem), figure)
+    print(f"Results: {table}, {prediction}, {figure}")
+
+
+if __name__ == "__main__":
+    main()
