@@ -22,10 +22,11 @@ Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
 }  // namespace
 
 template <int D>
-Part<D>::Part(System<D>& whole, Exchange& ranks) : whole_(whole), ranks_(ranks) {
+Part<D>::Part(System<D>& whole, Exchange& ranks)
+    : whole_(whole), ranks_(ranks), holders_(static_cast<std::size_t>(ranks.size())) {
   whole_.part = this;
   whole_.particles.ghost.resize(total());
-  choose_everybody(Division<D>(whole_.box, whole_.particles.x, static_cast<std::size_t>(ranks_.size())));
+  choose_everybody();
 }
 
 template <int D>
@@ -95,11 +96,10 @@ void Part<D>::divide(Luggage<D>& luggage, bool everybody, double slab_length) {
   std::vector<Place> places;
   std::vector<Bytes> all;
   if (!knew_everybody || !everybody) all = gather_state(&luggage, &places);
-  const Division<D> division(whole_.box, whole_.particles.x, static_cast<std::size_t>(ranks_.size()));
-  const bool chosen = !everybody && choose(division, slab_length);
+  const bool chosen = !everybody && choose(slab_length);
   if (!chosen) {
     some_.reset();
-    choose_everybody(division);
+    choose_everybody();
     if (knew_everybody) return;
   }
   luggage.regroup(known());
@@ -113,14 +113,15 @@ void Part<D>::divide(Luggage<D>& luggage, bool everybody, double slab_length) {
 }
 
 template <int D>
-void Part<D>::choose_everybody(const Division<D>& division) {
+void Part<D>::choose_everybody() {
   Particles<D>& p = whole_.particles;
-  holders_.assign(static_cast<std::size_t>(ranks_.size()), {});
+  const Division<D> division(whole_.box, p.x, holders_.size(), 0);
+  holders_.assign(holders_.size(), {});
   ghosts_ = holders_;
   matters_.clear();
   const auto me = static_cast<std::size_t>(ranks_.rank());
   for (Id i = 0; i < p.size(); ++i) {
-    const std::size_t owner = division.owner(p.x[i]);
+    const std::size_t owner = division.owner(division.wrapped(p.x[i]));
     p.ghost[i] = owner != me;
     if (owner != me)
       ghosts_[owner].push_back(i);
@@ -132,7 +133,7 @@ void Part<D>::choose_everybody(const Division<D>& division) {
 
 /// Chooses whom this rank knows, by where everybody is; false: it has to know everybody.
 template <int D>
-bool Part<D>::choose(const Division<D>& division, double slab_length) {
+bool Part<D>::choose(double slab_length) {
   const Particles<D>& all = whole_.particles;
   double reach = 0, radius = 0, speed = 0;
   for (const auto& term : whole_.interactions) reach = std::max(reach, term->reach(all.x));
@@ -142,17 +143,19 @@ bool Part<D>::choose(const Division<D>& division, double slab_length) {
   slack_ = std::clamp(kSlabsApart * speed * slab_length, kLeastSlack * 2 * radius, kMostSlack * 2 * radius);
   const double near = std::max(reach, 2 * radius) + 2 * path_ + 2 * slack_, far = near + depth_ * 2 * radius;
   if (!std::isfinite(far)) return false;
+  const Division<D> division(whole_.box, all.x, holders_.size(), far);
 
   auto some = std::make_unique<System<D>>();
   Particles<D>& p = some->particles;
   const auto me = static_cast<std::uint32_t>(ranks_.rank());
-  holders_.assign(static_cast<std::size_t>(ranks_.size()), {});
+  holders_.assign(holders_.size(), {});
   ghosts_ = holders_;
   matters_.clear();
   at_.clear();
   for (Id id = 0; id < all.size(); ++id) {
-    const std::uint32_t owner = division.owner(all.x[id]);
-    if (owner != me && !division.near(me, all.x[id], far)) continue;
+    const Vec<D> at = division.wrapped(all.x[id]);
+    const std::uint32_t owner = division.owner(at);
+    if (owner != me && !division.near(me, at)) continue;
     const auto i = static_cast<Id>(p.id.size());
     p.id.push_back(id);
     p.ghost.push_back(owner != me);
@@ -163,12 +166,12 @@ bool Part<D>::choose(const Division<D>& division, double slab_length) {
     p.radius.push_back(all.radius[id]);
     p.charge.push_back(all.charge[id]);
     p.species.push_back(all.species[id]);
-    matters_.push_back(owner != me && division.near(me, all.x[id], near));
+    matters_.push_back(owner != me && division.squared_distance(me, at) <= near * near);
     at_.push_back(unwrapped(whole_.box, p, i));
     if (owner != me)
       ghosts_[owner].push_back(i);
     else
-      division.for_each_near(all.x[id], far, [&](std::uint32_t rank) {
+      division.for_each_near(at, [&](std::uint32_t rank) {
         if (rank != me) holders_[rank].push_back(i);
       });
   }

@@ -11,7 +11,6 @@
 // not, the slab is done again with everybody known. Between looks at who is where nobody may come farther than slack().
 
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,9 +29,6 @@ class Luggage {
   virtual void regroup(System<D>& /*system*/) {}
   virtual void unpack(Id /*i*/, Reader& /*from*/) {}
 };
-
-template <int D>
-class Division;
 
 template <int D>
 class Part {
@@ -96,8 +92,8 @@ class Part {
   };
   std::vector<Bytes> gather_state(const Luggage<D>* luggage, std::vector<Place>* places);
   void divide(Luggage<D>& luggage, bool everybody, double slab_length);
-  bool choose(const Division<D>& division, double slab_length);
-  void choose_everybody(const Division<D>& division);
+  bool choose(double slab_length);
+  void choose_everybody();
   bool outdated();
   std::size_t total() const { return whole_.particles.size(); }
 
