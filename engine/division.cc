@@ -48,7 +48,12 @@ std::int32_t Division<D>::divide(std::span<Vec<D>> x, Part part, std::size_t reg
   if (split < x.size()) {
     std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(split), x.end(),
                      [&](const Vec<D>& a, const Vec<D>& b) { return a[axis] < b[axis]; });
-    at = x[split][axis];
+    // Between two layers, where there are layers: spheres of one that is cut would soon stand on one side of it.
+    const double upper = x[split][axis];
+    double lower = -kInfinite;
+    for (std::size_t i = 0; i < split; ++i)
+      if (x[i][axis] < upper) lower = std::max(lower, x[i][axis]);
+    at = std::isfinite(lower) ? 0.5 * (lower + upper) : upper;
   }
   const auto middle = std::partition(x.begin(), x.end(), [&](const Vec<D>& place) { return place[axis] < at; });
   const auto number = static_cast<std::int32_t>(cuts_.size());

@@ -14,6 +14,14 @@ constexpr double kFaster = 2;                        // than anybody is, somebod
 constexpr std::int64_t kSlabs = 64;                  // between divisions while everybody is known
 constexpr double kMost = 0.7;                        // of all particles; a rank that would know more knows everybody
 
+/// What ranks tell each other of a particle.
+template <int D>
+struct State {
+  Vec<D> x, v;
+  Image<D> image;
+  Id id;
+};
+
 template <int D>
 Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
   return p.x[i] + box.shift(p.image[i]);
@@ -40,13 +48,10 @@ template <int D>
 std::vector<Bytes> Part<D>::gather_state(const Luggage<D>* luggage, std::vector<Place>* places) {
   const Particles<D>& p = known().particles;
   Bytes mine, packed;
-  mine.reserve(p.size() * 128);
+  mine.reserve(p.size() * 2 * sizeof(State<D>));
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
-    put(mine, p.id_of(i));
-    put(mine, p.x[i]);
-    put(mine, p.v[i]);
-    put(mine, p.image[i]);
+    put(mine, State<D>{p.x[i], p.v[i], p.image[i], p.id_of(i)});
     if (!luggage) continue;
     packed.clear();
     luggage->pack(i, packed);
@@ -57,10 +62,10 @@ std::vector<Bytes> Part<D>::gather_state(const Luggage<D>* luggage, std::vector<
   if (places) places->resize(total());
   for (std::size_t rank = 0; rank < all.size(); ++rank)
     for (Reader from(all[rank]); from.more();) {
-      const Id id = from.get<Id>();
-      whole_.particles.x[id] = from.get<Vec<D>>();
-      whole_.particles.v[id] = from.get<Vec<D>>();
-      whole_.particles.image[id] = from.get<Image<D>>();
+      const auto [x, v, image, id] = from.get<State<D>>();
+      whole_.particles.x[id] = x;
+      whole_.particles.v[id] = v;
+      whole_.particles.image[id] = image;
       if (!luggage) continue;
       const auto size = from.get<std::size_t>();
       (*places)[id] = {rank, all[rank].size() - from.left()};

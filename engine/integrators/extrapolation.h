@@ -28,14 +28,15 @@ class Extrapolation {
   }
   /// What is known of a particle.
   void pack(Id i, Bytes& to) const {
-    for (const auto& past : past_) put(to, past[i]);
-    put(to, age_[i]);
-    put(to, time_[i]);
+    Known known{{}, time_[i], age_[i]};
+    for (std::size_t k = 0; k < past_.size(); ++k) known.past[k] = past_[k][i];
+    put(to, known);
   }
   void unpack(Id i, Reader& from) {
-    for (auto& past : past_) past[i] = from.get<Vec<D>>();
-    age_[i] = from.get<std::uint8_t>();
-    time_[i] = from.get<double>();
+    const auto known = from.get<Known>();
+    for (std::size_t k = 0; k < past_.size(); ++k) past_[k][i] = known.past[k];
+    age_[i] = known.age;
+    time_[i] = known.time;
   }
   /// A piece of this length is done; then add() for everybody.
   void pass(double length) {
@@ -65,6 +66,11 @@ class Extrapolation {
 
  private:
   static constexpr std::size_t kOrder = 3;
+  struct Known {
+    std::array<Vec<D>, kOrder + 1> past;
+    double time;
+    std::uint8_t age;
+  };
   static constexpr double kMostGrowth = 3;  // of pieces; beyond it only the last one counts
 
   /// [age][piece]. The integral of the acceleration is known at the pieces' ends, −s_k before now, and continued by
