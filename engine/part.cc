@@ -12,6 +12,7 @@ constexpr double kLeastSlack = 0.5, kMostSlack = 2;  // that anybody comes betwe
 constexpr double kSlabsApart = 16;                   // divisions, about
 constexpr double kFaster = 2;                        // than anybody is, somebody may come to be
 constexpr std::int64_t kSlabs = 64;                  // between divisions while everybody is known
+constexpr double kLeastDepth = 3;                    // of ghosts that do not matter [largest diameter]
 constexpr double kMost = 0.7;                        // of all particles; a rank that would know more knows everybody
 
 /// What ranks tell each other of a particle.
@@ -31,7 +32,7 @@ Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
 
 template <int D>
 Part<D>::Part(System<D>& whole, Exchange& ranks)
-    : whole_(whole), ranks_(ranks), holders_(static_cast<std::size_t>(ranks.size())) {
+    : whole_(whole), ranks_(ranks), holders_(static_cast<std::size_t>(ranks.size())), depth_(kLeastDepth) {
   whole_.part = this;
   whole_.particles.ghost.resize(total());
   choose_everybody();
@@ -82,7 +83,10 @@ void Part<D>::collect() {
 template <int D>
 bool Part<D>::divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, double slab_length) {
   if (some_ ? !outdated() : slab < next_) return false;
-  if (some_) patience_ = std::max<std::int64_t>(patience_ / 2, 1);
+  if (some_) {  // all has gone well since the last time
+    patience_ = std::max<std::int64_t>(patience_ / 2, 1);
+    depth_ = std::max(0.75 * depth_, kLeastDepth);
+  }
   divide(luggage, !local, slab_length);
   next_ = slab + kSlabs;
   return true;
