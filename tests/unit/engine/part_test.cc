@@ -178,6 +178,21 @@ TEST(Part, Rod) {
     EXPECT_LT(s.counters.slabs_again, 5u) << method;
   }
 }
+/// Chains of collisions that reach from the rim of what a rank knows to what matters: discs in a long strip, so close
+/// that each collides more than once in two steps.
+TEST(Part, GhostsThatGoWrong) {
+  const auto strip = [] {
+    std::vector<Vec<2>> x, v;
+    for (int k = 0; k < 2400; ++k) {
+      x.push_back({0.5 + 1.08 * (k / 12), 0.5 + 1.08 * (k % 12)});
+      v.push_back({0.3 * (k * 7 % 11 - 5), 0.3 * (k * 5 % 13 - 6)});
+    }
+    auto system = test::make_system<2>({216, 12.96}, Boundary::periodic, x, v);
+    test::add_interaction(*system, "harmonic-bond", {{"within", 1.2}, {"stiffness", 0.1}, {"rest_length", 1.1}});
+    return system;
+  };
+  EXPECT_GT(compare<2>(strip, "acdda", 0.12, 5, 10000).counters.slabs_again, 0u);
+}
 /// In such long steps a collision is felt farther away than a rank knows.
 TEST(Part, StepsThatTakeEverybody) {
   EXPECT_GT(compare<2>([] { return springs(40); }, "psa", 0.3, 4, 1000).counters.slabs_again, 0u);
