@@ -63,15 +63,15 @@ struct MotionSums {
   }
 };
 
-/// Of all particles of a system, at velocities other than its own.
+/// Of all particles of a system: the momentum in one state, the rest in another.
 template <int D>
-MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& at) {
+MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
   MotionSums<D> sums;
   for (Id i = 0; i < at.size(); ++i) {
     if (!system.particles.owns(i)) continue;
     sums.kinetic.add(0.5 * at.mass[i] * at.v[i].squaredNorm());
     sums.speed.add(at.v[i].norm());
-    for (int k = 0; k < D; ++k) sums.momentum[k].add(at.mass[i] * at.v[i][k]);
+    for (int k = 0; k < D; ++k) sums.momentum[k].add(state.mass[i] * state.v[i][k]);
   }
   return system.part ? sum_of_all(system.part->ranks(), sums) : sums;
 }

@@ -109,7 +109,10 @@ void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool las
     s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - first_shadow_));
   if (s.max_momentum_error)
     s.max_momentum_error = std::max(*s.max_momentum_error, (shot_.momentum - first_momentum_).norm());
-  if (info_.hard_cores) s.counters.max_overlap = std::max(s.counters.max_overlap, deepest_overlap());
+  if (info_.hard_cores) {
+    s.counters.max_overlap = std::max(s.counters.max_overlap, deepest_overlap());
+    if (system_.part) s.counters.max_overlap = system_.part->largest(s.counters.max_overlap);
+  }
   virial_time_ += elapsed * virial_;
   if (s.end_time > 0) {
     s.mean_pressure = (virial_time_ + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
@@ -135,7 +138,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Pa
   shot.particles = &state;
   const PotentialSums sums = evaluate_energy<D>(known(), nodes.x);
   const auto total = static_cast<double>(system_.particles.size());
-  const MotionSums<D> motion = evaluate_motion(known(), nodes);
+  const MotionSums<D> motion = evaluate_motion(known(), state, nodes);
   shot.kinetic = motion.kinetic.value();
   shot.potential = sums.energy.value();
   magnitude_ = shot.kinetic + sums.magnitude.value();
@@ -196,7 +199,7 @@ double Monitor<D>::deepest_overlap() {
     const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
     if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
   }
-  return system_.part ? system_.part->largest(deepest) : deepest;
+  return deepest;
 }
 
 /// Everybody, where the system shares its particles among ranks.

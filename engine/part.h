@@ -8,7 +8,7 @@
 // A rank knows either everybody, or its own particles and those near them. For methods that can do with these
 // (Integrator::local()) it runs its ghosts like its own particles; those at the rim of what it knows may go wrong, for
 // they miss partners, so it is checked that those near enough to matter did what they did at their owners'. If they did
-// not, the slab is done again with everybody known. Between looks at who is where nobody may come farther than slack().
+// not, the slab is done again with everybody known. Particles are divided anew before anybody has come too far.
 
 #include <memory>
 #include <span>
@@ -104,7 +104,7 @@ class Part {
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // where everybody was at the last division, images undone
   double path_ = 0, slack_ = 0;
-  double depth_ = 3;       // of ghosts that do not matter [largest diameter]
+  double depth_;           // of ghosts that do not matter [largest diameter]
   std::int64_t next_ = 0;  // while everybody is known: the slab before which to divide
   std::int64_t patience_ = 1;
 };

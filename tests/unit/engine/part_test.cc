@@ -65,6 +65,11 @@ void expect_same(const Account<D>& one, const Account<D>& other) {
   EXPECT_EQ(a.max_energy_error, b.max_energy_error);
   EXPECT_EQ(a.mean_pressure, b.mean_pressure);
   EXPECT_EQ(a.force_passes, b.force_passes);
+  EXPECT_EQ(a.counters.max_overlap, b.counters.max_overlap);
+  EXPECT_EQ(a.counters.pieces, b.counters.pieces);
+  EXPECT_EQ(a.max_shadow_energy_error, b.max_shadow_energy_error);
+  EXPECT_EQ(a.max_momentum_error, b.max_momentum_error);
+  EXPECT_EQ(a.mean_free_path, b.mean_free_path);
   EXPECT_EQ(a.counters.sphere_sphere, b.counters.sphere_sphere);
   EXPECT_EQ(a.counters.sphere_wall, b.counters.sphere_wall);
   EXPECT_EQ(a.counters.sweeps, b.counters.sweeps);
