@@ -19,12 +19,13 @@ Domains<D>::Domains(const Box<D>& box, const Particles<D>& particles, Exchange& 
                     const SearchOptions& options, std::function<double()> window)
     : box_(box),
       particles_(particles),
+      sizes_(particles),
       exchange_(exchange),
       regions_(std::clamp<std::size_t>(regions, 1, std::max<std::size_t>(particles.radius.size() / kFewest, 1))),
       forced_window_(std::move(window)) {
   diameter_ = 2 * *std::max_element(particles.radius.begin(), particles.radius.end());
   for (std::size_t r = first_region(exchange_.rank()); r < first_region(exchange_.rank() + 1); ++r)
-    local_.push_back(std::make_unique<Region<D>>(box, particles, options));
+    local_.push_back(std::make_unique<Region<D>>(box, sizes_, options));
 }
 
 /// Regions go to ranks in their order, as evenly as may be.

@@ -65,6 +65,7 @@ class Domains {
 
   const Box<D>& box_;
   const Particles<D>& particles_;
+  Sizes sizes_;
   mutable TimedExchange exchange_;
   std::size_t regions_;
   std::function<double()> forced_window_;

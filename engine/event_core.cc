@@ -8,8 +8,8 @@
 
 namespace carom {
 template <int D>
-EventCore<D>::EventCore(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options)
-    : box_(box), particles_(particles), flights_(box), options_(options), kernels_(scan_kernels()), tuning_(options) {
+EventCore<D>::EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options)
+    : box_(box), sizes_(sizes), flights_(box), options_(options), kernels_(scan_kernels()), tuning_(options) {
   for (int k = 0; k < D; ++k) walled_ = walled_ || box.walled(k);
 }
 

@@ -48,8 +48,12 @@ class EventCore {
     Trace<D>* trace = nullptr;  ///< where to write down paths; then contacts are not counted, they may be revoked
   };
 
-  /// Masses and radii are read from `particles`, which outlives the core; they change between slabs only.
-  EventCore(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options = {});
+  /// Masses and radii are read from `particles` at the start of each slab.
+  EventCore(const Box<D>& box, const Particles<D>& /*particles*/, const SearchOptions& options = {})
+      : EventCore(box, nullptr, options) {}
+  /// For a core that runs a part of a larger system; `sizes` tells masses and radii of all of it, and outlives the
+  /// core.
+  EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options);
   ~EventCore();
   EventCore(const EventCore&) = delete;
   EventCore& operator=(const EventCore&) = delete;
@@ -144,7 +148,7 @@ class EventCore {
   void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
 
   const Box<D>& box_;
-  const Particles<D>& particles_;
+  const Sizes* sizes_;  // of the larger system; null: there is none
   Flights<D> flights_;
   SearchOptions options_;
   const ScanKernels& kernels_;

@@ -54,7 +54,7 @@ void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double 
   tied_ = {};
   free_.clear();
   lists_.reset();
-  flights_.load(sorted, particles_, g, horizon);
+  flights_.load(sorted, *sizes_, g, horizon);
   plan(true, now);
 }
 
@@ -119,12 +119,14 @@ void EventCore<D>::plan(bool anew, double now) {
 template <int D>
 void EventCore<D>::choose_search(double now) {
   // A region is as dense as the whole, of which it has a part only, and larger spheres may come.
-  const std::vector<double>& radii = radii_.empty() ? particles_.radius : radii_;
-  largest_ = *std::max_element(radii.begin(), radii.end());
-  if (flights_.size() < particles_.radius.size())
-    largest_ = std::max(largest_, *std::max_element(particles_.radius.begin(), particles_.radius.end()));
+  const std::vector<double>& radii = radii_.empty() ? sizes_->radius : radii_;
   Extent<D> extent = flights_.extent();
-  extent.particles = particles_.radius.size();
+  if (sizes_) {
+    largest_ = sizes_->largest_radius();
+    extent.particles = sizes_->spheres;
+  } else {
+    largest_ = *std::max_element(radii.begin(), radii.end());
+  }
   SearchSituation situation = situation_of<D>(box_, radii, extent);
   situation.largest = 2 * largest_;
   tuning_.choose(situation, counts_);
@@ -154,8 +156,8 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
     if (flights_.size() == flights_.room()) return false;
     slot = static_cast<Slot>(flights_.size());
   }
-  const double radius = particles_.radius[r.id];
-  flights_.admit(slot, r, radius, particles_.mass[r.id]);
+  const double radius = sizes_->radius_of(r);
+  flights_.admit(slot, r, radius, sizes_->mass_of(r));
   if (slot == agenda_.size()) {
     agenda_.emplace_back();
     if (!flights_.equal()) radii_.push_back(radius);

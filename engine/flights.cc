@@ -87,21 +87,19 @@ void Flights<D>::advance(Record<D>& r, double t) const {
 }
 
 template <int D>
-void Flights<D>::load(std::span<const Record<D>> records, const Particles<D>& particles, const Vec<D>& g,
-                      double horizon) {
+void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon) {
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
   horizon_ = horizon;
-  common_radius_ = common(particles.radius);
-  common_mass_ = common(particles.mass);
+  common_radius_ = common(sizes.radius);
+  common_mass_ = common(sizes.mass);
   room_ = records.size() + records.size() / 4 + 256;
   records_.clear();
   records_.reserve(room_);
   radius_.clear();
   mass_.clear();
-  for (const Record<D>& r : records)
-    admit(static_cast<Slot>(records_.size()), r, particles.radius[r.id], particles.mass[r.id]);
+  for (const Record<D>& r : records) admit(static_cast<Slot>(records_.size()), r, sizes.radius_of(r), sizes.mass_of(r));
 }
 
 template <int D>

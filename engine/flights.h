@@ -14,6 +14,7 @@
 #include "engine/particles.h"
 #include "engine/record.h"
 #include "engine/scan.h"
+#include "engine/sizes.h"
 
 namespace carom {
 
@@ -37,7 +38,7 @@ class Flights {
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
 
   /// The same for records of other times, in their order; with room for more that come meanwhile.
-  void load(std::span<const Record<D>> records, const Particles<D>& particles, const Vec<D>& g, double horizon);
+  void load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon);
 
   std::size_t size() const { return records_.size(); }
   std::size_t room() const { return room_; }

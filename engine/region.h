@@ -46,9 +46,9 @@ class Region {
     }
   };
 
-  /// `particles` tells masses and radii of everybody, by id.
-  Region(const Box<D>& box, const Particles<D>& particles, const SearchOptions& options)
-      : box_(box), core_(box, particles, options) {}
+  /// `sizes` tells masses and radii of everybody, and outlives the region.
+  Region(const Box<D>& box, const Sizes& sizes, const SearchOptions& options)
+      : box_(box), core_(box, &sizes, options) {}
 
   /// Starts anew at time `now` as region `number` of a division, with all spheres that concern it. In no window will
   /// anyone come farther than `stray`.
