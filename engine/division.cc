@@ -1,70 +1,169 @@
 #include "engine/division.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace carom {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
+/// Doubles as whole numbers in the same order.
+std::uint64_t ordered(double value) {
+  const auto bits = std::bit_cast<std::uint64_t>(value + 0.0);  // one zero only
+  constexpr std::uint64_t kSign = std::uint64_t{1} << 63;
+  return (bits & kSign) != 0 ? ~bits : bits | kSign;
+}
+double from_ordered(std::uint64_t key) {
+  constexpr std::uint64_t kSign = std::uint64_t{1} << 63;
+  return std::bit_cast<double>((key & kSign) != 0 ? key & ~kSign : ~key);
+}
+
+/// One of several sorted sequences that all ranks have parts of, and which element of it is asked for.
+struct Rank {
+  std::vector<std::uint64_t> keys;  // of this rank; in the end those that are left
+  std::uint64_t number;             // from 0, less than there are; none are asked for where there is nobody
+  std::uint64_t found = 0;          // the bits known so far
+};
+
+/// Finds the elements asked for, digit by digit from the highest, by counting: all ranks find the same.
+void select(std::span<Rank> wanted, Exchange& ranks) {
+  constexpr int kBits = 8;
+  constexpr std::size_t kDigits = std::size_t{1} << kBits;
+  std::vector<std::uint64_t> counts(wanted.size() * kDigits);
+  for (int shift = 64 - kBits; shift >= 0; shift -= kBits) {
+    std::ranges::fill(counts, 0);
+    for (std::size_t w = 0; w < wanted.size(); ++w)
+      for (const std::uint64_t key : wanted[w].keys) ++counts[w * kDigits + (key >> shift) % kDigits];
+    ranks.sum(counts);
+    for (std::size_t w = 0; w < wanted.size(); ++w) {
+      std::uint64_t digit = 0;
+      for (const std::uint64_t* count = &counts[w * kDigits]; digit + 1 < kDigits && wanted[w].number >= count[digit];)
+        wanted[w].number -= count[digit++];
+      wanted[w].found |= digit << shift;
+      std::erase_if(wanted[w].keys, [&](std::uint64_t key) { return (key >> shift) % kDigits != digit; });
+    }
+  }
+}
+
 }  // namespace
 
+/// What is still to be cut, into so many regions from `first` on.
 template <int D>
-Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach)
-    : box_(box), reach_(reach) {
-  Part all;
-  for (int k = 0; k < D; ++k) {
-    all.low[k] = box.periodic(k) ? 0 : -kInfinite;
-    all.high[k] = box.periodic(k) ? box.edges[k] : kInfinite;
-  }
+struct Division<D>::Piece {
+  Part part;
+  std::uint32_t first;
+  std::size_t regions;
+  std::span<Vec<D>> x;              // of this rank's spheres
+  std::int32_t above_cut = kNoCut;  // that it is a side of
+  bool upper = false;
+};
+
+template <int D>
+Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks)
+    : box_(box), reach_(reach), parts_(std::max<std::size_t>(regions, 1)) {
   std::vector<Vec<D>> places(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) places[i] = wrapped(x[i]);
-  root_ = divide(places, all, std::max<std::size_t>(regions, 1));
+  Piece all{.part = {}, .first = 0, .regions = parts_.size(), .x = places};
+  for (int k = 0; k < D; ++k) {
+    all.part.low[k] = box.periodic(k) ? 0 : -kInfinite;
+    all.part.high[k] = box.periodic(k) ? box.edges[k] : kInfinite;
+  }
+  std::vector<Piece> pieces;
+  settle(all, pieces);
+  while (!pieces.empty()) pieces = cut(pieces, ranks);
   for (std::uint32_t r = 0; r < parts_.size(); ++r) neighbours_.push_back(neighbours_of(r));
 }
 
-/// Cuts a part across its longest edge; returns the cut, or the complement of the region's number.
+/// Makes a piece known to the cut that it is a side of, and a region where that is all; else it is cut further.
 template <int D>
-std::int32_t Division<D>::divide(std::span<Vec<D>> x, Part part, std::size_t regions) {
-  if (regions == 1) {
-    part.centre = 0.5 * (part.low + part.high);
-    part.half = 0.5 * (part.high - part.low);
-    for (int k = 0; k < D; ++k)
-      part.whole[k] = box_.periodic(k) ? part.low[k] == 0 && part.high[k] == box_.edges[k]
-                                       : !std::isfinite(part.low[k]) && !std::isfinite(part.high[k]);
-    parts_.push_back(part);
-    return ~static_cast<std::int32_t>(parts_.size() - 1);
+void Division<D>::settle(Piece piece, std::vector<Piece>& pieces) {
+  const bool region = piece.regions == 1;
+  // Pieces that are cut further are cut in their order.
+  const auto node =
+      region ? ~static_cast<std::int32_t>(piece.first) : static_cast<std::int32_t>(cuts_.size() + pieces.size());
+  if (piece.above_cut == kNoCut)
+    root_ = node;
+  else
+    (piece.upper ? cuts_[static_cast<std::size_t>(piece.above_cut)].above
+                 : cuts_[static_cast<std::size_t>(piece.above_cut)].below) = node;
+  if (!region) {
+    pieces.push_back(std::move(piece));
+    return;
   }
-  Vec<D> low = box_.edges, high = Vec<D>::Zero();  // of the spheres in it
-  for (const Vec<D>& place : x) low = low.cwiseMin(place).eval(), high = high.cwiseMax(place).eval();
-  int axis = 0;
-  for (int k = 0; k < D; ++k) {
-    if (std::isfinite(part.low[k])) low[k] = part.low[k];
-    if (std::isfinite(part.high[k])) high[k] = part.high[k];
-    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+  Part& part = parts_[piece.first] = piece.part;
+  part.centre = 0.5 * (part.low + part.high);
+  part.half = 0.5 * (part.high - part.low);
+  for (int k = 0; k < D; ++k)
+    part.whole[k] = box_.periodic(k) ? part.low[k] == 0 && part.high[k] == box_.edges[k]
+                                     : !std::isfinite(part.low[k]) && !std::isfinite(part.high[k]);
+}
+
+/// Cuts pieces across their longest edges, all at once; returns what is to be cut further.
+template <int D>
+auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::vector<Piece> {
+  // Where the spheres of each are, for edges that are not those of the box; and how many.
+  std::vector<double> bounds;  // largest of −x, and of x
+  std::vector<std::uint64_t> spheres;
+  for (const Piece& piece : pieces) {
+    Vec<D> low = box_.edges, high = Vec<D>::Zero();
+    for (const Vec<D>& place : piece.x) low = low.cwiseMin(place).eval(), high = high.cwiseMax(place).eval();
+    for (int k = 0; k < D; ++k) bounds.push_back(-low[k]), bounds.push_back(high[k]);
+    spheres.push_back(piece.x.size());
   }
-  const std::size_t below = regions / 2, split = x.size() * below / regions;
-  double at = low[axis] + (high[axis] - low[axis]) * static_cast<double>(below) / static_cast<double>(regions);
-  if (split < x.size()) {
-    std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(split), x.end(),
-                     [&](const Vec<D>& a, const Vec<D>& b) { return a[axis] < b[axis]; });
-    // Between two layers, where there are layers: spheres of one that is cut would soon stand on one side of it.
-    const double upper = x[split][axis];
-    double lower = -kInfinite;
-    for (std::size_t i = 0; i < split; ++i)
-      if (x[i][axis] < upper) lower = std::max(lower, x[i][axis]);
-    at = std::isfinite(lower) ? 0.5 * (lower + upper) : upper;
+  ranks.largest(bounds);
+  ranks.sum(spheres);
+
+  std::vector<Rank> wanted;
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    const Piece& piece = pieces[p];
+    Vec<D> low, high;
+    int axis = 0;
+    for (int k = 0; k < D; ++k) {
+      low[k] = std::isfinite(piece.part.low[k]) ? piece.part.low[k] : -bounds[2 * (p * D + k)];
+      high[k] = std::isfinite(piece.part.high[k]) ? piece.part.high[k] : bounds[2 * (p * D + k) + 1];
+      if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+    }
+    const std::size_t below = piece.regions / 2;
+    const double share = static_cast<double>(below) / static_cast<double>(piece.regions);
+    cuts_.push_back({axis, low[axis] + (high[axis] - low[axis]) * share, 0, 0});
+    Rank& rank = wanted.emplace_back();
+    rank.number = spheres[p] * below / piece.regions;
+    for (const Vec<D>& place : piece.x) rank.keys.push_back(ordered(place[axis]));
   }
-  const auto middle = std::partition(x.begin(), x.end(), [&](const Vec<D>& place) { return place[axis] < at; });
-  const auto number = static_cast<std::int32_t>(cuts_.size());
-  cuts_.push_back({axis, at, 0, 0});
-  Part lower = part, upper = part;
-  lower.high[axis] = upper.low[axis] = at;
-  const std::int32_t first = divide({x.begin(), middle}, lower, below);
-  const std::int32_t second = divide({middle, x.end()}, upper, regions - below);
-  cuts_[static_cast<std::size_t>(number)].below = first;
-  cuts_[static_cast<std::size_t>(number)].above = second;
-  return number;
+  select(wanted, ranks);
+
+  // Between two layers, where there are layers: spheres of one that is cut would soon stand on one side of it.
+  const std::size_t first = cuts_.size() - pieces.size();
+  std::vector<double> layer_below(pieces.size(), -kInfinite);
+  for (std::size_t p = 0; p < pieces.size(); ++p)
+    for (const Vec<D>& place : pieces[p].x)
+      if (const double at = place[cuts_[first + p].axis]; at < from_ordered(wanted[p].found))
+        layer_below[p] = std::max(layer_below[p], at);
+  ranks.largest(layer_below);
+
+  std::vector<Piece> further;
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    const Piece& piece = pieces[p];
+    Cut& cut = cuts_[first + p];
+    const double layer = from_ordered(wanted[p].found);
+    if (spheres[p] > 0) cut.at = std::isfinite(layer_below[p]) ? 0.5 * (layer_below[p] + layer) : layer;
+    const auto middle =
+        std::partition(piece.x.begin(), piece.x.end(), [&](const Vec<D>& place) { return place[cut.axis] < cut.at; });
+    const auto number = static_cast<std::int32_t>(first + p);
+    const std::size_t below = piece.regions / 2;
+    Piece lower{piece.part, piece.first, below, {piece.x.begin(), middle}, number, false};
+    Piece upper{piece.part,
+                piece.first + static_cast<std::uint32_t>(below),
+                piece.regions - below,
+                {middle, piece.x.end()},
+                number,
+                true};
+    lower.part.high[cut.axis] = upper.part.low[cut.axis] = cut.at;
+    settle(lower, further);
+    settle(upper, further);
+  }
+  return further;
 }
 
 template <int D>

@@ -1,7 +1,8 @@
 #pragma once
 // How the box is divided among regions: by recursive bisection, so that each has about as many spheres.
 //
-// Which region owns a sphere never reaches the physics; all that matters is that everybody computes the same.
+// Which region owns a sphere never reaches the physics; all that matters is that everybody computes the same: cuts come
+// from whole numbers of spheres, whichever rank has them.
 
 #include <algorithm>
 #include <limits>
@@ -9,14 +10,16 @@
 #include <vector>
 
 #include "engine/box.h"
+#include "engine/exchange.h"
 
 namespace carom {
 
 template <int D>
 class Division {
  public:
-  /// Regions for spheres at x. Places that are nearer to a region than `reach` concern it.
-  Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach);
+  /// Regions for the spheres of all ranks, of which this one has those at x. Places that are nearer to a region than
+  /// `reach` concern it. Collective; the cuts are the same whoever has whom.
+  Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks);
 
   std::size_t regions() const { return parts_.size(); }
   double reach() const { return reach_; }
@@ -86,7 +89,11 @@ class Division {
     std::int32_t below, above;  // a further cut, or ~region
   };
 
-  std::int32_t divide(std::span<Vec<D>> x, Part part, std::size_t regions);
+  struct Piece;
+  static constexpr std::int32_t kNoCut = -1;
+
+  void settle(Piece piece, std::vector<Piece>& pieces);
+  std::vector<Piece> cut(std::span<const Piece> pieces, Exchange& ranks);
   double gap(int axis, double low, double high, double other_low, double other_high) const;
   std::vector<std::uint32_t> neighbours_of(std::uint32_t region) const;
 

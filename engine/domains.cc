@@ -15,15 +15,14 @@ constexpr std::size_t kFewest = 8;                            // spheres a regio
 }  // namespace
 
 template <int D>
-Domains<D>::Domains(const Box<D>& box, const Particles<D>& particles, Exchange& exchange, std::size_t regions,
+Domains<D>::Domains(const Box<D>& box, Sizes sizes, Exchange& exchange, std::size_t regions,
                     const SearchOptions& options, std::function<double()> window)
     : box_(box),
-      particles_(particles),
-      sizes_(particles),
+      sizes_(std::move(sizes)),
       exchange_(exchange),
-      regions_(std::clamp<std::size_t>(regions, 1, std::max<std::size_t>(particles.radius.size() / kFewest, 1))),
+      regions_(std::clamp<std::size_t>(regions, 1, std::max<std::size_t>(sizes_.spheres / kFewest, 1))),
       forced_window_(std::move(window)) {
-  diameter_ = 2 * *std::max_element(particles.radius.begin(), particles.radius.end());
+  diameter_ = 2 * sizes_.largest_radius();
   for (std::size_t r = first_region(exchange_.rank()); r < first_region(exchange_.rank() + 1); ++r)
     local_.push_back(std::make_unique<Region<D>>(box, sizes_, options));
 }
@@ -48,42 +47,73 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
   horizon_ = horizon;
   events_ = 0;
   fastest_ = 0;
-  double squares = 0;
-  for (const Vec<D>& v : particles.v) {
-    fastest_ = std::max(fastest_, v.norm());
-    squares += v.squaredNorm();
-  }
-  if (pace_ == 0 && squares > 0) {
-    Extent<D> extent;
-    for (const Vec<D>& x : particles.x) extent.add(x);
-    const double thermal = std::sqrt(squares / static_cast<double>(D * particles.size()));
-    pace_ = kCollisions / (contacts_a_length(situation_of<D>(box_, particles_.radius, extent)) * thermal);
-  }
+  for (const Vec<D>& v : particles.v) fastest_ = std::max(fastest_, v.norm());
+  exchange_.largest({&fastest_, 1});
+  if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(particles);
   fastest_ = kFaster * fastest_ + g_.norm() * horizon_;
   stray_ = std::clamp(1.05 * pace_ * fastest_, kSmallestStray * diameter_, kLargestStray * diameter_);
-  division_.emplace(box_, particles.x, regions_, diameter_ + 2 * stray_);
+  division_.emplace(box_, particles.x, regions_, diameter_ + 2 * stray_, exchange_);
   for (std::uint32_t r = 0; r < regions_; ++r)
     if (division_->neighbours(r).size() > 64)
       throw Error(Failure::deck, "a region has more than 64 neighbours; use fewer ranks for this box");
-  std::vector<Record<D>> records(particles.size());
-  for (std::size_t i = 0; i < records.size(); ++i)
-    records[i] = {particles.x[i], particles.v[i], 0.0, static_cast<Id>(i), 0, particles.species[i]};
-  std::vector<Vec<D>>().swap(particles.x);
-  std::vector<Vec<D>>().swap(particles.v);
-  load(records, 0);
+  load(0, [&](auto&& tell) {
+    for (Id i = 0; i < particles.size(); ++i)
+      tell(Record<D>{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]});
+    std::vector<Vec<D>>().swap(particles.x);
+    std::vector<Vec<D>>().swap(particles.v);
+  });
 }
 
+/// The time in which a sphere collides kCollisions times, by Enskog's theory.
 template <int D>
-void Domains<D>::load(std::span<const Record<D>> records, double now) {
+double Domains<D>::first_pace(const Particles<D>& particles) const {
+  ExactSum squares;  // the same for any number of ranks
+  Extent<D> extent;
+  for (const Vec<D>& v : particles.v) squares.add(v.squaredNorm());
+  for (const Vec<D>& x : particles.x) extent.add(x);
+  std::vector<double> bounds;
+  for (int k = 0; k < D; ++k) {
+    bounds.push_back(extent.particles > 0 ? -extent.low[k] : -std::numeric_limits<double>::infinity());
+    bounds.push_back(extent.particles > 0 ? extent.high[k] : -std::numeric_limits<double>::infinity());
+  }
+  exchange_.largest(bounds);
+  for (int k = 0; k < D; ++k) extent.low[k] = -bounds[2 * k], extent.high[k] = bounds[2 * k + 1];
+  extent.particles = sizes_.spheres;
+  const double thermal = std::sqrt(sum_of_all(exchange_, squares).value() / static_cast<double>(D * sizes_.spheres));
+  return kCollisions / (contacts_a_length(situation_of<D>(box_, sizes_.radius, extent, sizes_.number)) * thermal);
+}
+
+/// Where a sphere is, as Flights has it, bit for bit.
+template <int D>
+Vec<D> Domains<D>::place(const Record<D>& r, double now) const {
+  const double s = now - r.t;
+  Vec<D> x = r.x + s * r.v;
+  if (g_ != Vec<D>::Zero()) x += (0.5 * s * s) * g_;
+  return division_->wrapped(x);
+}
+
+/// Starts all regions anew. `spheres` tells a function of all spheres, each on one rank.
+template <int D>
+template <class Spheres>
+void Domains<D>::load(double now, Spheres&& spheres) {
+  std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
+  std::vector<Id> last(outgoing.size(), std::numeric_limits<Id>::max());  // that a rank was told of
+  spheres([&](const Record<D>& r) {
+    division_->for_each_near(place(r, now), [&](std::uint32_t region) {
+      const auto rank = static_cast<std::size_t>(rank_of(region));
+      if (std::exchange(last[rank], r.id) != r.id) put(outgoing[rank], r);
+    });
+  });
   const std::size_t first = first_region(exchange_.rank());
   std::vector<std::vector<Record<D>>> near(local_.size());
-  for (const Record<D>& r : records) {
-    const double s = now - r.t;
-    Vec<D> x = r.x + s * r.v;  // as in Flights, bit for bit
-    if (g_ != Vec<D>::Zero()) x += (0.5 * s * s) * g_;
-    division_->for_each_near(division_->wrapped(x), [&](std::uint32_t q) {
-      if (q >= first && q < first + near.size()) near[q - first].push_back(r);
-    });
+  for (Bytes& bytes : exchange_.swap(std::move(outgoing))) {
+    for (Reader reader(bytes); reader.more();) {
+      const auto r = reader.get<Record<D>>();
+      division_->for_each_near(place(r, now), [&](std::uint32_t region) {
+        if (region >= first && region < first + near.size()) near[region - first].push_back(r);
+      });
+    }
+    Bytes().swap(bytes);
   }
   for (std::size_t k = 0; k < local_.size(); ++k)
     local_[k]->load(std::move(near[k]), *division_, static_cast<std::uint32_t>(first + k), g_, horizon_, now, stray_);
@@ -92,19 +122,13 @@ void Domains<D>::load(std::span<const Record<D>> records, double now) {
   sort_out(true);
 }
 
-/// Starts all regions anew from what everybody knows.
+/// Starts all regions anew from what they have now.
 template <int D>
 void Domains<D>::reload() {
-  Bytes mine;
-  for (const Local& region : local_)
-    for (const Slot i : region->own()) put(mine, region->after(i));
-  std::vector<Record<D>> records(particles_.radius.size());
-  for (const Bytes& bytes : exchange_.gather(mine))
-    for (Reader reader(bytes); reader.more();) {
-      const auto r = reader.get<Record<D>>();
-      records[r.id] = r;
-    }
-  load(records, now_);
+  load(now_, [&](auto&& tell) {
+    for (const Local& region : local_)
+      for (const Slot i : region->own()) tell(region->after(i));
+  });
 }
 
 /// At the start of a window: says anew who is whose, and gives neighbours the ghosts that they do not have. Where
@@ -174,7 +198,7 @@ double Domains<D>::run(double end, const Report& report) {
     sum.add(got);
     counts_.events += got.collisions + got.bounces;
     collisions += count;
-    const double length = stop - now_, n = static_cast<double>(particles_.radius.size());
+    const double length = stop - now_, n = static_cast<double>(sizes_.spheres);
     now_ = stop;
     sorted_ = false;
     if (cut_) continue;
@@ -232,19 +256,21 @@ void Domains<D>::fly_to(double time, Particles<D>& copies) const {
     Id id;
     Vec<D> x, v;
   };
-  Bytes mine;
+  const Shares shares = this->shares();
+  std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
   for (const Local& region : local_)
     for (const Slot i : region->own()) {
       const Record<D> r = region->flights().at(region->after(i), time);
-      put(mine, Place{r.id, r.x, r.v});
+      put(outgoing[static_cast<std::size_t>(shares.rank_of(r.id))], Place{r.id, r.x, r.v});
     }
-  copies.x.resize(particles_.radius.size());
-  copies.v.resize(particles_.radius.size());
-  for (const Bytes& bytes : exchange_.gather(mine))
+  const Id first = shares.first(exchange_.rank()), end = shares.first(exchange_.rank() + 1);
+  copies.x.resize(end - first);
+  copies.v.resize(end - first);
+  for (const Bytes& bytes : exchange_.swap(std::move(outgoing)))
     for (Reader reader(bytes); reader.more();) {
       const auto place = reader.get<Place>();
-      copies.x[place.id] = place.x;
-      copies.v[place.id] = place.v;
+      copies.x[place.id - first] = place.x;
+      copies.v[place.id - first] = place.v;
     }
 }
 

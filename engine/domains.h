@@ -11,13 +11,15 @@
 //   domains.run(end, report);
 //   domains.give_back(end, particles);
 //
-// All of it is collective. At the start and the end of an epoch every rank has all particles.
+// All of it is collective. No rank has all particles: between epochs it has its share of them (shares.h), in an epoch
+// those of its regions and their ghosts.
 
 #include <optional>
 
 #include "engine/division.h"
 #include "engine/exchange.h"
 #include "engine/region.h"
+#include "engine/shares.h"
 
 namespace carom {
 
@@ -26,11 +28,11 @@ class Domains {
  public:
   using Report = typename EventCore<D>::Report;
 
-  /// `particles` tells masses and radii, and outlives the domains. `window` forces the length of windows [time].
-  Domains(const Box<D>& box, const Particles<D>& particles, Exchange& exchange, std::size_t regions,
-          const SearchOptions& options = {}, std::function<double()> window = {});
+  /// `window` forces the length of windows [time].
+  Domains(const Box<D>& box, Sizes sizes, Exchange& exchange, std::size_t regions, const SearchOptions& options = {},
+          std::function<double()> window = {});
 
-  /// As EventCore::take(), load() and so on.
+  /// As EventCore::take(), load() and so on. Particles are this rank's share; contacts are reported on rank 0.
   void take(Particles<D>& particles, const Vec<D>& g, double horizon);
   double run(double end, const Report& report);
   void fly_to(double time, Particles<D>& copies) const;
@@ -46,10 +48,14 @@ class Domains {
   using Local = std::unique_ptr<Region<D>>;
   static constexpr double kFaster = 1.15;  // than anyone is, somebody may come to be
 
+  Shares shares() const { return {sizes_.spheres, static_cast<std::size_t>(exchange_.size())}; }
   std::size_t first_region(int rank) const;
   int rank_of(std::uint32_t region) const;
   void reload();
-  void load(std::span<const Record<D>> records, double now);
+  template <class Spheres>
+  void load(double now, Spheres&& spheres);
+  Vec<D> place(const Record<D>& r, double now) const;
+  double first_pace(const Particles<D>& particles) const;
   void sort_out(bool loaded);
   void agree();
   void send_paths(std::vector<Bytes>& outgoing) const;
@@ -64,7 +70,6 @@ class Domains {
   Contact<D> contact_of(Region<D>& region, Slot lo, std::size_t k) const;
 
   const Box<D>& box_;
-  const Particles<D>& particles_;
   Sizes sizes_;
   mutable TimedExchange exchange_;
   std::size_t regions_;

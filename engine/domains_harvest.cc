@@ -78,7 +78,7 @@ void Domains<D>::report_all(const typename Region<D>::Tally& sum, const std::vec
   exchange_.largest({&overlap, 1});
   report.counters.max_overlap = std::max(report.counters.max_overlap, overlap);
   report.counters.collision_virial.add(sum_of_all(exchange_, sum.virial));
-  if (report.contacts) gather_contacts<D>(exchange_, contacts, *report.contacts);
+  if (report.contacts) merge_contacts<D>(gather_on_first(exchange_, packed<D>(contacts)), *report.contacts);
   if (events_ += totals[0] + totals[1]; events_ > report.max_events)
     throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
                                         " collisions in one step; use a smaller step or raise "

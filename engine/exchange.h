@@ -62,6 +62,13 @@ class Exchange {
   virtual void sum(std::span<std::uint64_t> /*values*/) {}
 };
 
+/// Tells rank 0 what every rank has to say, by rank; the others hear nothing. Collective.
+inline std::vector<Bytes> gather_on_first(Exchange& ranks, Bytes mine) {
+  std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
+  outgoing[0] = std::move(mine);
+  return ranks.swap(std::move(outgoing));
+}
+
 /// The sum over all ranks of what has a function add().
 template <class Sums>
 Sums sum_of_all(Exchange& ranks, const Sums& mine) {

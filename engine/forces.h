@@ -10,6 +10,13 @@
 
 namespace carom {
 
+/// The sum over all ranks of what each has summed up over what it owns.
+template <int D, class Sums>
+Sums of_all_ranks(const System<D>& system, const Sums& mine) {
+  if (system.part) return sum_of_all(system.part->ranks(), mine);
+  return system.sizes ? sum_of_all(*system.ranks, mine) : mine;
+}
+
 /// One force pass: `add` adds each interaction's share to `out`, which begins at zero.
 template <int D, class Add>
 void force_pass(const System<D>& system, Vectors<D> out, Counters& counters, Add&& add) {
@@ -45,8 +52,7 @@ template <int D>
 PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
   PotentialSums sums;
   for (const auto& term : system.interactions) term->add_energy(x, sums);
-  if (!system.part) return sums;
-  return sum_of_all(system.part->ranks(), sums);
+  return of_all_ranks(system, sums);
 }
 
 /// Exact sums over all particles.
@@ -73,7 +79,7 @@ MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state
     sums.speed.add(at.v[i].norm());
     for (int k = 0; k < D; ++k) sums.momentum[k].add(state.mass[i] * state.v[i][k]);
   }
-  return system.part ? sum_of_all(system.part->ranks(), sums) : sums;
+  return of_all_ranks(system, sums);
 }
 
 /// G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet follows to second order:
@@ -89,8 +95,7 @@ double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D>
     sum.add(at.v[i].dot(scratch[i]) / 12);
     sum.add(-force[i].squaredNorm() / (24 * at.mass[i]));
   }
-  if (system.part) sum = sum_of_all(system.part->ranks(), sum);
-  return sum.value();
+  return of_all_ranks(system, sum).value();
 }
 
 }  // namespace carom

@@ -7,9 +7,7 @@ namespace carom {
 
 template <int D>
 MeanSquaredDisplacement<D>::MeanSquaredDisplacement(const System<D>& system, const Sampling& sampling)
-    : system_(system), sampling_(sampling), number_(system.species.size()) {
-  for (const auto species : system.particles.species) number_[species] += 1;
-}
+    : system_(system), sampling_(sampling), number_(system.species.size()) {}
 
 template <int D>
 void MeanSquaredDisplacement<D>::sample(double time, const Particles<D>& particles) {
@@ -19,6 +17,8 @@ void MeanSquaredDisplacement<D>::sample(double time, const Particles<D>& particl
       now_[i][k] = particles.x[i][k] + static_cast<double>(particles.image[i][k]) * system_.box.edges[k];
   const std::uint64_t index = samples_++;
   if (index == 0) {
+    species_ = particles.species;
+    for (const auto species : species_) number_[species] += 1;
     decades_.push_back({time, now_, {}});
     return;
   }
@@ -41,8 +41,7 @@ void MeanSquaredDisplacement<D>::add(Lag& lag, double time, const Decade& from) 
   lag.squares.resize(number_.size());
   ++lag.origins;
   lag.time.add(time - from.origin_time);
-  const auto& species = system_.particles.species;
-  for (std::size_t i = 0; i < now_.size(); ++i) lag.squares[species[i]].add((now_[i] - from.origin[i]).squaredNorm());
+  for (std::size_t i = 0; i < now_.size(); ++i) lag.squares[species_[i]].add((now_[i] - from.origin[i]).squaredNorm());
 }
 
 template <int D>

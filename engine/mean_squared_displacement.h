@@ -23,7 +23,7 @@ namespace carom {
 template <int D>
 class MeanSquaredDisplacement : public Observer<D> {
  public:
-  /// Keeps a reference to the system.
+  /// Keeps a reference to the system, for its box.
   MeanSquaredDisplacement(const System<D>& system, const Sampling& sampling);
 
   Sampling sampling() const override { return sampling_; }
@@ -57,6 +57,7 @@ class MeanSquaredDisplacement : public Observer<D> {
   const System<D>& system_;
   Sampling sampling_;
   std::vector<double> number_;  // of particles of each species
+  std::vector<std::uint16_t> species_;
   std::vector<Vec<D>> now_;
   std::vector<Decade> decades_;
   std::uint64_t samples_ = 0;

@@ -7,6 +7,7 @@
 
 #include "engine/error.h"
 #include "engine/forces.h"
+#include "engine/vicinity.h"
 
 namespace carom {
 
@@ -39,7 +40,7 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
 template <int D>
 void Monitor<D>::regroup() {
   const Particles<D>& p = known().particles;
-  if (info_.hard_cores) touching_.emplace(system_.box, p.radius);
+  if (info_.hard_cores && !system_.sizes) touching_.emplace(system_.box, p.radius);
   if (!info_.shadow) return;
   force_.resize(p.size());
   scratch_.resize(p.size());
@@ -90,7 +91,7 @@ void Monitor<D>::sample(double time, const Particles<D>& state) {
   for (Sampler& sampler : samplers_) {
     if (sampler.due.due() > time + time_slack()) continue;
     const Stopwatch watch(statistics_.counters.seconds.output);
-    sampler.observer->sample(time, system_.part && &state == &known().particles ? collected() : state);
+    sampler.observer->sample(time, everybody(state));
     sampler.due.pass(time + time_slack());
   }
 }
@@ -99,7 +100,7 @@ template <int D>
 void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool last) {
   Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
-  const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.particles.size() <= kShadowAtEveryStep);
+  const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.size() <= kShadowAtEveryStep);
   const double speed = speed_;
   shot_ = measure(s.end_time, known().particles, nodes, with_shadow);
   s.energy_final = shot_.total();
@@ -111,13 +112,13 @@ void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool las
     s.max_momentum_error = std::max(*s.max_momentum_error, (shot_.momentum - first_momentum_).norm());
   if (info_.hard_cores) {
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest_overlap());
-    if (system_.part) s.counters.max_overlap = system_.part->largest(s.counters.max_overlap);
+    if (system_.ranks) system_.ranks->largest({&s.counters.max_overlap, 1});
   }
   virial_time_ += elapsed * virial_;
   if (s.end_time > 0) {
     s.mean_pressure = (virial_time_ + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
-    s.collision_rate = 2.0 * static_cast<double>(s.counters.sphere_sphere) /
-                       (static_cast<double>(system_.particles.size()) * s.end_time);
+    s.collision_rate =
+        2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * s.end_time);
   }
   path_ += elapsed * 0.5 * (speed + speed_);
   if (s.collision_rate > 0) {
@@ -137,7 +138,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Pa
   shot.collisions = statistics_.counters.sphere_sphere;
   shot.particles = &state;
   const PotentialSums sums = evaluate_energy<D>(known(), nodes.x);
-  const auto total = static_cast<double>(system_.particles.size());
+  const auto total = static_cast<double>(system_.size());
   const MotionSums<D> motion = evaluate_motion(known(), state, nodes);
   shot.kinetic = motion.kinetic.value();
   shot.potential = sums.energy.value();
@@ -180,7 +181,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
     last_row_virial_ = collision_virial;
   }
   if (frame) {
-    if (system_.part && shot.particles == &known().particles) shot.particles = &collected();
+    shot.particles = &everybody(*shot.particles);
     for (auto* observer : observers_) observer->frame(shot);
     frames_.pass(now);
     last_frame_ = shot.time;
@@ -191,20 +192,31 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
 /// missed. 0 where none overlap.
 template <int D>
 double Monitor<D>::deepest_overlap() {
-  const auto& p = known().particles;
   double deepest = 0;
-  for (const auto& pair : touching_->cover(p.x)) {
-    if (!p.owns(pair.i)) continue;
-    const double sigma = p.radius[pair.i] + p.radius[pair.j];
-    const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
-    if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
+  const auto look = [&](NeighbourList<D>& list, const auto& p, auto&& counts) {
+    for (const auto& pair : list.cover(p.x)) {
+      if (!counts(pair.i)) continue;
+      const double sigma = p.radius[pair.i] + p.radius[pair.j];
+      const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
+      if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
+    }
+  };
+  const Particles<D>& p = known().particles;
+  if (system_.sizes) {
+    const Vicinity<D> near = vicinity(system_.box, *system_.sizes, *system_.ranks, p);
+    NeighbourList<D> touching(system_.box, near.radius);
+    look(touching, near, [&](Id i) { return near.beyond[i] == 0; });
+  } else {
+    look(*touching_, p, [&](Id i) { return p.owns(i); });
   }
   return deepest;
 }
 
-/// Everybody, where the system shares its particles among ranks.
+/// Everybody in a state of this rank's particles; where the ranks have shares, on rank 0 only.
 template <int D>
-const Particles<D>& Monitor<D>::collected() {
+const Particles<D>& Monitor<D>::everybody(const Particles<D>& state) {
+  if (system_.sizes) return gathered_ = gathered(*system_.ranks, state);
+  if (!system_.part || &state != &known().particles) return state;
   system_.part->collect();
   return system_.particles;
 }

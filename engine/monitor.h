@@ -71,7 +71,7 @@ class Monitor {
   void show(Snapshot<D> shot, bool last);
   void count_from(const Snapshot<D>& shot);
   double deepest_overlap();
-  const Particles<D>& collected();
+  const Particles<D>& everybody(const Particles<D>& state);
   const System<D>& known() const { return system_.part ? system_.part->known() : system_; }
 
   const System<D>& system_;
@@ -92,6 +92,7 @@ class Monitor {
   Vec<D> first_momentum_ = Vec<D>::Zero();
   std::vector<Vec<D>> force_, scratch_;       // for S_h
   std::optional<NeighbourList<D>> touching_;  // pairs that may overlap
+  Particles<D> gathered_;                     // from the shares of all ranks
 };
 
 }  // namespace carom

@@ -124,7 +124,8 @@ void Part<D>::divide(Luggage<D>& luggage, bool everybody, double slab_length) {
 template <int D>
 void Part<D>::choose_everybody() {
   Particles<D>& p = whole_.particles;
-  const Division<D> division(whole_.box, p.x, holders_.size(), 0);
+  Exchange alone;
+  const Division<D> division(whole_.box, p.x, holders_.size(), 0, alone);
   holders_.assign(holders_.size(), {});
   ghosts_ = holders_;
   matters_.clear();
@@ -152,7 +153,8 @@ bool Part<D>::choose(double slab_length) {
   slack_ = std::clamp(kSlabsApart * speed * slab_length, kLeastSlack * 2 * radius, kMostSlack * 2 * radius);
   const double near = std::max(reach, 2 * radius) + 2 * path_ + 2 * slack_, far = near + depth_ * 2 * radius;
   if (!std::isfinite(far)) return false;
-  const Division<D> division(whole_.box, all.x, holders_.size(), far);
+  Exchange alone;
+  const Division<D> division(whole_.box, all.x, holders_.size(), far, alone);
 
   auto some = std::make_unique<System<D>>();
   Particles<D>& p = some->particles;

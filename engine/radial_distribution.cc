@@ -142,7 +142,11 @@ RadialDistribution<D>::RadialDistribution(const System<D>& system, const RadialD
   smallest_.assign(species, std::numeric_limits<double>::infinity());
   largest_.resize(species);
   counts_.resize(species * (species + 1) / 2 * static_cast<std::size_t>(options.bins));
-  const auto& p = system.particles;
+}
+
+/// Counts the particles of each species.
+template <int D>
+void RadialDistribution<D>::count(const Particles<D>& p) {
   for (std::size_t i = 0; i < p.size(); ++i) {
     const std::size_t s = p.species[i];
     number_[s] += 1;
@@ -153,7 +157,7 @@ RadialDistribution<D>::RadialDistribution(const System<D>& system, const RadialD
 
 template <int D>
 double RadialDistribution<D>::longest_range(const System<D>& system) {
-  const auto& radius = system.particles.radius;
+  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
   const double margin = radius.empty() ? 0 : 2 * *std::ranges::min_element(radius);
   double longest = std::numeric_limits<double>::infinity();
   for (int k = 0; k < D; ++k)
@@ -163,7 +167,7 @@ double RadialDistribution<D>::longest_range(const System<D>& system) {
 
 template <int D>
 double RadialDistribution<D>::usual_range(const System<D>& system) {
-  const auto& radius = system.particles.radius;
+  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
   return std::min(longest_range(system), radius.empty() ? 1.0 : 6 * *std::ranges::max_element(radius));
 }
 
@@ -175,7 +179,7 @@ std::size_t RadialDistribution<D>::pair_index(std::size_t a, std::size_t b) cons
 
 template <int D>
 void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particles) {
-  ++samples_;
+  if (samples_++ == 0) count(particles);
   const std::size_t n = particles.size(), bins = static_cast<std::size_t>(options_.bins);
   const Grid<D> grid(system_.box, options_.range, n);
 
@@ -196,7 +200,7 @@ void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particle
   for (std::size_t i = 0; i < n; ++i) {
     const std::uint32_t at = next[cell_[i]]++;
     for (int k = 0; k < D; ++k) x_[k][at] = particles.x[i][k];
-    species_[at] = system_.particles.species[i];
+    species_[at] = particles.species[i];
   }
 
   // Everybody who is looked at is counted, so that nothing branches; those beyond the range are left out in the end.
@@ -301,7 +305,7 @@ std::vector<double> RadialDistribution<D>::g(std::size_t a, std::size_t b) const
 
 template <int D>
 std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::size_t b) const {
-  if (smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
+  if (samples_ == 0 || smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
   const double contact = smallest_[a] + smallest_[b], width = options_.range / options_.bins;
   const auto r = radii(), value = g(a, b);
   const std::uint64_t* counts = &counts_[pair_index(a, b) * static_cast<std::size_t>(options_.bins)];

@@ -31,8 +31,8 @@ struct RadialDistributionOptions {
 template <int D>
 class RadialDistribution : public Observer<D> {
  public:
-  /// Keeps a reference to the system. Throws Error(deck) for a box that is open (it has no density) and a range beyond
-  /// longest_range().
+  /// Keeps a reference to the system, for its box. Throws Error(deck) for a box that is open (it has no density) and a
+  /// range beyond longest_range().
   RadialDistribution(const System<D>& system, const RadialDistributionOptions& options);
 
   /// Half the shortest periodic edge, or the shortest way between walls that centres can go, if that is less.
@@ -56,6 +56,7 @@ class RadialDistribution : public Observer<D> {
   std::optional<double> contact_value(std::size_t a, std::size_t b) const;
 
  private:
+  void count(const Particles<D>& particles);
   std::size_t pair_index(std::size_t a, std::size_t b) const;
   std::vector<double> normalised(const std::vector<std::uint64_t>& counts, double pairs, double margin) const;
   double pairs_between(std::size_t a, std::size_t b) const;

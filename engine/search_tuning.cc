@@ -45,13 +45,15 @@ double contacts_a_length(const SearchSituation& s) {
 }
 
 template <int D>
-SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, const Extent<D>& extent) {
+SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, const Extent<D>& extent,
+                             std::span<const double> numbers) {
   const auto n = static_cast<double>(extent.particles), each = n / static_cast<double>(radii.size());
   double largest = 0, sum = 0, sum_of_powers = 0;
-  for (const double r : radii) {
+  for (std::size_t k = 0; k < radii.size(); ++k) {
+    const double r = radii[k], number = numbers.empty() ? each : numbers[k];
     largest = std::max(largest, r);
-    sum += each * r;
-    sum_of_powers += each * std::pow(r, D);
+    sum += number * r;
+    sum_of_powers += number * std::pow(r, D);
   }
   double volume = 1;
   for (int k = 0; k < D; ++k) {
@@ -61,8 +63,10 @@ SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, c
   const double filled = (D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * sum_of_powers / volume;
   return {D, n / volume, filled, 2 * sum / n, 2 * largest};
 }
-template SearchSituation situation_of<2>(const Box<2>&, std::span<const double>, const Extent<2>&);
-template SearchSituation situation_of<3>(const Box<3>&, std::span<const double>, const Extent<3>&);
+template SearchSituation situation_of<2>(const Box<2>&, std::span<const double>, const Extent<2>&,
+                                         std::span<const double>);
+template SearchSituation situation_of<3>(const Box<3>&, std::span<const double>, const Extent<3>&,
+                                         std::span<const double>);
 
 void SearchTuning::choose(const SearchSituation& situation, const EventCounts& counts) {
   if (!chosen_) {

@@ -31,9 +31,11 @@ struct SearchSituation {
   double mean = 0, largest = 0;  ///< diameters
 };
 
-/// For so many particles as `extent` has, with radii like these.
+/// For so many particles as `extent` has, with radii like these, of each of which there is the given number; empty: as
+/// many of each.
 template <int D>
-SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, const Extent<D>& extent);
+SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, const Extent<D>& extent,
+                             std::span<const double> numbers = {});
 
 /// Contacts of a sphere while a thermal sphere flies the length 1, about (Enskog).
 double contacts_a_length(const SearchSituation& situation);

@@ -11,13 +11,18 @@
 
 namespace carom {
 
-/// Appends the contacts of all ranks, in the order of their keys.
+/// Contacts as a message.
 template <int D>
-void gather_contacts(Exchange& ranks, std::span<const Contact<D>> mine, std::vector<Contact<D>>& to) {
-  Bytes bytes;
-  for (const Contact<D>& contact : mine) put(bytes, contact);
+Bytes packed(std::span<const Contact<D>> contacts) {
+  const auto bytes = std::as_bytes(contacts);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// Appends the contacts that ranks have told, in the order of their keys.
+template <int D>
+void merge_contacts(const std::vector<Bytes>& told, std::vector<Contact<D>>& to) {
   const auto before = static_cast<std::ptrdiff_t>(to.size());
-  for (const Bytes& each : ranks.gather(bytes))
+  for (const Bytes& each : told)
     for (Reader reader(each); reader.more();) to.push_back(reader.get<Contact<D>>());
   std::sort(to.begin() + before, to.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
 }
@@ -65,7 +70,7 @@ bool commit_contacts(const System<D>& system, std::span<const Contact<D>> found,
   counters.sphere_wall += tally.bounces;
   counters.collision_virial.add(tally.virial);
   counters.max_overlap = std::max(counters.max_overlap, tally.overlap);
-  if (log) gather_contacts<D>(system.part->ranks(), own, *log);
+  if (log) merge_contacts<D>(system.part->ranks().gather(packed<D>(own)), *log);
   return true;
 }
 

@@ -4,6 +4,7 @@
 
 #include "engine/error.h"
 #include "engine/monitor.h"
+#include "engine/shares.h"
 
 namespace carom {
 
@@ -41,9 +42,10 @@ template <int D>
 void Simulation<D>::run(const std::function<bool()>& should_stop) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
-  Monitor<D> monitor(*system_, info_, plan_, observers_, s);
   std::optional<Part<D>> part;
   if (system_->ranks && info_.smooth_forces) part.emplace(*system_, *system_->ranks);
+  if (system_->ranks && !info_.smooth_forces) keep_share(*system_);
+  Monitor<D> monitor(*system_, info_, plan_, observers_, s);
   const auto known = [&]() -> System<D>& { return part ? part->known() : *system_; };
   const auto nodes = [&]() -> const Particles<D>& {
     const auto* state = integrator_->energy_state();

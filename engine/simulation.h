@@ -37,7 +37,7 @@ struct Snapshot {
   double time = 0;
   std::int64_t step = 0;         ///< slabs completed (free flight: epochs begun or completed)
   std::uint64_t collisions = 0;  ///< pair collisions so far
-  const Particles<D>* particles = nullptr;
+  const Particles<D>* particles = nullptr;  ///< on rank 0 all of them
   double kinetic = 0, potential = 0;                         ///< [energy]
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN where the method has none
   double max_energy_error = 0;                               ///< largest |H − H₁| so far [energy]

@@ -2,12 +2,14 @@
 // Everything that moves and what it feels: the state an integrator advances.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/box.h"
 #include "engine/interaction.h"
 #include "engine/particles.h"
+#include "engine/sizes.h"
 
 namespace carom {
 
@@ -26,8 +28,12 @@ struct System {
   Particles<D> particles;
   std::vector<std::string> species;
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
-  Exchange* ranks = nullptr;  ///< that advance this system together, each with the same state; null: one
-  Part<D>* part = nullptr;    ///< what this rank does of it, where they share the work on forces
+  Exchange* ranks = nullptr;   ///< that advance this system together; null: one
+  std::optional<Sizes> sizes;  ///< of all particles, where each rank has only its share of them (engine/shares.h)
+  Part<D>* part = nullptr;     ///< what this rank does of it, where they share the work on forces
+
+  /// How many particles there are, on all ranks together, also while they are in the cores.
+  std::size_t size() const { return sizes ? sizes->spheres : particles.mass.size(); }
 
   /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
   void wrap();

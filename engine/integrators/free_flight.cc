@@ -26,7 +26,8 @@ class FreeFlight : public Integrator<D> {
     if (system.ranks) ranks_ = system.ranks;
     const std::size_t regions = regions_a_rank();
     if (ranks_->size() > 1 || regions > 1)
-      domains_.emplace(system.box, system.particles, *ranks_, regions * static_cast<std::size_t>(ranks_->size()));
+      domains_.emplace(system.box, system.sizes ? *system.sizes : Sizes(system.particles), *ranks_,
+                       regions * static_cast<std::size_t>(ranks_->size()));
     else
       core_.emplace(system.box, system.particles);
     for (const auto& term : system.interactions) {
@@ -48,7 +49,7 @@ class FreeFlight : public Integrator<D> {
   template <class Flight>
   void run_epoch(Flight& flight, System<D>& system, const Slab& slab, SlabReport<D>& report) {
     const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
-                                               max_events_ * system.particles.size()};
+                                               max_events_ * system.size()};
     const auto run = [&](double end) {
       auto& seconds = report.counters.seconds;
       const Stopwatch watch(seconds.queue);

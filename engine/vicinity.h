@@ -1,0 +1,51 @@
+#pragma once
+// Particles sorted by place for a look at who is near whom, where each rank has only some of them.
+
+#include <vector>
+
+#include "engine/division.h"
+#include "engine/shares.h"
+#include "engine/sizes.h"
+
+namespace carom {
+
+/// Those in this rank's part of the box, and copies of those so near to it that they may touch them.
+template <int D>
+struct Vicinity {
+  std::vector<Vec<D>> x;
+  std::vector<double> radius;
+  std::vector<Id> id;
+  std::vector<char> beyond;  ///< 1: not in this part, but near it
+};
+
+/// Of the particles that all ranks have together, this one those at x with these species. Collective.
+template <int D>
+Vicinity<D> vicinity(const Box<D>& box, const Sizes& sizes, Exchange& ranks, const Particles<D>& share) {
+  struct Place {
+    Vec<D> x;
+    Id id;
+    std::uint16_t species;
+  };
+  const double reach = 2 * sizes.largest_radius() * (1 + 1e-6);
+  const auto size = static_cast<std::size_t>(ranks.size());
+  const Division<D> division(box, share.x, size, reach, ranks);
+  std::vector<Bytes> outgoing(size);
+  for (Id i = 0; i < share.size(); ++i)
+    division.for_each_near(division.wrapped(share.x[i]), [&](std::uint32_t rank) {
+      put(outgoing[rank], Place{share.x[i], share.id_of(i), share.species[i]});
+    });
+  Vicinity<D> found;
+  for (Bytes& bytes : ranks.swap(std::move(outgoing))) {
+    for (Reader reader(bytes); reader.more();) {
+      const auto place = reader.get<Place>();
+      found.x.push_back(place.x);
+      found.radius.push_back(sizes.radius_of(place.id, place.species));
+      found.id.push_back(place.id);
+      found.beyond.push_back(division.owner(division.wrapped(place.x)) != static_cast<std::uint32_t>(ranks.rank()));
+    }
+    Bytes().swap(bytes);
+  }
+  return found;
+}
+
+}  // namespace carom

@@ -1,0 +1,152 @@
+// Free flight on ranks that have shares of the particles, against one that has all.
+
+#include "engine/shares.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/division.h"
+#include "engine/simulation.h"
+#include "tests/support/thread_ranks.h"
+#include "tests/unit/engine/event_cases.h"
+
+namespace carom {
+namespace {
+
+/// All that a run shows.
+template <int D>
+struct Account : Observer<D> {
+  Sampling sampling() const override { return {.interval = 0.11}; }
+  void sample(double, const Particles<D>& state) override { states.push_back(state); }
+  void frame(const Snapshot<D>& shot) override { states.push_back(*shot.particles); }
+  void thermo(const Snapshot<D>& shot) override {
+    EXPECT_GT(shot.temperature, 0) << "at time " << shot.time;
+    values.insert(values.end(), {shot.time, shot.kinetic, shot.potential, shot.pressure, shot.temperature});
+    for (int k = 0; k < D; ++k) values.push_back(shot.momentum[k]);
+  }
+  void contacts(double, std::span<const Contact<D>> all) override {
+    for (const auto& contact : all) events.push_back(contact.key);
+  }
+  std::vector<Particles<D>> states;
+  std::vector<EventKey<D>> events;
+  std::vector<double> values;
+  std::size_t kept = 0;  // particles here at the end
+};
+
+template <int D>
+using Scene = std::function<std::unique_ptr<System<D>>()>;
+
+template <int D>
+Account<D> run(const Scene<D>& scene, Exchange* ranks) {
+  auto system = scene();
+  system->ranks = ranks;
+  auto run =
+      test::make_run<D>(std::move(system), "free-flight",
+                        {.step = 0.3, .end_time = 0.8, .frame_interval = 0.2, .thermo_interval = 0.07, .events = true});
+  Account<D> account;
+  run->add(account);
+  run->run();
+  const Statistics& s = run->statistics();
+  account.values.insert(account.values.end(), {s.max_energy_error, s.counters.max_overlap, s.mean_pressure,
+                                               *s.mean_free_path, static_cast<double>(s.counters.sphere_sphere)});
+  account.kept = run->system().particles.size();
+  return account;
+}
+
+template <int D>
+void compare(const Scene<D>& scene, std::size_t contacts) {
+  const Account<D> alone = run<D>(scene, nullptr);
+  ASSERT_GE(alone.events.size(), contacts);
+  for (const int ranks : {2, 3, 5}) {
+    SCOPED_TRACE(ranks);
+    std::vector<Account<D>> all(static_cast<std::size_t>(ranks));
+    test::ThreadRanks(ranks).run(
+        [&](Exchange& exchange) { all[static_cast<std::size_t>(exchange.rank())] = run<D>(scene, &exchange); });
+    const Account<D>& first = all.front();
+    EXPECT_EQ(first.events, alone.events);
+    ASSERT_EQ(first.states.size(), alone.states.size());
+    for (std::size_t k = 0; k < first.states.size(); ++k) {
+      const Particles<D>&a = first.states[k], &b = alone.states[k];
+      EXPECT_EQ(a.x, b.x) << k;
+      EXPECT_EQ(a.v, b.v) << k;
+      EXPECT_EQ(a.image, b.image) << k;
+      EXPECT_EQ(a.mass, b.mass) << k;
+      EXPECT_EQ(a.radius, b.radius) << k;
+      EXPECT_EQ(a.species, b.species) << k;
+    }
+    const std::size_t n = alone.kept;
+    for (const Account<D>& each : all) {
+      EXPECT_EQ(each.values, alone.values);
+      EXPECT_LE(each.kept, n / all.size() + 1);
+    }
+    if (::testing::Test::HasFailure()) break;
+  }
+}
+
+TEST(Shares, Fluid) {
+  compare<3>([] { return test::hard_spheres<3>(5, 0.3); }, 1500);
+}
+TEST(Shares, ManySizesBetweenWalls) {
+  compare<2>(
+      [] {
+        auto system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4);
+        test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0.0, -0.5}}});
+        return system;
+      },
+      300);
+}
+TEST(Shares, Species) {
+  compare<3>(
+      [] {
+        auto system = random_system<3>(200, {8, 8, 8}, {O, P, P}, 0.5, 0.5, 9);
+        system->species = {"light", "heavy"};
+        for (std::size_t i = 0; i < 200; i += 3) system->particles.species[i] = 1, system->particles.mass[i] = 2.5;
+        return system;
+      },
+      100);
+}
+
+TEST(Sizes, AreThoseOfTheSpeciesWhereTheyAreEqual) {
+  auto system = random_system<2>(30, {21, 21}, {P, P}, 0.5, 0.5, 4);
+  Particles<2>& p = system->particles;
+  for (std::size_t i = 0; i < 30; i += 2) p.species[i] = 1, p.radius[i] = 0.25;
+  const Sizes by_species(p);
+  EXPECT_TRUE(by_species.by_species);
+  EXPECT_EQ(by_species.radius, (std::vector<double>{0.5, 0.25}));
+  EXPECT_EQ(by_species.number, (std::vector<double>{15, 15}));
+  p.mass[7] = 3;
+  const Sizes by_id(p);
+  EXPECT_FALSE(by_id.by_species);
+  EXPECT_EQ(by_id.radius_of(4, 1), 0.25);
+  EXPECT_EQ(by_id.mass_of(7, 0), 3);
+  EXPECT_EQ(by_id.largest_radius(), 0.5);
+}
+
+/// Whoever knows whom, and with many at the same coordinates.
+TEST(Division, HasTheSameCutsOnAnyNumberOfRanks) {
+  for (const bool layers : {false, true}) {
+    auto system = random_system<3>(500, {30, 12, 12}, {O, P, W}, 0.3, 0.3, 3);
+    auto& x = system->particles.x;
+    for (Vec<3>& at : x)
+      if (layers) at = at.array().round();
+    Exchange alone;
+    const Division<3> whole(system->box, x, 7, 1.0, alone);
+    std::vector<std::size_t> spheres(7);
+    for (const Vec<3>& at : x) ++spheres[whole.owner(at)];
+    for (const std::size_t n : spheres) EXPECT_NEAR(static_cast<double>(n), 500.0 / 7, layers ? 40 : 5);
+    test::ThreadRanks(3).run([&](Exchange& ranks) {
+      std::vector<Vec<3>> some;  // one rank has nobody
+      for (std::size_t i = 0; i < x.size(); ++i)
+        if (static_cast<int>(i % 2) == ranks.rank()) some.push_back(x[i]);
+      const Division<3> division(system->box, some, 7, 1.0, ranks);
+      for (std::uint32_t i = 0; i < 5000; ++i) {
+        RandomStream random(2, RandomPurpose::probe, i);
+        Vec<3> at;
+        for (int k = 0; k < 3; ++k) at[k] = random.uniform() * system->box.edges[k];
+        ASSERT_EQ(division.owner(at), whole.owner(at));
+      }
+    });
+  }
+}
+
+}  // namespace
+}  // namespace carom
