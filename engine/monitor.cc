@@ -181,7 +181,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
     last_row_virial_ = collision_virial;
   }
   if (frame) {
-    shot.particles = &everybody(*shot.particles);
+    if (!system_.sizes) shot.particles = &everybody(*shot.particles);
     for (auto* observer : observers_) observer->frame(shot);
     frames_.pass(now);
     last_frame_ = shot.time;

@@ -48,6 +48,16 @@ void keep_share(System<D>& system) {
   for (Id i = first; i < end; ++i) p.id.push_back(i);
 }
 
+/// Has rank 0 look at what every rank has to say, at one after the other: it never holds more than one message. pack()
+/// makes a rank's message, visit(rank, message) is called on rank 0. Collective.
+template <class Pack, class Visit>
+void one_after_the_other(Exchange& ranks, Pack&& pack, Visit&& visit) {
+  for (int rank = 0; rank < ranks.size(); ++rank) {
+    const auto told = gather_on_first(ranks, rank == ranks.rank() ? pack() : Bytes());
+    if (ranks.rank() == 0) visit(rank, told[static_cast<std::size_t>(rank)]);
+  }
+}
+
 /// Copies of all particles on rank 0, by id, from the shares of all ranks; of nobody elsewhere. Collective.
 template <int D>
 Particles<D> gathered(Exchange& ranks, const Particles<D>& share) {

@@ -37,7 +37,7 @@ struct Snapshot {
   double time = 0;
   std::int64_t step = 0;         ///< slabs completed (free flight: epochs begun or completed)
   std::uint64_t collisions = 0;  ///< pair collisions so far
-  const Particles<D>* particles = nullptr;  ///< on rank 0 all of them
+  const Particles<D>* particles = nullptr;  ///< all of them; with ids: this rank's share (frames only)
   double kinetic = 0, potential = 0;                         ///< [energy]
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN where the method has none
   double max_energy_error = 0;                               ///< largest |H − H₁| so far [energy]
@@ -59,12 +59,13 @@ class Observer {
   virtual ~Observer() = default;
   /// Asked once, before the run begins.
   virtual Sampling sampling() const { return {}; }
-  /// Copies of the particles at a time of sampling(): exactly then with free flight, else at the first step end at or
-  /// after it. Costs no measurement: this is the way to look often.
+  /// Copies of all particles at a time of sampling(): exactly then with free flight, else at the first step end at or
+  /// after it. Costs no measurement: this is the way to look often. Where ranks have shares rank 0 alone sees somebody.
   virtual void sample(double /*time*/, const Particles<D>&) {}
   virtual void frame(const Snapshot<D>&) {}
   virtual void thermo(const Snapshot<D>&) {}
-  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`.
+  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`. Where ranks have shares rank 0
+  /// alone is told.
   virtual void contacts(double /*slab_start*/, std::span<const Contact<D>>) {}
   /// After every slab: how far the run has come. Cheap; called often.
   virtual void progress(const struct Statistics&) {}

@@ -27,6 +27,25 @@ std::vector<T> three_columns(const Vectors& vectors, int dimension) {
   return rows;
 }
 
+/// What changes of the particles of a share, as a message.
+template <int D>
+Bytes told(const Particles<D>& p) {
+  Bytes bytes;
+  bytes.reserve(p.size() * (2 * sizeof(Vec<D>) + sizeof(Image<D>)));
+  const auto add = [&](const auto& vectors) {
+    const auto more = std::as_bytes(std::span(vectors));
+    bytes.insert(bytes.end(), more.begin(), more.end());
+  };
+  add(p.x), add(p.v), add(p.image);
+  return bytes;
+}
+
+/// The next `n` of a message.
+template <class T>
+std::span<const T> next(Reader& message, std::size_t n) {
+  return {reinterpret_cast<const T*>(message.skip(n * sizeof(T))), n};
+}
+
 std::string user_name() {
   const passwd* entry = getpwuid(getuid());
   return entry != nullptr ? entry->pw_name : "unknown";
@@ -81,7 +100,8 @@ struct TrajectoryWriter<D>::Contents {
         box(file.group("particles/trajectory/box")),
         edges(file, "particles/trajectory/box/edges", {3, 3}),
         momentum(file, "observables/momentum", {3}),
-        collisions(file, "observables/collisions") {
+        collisions(file, "observables/collisions"),
+        ranks(system.ranks) {
     write_origin(file);
     write_parameters(file, deck, system);
     write_box(system.box);
@@ -118,6 +138,32 @@ struct TrajectoryWriter<D>::Contents {
     file.write_numbers<double>(group, "charge", p.charge);
   }
 
+  /// Writes what changes of the particles: a row of all that there are, from one state or from the shares of all ranks.
+  void write_particles(const Particles<D>& p) {
+    for (auto* element : {&position, &velocity}) element->value.append_row();
+    image.value.append_row();
+    if (p.id.empty()) {
+      write_part(0, p.x, p.v, p.image);
+      return;
+    }
+    std::size_t first = 0;
+    one_after_the_other(
+        *ranks, [&] { return told(p); },
+        [&](int /*rank*/, const Bytes& message) {
+          const std::size_t n = message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>));
+          Reader reader(message);
+          const auto x = next<Vec<D>>(reader, n), v = next<Vec<D>>(reader, n);
+          write_part(first, x, v, next<Image<D>>(reader, n));
+          first += n;
+        });
+  }
+  void write_part(std::size_t first, std::span<const Vec<D>> x, std::span<const Vec<D>> v,
+                  std::span<const Image<D>> images) {
+    velocity.value.write_part(first, three_columns<double>(v, D));
+    image.value.write_part(first, three_columns<std::int32_t>(images, D));
+    position.value.write_part(first, three_columns<double>(x, D));
+  }
+
   std::uint64_t frame_bytes() const {
     return position.value.row_bytes() + velocity.value.row_bytes() + image.value.row_bytes();
   }
@@ -132,6 +178,7 @@ struct TrajectoryWriter<D>::Contents {
   Element<std::uint64_t> collisions;
   std::map<std::string, Element<double>> observables;
   std::array<double, 9> edge_rows{};
+  Exchange* ranks;
 };
 
 template <int D>
@@ -145,8 +192,6 @@ template <int D>
 void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   Contents& c = *contents_;
   c.file.reserve(c.frame_bytes());
-  c.velocity.value.append(three_columns<double>(s.particles->v, D));
-  c.image.value.append(three_columns<std::int32_t>(s.particles->image, D));
   c.edges.value.append(c.edge_rows);
   c.momentum.value.append(three_columns<double>(std::array{s.momentum}, D));
   c.collisions.value.append(s.collisions);
@@ -156,7 +201,7 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
       {"pressure", s.pressure}};
   for (const auto& [name, value] : scalars) c.observables.at(name).value.append(value);
   c.time.append(s.time);
-  c.position.value.append(three_columns<double>(s.particles->x, D));
+  c.write_particles(*s.particles);
   c.file.flush();
   // The frames there are, are those that have a step: to MDAnalysis a missing step is the end of the file, and a
   // missing position an error. So the step goes in when all else is safe; a kill in between leaves rows nobody looks
@@ -170,7 +215,16 @@ void TrajectoryWriter<D>::close() {
   contents_->file.close();
 }
 
+template <int D>
+void ShareTeller<D>::frame(const Snapshot<D>& s) {
+  if (s.particles->id.empty()) return;  // rank 0 has them too
+  one_after_the_other(
+      ranks_, [&] { return told(*s.particles); }, [](int, const Bytes&) {});
+}
+
 template class TrajectoryWriter<2>;
 template class TrajectoryWriter<3>;
+template class ShareTeller<2>;
+template class ShareTeller<3>;
 
 }  // namespace carom

@@ -12,10 +12,14 @@
 // there are no `unit` attributes, so readers must be told not to convert. Positions are wrapped; unwrapped position =
 // position + image · edge. Every frame is flushed: it
 // survives the end of the process; positions go in last, and their number is the number of whole frames.
+//
+// Where ranks have shares of the particles (engine/shares.h) rank 0 writes one after the other, as a piece of the same
+// row: it never has more than one of them. The others have a ShareTeller each.
 
 #include <filesystem>
 #include <memory>
 
+#include "engine/shares.h"
 #include "engine/simulation.h"
 #include "io/deck.h"
 
@@ -24,8 +28,8 @@ namespace carom {
 template <int D>
 class TrajectoryWriter : public Observer<D> {
  public:
-  /// Creates the file. `system` is read for what does not change: box, masses, radii, charges, species.
-  /// Throws Error(Failure::file).
+  /// Creates the file. `system` is read for what does not change: box, masses, radii, charges, species; and for the
+  /// ranks. Throws Error(Failure::file).
   TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system);
   ~TrajectoryWriter() override;
 
@@ -38,6 +42,17 @@ class TrajectoryWriter : public Observer<D> {
  private:
   struct Contents;
   std::unique_ptr<Contents> contents_;
+};
+
+/// Tells the writer of rank 0 what it is to write, on all other ranks.
+template <int D>
+class ShareTeller : public Observer<D> {
+ public:
+  explicit ShareTeller(Exchange& ranks) : ranks_(ranks) {}
+  void frame(const Snapshot<D>& snapshot) override;
+
+ private:
+  Exchange& ranks_;
 };
 
 }  // namespace carom

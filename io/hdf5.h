@@ -129,8 +129,13 @@ class SeriesBase {
   SeriesBase(const File& file, const Handle& where, const std::string& name, hid_t type,
              std::vector<hsize_t> row_shape);
   void append(hid_t type, const void* data, std::size_t elements);
+  void append_row();
+  void write_part(hid_t type, const void* data, std::size_t first, std::size_t elements);
 
  private:
+  void extend(std::uint64_t rows);
+  void write(hid_t type, const void* data, const std::vector<hsize_t>& start, const std::vector<hsize_t>& count);
+
   std::string label_;  // file and name, for messages
   const File* file_;
   Handle dataset_;
@@ -147,6 +152,11 @@ class Series : public SeriesBase {
   /// `values`: whole rows, the last axis fastest.
   void append(std::span<const T> values) { SeriesBase::append(native_type<T>(), values.data(), values.size()); }
   void append(T value) { SeriesBase::append(native_type<T>(), &value, 1); }
+  /// The same in parts: a row of nothing yet, and what stands in it from place `first` of its first axis on.
+  using SeriesBase::append_row;
+  void write_part(std::size_t first, std::span<const T> values) {
+    SeriesBase::write_part(native_type<T>(), values.data(), first, values.size());
+  }
 };
 
 /// Reading, for `carom info`; throws Error(Failure::file) where the name is missing or of another kind.

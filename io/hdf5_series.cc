@@ -39,16 +39,38 @@ SeriesBase::SeriesBase(const File& file, const Handle& where, const std::string&
 
 void SeriesBase::append(hid_t type, const void* data, std::size_t elements) {
   if (elements == 0) return;
-  std::vector<hsize_t> start(shape_.size(), 0), count = shape_, size = shape_;
+  std::vector<hsize_t> start(shape_.size(), 0), count = shape_;
   start[0] = rows_;
   count[0] = elements / row_elements_;
-  size[0] = rows_ + count[0];
+  extend(count[0]);
+  write(type, data, start, count);
+}
+
+void SeriesBase::append_row() { extend(1); }
+
+void SeriesBase::write_part(hid_t type, const void* data, std::size_t first, std::size_t elements) {
+  if (elements == 0) return;
+  std::vector<hsize_t> start(shape_.size(), 0), count = shape_;
+  start[0] = rows_ - 1;
+  count[0] = 1;
+  start[1] = first;
+  count[1] = elements / (row_elements_ / shape_[1]);
+  write(type, data, start, count);
+}
+
+void SeriesBase::extend(std::uint64_t rows) {
+  std::vector<hsize_t> size = shape_;
+  size[0] = rows_ + rows;
   file_->check(H5Dset_extent(dataset_.id(), size.data()), label_);
+  rows_ = size[0];
+}
+
+void SeriesBase::write(hid_t type, const void* data, const std::vector<hsize_t>& start,
+                       const std::vector<hsize_t>& count) {
   const Handle in_file(H5Dget_space(dataset_.id()), H5Sclose);
   const Handle in_memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
   H5Sselect_hyperslab(in_file.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
   file_->check(H5Dwrite(dataset_.id(), type, in_memory.id(), in_file.id(), H5P_DEFAULT, data), label_);
-  rows_ = size[0];
 }
 
 }  // namespace carom::hdf5

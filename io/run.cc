@@ -149,6 +149,8 @@ int run_beside(Deck& deck, Exchange& at_work, const Deadline& deadline) {
   std::vector<Onlooker<D>> onlookers;
   for (const Sampling& sampling : samplings(deck.output)) onlookers.emplace_back(sampling);
   for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
+  ShareTeller<D> teller(at_work);
+  simulation.add(teller);
   simulation.run([&] { return deadline.passed(at_work); });
   accounts_of_all(at_work, simulation.statistics());
   return simulation.statistics().stopped_early ? kStoppedEarly : kDone;

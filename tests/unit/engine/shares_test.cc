@@ -17,7 +17,9 @@ template <int D>
 struct Account : Observer<D> {
   Sampling sampling() const override { return {.interval = 0.11}; }
   void sample(double, const Particles<D>& state) override { states.push_back(state); }
-  void frame(const Snapshot<D>& shot) override { states.push_back(*shot.particles); }
+  void frame(const Snapshot<D>& shot) override {
+    states.push_back(ranks ? gathered(*ranks, *shot.particles) : *shot.particles);
+  }
   void thermo(const Snapshot<D>& shot) override {
     EXPECT_GT(shot.temperature, 0) << "at time " << shot.time;
     values.insert(values.end(), {shot.time, shot.kinetic, shot.potential, shot.pressure, shot.temperature});
@@ -30,6 +32,7 @@ struct Account : Observer<D> {
   std::vector<EventKey<D>> events;
   std::vector<double> values;
   std::size_t kept = 0;  // particles here at the end
+  Exchange* ranks = nullptr;
 };
 
 template <int D>
@@ -43,6 +46,7 @@ Account<D> run(const Scene<D>& scene, Exchange* ranks) {
       test::make_run<D>(std::move(system), "free-flight",
                         {.step = 0.3, .end_time = 0.8, .frame_interval = 0.2, .thermo_interval = 0.07, .events = true});
   Account<D> account;
+  account.ranks = ranks;
   run->add(account);
   run->run();
   const Statistics& s = run->statistics();
