@@ -69,6 +69,21 @@ inline std::vector<Bytes> gather_on_first(Exchange& ranks, Bytes mine) {
   return ranks.swap(std::move(outgoing));
 }
 
+/// What becomes of a value that is handed from rank to rank, each of which does add(value): as if one had done it all.
+template <class Value, class Add>
+Value handed_on(Exchange& ranks, Value value, Add&& add) {
+  for (int rank = 0; rank < ranks.size(); ++rank) {
+    Bytes mine;
+    if (rank == ranks.rank()) {
+      add(value);
+      put(mine, value);
+    }
+    const auto told = ranks.gather(mine);
+    value = Reader(told[static_cast<std::size_t>(rank)]).template get<Value>();
+  }
+  return value;
+}
+
 /// The sum over all ranks of what has a function add().
 template <class Sums>
 Sums sum_of_all(Exchange& ranks, const Sums& mine) {

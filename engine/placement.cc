@@ -91,23 +91,29 @@ LatticeCells<D> fit_lattice(Lattice lattice, const Box<D>& box, std::size_t coun
 }
 
 template <int D>
-std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_t count, double margin) {
+std::size_t for_each_site(Lattice lattice, const Box<D>& box, std::size_t count, double margin,
+                          const std::function<void(const Vec<D>&)>& visit) {
   const auto fit = fit_lattice(lattice, box, count, margin);
   std::array<Planes, D> p;
   for (int k = 0; k < D; ++k) p[k] = planes(lattice, box, k, fit.cells[k], margin);
-  std::vector<Vec<D>> sites;
-  sites.reserve(fit.sites);
   std::array<int, D> at{};
   while (at[0] < p[0].number) {
     if (lattice == Lattice::simple || std::accumulate(at.begin(), at.end(), 0) % 2 == 0) {
       Vec<D> x;
       for (int k = 0; k < D; ++k) x[k] = p[k].at(at[k]);
-      sites.push_back(x);
+      visit(x);
     }
     int axis = D - 1;
     while (axis > 0 && at[axis] + 1 == p[axis].number) at[axis--] = 0;
     ++at[axis];
   }
+  return fit.sites;
+}
+
+template <int D>
+std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_t count, double margin) {
+  std::vector<Vec<D>> sites;
+  for_each_site<D>(lattice, box, count, margin, [&](const Vec<D>& x) { sites.push_back(x); });
   return sites;
 }
 
@@ -176,7 +182,8 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
 }
 
 template <int D>
-Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius) {
+Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
+                       std::span<const char> beyond) {
   Overlaps found;
   if (x.empty()) return found;
   PlacementGrid<D> grid(box, radius);
@@ -186,20 +193,22 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
     Vec<D> inside = x[i];
     Image<D> image{};
     box.wrap(inside, image);
-    grid.near(inside, radius[i], [&](Id j, const Vec<D>& shift) {
+    const auto look = [&](Id j, const Vec<D>& shift) {
       Vec<D> other = x[j];
       Image<D> ignored{};
       box.wrap(other, ignored);
       const double distance = (inside - other - shift).norm(), contact = radius[i] + radius[j];
       if (distance >= contact - tolerance(contact)) return;
       ++found.pairs;
-      if (distance / contact >= worst) return;
+      const bool tie = distance / contact == worst && found.hi == i && j < found.lo;
+      if (distance / contact >= worst && !tie) return;
       worst = distance / contact;
       found.lo = j;
       found.hi = i;
       found.distance = distance;
       found.contact = contact;
-    });
+    };
+    if (beyond.empty() || beyond[i] == 0) grid.near(inside, radius[i], look);
     grid.insert(i, inside);
   }
   return found;
@@ -228,55 +237,72 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
 
 template <int D>
 void draw_velocities(Particles<D>& particles, std::span<const Id> who, std::span<const double> temperature,
-                     std::uint64_t seed, RandomPurpose purpose) {
-  double total_mass = 0, twice_kinetic_wanted = 0;
-  Vec<D> momentum = Vec<D>::Zero();
+                     std::uint64_t seed, RandomPurpose purpose, Exchange* ranks) {
+  Exchange alone;
   for (std::size_t n = 0; n < who.size(); ++n) {
     const Id i = who[n];
-    RandomStream random(seed, purpose, i);
+    RandomStream random(seed, purpose, particles.id_of(i));
     const auto first = random.normal_pair(), second = random.normal_pair();
     const std::array<double, 4> normal{first[0], first[1], second[0], second[1]};
     for (int k = 0; k < D; ++k) particles.v[i][k] = std::sqrt(temperature[n] / particles.mass[i]) * normal[k];
-    total_mass += particles.mass[i];
-    momentum += particles.mass[i] * particles.v[i];
-    twice_kinetic_wanted += D * temperature[n];
   }
-  double twice_kinetic = 0;
-  for (const Id i : who) {
-    if (who.size() > 1) particles.v[i] -= momentum / total_mass;
-    twice_kinetic += particles.mass[i] * particles.v[i].squaredNorm();
-  }
-  const double scale = twice_kinetic > 0 ? std::sqrt(twice_kinetic_wanted / twice_kinetic) : 0;
+  struct Sums {
+    std::size_t particles = 0;
+    double mass = 0, twice_kinetic_wanted = 0, twice_kinetic = 0;
+    Vec<D> momentum = Vec<D>::Zero();
+  };
+  const Sums drawn = handed_on(ranks ? *ranks : alone, Sums{}, [&](Sums& sums) {
+    sums.particles += who.size();
+    for (std::size_t n = 0; n < who.size(); ++n) {
+      const Id i = who[n];
+      sums.mass += particles.mass[i];
+      sums.momentum += particles.mass[i] * particles.v[i];
+      sums.twice_kinetic_wanted += D * temperature[n];
+    }
+  });
+  const Sums centred = handed_on(ranks ? *ranks : alone, drawn, [&](Sums& sums) {
+    for (const Id i : who) {
+      if (sums.particles > 1) particles.v[i] -= sums.momentum / sums.mass;
+      sums.twice_kinetic += particles.mass[i] * particles.v[i].squaredNorm();
+    }
+  });
+  const double scale = centred.twice_kinetic > 0 ? std::sqrt(centred.twice_kinetic_wanted / centred.twice_kinetic) : 0;
   for (const Id i : who) particles.v[i] *= scale;
 }
 
 template <int D>
-double packing_fraction(double volume, std::span<const double> radius) {
-  double filled = 0;
-  for (const double r : radius) filled += D == 2 ? std::numbers::pi * r * r : 4 * std::numbers::pi / 3 * r * r * r;
+double packing_fraction(double volume, std::span<const double> radius, Exchange* ranks) {
+  Exchange alone;
+  const double filled = handed_on(ranks ? *ranks : alone, 0.0, [&](double& sum) {
+    for (const double r : radius) sum += D == 2 ? std::numbers::pi * r * r : 4 * std::numbers::pi / 3 * r * r * r;
+  });
   return filled / volume;
 }
 
 template LatticeCells<2> fit_lattice(Lattice, const Box<2>&, std::size_t, double);
+template std::size_t for_each_site(Lattice, const Box<2>&, std::size_t, double,
+                                   const std::function<void(const Vec<2>&)>&);
 template std::vector<Vec<2>> lattice_sites(Lattice, const Box<2>&, std::size_t, double);
 template Vec<2> commensurate_edges<2>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::span<const double>, std::span<const Id>,
                                       std::uint64_t, std::uint64_t);
-template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
+template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>, std::span<const char>);
 template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
-template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t,
-                              RandomPurpose);
-template double packing_fraction<2>(double, std::span<const double>);
+template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
+                              Exchange*);
+template double packing_fraction<2>(double, std::span<const double>, Exchange*);
 
 template LatticeCells<3> fit_lattice(Lattice, const Box<3>&, std::size_t, double);
+template std::size_t for_each_site(Lattice, const Box<3>&, std::size_t, double,
+                                   const std::function<void(const Vec<3>&)>&);
 template std::vector<Vec<3>> lattice_sites(Lattice, const Box<3>&, std::size_t, double);
 template Vec<3> commensurate_edges<3>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::span<const double>, std::span<const Id>,
                                       std::uint64_t, std::uint64_t);
-template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
+template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>, std::span<const char>);
 template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
-template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t,
-                              RandomPurpose);
-template double packing_fraction<3>(double, std::span<const double>);
+template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
+                              Exchange*);
+template double packing_fraction<3>(double, std::span<const double>, Exchange*);
 
 }  // namespace carom

@@ -9,10 +9,12 @@
 // (k_B = 1).
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "engine/box.h"
+#include "engine/exchange.h"
 #include "engine/particles.h"
 #include "engine/random.h"
 
@@ -32,7 +34,11 @@ struct LatticeCells {
 template <int D>
 LatticeCells<D> fit_lattice(Lattice lattice, const Box<D>& box, std::size_t count, double margin);
 
-/// All sites (at least `count`) of that lattice, in the order of their coordinates.
+/// Calls visit(x) for all sites (at least `count`) of that lattice, in the order of their coordinates; returns how
+/// many.
+template <int D>
+std::size_t for_each_site(Lattice lattice, const Box<D>& box, std::size_t count, double margin,
+                          const std::function<void(const Vec<D>&)>& visit);
 template <int D>
 std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_t count, double margin);
 
@@ -52,7 +58,7 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
                              std::span<const Id> who, std::uint64_t seed, std::uint64_t tries = 20000);
 
 /// Pairs closer than their contact distance by more than the gap tolerance (engine/contact.h), through periodic images
-/// too.
+/// too; without those whose later sphere is `beyond` what is looked at.
 struct Overlaps {
   std::size_t pairs = 0;
   Id lo = 0, hi = 0;    ///< the pair that overlaps most, relative to its contact distance
@@ -60,7 +66,8 @@ struct Overlaps {
   double contact = 0;   ///< its contact distance [length]
 };
 template <int D>
-Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius);
+Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
+                       std::span<const char> beyond = {});
 
 /// Spheres that reach through a wall by more than the gap tolerance.
 struct Outsiders {
@@ -73,13 +80,14 @@ template <int D>
 Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius);
 
 /// Maxwell–Boltzmann velocities for the particles `who`, whose temperatures are given: drawn, freed of total momentum
-/// (not so a single particle) and scaled so that 2K = D Σ temperature exactly, up to rounding.
+/// (not so a single particle) and scaled so that 2K = D Σ temperature exactly, up to rounding. With `ranks`, each of
+/// them does so for its share of the particles, with the same bits; collective.
 template <int D>
 void draw_velocities(Particles<D>& particles, std::span<const Id> who, std::span<const double> temperature,
-                     std::uint64_t seed, RandomPurpose purpose = RandomPurpose::velocity);
+                     std::uint64_t seed, RandomPurpose purpose = RandomPurpose::velocity, Exchange* ranks = nullptr);
 
-/// The part of the box that the spheres fill, 0 … 1.
+/// The part of the box that the spheres fill, 0 … 1; with `ranks`, those of all of them.
 template <int D>
-double packing_fraction(double volume, std::span<const double> radius);
+double packing_fraction(double volume, std::span<const double> radius, Exchange* ranks = nullptr);
 
 }  // namespace carom

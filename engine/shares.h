@@ -24,6 +24,12 @@ struct Shares {
   }
 };
 
+/// The ranks that have shares of a system; null: everybody is here.
+template <int D>
+Exchange* shared_by(const System<D>& system) {
+  return system.sizes ? system.ranks : nullptr;
+}
+
 /// Calls visit(vector) for everything that is kept of each particle, but for its id and whose it is.
 template <int D, class Visit>
 void for_each_array(Particles<D>& p, Visit&& visit) {

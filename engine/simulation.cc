@@ -44,7 +44,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
   Statistics& s = statistics_;
   std::optional<Part<D>> part;
   if (system_->ranks && info_.smooth_forces) part.emplace(*system_, *system_->ranks);
-  if (system_->ranks && !info_.smooth_forces) keep_share(*system_);
+  if (system_->ranks && !info_.smooth_forces && !system_->sizes) keep_share(*system_);
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);
   const auto known = [&]() -> System<D>& { return part ? part->known() : *system_; };
   const auto nodes = [&]() -> const Particles<D>& {

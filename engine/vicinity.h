@@ -1,6 +1,7 @@
 #pragma once
 // Particles sorted by place for a look at who is near whom, where each rank has only some of them.
 
+#include <algorithm>
 #include <vector>
 
 #include "engine/division.h"
@@ -9,19 +10,19 @@
 
 namespace carom {
 
-/// Those in this rank's part of the box, and copies of those so near to it that they may touch them.
+/// Those in this rank's part of the box, and copies of those so near to it that they may touch them; by id, ascending.
 template <int D>
 struct Vicinity {
   std::vector<Vec<D>> x;
   std::vector<double> radius;
   std::vector<Id> id;
-  std::vector<char> beyond;  ///< 1: not in this part, but near it
+  std::vector<char> beyond{};  ///< 1: not in this part, but near it
 };
 
 /// Of the particles that all ranks have together, this one those at x with these species. Collective.
 template <int D>
 Vicinity<D> vicinity(const Box<D>& box, const Sizes& sizes, Exchange& ranks, const Particles<D>& share) {
-  struct Place {
+  struct Copy {
     Vec<D> x;
     Id id;
     std::uint16_t species;
@@ -32,18 +33,20 @@ Vicinity<D> vicinity(const Box<D>& box, const Sizes& sizes, Exchange& ranks, con
   std::vector<Bytes> outgoing(size);
   for (Id i = 0; i < share.size(); ++i)
     division.for_each_near(division.wrapped(share.x[i]), [&](std::uint32_t rank) {
-      put(outgoing[rank], Place{share.x[i], share.id_of(i), share.species[i]});
+      put(outgoing[rank], Copy{share.x[i], share.id_of(i), share.species[i]});
     });
-  Vicinity<D> found;
+  std::vector<Copy> places;
   for (Bytes& bytes : ranks.swap(std::move(outgoing))) {
-    for (Reader reader(bytes); reader.more();) {
-      const auto place = reader.get<Place>();
-      found.x.push_back(place.x);
-      found.radius.push_back(sizes.radius_of(place.id, place.species));
-      found.id.push_back(place.id);
-      found.beyond.push_back(division.owner(division.wrapped(place.x)) != static_cast<std::uint32_t>(ranks.rank()));
-    }
+    for (Reader reader(bytes); reader.more();) places.push_back(reader.get<Copy>());
     Bytes().swap(bytes);
+  }
+  std::ranges::sort(places, {}, &Copy::id);
+  Vicinity<D> found;
+  for (const Copy& place : places) {
+    found.x.push_back(place.x);
+    found.radius.push_back(sizes.radius_of(place.id, place.species));
+    found.id.push_back(place.id);
+    found.beyond.push_back(division.owner(division.wrapped(place.x)) != static_cast<std::uint32_t>(ranks.rank()));
   }
   return found;
 }

@@ -72,6 +72,6 @@ std::size_t particle_count(const Deck& deck);
 /// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
 /// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards.
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck);
+std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks = nullptr);
 
 }  // namespace carom

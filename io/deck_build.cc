@@ -7,6 +7,7 @@
 
 #include "engine/placement.h"
 #include "engine/radial_distribution.h"
+#include "engine/shares.h"
 #include "io/deck_interactions.h"
 #include "io/validate_state.h"
 
@@ -18,15 +19,19 @@ template <int D>
 void give_velocities(const Deck::Source& source, System<D>& system) {
   std::vector<Id> drawn;
   std::vector<double> temperature;
-  Id id = 0;
-  for (const SpeciesConfig& species : source.species)
-    for (std::size_t n = 0; n < species.count; ++n, ++id) {
-      if (!species.velocity.empty()) system.particles.v[id] = Eigen::Map<const Vec<D>>(species.velocity[n].data());
+  Particles<D>& p = system.particles;
+  std::size_t first = 0;  // id of the species
+  Id i = 0;
+  for (const SpeciesConfig& species : source.species) {
+    for (; i < p.size() && p.id_of(i) < first + species.count; ++i) {
+      if (!species.velocity.empty()) p.v[i] = Eigen::Map<const Vec<D>>(species.velocity[p.id_of(i) - first].data());
       if (!species.temperature) continue;
-      drawn.push_back(id);
+      drawn.push_back(i);
       temperature.push_back(*species.temperature);
     }
-  draw_velocities<D>(system.particles, drawn, temperature, source.placement.seed);
+    first += species.count;
+  }
+  draw_velocities<D>(p, drawn, temperature, source.placement.seed, RandomPurpose::velocity, shared_by(system));
 }
 
 /// Writes what was left to the initial state into the values of the deck, so that they say it themselves from now on.
@@ -54,18 +59,46 @@ void complete_values(Deck& deck, const System<D>& system) {
 
 }  // namespace
 
+bool built_in_shares(const Deck::Source& source) {
+  const std::string& type = source.placement.type;
+  const bool lattice = !type.empty() && type != "file" && type != "random" && type != "compressed";
+  return lattice && source.integrator != nullptr && !source.integrator->smooth_forces &&
+         std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
+           return species.placed && species.radius.size() == 1 && species.mass.size() == 1;
+         });
+}
+
 template <int D>
 void fill_system(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
   Particles<D>& all = system.particles;
+  std::size_t begin = 0, end = source.particles();  // ids of this rank
+  if (system.ranks && built_in_shares(source)) {
+    Sizes& sizes = system.sizes.emplace();
+    sizes.spheres = end;
+    sizes.by_species = true;
+    for (const SpeciesConfig& species : source.species) {
+      sizes.radius.push_back(species.radius[0]);
+      sizes.mass.push_back(species.mass[0]);
+      sizes.number.push_back(static_cast<double>(species.count));
+    }
+    const Shares shares{end, static_cast<std::size_t>(system.ranks->size())};
+    begin = shares.first(system.ranks->rank());
+    end = shares.first(system.ranks->rank() + 1);
+    for (std::size_t id = begin; id < end; ++id) all.id.push_back(static_cast<Id>(id));
+  }
+  std::size_t first = 0;  // id of the species
   for (const SpeciesConfig& species : source.species) {
     const auto index = static_cast<std::uint16_t>(system.species.size());
     system.species.push_back(species.name);
-    all.mass.insert(all.mass.end(), species.mass.begin(), species.mass.end());
-    all.radius.insert(all.radius.end(), species.radius.begin(), species.radius.end());
-    all.charge.insert(all.charge.end(), species.charge.begin(), species.charge.end());
-    all.species.insert(all.species.end(), species.count, index);
+    for (std::size_t id = std::max(begin, first); id < std::min(end, first + species.count); ++id) {
+      all.mass.push_back(SpeciesConfig::of(species.mass, id - first));
+      all.radius.push_back(SpeciesConfig::of(species.radius, id - first));
+      all.charge.push_back(SpeciesConfig::of(species.charge, id - first));
+      all.species.push_back(index);
+    }
+    first += species.count;
   }
   const std::size_t n = all.mass.size();
   all.x.assign(n, Vec<D>::Zero());
@@ -76,17 +109,24 @@ void fill_system(const Deck::Source& source, System<D>& system) {
 template <int D>
 double default_epoch(const System<D>& system) {
   const auto& p = system.particles;
-  const auto n = static_cast<double>(p.size());
-  double twice_kinetic = 0, mass = 0, diameter = 0;
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    twice_kinetic += p.mass[i] * p.v[i].squaredNorm();
-    mass += p.mass[i] / n;
-    diameter += 2 * p.radius[i] / n;
-  }
+  const auto n = static_cast<double>(system.size());
+  struct Sums {
+    double twice_kinetic = 0, mass = 0, diameter = 0;
+  };
+  Exchange alone;
+  const auto [twice_kinetic, mass, diameter] =
+      handed_on(shared_by(system) ? *shared_by(system) : alone, Sums{}, [&](Sums& sums) {
+        for (std::size_t i = 0; i < p.size(); ++i) {
+          sums.twice_kinetic += p.mass[i] * p.v[i].squaredNorm();
+          sums.mass += p.mass[i] / n;
+          sums.diameter += 2 * p.radius[i] / n;
+        }
+      });
+  const double filled = packing_fraction<D>(system.box.volume(), p.radius, shared_by(system));
   if (twice_kinetic == 0) return 1;
   // Collision rate of one particle by Enskog's theory, contact value by Carnahan–Starling (3-D), Henderson (2-D).
   const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));
-  const double density = n / system.box.volume(), filled = packing_fraction<D>(system.box.volume(), p.radius);
+  const double density = n / system.box.volume();
   const double empty = std::max(1 - filled, 0.01);
   const double contact_value =
       D == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
@@ -102,10 +142,11 @@ double default_epoch(const System<D>& system) {
 }
 
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck) {
+std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
   const Deck::Source& source = *deck.source;
   if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
   auto system = std::make_unique<System<D>>();
+  system->ranks = ranks;
   fill_system(source, *system);
   place_particles(source, *system);
   system->wrap();
@@ -126,10 +167,10 @@ std::unique_ptr<System<D>> build_system(Deck& deck) {
 
 template void fill_system(const Deck::Source&, System<2>&);
 template double default_epoch(const System<2>&);
-template std::unique_ptr<System<2>> build_system<2>(Deck&);
+template std::unique_ptr<System<2>> build_system<2>(Deck&, Exchange*);
 
 template void fill_system(const Deck::Source&, System<3>&);
 template double default_epoch(const System<3>&);
-template std::unique_ptr<System<3>> build_system<3>(Deck&);
+template std::unique_ptr<System<3>> build_system<3>(Deck&, Exchange*);
 
 }  // namespace carom

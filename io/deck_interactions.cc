@@ -1,6 +1,7 @@
 #include "io/deck_interactions.h"
 
 #include <algorithm>
+#include <array>
 
 #include "io/deck_build.h"
 #include "io/deck_interpret.h"
@@ -42,7 +43,8 @@ bool ready(const Deck::Source& source, std::size_t dimension) {
   const bool box = dimension != 0 && source.boundary.size() == dimension &&
                    (source.edges.empty() || source.edges.size() == dimension);
   return box && std::all_of(source.species.begin(), source.species.end(), [](const SpeciesConfig& s) {
-           return s.count > 0 && s.mass.size() == s.count && s.radius.size() == s.count && s.charge.size() == s.count;
+           return s.count > 0 && std::ranges::all_of(std::array{s.mass.size(), s.radius.size(), s.charge.size()},
+                                                     [&](std::size_t n) { return n == 1 || n == s.count; });
          });
 }
 
@@ -75,7 +77,7 @@ void read_interactions(Deck::Source& source, std::size_t dimension, Problems& pr
     wrong.push_back(!complete || problems.errors() > before);
     source.interactions.push_back(std::move(config));
   }
-  if (!ready(source, dimension)) return;
+  if (!ready(source, dimension) || source.interactions.empty()) return;
   if (dimension == 2)
     try_interactions<2>(source, wrong, problems);
   else

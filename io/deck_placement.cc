@@ -7,6 +7,7 @@
 
 #include "engine/compression.h"
 #include "engine/placement.h"
+#include "engine/shares.h"
 #include "io/deck_build.h"
 
 namespace carom {
@@ -101,14 +102,26 @@ template <int D>
 void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& system) {
   std::vector<std::size_t> counts;
   for (const SpeciesConfig& species : source.species) counts.push_back(species.count);
-  const auto& radius = system.particles.radius;
-  const double margin = *std::max_element(radius.begin(), radius.end());
-  const auto sites = lattice_sites(lattice, system.box, source.particles(), margin);
-  const std::vector<int> owner = distribute(sites.size(), counts, source.placement.seed);
-  Id id = 0;
-  for (std::size_t s = 0; s < counts.size(); ++s)
-    for (std::size_t site = 0; site < sites.size(); ++site)
-      if (owner[site] == static_cast<int>(s)) system.particles.x[id++] = sites[site];
+  Particles<D>& p = system.particles;
+  double margin = 0;
+  for (const SpeciesConfig& species : source.species)
+    margin = std::max(margin, *std::ranges::max_element(species.radius));
+  const std::size_t n = source.particles();
+  std::vector<Id> next(counts.size());  // of each species
+  for (std::size_t s = 1; s < counts.size(); ++s) next[s] = next[s - 1] + static_cast<Id>(counts[s - 1]);
+  const std::size_t sites = fit_lattice(lattice, system.box, n, margin).sites;
+  // A species that takes all needs no drawing.
+  const std::vector<int> owner =
+      counts.size() > 1 || sites > n ? distribute(sites, counts, source.placement.seed) : std::vector<int>{};
+  const Id first = p.size() > 0 ? p.id_of(0) : 0;
+  std::size_t site = 0;
+  for_each_site<D>(lattice, system.box, n, margin, [&](const Vec<D>& x) {
+    const int species = owner.empty() ? 0 : owner[site];
+    ++site;
+    if (species < 0) return;
+    const Id id = next[static_cast<std::size_t>(species)]++;
+    if (id >= first && id - first < p.size()) p.x[id - first] = x;
+  });
 }
 
 }  // namespace
@@ -143,8 +156,12 @@ void place_particles(const Deck::Source& source, System<D>& system) {
   const bool centred = placement.type == "fcc" || placement.type == "hexagonal";
   const Lattice lattice = centred ? Lattice::centred : Lattice::simple;
   if (source.edges.empty()) {
-    const double filled = packing_fraction<D>(1, system.particles.radius);
+    const double filled = packing_fraction<D>(1, system.particles.radius, shared_by(system));
     system.box.edges = commensurate_edges<D>(lattice, source.particles(), filled / *placement.packing_fraction);
+  }
+  if (built_in_shares(source)) {
+    place_on_lattice(source, lattice, system);
+    return;
   }
   std::vector<Id> placed;
   Id id = 0;

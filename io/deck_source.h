@@ -15,7 +15,9 @@ struct SpeciesConfig {
   bool placed = false;  ///< given by count: [placement] finds the positions
   std::vector<std::vector<double>> position, velocity;
   std::optional<double> temperature;
-  std::vector<double> radius, mass, charge;  ///< one for each particle
+  std::vector<double> radius, mass, charge;  ///< one for each particle, or one for all
+
+  static double of(const std::vector<double>& values, std::size_t n) { return values[values.size() == 1 ? 0 : n]; }
 };
 
 struct PlacementConfig {

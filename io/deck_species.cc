@@ -26,9 +26,9 @@ class SpeciesReader {
       positions(table, species);
       velocities(table, species);
       if (species.count > 0) {
-        species.radius = one_a_particle(table, "radius", species.count);
-        species.mass = one_a_particle(table, "mass", species.count);
-        species.charge = one_a_particle(table, "charge", species.count);
+        species.radius = numbers(table, "radius", species.count);
+        species.mass = numbers(table, "mass", species.count);
+        species.charge = numbers(table, "charge", species.count);
       }
       all_.push_back(std::move(species));
     }
@@ -88,8 +88,8 @@ class SpeciesReader {
             "system.dimension asks for " + std::to_string(dimension_));
   }
 
-  std::vector<double> one_a_particle(const ValueTable& table, const std::string& key, std::size_t count) {
-    if (const auto* number = table.find<double>(key)) return std::vector<double>(count, *number);
+  std::vector<double> numbers(const ValueTable& table, const std::string& key, std::size_t count) {
+    if (const auto* number = table.find<double>(key)) return {*number};
     const auto* list = table.find<std::vector<double>>(key);
     if (list == nullptr) return {};
     if (list->size() != count)

@@ -27,16 +27,13 @@ std::vector<T> three_columns(const Vectors& vectors, int dimension) {
   return rows;
 }
 
-/// What changes of the particles of a share, as a message.
-template <int D>
-Bytes told(const Particles<D>& p) {
+/// Arrays as a message, one after the other.
+template <class... Arrays>
+Bytes told(const Arrays&... arrays) {
   Bytes bytes;
-  bytes.reserve(p.size() * (2 * sizeof(Vec<D>) + sizeof(Image<D>)));
-  const auto add = [&](const auto& vectors) {
-    const auto more = std::as_bytes(std::span(vectors));
-    bytes.insert(bytes.end(), more.begin(), more.end());
-  };
-  add(p.x), add(p.v), add(p.image);
+  bytes.reserve((std::as_bytes(std::span(arrays)).size() + ...));
+  const auto add = [&](std::span<const std::byte> more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
+  (add(std::as_bytes(std::span(arrays))), ...);
   return bytes;
 }
 
@@ -92,9 +89,9 @@ template <int D>
 struct TrajectoryWriter<D>::Contents {
   Contents(const std::filesystem::path& path, const Deck& deck, const System<D>& system)
       : file(File::create(path)),
-        position(file, "particles/trajectory/position", {system.particles.size(), 3}),
-        velocity(file, "particles/trajectory/velocity", {system.particles.size(), 3}),
-        image(file, "particles/trajectory/image", {system.particles.size(), 3}),
+        position(file, "particles/trajectory/position", {system.size(), 3}),
+        velocity(file, "particles/trajectory/velocity", {system.size(), 3}),
+        image(file, "particles/trajectory/image", {system.size(), 3}),
         step(file, position.group, "step"),
         time(file, position.group, "time"),
         box(file.group("particles/trajectory/box")),
@@ -105,7 +102,7 @@ struct TrajectoryWriter<D>::Contents {
     write_origin(file);
     write_parameters(file, deck, system);
     write_box(system.box);
-    write_fixed(system.particles);
+    write_fixed(system);
     for (const char* name : {"kinetic_energy", "potential_energy", "total_energy", "shadow_energy", "max_energy_error",
                              "temperature", "pressure"})
       observables.emplace(name, Element<double>(file, std::string("observables/") + name));
@@ -126,16 +123,36 @@ struct TrajectoryWriter<D>::Contents {
     for (std::size_t k = 0; k < 3; ++k) edge_rows[4 * k] = static_cast<int>(k) < D ? b.edges[static_cast<int>(k)] : 1.0;
   }
 
-  void write_fixed(const Particles<D>& p) {
+  void write_fixed(const System<D>& system) {
     const Handle group(H5Gopen2(file.id(), "particles/trajectory", H5P_DEFAULT), H5Gclose);
-    std::vector<std::uint32_t> id(p.size());
-    std::iota(id.begin(), id.end(), 0U);
-    const std::vector<std::int32_t> species(p.species.begin(), p.species.end());
-    file.write_numbers<std::uint32_t>(group, "id", id);
-    file.write_numbers<std::int32_t>(group, "species", species);
-    file.write_numbers<double>(group, "mass", p.mass);
-    file.write_numbers<double>(group, "radius", p.radius);
-    file.write_numbers<double>(group, "charge", p.charge);
+    const std::size_t n = system.size();
+    const hdf5::Array<std::uint32_t> id(file, group, "id", n);
+    const hdf5::Array<std::int32_t> species(file, group, "species", n);
+    const hdf5::Array<double> mass(file, group, "mass", n), radius(file, group, "radius", n),
+        charge(file, group, "charge", n);
+    std::size_t first = 0;
+    const auto write = [&](std::span<const std::uint16_t> kinds, std::span<const double> masses,
+                           std::span<const double> radii, std::span<const double> charges) {
+      std::vector<std::uint32_t> ids(kinds.size());
+      std::iota(ids.begin(), ids.end(), static_cast<std::uint32_t>(first));
+      id.write(first, ids);
+      species.write(first, std::vector<std::int32_t>(kinds.begin(), kinds.end()));
+      mass.write(first, masses);
+      radius.write(first, radii);
+      charge.write(first, charges);
+      first += kinds.size();
+    };
+    const Particles<D>& p = system.particles;
+    if (!system.sizes) return write(p.species, p.mass, p.radius, p.charge);
+    one_after_the_other(
+        *ranks, [&] { return told(p.mass, p.radius, p.charge, p.species); },
+        [&](int /*rank*/, const Bytes& message) {
+          const std::size_t here = message.size() / (3 * sizeof(double) + sizeof(std::uint16_t));
+          Reader reader(message);
+          const auto masses = next<double>(reader, here), radii = next<double>(reader, here),
+                     charges = next<double>(reader, here);
+          write(next<std::uint16_t>(reader, here), masses, radii, charges);
+        });
   }
 
   /// Writes what changes of the particles: a row of all that there are, from one state or from the shares of all ranks.
@@ -148,7 +165,7 @@ struct TrajectoryWriter<D>::Contents {
     }
     std::size_t first = 0;
     one_after_the_other(
-        *ranks, [&] { return told(p); },
+        *ranks, [&] { return told(p.x, p.v, p.image); },
         [&](int /*rank*/, const Bytes& message) {
           const std::size_t n = message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>));
           Reader reader(message);
@@ -216,10 +233,18 @@ void TrajectoryWriter<D>::close() {
 }
 
 template <int D>
+ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system) : ranks_(ranks) {
+  const Particles<D>& p = system.particles;
+  if (system.sizes)
+    one_after_the_other(
+        ranks, [&] { return told(p.mass, p.radius, p.charge, p.species); }, [](int, const Bytes&) {});
+}
+
+template <int D>
 void ShareTeller<D>::frame(const Snapshot<D>& s) {
   if (s.particles->id.empty()) return;  // rank 0 has them too
   one_after_the_other(
-      ranks_, [&] { return told(*s.particles); }, [](int, const Bytes&) {});
+      ranks_, [&] { return told(s.particles->x, s.particles->v, s.particles->image); }, [](int, const Bytes&) {});
 }
 
 template class TrajectoryWriter<2>;

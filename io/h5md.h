@@ -48,7 +48,8 @@ class TrajectoryWriter : public Observer<D> {
 template <int D>
 class ShareTeller : public Observer<D> {
  public:
-  explicit ShareTeller(Exchange& ranks) : ranks_(ranks) {}
+  /// While the writer creates the file.
+  ShareTeller(Exchange& ranks, const System<D>& system);
   void frame(const Snapshot<D>& snapshot) override;
 
  private:

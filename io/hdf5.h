@@ -93,10 +93,6 @@ class File {
   void write_text(const Handle& where, const std::string& name, const std::string& text);
   void write_texts(const Handle& where, const std::string& name, const std::vector<std::string>& texts);
   template <class T>
-  void write_numbers(const Handle& where, const std::string& name, std::span<const T> numbers) {
-    write_array(where, name, native_type<T>(), numbers.data(), {numbers.size()});
-  }
-  template <class T>
   void write_number(const Handle& where, const std::string& name, T number) {
     write_array(where, name, native_type<T>(), &number, {});
   }
@@ -156,6 +152,29 @@ class Series : public SeriesBase {
   using SeriesBase::append_row;
   void write_part(std::size_t first, std::span<const T> values) {
     SeriesBase::write_part(native_type<T>(), values.data(), first, values.size());
+  }
+};
+
+/// The untyped part of Array.
+class ArrayBase {
+ protected:
+  ArrayBase(const File& file, const Handle& where, const std::string& name, hid_t type, std::size_t size);
+  void write(hid_t type, const void* data, std::size_t first, std::size_t count) const;
+
+ private:
+  std::string label_;
+  const File* file_;
+  Handle dataset_;
+};
+
+/// A data set of so many numbers, to be written in parts. The file must outlive it and not move.
+template <class T>
+class Array : public ArrayBase {
+ public:
+  Array(const File& file, const Handle& where, const std::string& name, std::size_t size)
+      : ArrayBase(file, where, name, native_type<T>(), size) {}
+  void write(std::size_t first, std::span<const T> values) const {
+    ArrayBase::write(native_type<T>(), values.data(), first, values.size());
   }
 };
 

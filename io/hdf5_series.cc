@@ -37,6 +37,25 @@ SeriesBase::SeriesBase(const File& file, const Handle& where, const std::string&
              H5Dclose);
 }
 
+ArrayBase::ArrayBase(const File& file, const Handle& where, const std::string& name, hid_t type, std::size_t size)
+    : label_("write to data set " + name), file_(&file) {
+  const hsize_t n = size;
+  const Handle space(H5Screate_simple(1, &n, nullptr), H5Sclose);
+  dataset_ =
+      Handle(file.check(H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                        "create data set " + name),
+             H5Dclose);
+}
+
+void ArrayBase::write(hid_t type, const void* data, std::size_t first, std::size_t elements) const {
+  if (elements == 0) return;
+  const hsize_t start = first, count = elements;
+  const Handle in_file(H5Dget_space(dataset_.id()), H5Sclose);
+  const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  H5Sselect_hyperslab(in_file.id(), H5S_SELECT_SET, &start, nullptr, &count, nullptr);
+  file_->check(H5Dwrite(dataset_.id(), type, in_memory.id(), in_file.id(), H5P_DEFAULT, data), label_);
+}
+
 void SeriesBase::append(hid_t type, const void* data, std::size_t elements) {
   if (elements == 0) return;
   std::vector<hsize_t> start(shape_.size(), 0), count = shape_;

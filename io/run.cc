@@ -79,9 +79,8 @@ TextReader reader_for(Exchange& ranks) {
 template <int D>
 Simulation<D> simulation_of(Deck& deck, Exchange& ranks) {
   const IntegratorInfo& info = integrator_named(deck.integrator);
-  auto system = build_system<D>(deck);
+  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr);
   auto integrator = info.make<D>(deck.integrator_parameters);
-  if (ranks.size() > 1) system->ranks = &ranks;
   return Simulation<D>(std::move(system), info, std::move(integrator), deck.plan);
 }
 
@@ -93,7 +92,7 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
   const auto& directory = deck.output.directory;
   const auto backup = prepare_output_directory(directory);
   RunLog log(directory / run_file::log, options.quiet);
-  RunOutcome outcome{.status = "done", .particles = simulation.system().particles.size(), .ranks = ranks};
+  RunOutcome outcome{.status = "done", .particles = simulation.system().size(), .ranks = ranks};
   log.say(banner_text(deck, outcome.particles, ranks));
   for (const std::string& warning : deck.warnings) log.warn(warning);
   if (at_work.size() < ranks)
@@ -149,7 +148,7 @@ int run_beside(Deck& deck, Exchange& at_work, const Deadline& deadline) {
   std::vector<Onlooker<D>> onlookers;
   for (const Sampling& sampling : samplings(deck.output)) onlookers.emplace_back(sampling);
   for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
-  ShareTeller<D> teller(at_work);
+  ShareTeller<D> teller(at_work, simulation.system());
   simulation.add(teller);
   simulation.run([&] { return deadline.passed(at_work); });
   accounts_of_all(at_work, simulation.statistics());

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <numbers>
 #include <sstream>
+#include <tuple>
+#include <utility>
 
 #include "engine/contact.h"
 #include "engine/placement.h"
 #include "engine/radial_distribution.h"
 #include "engine/random.h"
+#include "engine/vicinity.h"
 
 namespace carom {
 namespace {
@@ -26,14 +29,53 @@ std::string plural(std::size_t n, const std::string& one, const std::string& man
 }
 
 /// Where the deck says the positions of this particle.
-const Place& place_of(const Deck::Source& source, std::uint16_t species) {
-  const SpeciesConfig& config = source.species[species];
-  return config.placed ? source.placement.at : config.at;
+const Place& place_of(const Deck::Source& source, Id id) {
+  const SpeciesConfig* config = source.species.data();
+  for (std::size_t end = config->count; end <= id; end += config->count) ++config;
+  return config->placed ? source.placement.at : config->at;
+}
+
+/// What all ranks have found, each in its share.
+template <int D>
+Outsiders all_outsiders(const System<D>& system) {
+  const Particles<D>& p = system.particles;
+  Outsiders all = find_outsiders<D>(system.box, p.x, p.radius);
+  if (!shared_by(system)) return all;
+  Bytes mine;
+  if (all.spheres > 0) all.worst = p.id_of(all.worst);
+  put(mine, std::exchange(all, {}));
+  for (const Bytes& bytes : system.ranks->gather(mine)) {
+    const auto found = Reader(bytes).get<Outsiders>();
+    const std::size_t spheres = all.spheres + found.spheres;
+    if (found.depth > all.depth) all = found;
+    all.spheres = spheres;
+  }
+  return all;
+}
+
+/// The same of pairs. The worst is the same for any number of ranks: among equals that with the lowest ids.
+template <int D>
+Overlaps all_overlaps(const System<D>& system) {
+  if (!shared_by(system)) return find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
+  const Vicinity<D> near = vicinity<D>(system.box, *system.sizes, *system.ranks, system.particles);
+  Overlaps all = find_overlaps<D>(system.box, near.x, near.radius, near.beyond);
+  if (all.pairs > 0) all.lo = near.id[all.lo], all.hi = near.id[all.hi];
+  Bytes mine;
+  put(mine, std::exchange(all, {}));
+  for (const Bytes& bytes : system.ranks->gather(mine)) {
+    const auto found = Reader(bytes).get<Overlaps>();
+    if (found.pairs == 0) continue;
+    const std::size_t pairs = all.pairs + found.pairs;
+    const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.hi, o.lo); };
+    if (all.pairs == 0 || order(found) < order(all)) all = found;
+    all.pairs = pairs;
+  }
+  return all;
 }
 
 template <int D>
 void check_box(const Deck::Source& source, const System<D>& system, Problems& problems) {
-  const auto& radius = system.particles.radius;
+  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
   const double diameter = 2 * *std::max_element(radius.begin(), radius.end());
   for (int k = 0; k < D; ++k) {
     const double edge = system.box.edges[k];
@@ -42,21 +84,21 @@ void check_box(const Deck::Source& source, const System<D>& system, Problems& pr
                    say("the periodic box is ", edge, " long on axis ", k, ", less than a diameter of ", diameter),
                    "enlarge the box; a sphere must not touch itself");
   }
-  if (const double filled = packing_fraction<D>(system.box.volume(), radius); filled > 1 && closed(system.box))
+  const double filled = packing_fraction<D>(system.box.volume(), system.particles.radius, shared_by(system));
+  if (filled > 1 && closed(system.box))
     problems.error(source.box, say("the spheres fill ", filled, " of the box"),
                    "enlarge the box or take fewer spheres");
 }
 
 template <int D>
 void check_spheres(const Deck::Source& source, const System<D>& system, Problems& problems) {
-  const Particles<D>& p = system.particles;
-  if (const Outsiders out = find_outsiders<D>(system.box, p.x, p.radius); out.spheres > 0)
-    problems.error(place_of(source, p.species[out.worst]),
+  if (const Outsiders out = all_outsiders(system); out.spheres > 0)
+    problems.error(place_of(source, out.worst),
                    say(plural(out.spheres, "sphere is", "spheres are"), " not inside the walls; the worst is particle ",
                        out.worst, ", which reaches ", out.depth, " beyond a wall of axis ", out.axis),
                    "move it inside (at least a radius from every wall), or enlarge the box");
-  if (const Overlaps overlaps = find_overlaps<D>(system.box, p.x, p.radius); overlaps.pairs > 0)
-    problems.error(place_of(source, p.species[overlaps.hi]),
+  if (const Overlaps overlaps = all_overlaps(system); overlaps.pairs > 0)
+    problems.error(place_of(source, overlaps.hi),
                    say(plural(overlaps.pairs, "pair of spheres overlaps", "pairs of spheres overlap"),
                        "; the worst is particles ", overlaps.lo, " and ", overlaps.hi, " at distance ",
                        overlaps.distance, ", contact distance ", overlaps.contact),
@@ -130,7 +172,7 @@ void warn_of_state(const Deck& deck, const System<D>& system, Problems& problems
                      "make the boundary open or periodic, or take another integrator");
 
   const double close_packing = D == 2 ? std::numbers::pi / std::sqrt(12.0) : std::numbers::pi / std::sqrt(18.0);
-  const double filled = packing_fraction<D>(box.volume(), system.particles.radius);
+  const double filled = packing_fraction<D>(box.volume(), system.particles.radius, shared_by(system));
   if (source.integrator->hard_cores && closed(box) && filled > close_packing)
     problems.warning(source.box,
                      say("packing fraction ", filled, " is beyond close packing of equal spheres, ", close_packing),

@@ -6,7 +6,10 @@
 #include <numbers>
 
 #include "engine/placement.h"
+#include "engine/shares.h"
+#include "io/deck_source.h"
 #include "io/validate_state.h"
+#include "tests/support/thread_ranks.h"
 
 namespace carom {
 namespace {
@@ -148,6 +151,71 @@ TEST_F(DeckTest, ResolvedDeckKeepsWhatTheInitialStateDecided) {
   EXPECT_EQ(again.integrator_parameters.real("step"), deck.plan.step);
   expect_equal(*system, *build_system<3>(again));
   EXPECT_EQ(again.toml_text, deck.toml_text);
+}
+
+/// Species, vacancies and walls; and what does not fit, in the same words.
+TEST_F(DeckTest, RanksBuildTheSharesOfOneInitialState) {
+  const std::string mixture = R"(format = 1
+[system]
+dimension = 3
+boundary = ["periodic", "wall", "periodic"]
+[[particles]]
+name = "large"
+count = 61
+temperature = 1.5
+radius = 0.5
+[[particles]]
+name = "small"
+count = 120
+temperature = 0.5
+radius = 0.3
+mass = 0.25
+[placement]
+type = "fcc"
+packing_fraction = 0.2
+[integrator]
+type = "free-flight"
+[run]
+end_time = 1.0
+[output]
+directory = "unused"
+)";
+  Deck deck = read(mixture);
+  const auto whole = build_system<3>(deck);
+  Deck dense = read(mixture, {"placement.packing_fraction=0.9"});
+  std::string refused;
+  try {
+    build_system<3>(dense);
+  } catch (const Error& e) {
+    refused = e.what();
+  }
+  EXPECT_NE(refused.find("overlap"), std::string::npos);
+  for (const int size : {2, 3, 5})
+    test::ThreadRanks(size).run([&](Exchange& ranks) {
+      Deck mine = deck, too_dense = dense;
+      mine.source = std::make_shared<Deck::Source>(*deck.source),
+      too_dense.source = std::make_shared<Deck::Source>(*dense.source);
+      const auto share = build_system<3>(mine, &ranks);
+      EXPECT_LE(share->particles.size(), 181u / static_cast<unsigned>(size) + 1);
+      EXPECT_EQ(share->size(), 181u);
+      EXPECT_EQ(mine.plan.step, deck.plan.step);
+      EXPECT_EQ(share->box.edges, whole->box.edges);
+      const Particles<3> all = gathered(ranks, share->particles);
+      if (ranks.rank() == 0) {
+        EXPECT_EQ(all.x, whole->particles.x);
+        EXPECT_EQ(all.v, whole->particles.v);
+        EXPECT_EQ(all.mass, whole->particles.mass);
+        EXPECT_EQ(all.radius, whole->particles.radius);
+        EXPECT_EQ(all.charge, whole->particles.charge);
+        EXPECT_EQ(all.species, whole->particles.species);
+      }
+      try {
+        build_system<3>(too_dense, &ranks);
+        ADD_FAILURE() << "was not refused";
+      } catch (const Error& e) {
+        EXPECT_EQ(e.what(), refused);
+      }
+    });
 }
 
 TEST_F(DeckTest, PackingFractionAndTemperatureAreMet) {
