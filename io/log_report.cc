@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -85,6 +86,20 @@ std::string domains_text(std::span<const RankAccount> ranks) {
       100 * (static_cast<double>(most) * static_cast<double>(ranks.size()) / events - 1));
 }
 
+std::string memory_text(std::span<const RankAccount> ranks) {
+  constexpr double kMegabyte = 1e6;
+  double least = std::numeric_limits<double>::infinity(), sum = 0, most = 0;
+  for (const RankAccount& rank : ranks) {
+    const double megabytes = static_cast<double>(rank.peak_memory_bytes) / kMegabyte;
+    least = std::min(least, megabytes);
+    most = std::max(most, megabytes);
+    sum += megabytes;
+  }
+  if (ranks.size() == 1) return fmt::format("\nmemory at the peak {:.0f} MB", most);
+  return fmt::format("\nmemory of a rank at the peak {:.0f} to {:.0f} MB, {:.0f} on average", least, most,
+                     sum / static_cast<double>(ranks.size()));
+}
+
 }  // namespace
 
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
@@ -124,7 +139,7 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
   if (c.divisions > 0)
     text += fmt::format("\nparticles divided among {} ranks {} times, {} steps done again with everybody known",
                         ranks.size(), c.divisions, c.slabs_again);
-  text += domains_text(ranks);
+  text += domains_text(ranks) + memory_text(ranks);
   return text + "\n" + breakdown_text(ranks) + "\nfiles in " + deck.output.directory.string();
 }
 

@@ -31,6 +31,7 @@ struct Account : Observer<D> {
   std::vector<Particles<D>> states;
   std::vector<EventKey<D>> events;
   std::vector<double> values;
+  double overlap = 0;
   std::size_t kept = 0;  // particles here at the end
   Exchange* ranks = nullptr;
 };
@@ -52,6 +53,7 @@ Account<D> run(const Scene<D>& scene, Exchange* ranks) {
   const Statistics& s = run->statistics();
   account.values.insert(account.values.end(), {s.max_energy_error, s.counters.max_overlap, s.mean_pressure,
                                                *s.mean_free_path, static_cast<double>(s.counters.sphere_sphere)});
+  account.overlap = s.counters.max_overlap;
   account.kept = run->system().particles.size();
   return account;
 }
@@ -107,6 +109,19 @@ TEST(Shares, Species) {
         return system;
       },
       100);
+}
+
+/// Two that overlap and never move are seen by whichever rank, in whichever way the box is cut.
+TEST(Shares, OverlapsAreFound) {
+  const auto grid = [] {
+    std::vector<Vec<3>> x, v(125, Vec<3>::Zero());
+    for (int k = 0; k < 125; ++k) x.push_back({1.0 + 2 * (k / 25), 1.0 + 2 * (k / 5 % 5), 1.0 + 2 * (k % 5)});
+    x[1] = x[0] + Vec<3>(0, 0, 0.99);
+    v[124] = {0, 0, -3};
+    return test::make_system<3>({10, 10, 10}, P, x, v);
+  };
+  compare<3>(grid, 1);
+  EXPECT_NEAR(run<3>(grid, nullptr).overlap, 0.01, 1e-12);
 }
 
 TEST(Sizes, AreThoseOfTheSpeciesWhereTheyAreEqual) {
