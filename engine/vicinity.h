@@ -16,10 +16,10 @@ struct Vicinity {
   std::vector<Vec<D>> x;
   std::vector<double> radius;
   std::vector<Id> id;
-  std::vector<char> beyond{};  ///< 1: not in this part, but near it
+  std::vector<char> beyond;  ///< 1: not in this part, but near it
 };
 
-/// Of the particles that all ranks have together, this one those at x with these species. Collective.
+/// Of the particles that all ranks have together, this one its share. Collective.
 template <int D>
 Vicinity<D> vicinity(const Box<D>& box, const Sizes& sizes, Exchange& ranks, const Particles<D>& share) {
   struct Copy {
