@@ -164,15 +164,21 @@ struct TrajectoryWriter<D>::Contents {
       return;
     }
     std::size_t first = 0;
-    one_after_the_other(
-        *ranks, [&] { return told(p.x, p.v, p.image); },
-        [&](int /*rank*/, const Bytes& message) {
-          const std::size_t n = message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>));
-          Reader reader(message);
-          const auto x = next<Vec<D>>(reader, n), v = next<Vec<D>>(reader, n);
-          write_part(first, x, v, next<Image<D>>(reader, n));
-          first += n;
-        });
+    try {
+      one_after_the_other(
+          *ranks, [&] { return told(p.x, p.v, p.image); },
+          [&](int /*rank*/, const Bytes& message) {
+            const std::size_t n = message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>));
+            Reader reader(message);
+            const auto x = next<Vec<D>>(reader, n), v = next<Vec<D>>(reader, n);
+            write_part(first, x, v, next<Image<D>>(reader, n));
+            first += n;
+          });
+    } catch (...) {  // a rank is lost: there is no such frame
+      for (auto* element : {&position, &velocity}) element->value.drop_row();
+      image.value.drop_row();
+      throw;
+    }
   }
   void write_part(std::size_t first, std::span<const Vec<D>> x, std::span<const Vec<D>> v,
                   std::span<const Image<D>> images) {
@@ -209,6 +215,7 @@ template <int D>
 void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   Contents& c = *contents_;
   c.file.reserve(c.frame_bytes());
+  c.write_particles(*s.particles);
   c.edges.value.append(c.edge_rows);
   c.momentum.value.append(three_columns<double>(std::array{s.momentum}, D));
   c.collisions.value.append(s.collisions);
@@ -218,7 +225,6 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
       {"pressure", s.pressure}};
   for (const auto& [name, value] : scalars) c.observables.at(name).value.append(value);
   c.time.append(s.time);
-  c.write_particles(*s.particles);
   c.file.flush();
   // The frames there are, are those that have a step: to MDAnalysis a missing step is the end of the file, and a
   // missing position an error. So the step goes in when all else is safe; a kill in between leaves rows nobody looks

@@ -11,7 +11,7 @@
 // `time` explicit and shared by hard links, texts of fixed length, observables without subgroups. Units are reduced:
 // there are no `unit` attributes, so readers must be told not to convert. Positions are wrapped; unwrapped position =
 // position + image · edge. Every frame is flushed: it
-// survives the end of the process; positions go in last, and their number is the number of whole frames.
+// survives the end of the process; steps go in last, and their number is the number of whole frames.
 //
 // Where ranks have shares of the particles (engine/shares.h) rank 0 writes one after the other, as a piece of the same
 // row: it never has more than one of them. The others have a ShareTeller each.

@@ -126,6 +126,7 @@ class SeriesBase {
              std::vector<hsize_t> row_shape);
   void append(hid_t type, const void* data, std::size_t elements);
   void append_row();
+  void drop_row();
   void write_part(hid_t type, const void* data, std::size_t first, std::size_t elements);
 
  private:
@@ -148,8 +149,10 @@ class Series : public SeriesBase {
   /// `values`: whole rows, the last axis fastest.
   void append(std::span<const T> values) { SeriesBase::append(native_type<T>(), values.data(), values.size()); }
   void append(T value) { SeriesBase::append(native_type<T>(), &value, 1); }
-  /// The same in parts: a row of nothing yet, and what stands in it from place `first` of its first axis on.
+  /// The same in parts: a row of nothing yet, and what stands in it from place `first` of its first axis on; or the row
+  /// is taken back.
   using SeriesBase::append_row;
+  using SeriesBase::drop_row;
   void write_part(std::size_t first, std::span<const T> values) {
     SeriesBase::write_part(native_type<T>(), values.data(), first, values.size());
   }

@@ -67,6 +67,11 @@ void SeriesBase::append(hid_t type, const void* data, std::size_t elements) {
 
 void SeriesBase::append_row() { extend(1); }
 
+void SeriesBase::drop_row() {
+  --rows_;
+  extend(0);
+}
+
 void SeriesBase::write_part(hid_t type, const void* data, std::size_t first, std::size_t elements) {
   if (elements == 0) return;
   std::vector<hsize_t> start(shape_.size(), 0), count = shape_;

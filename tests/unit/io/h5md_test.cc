@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "engine/error.h"
 #include "io/hdf5.h"
 #include "sample_run.h"
 
@@ -93,6 +94,34 @@ TYPED_TEST(Trajectory, IsReadableAfterEveryFrame) {
     EXPECT_EQ(all_numbers(file, "/particles/trajectory/position/time").back(), f);
     EXPECT_EQ(all_numbers(file, "/particles/trajectory/position/value").back(), D == 3 ? 2.5 : 0.0);
   }
+}
+
+/// Another rank that has nobody, and is lost in the middle of the second frame.
+TEST(TrajectoryFile, HasNoPartOfAFrameInWhichARankIsLost) {
+  struct Lost : Exchange {
+    int calls = 0;
+    int size() const override { return 2; }
+    std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
+      if (++calls == 6) throw Error(Failure::numerical, "a rank is lost");  // two when the file is made, two a frame
+      return {outgoing[0], {}};
+    }
+  } ranks;
+  const auto path = fresh_directory() / "t.h5md";
+  const auto system = test::sample_system<3>();
+  system->ranks = &ranks;
+  system->sizes.emplace(system->particles);
+  system->particles.id = {0, 1, 2};
+  TrajectoryWriter<3> writer(path, test::sample_deck(3), *system);
+  writer.frame(test::sample_snapshot<3>(system->particles, 0.0, 0));
+  EXPECT_THROW(writer.frame(test::sample_snapshot<3>(system->particles, 0.5, 1)), Error);
+  writer.close();
+  const hdf5::File file = hdf5::File::open(path);
+  for (const char* name : {"particles/trajectory/position/value", "particles/trajectory/velocity/value",
+                           "particles/trajectory/image/value", "particles/trajectory/position/step",
+                           "particles/trajectory/position/time", "observables/momentum/value"})
+    EXPECT_EQ(hdf5::shape(file, name).at(0), 1u) << name;
+  EXPECT_EQ(all_numbers(file, "particles/trajectory/position/value")[5], 1.5);
+  EXPECT_EQ(all_numbers(file, "particles/trajectory/mass")[2], 3.5);
 }
 
 TEST(TrajectoryFile, NamesTheFileThatCannotBeCreated) {
