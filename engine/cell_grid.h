@@ -51,8 +51,7 @@ class CellGrid {
       edge_[k] = length / count_[k];
       inverse_[k] = 1 / edge_[k];
     }
-    stride_[D - 1] = 1;
-    for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * static_cast<std::size_t>(count_[k]);
+    lay_out();
   }
 
   CellGrid(const Box<D>& box, double smallest, std::span<const Vec<D>> x)
@@ -61,9 +60,10 @@ class CellGrid {
                    return all;
                  })) {}
 
+  /// Of which something can be stored.
   std::size_t cells() const {
     std::size_t n = 1;
-    for (auto c : count_) n *= static_cast<std::size_t>(c);
+    for (int k = 0; k < D; ++k) n *= static_cast<std::size_t>(rows(k));
     return n;
   }
   int count(int axis) const { return count_[axis]; }
@@ -88,9 +88,44 @@ class CellGrid {
   /// Where an unwrapped cell is stored.
   std::size_t index(const Cell<D>& c) const {
     std::size_t at = 0;
-    for (int k = 0; k < D; ++k) at += stride_[k] * static_cast<std::size_t>(wrapped(k, c[k]));
+    for (int k = 0; k < D; ++k) at += stride_[k] * static_cast<std::size_t>(row(k, wrapped(k, c[k])));
     return at;
   }
+
+  /// Only cells that are, along each of the first `axes` axes, at most `margin` cells from one of these places are
+  /// stored each for itself. All others share places that must stay empty: see holds().
+  void confine(std::span<const Vec<D>> places, std::int32_t margin, int axes = D) {
+    for (int k = 0; k < axes; ++k) {
+      std::vector<std::int32_t>& row = row_[k];
+      row.assign(static_cast<std::size_t>(count_[k]), 0);
+      for (const Vec<D>& x : places) row[static_cast<std::size_t>(wrapped(k, cell(x)[k]))] = 1;
+      const std::vector<std::int32_t> inside = row;
+      for (std::int32_t c = 0; c < count_[k]; ++c)
+        for (std::int32_t m = -margin; m <= margin && inside[static_cast<std::size_t>(c)] != 0; ++m)
+          if (Step to; step(k, c + m, to)) row[static_cast<std::size_t>(wrapped(k, c + m))] = 1;
+      rows_[k] = 0;
+      for (std::int32_t& r : row) r = r != 0 ? rows_[k]++ : -1;
+      if (rows_[k] == count_[k]) row.clear();
+      if (!row.empty()) std::replace(row.begin(), row.end(), -1, rows_[k]);
+    }
+    lay_out();
+  }
+  /// Whether something may be stored in an unwrapped cell.
+  bool holds(const Cell<D>& c) const {
+    for (int k = 0; k < D; ++k)
+      if (!row_[k].empty() && row(k, wrapped(k, c[k])) == rows_[k]) return false;
+    return true;
+  }
+  /// Takes confine() back.
+  void spread() {
+    for (auto& row : row_) row.clear();
+    lay_out();
+  }
+  /// Where a cell of an axis, 0 … count - 1, is stored along it, and how many such rows there are.
+  std::int32_t row(int axis, std::int32_t c) const {
+    return row_[axis].empty() ? c : row_[axis][static_cast<std::size_t>(c)];
+  }
+  std::int32_t rows(int axis) const { return row_[axis].empty() ? count_[axis] : rows_[axis] + 1; }
 
   /// How many boxes an unwrapped cell number lies away.
   std::int32_t boxes(int axis, std::int32_t c) const {
@@ -109,13 +144,10 @@ class CellGrid {
   };
   /// The step to unwrapped cell number c; false where there is no such cell, beyond a wall or an open end.
   bool step(int axis, std::int32_t c, Step& to) const {
-    if (c >= 0 && c < count_[axis]) {
-      to = {stride_[axis] * static_cast<std::size_t>(c), 0};
-      return true;
-    }
-    if (!box_.periodic(axis)) return false;
+    const bool inside = c >= 0 && c < count_[axis];
+    if (!inside && !box_.periodic(axis)) return false;
     const std::int32_t w = wrapped(axis, c);
-    to = {stride_[axis] * static_cast<std::size_t>(w), (c - w) / count_[axis]};
+    to = {stride_[axis] * static_cast<std::size_t>(row(axis, w)), inside ? 0 : (c - w) / count_[axis]};
     return true;
   }
 
@@ -154,8 +186,15 @@ class CellGrid {
     return r < 0 ? r + count_[axis] : r;
   }
 
+  void lay_out() {
+    stride_[D - 1] = 1;
+    for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * static_cast<std::size_t>(rows(k));
+  }
+
   Box<D> box_;
   Cell<D> count_;
+  std::array<std::vector<std::int32_t>, D> row_;  // by axis and cell, where confined: else the cell's own number
+  Cell<D> rows_{};                                // so many hold something there; one more is empty
   std::array<std::size_t, D> stride_;
   Vec<D> origin_, edge_, inverse_;
 };

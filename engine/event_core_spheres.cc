@@ -132,7 +132,8 @@ void EventCore<D>::choose_search(double now) {
   tuning_.choose(situation, counts_);
   if (!tuning_.lists()) {
     lists_.reset();
-    cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, kernels_, tuning_.cell(), extent);
+    cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, kernels_, tuning_.cell(), extent, flights_.size());
+    if (flights_.size() < extent.particles) cells_->confine(flights_.places(now));
     for (Slot i = 0; i < flights_.size(); ++i) {
       agenda_[i].where.cell = cells_->place(flights_.at(i, now).x);
       cells_->insert(i, agenda_[i].where.cell);

@@ -50,6 +50,13 @@ class Flights {
 
   /// One radius where all are equal, else by slot; as they are at a time.
   std::vector<double> radii(double t) const;
+  /// Where everybody is at a time, by slot.
+  std::vector<Vec<D>> places(double t) const {
+    std::vector<Vec<D>> places;
+    places.reserve(size());
+    for (Slot i = 0; i < size(); ++i) places.push_back(at(i, t).x);
+    return places;
+  }
   /// Of the places at the records.
   Extent<D> extent() const;
   /// What the kernels of scan.h are to know.

@@ -20,31 +20,26 @@ class LinkedCells {
  public:
   using Place = CellPlace<D>;
 
-  /// Cells of edge at least `smallest`.
+  /// Cells of edge at least `smallest`, for spheres in so many slots.
   LinkedCells(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, double smallest,
-              const Extent<D>& extent)
+              const Extent<D>& extent, std::size_t slots)
       : packing_(packing),
         kernels_(kernels),
         grid_(box, smallest, extent, kCellsAParticle),
-        link_(extent.particles),
-        boxes_(extent.particles),
+        link_(slots),
+        boxes_(slots),
         here_(packing.pack(0, 0)) {
-    // A row along the last axis has a cell before it and one behind it, and rows are read by four.
-    std::ptrdiff_t cells = grid_.count(D - 1) + 2;
-    for (int k = D - 2; k >= 0; --k) {
-      stride_[k] = cells;
-      cells *= grid_.count(k);
-    }
-    first_.assign(static_cast<std::size_t>(cells + 3), kNobody);
     for (int k = 0; k < D; ++k) {
       one_[k] = 1 << (packing.field_bits * k);
       periodic_[k] = box.periodic(k);
-      if (k == D - 1) break;
-      for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
-        const std::int32_t count = grid_.count(k), boxes = c < 0 ? -1 : c < count ? 0 : 1;
-        steps_[k].push_back({stride_[k] * (c - boxes * count), shifted(boxes * one_[k])});
-      }
     }
+    lay_out();
+  }
+
+  /// Before anyone is in: most spheres will stay near these places, and memory for cells elsewhere is saved.
+  void confine(std::span<const Vec<D>> places) {
+    grid_.confine(places, kMargin, D - 1);
+    lay_out();
   }
 
   const CellGrid<D>& grid() const { return grid_; }
@@ -80,6 +75,7 @@ class LinkedCells {
     insert(i, place);
   }
   void insert(Slot i, const Place& place) {
+    if (confined_ && !grid_.holds(wrapped(place))) spread();
     std::uint32_t& first = first_[index(place)];
     link_[i] = first;
     boxes_[i] = place.boxes;
@@ -142,13 +138,57 @@ class LinkedCells {
  private:
   static constexpr std::uint32_t kMore = std::uint32_t{1} << 31;  ///< beside a sphere: another one is behind it
   static constexpr double kCellsAParticle = 8;
+  static constexpr std::int32_t kMargin = 3;  // cells, round those of a part
 
   std::uint32_t shifted(std::int32_t boxes) const { return static_cast<std::uint32_t>(boxes) << packing_.slot_bits; }
 
   std::size_t index(const Place& place) const {
     std::ptrdiff_t at = place.wrapped[D - 1] + 1;
-    for (int k = 0; k + 1 < D; ++k) at += stride_[k] * place.wrapped[k];
+    for (int k = 0; k + 1 < D; ++k) at += steps_[k][place.wrapped[k] + 1u].offset;
     return static_cast<std::size_t>(at);
+  }
+  static Cell<D> wrapped(const Place& place) {
+    Cell<D> cell;
+    for (int k = 0; k < D; ++k) cell[k] = place.wrapped[k];
+    return cell;
+  }
+
+  /// Makes empty cells. A row along the last axis has a cell before it and one behind it, and rows are read by four.
+  void lay_out() {
+    confined_ = false;
+    std::ptrdiff_t cells = grid_.count(D - 1) + 2;
+    for (int k = D - 2; k >= 0; --k) {
+      confined_ = confined_ || grid_.rows(k) != grid_.count(k);
+      steps_[k].clear();
+      for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
+        const std::int32_t count = grid_.count(k), boxes = c < 0 ? -1 : c < count ? 0 : 1;
+        steps_[k].push_back({cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k])});
+      }
+      cells *= grid_.rows(k);
+    }
+    first_.assign(static_cast<std::size_t>(cells + 3), kNobody);
+  }
+
+  /// Somebody has come to where nobody was expected: from now on there are cells everywhere.
+  void spread() {
+    const CellGrid<D> before = grid_;
+    const auto old_steps = steps_;
+    const PageVector<std::uint32_t> old_first = std::move(first_);
+    grid_.spread();
+    lay_out();
+    const auto start = [](const auto& steps, const Cell<D>& row) {
+      std::ptrdiff_t at = 0;
+      for (std::size_t k = 0; k + 1 < D; ++k) at += steps[k][static_cast<std::size_t>(row[k] + 1)].offset;
+      return at;
+    };
+    Cell<D> row{};
+    for (row[0] = 0; row[0] < grid_.count(0); ++row[0])
+      for (std::int32_t c = 0; c < (D == 3 ? grid_.count(1) : 1); ++c) {
+        if (D == 3) row[1] = c;
+        if (before.holds(row))
+          std::copy_n(old_first.begin() + start(old_steps, row), grid_.count(D - 1) + 2,
+                      first_.begin() + start(steps_, row));
+      }
   }
 
   /// The cells before and behind a periodic row are images of its ends.
@@ -202,7 +242,8 @@ class LinkedCells {
     const std::int32_t last = periodic_[axis] ? high[axis] : std::min(high[axis], count - 1);
     for (std::int32_t c = first; c <= last; ++c) {
       const std::int32_t boxes = grid_.boxes(axis, c), seen = away + boxes * one_[axis];
-      const std::ptrdiff_t cell = at + (axis < D - 1 ? stride_[axis] : 1) * (c - boxes * count);
+      const std::int32_t wrapped = c - boxes * count;
+      const std::ptrdiff_t cell = at + (axis < D - 1 ? steps_[axis][static_cast<std::size_t>(wrapped + 1)].offset : wrapped);
       if (axis < D - 1) {
         collect(low, high, found, axis + 1, cell, seen);
         continue;
@@ -246,10 +287,10 @@ class LinkedCells {
   Packing<D> packing_;
   const ScanKernels& kernels_;
   CellGrid<D> grid_;
-  std::ptrdiff_t stride_[D - 1];
-  std::vector<HeadStep> steps_[D - 1];  // to the cells −1 … count along each axis but the last
+  std::array<std::vector<HeadStep>, D - 1> steps_;  // to the cells −1 … count along each axis but the last
   std::int32_t one_[D];                 // a box along each axis, as a linear image
   bool periodic_[D];
+  bool confined_ = false;
   // Of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kNobody.
   PageVector<std::uint32_t> first_;
   PageVector<std::uint32_t> link_;  // by slot: who is behind it in its cell, as first_ has it

@@ -8,6 +8,7 @@ namespace {
 constexpr double kPlaces = 1024;  // to a cell, along each axis
 constexpr unsigned kSlack = 3;    // candidates that a new list has room for, beside those it has
 constexpr double kMembers = 4;    // of a cell, at least: fewer would waste its line
+constexpr std::int32_t kMargin = 2;  // cells, round those of a part
 
 template <int D>
 Vec<D> centre(const Agenda<D>& a) {
@@ -66,13 +67,12 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
     const double edge = std::max(reach, roomy);
     Level level{
         .grid = CellGrid<D>(box_, edge, extent), .largest_radius = largest, .lines = {}, .next = {}, .steps = {}};
-    level.lines.resize(level.grid.cells());
-    for (auto& line : level.lines) std::fill_n(line.slot, 8, kNobody);
-    level.next.assign(level.grid.cells(), kNobody);
+    if (n < extent.particles) level.grid.confine(flights.places(now), kMargin);
     levels_.push_back(std::move(level));
   }
   widest_ = 0;
-  for (Level& level : levels_) lay_steps(level, astray);
+  astray_ = astray;
+  for (Level& level : levels_) lay_out(level, astray);
   // 2. Everybody into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -91,9 +91,14 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
   }
 }
 
-/// Tabulates the steps to all cells that the spheres of a level can be seen from.
+/// Makes empty cells, and tabulates the steps to all that the spheres of a level can be seen from.
 template <int D>
-void SkinLists<D>::lay_steps(Level& level, double astray) {
+void SkinLists<D>::lay_out(Level& level, double astray) {
+  level.lines.resize(level.grid.cells());
+  for (auto& line : level.lines) std::fill_n(line.slot, 8, kNobody);
+  level.next.assign(level.grid.cells(), kNobody);
+  level.free = kNobody;
+  level.steps = {};
   for (int k = 0; k < D; ++k) {
     const double places = most_places(levels_[0].largest_radius, level, astray);
     level.margin = std::max(level.margin, static_cast<std::int32_t>(std::ceil(places / level.grid.edge(k))));
@@ -131,6 +136,7 @@ void SkinLists<D>::insert(Slot i, const Vec<D>& x) {
   Level& level = levels_[level_of(i)];
   Place place;
   const Cell<D> cell = locate(level, x, place);
+  if (!level.grid.holds(cell)) spread(level);
   const Image<D> boxes = level.grid.boxes(cell);
   boxes_[i] = packing_.linear(boxes);
   for (const std::int32_t b : boxes) widest_ = std::max(widest_, std::abs(b));
@@ -160,6 +166,19 @@ void SkinLists<D>::insert(Slot i, const Vec<D>& x) {
     }
     line = level.next[line];
   }
+}
+
+/// Somebody has come to where nobody was expected: from now on there are cells everywhere.
+template <int D>
+void SkinLists<D>::spread(Level& level) {
+  std::vector<Slot> members;
+  for (const CellLine& line : level.lines)
+    for (const Slot i : line.slot)
+      if (i != kNobody) members.push_back(i);
+  level.grid.spread();
+  level.lines.clear();
+  lay_out(level, astray_);
+  for (const Slot i : members) insert(i, centre(agenda_[i]));
 }
 
 template <int D>

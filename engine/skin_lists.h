@@ -64,7 +64,8 @@ class SkinLists {
   static std::uint8_t octave(double largest, double radius);
   std::size_t level_of(Slot i) const { return equal_ ? 0 : level_[i]; }
   double radius(Slot i) const { return radius_[equal_ ? 0 : i]; }
-  void lay_steps(Level& level, double astray);
+  void lay_out(Level& level, double astray);
+  void spread(Level& level);
   double most_places(double radius, const Level& level, double astray) const;
   Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
   void insert(Slot i, const Vec<D>& x);
@@ -87,7 +88,7 @@ class SkinLists {
   const unsigned lanes_;  // lists start and end at multiples of so many candidates
   std::span<const double> radius_;
   bool equal_;
-  double largest_, skin_;
+  double largest_, skin_, astray_ = 0;
   PageVector<Agenda<D>>& agenda_;
   std::vector<Level> levels_;
   std::vector<std::uint8_t> level_;                 // by slot; empty where all are equal
