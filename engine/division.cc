@@ -211,9 +211,8 @@ double Division<D>::gap(int axis, double low, double high, double other_low, dou
 template <int D>
 std::vector<std::uint32_t> Division<D>::neighbours_of(std::uint32_t region) const {
   std::vector<std::uint32_t> near;
-  const Part& a = parts_[region];
   for (std::uint32_t r = 0; r < parts_.size(); ++r) {
-    const Part& b = parts_[r];
+    const Part &a = parts_[std::min(r, region)], &b = parts_[std::max(r, region)];  // the same for both
     double sum = 0;
     for (int k = 0; k < D; ++k) {
       const double d = gap(k, a.low[k], a.high[k], b.low[k], b.high[k]);

@@ -56,6 +56,7 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
   for (std::uint32_t r = 0; r < regions_; ++r)
     if (division_->neighbours(r).size() > 64)
       throw Error(Failure::deck, "a region has more than 64 neighbours; use fewer ranks for this box");
+  find_partners();
   load(0, [&](auto&& tell) {
     for (Id i = 0; i < particles.size(); ++i)
       tell(Record<D>{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]});
@@ -81,6 +82,40 @@ double Domains<D>::first_pace(const Particles<D>& particles) const {
   extent.particles = sizes_.spheres;
   const double thermal = std::sqrt(sum_of_all(exchange_, squares).value() / static_cast<double>(D * sizes_.spheres));
   return kCollisions / (contacts_a_length(situation_of<D>(box_, sizes_.radius, extent, sizes_.number)) * thermal);
+}
+
+template <int D>
+void Domains<D>::find_partners() {
+  partners_.clear();
+  for (std::size_t q = first_region(exchange_.rank()); q < first_region(exchange_.rank() + 1); ++q)
+    for (const std::uint32_t r : division_->neighbours(static_cast<std::uint32_t>(q)))
+      if (rank_of(r) != exchange_.rank()) partners_.push_back(rank_of(r));
+  std::sort(partners_.begin(), partners_.end());
+  partners_.erase(std::unique(partners_.begin(), partners_.end()), partners_.end());
+  letters_.assign(partners_.size() + 1, {});
+}
+
+/// What is going to be sent to a region that is a neighbour of one here.
+template <int D>
+Bytes& Domains<D>::letter_to(std::uint32_t region) {
+  const int rank = rank_of(region);
+  Bytes& letter = rank == exchange_.rank()
+                      ? letters_.back()
+                      : letters_[static_cast<std::size_t>(std::lower_bound(partners_.begin(), partners_.end(), rank) -
+                                                          partners_.begin())];
+  put(letter, region);
+  return letter;
+}
+
+/// Sends all letters; returns those that have come.
+template <int D>
+std::vector<Bytes> Domains<D>::post() {
+  Bytes here = std::move(letters_.back());
+  letters_.pop_back();
+  std::vector<Bytes> mail = exchange_.swap(std::move(letters_), partners_);
+  mail.push_back(std::move(here));
+  letters_.assign(partners_.size() + 1, {});
+  return mail;
 }
 
 /// Where a sphere is, as Flights has it, bit for bit.
@@ -136,17 +171,13 @@ void Domains<D>::reload() {
 template <int D>
 void Domains<D>::sort_out(bool loaded) {
   sorted_ = true;
-  std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
   for (const Local& region : local_)
     region->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
-      if (loaded) return;
-      const std::uint32_t to = division_->neighbours(region->number())[neighbour];
-      put(outgoing[static_cast<std::size_t>(rank_of(to))], to);
-      put(outgoing[static_cast<std::size_t>(rank_of(to))], record);
+      if (!loaded) put(letter_to(division_->neighbours(region->number())[neighbour]), record);
     });
   if (loaded) return;
   double full = 0;
-  for (const Bytes& bytes : exchange_.swap(std::move(outgoing)))
+  for (const Bytes& bytes : post())
     for (Reader reader(bytes); reader.more();) {
       const auto number = reader.get<std::uint32_t>();
       const auto record = reader.get<Record<D>>();
@@ -218,9 +249,8 @@ void Domains<D>::agree() {
   mail_.clear();
   for (double more = 1; more > 0;) {
     ++counts_.rounds;
-    std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
-    send_paths(outgoing);
-    for (const Bytes& bytes : mail_.emplace_back(exchange_.swap(std::move(outgoing))))
+    send_paths();
+    for (const Bytes& bytes : mail_.emplace_back(post()))
       for (Reader reader(bytes); reader.more();) {
         const auto number = reader.get<std::uint32_t>();
         const auto id = reader.get<Id>();
@@ -236,14 +266,12 @@ void Domains<D>::agree() {
 }
 
 template <int D>
-void Domains<D>::send_paths(std::vector<Bytes>& outgoing) const {
+void Domains<D>::send_paths() {
   for (const Local& region : local_) {
     const auto neighbours = division_->neighbours(region->number());
     for (const Slot i : region->changed())
       for (std::uint64_t holders = region->holders(i); holders != 0; holders &= holders - 1) {
-        const std::uint32_t to = neighbours[static_cast<std::size_t>(std::countr_zero(holders))];
-        Bytes& bytes = outgoing[static_cast<std::size_t>(rank_of(to))];
-        put(bytes, to);
+        Bytes& bytes = letter_to(neighbours[static_cast<std::size_t>(std::countr_zero(holders))]);
         put(bytes, region->flights()[i].id);
         region->write_path(i, bytes);
       }

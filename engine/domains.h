@@ -58,7 +58,10 @@ class Domains {
   double first_pace(const Particles<D>& particles) const;
   void sort_out(bool loaded);
   void agree();
-  void send_paths(std::vector<Bytes>& outgoing) const;
+  void find_partners();
+  Bytes& letter_to(std::uint32_t region);
+  std::vector<Bytes> post();
+  void send_paths();
   double window_end(double end);
   double first_astray(double end);
   double cut_at(double time);
@@ -76,6 +79,8 @@ class Domains {
   std::function<double()> forced_window_;
   std::optional<Division<D>> division_;
   std::vector<Local> local_;              // the regions of this rank
+  std::vector<int> partners_;             // ranks that have neighbours of these, ascending
+  std::vector<Bytes> letters_;            // to each partner, and to the regions here
   std::vector<std::vector<Bytes>> mail_;  // of the window: paths that were sent here
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;

@@ -54,6 +54,9 @@ class Exchange {
   /// Sends outgoing[r] to rank r and returns what each rank has sent here, by rank. Nothing goes where there is nothing
   /// to say.
   virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing) { return outgoing; }
+  /// The same among neighbours: outgoing[k] goes to partners[k], who has this rank among its own partners; returns what
+  /// they have sent, in their order. Others are not waited for.
+  virtual std::vector<Bytes> swap(std::vector<Bytes> /*outgoing*/, std::span<const int> /*partners*/) { return {}; }
   /// What every rank has to say, by rank.
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
   /// Makes each value the largest among all ranks.
@@ -103,6 +106,10 @@ class TimedExchange final : public Exchange {
   std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
     const Stopwatch watch(seconds_);
     return ranks_.swap(std::move(outgoing));
+  }
+  std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override {
+    const Stopwatch watch(seconds_);
+    return ranks_.swap(std::move(outgoing), partners);
   }
   std::vector<Bytes> gather(const Bytes& mine) override {
     const Stopwatch watch(seconds_);

@@ -9,7 +9,8 @@ namespace carom {
 namespace {
 
 constexpr std::size_t kPiece = std::size_t{1} << 30;  // bytes of one message, at most
-enum Tag : int { data, fold, step };
+constexpr std::size_t kFirst = std::size_t{1} << 15;  // bytes that go with the first message among neighbours
+enum Tag : int { data, fold, step, first };
 
 int bytes(std::size_t count) { return static_cast<int>(count); }
 
@@ -97,6 +98,47 @@ std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing) {
   incoming[self] = std::move(outgoing_[self]);
   outgoing_.clear();
   return incoming;
+}
+
+/// The first message to a neighbour tells how much there is, and has as much of it as goes in; few need a second one.
+std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing, std::span<const int> partners) {
+  ranks_.watch().begin_call();
+  outgoing_ = std::move(outgoing);
+  incoming_.assign(partners.size(), {});
+  first_in_.resize(partners.size());
+  first_out_.resize(partners.size());
+  std::vector<MPI_Request> requests;
+  requests.reserve(2 * partners.size());
+  const auto next = [&] { return &requests.emplace_back(MPI_REQUEST_NULL); };
+  for (std::size_t k = 0; k < partners.size(); ++k) {
+    const Bytes& all = outgoing_[k];
+    Bytes &in = first_in_[k], &out = first_out_[k];
+    out.clear();
+    put(out, std::uint64_t{all.size()});
+    out.insert(out.end(), all.begin(), all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size(), kFirst)));
+    in.resize(sizeof(std::uint64_t) + kFirst);
+    MPI_Irecv(in.data(), bytes(in.size()), MPI_BYTE, partners[k], first, ranks_.handle(), next());
+    MPI_Isend(out.data(), bytes(out.size()), MPI_BYTE, partners[k], first, ranks_.handle(), next());
+  }
+  ranks_.watch().wait(requests);
+  requests.clear();
+  for (std::size_t k = 0; k < partners.size(); ++k) {
+    Reader reader(first_in_[k]);
+    Bytes &in = incoming_[k], &out = outgoing_[k];
+    in.resize(reader.get<std::uint64_t>());
+    if (!in.empty()) std::memcpy(in.data(), reader.skip(0), std::min(in.size(), kFirst));
+    if (in.size() > kFirst)
+      in_pieces(in.size() - kFirst, [&](std::size_t at, int count) {
+        MPI_Irecv(in.data() + kFirst + at, count, MPI_BYTE, partners[k], data, ranks_.handle(), next());
+      });
+    if (out.size() > kFirst)
+      in_pieces(out.size() - kFirst, [&](std::size_t at, int count) {
+        MPI_Isend(out.data() + kFirst + at, count, MPI_BYTE, partners[k], data, ranks_.handle(), next());
+      });
+  }
+  if (!requests.empty()) ranks_.watch().wait(requests);
+  outgoing_.clear();
+  return std::move(incoming_);
 }
 
 std::vector<Bytes> MpiExchange::gather(const Bytes& mine) {

@@ -18,6 +18,7 @@ class MpiExchange : public Exchange {
   int rank() const override { return ranks_.rank(); }
   int size() const override { return ranks_.size(); }
   std::vector<Bytes> swap(std::vector<Bytes> outgoing) override;
+  std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override;
   std::vector<Bytes> gather(const Bytes& mine) override;
   void largest(std::span<double> values) override;
   void sum(std::span<std::uint64_t> values) override;
@@ -31,6 +32,7 @@ class MpiExchange : public Exchange {
   // Where messages arrive; what leaves in swap().
   std::vector<std::uint64_t> leaving_, coming_;
   std::vector<Bytes> incoming_, outgoing_;
+  std::vector<Bytes> first_in_, first_out_;  // the first messages among neighbours
   Bytes theirs_;
 };
 

@@ -75,6 +75,17 @@ void check_calls(MpiExchange& ranks) {
       require(incoming[static_cast<std::size_t>(r)] ==
                   (says(r, rank) ? filled(length + static_cast<std::size_t>(rank), r, rank) : Bytes{}),
               "swap");
+    // In a ring, where with two ranks both neighbours are one, and with one there are none.
+    std::vector<int> partners;
+    for (const int r : {(rank + 1) % size, (rank + size - 1) % size})
+      if (r != rank && std::find(partners.begin(), partners.end(), r) == partners.end()) partners.push_back(r);
+    std::vector<Bytes> letters;
+    for (const int r : partners) letters.push_back(filled(says(rank, r) ? length : length / 7, rank, r));
+    const auto mail = ranks.swap(std::move(letters), partners);
+    require(mail.size() == partners.size(), "number of letters");
+    for (std::size_t k = 0; k < partners.size(); ++k)
+      require(mail[k] == filled(says(partners[k], rank) ? length : length / 7, partners[k], rank),
+              "swap of neighbours");
     const auto all = ranks.gather(filled(length * static_cast<std::size_t>(rank), rank, 0));
     for (int r = 0; r < size; ++r)
       require(all[static_cast<std::size_t>(r)] == filled(length * static_cast<std::size_t>(r), r, 0), "gather");
@@ -112,6 +123,10 @@ void measure(MpiExchange& ranks, MPI_Comm world) {
   show("swap, nothing", [&] { ranks.swap(nothing); });
   const std::vector<Bytes> some(static_cast<std::size_t>(ranks.size()), Bytes(1000));
   show("swap, 1000 bytes each", [&] { ranks.swap(some); });
+  const int other = ranks.rank() ^ 1;  // the last of an odd number is alone
+  const std::vector<int> partners(other < ranks.size() ? 1 : 0, other);
+  const std::vector<Bytes> letters(partners.size(), Bytes(1000));
+  show("swap in pairs, 1000 bytes", [&] { ranks.swap(letters, partners); });
 }
 
 int all(const std::string& what, MpiExchange& ranks, MPI_Comm world) {

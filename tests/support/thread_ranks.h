@@ -48,6 +48,14 @@ class ThreadRanks {
       team_.meet(rank_);
       return incoming;
     }
+    std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override {
+      std::vector<Bytes> to(team_.post_.size()), incoming;
+      for (std::size_t k = 0; k < partners.size(); ++k)
+        to[static_cast<std::size_t>(partners[k])] = std::move(outgoing[k]);
+      std::vector<Bytes> from = swap(std::move(to));
+      for (const int partner : partners) incoming.push_back(std::move(from[static_cast<std::size_t>(partner)]));
+      return incoming;
+    }
     std::vector<Bytes> gather(const Bytes& mine) override { return swap(std::vector<Bytes>(team_.post_.size(), mine)); }
     void largest(std::span<double> values) override {
       combine(values, [](double a, double b) { return std::max(a, b); });
