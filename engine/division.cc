@@ -21,9 +21,13 @@ double from_ordered(std::uint64_t key) {
 
 /// One of several sorted sequences that all ranks have parts of, and which element of it is asked for.
 struct Rank {
-  std::vector<std::uint64_t> keys;  // of this rank; in the end those that are left
-  std::uint64_t number;             // from 0, less than there are; none are asked for where there is nobody
-  std::uint64_t found = 0;          // the bits known so far
+  struct Element {
+    std::uint64_t key;
+    std::uint32_t weight;  // it stands there so many times
+  };
+  std::vector<Element> elements;  // of this rank; in the end those that are left
+  std::uint64_t number;           // from 0, less than there are; none are asked for where there is nobody
+  std::uint64_t found = 0;        // the bits known so far
 };
 
 /// Finds the elements asked for, digit by digit from the highest, by counting: all ranks find the same.
@@ -34,19 +38,25 @@ void select(std::span<Rank> wanted, Exchange& ranks) {
   for (int shift = 64 - kBits; shift >= 0; shift -= kBits) {
     std::ranges::fill(counts, 0);
     for (std::size_t w = 0; w < wanted.size(); ++w)
-      for (const std::uint64_t key : wanted[w].keys) ++counts[w * kDigits + (key >> shift) % kDigits];
+      for (const auto& [key, weight] : wanted[w].elements) counts[w * kDigits + (key >> shift) % kDigits] += weight;
     ranks.sum(counts);
     for (std::size_t w = 0; w < wanted.size(); ++w) {
       std::uint64_t digit = 0;
       for (const std::uint64_t* count = &counts[w * kDigits]; digit + 1 < kDigits && wanted[w].number >= count[digit];)
         wanted[w].number -= count[digit++];
       wanted[w].found |= digit << shift;
-      std::erase_if(wanted[w].keys, [&](std::uint64_t key) { return (key >> shift) % kDigits != digit; });
+      std::erase_if(wanted[w].elements, [&](const auto& element) { return (element.key >> shift) % kDigits != digit; });
     }
   }
 }
 
 }  // namespace
+
+template <int D>
+struct Division<D>::Sphere {
+  Vec<D> x;
+  std::uint32_t work;
+};
 
 /// What is still to be cut, into so many regions from `first` on.
 template <int D>
@@ -54,17 +64,18 @@ struct Division<D>::Piece {
   Part part;
   std::uint32_t first;
   std::size_t regions;
-  std::span<Vec<D>> x;              // of this rank's spheres
+  std::span<Sphere> spheres;        // of this rank
   std::int32_t above_cut = kNoCut;  // that it is a side of
   bool upper = false;
 };
 
 template <int D>
-Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks)
+Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks,
+                      std::span<const std::uint32_t> work)
     : box_(box), reach_(reach), parts_(std::max<std::size_t>(regions, 1)) {
-  std::vector<Vec<D>> places(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) places[i] = wrapped(x[i]);
-  Piece all{.part = {}, .first = 0, .regions = parts_.size(), .x = places};
+  std::vector<Sphere> spheres(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) spheres[i] = {wrapped(x[i]), work.empty() ? 1 : work[i]};
+  Piece all{.part = {}, .first = 0, .regions = parts_.size(), .spheres = spheres};
   for (int k = 0; k < D; ++k) {
     all.part.low[k] = box.periodic(k) ? 0 : -kInfinite;
     all.part.high[k] = box.periodic(k) ? box.edges[k] : kInfinite;
@@ -102,17 +113,20 @@ void Division<D>::settle(Piece piece, std::vector<Piece>& pieces) {
 /// Cuts pieces across their longest edges, all at once; returns what is to be cut further.
 template <int D>
 auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::vector<Piece> {
-  // Where the spheres of each are, for edges that are not those of the box; and how many.
+  // Where the spheres of each are, for edges that are not those of the box; and their work.
   std::vector<double> bounds;  // largest of −x, and of x
-  std::vector<std::uint64_t> spheres;
+  std::vector<std::uint64_t> work;
   for (const Piece& piece : pieces) {
     Vec<D> low = box_.edges, high = Vec<D>::Zero();
-    for (const Vec<D>& place : piece.x) low = low.cwiseMin(place).eval(), high = high.cwiseMax(place).eval();
+    std::uint64_t& sum = work.emplace_back(0);
+    for (const Sphere& sphere : piece.spheres) {
+      low = low.cwiseMin(sphere.x).eval(), high = high.cwiseMax(sphere.x).eval();
+      sum += sphere.work;
+    }
     for (int k = 0; k < D; ++k) bounds.push_back(-low[k]), bounds.push_back(high[k]);
-    spheres.push_back(piece.x.size());
   }
   ranks.largest(bounds);
-  ranks.sum(spheres);
+  ranks.sum(work);
 
   std::vector<Rank> wanted;
   for (std::size_t p = 0; p < pieces.size(); ++p) {
@@ -128,8 +142,8 @@ auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::ve
     const double share = static_cast<double>(below) / static_cast<double>(piece.regions);
     cuts_.push_back({axis, low[axis] + (high[axis] - low[axis]) * share, 0, 0});
     Rank& rank = wanted.emplace_back();
-    rank.number = spheres[p] * below / piece.regions;
-    for (const Vec<D>& place : piece.x) rank.keys.push_back(ordered(place[axis]));
+    rank.number = work[p] / piece.regions * below + work[p] % piece.regions * below / piece.regions;
+    for (const Sphere& sphere : piece.spheres) rank.elements.push_back({ordered(sphere.x[axis]), sphere.work});
   }
   select(wanted, ranks);
 
@@ -137,8 +151,8 @@ auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::ve
   const std::size_t first = cuts_.size() - pieces.size();
   std::vector<double> layer_below(pieces.size(), -kInfinite);
   for (std::size_t p = 0; p < pieces.size(); ++p)
-    for (const Vec<D>& place : pieces[p].x)
-      if (const double at = place[cuts_[first + p].axis]; at < from_ordered(wanted[p].found))
+    for (const Sphere& sphere : pieces[p].spheres)
+      if (const double at = sphere.x[cuts_[first + p].axis]; at < from_ordered(wanted[p].found))
         layer_below[p] = std::max(layer_below[p], at);
   ranks.largest(layer_below);
 
@@ -147,16 +161,16 @@ auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::ve
     const Piece& piece = pieces[p];
     Cut& cut = cuts_[first + p];
     const double layer = from_ordered(wanted[p].found);
-    if (spheres[p] > 0) cut.at = std::isfinite(layer_below[p]) ? 0.5 * (layer_below[p] + layer) : layer;
-    const auto middle =
-        std::partition(piece.x.begin(), piece.x.end(), [&](const Vec<D>& place) { return place[cut.axis] < cut.at; });
+    if (work[p] > 0) cut.at = std::isfinite(layer_below[p]) ? 0.5 * (layer_below[p] + layer) : layer;
+    const auto middle = std::partition(piece.spheres.begin(), piece.spheres.end(),
+                                       [&](const Sphere& sphere) { return sphere.x[cut.axis] < cut.at; });
     const auto number = static_cast<std::int32_t>(first + p);
     const std::size_t below = piece.regions / 2;
-    Piece lower{piece.part, piece.first, below, {piece.x.begin(), middle}, number, false};
+    Piece lower{piece.part, piece.first, below, {piece.spheres.begin(), middle}, number, false};
     Piece upper{piece.part,
                 piece.first + static_cast<std::uint32_t>(below),
                 piece.regions - below,
-                {middle, piece.x.end()},
+                {middle, piece.spheres.end()},
                 number,
                 true};
     lower.part.high[cut.axis] = upper.part.low[cut.axis] = cut.at;

@@ -1,8 +1,8 @@
 #pragma once
-// How the box is divided among regions: by recursive bisection, so that each has about as many spheres.
+// How the box is divided among regions: by recursive bisection, so that each has about as much work.
 //
 // Which region owns a sphere never reaches the physics; all that matters is that everybody computes the same: cuts come
-// from whole numbers of spheres, whichever rank has them.
+// from sums of whole numbers, whichever rank has which spheres.
 
 #include <algorithm>
 #include <limits>
@@ -17,9 +17,11 @@ namespace carom {
 template <int D>
 class Division {
  public:
-  /// Regions for the spheres of all ranks, of which this one has those at x. Places that are nearer to a region than
-  /// `reach` concern it. Collective; the cuts are the same whoever has whom.
-  Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks);
+  /// Regions for the spheres of all ranks, of which this one has those at x; so that each has about as much `work`, of
+  /// each sphere (empty: the same). Places that are nearer to a region than `reach` concern it. Collective; the cuts
+  /// are the same whoever has whom.
+  Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks,
+           std::span<const std::uint32_t> work = {});
 
   std::size_t regions() const { return parts_.size(); }
   double reach() const { return reach_; }
@@ -89,6 +91,7 @@ class Division {
     std::int32_t below, above;  // a further cut, or ~region
   };
 
+  struct Sphere;
   struct Piece;
   static constexpr std::int32_t kNoCut = -1;
 

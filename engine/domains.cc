@@ -11,20 +11,29 @@ namespace {
 constexpr double kCollisions = 0.3;                           // of a sphere in a window, about
 constexpr double kLargestStray = 1.0, kSmallestStray = 0.02;  // in diameters
 constexpr std::size_t kFewest = 8;                            // spheres a region
+constexpr std::size_t kMostNeighbours = 64;                   // of a region: the bits of Region::holders()
+constexpr double kUsualWork = 64, kMostWork = 64 * 64;        // in whole numbers
+constexpr double kUneven = 0.1;                               // what differs less from the usual counts as usual
 
 }  // namespace
 
 template <int D>
 Domains<D>::Domains(const Box<D>& box, Sizes sizes, Exchange& exchange, std::size_t regions,
                     const SearchOptions& options, std::function<double()> window)
-    : box_(box),
-      sizes_(std::move(sizes)),
-      exchange_(exchange),
-      regions_(std::clamp<std::size_t>(regions, 1, std::max<std::size_t>(sizes_.spheres / kFewest, 1))),
-      forced_window_(std::move(window)) {
+    : box_(box), sizes_(std::move(sizes)), exchange_(exchange), options_(options), forced_window_(std::move(window)) {
   diameter_ = 2 * sizes_.largest_radius();
+  make_regions(std::clamp<std::size_t>(regions, 1, std::max<std::size_t>(sizes_.spheres / kFewest, 1)));
+}
+
+template <int D>
+void Domains<D>::make_regions(std::size_t regions) {
+  event_counts_ = counts();
+  counts_ = domain_counts();
+  regions_ = regions;
+  counts_.regions = regions;
+  local_.clear();
   for (std::size_t r = first_region(exchange_.rank()); r < first_region(exchange_.rank() + 1); ++r)
-    local_.push_back(std::make_unique<Region<D>>(box, sizes_, options));
+    local_.push_back(std::make_unique<Region<D>>(box_, sizes_, options_));
 }
 
 /// Regions go to ranks in their order, as evenly as may be.
@@ -52,10 +61,15 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
   if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(particles);
   fastest_ = kFaster * fastest_ + g_.norm() * horizon_;
   stray_ = std::clamp(1.05 * pace_ * fastest_, kSmallestStray * diameter_, kLargestStray * diameter_);
-  division_.emplace(box_, particles.x, regions_, diameter_ + 2 * stray_, exchange_);
-  for (std::uint32_t r = 0; r < regions_; ++r)
-    if (division_->neighbours(r).size() > 64)
-      throw Error(Failure::deck, "a region has more than 64 neighbours; use fewer ranks for this box");
+  const auto divide = [&](std::size_t regions) {
+    division_.emplace(box_, particles.x, regions, diameter_ + 2 * stray_, exchange_, work_);
+    for (std::uint32_t r = 0; r < regions; ++r)
+      if (division_->neighbours(r).size() > kMostNeighbours) return false;
+    return true;
+  };
+  std::size_t regions = regions_;
+  while (!divide(regions)) regions -= (regions + 7) / 8;  // the box is too small for so many
+  if (regions < regions_) make_regions(regions);
   find_partners();
   load(0, [&](auto&& tell) {
     for (Id i = 0; i < particles.size(); ++i)
@@ -63,6 +77,8 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
+  run_before_.clear();
+  for (const Local& region : local_) run_before_.push_back(region->run_events());
 }
 
 /// The time in which a sphere collides kCollisions times, by Enskog's theory.
@@ -280,36 +296,67 @@ void Domains<D>::send_paths() {
 
 template <int D>
 void Domains<D>::fly_to(double time, Particles<D>& copies) const {
+  collect(time, copies, nullptr);
+}
+
+template <int D>
+void Domains<D>::give_back(double time, Particles<D>& particles) {
+  measure_work();
+  collect(time, particles, &work_);
+}
+
+/// So that the next division gives less to regions whose spheres have more to do.
+template <int D>
+void Domains<D>::measure_work() {
+  std::vector<std::uint64_t> events, spheres;
+  std::array<std::uint64_t, 2> all{};
+  for (std::size_t k = 0; k < local_.size(); ++k) {
+    events.push_back(local_[k]->run_events() - run_before_[k]);
+    spheres.push_back(local_[k]->own().size());
+    all[0] += events[k];
+    all[1] += spheres[k];
+  }
+  exchange_.sum(all);
+  region_work_.clear();
+  for (std::size_t k = 0; k < local_.size(); ++k) {
+    const double expected = static_cast<double>(all[0]) / static_cast<double>(all[1]) * static_cast<double>(spheres[k]);
+    double work = expected > 0 ? static_cast<double>(events[k]) / expected : 1;
+    if (std::abs(work - 1) < kUneven) work = 1;
+    region_work_.push_back(static_cast<std::uint32_t>(std::clamp(std::round(work * kUsualWork), 1.0, kMostWork)));
+  }
+}
+
+/// Brings the spheres, flown to a time, to those who have them in their shares; and what region_work_ says of them.
+template <int D>
+void Domains<D>::collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const {
   struct Place {
     Id id;
+    std::uint32_t work;
     Vec<D> x, v;
   };
   const Shares shares = this->shares();
   std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
-  for (const Local& region : local_)
-    for (const Slot i : region->own()) {
-      const Record<D> r = region->flights().at(region->after(i), time);
-      put(outgoing[static_cast<std::size_t>(shares.rank_of(r.id))], Place{r.id, r.x, r.v});
+  for (std::size_t k = 0; k < local_.size(); ++k)
+    for (const Slot i : local_[k]->own()) {
+      const Record<D> r = local_[k]->flights().at(local_[k]->after(i), time);
+      put(outgoing[static_cast<std::size_t>(shares.rank_of(r.id))], Place{r.id, work ? region_work_[k] : 0, r.x, r.v});
     }
   const Id first = shares.first(exchange_.rank()), end = shares.first(exchange_.rank() + 1);
   copies.x.resize(end - first);
   copies.v.resize(end - first);
+  if (work) work->resize(end - first);
   for (const Bytes& bytes : exchange_.swap(std::move(outgoing)))
     for (Reader reader(bytes); reader.more();) {
       const auto place = reader.get<Place>();
       copies.x[place.id - first] = place.x;
       copies.v[place.id - first] = place.v;
+      if (work) (*work)[place.id - first] = place.work;
     }
 }
 
 template <int D>
-void Domains<D>::give_back(double time, Particles<D>& particles) {
-  fly_to(time, particles);
-}
-
-template <int D>
 EventCounts Domains<D>::counts() const {
-  EventCounts all;
+  EventCounts all = event_counts_;
   for (const Local& region : local_) all += region->counts();
   return all;
 }

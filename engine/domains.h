@@ -49,6 +49,9 @@ class Domains {
   static constexpr double kFaster = 1.15;  // than anyone is, somebody may come to be
 
   Shares shares() const { return {sizes_.spheres, static_cast<std::size_t>(exchange_.size())}; }
+  void make_regions(std::size_t regions);
+  void measure_work();
+  void collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const;
   std::size_t first_region(int rank) const;
   int rank_of(std::uint32_t region) const;
   void reload();
@@ -75,7 +78,8 @@ class Domains {
   const Box<D>& box_;
   Sizes sizes_;
   mutable TimedExchange exchange_;
-  std::size_t regions_;
+  std::size_t regions_ = 0;
+  SearchOptions options_;
   std::function<double()> forced_window_;
   std::optional<Division<D>> division_;
   std::vector<Local> local_;              // the regions of this rank
@@ -91,6 +95,11 @@ class Domains {
   bool sorted_ = false;       // everybody is known to be whose at now_
   bool cut_ = false;          // the last window was, and regions must be loaded again
   std::uint64_t events_ = 0;  // contacts since take()
+  // How much each region had to do in the epoch, a sphere of it, the mean of all being kUsualWork; and each sphere of
+  // this rank's share.
+  std::vector<std::uint32_t> region_work_, work_;
+  std::vector<std::uint64_t> run_before_;  // by region: events of first runs, before the epoch
+  EventCounts event_counts_;               // of regions that are no more
   DomainCounts counts_;
 };
 

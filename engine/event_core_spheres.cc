@@ -118,8 +118,9 @@ void EventCore<D>::plan(bool anew, double now) {
 
 template <int D>
 void EventCore<D>::choose_search(double now) {
-  // A region is as dense as the whole, of which it has a part only, and larger spheres may come.
-  const std::vector<double>& radii = radii_.empty() ? sizes_->radius : radii_;
+  // A region is as dense as the whole, of which it has a part only, or nobody yet; and larger spheres may come.
+  const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : radii_;
+  if (counts_.predictions == 0) tuning_ = SearchTuning(options_);
   Extent<D> extent = flights_.extent();
   if (sizes_) {
     largest_ = sizes_->largest_radius();

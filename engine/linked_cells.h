@@ -243,7 +243,8 @@ class LinkedCells {
     for (std::int32_t c = first; c <= last; ++c) {
       const std::int32_t boxes = grid_.boxes(axis, c), seen = away + boxes * one_[axis];
       const std::int32_t wrapped = c - boxes * count;
-      const std::ptrdiff_t cell = at + (axis < D - 1 ? steps_[axis][static_cast<std::size_t>(wrapped + 1)].offset : wrapped);
+      const std::ptrdiff_t cell =
+          at + (axis < D - 1 ? steps_[axis][static_cast<std::size_t>(wrapped + 1)].offset : wrapped);
       if (axis < D - 1) {
         collect(low, high, found, axis + 1, cell, seen);
         continue;
@@ -288,7 +289,7 @@ class LinkedCells {
   const ScanKernels& kernels_;
   CellGrid<D> grid_;
   std::array<std::vector<HeadStep>, D - 1> steps_;  // to the cells −1 … count along each axis but the last
-  std::int32_t one_[D];                 // a box along each axis, as a linear image
+  std::int32_t one_[D];                             // a box along each axis, as a linear image
   bool periodic_[D];
   bool confined_ = false;
   // Of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kNobody.

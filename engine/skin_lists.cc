@@ -5,9 +5,9 @@
 namespace carom {
 namespace {
 
-constexpr double kPlaces = 1024;  // to a cell, along each axis
-constexpr unsigned kSlack = 3;    // candidates that a new list has room for, beside those it has
-constexpr double kMembers = 4;    // of a cell, at least: fewer would waste its line
+constexpr double kPlaces = 1024;     // to a cell, along each axis
+constexpr unsigned kSlack = 3;       // candidates that a new list has room for, beside those it has
+constexpr double kMembers = 4;       // of a cell, at least: fewer would waste its line
 constexpr std::int32_t kMargin = 2;  // cells, round those of a part
 
 template <int D>

@@ -121,6 +121,8 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
     outcome.peak_memory_bytes = peak_memory_bytes(accounts);
     if (statistics.stopped_early) outcome.status = "stopped";
     log.say(report_text(deck, statistics, accounts));
+    if (const auto regions = statistics.counters.domains.regions; regions > 0 && regions < static_cast<unsigned>(ranks))
+      log.warn(fmt::format("warning: there is work for {} of {} ranks only; use so many", regions, ranks));
     if (statistics.stopped_early)
       log.warn("warning: stopped by --max-wall; this version writes no checkpoint, so the run cannot be continued");
     log.close();

@@ -151,6 +151,11 @@ def test_too_few_particles_to_share(tmp_path):
     assert compare.compare(tmp_path / "one", tmp_path / "three") == []
 
 
+def test_more_ranks_than_there_is_work_for(tmp_path):
+    done = mpirun(3, command(write_deck(tmp_path, SPHERES), tmp_path / "three", ["particles.0.count=20"]))
+    assert "there is work for 2 of 3 ranks only" in done.stderr
+
+
 def idle_seconds(output):
     """Processor time so far of each rank other than 0 of the run that writes there."""
     seconds = []

@@ -111,7 +111,8 @@ TEST(Domains, EmptyRegions) {
     radius.push_back(0.1 + 0.1 * (i % 7) / 7.0);
   }
   const std::vector<double> mass(n, 1.0);
-  expect_the_same_however_divided<2>({.system = test::make_system<2>({200, 40}, P, x, v, radius, mass), .slab = 3}, 50);
+  expect_the_same_however_divided<2>(
+      {.system = test::make_system<2>({200, 40}, P, x, v, radius, mass), .slab = 3, .slabs = 3}, 50);
   expect_the_same_however_divided<2>(
       {.system = test::make_system<2>({200, 40}, P, x, v, std::vector<double>(n, 0.2), mass), .slab = 3}, 50);
 }
@@ -123,6 +124,24 @@ TEST(Domains, WallsAndFields) {
       {.system = random_system<3>(150, {6, 6, 9}, {P, P, W}, 0.5, 0.5, 7), .g = {0.1, 0, -1}, .slab = 1}, 1000);
   expect_the_same_however_divided<2>(
       {.system = random_system<2>(40, {7, 12}, {W, W}, 0.3, 0.5, 8), .g = {0, -0.5}, .slab = 1}, 200);
+}
+
+/// Regions whose spheres have more to do become smaller: that reaches nobody's path.
+TEST(Domains, UnevenWork) {
+  expect_the_same_however_divided<3>(
+      {.system = random_system<3>(200, {6, 6, 24}, {P, P, W}, 0.4, 0.4, 17), .g = {0, 0, -2}, .slab = 1.5, .slabs = 5},
+      1500);
+}
+
+/// One sphere is so fast that each region would have more neighbours than can be told apart.
+TEST(Domains, MoreRegionsThanTheBoxHasRoomFor) {
+  const Case<3> c{.system = test::hard_spheres<3>(6, 0.49), .slab = 0.05, .slabs = 2};
+  c.system->particles.v[5] *= 100;
+  DomainCounts counts;
+  expect_same(whole(c), divided(c, {.regions = 100}, nullptr, &counts), "100 regions");
+  EXPECT_GT(counts.regions, 20u);
+  EXPECT_LT(counts.regions, 100u);
+  EXPECT_GT(counts.windows, 0u);
 }
 
 TEST(Domains, OpenSpace) {

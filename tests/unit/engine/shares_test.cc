@@ -167,5 +167,23 @@ TEST(Division, HasTheSameCutsOnAnyNumberOfRanks) {
   }
 }
 
+/// Spheres in a row of 1000, of which those at the left have three times as much to do.
+TEST(Division, GivesEachTheSameWork) {
+  const Box<2> box{{100, 10}, {W, W}};
+  std::vector<Vec<2>> x;
+  std::vector<std::uint32_t> work;
+  for (int i = 0; i < 1000; ++i) {
+    x.push_back({0.1 * i + 0.05, 5});
+    work.push_back(i < 500 ? 3 : 1);
+  }
+  Exchange alone;
+  const Division<2> division(box, x, 4, 1.0, alone, work);
+  std::vector<std::uint32_t> shares(4);
+  for (std::size_t i = 0; i < x.size(); ++i) shares[division.owner(x[i])] += work[i];
+  for (const std::uint32_t share : shares) EXPECT_NEAR(share, 500, 3);
+  EXPECT_EQ(division.owner({16.6, 5}), 0u);
+  EXPECT_EQ(division.owner({16.8, 5}), 1u);
+}
+
 }  // namespace
 }  // namespace carom
