@@ -181,8 +181,8 @@ TEST(Division, GivesEachTheSameWork) {
   std::vector<std::uint32_t> shares(4);
   for (std::size_t i = 0; i < x.size(); ++i) shares[division.owner(x[i])] += work[i];
   for (const std::uint32_t share : shares) EXPECT_NEAR(share, 500, 3);
-  EXPECT_EQ(division.owner({16.6, 5}), 0u);
-  EXPECT_EQ(division.owner({16.8, 5}), 1u);
+  EXPECT_EQ(division.owner({16.5, 5}), 0u);
+  EXPECT_EQ(division.owner({16.7, 5}), 1u);
 }
 
 }  // namespace
