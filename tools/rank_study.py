@@ -17,9 +17,8 @@ at all borders), a chain of repairs that gets longer by one with a probability.
 Modelled from that: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a region.
 The work is its collisions by --rate. The imbalance is that of independent events, sqrt(2 ln P / events), times
 --imbalance. Messages: a window has rounds + 1 exchanges and rounds + 3 reductions; a reduction takes
-log2 P times --latency, an exchange --latency and, as every rank tells every other how much will come, P times --overhead.
-The last column of the table has exchanges that reach neighbours only. Left out: volume of data, bookkeeping of windows,
-memory, and starts and ends of epochs and frames, at which every rank has all spheres.
+log2 P times --latency, an exchange --latency and --overhead for each of 3^D - 1 neighbours. Left out: volume of data,
+bookkeeping of windows, and starts and ends of epochs and frames, at which ranks exchange all they have.
 """
 
 import argparse
@@ -37,8 +36,7 @@ COUNTS = re.compile(r"(\d+) windows, ([\d.]+) rounds each; events at borders run
                     r"imbalance ([\d.]+)%")
 COLUMNS = ["regions", "per_region", "particles", "windows", "events", "rounds", "twice", "redone", "redone_events",
            "imbalance"]
-MODEL = ["regions", "per_region", "rounds", "twice", "redone", "imbalance", "messages", "efficiency",
-         "efficiency_neighbours"]
+MODEL = ["regions", "per_region", "rounds", "twice", "redone", "imbalance", "messages", "efficiency"]
 RATE_COLLISIONS = 1_000_000
 
 
@@ -150,12 +148,10 @@ def modelled(fitted, options, regions, per_region):
     events = fitted["events"] * per_region
     imbalance = fitted["imbalance"] * np.sqrt(2 * np.log(regions) / events)
     work = events / options.rate
-    least = ((rounds + 1) + (rounds + 3) * np.log2(regions)) * options.latency / work
-    messages = least + (rounds + 1) * options.overhead * regions / work
-    rest = 1 + twice + redone + imbalance
+    exchange = options.latency + options.overhead * min(3**dimension, regions)
+    messages = ((rounds + 1) * exchange + (rounds + 3) * np.log2(regions) * options.latency) / work
     return {"regions": regions, "per_region": per_region, "rounds": rounds, "twice": twice, "redone": redone,
-            "imbalance": imbalance, "messages": messages, "efficiency": 1 / (rest + messages),
-            "efficiency_neighbours": 1 / (rest + least)}
+            "imbalance": imbalance, "messages": messages, "efficiency": 1 / (1 + twice + redone + imbalance + messages)}
 
 
 def draw(rows, fitted, options, title, file):
@@ -168,8 +164,7 @@ def draw(rows, fitted, options, title, file):
             left.loglog(sizes, [row[name] for row in curves], color=colour, label=name)
         for regions in (64, 1000, 10000):
             curves = [modelled(fitted, options, regions, size) for size in sizes]
-            line, = right.plot(sizes, [row["efficiency"] for row in curves], label=f"{regions} ranks")
-            right.plot(sizes, [row["efficiency_neighbours"] for row in curves], "--", color=line.get_color())
+            right.plot(sizes, [row["efficiency"] for row in curves], label=f"{regions} ranks")
 
 
 def main(arguments=None):
@@ -190,12 +185,12 @@ def main(arguments=None):
           "imbalance {imbalance:.2f} of independent events".format(**fitted))
     print(f"One core: {options.rate:.3g} collisions/s ({how}). Assumed: {options.latency:.1e} s a message, "
           f"{options.overhead:.1e} s each further one")
-    print("Modelled:\nregions per region  rounds    twice   redone imbalance messages efficiency neighbours only")
+    print("Modelled:\nregions per region  rounds    twice   redone imbalance messages efficiency")
     model = [modelled(fitted, options, regions, per_region) for per_region in (10**4, 10**5, 10**6)
              for regions in (64, 1000, 10000)]
     for row in model:
         print("{regions:7} {per_region:10} {rounds:7.2f} {twice:8.1%} {redone:8.2%} {imbalance:9.1%} {messages:8.1%} "
-              "{efficiency:10.2f} {efficiency_neighbours:15.2f}".format(**row))
+              "{efficiency:10.2f}".format(**row))
     table, prediction, figure = (options.output / name for name in ("ranks.csv", "model.csv", "ranks.png"))
     write_table(table, COLUMNS, rows)
     write_table(prediction, MODEL, model)
