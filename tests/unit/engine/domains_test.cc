@@ -100,21 +100,24 @@ TEST(Domains, ManySizes) {
       {.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3, .slabs = 2}, 200);
 }
 
-/// All in one line across the longest edge: regions can have nobody, or one sphere, before others come.
+/// All in one line across the longest edge, at its end or in its middle: regions can have nobody, or one sphere, before
+/// others come, in the same epoch or in the next.
 TEST(Domains, EmptyRegions) {
-  const int n = 80;
-  std::vector<Vec<2>> x, v;
-  std::vector<double> radius;
-  for (int i = 0; i < n; ++i) {
-    x.push_back({5.0, 0.25 + 0.5 * i});
-    v.push_back({std::sin(37.0 * i), std::cos(11.0 * i)});
-    radius.push_back(0.1 + 0.1 * (i % 7) / 7.0);
+  for (const double column : {5.0, 100.0}) {
+    const int n = 80;
+    std::vector<Vec<2>> x, v;
+    std::vector<double> radius;
+    for (int i = 0; i < n; ++i) {
+      x.push_back({column, 0.25 + 0.5 * i});
+      v.push_back({std::sin(37.0 * i), std::cos(11.0 * i)});
+      radius.push_back(0.1 + 0.1 * (i % 7) / 7.0);
+    }
+    const std::vector<double> mass(n, 1.0);
+    expect_the_same_however_divided<2>(
+        {.system = test::make_system<2>({200, 40}, P, x, v, radius, mass), .slab = 3, .slabs = 3}, 50);
+    expect_the_same_however_divided<2>(
+        {.system = test::make_system<2>({200, 40}, P, x, v, std::vector<double>(n, 0.2), mass), .slab = 3}, 50);
   }
-  const std::vector<double> mass(n, 1.0);
-  expect_the_same_however_divided<2>(
-      {.system = test::make_system<2>({200, 40}, P, x, v, radius, mass), .slab = 3, .slabs = 3}, 50);
-  expect_the_same_however_divided<2>(
-      {.system = test::make_system<2>({200, 40}, P, x, v, std::vector<double>(n, 0.2), mass), .slab = 3}, 50);
 }
 
 TEST(Domains, WallsAndFields) {
