@@ -120,6 +120,32 @@ TEST(Domains, EmptyRegions) {
   }
 }
 
+/// The core of a region has cells near its spheres only, until one comes to where nobody was expected: here all, out of
+/// one end of a periodic box into all of it.
+TEST(Domains, SpheresFarFromTheirRegion) {
+  for (const double radius : {0.4, 0.2})  // equal ones, and others
+    for (const auto method : {SearchOptions::Method::lists, SearchOptions::Method::cells}) {
+      auto system = random_system<3>(150, {6, 6, 6}, {P, P, P}, radius, 0.4, 23);
+      system->box.edges = {60, 7, 7};
+      Particles<3>& p = system->particles;
+      Counters counters;
+      std::vector<Contact<3>> all, here;
+      EventCore<3> whole(system->box, p);
+      whole.load(p, Vec<3>::Zero(), 20);
+      whole.run(20, {.counters = counters, .contacts = &all});
+      Sizes sizes(p);
+      sizes.spheres *= 4;  // as if there were more elsewhere
+      EventCore<3> part(system->box, &sizes, {.method = method});
+      std::vector<Record<3>> records;
+      for (Id i = 0; i < p.size(); ++i) records.push_back({p.x[i], p.v[i], 0.0, i, 0, p.species[i]});
+      part.load(records, Vec<3>::Zero(), 20, 0, 0.5);
+      part.run(20, {.counters = counters, .contacts = &here});
+      ASSERT_GT(all.size(), 300u);
+      ASSERT_EQ(all.size(), here.size());
+      for (std::size_t k = 0; k < all.size(); ++k) ASSERT_TRUE(all[k].key == here[k].key) << "contact " << k;
+    }
+}
+
 TEST(Domains, WallsAndFields) {
   expect_the_same_however_divided<3>({.system = random_system<3>(150, {7, 6, 6}, {W, P, W}, 0.5, 0.5, 5), .slab = 1},
                                      1000);
