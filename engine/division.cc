@@ -19,8 +19,8 @@ double from_ordered(std::uint64_t key) {
   return std::bit_cast<double>((key & kSign) != 0 ? key & ~kSign : ~key);
 }
 
-/// One of several sorted sequences that all ranks have parts of, and which element of it is asked for.
-struct Rank {
+/// Which element is asked for of a sorted sequence that all ranks have parts of.
+struct OrderStatistic {
   struct Element {
     std::uint64_t key;
     std::uint32_t weight;  // it stands there so many times
@@ -31,7 +31,7 @@ struct Rank {
 };
 
 /// Finds the elements asked for, digit by digit from the highest, by counting: all ranks find the same.
-void select(std::span<Rank> wanted, Exchange& ranks) {
+void select(std::span<OrderStatistic> wanted, Exchange& ranks) {
   constexpr int kBits = 8;
   constexpr std::size_t kDigits = std::size_t{1} << kBits;
   std::vector<std::uint64_t> counts(wanted.size() * kDigits);
@@ -128,7 +128,7 @@ auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::ve
   ranks.largest(bounds);
   ranks.sum(work);
 
-  std::vector<Rank> wanted;
+  std::vector<OrderStatistic> wanted;
   for (std::size_t p = 0; p < pieces.size(); ++p) {
     const Piece& piece = pieces[p];
     Vec<D> low, high;
@@ -141,9 +141,9 @@ auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::ve
     const std::size_t below = piece.regions / 2;
     const double share = static_cast<double>(below) / static_cast<double>(piece.regions);
     cuts_.push_back({axis, low[axis] + (high[axis] - low[axis]) * share, 0, 0});
-    Rank& rank = wanted.emplace_back();
-    rank.number = work[p] / piece.regions * below + work[p] % piece.regions * below / piece.regions;
-    for (const Sphere& sphere : piece.spheres) rank.elements.push_back({ordered(sphere.x[axis]), sphere.work});
+    OrderStatistic& split = wanted.emplace_back();
+    split.number = work[p] / piece.regions * below + work[p] % piece.regions * below / piece.regions;
+    for (const Sphere& sphere : piece.spheres) split.elements.push_back({ordered(sphere.x[axis]), sphere.work});
   }
   select(wanted, ranks);
 
