@@ -73,6 +73,7 @@ bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
       slot = entry.slot;
       time = entry.time;
       if (!calendar_.more_at(time)) return true;
+      settle();  // from here on it matters who is stale
       // Often it is the same contact, planned by both partners: the other's plan falls with this one.
       Slot other = slot;
       if (const CalendarEntry* const next = calendar_.top(holds); mirrored(slot, next->slot)) {
@@ -84,6 +85,7 @@ bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
       if (other != slot) tied_.push(tie(other));
       tied_time_ = time;
     }
+    settle();
     time = tied_time_;
     while (calendar_.more_at(time)) {
       const CalendarEntry* const top = calendar_.top(holds);
@@ -100,31 +102,13 @@ bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
   }
 }
 
-/// Fetches what the next events will need, while this one is at work.
+/// A contact holds while its partner's version is the one it was planned with. Versions are read an event after the
+/// plans were made, because they come from memory.
 template <int D>
-void EventCore<D>::prefetch_upcoming() const {
-  if (const CalendarEntry* const later = calendar_.upcoming(3)) {
-    __builtin_prefetch(&agenda_[later->slot]);
-    __builtin_prefetch(&flights_[later->slot]);
-  }
-  if (const CalendarEntry* const next = calendar_.upcoming(1)) {
-    const Agenda<D>& a = agenda_[next->slot];
-    if (lists_) {
-      __builtin_prefetch(lists_->candidates(a));
-      if (a.contact < a.update) {
-        const Slot j = packing_.slot(a.partner);
-        __builtin_prefetch(&agenda_[j]);
-      }
-    } else {
-      cells_->prefetch(a.where.cell);
-    }
-  }
-  if (const CalendarEntry* const next = calendar_.upcoming(0); next && lists_) {
-    const Agenda<D>& a = agenda_[next->slot];
-    const std::uint32_t* const list = lists_->candidates(a);
-    for (unsigned q = 0; q < a.count; ++q) __builtin_prefetch(&flights_[packing_.slot(list[q])]);
-    if (a.contact < a.update && a.kind == EventKind::pair)
-      __builtin_prefetch(lists_->candidates(agenda_[packing_.slot(a.partner)]));
+void EventCore<D>::settle() {
+  for (; planned_ > 0; --planned_) {
+    Agenda<D>& a = agenda_[just_planned_[planned_ - 1]];
+    if (a.kind == EventKind::pair) a.partner_version = agenda_[packing_.slot(a.partner)].version;
   }
 }
 
@@ -135,6 +119,7 @@ double EventCore<D>::run(double end, const Report& report) {
   while (next_event(end, i, now)) {
     now_ = now;
     prefetch_upcoming();
+    settle();
     Agenda<D>& a = agenda_[i];
     if (a.update < a.contact) {
       update(i, now);
@@ -162,8 +147,12 @@ double EventCore<D>::run(double end, const Report& report) {
     const Slot j = packing_.slot(a.partner);
     collide_pair(i, now, generation, report);
     predict_two(i, j, now);
-    if (report.counters.sphere_sphere >= report.collision_limit) return now;
+    if (report.counters.sphere_sphere >= report.collision_limit) {
+      settle();
+      return now;
+    }
   }
+  settle();
   return end;
 }
 
@@ -244,7 +233,8 @@ void EventCore<D>::take(const ScanTask& task, const ScanResult& first) {
   a.contact = first.time;
   a.kind = EventKind::pair;
   a.partner = task.candidates[first.which];
-  a.partner_version = agenda_[packing_.slot(a.partner)].version;
+  prefetch_line(&agenda_[packing_.slot(a.partner)]);
+  just_planned_[planned_++] = task.self;
 }
 
 template <int D>

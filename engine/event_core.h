@@ -30,6 +30,7 @@
 #include "engine/flights.h"
 #include "engine/linked_cells.h"
 #include "engine/particles.h"
+#include "engine/prefetch.h"
 #include "engine/search_tuning.h"
 #include "engine/skin_lists.h"
 #include "engine/trace.h"
@@ -120,7 +121,16 @@ class EventCore {
   bool read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
   void plan(bool anew, double now);
   void choose_search(double now);
-  void prefetch_upcoming() const;
+  void prefetch_upcoming();
+  void prefetch_lists() const;
+  void prefetch_few_cells() const;
+  void prefetch_cells();
+  void prefetch(Slot i) const {
+    prefetch_line(&agenda_[i]);
+    prefetch_line(&flights_[i]);
+  }
+  static bool meets(const Agenda<D>& a) { return a.contact < a.update && a.kind == EventKind::pair; }
+  void settle();
   bool mirrored(Slot i, Slot j) const;
   bool next_event(double end, Slot& slot, double& time);
   bool stale(const Agenda<D>& a) const;
@@ -168,6 +178,9 @@ class EventCore {
   std::unique_ptr<SkinLists<D>> lists_;  // one of the two
   std::unique_ptr<LinkedCells<D>> cells_;
   Candidates found_, others_;
+  bool large_ = false;      // more than a cache holds
+  Slot just_planned_[2]{};  // by the last event: who plans to meet somebody whose version is still to be read
+  unsigned planned_ = 0;    // how many
 
   SearchTuning tuning_;
   EventCounts counts_;

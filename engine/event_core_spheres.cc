@@ -96,6 +96,7 @@ template <int D>
 void EventCore<D>::plan(bool anew, double now) {
   const std::size_t n = flights_.size();
   packing_ = Packing<D>(flights_.room());
+  large_ = static_cast<double>(flights_.room()) > options_.in_cache;
   setting_ = flights_.setting(packing_);
   std::vector<double> radii = flights_.radii(flights_.horizon());
   if (lists_ && !anew && radii_ == radii) {  // lists outlive a slab while they are good for its radii
@@ -108,7 +109,7 @@ void EventCore<D>::plan(bool anew, double now) {
     radii_ = std::move(radii);
     choose_search(now);
   }
-  for (std::size_t i = 0; i < n; ++i) foresee(static_cast<Slot>(i), now);
+  for (std::size_t i = 0; i < n; ++i) foresee(static_cast<Slot>(i), now), settle();
   constexpr std::size_t kSample = 8192;
   std::vector<double> some;
   for (std::size_t i = 0; i < n; i += n / kSample + 1) some.push_back(agenda_[i].due());
@@ -176,7 +177,7 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
     agenda_[slot].where.cell = cells_->place(x);
     cells_->admit(slot, agenda_[slot].where.cell);
   }
-  predict(slot, now);
+  predict(slot, now), settle();
   return true;
 }
 
@@ -209,7 +210,7 @@ void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, doub
       cells_->admit(i, cell);
     }
   }
-  for (const auto& [i, r] : records) predict(i, now);
+  for (const auto& [i, r] : records) predict(i, now), settle();
 }
 
 template <int D>
@@ -236,7 +237,7 @@ void EventCore<D>::set_border(std::span<const Slot> slots, double now) {
   for (const Slot i : slots) {
     at_border_[i] = 1;
     if (lists_->move(i, flights_.at(i, now).x, room(i)))
-      predict(i, now);
+      predict(i, now), settle();
     else
       predict_leaving(i, now), schedule(i);
   }

@@ -4,6 +4,7 @@
 
 #include "engine/agenda.h"
 #include "engine/pages.h"
+#include "engine/prefetch.h"
 #include "engine/scan.h"
 
 namespace carom {
@@ -27,7 +28,6 @@ class LinkedCells {
         kernels_(kernels),
         grid_(box, smallest, extent, kCellsAParticle),
         link_(slots),
-        boxes_(slots),
         here_(packing.pack(0, 0)) {
     for (int k = 0; k < D; ++k) {
       one_[k] = 1 << (packing.field_bits * k);
@@ -57,19 +57,33 @@ class LinkedCells {
     return place;
   }
 
-  /// Fetches the cells around a place into the cache.
-  void prefetch(const Place& place) const {
-    const HeadStep* const x = &steps_[0][place.wrapped[0] + 1u];
-    const HeadStep* const y = D == 3 ? &steps_[D - 2][place.wrapped[D - 2] + 1u] : nullptr;
-    const std::uint32_t* const first = first_.data() + place.wrapped[D - 1];
-    for (int a = -1; a <= 1; ++a)
-      for (int b = D == 3 ? -1 : 0; b <= (D == 3 ? 1 : 0); ++b)
-        __builtin_prefetch(first + x[a].offset + (D == 3 ? y[b].offset : 0));
+  /// Starts to fetch what cross() and searches read of a sphere.
+  void prefetch(Slot i) const { prefetch_line(&link_[i]); }
+  /// Starts to fetch the cells of around(), or, where `step` is not 0, of ahead() after a step that is still to come.
+  void prefetch(const Place& place, int axis, int step) const {
+    const HeadsTask task = step == 0 ? rows(place, D, 0) : rows_beyond(place, axis, step);
+    for (unsigned a = 0; a < task.steps[0]; ++a)
+      for (unsigned b = 0; b < task.steps[1]; ++b) {
+        const std::uint32_t* const row = task.first + task.step[0][a].offset + task.step[1][b].offset;
+        prefetch_line(row);
+        prefetch_line(row + 3);
+      }
+  }
+  /// The first spheres of these cells, for fetch(slot).
+  template <class Fetch>
+  void prefetch(const Place& place, int axis, int step, Candidates& found, Fetch&& fetch) const {
+    const HeadsTask task = step == 0 ? rows(place, D, 0) : rows_beyond(place, axis, step);
+    const unsigned n = kernels_.heads(task, found.packed.data()).count;
+    for (unsigned q = 0; q < n; ++q) {
+      const Slot j = packing_.slot(found.packed[q] & ~kMore);
+      fetch(j);
+      if ((found.packed[q] & kMore) != 0) prefetch(j);
+    }
   }
 
   /// The same for a sphere that comes in later.
   void admit(Slot i, const Place& place) {
-    if (i >= link_.size()) link_.resize(i + 1), boxes_.resize(i + 1);
+    if (i >= link_.size()) link_.resize(i + 1);
     for (const std::int32_t b : packing_.image(packing_.pack(0, place.boxes))) widest_ = std::max(widest_, std::abs(b));
     if (widest_ > packing_.largest()) throw_too_far();
     insert(i, place);
@@ -77,8 +91,7 @@ class LinkedCells {
   void insert(Slot i, const Place& place) {
     if (confined_ && !grid_.holds(wrapped(place))) spread();
     std::uint32_t& first = first_[index(place)];
-    link_[i] = first;
-    boxes_[i] = place.boxes;
+    link_[i] = {first, place.boxes};
     first = packing_.pack(i, place.boxes) | (first != kNobody ? kMore : 0);
     mirror(place);
   }
@@ -86,9 +99,9 @@ class LinkedCells {
     std::uint32_t *at = &first_[index(place)], *before = nullptr;
     while (packing_.slot(*at) != i) {
       before = at;
-      at = &link_[packing_.slot(*at)];
+      at = &link_[packing_.slot(*at)].next;
     }
-    *at = link_[i];
+    *at = link_[i].next;
     if (before && *at == kNobody) *before &= ~kMore;
     mirror(place);
   }
@@ -136,6 +149,10 @@ class LinkedCells {
   }
 
  private:
+  struct Link {
+    std::uint32_t next;  // who is behind the sphere in its cell, as first_ has it
+    std::int32_t boxes;  // of its place
+  };
   static constexpr std::uint32_t kMore = std::uint32_t{1} << 31;  ///< beside a sphere: another one is behind it
   static constexpr double kCellsAParticle = 8;
   static constexpr std::int32_t kMargin = 3;  // cells, round those of a part
@@ -202,8 +219,8 @@ class LinkedCells {
     if (z == last) first_[at - row] = first == kNobody ? first : first + box;
   }
 
-  /// Takes everybody in the cells around a place for a candidate, or only in those a step away along an axis.
-  void search(Slot self, const Place& place, int axis, int step, Candidates& found) const {
+  /// The cells around a place, or only those a step away along an axis.
+  HeadsTask rows(const Place& place, int axis, int step) const {
     static constexpr HeadStep kNone{0, 0};
     const bool in_row = axis == D - 1;  // a cell of each row, not three
     HeadsTask task{.first = first_.data() + place.wrapped[D - 1] + (in_row ? 1 + step : 0),
@@ -212,19 +229,28 @@ class LinkedCells {
                    .wanted = in_row ? 1u : 7u,
                    .away = shifted(place.boxes),
                    .here = here_};
-    found.count = found.same = 0;
     for (int k = 0; k < D - 1; ++k) {
       const int here = place.wrapped[k];
       int low = k == axis ? step : -1, high = k == axis ? step : 1;
       if (!periodic_[k]) {  // no cells beyond walls
         low = std::max(low, -here);
         high = std::min(high, grid_.count(k) - 1 - here);
-        if (low > high) return;
       }
       task.step[k] = &steps_[k][static_cast<std::size_t>(here + 1 + low)];
-      task.steps[k] = static_cast<unsigned>(high - low + 1);
+      task.steps[k] = static_cast<unsigned>(std::max(high - low + 1, 0));
     }
-    const Heads heads = kernels_.heads(task, found.packed.data());
+    return task;
+  }
+  /// Those that a step along an axis will bring into view; none where they are beyond the end of the box.
+  HeadsTask rows_beyond(const Place& place, int axis, int step) const {
+    const int to = place.wrapped[axis] + 2 * step;
+    if (to < -1 || to > grid_.count(axis)) return {};
+    return rows(place, axis, 2 * step);
+  }
+
+  /// Takes everybody in such cells for a candidate.
+  void search(Slot self, const Place& place, int axis, int step, Candidates& found) const {
+    const Heads heads = kernels_.heads(rows(place, axis, step), found.packed.data());
     found.count = heads.count;
     std::uint32_t any = heads.any;
     if ((any & kMore) != 0) any |= follow(found);
@@ -252,8 +278,8 @@ class LinkedCells {
       std::uint32_t next = first_[static_cast<std::size_t>(cell)];
       while (next != kNobody) {
         const Slot j = packing_.slot(next & ~kMore);
-        found.push_back(packing_.pack(j, boxes_[j] - seen));
-        next = (next & kMore) != 0 ? link_[j] : kNobody;
+        found.push_back(packing_.pack(j, link_[j].boxes - seen));
+        next = (next & kMore) != 0 ? link_[j].next : kNobody;
       }
     }
   }
@@ -267,7 +293,8 @@ class LinkedCells {
       found.packed[q] = candidate & ~kMore;
       const Slot slot = packing_.slot(candidate);
       // The box that was taken from the candidate is taken from who comes next, too.
-      const std::uint32_t box = packing_.pack(slot, boxes_[slot]) - (candidate & ~kMore), next = link_[slot] - box;
+      const Link& link = link_[slot];
+      const std::uint32_t box = packing_.pack(slot, link.boxes) - (candidate & ~kMore), next = link.next - box;
       any |= next ^ here_;
       if (found.count + 9u > found.packed.size()) found.packed.resize(2 * found.packed.size());
       found.packed[found.count++] = next;
@@ -279,7 +306,7 @@ class LinkedCells {
   void check(const Place& place, const Candidates& found) const {
     const Image<D> own = packing_.image(packing_.pack(0, place.boxes));
     for (unsigned q = 0; q < found.count; ++q) {
-      const Image<D> theirs = packing_.image(packing_.pack(0, boxes_[packing_.slot(found.packed[q])]));
+      const Image<D> theirs = packing_.image(packing_.pack(0, link_[packing_.slot(found.packed[q])].boxes));
       for (int k = 0; k < D; ++k)
         if (std::abs(theirs[k] - own[k]) + 1 > packing_.largest()) throw_too_far();  // 1: seen through a face
     }
@@ -294,10 +321,9 @@ class LinkedCells {
   bool confined_ = false;
   // Of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kNobody.
   PageVector<std::uint32_t> first_;
-  PageVector<std::uint32_t> link_;  // by slot: who is behind it in its cell, as first_ has it
-  PageVector<std::int32_t> boxes_;  // by slot: of its place
-  std::uint32_t here_;              // a candidate in the same box, but for its slot
-  std::int32_t widest_ = 0;         // the farthest box anyone has come to
+  PageVector<Link> link_;    // by slot
+  std::uint32_t here_;       // a candidate in the same box, but for its slot
+  std::int32_t widest_ = 0;  // the farthest box anyone has come to
 };
 
 }  // namespace carom

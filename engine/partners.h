@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/prefetch.h"
 #include "engine/vec.h"
 
 namespace carom {
@@ -37,8 +38,8 @@ class Partners {
   }
 
   /// Fetch what of(i) reads, and what it gives, into the cache: the one some time before the other.
-  void prefetch_place(Id i) const { __builtin_prefetch(&start_[i]); }
-  void prefetch(Id i) const { __builtin_prefetch(partner_.data() + start_[i]); }
+  void prefetch_place(Id i) const { prefetch_line(&start_[i]); }
+  void prefetch(Id i) const { prefetch_line(partner_.data() + start_[i]); }
 
   std::span<const Partner> of(Id i) const { return {partner_.data() + start_[i], start_[i + 1] - start_[i]}; }
 

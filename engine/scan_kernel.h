@@ -408,7 +408,10 @@ inline unsigned bits(Quad mask) {
 [[maybe_unused]] Heads heads(const HeadsTask& task, std::uint32_t* candidates) {
   const std::uint32_t* const first = task.first;
   const HeadStep* const inner = task.step[1];
-  const unsigned steps = task.steps[1], wanted = task.wanted;
+  const unsigned steps = task.steps[1];
+  const Quad here = Quad{} + task.here;
+  Quad wanted{}, any{};
+  for (unsigned l = 0; l < 3; ++l) wanted[l] = (task.wanted >> l & 1) != 0 ? ~0u : 0u;
   std::uint32_t* end = candidates;
   for (const HeadStep *outer = task.step[0], *const last = outer + task.steps[0]; outer < last; ++outer) {
     const std::uint32_t* const row = first + outer->offset;
@@ -416,19 +419,14 @@ inline unsigned bits(Quad mask) {
     for (unsigned b = 0; b < steps; ++b) {
       Quad four;
       __builtin_memcpy(&four, row + inner[b].offset, sizeof four);
-      const unsigned mask = ~bits((Quad)(four == kNobody)) & wanted;
-      const Quad front = pack(four - (box + inner[b].away), mask);
+      const Quad somebody = ~(Quad)(four == kNobody) & wanted;
+      const unsigned mask = bits(somebody);
+      const Quad seen = four - (box + inner[b].away);
+      any |= (seen ^ here) & somebody;
+      const Quad front = pack(seen, mask);
       __builtin_memcpy(end, &front, sizeof front);
       end += __builtin_popcount(mask);
     }
-  }
-  const Quad here = Quad{} + task.here;
-  __builtin_memcpy(end, &here, sizeof here);
-  Quad any{};
-  for (const std::uint32_t* at = candidates; at < end; at += 4) {
-    Quad four;
-    __builtin_memcpy(&four, at, sizeof four);
-    any |= four ^ here;
   }
   return {static_cast<unsigned>(end - candidates), any[0] | any[1] | any[2] | any[3]};
 }

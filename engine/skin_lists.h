@@ -13,6 +13,7 @@
 #include "engine/agenda.h"
 #include "engine/flights.h"
 #include "engine/pages.h"
+#include "engine/prefetch.h"
 #include "engine/scan.h"
 
 namespace carom {
@@ -46,6 +47,10 @@ class SkinLists {
   /// The sphere is now at x: renews its list where that is farther than `room` from the centre of its region; whether
   /// it was.
   bool move(Slot i, const Vec<D>& x, double room);
+  /// Starts to fetch the list of a sphere; of a long one what a list of equal spheres would be.
+  void prefetch(const Agenda<D>& a) const {
+    for (const unsigned q : {0u, 16u, 32u}) prefetch_line(candidates(a) + q);
+  }
   /// Everybody whom a sphere may touch where both have come up to `astray` from their regions.
   std::span<const std::uint32_t> find_near(Slot i, double astray);
 

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "engine/collision.h"
+#include "engine/prefetch.h"
 
 namespace carom {
 
@@ -177,14 +178,14 @@ bool SlabCore<D>::next_event(const Histories<D>& paths, Planned& event) {
 template <int D>
 void SlabCore<D>::prefetch_upcoming(const Histories<D>& paths) const {
   const auto state = [&](Id i) {
-    __builtin_prefetch(&paths.last[i]);
-    __builtin_prefetch(&paths.start[i]);
-    __builtin_prefetch(&paths.x[i]);
-    __builtin_prefetch(&paths.v[i]);
-    __builtin_prefetch(&paths.a[i]);
-    __builtin_prefetch(&paths.next[i]);
-    __builtin_prefetch(&version_[i]);
-    __builtin_prefetch(&particles_.radius[i]);
+    prefetch_line(&paths.last[i]);
+    prefetch_line(&paths.start[i]);
+    prefetch_line(&paths.x[i]);
+    prefetch_line(&paths.v[i]);
+    prefetch_line(&paths.a[i]);
+    prefetch_line(&paths.next[i]);
+    prefetch_line(&version_[i]);
+    prefetch_line(&particles_.radius[i]);
   };
   const auto at = [&](std::size_t ahead, auto&& visit) {
     if (served_ + ahead >= first_.size()) return;
@@ -196,13 +197,13 @@ void SlabCore<D>::prefetch_upcoming(const Histories<D>& paths) const {
   at(6, [&](Id i) { partners.prefetch_place(i); });
   at(4, [&](Id i) {
     partners.prefetch(i);
-    __builtin_prefetch(&paths.past[i]);
-    __builtin_prefetch(&particles_.mass[i]);
+    prefetch_line(&paths.past[i]);
+    prefetch_line(&particles_.mass[i]);
   });
   at(2, [&](Id i) {
     for (const auto& [j, pair] : partners.of(i)) {
       state(j);
-      __builtin_prefetch(&pairs_[pair]);
+      prefetch_line(&pairs_[pair]);
     }
   });
 }

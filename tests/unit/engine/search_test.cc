@@ -75,6 +75,8 @@ void expect_the_same_whatever_the_search(const Case<D>& c, std::size_t at_least)
   for (const double sort : {0.0, 0.7, 1e9})
     for (const Method method : {Method::lists, Method::cells})
       expect_same(reference, run(c, {.method = method, .sort_interval = sort}), "sort " + std::to_string(sort));
+  for (const Method method : {Method::lists, Method::cells})
+    expect_same(reference, run(c, {.method = method, .in_cache = 0}), "as if there were no cache");
   for (const char* simd : {"sse2", "avx2", "avx512"}) {
     if (!machine_has(simd)) continue;
     expect_same(reference, run(c, {.method = Method::lists}, simd), simd);
