@@ -118,7 +118,7 @@ double EventCore<D>::run(double end, const Report& report) {
   double now;
   while (next_event(end, i, now)) {
     now_ = now;
-    prefetch_upcoming();
+    if (!small_) prefetch_upcoming();
     settle();
     Agenda<D>& a = agenda_[i];
     if (a.update < a.contact) {

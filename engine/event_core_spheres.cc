@@ -96,6 +96,7 @@ template <int D>
 void EventCore<D>::plan(bool anew, double now) {
   const std::size_t n = flights_.size();
   packing_ = Packing<D>(flights_.room());
+  small_ = 8 * static_cast<double>(flights_.room()) <= options_.in_cache;
   large_ = static_cast<double>(flights_.room()) > options_.in_cache;
   setting_ = flights_.setting(packing_);
   std::vector<double> radii = flights_.radii(flights_.horizon());
