@@ -69,7 +69,7 @@ class LinkedCells {
         prefetch_line(row + 3);
       }
   }
-  /// The first spheres of these cells, for fetch(slot).
+  /// Calls fetch(slot) for the first spheres of these cells; `found` is room to work in.
   template <class Fetch>
   void prefetch(const Place& place, int axis, int step, Candidates& found, Fetch&& fetch) const {
     const HeadsTask task = step == 0 ? rows(place, D, 0) : rows_beyond(place, axis, step);
