@@ -198,7 +198,7 @@ TEST(Domains, ExactTies) {
     for (int j = 0; j < n; ++j)
       for (int k = 0; k < n; ++k) {
         x.push_back({2.0 * i, 2.0 * j, 2.0 * k});
-        const int which = static_cast<int>(x.size() * 2654435761u >> 7) % 6;
+        const int which = static_cast<int>((x.size() * 2654435761u >> 7) % 6);
         Vec<3> speed = Vec<3>::Zero();
         speed[which / 2] = which % 2 == 0 ? 1 : -1;
         v.push_back(speed);
