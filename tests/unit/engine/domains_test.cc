@@ -199,9 +199,9 @@ TEST(Domains, ExactTies) {
       for (int j = 0; j < n; ++j)
         for (int k = 0; k < n; ++k) {
           x.push_back({2.0 * i, 2.0 * j, 2.0 * k});
-          const int which = static_cast<int>(((x.size() + 1000 * variant) * 2654435761u >> 7) % 11);
+          const int which = static_cast<int>(((x.size() + 1000 * variant) * 2654435761u >> 7) % 12);
           Vec<3> speed = Vec<3>::Zero();
-          if (which < 6) speed[which / 2] = which % 2 == 0 ? 1 : -1;
+          if (which < 8) speed[which / 2 % 3] = which % 2 == 0 ? 1 : -1;
           v.push_back(speed);
         }
     auto system = test::make_system<3>({12, 12, 12}, P, x, v, std::vector<double>(x.size(), 0.5),

@@ -151,6 +151,18 @@ TEST(Search, ExactTies) {  // a lattice with speeds of 1: whole layers collide a
   expect_the_same_whatever_the_search<3>({.system = test::make_system<3>({9, 9, 9}, P, x, v), .slab = 2}, 400);
 }
 
+TEST(Search, BlowsFromBothSides) {  // two that touch are hit at one instant, again and again, and pass the blows on
+  std::vector<Vec<2>> x, v;
+  for (int row = 0; row < 4; ++row)
+    for (const double place : {2.0, 5.5, 6.5, 10.0}) {
+      x.push_back({place, 2.0 * row});
+      v.push_back({place == 2.0 ? 1.0 : place == 10.0 ? -1.0 : 0.0, 0.0});
+    }
+  const std::vector<double> radius(x.size(), 0.5), mass(x.size(), 1.0);
+  expect_the_same_whatever_the_search<2>({.system = test::make_system<2>({12, 8}, P, x, v, radius, mass), .slab = 40},
+                                         100);
+}
+
 TEST(Search, AWidthThisMachineLacksIsAnError) {
   const Environment environment("CAROM_SIMD", "mmx");
   EXPECT_THROW(scan_kernels(), Error);
