@@ -178,9 +178,9 @@ class EventCore {
   std::unique_ptr<SkinLists<D>> lists_;  // one of the two
   std::unique_ptr<LinkedCells<D>> cells_;
   Candidates found_, others_;
-  bool small_ = true, large_ = false;  // for a fast cache, for any
-  Slot just_planned_[2]{};  // by the last event: who plans to meet somebody whose version is still to be read
-  unsigned planned_ = 0;    // how many
+  bool small_ = true, large_ = false;  // few enough for a fast cache; too many for any
+  Slot just_planned_[2]{};             // in the last event: their partners' versions are still to be read
+  unsigned planned_ = 0;               // how many
 
   SearchTuning tuning_;
   EventCounts counts_;

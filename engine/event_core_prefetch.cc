@@ -62,12 +62,12 @@ void EventCore<D>::prefetch_cells() {
   }
   if (const CalendarEntry* const later = calendar_.upcoming(3)) {
     const Agenda<D>& a = agenda_[later->slot];
-    cells_->prefetch(a.where.cell, a.face / 2, step(a), found_, fetch);
+    cells_->prefetch_spheres(a.where.cell, a.face / 2, step(a), found_, fetch);
     if (meets(a)) cells_->prefetch(agenda_[packing_.slot(a.partner)].where.cell, 0, 0);
   }
   if (const CalendarEntry* const next = calendar_.upcoming(1))
     if (const Agenda<D>& a = agenda_[next->slot]; meets(a))
-      cells_->prefetch(agenda_[packing_.slot(a.partner)].where.cell, 0, 0, found_, fetch);
+      cells_->prefetch_spheres(agenda_[packing_.slot(a.partner)].where.cell, 0, 0, found_, fetch);
 }
 
 template void EventCore<2>::prefetch_upcoming();

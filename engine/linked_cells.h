@@ -69,9 +69,10 @@ class LinkedCells {
         prefetch_line(row + 3);
       }
   }
-  /// Calls fetch(slot) for the first spheres of these cells; `found` is room to work in.
+  /// Starts to fetch who is behind the first spheres of these cells, and calls fetch(slot) for the first ones; `found`
+  /// is room to work in.
   template <class Fetch>
-  void prefetch(const Place& place, int axis, int step, Candidates& found, Fetch&& fetch) const {
+  void prefetch_spheres(const Place& place, int axis, int step, Candidates& found, Fetch&& fetch) const {
     const HeadsTask task = step == 0 ? rows(place, D, 0) : rows_beyond(place, axis, step);
     const unsigned n = kernels_.heads(task, found.packed.data()).count;
     for (unsigned q = 0; q < n; ++q) {

@@ -21,7 +21,7 @@ struct SearchOptions {
   double cell = 0;             ///< least edge of a cell [length]
   double entries_per_bin = 0;  ///< of the calendar
   double sort_interval = 20;   ///< contacts a particle after which the particles are sorted in space again
-  double in_cache = 16384;  ///< spheres up to which the core counts on a cache that holds them, an eighth on a fast one
+  double in_cache = 16384;     ///< spheres that a cache holds, a fast one an eighth; more are fetched ahead (0: all)
 };
 
 /// What the choice depends on.
