@@ -23,6 +23,8 @@
 
 namespace carom {
 
+class Exchange;
+
 template <int D>
 using Positions = std::span<const Vec<D>>;
 template <int D>
@@ -105,11 +107,13 @@ class Interaction {
   /// both have inner nodes is done with the lower id. Returns how many pair forces were evaluated.
   virtual std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const = 0;
 
-  /// The same term for some of the particles it was made for, with their new numbers; `some` tells whom, and outlives
-  /// it. Null where they are not enough for those of them that are owned.
-  virtual std::unique_ptr<Interaction> among(const Particles<D>& all, const Particles<D>& some) const = 0;
-  /// How far it reaches from positions x [length]; infinite: it needs everybody.
+  /// The same term for `some` of all particles, which outlive it; `made_for`: the particles it was made for, all or a
+  /// share. Null where they are not enough for those of them that are owned.
+  virtual std::unique_ptr<Interaction> among(const Particles<D>& made_for, const Particles<D>& some) const = 0;
+  /// How far it reaches from positions x, as far as this rank knows [length]; infinite: it needs everybody.
   virtual double reach(Positions<D> x) const = 0;
+  /// The same of a term that was made for a share of the particles. Collective.
+  virtual double reach(const Particles<D>& share, Exchange& ranks) const = 0;
 
   /// How many pairs (or particles, for a field) of this rank one evaluation visits within reach: the unit of
   /// `force_passes`.
@@ -130,6 +134,8 @@ struct InteractionContext {
   const Particles<D>& particles;
   const std::vector<std::string>& species;  ///< names, in the order of Particles::species
   bool placed = true;                       ///< whether positions are known; else only the parameters count
+  std::size_t total = particles.size();     ///< how many there are on all ranks, where `particles` are a share of them
+  Exchange* ranks = nullptr;                ///< these ranks; null: all particles are here
 };
 
 /// The declaration of one type of interaction; engine/potentials/registry.cc lists them all.

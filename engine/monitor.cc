@@ -7,6 +7,7 @@
 
 #include "engine/error.h"
 #include "engine/forces.h"
+#include "engine/shares.h"
 #include "engine/vicinity.h"
 
 namespace carom {
@@ -40,7 +41,7 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
 template <int D>
 void Monitor<D>::regroup() {
   const Particles<D>& p = known().particles;
-  if (info_.hard_cores && !system_.sizes) touching_.emplace(system_.box, p.radius);
+  if (info_.hard_cores && !in_free_flight()) touching_.emplace(system_.box, p.radius);
   if (!info_.shadow) return;
   force_.resize(p.size());
   scratch_.resize(p.size());
@@ -181,7 +182,10 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
     last_row_virial_ = collision_virial;
   }
   if (frame) {
-    if (!system_.sizes) shot.particles = &everybody(*shot.particles);
+    if (system_.part) {
+      system_.part->collect();
+      shot.particles = &system_.particles;
+    }
     for (auto* observer : observers_) observer->frame(shot);
     frames_.pass(now);
     last_frame_ = shot.time;
@@ -202,8 +206,8 @@ double Monitor<D>::deepest_overlap() {
     }
   };
   const Particles<D>& p = known().particles;
-  if (system_.sizes) {
-    const Vicinity<D> near = vicinity(system_.box, *system_.sizes, *system_.ranks, p);
+  if (in_free_flight()) {
+    const Vicinity<D> near = vicinity(system_.box, 2 * system_.sizes->largest_radius(), *system_.ranks, p);
     NeighbourList<D> touching(system_.box, near.radius);
     look(touching, near, [&](Id i) { return near.beyond[i] == 0; });
   } else {
@@ -212,13 +216,12 @@ double Monitor<D>::deepest_overlap() {
   return deepest;
 }
 
-/// Everybody in a state of this rank's particles; where the ranks have shares, on rank 0 only.
+/// Everybody in a state of this rank's particles; where there are several ranks, on rank 0 only.
 template <int D>
 const Particles<D>& Monitor<D>::everybody(const Particles<D>& state) {
-  if (system_.sizes) return gathered_ = gathered(*system_.ranks, state);
-  if (!system_.part || &state != &known().particles) return state;
-  system_.part->collect();
-  return system_.particles;
+  if (!system_.sizes) return state;
+  if (system_.part) system_.part->collect();
+  return gathered_ = gathered(*system_.ranks, system_.part ? system_.particles : state);
 }
 
 template class Monitor<2>;

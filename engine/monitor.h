@@ -72,6 +72,7 @@ class Monitor {
   void count_from(const Snapshot<D>& shot);
   double deepest_overlap();
   const Particles<D>& everybody(const Particles<D>& state);
+  bool in_free_flight() const { return system_.sizes && !system_.part; }  // of shares
   const System<D>& known() const { return system_.part ? system_.part->known() : system_; }
 
   const System<D>& system_;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/division.h"
+#include "engine/shares.h"
 
 namespace carom {
 namespace {
@@ -15,12 +16,14 @@ constexpr std::int64_t kSlabs = 64;                  // between divisions while 
 constexpr double kLeastDepth = 3;                    // of ghosts that do not matter [largest diameter]
 constexpr double kMost = 0.7;                        // of all particles; a rank that would know more knows everybody
 
-/// What ranks tell each other of a particle.
+/// What ranks tell each other of a particle, beside its luggage.
 template <int D>
 struct State {
   Vec<D> x, v;
+  double mass, radius, charge;
   Image<D> image;
   Id id;
+  std::uint16_t species;
 };
 
 template <int D>
@@ -31,104 +34,236 @@ Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
 }  // namespace
 
 template <int D>
-Part<D>::Part(System<D>& whole, Exchange& ranks)
-    : whole_(whole), ranks_(ranks), holders_(static_cast<std::size_t>(ranks.size())), depth_(kLeastDepth) {
-  whole_.part = this;
-  whole_.particles.ghost.resize(total());
-  choose_everybody();
+Part<D>::Part(System<D>& shares, bool local, double slab_length)
+    : shares_(shares), ranks_(*shares.ranks), holders_(static_cast<std::size_t>(ranks_.size())), depth_(kLeastDepth) {
+  shares_.part = this;
+  divide(nullptr, !local, slab_length);
 }
 
 template <int D>
 Part<D>::~Part() {
-  whole_.part = nullptr;
-  whole_.particles.ghost.clear();
-}
-
-/// Brings what is known of the whole up to date, and tells where each particle's luggage is.
-template <int D>
-std::vector<Bytes> Part<D>::gather_state(const Luggage<D>* luggage, std::vector<Place>* places) {
-  const Particles<D>& p = known().particles;
-  Bytes mine, packed;
-  mine.reserve(p.size() * 2 * sizeof(State<D>));
-  for (Id i = 0; i < p.size(); ++i) {
-    if (!p.owns(i)) continue;
-    put(mine, State<D>{p.x[i], p.v[i], p.image[i], p.id_of(i)});
-    if (!luggage) continue;
-    packed.clear();
-    luggage->pack(i, packed);
-    put(mine, packed.size());
-    mine.insert(mine.end(), packed.begin(), packed.end());
-  }
-  std::vector<Bytes> all = ranks_.gather(mine);
-  if (places) places->resize(total());
-  for (std::size_t rank = 0; rank < all.size(); ++rank)
-    for (Reader from(all[rank]); from.more();) {
-      const auto [x, v, image, id] = from.get<State<D>>();
-      whole_.particles.x[id] = x;
-      whole_.particles.v[id] = v;
-      whole_.particles.image[id] = image;
-      if (!luggage) continue;
-      const auto size = from.get<std::size_t>();
-      (*places)[id] = {rank, all[rank].size() - from.left()};
-      from.skip(size);
-    }
-  return all;
+  shares_.part = nullptr;
 }
 
 template <int D>
 void Part<D>::collect() {
-  if (some_) gather_state(nullptr, nullptr);
+  struct Place {
+    Vec<D> x, v;
+    Image<D> image;
+    Id id;
+  };
+  const Particles<D>& p = known_->particles;
+  const Shares shares{total(), holders_.size()};
+  std::vector<Bytes> outgoing(holders_.size());
+  for (Id i = 0; i < p.size(); ++i)
+    if (p.owns(i))
+      put(outgoing[static_cast<std::size_t>(shares.rank_of(p.id_of(i)))], Place{p.x[i], p.v[i], p.image[i], p.id_of(i)});
+  Particles<D>& share = shares_.particles;
+  const Id first = shares.first(ranks_.rank());
+  for (const Bytes& told : ranks_.swap(std::move(outgoing)))
+    for (Reader reader(told); reader.more();) {
+      const auto [x, v, image, id] = reader.get<Place>();
+      share.x[id - first] = x;
+      share.v[id - first] = v;
+      share.image[id - first] = image;
+    }
 }
 
 template <int D>
 bool Part<D>::divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, double slab_length) {
-  if (some_ ? !outdated() : slab < next_) return false;
-  if (some_) {  // all has gone well since the last time
+  if (everybody_ ? slab < next_ : !outdated()) return false;
+  if (!everybody_) {  // all has gone well since the last time
     patience_ = std::max<std::int64_t>(patience_ / 2, 1);
     depth_ = std::max(0.75 * depth_, kLeastDepth);
   }
-  divide(luggage, !local, slab_length);
+  divide(&luggage, !local, slab_length);
   next_ = slab + kSlabs;
   return true;
 }
 
 template <int D>
 void Part<D>::know_everybody(Luggage<D>& luggage, std::int64_t slab) {
-  divide(luggage, true, 0);
+  divide(&luggage, true, 0);
   next_ = slab + patience_;
   patience_ = std::min(2 * patience_, kSlabs);
 }
 
+/// `luggage`: null before there is any.
 template <int D>
-void Part<D>::divide(Luggage<D>& luggage, bool everybody, double slab_length) {
-  const bool knew_everybody = knows_everybody();
-  std::vector<Place> places;
-  std::vector<Bytes> all;
-  if (!knew_everybody || !everybody) all = gather_state(&luggage, &places);
-  const bool chosen = !everybody && choose(slab_length);
-  if (!chosen) {
-    some_.reset();
-    choose_everybody();
-    if (knew_everybody) return;
-  }
-  luggage.regroup(known());
-  const Particles<D>& p = known().particles;
+void Part<D>::divide(Luggage<D>* luggage, bool everybody, double slab_length) {
+  if (!everybody && divide_some(luggage, slab_length)) return;
+  if (everybody_)
+    own_anew();
+  else
+    tell_everybody(luggage);
+}
+
+/// What this rank's own particles have to tell, put into the messages that for_each_receiver(place, visit) visits.
+template <int D>
+std::vector<Bytes> Part<D>::pack(const Luggage<D>* luggage, std::size_t messages, auto&& for_each_receiver) const {
+  const Particles<D>& p = known_ ? known_->particles : shares_.particles;
+  std::vector<Bytes> told(messages);
+  Bytes packed;
   for (Id i = 0; i < p.size(); ++i) {
-    const Place& place = places[p.id_of(i)];
-    Reader from(all[place.rank]);
-    from.skip(place.at);
-    luggage.unpack(i, from);
+    if (!p.owns(i)) continue;
+    packed.clear();
+    put(packed, State<D>{p.x[i], p.v[i], p.mass[i], p.radius[i], p.charge[i], p.image[i], p.id_of(i), p.species[i]});
+    put(packed, std::size_t{0});
+    const std::size_t before = packed.size();
+    if (luggage) luggage->pack(i, packed);
+    const std::size_t size = packed.size() - before;
+    std::memcpy(packed.data() + before - sizeof size, &size, sizeof size);
+    for_each_receiver(p.x[i], [&](std::size_t message) {
+      told[message].insert(told[message].end(), packed.begin(), packed.end());
+    });
   }
+  return told;
+}
+
+/// Gives each particle to the ranks that need it; false, and nothing has changed: all have to know everybody.
+template <int D>
+bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
+  const System<D>& now = known_ ? *known_ : shares_;
+  const Particles<D>& p = now.particles;
+  std::array<double, 2> most{};  // reach and speed
+  auto& [reach, speed] = most;
+  for (const auto& term : now.interactions)
+    reach = std::max(reach, known_ ? term->reach(p.x) : term->reach(p, ranks_));
+  std::vector<Vec<D>> own;
+  for (Id i = 0; i < p.size(); ++i) {
+    if (!p.owns(i)) continue;
+    speed = std::max(speed, p.v[i].norm());
+    own.push_back(p.x[i]);
+  }
+  ranks_.largest(most);
+  const double diameter = 2 * shares_.sizes->largest_radius();
+  const double path = kFaster * speed * slab_length;
+  const double slack = std::clamp(kSlabsApart * speed * slab_length, kLeastSlack * diameter, kMostSlack * diameter);
+  const double near = std::max(reach, diameter) + 2 * path + 2 * slack, far = near + depth_ * diameter;
+  if (!std::isfinite(far)) return false;
+  const Division<D> division(shares_.box, own, holders_.size(), far, ranks_);
+  std::vector<std::uint64_t> known(holders_.size());
+  for (const Vec<D>& x : own) division.for_each_near(division.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
+  ranks_.sum(known);
+  if (static_cast<double>(std::ranges::max(known)) > kMost * static_cast<double>(total())) return false;
+
+  const auto told = ranks_.swap(pack(luggage, holders_.size(), [&](const Vec<D>& x, auto&& visit) {
+    division.for_each_near(division.wrapped(x), visit);
+  }));
+  std::vector<Arrival> arrivals;
+  auto system = system_of(told, arrivals);
+  std::vector<std::vector<Id>> holders(holders_.size()), ghosts(holders_.size());
+  std::vector<char> matters;
+  std::vector<Vec<D>> at;
+  const auto me = static_cast<std::uint32_t>(ranks_.rank());
+  Particles<D>& q = system->particles;
+  for (Id i = 0; i < q.size(); ++i) {
+    const Vec<D> x = division.wrapped(q.x[i]);
+    const std::uint32_t owner = division.owner(x);
+    q.ghost[i] = owner != me;
+    matters.push_back(owner != me && division.squared_distance(me, x) <= near * near);
+    at.push_back(unwrapped(system->box, q, i));
+    if (owner != me)
+      ghosts[owner].push_back(i);
+    else
+      division.for_each_near(x, [&](std::uint32_t rank) {
+        if (rank != me) holders[rank].push_back(i);
+      });
+  }
+  if (largest(make_interactions(*system) ? 0 : 1) > 0) return false;
+  holders_.swap(holders);
+  ghosts_.swap(ghosts);
+  matters_.swap(matters);
+  at_.swap(at);
+  path_ = path;
+  slack_ = slack;
+  everybody_ = false;
+  take(std::move(system), luggage, told, arrivals);
+  return true;
 }
 
 template <int D>
-void Part<D>::choose_everybody() {
-  Particles<D>& p = whole_.particles;
+void Part<D>::tell_everybody(Luggage<D>* luggage) {
+  const auto told = ranks_.gather(pack(luggage, 1, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
+  std::vector<Arrival> arrivals;
+  auto system = system_of(told, arrivals);
+  make_interactions(*system);
+  everybody_ = true;
+  take(std::move(system), luggage, told, arrivals);
+  own_anew();
+}
+
+/// Those of whom ranks have told, by id, with whatever acts on them. `arrivals`: where in the messages they stand.
+template <int D>
+std::unique_ptr<System<D>> Part<D>::system_of(const std::vector<Bytes>& told, std::vector<Arrival>& arrivals) {
+  for (std::size_t rank = 0; rank < told.size(); ++rank)
+    for (Reader from(told[rank]); from.more();) {
+      const std::size_t at = told[rank].size() - from.left();
+      const Id id = from.template get<State<D>>().id;
+      from.skip(from.template get<std::size_t>());
+      arrivals.push_back({id, rank, at});
+    }
+  std::ranges::sort(arrivals, {}, &Arrival::id);
+  auto system = std::make_unique<System<D>>();
+  Particles<D>& p = system->particles;
+  for_each_array(p, [&](auto& array) { array.reserve(arrivals.size()); });
+  for (const Arrival& arrival : arrivals) {
+    Reader from(told[arrival.rank]);
+    from.skip(arrival.at);
+    const auto s = from.template get<State<D>>();
+    p.x.push_back(s.x);
+    p.v.push_back(s.v);
+    p.image.push_back(s.image);
+    p.mass.push_back(s.mass);
+    p.radius.push_back(s.radius);
+    p.charge.push_back(s.charge);
+    p.species.push_back(s.species);
+    if (arrivals.size() < total()) p.id.push_back(s.id);
+  }
+  p.ghost.resize(p.size());
+  system->box = shares_.box;
+  system->species = shares_.species;
+  system->ranks = shares_.ranks;
+  system->part = this;
+  return system;
+}
+
+/// Whether there is all that this rank's own particles feel.
+template <int D>
+bool Part<D>::make_interactions(System<D>& system) {
+  for (const auto& term : shares_.interactions) {
+    system.interactions.push_back(term->among(shares_.particles, system.particles));
+    if (!system.interactions.back()) return false;
+  }
+  return true;
+}
+
+/// These are known from now on.
+template <int D>
+void Part<D>::take(std::unique_ptr<System<D>> system, Luggage<D>* luggage, const std::vector<Bytes>& told,
+                   const std::vector<Arrival>& arrivals) {
+  known_ = std::move(system);
+  if (!luggage) return;
+  luggage->regroup(*known_);
+  for (Id i = 0; i < arrivals.size(); ++i) {
+    Reader from(told[arrivals[i].rank]);
+    from.skip(arrivals[i].at);
+    from.template get<State<D>>();
+    from.template get<std::size_t>();
+    luggage->unpack(i, from);
+  }
+}
+
+/// Everybody is known: says anew who owns whom.
+template <int D>
+void Part<D>::own_anew() {
+  Particles<D>& p = known_->particles;
   Exchange alone;
-  const Division<D> division(whole_.box, p.x, holders_.size(), 0, alone);
+  const Division<D> division(known_->box, p.x, holders_.size(), 0, alone);
   holders_.assign(holders_.size(), {});
   ghosts_ = holders_;
   matters_.clear();
+  at_ = {};
   const auto me = static_cast<std::size_t>(ranks_.rank());
   for (Id i = 0; i < p.size(); ++i) {
     const std::size_t owner = division.owner(division.wrapped(p.x[i]));
@@ -141,80 +276,21 @@ void Part<D>::choose_everybody() {
   }
 }
 
-/// Chooses whom this rank knows, by where everybody is; false: it has to know everybody.
-template <int D>
-bool Part<D>::choose(double slab_length) {
-  const Particles<D>& all = whole_.particles;
-  double reach = 0, radius = 0, speed = 0;
-  for (const auto& term : whole_.interactions) reach = std::max(reach, term->reach(all.x));
-  for (const double each : all.radius) radius = std::max(radius, each);
-  for (const Vec<D>& v : all.v) speed = std::max(speed, v.norm());
-  path_ = kFaster * speed * slab_length;
-  slack_ = std::clamp(kSlabsApart * speed * slab_length, kLeastSlack * 2 * radius, kMostSlack * 2 * radius);
-  const double near = std::max(reach, 2 * radius) + 2 * path_ + 2 * slack_, far = near + depth_ * 2 * radius;
-  if (!std::isfinite(far)) return false;
-  Exchange alone;
-  const Division<D> division(whole_.box, all.x, holders_.size(), far, alone);
-
-  auto some = std::make_unique<System<D>>();
-  Particles<D>& p = some->particles;
-  const auto me = static_cast<std::uint32_t>(ranks_.rank());
-  holders_.assign(holders_.size(), {});
-  ghosts_ = holders_;
-  matters_.clear();
-  at_.clear();
-  for (Id id = 0; id < all.size(); ++id) {
-    const Vec<D> at = division.wrapped(all.x[id]);
-    const std::uint32_t owner = division.owner(at);
-    if (owner != me && !division.near(me, at)) continue;
-    const auto i = static_cast<Id>(p.id.size());
-    p.id.push_back(id);
-    p.ghost.push_back(owner != me);
-    p.x.push_back(all.x[id]);
-    p.v.push_back(all.v[id]);
-    p.image.push_back(all.image[id]);
-    p.mass.push_back(all.mass[id]);
-    p.radius.push_back(all.radius[id]);
-    p.charge.push_back(all.charge[id]);
-    p.species.push_back(all.species[id]);
-    matters_.push_back(owner != me && division.squared_distance(me, at) <= near * near);
-    at_.push_back(unwrapped(whole_.box, p, i));
-    if (owner != me)
-      ghosts_[owner].push_back(i);
-    else
-      division.for_each_near(at, [&](std::uint32_t rank) {
-        if (rank != me) holders_[rank].push_back(i);
-      });
-  }
-  some->box = whole_.box;
-  some->species = whole_.species;
-  some->ranks = whole_.ranks;
-  some->part = this;
-  bool enough = static_cast<double>(p.size()) <= kMost * static_cast<double>(all.size());
-  for (const auto& term : whole_.interactions) {
-    some->interactions.push_back(term->among(all, p));
-    enough = enough && some->interactions.back();
-  }
-  if (largest(enough ? 0 : 1) > 0) return false;
-  some_ = std::move(some);
-  return true;
-}
-
 template <int D>
 bool Part<D>::covers(const Particles<D>& p, std::span<const Vec<D>> a, double length) {
-  if (!some_) return true;
+  if (everybody_) return true;
   double farthest = 0;
   for (Id i = 0; i < p.size(); ++i) farthest = std::max(farthest, length * (p.v[i] + 0.5 * length * a[i]).norm());
   return covers(farthest);
 }
 
+/// Whether somebody has come so far that the particles are to be divided anew.
 template <int D>
 bool Part<D>::outdated() {
-  if (!some_) return false;
-  const Particles<D>& p = some_->particles;
+  const Particles<D>& p = known_->particles;
   double farthest = 0;
   for (Id i = 0; i < p.size(); ++i)
-    if (p.owns(i)) farthest = std::max(farthest, (unwrapped(whole_.box, p, i) - at_[i]).squaredNorm());
+    if (p.owns(i)) farthest = std::max(farthest, (unwrapped(known_->box, p, i) - at_[i]).squaredNorm());
   return largest(farthest) > 0.64 * slack_ * slack_;
 }
 

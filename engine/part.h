@@ -8,7 +8,9 @@
 // A rank knows either everybody, or its own particles and those near them. For methods that can do with these
 // (Integrator::local()) it runs its ghosts like its own particles; those at the rim of what it knows may go wrong, for
 // they miss partners, so it is checked that those near enough to matter did what they did at their owners'. If they did
-// not, the slab is done again with everybody known. Particles are divided anew before anybody has come too far.
+// not, the slab is done again with everybody known. Particles are divided anew before anybody has come too far: each
+// goes from its owner to those who know it from then on. The system itself keeps to shares (engine/shares.h), which are
+// brought up to date when somebody looks.
 
 #include <memory>
 #include <span>
@@ -33,15 +35,18 @@ class Luggage {
 template <int D>
 class Part {
  public:
-  /// Every rank has the same system; it and `ranks` outlive the part. Everybody is known at first.
-  Part(System<D>& whole, Exchange& ranks);
+  /// Of a system that is kept in shares, which outlives the part. `local`: a rank's own particles and those near them
+  /// are enough for slabs of this length. Collective.
+  Part(System<D>& shares, bool local, double slab_length);
   ~Part();
   Part(const Part&) = delete;
   Part& operator=(const Part&) = delete;
 
   /// The particles that this rank knows.
-  System<D>& known() { return some_ ? *some_ : whole_; }
-  bool knows_everybody() const { return !some_; }
+  System<D>& known() { return *known_; }
+  bool knows_everybody() const { return everybody_; }
+  /// How many particles there are, known or not.
+  std::size_t total() const { return shares_.size(); }
 
   /// At the start of a slab: says anew who owns whom, by where everybody is, and whom this rank knows, if it is time
   /// for that; returns whether it was. `local`: those are enough that own particles may meet.
@@ -50,11 +55,11 @@ class Part {
   void know_everybody(Luggage<D>& luggage, std::int64_t slab);
   /// Ghosts went wrong that matter: next time more of them are to be known.
   void deepen() { depth_ *= 2; }
-  /// Brings positions, velocities and images of the whole system up to date, on all ranks.
+  /// Brings the positions, velocities and images of the shares up to date. Collective.
   void collect();
 
   /// Whether the particles that are known are enough for paths so long in a slab [length].
-  bool covers(double path) { return !some_ || largest(path) <= path_; }
+  bool covers(double path) { return everybody_ || largest(path) <= path_; }
   /// The same for a step of a kick-drift-kick method.
   bool covers(const Particles<D>& p, std::span<const Vec<D>> a, double length);
   /// Whether what a ghost does matters to own particles.
@@ -86,23 +91,29 @@ class Part {
   double seconds_waited() const { return ranks_.seconds(); }  ///< for other ranks
 
  private:
-  /// Where in the messages of all ranks a particle's luggage is.
-  struct Place {
+  /// Where in the messages of all ranks a particle is.
+  struct Arrival {
+    Id id;
     std::size_t rank, at;
   };
-  std::vector<Bytes> gather_state(const Luggage<D>* luggage, std::vector<Place>* places);
-  void divide(Luggage<D>& luggage, bool everybody, double slab_length);
-  bool choose(double slab_length);
-  void choose_everybody();
+  void divide(Luggage<D>* luggage, bool everybody, double slab_length);
+  bool divide_some(Luggage<D>* luggage, double slab_length);
+  void tell_everybody(Luggage<D>* luggage);
+  void own_anew();
+  std::vector<Bytes> pack(const Luggage<D>* luggage, std::size_t messages, auto&& for_each_receiver) const;
+  std::unique_ptr<System<D>> system_of(const std::vector<Bytes>& told, std::vector<Arrival>& arrivals);
+  bool make_interactions(System<D>& system);
+  void take(std::unique_ptr<System<D>> system, Luggage<D>* luggage, const std::vector<Bytes>& told,
+            const std::vector<Arrival>& arrivals);
   bool outdated();
-  std::size_t total() const { return whole_.particles.size(); }
 
-  System<D>& whole_;
-  std::unique_ptr<System<D>> some_;
+  System<D>& shares_;
+  std::unique_ptr<System<D>> known_;
+  bool everybody_ = false;
   TimedExchange ranks_;
   std::vector<std::vector<Id>> holders_, ghosts_;  // by rank: own particles that it knows, and ghosts of its particles
   std::vector<char> matters_;
-  std::vector<Vec<D>> at_;  // where everybody was at the last division, images undone
+  std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
   double path_ = 0, slack_ = 0;
   double depth_;           // of ghosts that do not matter [largest diameter]
   std::int64_t next_ = 0;  // while everybody is known: the slab before which to divide

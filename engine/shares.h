@@ -1,6 +1,6 @@
 #pragma once
-// Who keeps which particles of a system that several ranks share without forces: each has those of consecutive ids,
-// its share, between epochs and whenever somebody looks. While they fly they are where they belong (domains.h).
+// Who keeps which particles of a system that several ranks share: each has those of consecutive ids, its share, at the
+// start and whenever somebody looks. Else they are where they belong (domains.h, part.h).
 
 #include <cstring>
 #include <span>

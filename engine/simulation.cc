@@ -42,16 +42,16 @@ template <int D>
 void Simulation<D>::run(const std::function<bool()>& should_stop) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
+  if (system_->ranks && !system_->sizes) keep_share(*system_);
   std::optional<Part<D>> part;
-  if (system_->ranks && info_.smooth_forces) part.emplace(*system_, *system_->ranks);
-  if (system_->ranks && !info_.smooth_forces && !system_->sizes) keep_share(*system_);
+  if (system_->ranks && info_.smooth_forces) part.emplace(*system_, integrator_->local(), plan_.step);
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);
   const auto known = [&]() -> System<D>& { return part ? part->known() : *system_; };
   const auto nodes = [&]() -> const Particles<D>& {
     const auto* state = integrator_->energy_state();
     return state ? *state : known().particles;
   };
-  integrator_->start(*system_, s.counters);
+  integrator_->start(known(), s.counters);
   monitor.start(nodes());
 
   std::vector<Contact<D>> contacts;
@@ -77,7 +77,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       report.unsure = false;
       part->know_everybody(*integrator_, slab.index);
       monitor.regroup();
-      integrator_->slab(*system_, slab, report);
+      integrator_->slab(known(), slab, report);
     }
 
     ++s.steps;

@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "engine/division.h"
-#include "engine/shares.h"
-#include "engine/sizes.h"
+#include "engine/exchange.h"
+#include "engine/particles.h"
 
 namespace carom {
 
-/// Those in this rank's part of the box, and copies of those so near to it that they may touch them; by id, ascending.
+/// Those in this rank's part of the box, and copies of those near it; by id, ascending.
 template <int D>
 struct Vicinity {
   std::vector<Vec<D>> x;
@@ -19,21 +19,22 @@ struct Vicinity {
   std::vector<char> beyond;  ///< 1: not in this part, but near it
 };
 
-/// Of the particles that all ranks have together, this one its share. Collective.
+/// Of the particles that all ranks have together, this one its share; near: nearer than `distance`, but for rounding.
+/// Collective.
 template <int D>
-Vicinity<D> vicinity(const Box<D>& box, const Sizes& sizes, Exchange& ranks, const Particles<D>& share) {
+Vicinity<D> vicinity(const Box<D>& box, double distance, Exchange& ranks, const Particles<D>& share) {
   struct Copy {
     Vec<D> x;
+    double radius;
     Id id;
-    std::uint16_t species;
   };
-  const double reach = 2 * sizes.largest_radius() * (1 + 1e-6);
+  const double reach = distance * (1 + 1e-6);
   const auto size = static_cast<std::size_t>(ranks.size());
   const Division<D> division(box, share.x, size, reach, ranks);
   std::vector<Bytes> outgoing(size);
   for (Id i = 0; i < share.size(); ++i)
     division.for_each_near(division.wrapped(share.x[i]), [&](std::uint32_t rank) {
-      put(outgoing[rank], Copy{share.x[i], share.id_of(i), share.species[i]});
+      put(outgoing[rank], Copy{share.x[i], share.radius[i], share.id_of(i)});
     });
   std::vector<Copy> places;
   for (Bytes& bytes : ranks.swap(std::move(outgoing))) {
@@ -44,7 +45,7 @@ Vicinity<D> vicinity(const Box<D>& box, const Sizes& sizes, Exchange& ranks, con
   Vicinity<D> found;
   for (const Copy& place : places) {
     found.x.push_back(place.x);
-    found.radius.push_back(sizes.radius_of(place.id, place.species));
+    found.radius.push_back(place.radius);
     found.id.push_back(place.id);
     found.beyond.push_back(division.owner(division.wrapped(place.x)) != static_cast<std::uint32_t>(ranks.rank()));
   }

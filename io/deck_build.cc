@@ -62,16 +62,20 @@ void complete_values(Deck& deck, const System<D>& system) {
 bool built_in_shares(const Deck::Source& source) {
   const std::string& type = source.placement.type;
   const bool lattice = !type.empty() && type != "file" && type != "random" && type != "compressed";
-  return lattice && source.integrator != nullptr && !source.integrator->smooth_forces &&
-         std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
+  return lattice && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
            return species.placed && species.radius.size() == 1 && species.mass.size() == 1;
          });
 }
 
 template <int D>
-void fill_system(const Deck::Source& source, System<D>& system) {
+void fill_box(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
+  for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
+}
+
+template <int D>
+void fill_particles(const Deck::Source& source, System<D>& system) {
   Particles<D>& all = system.particles;
   std::size_t begin = 0, end = source.particles();  // ids of this rank
   if (system.ranks && built_in_shares(source)) {
@@ -89,9 +93,8 @@ void fill_system(const Deck::Source& source, System<D>& system) {
     for (std::size_t id = begin; id < end; ++id) all.id.push_back(static_cast<Id>(id));
   }
   std::size_t first = 0;  // id of the species
+  std::uint16_t index = 0;
   for (const SpeciesConfig& species : source.species) {
-    const auto index = static_cast<std::uint16_t>(system.species.size());
-    system.species.push_back(species.name);
     for (std::size_t id = std::max(begin, first); id < std::min(end, first + species.count); ++id) {
       all.mass.push_back(SpeciesConfig::of(species.mass, id - first));
       all.radius.push_back(SpeciesConfig::of(species.radius, id - first));
@@ -99,6 +102,7 @@ void fill_system(const Deck::Source& source, System<D>& system) {
       all.species.push_back(index);
     }
     first += species.count;
+    ++index;
   }
   const std::size_t n = all.mass.size();
   all.x.assign(n, Vec<D>::Zero());
@@ -147,7 +151,8 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
   if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
   auto system = std::make_unique<System<D>>();
   system->ranks = ranks;
-  fill_system(source, *system);
+  fill_box(source, *system);
+  fill_particles(source, *system);
   place_particles(source, *system);
   system->wrap();
   give_velocities(source, *system);
@@ -160,16 +165,19 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
   problems.throw_errors(Failure::deck);
   check_state(deck, *system, problems);
   problems.throw_errors(Failure::initial_state);
+  if (ranks && !system->sizes) keep_share(*system);
   warn_of_state(deck, *system, problems);
   for (const std::string& warning : problems.warnings()) deck.warnings.push_back(warning);
   return system;
 }
 
-template void fill_system(const Deck::Source&, System<2>&);
+template void fill_box(const Deck::Source&, System<2>&);
+template void fill_particles(const Deck::Source&, System<2>&);
 template double default_epoch(const System<2>&);
 template std::unique_ptr<System<2>> build_system<2>(Deck&, Exchange*);
 
-template void fill_system(const Deck::Source&, System<3>&);
+template void fill_box(const Deck::Source&, System<3>&);
+template void fill_particles(const Deck::Source&, System<3>&);
 template double default_epoch(const System<3>&);
 template std::unique_ptr<System<3>> build_system<3>(Deck&, Exchange*);
 

@@ -5,13 +5,16 @@
 
 namespace carom {
 
-/// Box (unit edges where the deck leaves them to the packing fraction), species, masses, radii and charges; of this
-/// rank's share, where the system has ranks and built_in_shares().
+/// Boundaries, edges (1 where the deck leaves them to the packing fraction) and the names of species.
 template <int D>
-void fill_system(const Deck::Source& source, System<D>& system);
+void fill_box(const Deck::Source& source, System<D>& system);
+
+/// Masses, radii and charges; of this rank's share, where the system has ranks and built_in_shares().
+template <int D>
+void fill_particles(const Deck::Source& source, System<D>& system);
 
 /// Whether ranks can build their shares of the initial state, each for itself: lattices of species whose particles are
-/// alike, for a method without forces.
+/// alike.
 bool built_in_shares(const Deck::Source& source);
 
 /// Positions as [placement] says, for species given by count. Sets the box where the packing fraction does so.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/shares.h"
 #include "io/deck_build.h"
 #include "io/deck_interpret.h"
 #include "io/deck_species.h"
@@ -51,7 +52,7 @@ bool ready(const Deck::Source& source, std::size_t dimension) {
 template <int D>
 void try_interactions(const Deck::Source& source, const std::vector<bool>& skip, Problems& problems) {
   System<D> system;
-  fill_system(source, system);
+  fill_box(source, system);
   make_interactions(source, skip, system, false, problems);
 }
 
@@ -91,7 +92,12 @@ void make_interactions(const Deck::Source& source, const std::vector<bool>& skip
     const InteractionConfig& config = source.interactions[n];
     if (n < skip.size() && skip[n]) continue;
     try {
-      auto term = config.info->make<D>(config.parameters, {system.box, system.particles, system.species, placed});
+      auto term = config.info->make<D>(config.parameters, {.box = system.box,
+                                                            .particles = system.particles,
+                                                            .species = system.species,
+                                                            .placed = placed,
+                                                            .total = source.particles(),
+                                                            .ranks = shared_by(system)});
       if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
         problems.error(config.at,
                        std::string(source.integrator->name) + " cannot carry the interaction '" +

@@ -248,7 +248,6 @@ ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system) : ranks_(r
 
 template <int D>
 void ShareTeller<D>::frame(const Snapshot<D>& s) {
-  if (s.particles->id.empty()) return;  // rank 0 has them too
   one_after_the_other(
       ranks_, [&] { return told(s.particles->x, s.particles->v, s.particles->image); }, [](int, const Bytes&) {});
 }

@@ -7,9 +7,12 @@
 #include <utility>
 
 #include "engine/contact.h"
+#include "engine/forces.h"
+#include "engine/part.h"
 #include "engine/placement.h"
 #include "engine/radial_distribution.h"
 #include "engine/random.h"
+#include "engine/shares.h"
 #include "engine/vicinity.h"
 
 namespace carom {
@@ -57,7 +60,7 @@ Outsiders all_outsiders(const System<D>& system) {
 template <int D>
 Overlaps all_overlaps(const System<D>& system) {
   if (!shared_by(system)) return find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
-  const Vicinity<D> near = vicinity<D>(system.box, *system.sizes, *system.ranks, system.particles);
+  const Vicinity<D> near = vicinity<D>(system.box, 2 * system.sizes->largest_radius(), *system.ranks, system.particles);
   Overlaps all = find_overlaps<D>(system.box, near.x, near.radius, near.beyond);
   if (all.pairs > 0) all.lo = near.id[all.lo], all.hi = near.id[all.hi];
   Bytes mine;
@@ -139,31 +142,29 @@ double shortest_period(const System<D>& system) {
   const std::size_t n = p.size();
   std::vector<Vec<D>> u(n), w(n), force(n);
   for (Id i = 0; i < n; ++i) {
-    RandomStream random(0, RandomPurpose::probe, i);
+    RandomStream random(0, RandomPurpose::probe, p.id_of(i));
     for (int k = 0; k < D; ++k) u[i][k] = random.uniform() - 0.5;
   }
-  double curvature = 0;
+  const auto norm = [&] {
+    ExactSum sum;
+    for (Id i = 0; i < n; ++i)
+      if (p.owns(i)) sum.add(u[i].squaredNorm());
+    return std::sqrt(of_all_ranks(system, sum).value());
+  };
+  Counters uncounted;
+  double curvature = norm();
   for (int round = 0; round < 40; ++round) {
-    double norm = 0;
-    for (const Vec<D>& part : u) norm += part.squaredNorm();
-    for (std::size_t i = 0; i < n; ++i) {
-      w[i] = u[i] / std::sqrt(norm * p.mass[i]);
-      force[i].setZero();
-    }
-    for (const auto& term : system.interactions) term->add_hessian_product(p.x, w, force);
-    double stretched = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      u[i] = force[i] / std::sqrt(p.mass[i]);
-      stretched += u[i].squaredNorm();
-    }
-    curvature = std::sqrt(stretched);
+    for (std::size_t i = 0; i < n; ++i) w[i] = u[i] / (curvature * std::sqrt(p.mass[i]));
+    evaluate_hessian_product<D>(system, p.x, w, force, uncounted);
+    for (std::size_t i = 0; i < n; ++i) u[i] = force[i] / std::sqrt(p.mass[i]);
+    curvature = norm();
     if (!(curvature > 0)) return std::numeric_limits<double>::infinity();
   }
   return 2 * std::numbers::pi / std::sqrt(curvature);
 }
 
 template <int D>
-void warn_of_state(const Deck& deck, const System<D>& system, Problems& problems) {
+void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
   const Deck::Source& source = *deck.source;
   const Box<D>& box = system.box;
   const bool walls = std::find(box.boundary.begin(), box.boundary.end(), Boundary::wall) != box.boundary.end();
@@ -187,11 +188,16 @@ void warn_of_state(const Deck& deck, const System<D>& system, Problems& problems
                        say("cutoff ", config.parameters.real("cutoff"), " is more than half the box, ", shortest / 2),
                        "particles meet several images of each other; enlarge the box");
 
-  constexpr std::uint64_t affordable = 500'000;  // pairs: below a second of work
+  constexpr std::uint64_t affordable = 500'000;  // particles or pairs: below a second of work
+  if (!source.integrator->stepping || system.interactions.empty() || system.size() > affordable) return;
+  std::optional<Part<D>> part;
+  if (shared_by(system)) part.emplace(system, true, deck.plan.step);
+  const System<D>& known = part ? part->known() : system;
   std::uint64_t pairs = 0;
-  for (const auto& term : system.interactions) pairs += term->interacting_pairs(system.particles.x);
-  if (!source.integrator->stepping || system.interactions.empty() || pairs > affordable) return;
-  if (const double period = shortest_period(system); deck.plan.step > period / 10)
+  for (const auto& term : known.interactions) pairs += term->interacting_pairs(known.particles.x);
+  if (part) part->ranks().sum({&pairs, 1});
+  if (pairs > affordable) return;
+  if (const double period = shortest_period(known); deck.plan.step > period / 10)
     problems.warning(source.step,
                      say("step ", deck.plan.step, " is long for the shortest period at the start, ", period),
                      "a tenth of that period or less is usual");
@@ -201,12 +207,12 @@ template bool closed(const Box<2>&);
 template void check_output(const Deck&, const System<2>&, Problems&);
 template void check_state(const Deck&, const System<2>&, Problems&);
 template double shortest_period(const System<2>&);
-template void warn_of_state(const Deck&, const System<2>&, Problems&);
+template void warn_of_state(const Deck&, System<2>&, Problems&);
 
 template bool closed(const Box<3>&);
 template void check_output(const Deck&, const System<3>&, Problems&);
 template void check_state(const Deck&, const System<3>&, Problems&);
 template double shortest_period(const System<3>&);
-template void warn_of_state(const Deck&, const System<3>&, Problems&);
+template void warn_of_state(const Deck&, System<3>&, Problems&);
 
 }  // namespace carom

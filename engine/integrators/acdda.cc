@@ -49,7 +49,7 @@ void AsynchronousDiscreteDerivative<D>::regroup(System<D>& system) {
 template <int D>
 void AsynchronousDiscreteDerivative<D>::start(System<D>& system, Counters& counters) {
   regroup(system);
-  total_ = system.particles.size();
+  total_ = system.part ? system.part->total() : system.size();
   const auto& mass = system.particles.mass;
   std::vector<Vec<D>> a(mass.size());
   evaluate_forces<D>(system, system.particles.x, a, counters);

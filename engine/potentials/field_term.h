@@ -92,6 +92,7 @@ class FieldTerm final : public Interaction<D> {
     return std::make_unique<FieldTerm>(some, field_.among(some));
   }
   double reach(Positions<D>) const override { return 0; }
+  double reach(const Particles<D>&, Exchange&) const override { return 0; }
 
  private:
   const Particles<D>& particles_;

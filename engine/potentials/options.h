@@ -11,6 +11,7 @@
 #include "engine/interaction.h"
 #include "engine/potentials/cut.h"
 #include "engine/potentials/pair_term.h"
+#include "engine/vicinity.h"
 
 namespace carom::options {
 
@@ -31,17 +32,29 @@ std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters&
 /// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending; none for `within`.
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
 
-/// The bonds that `pairs`, `chain` or `within` describe, i < j, ascending.
+/// What ranks have found together, ascending. Collective.
+PairList union_of_all(Exchange& ranks, const PairList& mine);
+
+/// The bonds that `pairs`, `chain` or `within` describe, by ids, i < j, ascending: all there are, on each rank.
 template <int D>
 PairList bonds(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
-  const auto& x = context.particles.x;
-  PairList list = bonds(type, parameters, context.particles.size());
+  PairList list = bonds(type, parameters, context.total);
   if (!parameters.has("within") || !context.placed) return list;
   const double distance = parameters.real("within");
-  NeighbourList<D> near(context.box, std::vector<double>(x.size(), 0.5 * distance));
-  for (const auto& [i, j, image] : near.cover(x)) {
-    const bool known = !list.empty() && list.back() == PairList::value_type{i, j};  // through another image
-    if (!known && (x[i] - x[j] + context.box.shift(image)).norm() <= distance) list.push_back({i, j});
+  const auto add = [&](const auto& p, auto&& counts) {
+    NeighbourList<D> near(context.box, std::vector<double>(p.x.size(), 0.5 * distance));
+    for (const auto& [i, j, image] : near.cover(p.x)) {
+      if (!counts(i) || !((p.x[i] - p.x[j] + context.box.shift(image)).norm() <= distance)) continue;
+      const PairList::value_type bond{p.id.empty() ? i : p.id[i], p.id.empty() ? j : p.id[j]};
+      if (list.empty() || list.back() != bond) list.push_back(bond);  // not through another image
+    }
+  };
+  if (context.ranks) {
+    const Vicinity<D> near = vicinity(context.box, distance, *context.ranks, context.particles);
+    add(near, [&](Id i) { return near.beyond[i] == 0; });
+    list = union_of_all(*context.ranks, list);
+  } else {
+    add(context.particles, [](Id) { return true; });
   }
   if (list.empty()) refuse(type, "no particles stand within " + std::to_string(distance) + "; give a larger 'within'");
   return list;
@@ -77,7 +90,7 @@ std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, We
                                           const std::string& remedy) {
   const SpeciesPair species = species_filter(type, parameters, context);
   if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
-  AllPairs<D> pairs(context.particles.size(), species);
+  AllPairs<D> pairs(context.total, species);
   return std::make_unique<PairTerm<D, P, Weight, AllPairs<D>>>(context.particles, potential, weight, std::move(pairs));
 }
 

@@ -30,8 +30,8 @@ class ProductWeight {
   double operator()(Id i, Id j) const { return (*factor_)[i] * (*factor_)[j]; }
   /// The same property of other particles.
   template <int D>
-  ProductWeight among(const Particles<D>& all, const Particles<D>& some) const {
-    return ProductWeight(factor_ == &all.mass ? some.mass : some.charge);
+  ProductWeight among(const Particles<D>& made_for, const Particles<D>& some) const {
+    return ProductWeight(factor_ == &made_for.mass ? some.mass : some.charge);
   }
 
  private:
@@ -233,12 +233,13 @@ class PairTerm final : public Interaction<D> {
     });
   }
 
-  std::unique_ptr<Interaction<D>> among(const Particles<D>& all, const Particles<D>& some) const override {
+  std::unique_ptr<Interaction<D>> among(const Particles<D>& made_for, const Particles<D>& some) const override {
     auto pairs = pairs_.among(some);
     if (!pairs) return nullptr;
-    return std::make_unique<PairTerm>(some, potential_, weight_.among(all, some), std::move(*pairs));
+    return std::make_unique<PairTerm>(some, potential_, weight_.among(made_for, some), std::move(*pairs));
   }
   double reach(Positions<D> x) const override { return pairs_.reach(x); }
+  double reach(const Particles<D>& share, Exchange& ranks) const override { return pairs_.reach(share, ranks); }
 
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t within = 0;

@@ -13,7 +13,7 @@
 //   pairs_in_slab()                         how many these are
 //   kRemembered                             whether it pays to keep what was found for a pair
 //
-//   reach(x)                                how far apart partners are at most; infinite: no end
+//   reach(x), reach(share, ranks)           how far apart partners are at most; infinite: no end
 //   among(some)                             itself for some of the particles, if they are enough
 //
 // Where ranks share a system, pairs of two ghosts are visited like any other; the loops of PairTerm pass over them.
@@ -23,9 +23,11 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "engine/error.h"
+#include "engine/exchange.h"
 #include "engine/interaction.h"
 #include "engine/neighbour_list.h"
 #include "engine/partners.h"
@@ -76,8 +78,9 @@ class Bonds {
   Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {}
 
   std::optional<Bonds> among(const Particles<D>& some) const {
+    if (some.id.empty()) return *this;
     constexpr Id kNobody = std::numeric_limits<Id>::max();
-    std::vector<Id> number(some.id.empty() ? 0 : some.id.back() + 1, kNobody);
+    std::vector<Id> number(some.id.back() + 1, kNobody);
     for (Id i = 0; i < some.id.size(); ++i) number[some.id[i]] = i;
     const auto of = [&](Id id) { return id < number.size() ? number[id] : kNobody; };
     PairList known;
@@ -95,6 +98,26 @@ class Bonds {
     for_each(x, x, [&](Id i, Id j, const Vec<D>& shift) {
       longest = std::max(longest, separation<D>(x[i], x[j], shift).norm());
     });
+    return longest;
+  }
+  double reach(const Particles<D>& share, Exchange& ranks) const {
+    const Id first = share.size() > 0 ? share.id_of(0) : 0;
+    const auto here = [&](Id id) { return id >= first && id - first < share.size(); };
+    Bytes told;  // of whom another has the lower partner
+    for (const auto& [i, j] : pairs_)
+      if (!here(i) && here(j)) put(told, j), put(told, share.x[j - first]);
+    std::unordered_map<Id, Vec<D>> elsewhere;
+    for (const Bytes& each : ranks.gather(told))
+      for (Reader reader(each); reader.more();) {
+        const auto id = reader.get<Id>();
+        elsewhere[id] = reader.get<Vec<D>>();
+      }
+    double longest = 0;
+    for (const auto& [i, j] : pairs_) {
+      if (!here(i)) continue;
+      const Vec<D> d = share.x[i - first] - (here(j) ? share.x[j - first] : elsewhere.at(j));
+      longest = std::max(longest, (d + box_.shift(box_.nearest_image(d))).norm());
+    }
     return longest;
   }
 
@@ -163,8 +186,12 @@ class AllPairs {
  public:
   AllPairs(std::size_t particles, SpeciesPair species) : particles_(static_cast<Id>(particles)), species_(species) {}
 
-  std::optional<AllPairs> among(const Particles<D>&) const { return std::nullopt; }
+  std::optional<AllPairs> among(const Particles<D>& some) const {
+    if (some.size() < particles_) return std::nullopt;
+    return AllPairs(particles_, species_.among(some));
+  }
   double reach(Positions<D>) const { return std::numeric_limits<double>::infinity(); }
+  double reach(const Particles<D>&, Exchange&) const { return std::numeric_limits<double>::infinity(); }
   static constexpr bool kRemembered = false;  // who collides changes the path of everybody
   void begin_slab(Positions<D>, double) const {}
   template <class Visit>
@@ -201,9 +228,10 @@ class PairsWithinCutoff {
         list_(box, std::vector<double>(particles, 0.5 * cutoff), wanted(species)) {}
 
   std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
-    return PairsWithinCutoff(box_, some.id.size(), cutoff_, species_.among(some));
+    return PairsWithinCutoff(box_, some.size(), cutoff_, species_.among(some));
   }
   double reach(Positions<D>) const { return cutoff_; }
+  double reach(const Particles<D>&, Exchange&) const { return cutoff_; }
 
   template <class Visit>
   void for_each(Positions<D> x, Positions<D> x_new, Visit&& visit) const {
