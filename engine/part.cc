@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "engine/division.h"
 #include "engine/shares.h"
@@ -98,11 +99,13 @@ void Part<D>::divide(Luggage<D>* luggage, bool everybody, double slab_length) {
     tell_everybody(luggage);
 }
 
-/// What this rank's own particles have to tell, put into the messages that for_each_receiver(place, visit) visits.
+/// What this rank's own particles have to tell, put into the messages that for_each_receiver(place, visit) visits;
+/// `particles`: in each of them. Nobody is known any more after that.
 template <int D>
-std::vector<Bytes> Part<D>::pack(const Luggage<D>* luggage, std::size_t messages, auto&& for_each_receiver) const {
+std::vector<Bytes> Part<D>::pack(Luggage<D>* luggage, const std::vector<std::uint64_t>& particles,
+                                 auto&& for_each_receiver) {
   const Particles<D>& p = known_ ? known_->particles : shares_.particles;
-  std::vector<Bytes> told(messages);
+  std::vector<Bytes> told(particles.size());
   Bytes packed;
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
@@ -114,9 +117,12 @@ std::vector<Bytes> Part<D>::pack(const Luggage<D>* luggage, std::size_t messages
     const std::size_t size = packed.size() - before;
     std::memcpy(packed.data() + before - sizeof size, &size, sizeof size);
     for_each_receiver(p.x[i], [&](std::size_t message) {
+      if (told[message].empty()) told[message].reserve(particles[message] * packed.size());
       told[message].insert(told[message].end(), packed.begin(), packed.end());
     });
   }
+  if (luggage) luggage->release();
+  known_.reset();
   return told;
 }
 
@@ -144,37 +150,35 @@ bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
   const Division<D> division(shares_.box, own, holders_.size(), far, ranks_);
   std::vector<std::uint64_t> known(holders_.size());
   for (const Vec<D>& x : own) division.for_each_near(division.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
+  const std::vector<std::uint64_t> mine = known;
   ranks_.sum(known);
   if (static_cast<double>(std::ranges::max(known)) > kMost * static_cast<double>(total())) return false;
 
-  const auto told = ranks_.swap(pack(luggage, holders_.size(), [&](const Vec<D>& x, auto&& visit) {
+  const auto told = ranks_.swap(pack(luggage, mine, [&](const Vec<D>& x, auto&& visit) {
     division.for_each_near(division.wrapped(x), visit);
   }));
   std::vector<Arrival> arrivals;
   auto system = system_of(told, arrivals);
-  std::vector<std::vector<Id>> holders(holders_.size()), ghosts(holders_.size());
-  std::vector<char> matters;
-  std::vector<Vec<D>> at;
+  holders_.assign(holders_.size(), {});
+  ghosts_ = holders_;
+  matters_.clear();
+  at_.clear();
   const auto me = static_cast<std::uint32_t>(ranks_.rank());
   Particles<D>& q = system->particles;
   for (Id i = 0; i < q.size(); ++i) {
     const Vec<D> x = division.wrapped(q.x[i]);
     const std::uint32_t owner = division.owner(x);
     q.ghost[i] = owner != me;
-    matters.push_back(owner != me && division.squared_distance(me, x) <= near * near);
-    at.push_back(unwrapped(system->box, q, i));
+    matters_.push_back(owner != me && division.squared_distance(me, x) <= near * near);
+    at_.push_back(unwrapped(system->box, q, i));
     if (owner != me)
-      ghosts[owner].push_back(i);
+      ghosts_[owner].push_back(i);
     else
       division.for_each_near(x, [&](std::uint32_t rank) {
-        if (rank != me) holders[rank].push_back(i);
+        if (rank != me) holders_[rank].push_back(i);
       });
   }
-  if (largest(make_interactions(*system) ? 0 : 1) > 0) return false;
-  holders_.swap(holders);
-  ghosts_.swap(ghosts);
-  matters_.swap(matters);
-  at_.swap(at);
+  find_partners();
   path_ = path;
   slack_ = slack;
   everybody_ = false;
@@ -184,10 +188,9 @@ bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
 
 template <int D>
 void Part<D>::tell_everybody(Luggage<D>* luggage) {
-  const auto told = ranks_.gather(pack(luggage, 1, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
+  const auto told = ranks_.gather(pack(luggage, {total() / holders_.size()}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
   std::vector<Arrival> arrivals;
   auto system = system_of(told, arrivals);
-  make_interactions(*system);
   everybody_ = true;
   take(std::move(system), luggage, told, arrivals);
   own_anew();
@@ -228,21 +231,15 @@ std::unique_ptr<System<D>> Part<D>::system_of(const std::vector<Bytes>& told, st
   return system;
 }
 
-/// Whether there is all that this rank's own particles feel.
-template <int D>
-bool Part<D>::make_interactions(System<D>& system) {
-  for (const auto& term : shares_.interactions) {
-    system.interactions.push_back(term->among(shares_.particles, system.particles));
-    if (!system.interactions.back()) return false;
-  }
-  return true;
-}
-
 /// These are known from now on.
 template <int D>
 void Part<D>::take(std::unique_ptr<System<D>> system, Luggage<D>* luggage, const std::vector<Bytes>& told,
                    const std::vector<Arrival>& arrivals) {
   known_ = std::move(system);
+  for (const auto& term : shares_.interactions) {
+    known_->interactions.push_back(term->among(shares_.particles, known_->particles));
+    if (!known_->interactions.back()) throw std::logic_error("Part: somebody is missing whom an own particle feels");
+  }
   if (!luggage) return;
   luggage->regroup(*known_);
   for (Id i = 0; i < arrivals.size(); ++i) {
@@ -263,7 +260,7 @@ void Part<D>::own_anew() {
   holders_.assign(holders_.size(), {});
   ghosts_ = holders_;
   matters_.clear();
-  at_ = {};
+  at_.clear();
   const auto me = static_cast<std::size_t>(ranks_.rank());
   for (Id i = 0; i < p.size(); ++i) {
     const std::size_t owner = division.owner(division.wrapped(p.x[i]));
@@ -274,6 +271,14 @@ void Part<D>::own_anew() {
       for (std::size_t rank = 0; rank < holders_.size(); ++rank)
         if (rank != me) holders_[rank].push_back(i);
   }
+  find_partners();
+}
+
+template <int D>
+void Part<D>::find_partners() {
+  partners_.clear();
+  for (std::size_t rank = 0; rank < holders_.size(); ++rank)
+    if (!holders_[rank].empty() || !ghosts_[rank].empty()) partners_.push_back(static_cast<int>(rank));
 }
 
 template <int D>

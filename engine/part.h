@@ -27,6 +27,8 @@ class Luggage {
  public:
   virtual ~Luggage() = default;
   virtual void pack(Id /*i*/, Bytes& /*to*/) const {}
+  /// All is packed: the memory of what it works with is needed for others until regroup().
+  virtual void release() {}
   /// It works for the particles of this system from now on; unpack() follows, for each of them.
   virtual void regroup(System<D>& /*system*/) {}
   virtual void unpack(Id /*i*/, Reader& /*from*/) {}
@@ -68,13 +70,13 @@ class Part {
   /// Tells the others about own particles that they know: pack(i, bytes), there unpack(i, reader).
   template <class Pack, class Unpack>
   void tell(Pack&& pack, Unpack&& unpack) {
-    std::vector<Bytes> outgoing(holders_.size());
-    for (std::size_t rank = 0; rank < holders_.size(); ++rank)
-      for (const Id i : holders_[rank]) pack(i, outgoing[rank]);
-    const std::vector<Bytes> incoming = ranks_.swap(std::move(outgoing));
-    for (std::size_t rank = 0; rank < incoming.size(); ++rank) {
-      Reader from(incoming[rank]);
-      for (const Id i : ghosts_[rank]) unpack(i, from);
+    std::vector<Bytes> outgoing(partners_.size());
+    for (std::size_t k = 0; k < partners_.size(); ++k)
+      for (const Id i : holders_[static_cast<std::size_t>(partners_[k])]) pack(i, outgoing[k]);
+    const std::vector<Bytes> incoming = ranks_.swap(std::move(outgoing), partners_);
+    for (std::size_t k = 0; k < partners_.size(); ++k) {
+      Reader from(incoming[k]);
+      for (const Id i : ghosts_[static_cast<std::size_t>(partners_[k])]) unpack(i, from);
     }
   }
   /// Ghosts get the vectors of their owners.
@@ -100,11 +102,11 @@ class Part {
   bool divide_some(Luggage<D>* luggage, double slab_length);
   void tell_everybody(Luggage<D>* luggage);
   void own_anew();
-  std::vector<Bytes> pack(const Luggage<D>* luggage, std::size_t messages, auto&& for_each_receiver) const;
+  std::vector<Bytes> pack(Luggage<D>* luggage, const std::vector<std::uint64_t>& messages, auto&& for_each_receiver);
   std::unique_ptr<System<D>> system_of(const std::vector<Bytes>& told, std::vector<Arrival>& arrivals);
-  bool make_interactions(System<D>& system);
   void take(std::unique_ptr<System<D>> system, Luggage<D>* luggage, const std::vector<Bytes>& told,
             const std::vector<Arrival>& arrivals);
+  void find_partners();
   bool outdated();
 
   System<D>& shares_;
@@ -112,6 +114,7 @@ class Part {
   bool everybody_ = false;
   TimedExchange ranks_;
   std::vector<std::vector<Id>> holders_, ghosts_;  // by rank: own particles that it knows, and ghosts of its particles
+  std::vector<int> partners_;                      // the ranks of which there are any
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
   double path_ = 0, slack_ = 0;

@@ -38,6 +38,17 @@ constexpr double kStalled = 1e-13;  // where increments stop shrinking below thi
 }  // namespace
 
 template <int D>
+void AsynchronousDiscreteDerivative<D>::release() {
+  core_.reset();
+  scan_.reset();
+  paths_ = Histories<D>();
+  memories_ = std::vector<PairMemory<D>>(memories_.size());
+  for (auto* vectors : {&impulse_, &mean_}) *vectors = std::vector<Vec<D>>();
+  differences_ = std::vector<double>();
+  extrapolation_.release();
+}
+
+template <int D>
 void AsynchronousDiscreteDerivative<D>::regroup(System<D>& system) {
   scan_.emplace(system, max_events_);
   core_.emplace(system, *scan_, max_events_);

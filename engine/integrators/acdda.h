@@ -26,6 +26,7 @@ class AsynchronousDiscreteDerivative : public Integrator<D> {
   bool local() const override { return adaptive_ == 0; }
   void pack(Id i, Bytes& to) const override { extrapolation_.pack(i, to); }
   void unpack(Id i, Reader& from) override { extrapolation_.unpack(i, from); }
+  void release() override;
   void regroup(System<D>& system) override;
   void start(System<D>& system, Counters& counters) override;
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override;

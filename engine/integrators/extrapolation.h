@@ -21,6 +21,12 @@ class Extrapolation {
     time_.assign(a.size(), 0.0);
     length_.fill(0);
   }
+  /// Frees what is known of particles; resize() follows.
+  void release() {
+    for (auto& past : past_) past = std::vector<Vec<D>>();
+    age_ = std::vector<std::uint8_t>();
+    time_ = std::vector<double>();
+  }
   void resize(std::size_t particles) {
     for (auto& past : past_) past.resize(particles);
     age_.resize(particles);

@@ -27,6 +27,7 @@ class PrimitiveSplitting : public Integrator<D> {
   bool local() const override { return true; }
   void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
   void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }
+  void release() override { core_.reset(); }
   void regroup(System<D>& system) override {
     core_.emplace(system.box, system.particles);
     accelerations_.a.resize(system.particles.size());
