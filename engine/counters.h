@@ -17,13 +17,14 @@ struct Counters {
   std::uint64_t sweeps = 0;  ///< iterations of implicit solves
   std::uint64_t pieces = 0;  ///< acdda: in which slabs were solved; more than the steps where one was cut
   std::uint64_t slabs_halved = 0;
-  std::uint64_t fallbacks = 0;    ///< mcva: plain elastic impulses; acdda: solves that took acceleration
-  std::uint64_t divisions = 0;    ///< of the particles among ranks under forces
-  std::uint64_t slabs_again = 0;  ///< done a second time, with everybody known
-  double max_overlap = 0;         ///< deepest overlap met, relative to the contact distance
-  ExactSum collision_virial;      ///< Σ d·impulse over pair collisions [mass·length²/time]
-  EventCounts events;             ///< of the event core, at the end of the last slab; 0 where a method has none
-  DomainCounts domains;           ///< of the regions of this rank; 0 where there is one
+  std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; acdda: solves that took acceleration
+  std::uint64_t divisions = 0;     ///< of the particles among ranks under forces
+  std::uint64_t slabs_again = 0;   ///< done again, with more particles known
+  std::uint64_t slabs_by_all = 0;  ///< of these, with everybody known
+  double max_overlap = 0;          ///< deepest overlap met, relative to the contact distance
+  ExactSum collision_virial;       ///< Σ d·impulse over pair collisions [mass·length²/time]
+  EventCounts events;              ///< of the event core, at the end of the last slab; 0 where a method has none
+  DomainCounts domains;            ///< of the regions of this rank; 0 where there is one
 
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;

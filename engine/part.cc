@@ -13,6 +13,7 @@ namespace {
 constexpr double kLeastSlack = 0.5, kMostSlack = 2;  // that anybody comes between divisions [largest diameter]
 constexpr double kSlabsApart = 16;                   // divisions, about
 constexpr double kFaster = 2;                        // than anybody is, somebody may come to be
+constexpr double kRoom = 1.25;                       // for a path that was too long
 constexpr std::int64_t kSlabs = 64;                  // between divisions while everybody is known
 constexpr double kLeastDepth = 3;                    // of ghosts that do not matter [largest diameter]
 constexpr double kMost = 0.7;                        // of all particles; a rank that would know more knows everybody
@@ -58,7 +59,8 @@ void Part<D>::collect() {
   std::vector<Bytes> outgoing(holders_.size());
   for (Id i = 0; i < p.size(); ++i)
     if (p.owns(i))
-      put(outgoing[static_cast<std::size_t>(shares.rank_of(p.id_of(i)))], Place{p.x[i], p.v[i], p.image[i], p.id_of(i)});
+      put(outgoing[static_cast<std::size_t>(shares.rank_of(p.id_of(i)))],
+          Place{p.x[i], p.v[i], p.image[i], p.id_of(i)});
   Particles<D>& share = shares_.particles;
   const Id first = shares.first(ranks_.rank());
   for (const Bytes& told : ranks_.swap(std::move(outgoing)))
@@ -76,6 +78,7 @@ bool Part<D>::divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, 
   if (!everybody_) {  // all has gone well since the last time
     patience_ = std::max<std::int64_t>(patience_ / 2, 1);
     depth_ = std::max(0.75 * depth_, kLeastDepth);
+    wanted_path_ *= 0.75;
   }
   divide(&luggage, !local, slab_length);
   next_ = slab + kSlabs;
@@ -83,8 +86,9 @@ bool Part<D>::divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, 
 }
 
 template <int D>
-void Part<D>::know_everybody(Luggage<D>& luggage, std::int64_t slab) {
-  divide(&luggage, true, 0);
+void Part<D>::know_more(Luggage<D>& luggage, std::int64_t slab, double slab_length) {
+  if (std::exchange(more_, false) && divide_some(&luggage, slab_length)) return;
+  tell_everybody(&luggage);
   next_ = slab + patience_;
   patience_ = std::min(2 * patience_, kSlabs);
 }
@@ -133,8 +137,7 @@ bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
   const Particles<D>& p = now.particles;
   std::array<double, 2> most{};  // reach and speed
   auto& [reach, speed] = most;
-  for (const auto& term : now.interactions)
-    reach = std::max(reach, known_ ? term->reach(p.x) : term->reach(p, ranks_));
+  for (const auto& term : now.interactions) reach = std::max(reach, known_ ? term->reach(p.x) : term->reach(p, ranks_));
   std::vector<Vec<D>> own;
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
@@ -143,7 +146,7 @@ bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
   }
   ranks_.largest(most);
   const double diameter = 2 * shares_.sizes->largest_radius();
-  const double path = kFaster * speed * slab_length;
+  const double path = std::max(kFaster * speed * slab_length, wanted_path_);
   const double slack = std::clamp(kSlabsApart * speed * slab_length, kLeastSlack * diameter, kMostSlack * diameter);
   const double near = std::max(reach, diameter) + 2 * path + 2 * slack, far = near + depth_ * diameter;
   if (!std::isfinite(far)) return false;
@@ -154,9 +157,8 @@ bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
   ranks_.sum(known);
   if (static_cast<double>(std::ranges::max(known)) > kMost * static_cast<double>(total())) return false;
 
-  const auto told = ranks_.swap(pack(luggage, mine, [&](const Vec<D>& x, auto&& visit) {
-    division.for_each_near(division.wrapped(x), visit);
-  }));
+  const auto told = ranks_.swap(
+      pack(luggage, mine, [&](const Vec<D>& x, auto&& visit) { division.for_each_near(division.wrapped(x), visit); }));
   std::vector<Arrival> arrivals;
   auto system = system_of(told, arrivals);
   holders_.assign(holders_.size(), {});
@@ -188,7 +190,8 @@ bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
 
 template <int D>
 void Part<D>::tell_everybody(Luggage<D>* luggage) {
-  const auto told = ranks_.gather(pack(luggage, {total() / holders_.size()}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
+  const auto told =
+      ranks_.gather(pack(luggage, {total() / holders_.size()}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
   std::vector<Arrival> arrivals;
   auto system = system_of(told, arrivals);
   everybody_ = true;
@@ -279,6 +282,14 @@ void Part<D>::find_partners() {
   partners_.clear();
   for (std::size_t rank = 0; rank < holders_.size(); ++rank)
     if (!holders_[rank].empty() || !ghosts_[rank].empty()) partners_.push_back(static_cast<int>(rank));
+}
+
+template <int D>
+bool Part<D>::covers(double path) {
+  if (everybody_ || (path = largest(path)) <= path_) return true;
+  more_ = std::isfinite(path);
+  if (more_) wanted_path_ = kRoom * path;
+  return false;
 }
 
 template <int D>

@@ -8,9 +8,9 @@
 // A rank knows either everybody, or its own particles and those near them. For methods that can do with these
 // (Integrator::local()) it runs its ghosts like its own particles; those at the rim of what it knows may go wrong, for
 // they miss partners, so it is checked that those near enough to matter did what they did at their owners'. If they did
-// not, the slab is done again with everybody known. Particles are divided anew before anybody has come too far: each
-// goes from its owner to those who know it from then on. The system itself keeps to shares (engine/shares.h), which are
-// brought up to date when somebody looks.
+// not, the slab is done again with more ghosts, in the end with everybody known. Particles are divided anew before
+// anybody has come too far: each goes from its owner to those who know it from then on. The system itself keeps to
+// shares (engine/shares.h), which are brought up to date when somebody looks.
 
 #include <memory>
 #include <span>
@@ -53,15 +53,18 @@ class Part {
   /// At the start of a slab: says anew who owns whom, by where everybody is, and whom this rank knows, if it is time
   /// for that; returns whether it was. `local`: those are enough that own particles may meet.
   bool divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, double slab_length);
-  /// Those who are known were not enough for a slab.
-  void know_everybody(Luggage<D>& luggage, std::int64_t slab);
-  /// Ghosts went wrong that matter: next time more of them are to be known.
-  void deepen() { depth_ *= 2; }
+  /// Those who are known were not enough for a slab: knows more of them, where that was what lacked, or everybody.
+  void know_more(Luggage<D>& luggage, std::int64_t slab, double slab_length);
+  /// Ghosts went wrong that matter: more of them are to be known.
+  void deepen() {
+    depth_ *= 2;
+    more_ = true;
+  }
   /// Brings the positions, velocities and images of the shares up to date. Collective.
   void collect();
 
   /// Whether the particles that are known are enough for paths so long in a slab [length].
-  bool covers(double path) { return everybody_ || largest(path) <= path_; }
+  bool covers(double path);
   /// The same for a step of a kick-drift-kick method.
   bool covers(const Particles<D>& p, std::span<const Vec<D>> a, double length);
   /// Whether what a ghost does matters to own particles.
@@ -118,8 +121,10 @@ class Part {
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
   double path_ = 0, slack_ = 0;
-  double depth_;           // of ghosts that do not matter [largest diameter]
-  std::int64_t next_ = 0;  // while everybody is known: the slab before which to divide
+  double wanted_path_ = 0;  // was longer than that not long ago
+  bool more_ = false;       // ghosts would have been enough for the slab
+  double depth_;            // of ghosts that do not matter [largest diameter]
+  std::int64_t next_ = 0;   // while everybody is known: the slab before which to divide
   std::int64_t patience_ = 1;
 };
 

@@ -69,14 +69,15 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     contacts.clear();
     SlabReport<D> report{.counters = s.counters, .contacts = plan_.events ? &contacts : nullptr, .observe = due};
     report.observer = [&](double offset, const Particles<D>& copies) { monitor.observe(slab.start + offset, copies); };
-    const Counters before = s.counters;
+    Counters before = s.counters;
     integrator_->slab(known(), slab, report);
-    if (report.unsure) {
-      s.counters = before;
-      ++s.counters.slabs_again;
-      report.unsure = false;
-      part->know_everybody(*integrator_, slab.index);
+    while (report.unsure) {
+      part->know_more(*integrator_, slab.index, slab.length);
       monitor.regroup();
+      ++before.slabs_again;
+      before.slabs_by_all += part->knows_everybody() ? 1 : 0;
+      s.counters = before;
+      report.unsure = false;
       integrator_->slab(known(), slab, report);
     }
 

@@ -93,11 +93,11 @@ void make_interactions(const Deck::Source& source, const std::vector<bool>& skip
     if (n < skip.size() && skip[n]) continue;
     try {
       auto term = config.info->make<D>(config.parameters, {.box = system.box,
-                                                            .particles = system.particles,
-                                                            .species = system.species,
-                                                            .placed = placed,
-                                                            .total = source.particles(),
-                                                            .ranks = shared_by(system)});
+                                                           .particles = system.particles,
+                                                           .species = system.species,
+                                                           .placed = placed,
+                                                           .total = source.particles(),
+                                                           .ranks = shared_by(system)});
       if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
         problems.error(config.at,
                        std::string(source.integrator->name) + " cannot carry the interaction '" +

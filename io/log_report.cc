@@ -137,8 +137,9 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
     text += fmt::format("\n{:.6g} force passes, {} sweeps, {} steps halved, {} fallbacks", s.force_passes, c.sweeps,
                         c.slabs_halved, c.fallbacks);
   if (c.divisions > 0)
-    text += fmt::format("\nparticles divided among {} ranks {} times, {} steps done again with everybody known",
-                        ranks.size(), c.divisions, c.slabs_again);
+    text += fmt::format(
+        "\nparticles divided among {} ranks {} times, {} steps done again with more known, {} of them with everybody",
+        ranks.size(), c.divisions, c.slabs_again, c.slabs_by_all);
   text += domains_text(ranks) + memory_text(ranks);
   return text + "\n" + breakdown_text(ranks) + "\nfiles in " + deck.output.directory.string();
 }
