@@ -8,9 +8,12 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "engine/integrators/kicks.h"
+#include "engine/integrators/part_sweeps.h"
 #include "engine/integrators/registry.h"
+#include "engine/shared_contacts.h"
 #include "engine/slab_core.h"
 
 namespace carom::integrator {
@@ -20,25 +23,29 @@ namespace {
 template <int D>
 class TrapezoidRule : public NodeRule<D> {
  public:
-  explicit TrapezoidRule(const System<D>& system) : system_(system) {}
+  TrapezoidRule(const System<D>& system, const PartSweeps<D>& others) : system_(system), others_(others) {}
 
   void node(const Histories<D>& paths, Id i, double t, const EventKey<D>&, Vec<D>& v, Vec<D>& a) override {
     Vec<D> impulse = Vec<D>::Zero(), force = Vec<D>::Zero();
-    for (const auto& term : system_.interactions) evaluations_ += term->add_trapezoids(paths, i, t, impulse, force);
+    for (const auto& term : system_.interactions) count(i, term->add_trapezoids(paths, i, t, impulse, force));
     v = paths.v[paths.last[i]] + impulse / system_.particles.mass[i];
     a = force / system_.particles.mass[i];
   }
 
   /// See Interaction::add_corrections.
   void correct(const Histories<D>& paths, Id i, std::vector<Vec<D>>& impulse) {
-    for (const auto& term : system_.interactions) evaluations_ += term->add_corrections(paths, i, impulse);
+    for (const auto& term : system_.interactions) count(i, term->add_corrections(paths, i, impulse));
   }
 
-  std::uint64_t evaluations() const { return evaluations_; }
+  /// Evaluations of pair forces since this was asked last; of this rank's own particles, where it knows only some.
+  std::uint64_t take_evaluations() { return std::exchange(evaluations_, 0); }
 
  private:
+  void count(Id i, std::uint64_t evaluations) { evaluations_ += others_.counts(i) ? evaluations : 0; }
+
   const System<D>& system_;
-  std::uint64_t evaluations_ = 0;  // of pair forces, since the start
+  const PartSweeps<D>& others_;
+  std::uint64_t evaluations_ = 0;
 };
 
 template <int D>
@@ -48,16 +55,51 @@ class AsynchronousCollisionVerlet : public Integrator<D> {
       : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
 
   void start(System<D>& system, Counters& counters) override {
+    regroup(system);
+    accelerations_.update(system, counters);
+  }
+
+  bool local() const override { return true; }
+  void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
+  void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }
+  void release() override {
+    core_.reset();
+    scan_.reset();
+    paths_ = Histories<D>();
+    for (auto* vectors : {&flight_, &first_, &correction_}) *vectors = std::vector<Vec<D>>();
+  }
+  void regroup(System<D>& system) override {
     scan_.emplace(system, max_events_);
     core_.emplace(system, *scan_, max_events_);
-    rule_.emplace(system);
-    accelerations_.update(system, counters);
+    others_ = PartSweeps<D>(system);
+    rule_.emplace(system, others_);
+    accelerations_.a.resize(system.particles.size());
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
-    const std::uint64_t before = rule_->evaluations();
     scan_->begin_slab(report.counters, report.contacts, accelerations_.a, slab.length);
+    if (!others_) {
+      advance_all(system, slab, report);
+    } else if (!advance_some(system, slab, report)) {
+      report.unsure = true;
+      return;
+    }
+    std::uint64_t evaluations = rule_->take_evaluations();
+    if (others_) others_.ranks().sum({&evaluations, 1});
+    if (slab.index % kCountPairs == 0 || pairs_ == 0) {
+      pairs_ = 0;
+      for (const auto& term : system.interactions) pairs_ += term->interacting_pairs(p.x);
+      if (system.part) system.part->ranks().sum({&pairs_, 1});
+    }
+    if (pairs_ > 0) report.counters.force_passes += static_cast<double>(evaluations) / static_cast<double>(pairs_);
+    system.wrap();
+    report.reached = slab.length;
+  }
+
+ private:
+  void advance_all(System<D>& system, const Slab& slab, SlabReport<D>& report) {
+    auto& p = system.particles;
     auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, p); };
     for (double done = 0; done < slab.length;) {
       scan_->resolve(done, p.x, p.v, elastic);
@@ -69,38 +111,63 @@ class AsynchronousCollisionVerlet : public Integrator<D> {
       finish(system, report.counters);
       done = piece == rest ? slab.length : done + piece;
     }
-    if (slab.index % kCountPairs == 0 || pairs_ == 0) {
-      pairs_ = 0;
-      for (const auto& term : system.interactions) pairs_ += term->interacting_pairs(p.x);
-      if (system.part) system.part->ranks().sum({&pairs_, 1});
-    }
-    if (pairs_ > 0)
-      report.counters.force_passes += static_cast<double>(rule_->evaluations() - before) / static_cast<double>(pairs_);
-    system.wrap();
-    report.reached = slab.length;
   }
 
- private:
+  /// A slab of the particles that this rank knows. False, and nothing has been done, where it takes more than that: an
+  /// earlier end, contacts at its start, or more particles.
+  bool advance_some(System<D>& system, const Slab& slab, SlabReport<D>& report) {
+    auto& p = system.particles;
+    rule_->take_evaluations();
+    if (others_.any(!scan_->quiet(p.x, p.v))) return false;
+    flight_ = accelerations_.a;
+    const double margin = kRoom * others_.largest(farthest(p, slab.length));
+    if (!system.part->covers(margin)) return false;
+    begin(system, slab.length, margin);
+    if (others_.any(core_->run(paths_, *rule_).end != SlabRun<D>::End::complete)) return false;
+    if (!others_.agree(paths_)) {
+      system.part->deepen();
+      return false;
+    }
+    if (!commit_contacts<D>(system, core_->contacts(), max_events_, report.counters, report.contacts)) return false;
+    finish(system, report.counters);
+    system.part->refresh(p.v);
+    return true;
+  }
+
+  /// How far anybody would come [length].
+  double farthest(const Particles<D>& p, double length) const {
+    double farthest = 0;
+    for (std::size_t i = 0; i < p.size(); ++i)
+      farthest = std::max(farthest, length * (p.v[i].norm() + 0.5 * length * flight_[i].norm()));
+    return farthest;
+  }
+
+  /// Gets ready for a slab in which nobody strays farther than `margin`.
+  void begin(const System<D>& system, double length, double margin) {
+    const auto& p = system.particles;
+    core_->begin(p.x, margin);
+    for (const auto& term : system.interactions) term->begin_slab(p.x, margin);
+    reset(p, length);
+  }
+  void reset(const Particles<D>& p, double length) {
+    paths_.reset(length, p.x, p.v);
+    std::ranges::copy(flight_, paths_.a.begin());
+  }
+
   /// Flies everybody through a slab of this length, or a shorter one where it has to end for everybody; returns its
   /// length and leaves the histories in paths_.
   double fly(const System<D>& system, double length) {
     using End = typename SlabRun<D>::End;
     const auto& p = system.particles;
-    double margin = 0;
-    for (std::size_t i = 0; i < p.size(); ++i)
-      margin = std::max(margin, length * (p.v[i].norm() + 0.5 * length * flight_[i].norm()));
+    double margin = farthest(p, length);
     for (;;) {
-      core_->begin(p.x, kRoom * margin);
-      for (const auto& term : system.interactions) term->begin_slab(p.x, kRoom * margin);
+      begin(system, length, kRoom * margin);
       SlabRun<D> run;
-      do {
-        paths_.reset(length, p.x, p.v);
-        std::ranges::copy(flight_, paths_.a.begin());
-        run = core_->run(paths_, *rule_);
-        if (run.end != End::cut) break;
+      while ((run = core_->run(paths_, *rule_)).end == End::cut) {
         scan_->count_event(run.key);
         length = run.time;
-      } while (true);
+        reset(p, length);
+      }
       if (run.end == End::complete) return length;
       if (run.end == End::crowded) scan_->too_many(run.key);
       margin = run.margin;
@@ -115,6 +182,7 @@ class AsynchronousCollisionVerlet : public Integrator<D> {
     for (Id i = 0; i < n; ++i)
       if (!paths_.simple(i)) rule_->correct(paths_, i, correction_);
     for (Id i = 0; i < n; ++i) p.x[i] = paths_.position_in(paths_.last[i], paths_.length);
+    if (others_) system.part->refresh(p.x);
     first_.swap(accelerations_.a);
     accelerations_.update(system, counters);
     for (Id i = 0; i < n; ++i) {
@@ -132,6 +200,7 @@ class AsynchronousCollisionVerlet : public Integrator<D> {
   std::uint64_t max_events_;
   std::optional<ContactScan<D>> scan_;
   std::optional<SlabCore<D>> core_;
+  PartSweeps<D> others_;
   std::optional<TrapezoidRule<D>> rule_;
   Accelerations<D> accelerations_;
   Histories<D> paths_;

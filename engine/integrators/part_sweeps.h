@@ -1,8 +1,9 @@
 #pragma once
-// What acdda tells other ranks about a slab when each of them knows only the particles near its own (engine/part.h).
+// What acva and acdda tell other ranks about a slab when each of them knows only the particles near its own
+// (engine/part.h).
 //
-// After each sweep owners tell what their particles received, and a digest of the events on their paths; whoever has a
-// copy that matters compares. A method alone, or one that knows everybody, asks and tells nothing.
+// After a run owners tell a digest of the events on their particles' paths, and in sweeps what these received; whoever
+// has a copy that matters compares. A method alone, or one that knows everybody, asks and tells nothing.
 
 #include <bit>
 #include <cmath>
@@ -38,6 +39,17 @@ class PartSweeps {
     if (some_) part_->ranks().largest(values);
   }
   Exchange& ranks() const { return part_->ranks(); }
+
+  /// Whether on all ranks all ghosts that matter did what they did at their owners'. Collective.
+  bool agree(const Histories<D>& paths) const {
+    bool agreed = true;
+    part_->tell([&](Id i, Bytes& to) { put(to, digest_with_flight(paths, i)); },
+                [&](Id i, Reader& from) {
+                  const bool same = from.get<std::uint64_t>() == digest_with_flight(paths, i);
+                  agreed = agreed && (same || !part_->matters(i));
+                });
+    return !any(!agreed);
+  }
 
   /// Gives ghosts the impulses of their owners; returns whether all that matter did what they did there. Ghosts whose
   /// impulses are other than before are appended to `changed`.
@@ -82,6 +94,13 @@ class PartSweeps {
       mix(sum, std::bit_cast<std::uint64_t>(paths.x[last][k]));
       mix(sum, std::bit_cast<std::uint64_t>(paths.v[last][k]));
     }
+    return sum;
+  }
+  /// Also of the acceleration after the last event.
+  std::uint64_t digest_with_flight(const Histories<D>& paths, Id i) const {
+    std::uint64_t sum = digest(paths, i);
+    if (sum != 0)
+      for (int k = 0; k < D; ++k) mix(sum, std::bit_cast<std::uint64_t>(paths.a[paths.last[i]][k]));
     return sum;
   }
 

@@ -182,11 +182,11 @@ TEST(Part, Cloud) {
 }
 /// So many that each rank knows only some.
 TEST(Part, ManySprings) {
-  for (const char* method : {"verlet", "psa", "acdda"})
+  for (const char* method : {"verlet", "psa", "acva", "acdda"})
     compare<2>([] { return springs(40); }, method, 0.02, 60, std::string(method) == "verlet" ? 0 : 400);
 }
 TEST(Part, Rod) {
-  for (const char* method : {"psa", "acdda"}) {
+  for (const char* method : {"psa", "acva", "acdda"}) {
     const Statistics s = compare<3>(rod, method, 0.01, 40, 60);
     EXPECT_LT(s.counters.slabs_again, 5u) << method;
   }
