@@ -142,6 +142,18 @@ def test_forces_are_shared(method, tmp_path):
         assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
 
 
+def test_bonds_across_ranks(tmp_path):
+    deck = ROOT / "inputs" / "spring-lattice.toml"
+    stiff = ["particles.count=2500", "interaction.0.stiffness=60.0", "integrator.step=0.05", "run.steps=20",
+             "output.events=true", "output.frame_interval=0.2", "output.msd_interval=0.15"]
+    plain = run(deck, tmp_path / "plain", stiff)
+    assert "is long for the shortest period at the start" in plain.stderr
+    for ranks in 2, 4:
+        done = mpirun(ranks, command(deck, tmp_path / str(ranks), stiff))
+        assert done.stderr == plain.stderr
+        assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
+
+
 def test_too_few_particles_to_share(tmp_path):
     deck = write_deck(tmp_path, SPRINGS)
     run(deck, tmp_path / "one")

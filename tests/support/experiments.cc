@@ -6,6 +6,7 @@
 
 #include "engine/placement.h"
 #include "engine/random.h"
+#include "engine/shares.h"
 
 namespace carom::test {
 
@@ -58,8 +59,11 @@ template <int D>
 void add_interaction(System<D>& system, const std::string& type, const Given& given) {
   Parameters parameters;
   for (const auto& [name, value] : given) parameters.set(name, value);
-  system.interactions.push_back(
-      interaction_named(type).make<D>(parameters, {system.box, system.particles, system.species}));
+  system.interactions.push_back(interaction_named(type).make<D>(parameters, {.box = system.box,
+                                                                             .particles = system.particles,
+                                                                             .species = system.species,
+                                                                             .total = system.size(),
+                                                                             .ranks = shared_by(system)}));
 }
 
 std::unique_ptr<System<2>> five_springs(unsigned start) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "engine/forces.h"
 #include "engine/shares.h"
 #include "engine/simulation.h"
 #include "tests/support/experiments.h"
@@ -204,8 +205,50 @@ TEST(Part, GhostsThatGoWrong) {
     test::add_interaction(*system, "harmonic-bond", {{"within", 1.2}, {"stiffness", 0.1}, {"rest_length", 1.1}});
     return system;
   };
-  const Counters c = compare<2>(strip, "acdda", 0.12, 5, 10000).counters;
-  EXPECT_GT(c.slabs_again, c.slabs_by_all);  // more ghosts were enough
+  for (const char* method : {"acva", "acdda"}) {
+    const Counters c = compare<2>(strip, method, 0.12, 5, 10000).counters;
+    EXPECT_GT(c.slabs_again, c.slabs_by_all) << method;  // more ghosts were enough
+  }
+}
+/// From bonds that ranks find in their shares to what they sum up over what they know: nobody has all.
+TEST(Part, NobodyHasEverybody) {
+  const auto lattice = [] { return test::hard_spheres<2>(40, 0.5); };
+  const test::Given bonds = {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}};
+  auto whole = lattice();
+  test::add_interaction(*whole, "harmonic-bond", bonds);
+  const Particles<2>& all = whole->particles;
+  const double energy = evaluate_energy<2>(*whole, all.x).energy.value();
+  std::vector<Vec<2>> forces(all.size());
+  Counters uncounted;
+  evaluate_forces<2>(*whole, all.x, forces, uncounted);
+  test::ThreadRanks(8).run([&](Exchange& exchange) {
+    auto system = lattice();
+    system->ranks = &exchange;
+    keep_share(*system);
+    test::add_interaction(*system, "harmonic-bond", bonds);
+    double reach = system->interactions[0]->reach(system->particles, exchange);
+    exchange.largest({&reach, 1});
+    EXPECT_EQ(reach, whole->interactions[0]->reach(all.x));
+    Part<2> part(*system, true, 0.02);
+    System<2>& known = part.known();
+    Particles<2>& p = known.particles;
+    EXPECT_FALSE(part.knows_everybody());
+    EXPECT_EQ(part.total(), all.size());
+    EXPECT_EQ(system->particles.size(), all.size() / 8);
+    EXPECT_LT(p.size(), all.size() / 2);
+    EXPECT_EQ(evaluate_energy<2>(known, p.x).energy.value(), energy);
+    std::vector<Vec<2>> felt(p.size());
+    Counters mine;
+    evaluate_forces<2>(known, p.x, felt, mine);
+    for (Id i = 0; i < p.size(); ++i) {
+      EXPECT_EQ(p.x[i], all.x[p.id[i]]);
+      EXPECT_EQ(felt[i], forces[p.id[i]]);
+      if (p.owns(i)) p.x[i] += p.v[i];
+    }
+    part.collect();
+    const Particles<2>& share = system->particles;
+    for (Id i = 0; i < share.size(); ++i) EXPECT_EQ(share.x[i], all.x[share.id[i]] + all.v[share.id[i]]);
+  });
 }
 /// In such long steps a collision is felt farther away than a rank knows.
 TEST(Part, StepsThatTakeEverybody) {
