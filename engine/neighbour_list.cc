@@ -12,6 +12,8 @@ namespace carom {
 
 namespace {
 constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
+constexpr double kCalls = 6;     // a skin that is half as wide as anybody comes in so many calls; so it lasts three,
+constexpr double kWidest = 1.6;  // where it need not be wider than this for it [mean reach]
 constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
 }  // namespace
 
@@ -32,6 +34,7 @@ NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, st
   const double mean =
       std::accumulate(reach_.begin(), reach_.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, reach_.size()));
   least_skin_ = skin_ = 0.3 * mean;  // 15 % of a mean pair reach
+  widest_ = kWidest * mean;
 }
 
 template <int D>
@@ -52,10 +55,12 @@ std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>
   if (!crossed.empty())
     for (auto& pair : pairs_)  // the images of two particles all change by as much: their order stays
       for (int k = 0; k < D; ++k) pair.image[k] += crossed[pair.i][k] - crossed[pair.j][k];
-  const double step = std::sqrt(squared_step) + margin;
-  const bool covers = known && std::sqrt(squared_from_build) + margin <= 0.5 * skin_;
-  const double wanted = std::max(least_skin_, 4 * step);        // room for the step and for some more of its size
-  const bool wasteful = step > 0 && skin_ > kTooWide * wanted;  // made for one wild step
+  const double step = std::sqrt(squared_step) + margin, from_build = std::sqrt(squared_from_build);
+  const bool covers = known && from_build + margin <= 0.5 * skin_;
+  const double to_last = kCalls * from_build / static_cast<double>(++calls_);
+  const double room = known && to_last <= widest_ ? to_last : 0;  // for some calls more
+  const double wanted = std::max({least_skin_, 4 * step, room});  // room for the step and for some more of its size
+  const bool wasteful = step > 0 && skin_ > kTooWide * wanted;    // made for one wild step
   if (!covers || wasteful) {
     for (int k = 0; k < D; ++k)
       if (box_.periodic(k) && !(step <= kMostBoxes * box_.edges[k]))
@@ -94,6 +99,7 @@ void NeighbourList<D>::build(std::span<const Vec<D>> x) {
       throw Error(Failure::numerical,
                   "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
   ++rebuilds_;
+  calls_ = 0;
   built_at_.assign(x.begin(), x.end());
   pairs_.clear();
   partners_.clear();

@@ -53,7 +53,8 @@ class NeighbourList {
   const Box<D>& box_;
   std::vector<double> reach_;
   std::function<bool(Id, Id)> wanted_;
-  double least_skin_, skin_;
+  double least_skin_, skin_, widest_;
+  std::uint64_t calls_ = 0;       // of cover() since the last build
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
   std::vector<NeighbourPair<D>> pairs_;
   Partners partners_;  // empty: not asked for since the last build
