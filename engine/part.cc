@@ -40,6 +40,7 @@ Part<D>::Part(System<D>& shares, bool local, double slab_length)
     : shares_(shares), ranks_(*shares.ranks), holders_(static_cast<std::size_t>(ranks_.size())), depth_(kLeastDepth) {
   shares_.part = this;
   divide(nullptr, !local, slab_length);
+  next_ = kSlabs;
 }
 
 template <int D>

@@ -105,7 +105,7 @@ class Part {
   bool divide_some(Luggage<D>* luggage, double slab_length);
   void tell_everybody(Luggage<D>* luggage);
   void own_anew();
-  std::vector<Bytes> pack(Luggage<D>* luggage, const std::vector<std::uint64_t>& messages, auto&& for_each_receiver);
+  std::vector<Bytes> pack(Luggage<D>* luggage, const std::vector<std::uint64_t>& particles, auto&& for_each_receiver);
   std::unique_ptr<System<D>> system_of(const std::vector<Bytes>& told, std::vector<Arrival>& arrivals);
   void take(std::unique_ptr<System<D>> system, Luggage<D>* luggage, const std::vector<Bytes>& told,
             const std::vector<Arrival>& arrivals);
@@ -121,7 +121,7 @@ class Part {
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
   double path_ = 0, slack_ = 0;
-  double wanted_path_ = 0;  // was longer than that not long ago
+  double wanted_path_ = 0;  // at least that, since one was too long not long ago
   bool more_ = false;       // ghosts would have been enough for the slab
   double depth_;            // of ghosts that do not matter [largest diameter]
   std::int64_t next_ = 0;   // while everybody is known: the slab before which to divide

@@ -44,7 +44,10 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
   Statistics& s = statistics_;
   if (system_->ranks && !system_->sizes) keep_share(*system_);
   std::optional<Part<D>> part;
-  if (system_->ranks && info_.smooth_forces) part.emplace(*system_, integrator_->local(), plan_.step);
+  if (system_->ranks && info_.smooth_forces) {
+    part.emplace(*system_, integrator_->local(), plan_.step);
+    ++s.counters.divisions;
+  }
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);
   const auto known = [&]() -> System<D>& { return part ? part->known() : *system_; };
   const auto nodes = [&]() -> const Particles<D>& {
