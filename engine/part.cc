@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "engine/division.h"
@@ -160,32 +161,12 @@ bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
 
   const auto told = ranks_.swap(
       pack(luggage, mine, [&](const Vec<D>& x, auto&& visit) { division.for_each_near(division.wrapped(x), visit); }));
-  std::vector<Arrival> arrivals;
-  auto system = system_of(told, arrivals);
-  holders_.assign(holders_.size(), {});
-  ghosts_ = holders_;
-  matters_.clear();
-  at_.clear();
-  const auto me = static_cast<std::uint32_t>(ranks_.rank());
-  Particles<D>& q = system->particles;
-  for (Id i = 0; i < q.size(); ++i) {
-    const Vec<D> x = division.wrapped(q.x[i]);
-    const std::uint32_t owner = division.owner(x);
-    q.ghost[i] = owner != me;
-    matters_.push_back(owner != me && division.squared_distance(me, x) <= near * near);
-    at_.push_back(unwrapped(system->box, q, i));
-    if (owner != me)
-      ghosts_[owner].push_back(i);
-    else
-      division.for_each_near(x, [&](std::uint32_t rank) {
-        if (rank != me) holders_[rank].push_back(i);
-      });
-  }
-  find_partners();
+  const auto arrivals = receive(told);
+  assign(division, near);
   path_ = path;
   slack_ = slack;
   everybody_ = false;
-  take(std::move(system), luggage, told, arrivals);
+  unpack(luggage, told, arrivals);
   return true;
 }
 
@@ -193,16 +174,16 @@ template <int D>
 void Part<D>::tell_everybody(Luggage<D>* luggage) {
   const auto told =
       ranks_.gather(pack(luggage, {total() / holders_.size()}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
-  std::vector<Arrival> arrivals;
-  auto system = system_of(told, arrivals);
+  const auto arrivals = receive(told);
   everybody_ = true;
-  take(std::move(system), luggage, told, arrivals);
   own_anew();
+  unpack(luggage, told, arrivals);
 }
 
-/// Those of whom ranks have told, by id, with whatever acts on them. `arrivals`: where in the messages they stand.
+/// Knows those of whom ranks have told; returns where in the messages they stand, by id.
 template <int D>
-std::unique_ptr<System<D>> Part<D>::system_of(const std::vector<Bytes>& told, std::vector<Arrival>& arrivals) {
+std::vector<typename Part<D>::Arrival> Part<D>::receive(const std::vector<Bytes>& told) {
+  std::vector<Arrival> arrivals;
   for (std::size_t rank = 0; rank < told.size(); ++rank)
     for (Reader from(told[rank]); from.more();) {
       const std::size_t at = told[rank].size() - from.left();
@@ -211,8 +192,12 @@ std::unique_ptr<System<D>> Part<D>::system_of(const std::vector<Bytes>& told, st
       arrivals.push_back({id, rank, at});
     }
   std::ranges::sort(arrivals, {}, &Arrival::id);
-  auto system = std::make_unique<System<D>>();
-  Particles<D>& p = system->particles;
+  known_ = std::make_unique<System<D>>();
+  known_->box = shares_.box;
+  known_->species = shares_.species;
+  known_->ranks = shares_.ranks;
+  known_->part = this;
+  Particles<D>& p = known_->particles;
   for_each_array(p, [&](auto& array) { array.reserve(arrivals.size()); });
   for (const Arrival& arrival : arrivals) {
     Reader from(told[arrival.rank]);
@@ -228,18 +213,12 @@ std::unique_ptr<System<D>> Part<D>::system_of(const std::vector<Bytes>& told, st
     if (arrivals.size() < total()) p.id.push_back(s.id);
   }
   p.ghost.resize(p.size());
-  system->box = shares_.box;
-  system->species = shares_.species;
-  system->ranks = shares_.ranks;
-  system->part = this;
-  return system;
+  return arrivals;
 }
 
-/// These are known from now on.
+/// Makes what acts on those known, and gives the method what it has to know of them.
 template <int D>
-void Part<D>::take(std::unique_ptr<System<D>> system, Luggage<D>* luggage, const std::vector<Bytes>& told,
-                   const std::vector<Arrival>& arrivals) {
-  known_ = std::move(system);
+void Part<D>::unpack(Luggage<D>* luggage, const std::vector<Bytes>& told, const std::vector<Arrival>& arrivals) {
   for (const auto& term : shares_.interactions) {
     known_->interactions.push_back(term->among(shares_.particles, known_->particles));
     if (!known_->interactions.back()) throw std::logic_error("Part: somebody is missing whom an own particle feels");
@@ -258,28 +237,33 @@ void Part<D>::take(std::unique_ptr<System<D>> system, Luggage<D>* luggage, const
 /// Everybody is known: says anew who owns whom.
 template <int D>
 void Part<D>::own_anew() {
-  Particles<D>& p = known_->particles;
+  constexpr double kAll = std::numeric_limits<double>::infinity();
   Exchange alone;
-  const Division<D> division(known_->box, p.x, holders_.size(), 0, alone);
+  assign(Division<D>(known_->box, known_->particles.x, holders_.size(), kAll, alone), kAll);
+}
+
+/// Says of those known who owns them, and who knows this rank's own; ghosts nearer than `near` matter.
+template <int D>
+void Part<D>::assign(const Division<D>& division, double near) {
+  Particles<D>& p = known_->particles;
   holders_.assign(holders_.size(), {});
   ghosts_ = holders_;
   matters_.clear();
   at_.clear();
-  const auto me = static_cast<std::size_t>(ranks_.rank());
+  const auto me = static_cast<std::uint32_t>(ranks_.rank());
   for (Id i = 0; i < p.size(); ++i) {
-    const std::size_t owner = division.owner(division.wrapped(p.x[i]));
+    const Vec<D> x = division.wrapped(p.x[i]);
+    const std::uint32_t owner = division.owner(x);
     p.ghost[i] = owner != me;
+    matters_.push_back(owner != me && division.squared_distance(me, x) <= near * near);
+    at_.push_back(unwrapped(known_->box, p, i));
     if (owner != me)
       ghosts_[owner].push_back(i);
     else
-      for (std::size_t rank = 0; rank < holders_.size(); ++rank)
+      division.for_each_near(x, [&](std::uint32_t rank) {
         if (rank != me) holders_[rank].push_back(i);
+      });
   }
-  find_partners();
-}
-
-template <int D>
-void Part<D>::find_partners() {
   partners_.clear();
   for (std::size_t rank = 0; rank < holders_.size(); ++rank)
     if (!holders_[rank].empty() || !ghosts_[rank].empty()) partners_.push_back(static_cast<int>(rank));

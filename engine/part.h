@@ -21,6 +21,9 @@
 
 namespace carom {
 
+template <int D>
+class Division;
+
 /// What a method keeps of each particle from slab to slab, and has to take along when it is to work for others.
 template <int D>
 class Luggage {
@@ -68,7 +71,7 @@ class Part {
   /// The same for a step of a kick-drift-kick method.
   bool covers(const Particles<D>& p, std::span<const Vec<D>> a, double length);
   /// Whether what a ghost does matters to own particles.
-  bool matters(Id i) const { return matters_.empty() || matters_[i] != 0; }
+  bool matters(Id i) const { return matters_[i] != 0; }
 
   /// Tells the others about own particles that they know: pack(i, bytes), there unpack(i, reader).
   template <class Pack, class Unpack>
@@ -106,10 +109,9 @@ class Part {
   void tell_everybody(Luggage<D>* luggage);
   void own_anew();
   std::vector<Bytes> pack(Luggage<D>* luggage, const std::vector<std::uint64_t>& particles, auto&& for_each_receiver);
-  std::unique_ptr<System<D>> system_of(const std::vector<Bytes>& told, std::vector<Arrival>& arrivals);
-  void take(std::unique_ptr<System<D>> system, Luggage<D>* luggage, const std::vector<Bytes>& told,
-            const std::vector<Arrival>& arrivals);
-  void find_partners();
+  std::vector<Arrival> receive(const std::vector<Bytes>& told);
+  void assign(const Division<D>& division, double near);
+  void unpack(Luggage<D>* luggage, const std::vector<Bytes>& told, const std::vector<Arrival>& arrivals);
   bool outdated();
 
   System<D>& shares_;

@@ -241,9 +241,8 @@ void TrajectoryWriter<D>::close() {
 template <int D>
 ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system) : ranks_(ranks) {
   const Particles<D>& p = system.particles;
-  if (system.sizes)
-    one_after_the_other(
-        ranks, [&] { return told(p.mass, p.radius, p.charge, p.species); }, [](int, const Bytes&) {});
+  one_after_the_other(
+      ranks, [&] { return told(p.mass, p.radius, p.charge, p.species); }, [](int, const Bytes&) {});
 }
 
 template <int D>

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
 #include <set>
@@ -85,6 +86,24 @@ TEST(NeighbourList, CoversAllPairsWhileParticlesMoveAndAreWrapped) {
 TEST(NeighbourList, SeesSeveralImagesOfOnePairInASmallBox) {
   walk<2>(Boundary::periodic, 1.5, 1.4);
   walk<3>(Boundary::periodic, 1.5, 1.4);
+}
+
+TEST(NeighbourList, LastsSomeCallsWhereEachMovesParticlesFar) {
+  Box<2> box;
+  box.edges = Vec<2>::Constant(12);
+  box.boundary.fill(Boundary::periodic);
+  const std::vector<double> reach(100, 0.5);
+  std::vector<Vec<2>> x, v;
+  for (int k = 0; k < 100; ++k) {
+    x.push_back({1.2 * (k % 10), 1.2 * (k / 10)});
+    v.push_back({0.1 * std::cos(k), 0.1 * std::sin(k)});  // a list of positions alone lasts for 0.075
+  }
+  NeighbourList<2> list(box, reach);
+  for (int call = 0; call < 30; ++call) {
+    expect_covered<2>(box, x, reach, list.cover(x));
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] += v[i];
+  }
+  EXPECT_LT(list.rebuilds(), 15u);
 }
 
 TEST(NeighbourList, RecoversFromOneWildStep) {
