@@ -17,7 +17,6 @@
 
 #include "engine/box.h"
 #include "engine/exact_sum.h"
-#include "engine/histories.h"
 #include "engine/parameters.h"
 #include "engine/particles.h"
 
@@ -43,23 +42,6 @@ struct PotentialSums {
   }
 };
 
-/// What a term has found out about the pairs of a slab, kept from sweep to sweep.
-template <int D>
-struct PairMemory {
-  /// Given to the lower id, of each pair in the order of the loop. Where a partner has inner nodes: first component,
-  /// where in `stretches` those of its stretches stand.
-  std::vector<Vec<D>> impulse;
-  std::vector<Vec<D>> stretches, stretches_before;
-
-  void clear() { impulse.clear(), stretches.clear(); }
-};
-
-/// How much of a term was evaluated.
-struct PairCounts {
-  std::uint64_t evaluations = 0;  ///< of pair forces
-  std::uint64_t pairs = 0;        ///< that these belong to
-};
-
 template <int D>
 class Interaction {
  public:
@@ -77,35 +59,6 @@ class Interaction {
 
   /// out += V″(x) w.
   virtual void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const = 0;
-
-  /// Fixes the pairs of a slab that starts at x and in which nobody strays farther than `margin` from x. The three
-  /// functions below speak of this slab and take positions from histories; each pair keeps the periodic image it has at
-  /// the start.
-  virtual void begin_slab(Positions<D> /*x*/, double /*margin*/) const {}
-
-  /// impulse[n] += what interval n receives when everybody moves on chords: over each stretch of a pair its duration
-  /// times the mean force between the separations at the stretch's ends. Whatever the nodes, Σ impulse·chord is then
-  /// the change of −V over the slab. Pairs of which neither particle has changed are remembered.
-  virtual PairCounts add_impulses(const Histories<D>& paths, PairMemory<D>& memory, Vectors<D> impulse) const = 0;
-
-  /// Where few have changed: renew_impulses() evaluates their pairs into the memory and appends their partners to
-  /// `partners`; add_impulses_on() then adds what the intervals of particle i receive, bit for bit what the function
-  /// above would. Only for terms that remember pairs.
-  virtual bool remembers() const = 0;
-  virtual std::uint64_t renew_impulses(const Histories<D>& paths, std::span<const Id> changed, PairMemory<D>& memory,
-                                       std::vector<Id>& partners) const = 0;
-  virtual void add_impulses_on(const Histories<D>& paths, Id i, const PairMemory<D>& memory,
-                               Vectors<D> impulse) const = 0;
-
-  /// What particle i receives from the start of its last interval to `end`, by the trapezoidal rule on the stretches of
-  /// its pairs, and −∂V/∂x_i at `end`, everybody moving on parabolas. Returns how many pair forces were evaluated.
-  virtual std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
-                                       Vec<D>& force) const = 0;
-
-  /// For particle i, which has inner nodes: adds to impulse[j], i and its partners among the j, by how much the rule
-  /// above on j's last interval differs from ½h (f(0) + f(h)), the trapezoid without nodes. A pair of particles that
-  /// both have inner nodes is done with the lower id. Returns how many pair forces were evaluated.
-  virtual std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const = 0;
 
   /// The same term for `some` of all particles, which outlive it; `made_for`: the particles it was made for, all or a
   /// share. Null where they are not enough for those of them that are owned.

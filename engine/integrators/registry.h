@@ -11,8 +11,6 @@ IntegratorInfo psa();
 IntegratorInfo cva();
 IntegratorInfo mcva();
 IntegratorInfo cdda();
-IntegratorInfo acva();
-IntegratorInfo acdda();
 
 /// The factory of an integrator template that is made from its parameters.
 template <template <int> class T, int D>

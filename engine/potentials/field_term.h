@@ -39,43 +39,6 @@ class FieldTerm final : public Interaction<D> {
   void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
     for (Id i = 0; i < x.size(); ++i) out[i] += field_.hessian_product(i, x[i], w[i]);
   }
-  PairCounts add_impulses(const Histories<D>& paths, PairMemory<D>& memory, Vectors<D> impulse) const override {
-    const auto particles = static_cast<Id>(paths.particles());
-    PairCounts counts;
-    for (Id i = 0; i < particles; ++i) {
-      add_impulses_on(paths, i, memory, impulse);
-      if (!particles_.owns(i)) continue;
-      ++counts.pairs;
-      for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) ++counts.evaluations;
-    }
-    return counts;
-  }
-  bool remembers() const override { return true; }
-  std::uint64_t renew_impulses(const Histories<D>&, std::span<const Id> changed, PairMemory<D>&,
-                               std::vector<Id>&) const override {
-    return static_cast<std::uint64_t>(std::ranges::count_if(changed, [&](Id i) { return particles_.owns(i); }));
-  }
-  void add_impulses_on(const Histories<D>& paths, Id i, const PairMemory<D>&, Vectors<D> impulse) const override {
-    for (std::uint32_t n = i; n != Histories<D>::kNone; n = paths.next[n]) {
-      const double time = paths.duration(n);
-      impulse[n] -= time * field_.mean_gradient(i, paths.x[n], paths.x[n] + time * paths.chord[n]);
-    }
-  }
-  std::uint64_t add_trapezoids(const Histories<D>& paths, Id i, double end, Vec<D>& impulse,
-                               Vec<D>& force) const override {
-    const std::uint32_t n = paths.last[i];
-    const Vec<D> before = field_.gradient(i, paths.x[n]), after = field_.gradient(i, paths.position_in(n, end));
-    impulse -= (0.5 * (end - paths.start[n])) * (before + after);
-    force -= after;
-    return 2;
-  }
-  std::uint64_t add_corrections(const Histories<D>& paths, Id i, Vectors<D> impulse) const override {
-    const std::uint32_t n = paths.last[i];
-    const Vec<D> first = field_.gradient(i, paths.x[i]), before = field_.gradient(i, paths.x[n]);
-    const Vec<D> after = field_.gradient(i, paths.position_in(n, paths.length));
-    impulse[i] += (0.5 * paths.length) * (first + after) - (0.5 * paths.duration(n)) * (before + after);
-    return 3;
-  }
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t owned = 0;
     for (Id i = 0; i < x.size(); ++i) owned += particles_.owns(i) ? 1 : 0;

@@ -4,15 +4,7 @@
 // Each source offers
 //   for_each(x, x_new, visit)   calls visit(i, j, shift) for its pairs in the order (i, j, image), i < j; the pair's
 //                               separation is separation(x[i], x[j], shift), at x_new with the same shift
-// and for a slab in which nobody strays farther than `margin` from its start x
-//   begin_slab(x, margin)
-//   for_each_in_slab(x, visit)              as for_each
-//   for_each_partner_in_slab(x, i, visit)   calls visit(j, shift, pair) for the pairs of i, in the order (j, image);
-//                                           the shift is that of the pair (lower id, higher id), `pair` its place in
-//                                           the loop over all
-//   pairs_in_slab()                         how many these are
-//   kRemembered                             whether it pays to keep what was found for a pair
-//
+// and
 //   reach(x), reach(share, ranks)           how far apart partners are at most; infinite: no end
 //   among(some)                             itself for some of the particles, if they are enough
 //
@@ -30,7 +22,6 @@
 #include "engine/exchange.h"
 #include "engine/interaction.h"
 #include "engine/neighbour_list.h"
-#include "engine/partners.h"
 
 namespace carom {
 
@@ -74,7 +65,6 @@ class SpeciesPair {
 template <int D>
 class Bonds {
  public:
-  static constexpr bool kRemembered = true;
   Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {}
 
   std::optional<Bonds> among(const Particles<D>& some) const {
@@ -121,37 +111,6 @@ class Bonds {
     return longest;
   }
 
-  void begin_slab(Positions<D> x, double /*margin*/) const {
-    if (partners_.empty()) partners_.build(x.size(), pairs_.size(), [&](std::size_t k) { return pairs_[k]; });
-    wrapped_.clear();
-    std::uint32_t pair = 0;
-    for_each(x, x, [&](Id, Id, const Vec<D>& shift) {
-      if (shift != Vec<D>::Zero()) wrapped_.push_back({pair, shift});
-      ++pair;
-    });
-  }
-  std::size_t pairs_in_slab() const { return pairs_.size(); }
-  template <class Visit>
-  void for_each_in_slab(Positions<D>, Visit&& visit) const {
-    const std::size_t pairs = pairs_.size();
-    std::size_t pair = 0;
-    const Vec<D> none = Vec<D>::Zero();
-    for (std::size_t k = 0; k <= wrapped_.size(); ++k) {
-      for (const std::size_t end = k < wrapped_.size() ? wrapped_[k].pair : pairs; pair < end; ++pair)
-        visit(pairs_[pair][0], pairs_[pair][1], none);
-      if (pair == pairs) return;
-      visit(pairs_[pair][0], pairs_[pair][1], wrapped_[k].shift);
-      ++pair;
-    }
-  }
-  template <class Visit>
-  void for_each_partner_in_slab(Positions<D> x, Id i, Visit&& visit) const {
-    for (const auto& [j, pair] : partners_.of(i)) {
-      const auto& [lo, hi] = pairs_[pair];
-      visit(j, box_.shift(box_.nearest_image(x[lo] - x[hi])), pair);
-    }
-  }
-
   template <class Visit>
   void for_each(Positions<D> x, Positions<D> /*x_new*/, Visit&& visit) const {
     for (const auto& [i, j] : pairs_) {
@@ -171,13 +130,7 @@ class Bonds {
   }
 
   const Box<D>& box_;
-  struct Wrapped {
-    std::uint32_t pair;
-    Vec<D> shift;
-  };
   PairList pairs_;
-  mutable Partners partners_;             // a cache
-  mutable std::vector<Wrapped> wrapped_;  // the bonds of the slab that span another image, in their order
 };
 
 /// All pairs of `particles` particles, in a box without periodic axes; nothing is stored.
@@ -192,19 +145,6 @@ class AllPairs {
   }
   double reach(Positions<D>) const { return std::numeric_limits<double>::infinity(); }
   double reach(const Particles<D>&, Exchange&) const { return std::numeric_limits<double>::infinity(); }
-  static constexpr bool kRemembered = false;  // who collides changes the path of everybody
-  void begin_slab(Positions<D>, double) const {}
-  template <class Visit>
-  void for_each_in_slab(Positions<D> x, Visit&& visit) const {
-    for_each(x, x, visit);
-  }
-  std::size_t pairs_in_slab() const { return 0; }  // of those that are remembered
-  template <class Visit>
-  void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
-    for (Id j = 0; j < particles_; ++j)
-      if (j != i && species_.contains(i, j)) visit(j, NoShift{}, 0);
-  }
-
   template <class Visit>
   void for_each(Positions<D> /*x*/, Positions<D> /*x_new*/, Visit&& visit) const {
     for (Id i = 0; i < particles_; ++i)
@@ -238,18 +178,6 @@ class PairsWithinCutoff {
     for (const NeighbourPair<D>& pair : list_.cover(x, x_new)) visit(pair.i, pair.j, box_.shift(pair.image));
   }
 
-  static constexpr bool kRemembered = true;
-  void begin_slab(Positions<D> x, double margin) const { in_slab_ = list_.cover(x, margin); }
-  std::size_t pairs_in_slab() const { return in_slab_.size(); }
-  template <class Visit>
-  void for_each_in_slab(Positions<D>, Visit&& visit) const {
-    for (const NeighbourPair<D>& pair : in_slab_) visit(pair.i, pair.j, box_.shift(pair.image));
-  }
-  template <class Visit>
-  void for_each_partner_in_slab(Positions<D>, Id i, Visit&& visit) const {
-    for (const auto& [j, pair] : list_.partners().of(i)) visit(j, box_.shift(in_slab_[pair].image), pair);
-  }
-
  private:
   static std::function<bool(Id, Id)> wanted(SpeciesPair species) {
     if (species.all()) return {};
@@ -261,7 +189,6 @@ class PairsWithinCutoff {
   SpeciesPair species_;
   // Caches: their state never shows in the sums.
   mutable NeighbourList<D> list_;
-  mutable std::span<const NeighbourPair<D>> in_slab_;
 };
 
 }  // namespace carom
