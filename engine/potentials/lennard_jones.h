@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -14,6 +16,8 @@ namespace carom {
 class LennardJones {
  public:
   LennardJones(double epsilon, double sigma) : epsilon_(epsilon), sigma2_(sigma * sigma) {}
+
+  ForceScale scale(double) const { return {24 * epsilon_ / std::sqrt(sigma2_), epsilon_}; }
 
   template <class T>
   T value(T rho) const {
