@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/error.h"
+#include "engine/forces.h"
 #include "engine/monitor.h"
 #include "engine/shares.h"
 
@@ -43,6 +44,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
   if (system_->ranks && !system_->sizes) keep_share(*system_);
+  if (info_.smooth_forces) system_->quanta = quanta(*system_);
   std::optional<Part<D>> part;
   if (system_->ranks && info_.smooth_forces) {
     part.emplace(*system_, integrator_->local(), plan_.step);
@@ -55,7 +57,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     return state ? *state : known().particles;
   };
   integrator_->start(known(), s.counters);
-  monitor.start(nodes());
+  monitor.start(nodes(), integrator_->potential());
 
   std::vector<Contact<D>> contacts;
   while (!finished(monitor.time_slack())) {
@@ -98,7 +100,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       const Stopwatch watch(s.counters.seconds.output);
       for (auto* observer : observers_) observer->contacts(slab.start, contacts);
     }
-    monitor.end_of_slab(report.reached, nodes(), finished(monitor.time_slack()));
+    monitor.end_of_slab(report.reached, nodes(), integrator_->potential(), finished(monitor.time_slack()));
     for (auto* observer : observers_) observer->progress(s);
   }
   if (s.stopped_early) monitor.finish();

@@ -35,10 +35,10 @@ struct Plan {
 template <int D>
 struct Snapshot {
   double time = 0;
-  std::int64_t step = 0;         ///< slabs completed (free flight: epochs begun or completed)
-  std::uint64_t collisions = 0;  ///< pair collisions so far
+  std::int64_t step = 0;                    ///< slabs completed (free flight: epochs begun or completed)
+  std::uint64_t collisions = 0;             ///< pair collisions so far
   const Particles<D>* particles = nullptr;  ///< all of them; where ranks have shares, this rank's (with ids)
-  double kinetic = 0, potential = 0;                         ///< [energy]
+  double kinetic = 0, potential = 0;        ///< [energy]
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN where the method has none
   double max_energy_error = 0;                               ///< largest |H − H₁| so far [energy]
   Vec<D> momentum = Vec<D>::Zero();

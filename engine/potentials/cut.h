@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -32,24 +30,31 @@ class Cut {
 
   double cutoff_squared() const { return cutoff2_; }
 
-  double value(double rho) const {
-    if (rho >= cutoff2_) return 0;
-    const double z = rho - cutoff2_;
-    return z * (potential_.quotient(cutoff2_, rho) - slope_ - half_curvature_ * z);
+  template <class T>
+  T value(T rho) const {
+    const T z = rho - cutoff2_;
+    const T inside = z * (potential_.quotient(all<T>(cutoff2_), rho) - slope_ - half_curvature_ * z);
+    return rho < cutoff2_ ? inside : all<T>(0);
   }
-  double derivative(double rho) const {
-    if (rho >= cutoff2_) return 0;
-    return potential_.derivative(rho) - slope_ - 2 * half_curvature_ * (rho - cutoff2_);
+  template <class T>
+  T derivative(T rho) const {
+    const T inside = potential_.derivative(rho) - slope_ - 2 * half_curvature_ * (rho - cutoff2_);
+    return rho < cutoff2_ ? inside : all<T>(0);
   }
-  double second_derivative(double rho) const {
-    if (rho >= cutoff2_) return 0;
-    return potential_.second_derivative(rho) - 2 * half_curvature_;
+  template <class T>
+  T second_derivative(T rho) const {
+    return rho < cutoff2_ ? potential_.second_derivative(rho) - 2 * half_curvature_ : all<T>(0);
   }
-  double quotient(double rho_old, double rho_new) const {
-    const auto [lower, upper] = std::minmax(rho_old, rho_new);
-    if (lower >= cutoff2_) return 0;
-    if (upper >= cutoff2_) return -value(lower) / (upper - lower);
-    return potential_.quotient(lower, upper) - slope_ - half_curvature_ * ((lower - cutoff2_) + (upper - cutoff2_));
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    const T lower = elementary::min(rho_old, rho_new), upper = elementary::max(rho_old, rho_new);
+    T result = potential_.quotient(lower, upper) - slope_ - half_curvature_ * ((lower - cutoff2_) + (upper - cutoff2_));
+    const auto across = !(upper < cutoff2_);
+    if (elementary::any(across)) {
+      const T leaving = lower < cutoff2_ ? -value(lower) / (upper - lower) : all<T>(0);
+      result = across ? leaving : result;
+    }
+    return result;
   }
 
  private:

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/interaction.h"
+#include "engine/neighbour_list.h"
 #include "engine/potentials/cut.h"
 #include "engine/potentials/pair_term.h"
 #include "engine/vicinity.h"
@@ -71,9 +72,9 @@ Vec<D> vector(std::string_view type, const Parameters& parameters, std::string_v
 }
 
 template <int D>
-SpeciesPair species_filter(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
+SpeciesRule species_rule(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
   const auto pair = species_pair(type, parameters, context.species);
-  return pair.empty() ? SpeciesPair() : SpeciesPair(context.particles.species, pair[0], pair[1]);
+  return pair.empty() ? SpeciesRule() : SpeciesRule{&context.particles.species, pair[0], pair[1]};
 }
 
 template <int D>
@@ -83,36 +84,43 @@ bool any_periodic(const Box<D>& box) {
   return false;
 }
 
+/// A term over the pairs of a source, with the scale of the potential before it was cut.
+template <int D, Potential P, class Pairs>
+std::unique_ptr<Interaction<D>> term(P potential, PairWeight weight, const InteractionContext<D>& context, Pairs pairs,
+                                     const auto& whole) {
+  return std::make_unique<PairTerm<D, P, Pairs>>(context.particles, potential, weight, std::move(pairs),
+                                                 [whole](double distance) { return whole.scale(distance); });
+}
+
 /// A term over all pairs; `remedy` says what to write instead in a periodic box, where there is no such sum.
-template <int D, Potential P, class Weight>
-std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, Weight weight,
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, PairWeight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context,
                                           const std::string& remedy) {
-  const SpeciesPair species = species_filter(type, parameters, context);
+  const SpeciesRule species = species_rule(type, parameters, context);
   if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
-  AllPairs<D> pairs(context.total, species);
-  return std::make_unique<PairTerm<D, P, Weight, AllPairs<D>>>(context.particles, potential, weight, std::move(pairs));
+  return term<D>(potential, weight, context, AllPairs<D>(context.box, context.total, species), potential);
 }
 
 /// A term over the pairs within the reach of a potential that ends by itself.
-template <int D, ShortRanged P, class Weight>
-std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, Weight weight,
-                                             const Parameters& parameters, const InteractionContext<D>& context) {
-  const SpeciesPair species = species_filter(type, parameters, context);
+template <int D, ShortRanged P>
+std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, PairWeight weight,
+                                             const Parameters& parameters, const InteractionContext<D>& context,
+                                             const auto& whole) {
   const double reach = std::sqrt(potential.cutoff_squared()) * (1 + 1e-15);
-  PairsWithinCutoff<D> pairs(context.box, context.particles.size(), reach, species);
-  return std::make_unique<PairTerm<D, P, Weight, PairsWithinCutoff<D>>>(context.particles, potential, weight,
-                                                                        std::move(pairs));
+  return term<D>(potential, weight, context,
+                 PairsWithinCutoff<D>(context.box, reach, species_rule(type, parameters, context)), whole);
 }
 
 /// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.
-template <int D, Potential P, class Weight>
-std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, Weight weight,
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, PairWeight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context) {
   if (!parameters.has("cutoff"))
     return all_pairs<D>(type, potential, weight, parameters, context, "give 'cutoff', at most half the shortest edge");
   const CutKind kind = parameters.text("cut") == "shifted" ? CutKind::shifted : CutKind::smooth;
-  return within_reach<D>(type, Cut<P>(potential, parameters.real("cutoff"), kind), weight, parameters, context);
+  return within_reach<D>(type, Cut<P>(potential, parameters.real("cutoff"), kind), weight, parameters, context,
+                         potential);
 }
 
 }  // namespace carom::options

@@ -60,9 +60,11 @@ struct Scene {
   std::mt19937_64 random{11};
 };
 
+inline constexpr double kQuantum = 0x1p-50;  ///< of forces and energies
+
 template <int D>
 PotentialSums sums(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
-  PotentialSums result;
+  PotentialSums result{.quantum = kQuantum};
   term.add_energy(x, result);
   return result;
 }
@@ -73,18 +75,25 @@ double energy(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
 }
 
 template <int D>
-std::vector<Vec<D>> forces(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
-  std::vector<Vec<D>> f(x.size(), Vec<D>::Zero());
-  term.add_forces(x, f);
+std::vector<Vec<D>> values(const ForceSums<D>& sums) {
+  std::vector<Vec<D>> f;
+  for (Id i = 0; i < sums.size(); ++i) f.push_back(sums.value(i));
   return f;
+}
+
+template <int D>
+std::vector<Vec<D>> forces(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
+  ForceSums<D> sums(x.size(), kQuantum);
+  term.add_forces(x, sums);
+  return values(sums);
 }
 
 template <int D>
 std::vector<Vec<D>> mean_forces(const Interaction<D>& term, const std::vector<Vec<D>>& x,
                                 const std::vector<Vec<D>>& x_new) {
-  std::vector<Vec<D>> f(x.size(), Vec<D>::Zero());
-  term.add_mean_forces(x, x_new, f);
-  return f;
+  ForceSums<D> sums(x.size(), kQuantum);
+  term.add_mean_forces(x, x_new, sums);
+  return values(sums);
 }
 
 template <int D>
