@@ -20,6 +20,24 @@ Sums of_all_ranks(const System<D>& system, const Sums& mine) {
   return system.sizes ? sum_of_all(*system.ranks, mine) : mine;
 }
 
+/// Makes each value the largest of what all ranks say. Collective.
+template <int D>
+void largest_of_all(const System<D>& system, std::span<double> values) {
+  if (system.part) system.part->ranks().largest(values);
+}
+template <int D>
+bool any_rank(const System<D>& system, bool value) {
+  double any = value ? 1 : 0;
+  largest_of_all<D>(system, {&any, 1});
+  return any > 0;
+}
+
+/// For what only a rank that knows all particles can do.
+template <int D>
+void need_all(const System<D>& system) {
+  if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
+}
+
 /// (V/N)^(1/D) [length]; whoever knows only some of the particles takes the number of all.
 template <int D>
 double mean_distance(const System<D>& system) {
