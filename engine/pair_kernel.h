@@ -290,9 +290,8 @@ void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32
   const V reach = all<V>(search.reach_squared);
   constexpr std::uint64_t kOdd = PartnerSearch::kMoving | PartnerSearch::kGhost;
   for (std::uint32_t j = begin; j < end; j += W) {
-    const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return search.x + j + l; });
-    const V dx = x - other.x, dy = y - other.y, dz = z - other.z;
-    const B code = (B)other.w;
+    const V dx = x - load<V>(search.x[0] + j), dy = y - load<V>(search.x[1] + j), dz = z - load<V>(search.x[2] + j);
+    const B code = load<B>(search.code + j);
     const auto near = dx * dx + dy * dy + dz * dz <= reach;
     const unsigned odd = bits((code & kOdd) != 0u), wanted = bits((code & search.wanted) != 0u);
     unsigned mask = bits(near) & wanted & first_lanes<W>(end - j);

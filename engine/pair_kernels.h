@@ -109,7 +109,8 @@ struct PairFormula {
 struct PartnerSearch {
   // Codes of particles: may leave the box, a ghost, of the first and of the second species.
   static constexpr std::uint64_t kMoving = 1, kGhost = 2, kFirst = 4, kSecond = 8;
-  const PairRecord* x = nullptr;  ///< in the box; w: the bits of the code
+  const double* x[3] = {};  ///< coordinates in the box
+  const std::uint64_t* code = nullptr;
   std::uint32_t row = 0;
   double own[3];  ///< its position, with the image's shift
   double reach_squared = 0;

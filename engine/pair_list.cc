@@ -1,7 +1,6 @@
 #include "engine/pair_list.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "engine/cell_grid.h"
@@ -99,7 +98,12 @@ constexpr double kCalls = 16;    // a skin is as wide as particles come in so ma
 constexpr double kWidest = 0.8;  // where it need not be wider than this for it [cutoff]
 constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
 
-std::uint64_t code_of(const PairRecord& place) { return std::bit_cast<std::uint64_t>(place.w); }
+/// The larger of two squared distances; a step to where there is no number does not count, its force will tell.
+template <int D>
+double farther(double squared, const Vec<D>& way) {
+  const double other = way.squaredNorm();
+  return other > squared && other <= std::numeric_limits<double>::max() ? other : squared;
+}
 
 }  // namespace
 
@@ -121,8 +125,7 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const std::vector<
   bool known = rebuilds_ > 0 && particles_ == step.x.size() && ghost_ == ghost;
   known = known && follow(step, squared_from_build, squared_step);
   if (!known && !still)
-    for (std::size_t i = 0; i < step.x.size(); ++i)
-      squared_step = std::max(squared_step, (step.x_new[i] - step.x[i]).squaredNorm());
+    for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
   const double length = std::sqrt(squared_step), from_build = std::sqrt(squared_from_build);
   const double to_last = kCalls * from_build / static_cast<double>(++calls_);
   const double room = known && to_last <= kWidest * cutoff_ ? to_last : 0;
@@ -130,7 +133,7 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const std::vector<
   const bool wasteful = length > 0 && skin_ > kTooWide * wanted;  // made for one wild step
   if (!(known && from_build <= 0.5 * skin_) || wasteful) {
     for (std::size_t i = 0; i < step.x.size(); ++i)
-      if (!step.x[i].allFinite() || !(still || step.x_new[i].allFinite()))
+      if (!step.x[i].allFinite())
         throw Error(Failure::numerical,
                     "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
     for (int k = 0; k < D; ++k)
@@ -153,9 +156,8 @@ bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, 
   const double allowed = 0.25 * skin_ * skin_;
   for (std::size_t r = 0; r < records_.order.size(); ++r) {
     const Id i = records_.order[r];
-    const PairRecord& built = built_at_[r];
     Vec<D> home;
-    for (int k = 0; k < D; ++k) home[k] = (&built.x)[k];
+    for (int k = 0; k < D; ++k) home[k] = built_at_[k][r];
     const auto in_box = [&](const Vec<D>& x) {
       Vec<D> y = x - home;
       if (!records_.box.empty())
@@ -167,17 +169,15 @@ bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, 
       if (!way.allFinite()) return false;
       const Image<D> jump = box_.nearest_image(way);
       if (jump != Image<D>{}) {
-        if ((code_of(built) & PartnerSearch::kMoving) == 0) return false;
+        if ((code_[r] & PartnerSearch::kMoving) == 0) return false;
         for (int k = 0; k < D; ++k) (&records_.box[r].x)[k] -= jump[k];
         way = in_box(step.x[i]);
       }
     }
     squared_from_build = std::max(squared_from_build, way.squaredNorm());
     if (step.x_new.empty()) continue;
-    const double after = in_box(step.x_new[i]).squaredNorm();
-    if (!(after <= std::numeric_limits<double>::max())) return false;
-    squared_from_build = std::max(squared_from_build, after);
-    squared_step = std::max(squared_step, (step.x_new[i] - step.x[i]).squaredNorm());
+    squared_from_build = farther<D>(squared_from_build, in_box(step.x_new[i]));
+    squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
   }
   return true;
 }
@@ -288,7 +288,8 @@ void CutoffList<D>::build(const PairStep<D>& step) {
   for (int k = 0; k < D; ++k) around *= 2 * cells.range[k] + 1;
   records_.most_partners = static_cast<std::size_t>(around * static_cast<double>(fullest));
 
-  built_at_.assign(members.size() + 8, {0, 0, 0, 0});
+  for (auto& coordinate : built_at_) coordinate.assign(members.size() + 8, 0);
+  code_.assign(members.size() + 8, 0);
   bool any_moving = false;
   std::vector<Image<D>> boxes(members.size());
   for (std::size_t r = 0; r < members.size(); ++r) {
@@ -303,7 +304,8 @@ void CutoffList<D>::build(const PairStep<D>& step) {
                (box_.periodic(k) && std::min(home[k], box_.edges[k] - home[k]) <= 0.5 * skin_ + 1e-9 * box_.edges[k]);
     if (moving) code |= PartnerSearch::kMoving;
     any_moving = any_moving || moving;
-    built_at_[r] = record<D>(home, std::bit_cast<double>(code));
+    for (int k = 0; k < D; ++k) built_at_[k][r] = home[k];
+    code_[r] = code;
   }
   if (any_moving)
     for (const Image<D>& box : boxes) {
@@ -337,11 +339,14 @@ void CutoffList<D>::build(const PairStep<D>& step) {
 /// Lists the pairs of one particle with those in these ranges.
 template <int D>
 void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> ranges) {
-  const PairRecord& own = built_at_[row];
-  const std::uint64_t code = code_of(own);
+  const std::uint64_t code = code_[row];
   const double reach = (cutoff_ + skin_) * (1 + 1e-12);
   const bool is_ghost = (code & PartnerSearch::kGhost) != 0;
-  PartnerSearch search{.x = built_at_.data(), .row = row, .own = {}, .reach_squared = reach * reach};
+  PartnerSearch search{.x = {built_at_[0].data(), built_at_[1].data(), built_at_[2].data()},
+                       .code = code_.data(),
+                       .row = row,
+                       .own = {},
+                       .reach_squared = reach * reach};
   search.wanted = species_.partner_code(code);
   search.plain = (code & (PartnerSearch::kMoving | PartnerSearch::kGhost)) == 0;
   for (std::size_t first = 0; first < ranges.size();) {
@@ -352,7 +357,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     if (plain_.size() < plain_size_ + candidates) plain_.resize(2 * (plain_size_ + candidates));
     if (other_.size() < candidates) other_.resize(candidates);
     search.here = ranges[first].here();
-    for (int k = 0; k < 3; ++k) search.own[k] = (&own.x)[k] + (k < D ? image[k] * box_.edges[k] : 0.0);
+    for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
     PartnersFound found{plain_.data() + plain_size_, other_.data()};
     for (; first < last; ++first) kernels_.find(search, ranges[first].begin, ranges[first].end, found);
     const auto add = [&](int kind, std::size_t begin, std::size_t end) {
@@ -369,7 +374,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
       auto& partners = records_.partners[kind];
       const std::size_t begin = partners.size();
       for (const std::uint32_t* other = other_.data(); other < found.other; ++other) {
-        const bool other_is_ghost = (code_of(built_at_[*other]) & PartnerSearch::kGhost) != 0;
+        const bool other_is_ghost = (code_[*other] & PartnerSearch::kGhost) != 0;
         if (is_ghost && other_is_ghost) continue;
         if ((kind == PairRecords<D>::kShared) == (is_ghost || other_is_ghost)) partners.push_back(*other);
       }

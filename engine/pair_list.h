@@ -108,7 +108,8 @@ class CutoffList {
   std::size_t particles_ = 0;  // at the last build
   std::uint64_t calls_ = 0, rebuilds_ = 0;
   PairRecords<D> records_;
-  std::vector<PairRecord> built_at_;  // positions in the box, with codes
+  std::array<std::vector<double>, 3> built_at_;  // coordinates in the box at the last build
+  std::vector<std::uint64_t> code_;
   std::vector<std::uint32_t> plain_, other_;
   std::size_t plain_size_ = 0;
 };
