@@ -22,6 +22,7 @@
 
 namespace carom {
 
+class BondTable;
 class Exchange;
 
 template <int D>
@@ -40,6 +41,12 @@ struct PotentialSums {
     magnitude.add(other.magnitude);
     virial.add(other.virial);
   }
+};
+
+/// A constant that is added to what is reported of V (engine/potentials/tail.h).
+struct Tail {
+  double energy = 0;  ///< [energy]
+  double virial = 0;  ///< as in PotentialSums [energy]
 };
 
 template <int D>
@@ -76,6 +83,12 @@ class Interaction {
   /// Free flight can carry such a field exactly.
   virtual const Vec<D>* common_acceleration() const { return nullptr; }
 
+  /// What its cutoff takes away, estimated; of all particles, on each rank.
+  virtual Tail tail() const { return {}; }
+
+  /// The bonds it stands for, by ids, where it was made for all particles or a share; null where it has none.
+  virtual const PairList* bonds() const { return nullptr; }
+
   /// Whether the term is invariant under translation, so that it keeps the total momentum.
   virtual bool keeps_momentum() const { return true; }
 };
@@ -85,10 +98,11 @@ template <int D>
 struct InteractionContext {
   const Box<D>& box;
   const Particles<D>& particles;
-  const std::vector<std::string>& species;  ///< names, in the order of Particles::species
-  bool placed = true;                       ///< whether positions are known; else only the parameters count
-  std::size_t total = particles.size();     ///< how many there are on all ranks, where `particles` are a share of them
-  Exchange* ranks = nullptr;                ///< these ranks; null: all particles are here
+  const std::vector<std::string>& species;   ///< names, in the order of Particles::species
+  bool placed = true;                        ///< whether positions are known; else only the parameters count
+  std::size_t total = particles.size();      ///< how many there are on all ranks, where `particles` are a share of them
+  Exchange* ranks = nullptr;                 ///< these ranks; null: all particles are here
+  std::shared_ptr<const BondTable> bonds{};  ///< of all terms of bonds; null: there are no such terms
 };
 
 /// The declaration of one type of interaction; engine/potentials/registry.cc lists them all.

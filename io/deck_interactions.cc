@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/potentials/pair_filter.h"
 #include "engine/shares.h"
 #include "io/deck_build.h"
 #include "io/deck_interpret.h"
@@ -88,30 +89,46 @@ void read_interactions(Deck::Source& source, std::size_t dimension, Problems& pr
 template <int D>
 void make_interactions(const Deck::Source& source, const std::vector<bool>& skip, System<D>& system, bool placed,
                        Problems& problems) {
-  for (std::size_t n = 0; n < source.interactions.size(); ++n) {
+  InteractionContext<D> context{.box = system.box,
+                                .particles = system.particles,
+                                .species = system.species,
+                                .placed = placed,
+                                .total = source.particles(),
+                                .ranks = shared_by(system)};
+  const auto bonded = [](const InteractionConfig& config) {
+    return config.info->kind == InteractionInfo::Kind::bonded;
+  };
+  std::vector<std::unique_ptr<Interaction<D>>> terms(source.interactions.size());
+  const auto make = [&](std::size_t n) {
     const InteractionConfig& config = source.interactions[n];
-    if (n < skip.size() && skip[n]) continue;
+    if (n < skip.size() && skip[n]) return;
     try {
-      auto term = config.info->make<D>(config.parameters, {.box = system.box,
-                                                           .particles = system.particles,
-                                                           .species = system.species,
-                                                           .placed = placed,
-                                                           .total = source.particles(),
-                                                           .ranks = shared_by(system)});
+      auto term = config.info->make<D>(config.parameters, context);
       if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
         problems.error(config.at,
                        std::string(source.integrator->name) + " cannot carry the interaction '" +
                            std::string(config.info->name) + "'",
                        "it knows no forces but a uniform-field; leave the interaction out, or take psa, acva, acdda or "
                        "their relatives");
-      system.interactions.push_back(std::move(term));
+      terms[n] = std::move(term);
     } catch (const Error& e) {  // its message has the form "what; what to do"
       const std::string message = e.what();
       const std::size_t cut = std::min(message.find("; "), message.size());
       problems.error(config.at, message.substr(0, cut),
                      cut < message.size() ? message.substr(cut + 2) : "see `carom schema`");
     }
+  };
+  PairList bonds;  // before the terms that leave out bonded pairs
+  for (std::size_t n = 0; n < terms.size(); ++n) {
+    if (!bonded(source.interactions[n])) continue;
+    make(n);
+    if (terms[n]) bonds.insert(bonds.end(), terms[n]->bonds()->begin(), terms[n]->bonds()->end());
   }
+  if (std::ranges::any_of(source.interactions, bonded)) context.bonds = std::make_shared<BondTable>(std::move(bonds));
+  for (std::size_t n = 0; n < terms.size(); ++n)
+    if (!bonded(source.interactions[n])) make(n);
+  for (auto& term : terms)
+    if (term) system.interactions.push_back(std::move(term));
 }
 
 template void make_interactions(const Deck::Source&, const std::vector<bool>&, System<2>&, bool, Problems&);

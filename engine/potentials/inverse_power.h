@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "engine/elementary.h"
 #include "engine/potentials/potential.h"
@@ -27,6 +29,11 @@ class InversePower {
     const double difference = upper - lower;
     if (difference == 0) return derivative(lower);
     return value(lower) * elementary::expm1(-n_ * elementary::log1p(difference / lower)) / difference;
+  }
+  /// ∫_r^∞ V r^(D−1) dr = V r^D/(p − D), infinite for p ≤ D
+  double tail(double r, int dimension) const {
+    if (2 * n_ <= dimension) return std::numeric_limits<double>::infinity();
+    return value(r * r) * std::pow(r, dimension) / (2 * n_ - dimension);
   }
 
  private:

@@ -11,23 +11,32 @@
 #include "engine/interaction.h"
 #include "engine/potentials/cut.h"
 #include "engine/potentials/pair_term.h"
+#include "engine/potentials/tail.h"
 #include "engine/vicinity.h"
 
 namespace carom::options {
 
-/// Shared declarations.
-Parameter species();
-Parameter cutoff();
-Parameter cut();
+/// `own` followed by those that say between which particles a term acts.
+std::vector<Parameter> with_filter(std::vector<Parameter> own);
 
-/// `own` followed by species, cutoff and cut.
+/// The same, followed by cutoff, cut, switch_from and tail.
 std::vector<Parameter> with_pair_options(std::vector<Parameter> own);
 
 [[noreturn]] void refuse(std::string_view type, const std::string& problem);
 
-/// The two species `species` names, as indices into `known`; empty if the key is absent.
-std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters& parameters,
-                                        const std::vector<std::string>& known);
+/// The two species `species` names, as indices into `known`.
+SpeciesPair species_pair(std::string_view type, const Parameters& parameters, const std::vector<std::string>& known);
+
+/// A potential cut as `cutoff`, `cut` and `switch_from` say, or at `end` where there is no `cutoff`.
+struct CutOptions {
+  double cutoff;
+  CutKind kind;
+  double switch_from;
+};
+CutOptions cut_options(std::string_view type, const Parameters& parameters, double end = 0);
+
+/// What is said of the end of a potential that has none.
+void refuse_cut_options(std::string_view type, const Parameters& parameters);
 
 /// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending; none for `within`.
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
@@ -70,10 +79,15 @@ Vec<D> vector(std::string_view type, const Parameters& parameters, std::string_v
   return Eigen::Map<const Vec<D>>(given.data());
 }
 
+/// What `species` and `exclude` say.
 template <int D>
-SpeciesPair species_filter(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
-  const auto pair = species_pair(type, parameters, context.species);
-  return pair.empty() ? SpeciesPair() : SpeciesPair(context.particles.species, pair[0], pair[1]);
+PairFilter filter(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
+  const SpeciesPair species = species_pair(type, parameters, context.species);
+  const bool exclude = parameters.has("exclude") && parameters.text("exclude") == "bonded";
+  if (exclude && !context.bonds)
+    refuse(type,
+           "exclude = \"bonded\" leaves out bonded pairs, but there are no bonds; leave it out or add a harmonic-bond");
+  return {context.particles, species, exclude ? context.bonds : nullptr};
 }
 
 template <int D>
@@ -88,31 +102,74 @@ template <int D, Potential P, class Weight>
 std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, Weight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context,
                                           const std::string& remedy) {
-  const SpeciesPair species = species_filter(type, parameters, context);
+  PairFilter pairs_of = filter(type, parameters, context);
   if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
-  AllPairs<D> pairs(context.total, species);
+  AllPairs<D> pairs(context.total, std::move(pairs_of));
   return std::make_unique<PairTerm<D, P, Weight, AllPairs<D>>>(context.particles, potential, weight, std::move(pairs));
 }
 
 /// A term over the pairs within the reach of a potential that ends by itself.
 template <int D, ShortRanged P, class Weight>
 std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, Weight weight,
-                                             const Parameters& parameters, const InteractionContext<D>& context) {
-  const SpeciesPair species = species_filter(type, parameters, context);
+                                             const Parameters& parameters, const InteractionContext<D>& context,
+                                             Tail tail = {}) {
   const double reach = std::sqrt(potential.cutoff_squared()) * (1 + 1e-15);
-  PairsWithinCutoff<D> pairs(context.box, context.particles.size(), reach, species);
+  PairsWithinCutoff<D> pairs(context.box, context.particles.size(), reach, filter(type, parameters, context));
   return std::make_unique<PairTerm<D, P, Weight, PairsWithinCutoff<D>>>(context.particles, potential, weight,
-                                                                        std::move(pairs));
+                                                                        std::move(pairs), tail);
+}
+
+/// The long-range correction of a term over all particles on all ranks.
+template <int D, Potential P, class Weight>
+Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, Weight weight, const Parameters& parameters,
+          const InteractionContext<D>& context) {
+  if constexpr (!KnowsTail<P>) {
+    refuse(type, "'tail' needs to know the potential beyond its end; leave it out");
+  } else {
+    if (kind == CutKind::force_shifted)
+      refuse(type,
+             "'tail' does not go with cut = \"force-shifted\", which changes V at all distances; take \"switch\"");
+    for (int k = 0; k < D; ++k)
+      if (!context.box.periodic(k))
+        refuse(type, "'tail' is for a fluid without borders; make the box periodic or leave it out");
+    if (!std::isfinite(cut.whole().tail(1, D)))
+      refuse(type, "the long-range correction diverges: V falls off too slowly; leave 'tail' out");
+    const SpeciesPair species = species_pair(type, parameters, context.species);
+    struct Sums {
+      std::array<ExactSum, 2> weight;  // of either species
+      void add(const Sums& other) {
+        for (int k = 0; k < 2; ++k) weight[k].add(other.weight[k]);
+      }
+    } sums;
+    for (Id i = 0; i < context.particles.mass.size(); ++i)
+      for (int k = 0; k < 2; ++k)
+        if (!species || context.particles.species[i] == (*species)[k]) sums.weight[k].add(weight.of(i));
+    if (context.ranks) sums = sum_of_all(*context.ranks, sums);
+    const double pairs = sums.weight[0].value() * sums.weight[1].value();
+    const bool alike = !species || (*species)[0] == (*species)[1];
+    return tail_of<D>(cut, alike ? pairs / 2 : pairs, context.box.volume());
+  }
+}
+
+/// A term cut as said, with its long-range correction if the deck wants it.
+template <int D, Potential P, class Weight>
+std::unique_ptr<Interaction<D>> cut_term(std::string_view type, P potential, Weight weight, const CutOptions& options,
+                                         const Parameters& parameters, const InteractionContext<D>& context) {
+  const Cut<P> cut(potential, options.cutoff, options.kind, options.switch_from);
+  const bool wanted = parameters.has("tail") && parameters.flag("tail");
+  return within_reach<D>(type, cut, weight, parameters, context,
+                         wanted ? tail<D>(type, cut, options.kind, weight, parameters, context) : Tail{});
 }
 
 /// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.
 template <int D, Potential P, class Weight>
 std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, Weight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context) {
-  if (!parameters.has("cutoff"))
+  if (!parameters.has("cutoff")) {
+    refuse_cut_options(type, parameters);
     return all_pairs<D>(type, potential, weight, parameters, context, "give 'cutoff', at most half the shortest edge");
-  const CutKind kind = parameters.text("cut") == "shifted" ? CutKind::shifted : CutKind::smooth;
-  return within_reach<D>(type, Cut<P>(potential, parameters.real("cutoff"), kind), weight, parameters, context);
+  }
+  return cut_term<D>(type, potential, weight, cut_options(type, parameters), parameters, context);
 }
 
 }  // namespace carom::options

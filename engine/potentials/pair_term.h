@@ -17,6 +17,7 @@ namespace carom {
 /// w_ij = 1.
 struct UnitWeight {
   double operator()(Id, Id) const { return 1; }
+  double of(Id) const { return 1; }
   template <int D>
   UnitWeight among(const Particles<D>&, const Particles<D>&) const {
     return {};
@@ -27,7 +28,8 @@ struct UnitWeight {
 class ProductWeight {
  public:
   explicit ProductWeight(const std::vector<double>& factor) : factor_(&factor) {}
-  double operator()(Id i, Id j) const { return (*factor_)[i] * (*factor_)[j]; }
+  double operator()(Id i, Id j) const { return of(i) * of(j); }
+  double of(Id i) const { return (*factor_)[i]; }
   /// The same property of other particles.
   template <int D>
   ProductWeight among(const Particles<D>& made_for, const Particles<D>& some) const {
@@ -42,8 +44,12 @@ template <int D, Potential P, class Weight, class Pairs>
 class PairTerm final : public Interaction<D> {
  public:
   /// `particles` tells who is a ghost, and outlives the term.
-  PairTerm(const Particles<D>& particles, P potential, Weight weight, Pairs pairs)
-      : particles_(particles), potential_(std::move(potential)), weight_(weight), pairs_(std::move(pairs)) {}
+  PairTerm(const Particles<D>& particles, P potential, Weight weight, Pairs pairs, Tail tail = {})
+      : particles_(particles),
+        potential_(std::move(potential)),
+        weight_(weight),
+        pairs_(std::move(pairs)),
+        tail_(tail) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override {
     // Pairs come with ascending i: what belongs to one i is summed in that order, and exactly from there on.
@@ -102,7 +108,14 @@ class PairTerm final : public Interaction<D> {
   std::unique_ptr<Interaction<D>> among(const Particles<D>& made_for, const Particles<D>& some) const override {
     auto pairs = pairs_.among(some);
     if (!pairs) return nullptr;
-    return std::make_unique<PairTerm>(some, potential_, weight_.among(made_for, some), std::move(*pairs));
+    return std::make_unique<PairTerm>(some, potential_, weight_.among(made_for, some), std::move(*pairs), tail_);
+  }
+  Tail tail() const override { return tail_; }
+  const PairList* bonds() const override {
+    if constexpr (requires { pairs_.list(); })
+      return &pairs_.list();
+    else
+      return nullptr;
   }
   double reach(Positions<D> x) const override { return pairs_.reach(x); }
   double reach(const Particles<D>& share, Exchange& ranks) const override { return pairs_.reach(share, ranks); }
@@ -137,6 +150,7 @@ class PairTerm final : public Interaction<D> {
   P potential_;
   Weight weight_;
   Pairs pairs_;
+  Tail tail_;
 };
 
 }  // namespace carom

@@ -22,6 +22,7 @@
 #include "engine/exchange.h"
 #include "engine/interaction.h"
 #include "engine/neighbour_list.h"
+#include "engine/potentials/pair_filter.h"
 
 namespace carom {
 
@@ -37,35 +38,13 @@ Vec<D> separation(const Vec<D>& x_i, const Vec<D>& x_j, NoShift) {
   return x_i - x_j;
 }
 
-/// The two species, in either order, that a term is restricted to; or no restriction.
-class SpeciesPair {
- public:
-  SpeciesPair() = default;
-  SpeciesPair(const std::vector<std::uint16_t>& species_of, std::uint16_t a, std::uint16_t b)
-      : species_of_(&species_of), a_(a), b_(b) {}
-
-  template <int D>
-  SpeciesPair among(const Particles<D>& some) const {
-    return all() ? SpeciesPair() : SpeciesPair(some.species, a_, b_);
-  }
-  bool all() const { return species_of_ == nullptr; }
-  bool contains(Id i, Id j) const {
-    if (all()) return true;
-    const std::uint16_t p = (*species_of_)[i], q = (*species_of_)[j];
-    return (p == a_ && q == b_) || (p == b_ && q == a_);
-  }
-
- private:
-  const std::vector<std::uint16_t>* species_of_ = nullptr;
-  std::uint16_t a_ = 0, b_ = 0;
-};
-
 /// Bonds, given with i < j in ascending order. A bond spans the image that is nearest at x; one that grows to nearly
 /// half an edge of a periodic box, where another image becomes the nearest, throws Error(Failure::numerical).
 template <int D>
 class Bonds {
  public:
   Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {}
+  const PairList& list() const { return pairs_; }
 
   std::optional<Bonds> among(const Particles<D>& some) const {
     if (some.id.empty()) return *this;
@@ -137,11 +116,12 @@ class Bonds {
 template <int D>
 class AllPairs {
  public:
-  AllPairs(std::size_t particles, SpeciesPair species) : particles_(static_cast<Id>(particles)), species_(species) {}
+  AllPairs(std::size_t particles, PairFilter filter)
+      : particles_(static_cast<Id>(particles)), filter_(std::move(filter)) {}
 
   std::optional<AllPairs> among(const Particles<D>& some) const {
     if (some.size() < particles_) return std::nullopt;
-    return AllPairs(particles_, species_.among(some));
+    return AllPairs(particles_, filter_.among(some));
   }
   double reach(Positions<D>) const { return std::numeric_limits<double>::infinity(); }
   double reach(const Particles<D>&, Exchange&) const { return std::numeric_limits<double>::infinity(); }
@@ -149,26 +129,26 @@ class AllPairs {
   void for_each(Positions<D> /*x*/, Positions<D> /*x_new*/, Visit&& visit) const {
     for (Id i = 0; i < particles_; ++i)
       for (Id j = i + 1; j < particles_; ++j)
-        if (species_.contains(i, j)) visit(i, j, NoShift{});
+        if (filter_.contains(i, j)) visit(i, j, NoShift{});
   }
 
  private:
   Id particles_;
-  SpeciesPair species_;
+  PairFilter filter_;
 };
 
 /// The pairs within a cutoff, and some beyond: whoever visits them looks at the distance.
 template <int D>
 class PairsWithinCutoff {
  public:
-  PairsWithinCutoff(const Box<D>& box, std::size_t particles, double cutoff, SpeciesPair species)
+  PairsWithinCutoff(const Box<D>& box, std::size_t particles, double cutoff, PairFilter filter)
       : box_(box),
         cutoff_(cutoff),
-        species_(species),
-        list_(box, std::vector<double>(particles, 0.5 * cutoff), wanted(species)) {}
+        filter_(std::move(filter)),
+        list_(box, std::vector<double>(particles, 0.5 * cutoff), wanted(filter_)) {}
 
   std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
-    return PairsWithinCutoff(box_, some.size(), cutoff_, species_.among(some));
+    return PairsWithinCutoff(box_, some.size(), cutoff_, filter_.among(some));
   }
   double reach(Positions<D>) const { return cutoff_; }
   double reach(const Particles<D>&, Exchange&) const { return cutoff_; }
@@ -179,14 +159,14 @@ class PairsWithinCutoff {
   }
 
  private:
-  static std::function<bool(Id, Id)> wanted(SpeciesPair species) {
-    if (species.all()) return {};
-    return [species](Id i, Id j) { return species.contains(i, j); };
+  static std::function<bool(Id, Id)> wanted(const PairFilter& filter) {
+    if (filter.all()) return {};
+    return [filter](Id i, Id j) { return filter.contains(i, j); };
   }
 
   const Box<D>& box_;
   double cutoff_;
-  SpeciesPair species_;
+  PairFilter filter_;
   // Caches: their state never shows in the sums.
   mutable NeighbourList<D> list_;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/elementary.h"
 #include "engine/potentials/potential.h"
@@ -35,6 +36,12 @@ class Yukawa {
     const double x = kappa_ * ((upper - lower) / (r + s));  // κ(s − r) without its cancellation
     const double phi = x > 0 ? -elementary::expm1(-x) / x : 1.0;
     return -amplitude_ * elementary::exp(-kappa_ * r) * (1 + kappa_ * r * phi) / (r * s * (r + s));
+  }
+  /// ∫_r^∞ V r^(D−1) dr = A e^(−κr) (1 + κr)/κ² or, in two dimensions, A e^(−κr)/κ; infinite for κ = 0
+  double tail(double r, int dimension) const {
+    if (kappa_ == 0) return std::numeric_limits<double>::infinity();
+    const double v = amplitude_ * elementary::exp(-kappa_ * r);
+    return dimension == 3 ? v * (1 + kappa_ * r) / (kappa_ * kappa_) : v / kappa_;
   }
 
  private:

@@ -115,7 +115,7 @@ Scene<3> yukawa(double packing_fraction) {
     auto system = test::hard_spheres<3>(3, packing_fraction);
     test::add_interaction(
         *system, "yukawa",
-        {{"amplitude", 2.0}, {"kappa", 2.0}, {"charges", false}, {"cutoff", 1.8}, {"cut", std::string("smooth")}});
+        {{"amplitude", 2.0}, {"kappa", 2.0}, {"charges", false}, {"cutoff", 1.8}, {"cut", std::string("switch")}});
     return system;
   };
 }
@@ -157,7 +157,7 @@ std::unique_ptr<System<3>> rod() {
   system->box.boundary[0] = Boundary::wall;
   test::add_interaction(
       *system, "yukawa",
-      {{"amplitude", 2.0}, {"kappa", 2.0}, {"charges", false}, {"cutoff", 1.8}, {"cut", std::string("smooth")}});
+      {{"amplitude", 2.0}, {"kappa", 2.0}, {"charges", false}, {"cutoff", 1.8}, {"cut", std::string("switch")}});
   test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{-1.0, 0.0, 0.0}}});
   return system;
 }

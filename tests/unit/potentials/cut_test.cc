@@ -1,11 +1,14 @@
-// Cut potentials: accuracy against 50 digits, also for pairs that cross the cutoff, and continuity at the cutoff.
+// Cut potentials: accuracy against 50 digits, also for pairs that cross the cutoff or the start of the switch, and
+// continuity there.
 
 #include "engine/potentials/cut.h"
 
 #include <boost/math/special_functions/erf.hpp>
 
 #include "engine/potentials/damped_coulomb.h"
+#include "engine/potentials/inverse_power.h"
 #include "engine/potentials/lennard_jones.h"
+#include "engine/potentials/tail.h"
 #include "engine/potentials/yukawa.h"
 #include "tests/unit/potentials/accuracy.h"
 
@@ -16,24 +19,36 @@ using test::expect_within;
 using test::measure;
 using test::Precise;
 
-/// V made to end at ρ_c, in 50 digits; and the sum of its terms' magnitudes, for V monotonic and convex.
+/// V made to end at ρ_c, in 50 digits; and the sum of its terms' magnitudes.
 template <class V>
 struct ExactCut {
   V v;
-  Precise cutoff2;
+  double cutoff;
   CutKind kind;
+  double switch_from = 0;
+  Precise cutoff2 = Precise(cutoff * cutoff), from2 = Precise(switch_from * switch_from);
   Precise level = v(cutoff2);
-  Precise slope = kind == CutKind::smooth ? test::precise_derivative(v, cutoff2) : Precise(0);
-  Precise curvature = kind == CutKind::smooth ? test::precise_second_derivative(v, cutoff2) : Precise(0);
+  Precise first = test::precise_derivative(v, cutoff2), second = test::precise_second_derivative(v, cutoff2);
+  Precise slope = kind == CutKind::quadratic ? first : Precise(0);
+  Precise curvature = kind == CutKind::quadratic ? second : Precise(0);
+  Precise slope_in_r = kind == CutKind::force_shifted ? Precise(2 * Precise(cutoff) * first) : Precise(0);
 
+  Precise factor(const Precise& rho) const {
+    if (rho <= from2) return 1;
+    if (rho >= cutoff2) return 0;
+    const Precise t = (cutoff2 - rho) / (cutoff2 - from2);
+    return t * t * t * (10 - t * (15 - 6 * t));
+  }
   Precise value(const Precise& rho) const {
     if (rho >= cutoff2) return 0;
+    if (kind == CutKind::switched) return v(rho) * factor(rho);
     const Precise z = rho - cutoff2;
-    return v(rho) - level - slope * z - curvature / 2 * z * z;
+    return v(rho) - level - slope * z - curvature / 2 * z * z - slope_in_r * (sqrt(rho) - Precise(cutoff));
   }
   Precise magnitude(const Precise& rho, const Precise& terms) const {
-    const Precise z = abs(rho - cutoff2);
-    return terms + abs(slope) * z + abs(curvature) / 2 * z * z;
+    if (rho >= cutoff2) return terms;
+    const Precise z = cutoff2 - rho;
+    return terms + abs(slope) * z + abs(curvature) / 2 * z * z + abs(slope_in_r) * abs(sqrt(rho) - Precise(cutoff));
   }
 };
 
@@ -44,14 +59,78 @@ Precise lennard_jones(const Precise& rho, int sign) {
 
 TEST(Cut, LennardJonesIsAccurateAlsoAcrossTheCutoff) {
   const double cutoff = 2.5;
-  for (const CutKind kind : {CutKind::smooth, CutKind::shifted}) {
+  for (const CutKind kind : {CutKind::quadratic, CutKind::shifted, CutKind::force_shifted}) {
     const auto v = [](const Precise& rho) { return lennard_jones(rho, -1); };
-    const ExactCut<decltype(v)> cut{v, Precise(cutoff * cutoff), kind};
+    const ExactCut<decltype(v)> cut{v, cutoff, kind};
     const auto exact = [&](const Precise& rho) { return cut.value(rho); };
     const auto scale = [&](const Precise& rho) { return cut.magnitude(rho, lennard_jones(rho, 1)); };
     const Cut potential(LennardJones(1, 1), cutoff, kind);
     expect_within(measure(potential, exact, scale, 0.3, cutoff * cutoff * (1 - 1e-10)), 6);
     expect_within(measure(potential, exact, scale, 0.9 * cutoff * cutoff, cutoff * cutoff * (1 - 1e-10)), 6);
+  }
+}
+
+/// The errors of a switched potential in ε of what its terms are; `m` the sum of the magnitudes of the terms of V. The
+/// ends lie on every side of both borders, and at them.
+template <Potential P, class V, class M>
+void expect_switched(const P& potential, V v, M m, double cutoff, double from, double limit) {
+  const Cut cut(potential, cutoff, CutKind::switched, from);
+  const ExactCut<V> exact{v, cutoff, CutKind::switched, from};
+  const auto value = [&](const Precise& rho) { return exact.value(rho); };
+  const auto factor = [&](const Precise& rho) { return exact.factor(rho); };
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> uniform(0, 1), digits(-16, 0), steps(-17, 1);
+  test::Errors worst;
+  const auto take = [](double& largest, double error) { largest = error <= largest ? largest : error; };
+  const std::array borders = {from * from, cutoff * cutoff};
+  const double width = borders[1] - borders[0];
+  for (int n = 0; n < 6000; ++n) {
+    double b = borders[0] * 0.5 + uniform(random) * 1.5 * borders[1];
+    if (n % 3 > 0) {  // from either side, as near as 1e-16 of it
+      const double z = width * std::pow(10, digits(random));
+      b = borders[n % 3 - 1] + (n % 2 == 0 ? z : -z);
+    }
+    const double delta = n % 10 == 0 ? 0 : std::pow(10, steps(random));
+    const double a = uniform(random) < 0.5 ? b / (1 + delta) : b * (1 + delta);
+    const auto [low, high] = std::minmax(a, b);
+    const Precise rho(b), lower(low), upper(high);
+    const Precise terms = m(lower) * abs(test::precise_quotient(factor, lower, upper)) +
+                          factor(upper) * abs(test::precise_quotient(m, lower, upper));
+    take(worst.quotient,
+         test::error_in_epsilons(cut.quotient(b, a), test::precise_quotient(value, rho, Precise(a)), terms));
+    EXPECT_EQ(cut.quotient(b, a), cut.quotient(a, b)) << b << ", " << a;
+    take(worst.value, test::error_in_epsilons(cut.value(b), value(rho), m(rho) * factor(rho)));
+    const Precise size = m(rho) / Precise(width);
+    take(worst.derivative, test::error_in_epsilons(cut.derivative(b), test::precise_derivative(value, rho),
+                                                   abs(test::precise_derivative(m, rho)) + size));
+    if (std::abs(b - borders[0]) < 1e-9 || std::abs(b - borders[1]) < 1e-9) continue;  // V‴ jumps
+    take(worst.second_derivative,
+         test::error_in_epsilons(cut.second_derivative(b), test::precise_second_derivative(value, rho),
+                                 abs(test::precise_second_derivative(m, rho)) + 10 * size / Precise(width)));
+  }
+  std::printf("    errors in eps: V %.2f, V' %.2f, V'' %.2f, quotient %.2f\n", worst.value, worst.derivative,
+              worst.second_derivative, worst.quotient);
+  expect_within(worst, limit);
+}
+
+TEST(Cut, ASwitchedPotentialIsAccurateOnEverySideOfItsBorders) {
+  const auto repulsive = [](const Precise& rho) { return Precise(exp(-sqrt(rho)) / sqrt(rho)); };
+  expect_switched(Yukawa(1, 1), repulsive, repulsive, 3.0, 2.7, 10);
+  const auto terms = [](const Precise& rho) { return lennard_jones(rho, 1); };
+  const auto attractive = [](const Precise& rho) { return lennard_jones(rho, -1); };
+  expect_switched(LennardJones(1, 1), attractive, terms, 2.5, 2.25, 10);
+  expect_switched(LennardJones(1, 1), attractive, terms, 2.5, 2.49, 10);
+  expect_switched(LennardJones(1, 1), attractive, terms, 3.0, 1.5, 10);
+}
+
+TEST(Cut, ASwitchedPotentialIsItselfUpToTheSwitch) {
+  const Cut cut(LennardJones(1, 1), 2.5, CutKind::switched, 2.25);
+  const LennardJones whole(1, 1);
+  for (const double rho : {0.8, 1.3, 4.0, 2.25 * 2.25}) {
+    EXPECT_EQ(cut.value(rho), whole.value(rho));
+    EXPECT_EQ(cut.derivative(rho), whole.derivative(rho));
+    EXPECT_EQ(cut.second_derivative(rho), whole.second_derivative(rho));
+    EXPECT_EQ(cut.quotient(rho, 0.9), whole.quotient(0.9, rho));
   }
 }
 
@@ -61,32 +140,43 @@ TEST(Cut, DampedShiftedCoulombIsAccurateAlsoAcrossTheCutoff) {
     const Precise r = sqrt(rho);
     return Precise(boost::math::erfc(Precise(alpha) * r) / r);
   };
-  const ExactCut<decltype(v)> cut{v, Precise(cutoff * cutoff), CutKind::smooth};
+  const ExactCut<decltype(v)> cut{v, cutoff, CutKind::quadratic};
   const auto exact = [&](const Precise& rho) { return cut.value(rho); };
   const auto scale = [&](const Precise& rho) { return cut.magnitude(rho, v(rho)); };
   const auto rounding = [&](double rho, double) { return 1 + alpha * alpha * rho; };
-  const Cut potential(DampedCoulomb(1, alpha), cutoff, CutKind::smooth);
+  const Cut potential(DampedCoulomb(1, alpha), cutoff, CutKind::quadratic);
   expect_within(measure(potential, exact, scale, 0.01, cutoff * cutoff * (1 - 1e-10), rounding, 400), 4);
 }
 
 TEST(Cut, IsTwiceContinuouslyDifferentiableAtTheCutoff) {
   const double cutoff = 2.5, rho_c = cutoff * cutoff;
-  const Cut potential(Yukawa(1.5, 1.2), cutoff, CutKind::smooth);
   const Yukawa whole(1.5, 1.2);
-  double last = 1;
-  for (const double step : {1e-2, 1e-4, 1e-6, 1e-8}) {  // V, V′, V″ fall as the third, second and first power
-    const double z = step * rho_c, inside = rho_c - z;
-    EXPECT_LE(std::abs(potential.value(inside)), 100 * whole.value(rho_c) * step * step * step + 1e-23);
-    EXPECT_LE(std::abs(potential.derivative(inside)), 100 * std::abs(whole.derivative(rho_c)) * step * step + 1e-17);
-    EXPECT_LE(std::abs(potential.second_derivative(inside)), 100 * whole.second_derivative(rho_c) * step + 1e-16);
-    EXPECT_LT(std::abs(potential.second_derivative(inside)), last);
-    last = std::abs(potential.second_derivative(inside));
+  for (const CutKind kind : {CutKind::quadratic, CutKind::switched}) {
+    const Cut potential(whole, cutoff, kind, 0.9 * cutoff);
+    double last = 1;
+    for (const double step : {1e-3, 1e-5, 1e-7}) {  // V, V′, V″ fall as the third, second and first power
+      const double z = step * rho_c, inside = rho_c - z;
+      const double v = 2000 * whole.value(rho_c);  // the switch: 10 t³, t = z/0.19 ρ_c
+      EXPECT_LE(std::abs(potential.value(inside)), v * step * step * step + 1e-23);
+      EXPECT_LE(std::abs(potential.derivative(inside)), 3 * v / rho_c * step * step + 1e-17);
+      EXPECT_LE(std::abs(potential.second_derivative(inside)), 6 * v / (rho_c * rho_c) * step + 1e-16);
+      EXPECT_LT(std::abs(potential.second_derivative(inside)), last);
+      last = std::abs(potential.second_derivative(inside));
+    }
   }
-  for (const double rho : {rho_c, 1.5 * rho_c}) {
-    EXPECT_EQ(potential.value(rho), 0);
-    EXPECT_EQ(potential.derivative(rho), 0);
-    EXPECT_EQ(potential.second_derivative(rho), 0);
-    EXPECT_EQ(potential.quotient(rho, 2 * rho), 0);
+}
+
+TEST(Cut, EveryKindIsZeroFromTheCutoffOutwards) {
+  const double rho_c = 6.25;
+  for (const CutKind kind : {CutKind::quadratic, CutKind::switched, CutKind::shifted, CutKind::force_shifted}) {
+    const Cut potential(Yukawa(1.5, 1.2), 2.5, kind, 2.0);
+    for (const double rho : {rho_c, 1.5 * rho_c}) {
+      EXPECT_EQ(potential.value(rho), 0);
+      EXPECT_EQ(potential.derivative(rho), 0);
+      EXPECT_EQ(potential.second_derivative(rho), 0);
+      EXPECT_EQ(potential.quotient(rho, 2 * rho), 0);
+      EXPECT_EQ(potential.quotient(rho, rho), 0);
+    }
   }
 }
 
@@ -95,6 +185,63 @@ TEST(Cut, ShiftedKeepsTheForceOfTheWholePotential) {
   EXPECT_EQ(potential.derivative(3.0), LennardJones(1, 1).derivative(3.0));
   EXPECT_NEAR(potential.value(6.25 * (1 - 1e-12)), 0, 1e-12);
   EXPECT_EQ(potential.derivative(6.25), 0);
+}
+
+TEST(Cut, ForceShiftedTakesTheSameForceOffAtAllDistances) {
+  const LennardJones whole(1, 1);
+  const Cut potential(whole, 2.5, CutKind::force_shifted);
+  const double at_end = 5.0 * whole.derivative(6.25);  // dV/dr
+  for (const double r : {0.95, 1.4, 2.4})
+    EXPECT_NEAR(2 * r * potential.derivative(r * r), 2 * r * whole.derivative(r * r) - at_end, 1e-14);
+  EXPECT_NEAR(potential.derivative(6.25 * (1 - 1e-12)), 0, 1e-12);
+}
+
+/// ∫_a^∞ f by the trapezoidal rule in s, r = a + e^(s − e^(−s)).
+template <class F>
+double to_infinity(double a, F f) {
+  double sum = 0;
+  const double h = 1.0 / 128;
+  for (double s = -5; s < 60; s += h) {
+    const double e = std::exp(-s), x = std::exp(s - e);
+    sum += h * f(a + x) * x * (1 + e);
+  }
+  return sum;
+}
+
+template <int D, class P>
+void expect_tail(const P& whole) {
+  const double area = (D == 3 ? 4 : 2) * std::numbers::pi, pairs = 500, volume = 20;
+  for (const CutKind kind : {CutKind::switched, CutKind::shifted}) {
+    const Cut cut(whole, 2.5, kind, 2.2);
+    const bool switched = kind == CutKind::switched;
+    const auto lost = [&](double r) { return whole.value(r * r) - (switched ? cut.value(r * r) : 0); };
+    const auto lost_force = [&](double r) {
+      return -2 * r * (whole.derivative(r * r) - (switched ? cut.derivative(r * r) : 0));
+    };
+    const double start = switched ? 2.2 : 2.5;
+    const double energy = to_infinity(start, [&](double r) { return lost(r) * std::pow(r, D - 1); });
+    const double virial = to_infinity(start, [&](double r) { return lost_force(r) * std::pow(r, D); });
+    const Tail tail = tail_of<D>(cut, pairs, volume);
+    EXPECT_NEAR(tail.energy, area * pairs / volume * energy, 1e-5 * std::abs(tail.energy));
+    EXPECT_NEAR(tail.virial, area * pairs / volume * virial, 1e-5 * std::abs(tail.virial));
+  }
+}
+
+TEST(TailCorrection, IsTheIntegralOfWhatTheCutTakesAway) {
+  expect_tail<2>(LennardJones(1.3, 0.9));
+  expect_tail<3>(LennardJones(1.3, 0.9));
+  expect_tail<2>(Yukawa(-2, 0.8));
+  expect_tail<3>(Yukawa(-2, 0.8));
+  expect_tail<2>(InversePower(0.7, 1.1, 5.5));
+  expect_tail<3>(InversePower(0.7, 1.1, 5.5));
+}
+
+TEST(TailCorrection, OfTruncatedLennardJonesIsTheTextbooks) {  // Allen, Tildesley, 2nd ed., eqs 2.144 and 2.145
+  const double n = 500, density = 0.776, end = 3, pi = std::numbers::pi;
+  const Tail tail = tail_of<3>(Cut(LennardJones(1, 1), end, CutKind::shifted), n * n / 2, n / density);
+  EXPECT_NEAR(tail.energy / n, 8 * pi * density * (std::pow(end, -9) / 9 - std::pow(end, -3) / 3), 1e-14);
+  EXPECT_NEAR(tail.virial / (3 * n / density),
+              32 * pi * density * density * (std::pow(end, -9) / 9 - std::pow(end, -3) / 6), 1e-13);
 }
 
 }  // namespace

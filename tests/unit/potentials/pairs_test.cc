@@ -159,7 +159,7 @@ TEST(Refused, WhatAPeriodicBoxDoesNotAllow) {
   const Scene<2> scene(5, 10, Boundary::periodic, 0.5);
   expect_contains(refusal(scene, "gravity", {{"constant", 1.0}}), "a periodic box does not allow");
   expect_contains(refusal(scene, "coulomb", {{"constant", 1.0}, {"form", "plain"s}}), "damped-shifted");
-  expect_contains(refusal(scene, "lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}, {"cut", "smooth"s}}),
+  expect_contains(refusal(scene, "lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}, {"cut", "switch"s}}),
                   "give 'cutoff'");
   expect_contains(refusal(scene, "harmonic-trap", {{"stiffness", 1.0}}), "periodic");
   expect_contains(refusal(scene, "uniform-field", {{"acceleration", std::vector<double>{0, 1}}}), "axis 1");
