@@ -1,10 +1,12 @@
 #pragma once
-// Elementary functions whose bits are the same on every machine.
+// Elementary functions whose bits are the same on every machine, of a double or of the lanes of a vector (lanes.h).
 //
 // The C library picks its exp, log, … by the processor it finds (with or without fused multiply-add), so their last
 // bits differ from machine to machine; a chaotic run would follow. These are plain double arithmetic, compiled like the
 // rest of the engine. Errors, against 50-digit arithmetic over the whole range: below 1 ulp (exp, expm1, log,
 // log1p), 1.5 ulp (pow up to |y| = 50), 1.2 ulp (erfc). They neither set errno nor promise floating-point exceptions.
+
+#include "engine/elementary_lanes.h"
 
 namespace carom::elementary {
 
@@ -20,5 +22,30 @@ double log1p(double x);
 double pow(double x, double y);
 /// Complementary error function, 2/√π ∫_x^∞ e^(−t²) dt, in full relative precision until it underflows near x = 27.2.
 double erfc(double x);
+
+template <Lanes T>
+[[gnu::always_inline]] inline T exp(T x) {
+  return formula::exp(x);
+}
+template <Lanes T>
+[[gnu::always_inline]] inline T expm1(T x) {
+  return formula::expm1(x);
+}
+template <Lanes T>
+[[gnu::always_inline]] inline T log(T x) {
+  return formula::log(x);
+}
+template <Lanes T>
+[[gnu::always_inline]] inline T log1p(T x) {
+  return formula::log1p(x);
+}
+template <Lanes T>
+[[gnu::always_inline]] inline T pow(T x, double y) {
+  return formula::pow(x, y);
+}
+template <Lanes T>
+[[gnu::always_inline]] inline T erfc(T x) {
+  return formula::erfc(x);
+}
 
 }  // namespace carom::elementary

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cmath>
-
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -31,9 +29,9 @@ enum class CutKind {
 ///   (W(a) − W(b))/(a − b) = [Q(b̄, ā) − c₁ − ½ c₂ ((ā − ρ_c) + (b̄ − ρ_c)) − F/(√ā + √b̄)] (ā − b̄)/(a − b),
 ///   ā, b̄ at most ρ_c
 ///
-/// Errors: those of V; of S and Q_S a few ulp; of the other kinds a few ε of the terms, whose differences go to zero at
-/// the cutoff. Sources: Toxvaerd, Dyre, J. Chem. Phys. 134 (2011) 081102 (shifted forces); Steinbach, Brooks, J.
-/// Comput. Chem. 15 (1994) 667 (switching).
+/// Errors: those of V; of S and Q_S up to 8 ε more; of the other kinds a few ε of the terms, whose differences go to
+/// zero at the cutoff. Sources: Toxvaerd, Dyre, J. Chem. Phys. 134 (2011) 081102 (shifted forces); Steinbach, Brooks,
+/// J. Comput. Chem. 15 (1994) 667 (switching).
 template <Potential P>
 class Cut {
  public:
@@ -62,7 +60,7 @@ class Cut {
   T value(T rho) const {
     if (switched_) return potential_.value(rho) * factor(rho);
     const T within = at_most_cutoff(rho), z = within - cutoff2_;
-    return z * taken_off_quotient(within, T{} + cutoff2_);
+    return z * taken_off_quotient(within, all<T>(cutoff2_));
   }
   template <class T>
   T derivative(T rho) const {
@@ -71,59 +69,59 @@ class Cut {
       return potential_.derivative(rho) * factor(rho) - potential_.value(rho) * (30 * inverse_width_) * (t * t * u * u);
     }
     T slope = potential_.derivative(rho) - slope_ - 2 * half_curvature_ * (rho - cutoff2_);
-    if (slope_in_r_ != 0) slope -= 0.5 * slope_in_r_ / root(rho);
-    return rho < cutoff2_ ? slope : T{};
+    if (slope_in_r_ != 0) slope -= 0.5 * slope_in_r_ / elementary::sqrt(rho);
+    return rho < cutoff2_ ? slope : all<T>(0);
   }
   template <class T>
   T second_derivative(T rho) const {
     if (switched_) {
-      const T t = rest(rho), u = share(rho), w = T{} + 60 * inverse_width_;
+      const T t = rest(rho), u = share(rho), w = all<T>(60 * inverse_width_);
       return potential_.second_derivative(rho) * factor(rho) - potential_.derivative(rho) * w * (t * t * u * u) +
              potential_.value(rho) * (w * inverse_width_) * (t * u * (u - t));
     }
     T curvature = potential_.second_derivative(rho) - 2 * half_curvature_;
-    if (slope_in_r_ != 0) curvature += 0.25 * slope_in_r_ / (rho * root(rho));
-    return rho < cutoff2_ ? curvature : T{};
+    if (slope_in_r_ != 0) curvature += 0.25 * slope_in_r_ / (rho * elementary::sqrt(rho));
+    return rho < cutoff2_ ? curvature : all<T>(0);
   }
   template <class T>
   T quotient(T rho_old, T rho_new) const {
-    const T lower = rho_old < rho_new ? rho_old : rho_new, upper = rho_old < rho_new ? rho_new : rho_old;
+    const T lower = elementary::min(rho_old, rho_new), upper = elementary::max(rho_old, rho_new);
     if (switched_) {
       const T quotient = potential_.quotient(lower, upper);
-      if (upper <= from2_) return quotient;
+      if (!elementary::any(upper > from2_)) return quotient;
       return potential_.value(lower) * factor_quotient(lower, upper) + factor(upper) * quotient;
     }
     const T from = at_most_cutoff(lower), to = at_most_cutoff(upper);
     const T quotient = taken_off_quotient(from, to) * part(to - from, upper - lower);
-    return lower < cutoff2_ ? quotient : T{};
+    return lower < cutoff2_ ? quotient : all<T>(0);
   }
 
  private:
   template <class T>
-  static T root(T rho) {
-    return std::sqrt(rho);
+  T within_switch(T rho) const {
+    return at_most_cutoff(elementary::max(rho, all<T>(from2_)));
   }
   template <class T>
   T at_most_cutoff(T rho) const {
-    return rho < cutoff2_ ? rho : T{} + cutoff2_;
+    return elementary::min(rho, all<T>(cutoff2_));
   }
   /// numerator/denominator, 1 where the ends coincide.
   template <class T>
   static T part(T numerator, T denominator) {
-    return denominator > 0 ? numerator / denominator : T{} + 1;
+    return denominator > 0 ? numerator / denominator : all<T>(1);
   }
 
   /// t, from exactly 1 to exactly 0.
   template <class T>
   T rest(T rho) const {
     const T t = (cutoff2_ - rho) * inverse_width_;
-    return rho <= from2_ ? T{} + 1 : rho < cutoff2_ ? t : T{};
+    return rho <= from2_ ? all<T>(1) : rho < cutoff2_ ? t : all<T>(0);
   }
   /// 1 − t, from 0 to 1.
   template <class T>
   T share(T rho) const {
     const T u = (rho - from2_) * inverse_width_;
-    return rho >= cutoff2_ ? T{} + 1 : rho > from2_ ? u : T{};
+    return rho >= cutoff2_ ? all<T>(1) : rho > from2_ ? u : all<T>(0);
   }
   /// S
   template <class T>
@@ -134,8 +132,7 @@ class Cut {
   /// Q_S
   template <class T>
   T factor_quotient(T lower, T upper) const {
-    const T raised = lower < from2_ ? T{} + from2_ : lower;
-    const T from = at_most_cutoff(raised), to = at_most_cutoff(upper);
+    const T from = within_switch(lower), to = within_switch(upper);
     const T m = 0.5 * (share(from) + share(to)), n = 0.5 * (rest(from) + rest(to));
     const T d = 0.5 * inverse_width_ * (to - from), d2 = d * d, mn = m * n;
     const T mean = mn * mn + d2 * ((1 - 6 * mn) * (1.0 / 3) + 0.2 * d2);
@@ -144,7 +141,7 @@ class Cut {
   template <class T>
   T taken_off_quotient(T from, T to) const {
     T quotient = potential_.quotient(from, to) - slope_ - half_curvature_ * ((from - cutoff2_) + (to - cutoff2_));
-    if (slope_in_r_ != 0) quotient -= slope_in_r_ / (root(from) + root(to));
+    if (slope_in_r_ != 0) quotient -= slope_in_r_ / (elementary::sqrt(from) + elementary::sqrt(to));
     return quotient;
   }
 

@@ -1,10 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-
-#include "engine/elementary.h"
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -27,54 +22,65 @@ class DampedCoulomb {
  public:
   DampedCoulomb(double constant, double damping) : c_(constant), alpha_(damping) {}
 
-  double value(double rho) const {
-    const double r = std::sqrt(rho);
+  template <class T>
+  T value(T rho) const {
+    const T r = elementary::sqrt(rho);
     return c_ * elementary::erfc(alpha_ * r) / r;
   }
-  double derivative(double rho) const { return -0.5 * (value(rho) + gauss(rho)) / rho; }
-  double second_derivative(double rho) const {
-    const double v = value(rho), g = gauss(rho);
+  template <class T>
+  T derivative(T rho) const {
+    return -0.5 * (value(rho) + gauss(rho)) / rho;
+  }
+  template <class T>
+  T second_derivative(T rho) const {
+    const T v = value(rho), g = gauss(rho);
     return (0.5 * alpha_ * alpha_ * g + 0.75 * (v + g) / rho) / rho;
   }
-  double quotient(double rho_old, double rho_new) const {
-    const auto [lower, upper] = std::minmax(rho_old, rho_new);
-    const double r = std::sqrt(lower), s = std::sqrt(upper);
-    const double difference = (upper - lower) / (r + s);  // s − r without its cancellation
-    const double erfc_r = elementary::erfc(alpha_ * r), erfc_s = elementary::erfc(alpha_ * s);
-    const bool near = alpha_ * difference < 0.5 && alpha_ * alpha_ * (upper - lower) < 2;
-    const double slope = near ? mean_slope(0.5 * (r + s), 0.5 * difference) : (erfc_s - erfc_r) / difference;
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    const T lower = elementary::min(rho_old, rho_new), upper = elementary::max(rho_old, rho_new);
+    const T r = elementary::sqrt(lower), s = elementary::sqrt(upper);
+    const T difference = (upper - lower) / (r + s);  // s − r without its cancellation
+    const T erfc_r = elementary::erfc(alpha_ * r), erfc_s = elementary::erfc(alpha_ * s);
+    const T m = 0.5 * alpha_ * (r + s), d = 0.5 * alpha_ * difference;
+    T mean = mean_by_series(m, d);  // of e^(−α²t²) over [r, s]
+    const auto wide = !((d < 0.015) & (m * d < 0.02));
+    if (elementary::any(wide)) {
+      const auto near = (d < 0.25) & (m * d < 0.5);
+      const T ends = (erfc_r - erfc_s) / (kTwoOverRootPi * 2 * d);
+      mean = wide ? (near ? mean_by_gauss(m, d) : ends) : mean;
+    }
+    const T slope = -kTwoOverRootPi * alpha_ * mean;
     return 0.5 * c_ * ((r + s) * slope - (erfc_r + erfc_s)) / (r * s * (r + s));
   }
 
  private:
   static constexpr double kTwoOverRootPi = 0x1.20dd750429b6dp+0;
 
-  double gauss(double rho) const { return c_ * kTwoOverRootPi * alpha_ * elementary::exp(-alpha_ * alpha_ * rho); }
-
-  /// Mean of d erfc(αt)/dt over [middle − half, middle + half].
-  double mean_slope(double middle, double half) const {
-    const double m = alpha_ * middle, d = alpha_ * half;
-    const double mean = d < 0.015 && m * d < 0.02 ? mean_by_series(m, d) : mean_by_gauss(m, d);
-    return -kTwoOverRootPi * alpha_ * mean;
+  template <class T>
+  T gauss(T rho) const {
+    return c_ * kTwoOverRootPi * alpha_ * elementary::exp(-alpha_ * alpha_ * rho);
   }
 
   /// Mean of e^(−t²) over [m − d, m + d]: Σ f⁽²ᵏ⁾(m) d²ᵏ/(2k + 1)!, to d⁶.
-  static double mean_by_series(double m, double d) {
-    const double m2 = m * m, d2 = d * d;
-    const double second = 4 * m2 - 2;
-    const double fourth = (16 * m2 - 48) * m2 + 12;
-    const double sixth = ((64 * m2 - 480) * m2 + 720) * m2 - 120;
+  template <class T>
+  static T mean_by_series(T m, T d) {
+    const T m2 = m * m, d2 = d * d;
+    const T second = 4 * m2 - 2;
+    const T fourth = (16 * m2 - 48) * m2 + 12;
+    const T sixth = ((64 * m2 - 480) * m2 + 720) * m2 - 120;
     return elementary::exp(-m2) * (1 + d2 * (second / 6 + d2 * (fourth / 120 + d2 * sixth / 5040)));
   }
 
-  static double mean_by_gauss(double m, double d) {
-    constexpr std::array<double, 4> node = {0.18343464249564980494, 0.52553240991632898582, 0.79666647741362673959,
-                                            0.96028985649753623168};
-    constexpr std::array<double, 4> weight = {0.18134189168918099148, 0.15685332293894364367, 0.11119051722668723527,
-                                              0.050614268145188129576};
-    double mean = 0;
+  template <class T>
+  static T mean_by_gauss(T m, T d) {
+    constexpr double node[4] = {0.18343464249564980494, 0.52553240991632898582, 0.79666647741362673959,
+                                0.96028985649753623168};
+    constexpr double weight[4] = {0.18134189168918099148, 0.15685332293894364367, 0.11119051722668723527,
+                                  0.050614268145188129576};
+    T mean = all<T>(0);
     for (int n = 3; n >= 0; --n) {
-      const double below = m - node[n] * d, above = m + node[n] * d;
+      const T below = m - node[n] * d, above = m + node[n] * d;
       mean += weight[n] * (elementary::exp(-below * below) + elementary::exp(-above * above));
     }
     return mean;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cmath>
-
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -16,22 +14,26 @@ class HarmonicBond {
  public:
   HarmonicBond(double stiffness, double rest_length) : half_k_(0.5 * stiffness), length_(rest_length) {}
 
-  double value(double rho) const {
-    const double stretch = std::sqrt(rho) - length_;
+  template <class T>
+  T value(T rho) const {
+    const T stretch = elementary::sqrt(rho) - length_;
     return half_k_ * stretch * stretch;
   }
-  double derivative(double rho) const {
-    if (length_ == 0) return half_k_;  // also where the particles coincide
-    const double r = std::sqrt(rho);
+  template <class T>
+  T derivative(T rho) const {
+    if (length_ == 0) return all<T>(half_k_);  // also where the particles coincide
+    const T r = elementary::sqrt(rho);
     return half_k_ * ((r - length_) / r);
   }
-  double second_derivative(double rho) const {
-    if (length_ == 0) return 0;
-    return 0.5 * half_k_ * length_ / (rho * std::sqrt(rho));
+  template <class T>
+  T second_derivative(T rho) const {
+    if (length_ == 0) return all<T>(0);
+    return 0.5 * half_k_ * length_ / (rho * elementary::sqrt(rho));
   }
-  double quotient(double rho_old, double rho_new) const {
-    if (length_ == 0) return half_k_;
-    const double r = std::sqrt(rho_old), s = std::sqrt(rho_new);
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    if (length_ == 0) return all<T>(half_k_);
+    const T r = elementary::sqrt(rho_old), s = elementary::sqrt(rho_new);
     return half_k_ * (((r - length_) + (s - length_)) / (r + s));
   }
 

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cmath>
-
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -16,11 +14,21 @@ class InverseDistance {
  public:
   explicit InverseDistance(double constant) : c_(constant) {}
 
-  double value(double rho) const { return c_ / std::sqrt(rho); }
-  double derivative(double rho) const { return -0.5 * c_ / (rho * std::sqrt(rho)); }
-  double second_derivative(double rho) const { return 0.75 * c_ / (rho * rho * std::sqrt(rho)); }
-  double quotient(double rho_old, double rho_new) const {
-    const double r = std::sqrt(rho_old), s = std::sqrt(rho_new);
+  template <class T>
+  T value(T rho) const {
+    return c_ / elementary::sqrt(rho);
+  }
+  template <class T>
+  T derivative(T rho) const {
+    return -0.5 * c_ / (rho * elementary::sqrt(rho));
+  }
+  template <class T>
+  T second_derivative(T rho) const {
+    return 0.75 * c_ / (rho * rho * elementary::sqrt(rho));
+  }
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    const T r = elementary::sqrt(rho_old), s = elementary::sqrt(rho_new);
     return -c_ / (r * s * (r + s));
   }
 

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "engine/elementary.h"
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -21,14 +19,24 @@ class InversePower {
   InversePower(double epsilon, double sigma, double exponent)
       : epsilon_(epsilon), sigma2_(sigma * sigma), n_(0.5 * exponent) {}
 
-  double value(double rho) const { return epsilon_ * elementary::pow(sigma2_ / rho, n_); }
-  double derivative(double rho) const { return -n_ * value(rho) / rho; }
-  double second_derivative(double rho) const { return n_ * (n_ + 1) * value(rho) / (rho * rho); }
-  double quotient(double rho_old, double rho_new) const {
-    const auto [lower, upper] = std::minmax(rho_old, rho_new);
-    const double difference = upper - lower;
-    if (difference == 0) return derivative(lower);
-    return value(lower) * elementary::expm1(-n_ * elementary::log1p(difference / lower)) / difference;
+  template <class T>
+  T value(T rho) const {
+    return epsilon_ * elementary::pow(sigma2_ / rho, n_);
+  }
+  template <class T>
+  T derivative(T rho) const {
+    return -n_ * value(rho) / rho;
+  }
+  template <class T>
+  T second_derivative(T rho) const {
+    return n_ * (n_ + 1) * value(rho) / (rho * rho);
+  }
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    const T lower = elementary::min(rho_old, rho_new), difference = elementary::max(rho_old, rho_new) - lower;
+    const T growth = elementary::expm1(-n_ * elementary::log1p(difference / lower));
+    const T v = value(lower);
+    return difference == 0.0 ? -n_ * v / lower : v * growth / difference;
   }
   /// ∫_r^∞ V r^(D−1) dr = V r^D/(p − D), infinite for p ≤ D
   double tail(double r, int dimension) const {

@@ -9,7 +9,7 @@ namespace carom {
 /// Lennard-Jones.
 ///
 ///   V(r) = 4ε [(σ/r)¹² − (σ/r)⁶] = 4ε u (u − 1),   u = x³, x = σ²/ρ
-///   V′ = −12ε u (2u − 1)/ρ,   V″ = 24ε u (7u − 2)/ρ²
+///   V′ = −(12ε/σ²) x u (2u − 1),   V″ = 24ε u (7u − 2)/ρ²
 ///   (V(a) − V(b))/(a − b) = −(4ε/σ²) x y (x² + y² + x y)(u + w − 1),   x, u at b; y, w = y³ at a
 ///
 /// Errors: a few ε of the sum of the magnitudes of the repulsive and the attractive part.
@@ -17,20 +17,24 @@ class LennardJones {
  public:
   LennardJones(double epsilon, double sigma) : epsilon_(epsilon), sigma2_(sigma * sigma) {}
 
-  double value(double rho) const {
-    const double u = cube(sigma2_ / rho);
+  template <class T>
+  T value(T rho) const {
+    const T u = cube(sigma2_ / rho);
     return 4 * epsilon_ * u * (u - 1);
   }
-  double derivative(double rho) const {
-    const double u = cube(sigma2_ / rho);
-    return -12 * epsilon_ * u * (2 * u - 1) / rho;
+  template <class T>
+  T derivative(T rho) const {
+    const T x = sigma2_ / rho, u = cube(x);
+    return -12 * epsilon_ / sigma2_ * (x * u) * (2 * u - 1);
   }
-  double second_derivative(double rho) const {
-    const double u = cube(sigma2_ / rho);
+  template <class T>
+  T second_derivative(T rho) const {
+    const T u = cube(sigma2_ / rho);
     return 24 * epsilon_ * u * (7 * u - 2) / (rho * rho);
   }
-  double quotient(double rho_old, double rho_new) const {
-    const double x = sigma2_ / rho_old, y = sigma2_ / rho_new;
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    const T x = sigma2_ / rho_old, y = sigma2_ / rho_new;
     return -4 * epsilon_ / sigma2_ * (x * y) * (x * x + y * y + x * y) * (cube(x) + cube(y) - 1);
   }
   /// ∫_r^∞ V r^(D−1) dr = 4ε r^D [u²/(12 − D) − u/(6 − D)]
@@ -40,7 +44,10 @@ class LennardJones {
   }
 
  private:
-  static double cube(double x) { return x * x * x; }
+  template <class T>
+  static T cube(T x) {
+    return x * x * x;
+  }
 
   double epsilon_;  ///< depth of the well [energy]
   double sigma2_;   ///< [length²]

@@ -8,10 +8,15 @@
 //
 // In ρ no square root is needed where the formula has none, and the discrete gradient of a pair is the quotient times
 // d + d′ (LaBudde, Greenspan, J. Comput. Phys. 15 (1974) 134). The quotient is always in closed form: never a
-// difference of values divided by a small a − b. Each potential stands in a file of its own, small enough to be read
-// whole; loops over pairs are in pair_term.h.
+// difference of values divided by a small a − b, and the same bits whichever of the two comes first.
+//
+// Each is a template over T, a double or a vector of doubles (lanes.h), so that the loops over pairs work on several
+// pairs at once: choices are written with ?:, never with if, and sqrt, exp, … are those of elementary.h. Each potential
+// stands in a file of its own, small enough to be read whole; loops over pairs are in pair_term.h.
 
 #include <concepts>
+
+#include "engine/elementary.h"
 
 namespace carom {
 

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-
 #include "engine/potentials/lennard_jones.h"
 #include "engine/potentials/potential.h"
 
@@ -15,29 +13,37 @@ namespace carom {
 /// V's digits there. Errors: as Lennard-Jones.
 class Wca {
  public:
-  Wca(double epsilon, double sigma) : inside_(epsilon, sigma), epsilon_(epsilon), sigma2_(sigma * sigma) {}
+  Wca(double epsilon, double sigma)
+      : inside_(epsilon, sigma), epsilon_(epsilon), sigma2_(sigma * sigma), cutoff2_(0x1.428a2f98d728bp+0 * sigma2_) {}
 
-  double cutoff_squared() const { return 0x1.428a2f98d728bp+0 * sigma2_; }  // 2^(1/3)
+  double cutoff_squared() const { return cutoff2_; }
 
-  double value(double rho) const {
-    if (rho >= cutoff_squared()) return 0;
-    const double x = sigma2_ / rho;
-    const double excess = 2 * (x * x * x) - 1;
-    return epsilon_ * excess * excess;
+  template <class T>
+  T value(T rho) const {
+    const T x = sigma2_ / rho;
+    const T excess = 2 * (x * x * x) - 1;
+    return rho < cutoff2_ ? epsilon_ * excess * excess : all<T>(0);
   }
-  double derivative(double rho) const { return rho < cutoff_squared() ? inside_.derivative(rho) : 0.0; }
-  double second_derivative(double rho) const { return rho < cutoff_squared() ? inside_.second_derivative(rho) : 0.0; }
-  double quotient(double rho_old, double rho_new) const {
-    const auto [lower, upper] = std::minmax(rho_old, rho_new);
-    if (lower >= cutoff_squared()) return 0;
-    if (upper >= cutoff_squared()) return -value(lower) / (upper - lower);
-    return inside_.quotient(rho_old, rho_new);
+  template <class T>
+  T derivative(T rho) const {
+    return rho < cutoff2_ ? inside_.derivative(rho) : all<T>(0);
+  }
+  template <class T>
+  T second_derivative(T rho) const {
+    return rho < cutoff2_ ? inside_.second_derivative(rho) : all<T>(0);
+  }
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    const T lower = elementary::min(rho_old, rho_new), upper = elementary::max(rho_old, rho_new);
+    return upper < cutoff2_ ? inside_.quotient(rho_old, rho_new)
+                            : (lower < cutoff2_ ? -value(lower) / (upper - lower) : all<T>(0));
   }
 
  private:
   LennardJones inside_;
   double epsilon_;  ///< V at r = σ [energy]
   double sigma2_;   ///< [length²]
+  double cutoff2_;  ///< ρ_c: 2^(1/3) σ² [length²]
 };
 
 static_assert(ShortRanged<Wca>);

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "engine/elementary.h"
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -13,29 +11,53 @@ namespace carom {
 ///
 ///   V(r) = A e^(−κr)/r
 ///   V′ = −V (1 + κr)/(2ρ),   V″ = V (3 + 3κr + κ²ρ)/(4ρ²)
-///   (V(a) − V(b))/(a − b) = −A e^(−κr) (1 + κr φ(κ(s − r)))/(r s (r + s)),   φ(x) = (1 − e^(−x))/x,
-///   r the smaller and s the larger of √a, √b
+///   (V(a) − V(b))/(a − b) = −A e^(−κm) (cosh y + κm sinh(y)/y)/(r s (r + s)),   m = ½(r + s), y = ½κ(s − r),
+///   r = √b, s = √a; where |y| ≥ ½: e^(−κr) (1 + κr φ(2|y|)) for the product, φ(x) = (1 − e^(−x))/x, r the smaller
 ///
 /// Errors: a few ulp, and κr ulp more from rounding the exponent.
 class Yukawa {
  public:
   Yukawa(double amplitude, double kappa) : amplitude_(amplitude), kappa_(kappa) {}
 
-  double value(double rho) const {
-    const double r = std::sqrt(rho);
+  template <class T>
+  T value(T rho) const {
+    const T r = elementary::sqrt(rho);
     return amplitude_ * elementary::exp(-kappa_ * r) / r;
   }
-  double derivative(double rho) const { return -0.5 * value(rho) * (1 + kappa_ * std::sqrt(rho)) / rho; }
-  double second_derivative(double rho) const {
-    const double u = kappa_ * std::sqrt(rho);
+  template <class T>
+  T derivative(T rho) const {
+    return -0.5 * value(rho) * (1 + kappa_ * elementary::sqrt(rho)) / rho;
+  }
+  template <class T>
+  T second_derivative(T rho) const {
+    const T u = kappa_ * elementary::sqrt(rho);
     return 0.25 * value(rho) * (3 + u * (3 + u)) / (rho * rho);
   }
-  double quotient(double rho_old, double rho_new) const {
-    const auto [lower, upper] = std::minmax(rho_old, rho_new);
-    const double r = std::sqrt(lower), s = std::sqrt(upper);
-    const double x = kappa_ * ((upper - lower) / (r + s));  // κ(s − r) without its cancellation
-    const double phi = x > 0 ? -elementary::expm1(-x) / x : 1.0;
-    return -amplitude_ * elementary::exp(-kappa_ * r) * (1 + kappa_ * r * phi) / (r * s * (r + s));
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    const T r = elementary::sqrt(rho_old), s = elementary::sqrt(rho_new), sum = r + s;
+    const T m = 0.5 * kappa_ * sum;
+    const T y = 0.5 * kappa_ * (elementary::abs(rho_new - rho_old) / sum);  // κ(s − r)/2 without its cancellation
+    const T z = y * y;
+    const T cosh =
+        1 + z * (1.0 / 2 +
+                 z * (1.0 / 24 +
+                      z * (1.0 / 720 +
+                           z * (1.0 / 40320 + z * (1.0 / 3628800 + z * (1.0 / 479001600 + z * (1.0 / 87178291200)))))));
+    const T sinh =
+        1 + z * (1.0 / 6 +
+                 z * (1.0 / 120 +
+                      z * (1.0 / 5040 +
+                           z * (1.0 / 362880 + z * (1.0 / 39916800 + z * (1.0 / 6227020800 +
+                                                                          z * (1.0 / 1307674368000)))))));  // sinh(y)/y
+    T mean = elementary::exp(-m) * (cosh + m * sinh);
+    const auto far = !(y < 0.5);
+    if (elementary::any(far)) {
+      const T u = kappa_ * elementary::min(r, s), x = 2 * y;
+      const T wide = elementary::exp(-u) * (1 - u * (elementary::expm1(-x) / x));
+      mean = far ? wide : mean;
+    }
+    return -amplitude_ * mean / (r * s * sum);
   }
   /// ∫_r^∞ V r^(D−1) dr = A e^(−κr) (1 + κr)/κ² or, in two dimensions, A e^(−κr)/κ; infinite for κ = 0
   double tail(double r, int dimension) const {

@@ -25,23 +25,15 @@ struct ExactCut {
   V v;
   double cutoff;
   CutKind kind;
-  double switch_from = 0;
-  Precise cutoff2 = Precise(cutoff * cutoff), from2 = Precise(switch_from * switch_from);
+  Precise cutoff2 = Precise(cutoff * cutoff);
   Precise level = v(cutoff2);
   Precise first = test::precise_derivative(v, cutoff2), second = test::precise_second_derivative(v, cutoff2);
   Precise slope = kind == CutKind::quadratic ? first : Precise(0);
   Precise curvature = kind == CutKind::quadratic ? second : Precise(0);
   Precise slope_in_r = kind == CutKind::force_shifted ? Precise(2 * Precise(cutoff) * first) : Precise(0);
 
-  Precise factor(const Precise& rho) const {
-    if (rho <= from2) return 1;
-    if (rho >= cutoff2) return 0;
-    const Precise t = (cutoff2 - rho) / (cutoff2 - from2);
-    return t * t * t * (10 - t * (15 - 6 * t));
-  }
   Precise value(const Precise& rho) const {
     if (rho >= cutoff2) return 0;
-    if (kind == CutKind::switched) return v(rho) * factor(rho);
     const Precise z = rho - cutoff2;
     return v(rho) - level - slope * z - curvature / 2 * z * z - slope_in_r * (sqrt(rho) - Precise(cutoff));
   }
@@ -71,42 +63,46 @@ TEST(Cut, LennardJonesIsAccurateAlsoAcrossTheCutoff) {
 }
 
 /// The errors of a switched potential in ε of what its terms are; `m` the sum of the magnitudes of the terms of V. The
-/// ends lie on every side of both borders, and at them.
+/// ends lie on every side of both borders, and as near as 1e-16 of the distance between them.
 template <Potential P, class V, class M>
 void expect_switched(const P& potential, V v, M m, double cutoff, double from, double limit) {
   const Cut cut(potential, cutoff, CutKind::switched, from);
-  const ExactCut<V> exact{v, cutoff, CutKind::switched, from};
-  const auto value = [&](const Precise& rho) { return exact.value(rho); };
-  const auto factor = [&](const Precise& rho) { return exact.factor(rho); };
+  const Precise start(from * from), end(cutoff * cutoff), width = end - start;
+  struct Switch {
+    Precise s, first, second, second_terms;
+  };
+  const auto factor = [&](const Precise& rho) -> Switch {
+    if (rho <= start) return {1, 0, 0, 0};
+    if (rho >= end) return {0, 0, 0, 0};
+    const Precise t = (end - rho) / width, u = (rho - start) / width;
+    return {t * t * t * (10 - t * (15 - 6 * t)), -30 * t * t * u * u / width, 60 * t * u * (u - t) / (width * width),
+            60 * t * u / (width * width)};
+  };
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> uniform(0, 1), digits(-16, 0), steps(-17, 1);
   test::Errors worst;
-  const auto take = [](double& largest, double error) { largest = error <= largest ? largest : error; };
-  const std::array borders = {from * from, cutoff * cutoff};
-  const double width = borders[1] - borders[0];
+  const auto take = [](double& largest, double computed, const Precise& exact, const Precise& terms) {
+    const double error = test::error_in_epsilons(computed, exact, terms);
+    if (!(error <= largest)) largest = error;
+  };
   for (int n = 0; n < 6000; ++n) {
-    double b = borders[0] * 0.5 + uniform(random) * 1.5 * borders[1];
-    if (n % 3 > 0) {  // from either side, as near as 1e-16 of it
-      const double z = width * std::pow(10, digits(random));
-      b = borders[n % 3 - 1] + (n % 2 == 0 ? z : -z);
-    }
+    const double border = n % 3 == 1 ? from * from : cutoff * cutoff;
+    const double z = static_cast<double>(width) * std::pow(10, digits(random));
+    const double b = n % 3 == 0 ? (0.5 + uniform(random)) * border : border + (n % 2 == 0 ? z : -z);
     const double delta = n % 10 == 0 ? 0 : std::pow(10, steps(random));
     const double a = uniform(random) < 0.5 ? b / (1 + delta) : b * (1 + delta);
-    const auto [low, high] = std::minmax(a, b);
-    const Precise rho(b), lower(low), upper(high);
-    const Precise terms = m(lower) * abs(test::precise_quotient(factor, lower, upper)) +
-                          factor(upper) * abs(test::precise_quotient(m, lower, upper));
-    take(worst.quotient,
-         test::error_in_epsilons(cut.quotient(b, a), test::precise_quotient(value, rho, Precise(a)), terms));
+    const Precise rho(b), lower(std::min(a, b)), upper(std::max(a, b));
+    const Switch at = factor(rho);
+    const Precise v1 = test::precise_derivative(v, rho), m1 = abs(test::precise_derivative(m, rho));
+    const Precise v2 = test::precise_second_derivative(v, rho), m2 = abs(test::precise_second_derivative(m, rho));
+    take(worst.value, cut.value(b), v(rho) * at.s, m(rho) * at.s);
+    take(worst.derivative, cut.derivative(b), v1 * at.s + v(rho) * at.first, m1 * at.s + m(rho) * abs(at.first));
+    take(worst.second_derivative, cut.second_derivative(b), v2 * at.s + 2 * v1 * at.first + v(rho) * at.second,
+         m2 * at.s + 2 * m1 * abs(at.first) + m(rho) * at.second_terms);
+    const Precise qs = a == b ? at.first : Precise((factor(upper).s - factor(lower).s) / (upper - lower));
+    take(worst.quotient, cut.quotient(b, a), v(lower) * qs + factor(upper).s * test::precise_quotient(v, lower, upper),
+         m(lower) * abs(qs) + factor(upper).s * abs(test::precise_quotient(m, lower, upper)));
     EXPECT_EQ(cut.quotient(b, a), cut.quotient(a, b)) << b << ", " << a;
-    take(worst.value, test::error_in_epsilons(cut.value(b), value(rho), m(rho) * factor(rho)));
-    const Precise size = m(rho) / Precise(width);
-    take(worst.derivative, test::error_in_epsilons(cut.derivative(b), test::precise_derivative(value, rho),
-                                                   abs(test::precise_derivative(m, rho)) + size));
-    if (std::abs(b - borders[0]) < 1e-9 || std::abs(b - borders[1]) < 1e-9) continue;  // V‴ jumps
-    take(worst.second_derivative,
-         test::error_in_epsilons(cut.second_derivative(b), test::precise_second_derivative(value, rho),
-                                 abs(test::precise_second_derivative(m, rho)) + 10 * size / Precise(width)));
   }
   std::printf("    errors in eps: V %.2f, V' %.2f, V'' %.2f, quotient %.2f\n", worst.value, worst.derivative,
               worst.second_derivative, worst.quotient);
@@ -115,12 +111,12 @@ void expect_switched(const P& potential, V v, M m, double cutoff, double from, d
 
 TEST(Cut, ASwitchedPotentialIsAccurateOnEverySideOfItsBorders) {
   const auto repulsive = [](const Precise& rho) { return Precise(exp(-sqrt(rho)) / sqrt(rho)); };
-  expect_switched(Yukawa(1, 1), repulsive, repulsive, 3.0, 2.7, 10);
+  expect_switched(Yukawa(1, 1), repulsive, repulsive, 3.0, 2.7, 12);
   const auto terms = [](const Precise& rho) { return lennard_jones(rho, 1); };
   const auto attractive = [](const Precise& rho) { return lennard_jones(rho, -1); };
-  expect_switched(LennardJones(1, 1), attractive, terms, 2.5, 2.25, 10);
-  expect_switched(LennardJones(1, 1), attractive, terms, 2.5, 2.49, 10);
-  expect_switched(LennardJones(1, 1), attractive, terms, 3.0, 1.5, 10);
+  expect_switched(LennardJones(1, 1), attractive, terms, 2.5, 2.25, 12);
+  expect_switched(LennardJones(1, 1), attractive, terms, 2.5, 2.49, 12);
+  expect_switched(LennardJones(1, 1), attractive, terms, 3.0, 1.5, 12);
 }
 
 TEST(Cut, ASwitchedPotentialIsItselfUpToTheSwitch) {
@@ -131,6 +127,28 @@ TEST(Cut, ASwitchedPotentialIsItselfUpToTheSwitch) {
     EXPECT_EQ(cut.derivative(rho), whole.derivative(rho));
     EXPECT_EQ(cut.second_derivative(rho), whole.second_derivative(rho));
     EXPECT_EQ(cut.quotient(rho, 0.9), whole.quotient(0.9, rho));
+  }
+}
+
+TEST(Cut, LanesGetTheBitsOfDoubles) {
+  using Two = double __attribute__((vector_size(16)));
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(0.8, 8.0), step(-0.3, 0.3);
+  for (const CutKind kind : {CutKind::switched, CutKind::shifted, CutKind::force_shifted, CutKind::quadratic}) {
+    const Cut cut(LennardJones(1, 1), 2.5, kind, 2.25);
+    for (int n = 0; n < 500; ++n) {
+      Two b, a;
+      for (int l = 0; l < 2; ++l) b[l] = uniform(random), a[l] = b[l] + (l == 0 ? 0 : step(random));
+      Two lanes[4];
+      lanes[0] = cut.value(b), lanes[1] = cut.derivative(b), lanes[2] = cut.second_derivative(b);
+      lanes[3] = cut.quotient(b, a);
+      for (int l = 0; l < 2; ++l) {
+        EXPECT_EQ(lanes[0][l], cut.value(b[l]));
+        EXPECT_EQ(lanes[1][l], cut.derivative(b[l]));
+        EXPECT_EQ(lanes[2][l], cut.second_derivative(b[l]));
+        EXPECT_EQ(lanes[3][l], cut.quotient(b[l], a[l]));
+      }
+    }
   }
 }
 

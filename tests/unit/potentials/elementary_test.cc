@@ -50,6 +50,12 @@ double worst_error(const std::vector<double>& arguments, Function function, Exac
   return worst;
 }
 
+template <class Exact>
+double worst_error(const std::vector<double>& arguments, double (*function)(double), Exact exact) {
+  return worst_error(
+      arguments, [function](double x) { return function(x); }, exact);
+}
+
 TEST(Elementary, ExpIsWithinAnUlp) {
   const auto exact = [](const Precise& x) { return Precise(boost::multiprecision::exp(x)); };
   EXPECT_LE(worst_error(arguments(-745, 709.7), elementary::exp, exact), 1.0);

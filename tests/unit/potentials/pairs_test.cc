@@ -46,7 +46,7 @@ TEST(Pairs, WithinACutoffAreThoseOfTheDoubleLoop) {
     for (std::size_t j = i + 1; j < x.size(); ++j) {
       const double rho = scene.nearest(x[i] - x[j]).squaredNorm();
       if (rho >= 4) continue;
-      expected += potential.value(rho) - potential.value(4);
+      expected += potential.value(rho) - potential.value(4.0);
       ++pairs;
     }
   EXPECT_NEAR(energy(*term, x), expected, 1e-11 * std::abs(expected));

@@ -45,10 +45,10 @@ TEST(Accuracy, HarmonicBondNearItsRestLength) {
 
 TEST(Accuracy, SpringOfZeroLengthIsFiniteWhereItsEndsMeet) {
   const HarmonicBond spring(3.0, 0.0);
-  EXPECT_EQ(spring.value(0), 0);
-  EXPECT_EQ(spring.derivative(0), 1.5);
-  EXPECT_EQ(spring.second_derivative(0), 0);
-  EXPECT_EQ(spring.quotient(0, 0), 1.5);
+  EXPECT_EQ(spring.value(0.0), 0);
+  EXPECT_EQ(spring.derivative(0.0), 1.5);
+  EXPECT_EQ(spring.second_derivative(0.0), 0);
+  EXPECT_EQ(spring.quotient(0.0, 0.0), 1.5);
 }
 
 TEST(Accuracy, InverseDistance) {
