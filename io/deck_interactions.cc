@@ -59,6 +59,30 @@ void try_interactions(const Deck::Source& source, const std::vector<bool>& skip,
 
 }  // namespace
 
+void read_potentials(DeckValues& values, const std::filesystem::path& folder, const TextReader& reader,
+                     Problems& problems) {
+  for (ValueTable& table : values.list("interaction")) {
+    const auto* name =
+        table.variant != nullptr && table.variant->name == "table" ? table.find<std::string>("file") : nullptr;
+    if (name == nullptr) continue;
+    if (table.given("r") || table.given("value")) {
+      problems.error(table.place("file"), "'file' and the points themselves exclude each other",
+                     "leave one of them out");
+      continue;
+    }
+    const std::filesystem::path file = folder / *name;
+    const auto text = reader(file);
+    if (!text)
+      throw Error(Failure::file, file.string() + ": error: cannot read the points of a potential; check 'file'");
+    std::vector<double> r, v;
+    for (const auto& row : rows_in(*text, file, 2, "not a point of a potential"))
+      r.push_back(row[0]), v.push_back(row[1]);
+    table.values.erase("file");
+    table.values.insert_or_assign("r", std::move(r));
+    table.values.insert_or_assign("value", std::move(v));
+  }
+}
+
 void read_interactions(Deck::Source& source, std::size_t dimension, Problems& problems) {
   std::vector<bool> wrong;
   for (const ValueTable& table : source.values.list("interaction")) {
@@ -118,15 +142,13 @@ void make_interactions(const Deck::Source& source, const std::vector<bool>& skip
                      cut < message.size() ? message.substr(cut + 2) : "see `carom schema`");
     }
   };
-  PairList bonds;  // before the terms that leave out bonded pairs
-  for (std::size_t n = 0; n < terms.size(); ++n) {
-    if (!bonded(source.interactions[n])) continue;
-    make(n);
-    if (terms[n]) bonds.insert(bonds.end(), terms[n]->bonds()->begin(), terms[n]->bonds()->end());
-  }
-  if (std::ranges::any_of(source.interactions, bonded)) context.bonds = std::make_shared<BondTable>(std::move(bonds));
-  for (std::size_t n = 0; n < terms.size(); ++n)
-    if (!bonded(source.interactions[n])) make(n);
+  const auto& all = source.interactions;  // bonds before the terms that leave out bonded pairs
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (bonded(all[n])) make(n);
+  context.bonds = bonds_of(terms);
+  if (!context.bonds && std::ranges::any_of(all, bonded)) context.bonds = std::make_shared<BondTable>(PairList());
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (!bonded(all[n])) make(n);
   for (auto& term : terms)
     if (term) system.interactions.push_back(std::move(term));
 }

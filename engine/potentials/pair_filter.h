@@ -39,6 +39,19 @@ class BondTable {
   std::vector<Id> partners_;
 };
 
+/// The bonds that these terms stand for; null: none of them does.
+template <class Terms>
+std::shared_ptr<const BondTable> bonds_of(const Terms& terms) {
+  PairList all;
+  bool any = false;
+  for (const auto& term : terms)
+    if (const PairList* bonds = term ? term->bonds() : nullptr) {
+      all.insert(all.end(), bonds->begin(), bonds->end());
+      any = true;
+    }
+  return any ? std::make_shared<BondTable>(std::move(all)) : nullptr;
+}
+
 /// Two species, in either order; or no restriction.
 using SpeciesPair = std::optional<std::array<std::uint16_t, 2>>;
 

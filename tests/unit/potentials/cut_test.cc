@@ -87,7 +87,7 @@ void expect_switched(const P& potential, V v, M m, double cutoff, double from, d
   };
   for (int n = 0; n < 6000; ++n) {
     const double border = n % 3 == 1 ? from * from : cutoff * cutoff;
-    const double z = static_cast<double>(width) * std::pow(10, digits(random));
+    const double z = std::min(0.5 * border, static_cast<double>(width) * std::pow(10, digits(random)));
     const double b = n % 3 == 0 ? (0.5 + uniform(random)) * border : border + (n % 2 == 0 ? z : -z);
     const double delta = n % 10 == 0 ? 0 : std::pow(10, steps(random));
     const double a = uniform(random) < 0.5 ? b / (1 + delta) : b * (1 + delta);

@@ -43,6 +43,14 @@ const std::vector<Case>& cases() {
       {"lennard-jones",
        Boundary::periodic,
        {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "switch"s}, {"species", Names{"B", "B"}}}},
+      {"lennard-jones", Boundary::open, {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "force-shifted"s}}},
+      {"table",
+       Boundary::periodic,
+       {{"r", std::vector<double>{0.5, 0.7, 0.9, 1.2, 1.6, 2.0}},
+        {"value", std::vector<double>{9.0, 5.0, 1.0, -1.0, -0.4, -0.1}},
+        {"slope", std::vector<double>{-30.0, 0.2}},
+        {"cut", "switch"s},
+        {"switch_from", 1.3}}},
       {"wca", Boundary::periodic, {{"epsilon", 1.0}, {"sigma", 1.1}}},
       {"inverse-power",
        Boundary::periodic,
@@ -59,7 +67,8 @@ class Terms : public ::testing::Test {
   static constexpr int kParticles = D == 2 ? 24 : 40;
   static constexpr double kEdge = 5;
 
-  /// Calls check(scene, term) for every case.
+  /// Calls check(scene, term) for every case, or check(scene, term, remake), where remake(scene) makes the same term
+  /// for another scene.
   template <class Check>
   void for_each_case(Check check) {
     for (const Case& each : cases()) {
@@ -74,7 +83,11 @@ class Terms : public ::testing::Test {
         }
       if (each.type == "uniform-field") parameters.emplace_back("acceleration", std::vector<double>(D, -0.6));
       const auto term = scene.make(each.type, parameters);
-      check(scene, *term);
+      const auto remake = [&](const Scene<D>& other) { return other.make(each.type, parameters); };
+      if constexpr (std::is_invocable_v<Check, Scene<D>&, const Interaction<D>&, decltype(remake)>)
+        check(scene, *term, remake);
+      else
+        check(scene, *term);
     }
   }
 };
@@ -102,6 +115,26 @@ TYPED_TEST(InDimension, ForcesAreMinusTheGradientOfTheEnergy) {
       for (std::size_t i = 0; i < x.size(); ++i) expected -= f[i].dot(w[i]);
       EXPECT_NEAR(slope, expected, 1e-6 * largest * static_cast<double>(x.size()));
     }
+  });
+}
+
+TYPED_TEST(InDimension, TheVirialIsMinusTheDerivativeOfTheEnergyByTheScaleOfTheBox) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term, auto&& remake) {
+    if (!term.keeps_momentum()) return;  // fields have none
+    const auto scaled_energy = [&](double scale) {
+      Scene<D> scaled = scene;
+      scaled.box.edges *= scale;
+      for (auto& x : scaled.particles.x) x *= scale;
+      return energy(*remake(scaled), scaled.particles.x);
+    };
+    const auto at = test::sums(term, scene.particles.x);
+    const double h = 1e-4;
+    const double slope =
+        (8 * (scaled_energy(1 + h) - scaled_energy(1 - h)) - (scaled_energy(1 + 2 * h) - scaled_energy(1 - 2 * h))) /
+        (12 * h);
+    EXPECT_NEAR(at.virial.value(), -slope, 1e-6 * (std::abs(slope) + at.magnitude.value()));
+    EXPECT_GT(std::abs(slope), 1e-3 * at.magnitude.value());
   });
 }
 
