@@ -110,9 +110,9 @@ TEST(Pairs, APairByHand) {  // Lennard-Jones at r = 1.3: V = 4 (1.3⁻¹² − 1
   scene.particles.x = {Vec<3>(1, 1, 1), Vec<3>(1, 2.3, 1)};
   const auto term = scene.make("lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}});
   const auto at = test::sums(*term, scene.particles.x);
-  EXPECT_NEAR(at.energy.value(), -0.6570198937, 1e-9);
-  EXPECT_NEAR(at.virial.value(), -2.9120020949, 1e-9);
-  EXPECT_NEAR(forces(*term, scene.particles.x)[0][1], 2.9120020949 / 1.3, 1e-9);  // towards the other
+  EXPECT_NEAR(at.energy.value(), -0.6570169145, 1e-9);
+  EXPECT_NEAR(at.virial.value(), -2.9119739087, 1e-9);
+  EXPECT_NEAR(forces(*term, scene.particles.x)[0][1], 2.9119739087 / 1.3, 1e-9);  // towards the other
 }
 
 TEST(Pairs, AYukawaTermWithChargesIsTheirProductTimesThatWithout) {

@@ -130,8 +130,8 @@ TEST(Table, QuotientsAreThoseOfTheSplineAlsoAcrossKnots) {
     EXPECT_EQ(quotient, table.quotient(a, b));
   }
   std::printf("    errors in eps: V %.1f, quotient %.1f\n", worst_value, worst);
-  EXPECT_LE(worst_value, 20);
-  EXPECT_LE(worst, 200);  // V differs between neighbouring knots by 0.01: 4 ε |V|/Δ
+  EXPECT_LE(worst_value, 6);
+  EXPECT_LE(worst, 12);
 }
 
 TEST(Table, TheWorkOfAStepIsTheDifferenceOfTheValues) {
