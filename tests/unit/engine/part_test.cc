@@ -175,6 +175,26 @@ const std::vector<std::pair<std::string, Given>> kMethods = {{"psa", {}},
 TEST(Part, Springs) {
   for (const auto& [method, given] : kMethods) compare<2>([] { return springs(7); }, method, 0.02, 25, 20, given);
 }
+/// Spheres joined to their neighbours, which attract the others only; with a long-range correction, and a table.
+std::unique_ptr<System<3>> chains() {
+  auto system = test::hard_spheres<3>(3, 0.35);
+  test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 20.0}, {"rest_length", 1.2}});
+  test::add_interaction(*system, "lennard-jones",
+                        {{"epsilon", 1.0},
+                         {"sigma", 1.3},
+                         {"cutoff", 1.9},
+                         {"cut", std::string("switch")},
+                         {"exclude", std::string("bonded")},
+                         {"tail", true}});
+  test::add_interaction(*system, "table",
+                        {{"r", std::vector<double>{0.8, 1.1, 1.4, 1.8}},
+                         {"value", std::vector<double>{2.0, 0.6, 0.2, 0.0}},
+                         {"cut", std::string("force-shifted")}});
+  return system;
+}
+TEST(Part, BondedPairsLeftOut) {
+  for (const char* method : {"psa", "cdda"}) compare<3>(chains, method, 0.01, 12, 10);
+}
 TEST(Part, Fluid) {
   for (const auto& [method, given] : kMethods) compare<3>(yukawa(0.35), method, 0.01, 12, 15, given);
 }
