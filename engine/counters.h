@@ -15,9 +15,11 @@ struct Counters {
   std::uint64_t sphere_wall = 0;    ///< executed wall collisions
   double force_passes = 0;   ///< pair evaluations of forces and their kin / interacting pairs; energies not counted
   std::uint64_t sweeps = 0;  ///< iterations of implicit solves
-  std::uint64_t pieces = 0;  ///< acdda: in which slabs were solved; more than the steps where one was cut
+  std::uint64_t pieces = 0;  ///< edda: in which steps were solved; more than the steps where one was cut
   std::uint64_t slabs_halved = 0;
-  std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; acdda: solves that took acceleration
+  std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; edda: solves that took Anderson mixing
+  std::uint64_t frozen = 0;        ///< edda: particles that kept an acceleration of an earlier sweep
+  double folded = 0;               ///< edda: Σ|r| of what was folded into velocities [energy]
   std::uint64_t divisions = 0;     ///< of the particles among ranks under forces
   std::uint64_t slabs_again = 0;   ///< done again, with more particles known
   std::uint64_t slabs_by_all = 0;  ///< of these, with everybody known

@@ -17,6 +17,22 @@ Sums of_all_ranks(const System<D>& system, const Sums& mine) {
   return system.sizes ? sum_of_all(*system.ranks, mine) : mine;
 }
 
+/// The largest of what all ranks say, where each knows only some of the particles; else all know the same.
+template <int D>
+double largest_of_all(const System<D>& system, double value) {
+  return system.part && !system.part->knows_everybody() ? system.part->largest(value) : value;
+}
+template <int D>
+bool any_rank(const System<D>& system, bool value) {
+  return largest_of_all(system, value ? 1 : 0) > 0;
+}
+
+/// For what only a rank that knows all particles can do.
+template <int D>
+void need_all(const System<D>& system) {
+  if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
+}
+
 /// One force pass: `add` adds each interaction's share to `out`, which begins at zero.
 template <int D, class Add>
 void force_pass(const System<D>& system, Vectors<D> out, Counters& counters, Add&& add) {

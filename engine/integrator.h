@@ -34,7 +34,6 @@ struct SlabReport {
   std::function<void(double, const Particles<D>&)> observer{};  ///< given copies flown to each of these times
   double reached =
       0;  ///< set by the integrator: the time within the slab it came to; less than its length only at collision_limit
-  bool unsure = false;  ///< set by the integrator: the particles that this rank knows were not enough, nothing is done
 };
 
 template <int D>

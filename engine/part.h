@@ -37,6 +37,10 @@ class Luggage {
   virtual void unpack(Id /*i*/, Reader& /*from*/) {}
 };
 
+/// Thrown on all ranks together, before anything of the system has changed: the particles that they know were not
+/// enough for a slab. Simulation does it again with more of them.
+struct HaloTooSmall {};
+
 template <int D>
 class Part {
  public:

@@ -73,16 +73,17 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     SlabReport<D> report{.counters = s.counters, .contacts = plan_.events ? &contacts : nullptr, .observe = due};
     report.observer = [&](double offset, const Particles<D>& copies) { monitor.observe(slab.start + offset, copies); };
     Counters before = s.counters;
-    integrator_->slab(known(), slab, report);
-    while (report.unsure) {
-      part->know_more(*integrator_, slab.index, slab.length);
-      monitor.regroup();
-      ++before.slabs_again;
-      before.slabs_by_all += part->knows_everybody() ? 1 : 0;
-      s.counters = before;
-      report.unsure = false;
-      integrator_->slab(known(), slab, report);
-    }
+    for (bool done = false; !done;) try {
+        integrator_->slab(known(), slab, report);
+        done = true;
+      } catch (HaloTooSmall) {
+        part->know_more(*integrator_, slab.index, slab.length);
+        monitor.regroup();
+        ++before.slabs_again;
+        before.slabs_by_all += part->knows_everybody() ? 1 : 0;
+        s.counters = before;
+        contacts.clear();
+      }
 
     ++s.steps;
     // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.

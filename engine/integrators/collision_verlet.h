@@ -44,7 +44,7 @@ class VerletPieces {
       p.x[i] += tau * p.v[i];
     }
     accelerations_.update(system_, *counters_);
-    kick(p, accelerations_.a, 0.5 * tau);
+    kick(p.v, accelerations_.a, 0.5 * tau);
     if (!scan_.resting().empty()) scan_.stop_approach(p.x, p.v);
   }
 

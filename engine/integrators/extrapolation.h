@@ -1,5 +1,5 @@
 #pragma once
-// What the mean accelerations of past pieces let expect of the next: where the sweeps of acdda start.
+// What the mean accelerations of past pieces let expect of the next: where the sweeps of edda start.
 
 #include <algorithm>
 #include <array>

@@ -21,8 +21,8 @@ struct Accelerations {
 };
 
 template <int D>
-void kick(Particles<D>& particles, const std::vector<Vec<D>>& a, double time) {
-  for (std::size_t i = 0; i < particles.size(); ++i) particles.v[i] += time * a[i];
+void kick(std::vector<Vec<D>>& v, const std::vector<Vec<D>>& a, double time) {
+  for (std::size_t i = 0; i < v.size(); ++i) v[i] += time * a[i];
 }
 
 }  // namespace carom::integrator

@@ -6,6 +6,7 @@ const std::vector<IntegratorInfo>& integrators() {
   static const std::vector<IntegratorInfo> all = {
       integrator::free_flight(), integrator::verlet(), integrator::psa(),  integrator::cva(),
       integrator::mcva(),        integrator::cdda(),
+      integrator::edda(),
   };
   return all;
 }

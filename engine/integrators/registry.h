@@ -11,6 +11,7 @@ IntegratorInfo psa();
 IntegratorInfo cva();
 IntegratorInfo mcva();
 IntegratorInfo cdda();
+IntegratorInfo edda();
 
 /// The factory of an integrator template that is made from its parameters.
 template <template <int> class T, int D>

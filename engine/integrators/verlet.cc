@@ -21,14 +21,11 @@ class Verlet : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
-    if (system.part && !system.part->covers(p, accelerations_.a, slab.length)) {
-      report.unsure = true;
-      return;
-    }
-    kick(p, accelerations_.a, 0.5 * slab.length);
+    if (system.part && !system.part->covers(p, accelerations_.a, slab.length)) throw HaloTooSmall{};
+    kick(p.v, accelerations_.a, 0.5 * slab.length);
     for (std::size_t i = 0; i < p.size(); ++i) p.x[i] += slab.length * p.v[i];
     accelerations_.update(system, report.counters);
-    kick(p, accelerations_.a, 0.5 * slab.length);
+    kick(p.v, accelerations_.a, 0.5 * slab.length);
     system.wrap();
     report.reached = slab.length;
   }

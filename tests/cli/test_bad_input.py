@@ -179,12 +179,12 @@ DECK_ERRORS = {
         changed("[integrator]", '[[interaction]]\ntype = "wca"\nepsilon = 1\nsigma = 1\n[integrator]', FLUID),
         17, ["free-flight cannot carry the interaction 'wca'", "uniform-field"]),
     "the cut of earlier versions": (
-        lennard_jones('cutoff = 2\ncut = "smooth"'), 21, ["'cut' can no longer be 'smooth'", 'write cut = "switch"']),
-    "unknown cut": (lennard_jones('cutoff = 2\ncut = "swicth"'), 21, ["'cut' cannot be 'swicth'", "did you mean 'switch'?"]),
+        lennard_jones('cutoff = 2\ncut = "smooth"'), 22, ["'cut' can no longer be 'smooth'", 'write cut = "switch"']),
+    "unknown cut": (lennard_jones('cutoff = 2\ncut = "swicth"'), 22, ["'cut' cannot be 'swicth'", "did you mean 'switch'?"]),
     "switch beyond the cutoff": (lennard_jones("cutoff = 2\nswitch_from = 2.5"), 17, ["'switch_from' is not below the cutoff"]),
     "switch of a shifted potential": (
         lennard_jones('cutoff = 2\ncut = "shifted"\nswitch_from = 1'), 17, ["'switch_from' belongs to cut = \"switch\""]),
-    "negative switch": (lennard_jones("cutoff = 2\nswitch_from = -1"), 21, ["'switch_from' must be positive (is -1)"]),
+    "negative switch": (lennard_jones("cutoff = 2\nswitch_from = -1"), 22, ["'switch_from' must be positive (is -1)"]),
     "tail that diverges": (
         lennard_jones("exponent = 3\ncutoff = 2\ntail = true").replace("lennard-jones", "inverse-power"),
         17, ["the long-range correction diverges", "leave 'tail' out"]),
@@ -195,7 +195,7 @@ DECK_ERRORS = {
     "bonds left out that are not there": (
         lennard_jones('cutoff = 2\nexclude = "bonded"'), 17, ["there are no bonds", "add a harmonic-bond"]),
     "unknown exclusion": (
-        lennard_jones('cutoff = 2\nexclude = "bonds"'), 21, ["'exclude' cannot be 'bonds'", "did you mean 'bonded'?"]),
+        lennard_jones('cutoff = 2\nexclude = "bonds"'), 22, ["'exclude' cannot be 'bonds'", "did you mean 'bonded'?"]),
     "table without points": (table(""), 17, ["no points are given", "'file'"]),
     "table out of order": (table("r = [1, 3, 2]\nvalue = [2, 1, 0]"), 17, ["the distances do not ascend"]),
     "table with a distance of zero": (table("r = [0, 1]\nvalue = [1, 0]"), 19, ["'r' must be positive (is 0)"]),
@@ -321,7 +321,7 @@ def test_positions_file(tmp_path):
 
 
 def test_potential_from_a_file(tmp_path):
-    deck = table('file = "potential.csv"')
+    deck = changed("collisions = 10", "steps = 10", table('file = "potential.csv"'))
     answer = validate(tmp_path, deck)
     assert (answer.returncode, "potential.csv" in answer.stderr) == (5, True)
     (tmp_path / "potential.csv").write_text("r,V\n0.9,1\n1.2\n")

@@ -1,0 +1,364 @@
+// edda: event-driven discrete gradients.
+//
+// In a slab [0, h] particle i moves under a constant acceleration of its own, a_i: parabolas, cut by collisions, which
+// change velocities and never a_i. That flow keeps K − Σ m_i a_i·x_i, whatever the a_i and whatever collides. With
+//
+//   m_i a_i = −∇̄_i V(x(0), x(h)),
+//
+// the discrete gradient between the slab's two ends, Σ m_i a_i·Δx_i = −(V(x(h)) − V(x(0))), so H is exact. The equation
+// is solved by sweeps: fly on a, evaluate a′ at the ends, go on with a′. What the last sweep leaves, e = a′ − a, is given
+// as a kick, so that momentum is exact; the energy that lacks then,
+//
+//   r = Σ m [e·(Δx − h v′) − ½ h² e²],   v′ before the kick,
+//
+// is folded into the velocities by a common factor.
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "engine/error.h"
+#include "engine/forces.h"
+#include "engine/integrators/extrapolation.h"
+#include "engine/integrators/mixing.h"
+#include "engine/integrators/registry.h"
+#include "engine/slab_core.h"
+
+namespace carom::integrator {
+namespace {
+
+constexpr int kMostSweeps = 60;
+constexpr int kMostPieces = 1 << 14;      // of a step
+constexpr int kPatience = 6;              // sweeps before particles may be frozen
+constexpr int kSwaps = 3;                 // of partners after that, until a particle is frozen
+constexpr double kSlow = 0.2;             // contraction of sweeps from which on they are mixed
+constexpr double kSettled = 0.1;          // of the tolerance: such a particle keeps its path
+constexpr double kRounding = 1e-13;       // of the speed scale: increments below it that do not shrink are rounding
+constexpr std::size_t kLeastCluster = 16;  // particles that take up what a frozen one lacks
+constexpr double kMostOfCluster = 0.1;    // of their kinetic energy
+
+template <int D>
+class EventDrivenDiscreteGradient : public Integrator<D> {
+ public:
+  explicit EventDrivenDiscreteGradient(const Parameters& parameters)
+      : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))),
+        tolerance_(parameters.real("tolerance")) {}
+
+  bool local() const override { return true; }
+  void pack(Id i, Bytes& to) const override { past_.pack(i, to); }
+  void unpack(Id i, Reader& from) override { past_.unpack(i, from); }
+  void release() override {
+    core_.reset();
+    past_.release();
+    for (auto* each : {&a_, &mean_}) *each = {};
+  }
+  void regroup(System<D>& system) override {
+    core_.emplace(system, max_events_);
+    const std::size_t n = system.particles.size();
+    past_.resize(n);
+    for (auto* each : {&a_, &mean_}) each->resize(n);
+    swaps_.assign(n, 0);
+  }
+
+  void start(System<D>& system, Counters& counters) override {
+    regroup(system);
+    const auto& p = system.particles;
+    evaluate_forces<D>(system, p.x, a_, counters);
+    for (std::size_t i = 0; i < a_.size(); ++i) a_[i] /= p.mass[i];
+    past_.start(a_);
+    bool free = system.size() > 1;  // the total momentum is kept, and more than it moves
+    for (int k = 0; k < D; ++k) free = free && !system.box.walled(k);
+    for (const auto& term : system.interactions) free = free && term->keeps_momentum();
+    ExactSum squares, mass, forces;
+    std::array<ExactSum, D> momentum;
+    for (Id i = 0; i < p.size(); ++i) {
+      if (!p.owns(i)) continue;
+      squares.add(p.v[i].squaredNorm());
+      forces.add(a_[i].squaredNorm());
+      mass.add(p.mass[i]);
+      for (int k = 0; k < D; ++k) momentum[k].add(p.mass[i] * p.v[i][k]);
+    }
+    const double n = static_cast<double>(system.part ? system.part->total() : system.size());
+    speed_ = std::sqrt(of_all_ranks(system, squares).value() / n);
+    strength_ = std::sqrt(of_all_ranks(system, forces).value() / n);
+    const double total = of_all_ranks(system, mass).value();
+    for (int k = 0; k < D; ++k) centre_[k] = free ? of_all_ranks(system, momentum[k]).value() / total : 0.0;
+  }
+
+  void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
+    counters_ = &report.counters;
+    auto& p = system.particles;
+    core_->begin_step(report.counters, report.contacts, past_.last(), slab.length);
+    double done = 0, longest = slab.length;
+    while (done < slab.length) {
+      if (touching_) touching_ = resolve(system, done);
+      const double rest = slab.length - done, piece = std::min(longest, rest);
+      const Outcome outcome = solve(system, piece);
+      if (outcome == Outcome::settled) {
+        core_->commit(done);
+        finish(system, piece);
+        if (touching_) core_->scan().slide(p.x, p.v);
+        ++report.counters.pieces;
+        done = piece == rest ? slab.length : done + piece;
+        longest = std::max(2 * piece, slab.length / kMostPieces);
+        touching_ = touching_ || cut_.time > 0;
+        cut_ = {};
+        continue;
+      }
+      need_all(system);
+      if (outcome == Outcome::cut) {
+        core_->scan().count_event(cut_.key);
+        touching_ = touching_ || cut_.time == 0;
+        longest = cut_.time > 0 ? cut_.time : longest;
+        continue;
+      }
+      ++report.counters.slabs_halved;
+      longest = 0.5 * piece;
+      if (longest * kMostPieces < slab.length)
+        throw Error(Failure::numerical, "the sweeps do not settle even in " + std::to_string(kMostPieces) +
+                                            " pieces; the forces are not finite or far too stiff for step = " +
+                                            std::to_string(slab.length));
+    }
+    system.wrap();
+    report.reached = slab.length;
+  }
+
+ private:
+  enum class Outcome { settled, cut, diverged };
+
+  /// Impulses of what touches and approaches now, and which contacts rest. Returns whether any do.
+  bool resolve(System<D>& system, double done) {
+    auto& p = system.particles;
+    auto& scan = core_->scan();
+    if (!any_rank(system, !scan.quiet(p.x, p.v))) return false;
+    need_all(system);
+    scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
+    return !scan.resting().empty();
+  }
+
+  /// Sweeps over a slab from the present state. settled: core_ has the flight on a_, mean_ the accelerations it gives.
+  Outcome solve(System<D>& system, double h) {
+    const Stopwatch watch(counters_->seconds.sweep);
+    auto& p = system.particles;
+    const std::size_t n = p.size();
+    past_.expect(h, a_);
+    core_->begin(p.v, a_, h);
+    for (const Id i : frozen_) swaps_[i] = 0;
+    for (const Id i : swapping_) swaps_[i] = 0;
+    frozen_.clear();
+    swapping_.clear();
+    bool mixes = false;
+    const double scale = std::max(speed_, h * strength_), wanted = tolerance_ * scale;
+    double last = 0, earlier = 0;
+    int since = 0;  // sweeps since partners swapped
+    for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
+      const FlightEnd<D> end = core_->fly(a_);
+      if (!end.complete) {
+        cut_ = end;
+        return Outcome::cut;
+      }
+      evaluate_mean_forces<D>(system, p.x, core_->x(), mean_, *counters_);
+      ++counters_->sweeps;
+      for (std::size_t i = 0; i < n; ++i) mean_[i] /= p.mass[i];
+      if (!core_->scan().resting().empty()) hold(system, h);
+      double largest = 0;
+      for (Id i = 0; i < n; ++i)
+        if (!frozen(i) && p.owns(i)) largest = std::max(largest, finite((mean_[i] - a_[i]).squaredNorm()));
+      largest = h * std::sqrt(largest_of_all(system, largest));
+      if (!std::isfinite(largest)) return Outcome::diverged;
+      if (largest <= wanted) return Outcome::settled;
+      if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * last) return Outcome::settled;
+      const bool alike = sweep > 1 && !any_rank(system, swaps_among_unfrozen());
+      since = alike ? since + 1 : 0;
+      if (sweep >= kPatience && !alike) freeze(system);
+      if (!mixes && since > 2 && largest > kSlow * kSlow * earlier) {
+        need_all(system);
+        mixes = true;
+        mixing_.clear();
+        ++counters_->fallbacks;
+      }
+      if (mixes) mix(h, alike);
+      earlier = last;
+      last = largest;
+      const double settled = std::pow(kSettled * wanted / h, 2);
+      for (Id i = 0; i < n; ++i) {
+        if (frozen(i)) continue;
+        if (mixes)
+          a_[i] = mean_[i] + mixing_.correction().template segment<D>(static_cast<Eigen::Index>(D * i)) / h;
+        else if ((mean_[i] - a_[i]).squaredNorm() > settled)
+          a_[i] = mean_[i];
+      }
+    }
+    return Outcome::diverged;
+  }
+
+  bool frozen(Id i) const { return swaps_[i] > kSwaps; }
+  static double finite(double value) { return std::isnan(value) ? kNever : value; }
+  bool swaps_among_unfrozen() const {
+    return std::ranges::any_of(core_->swapped(), [&](Id i) { return !frozen(i); });
+  }
+
+  /// Counts the swaps of partners of each particle. One which swaps again and again keeps its acceleration from then on,
+  /// and where it still swaps, so do its partners.
+  void freeze(const System<D>& system) {
+    need_all(system);
+    const auto note = [&](Id i) {
+      if (swaps_[i] == 0) swapping_.push_back(i);
+      if (++swaps_[i] != kSwaps + 1) return;
+      frozen_.push_back(i);
+      ++counters_->frozen;
+    };
+    for (const Id i : core_->swapped()) {
+      if (frozen(i) && ++swaps_[i] > 2 * kSwaps)
+        for (const Contact<D>& contact : core_->contacts())
+          if (contact.key.kind == EventKind::pair && (contact.key.lo == i || contact.key.hi == i))
+            for (const Id j : {contact.key.lo, contact.key.hi})
+              if (!frozen(j)) note(j);
+      if (!frozen(i)) note(i);
+    }
+  }
+
+  /// Accelerates slow sweeps, in terms of the velocities h a.
+  void mix(double h, bool alike) {
+    if (!alike) mixing_.clear();
+    const auto size = static_cast<Eigen::Index>(D * a_.size());
+    Eigen::VectorXd flown(size), lacking(size);
+    for (Id i = 0; i < a_.size(); ++i) {
+      flown.segment<D>(static_cast<Eigen::Index>(D * i)) = h * a_[i];
+      lacking.segment<D>(static_cast<Eigen::Index>(D * i)) =
+          frozen(i) ? Vec<D>(Vec<D>::Zero()) : Vec<D>(h * (mean_[i] - a_[i]));
+    }
+    mixing_.add(flown, lacking);
+  }
+
+  /// Adds the reactions λ(d + d′) of resting contacts, which do no work because they hold |d′| = |d|, to mean_.
+  void hold(const System<D>& system, double h) {
+    const auto& p = system.particles;
+    std::vector<Vec<D>> w(p.size());  // mean velocities; what rests has no collision in the slab
+    for (Id i = 0; i < p.size(); ++i) w[i] = p.v[i] + (0.5 * h) * mean_[i];
+    for (auto& contact : core_->scan().resting()) {
+      const Id lo = contact.key.lo, hi = contact.key.hi;
+      if (contact.key.kind == EventKind::pair)
+        contact.normal = 2 * (p.x[lo] - p.x[hi] + system.box.shift(contact.key.image)) +
+                         ((core_->x()[lo] - p.x[lo]) - (core_->x()[hi] - p.x[hi]));
+      contact.lambda = contact.bound = 0;
+    }
+    press_apart<D>(core_->scan().resting(), p.mass, w);
+    for (const auto& contact : core_->scan().resting())
+      for (const Id i : {contact.key.lo, contact.key.hi})
+        if (i == contact.key.lo || contact.key.kind == EventKind::pair) mean_[i] = 2 / h * (w[i] - p.v[i]);
+  }
+
+  /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
+  void finish(System<D>& system, double h) {
+    auto& p = system.particles;
+    const auto lacks = [&](Id i) -> double {
+      const Vec<D> e = mean_[i] - a_[i];
+      return p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
+    };
+    ExactSum sum;
+    for (Id i = 0; i < p.size(); ++i)
+      if (p.owns(i) && !frozen(i)) sum.add(lacks(i));
+    double rest = of_all_ranks(system, sum).value();
+    std::ranges::sort(frozen_);
+    std::vector<double> of_frozen;
+    for (const Id i : frozen_) of_frozen.push_back(lacks(i));
+    core_->finish(p);
+    for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
+    for (std::size_t k = 0; k < frozen_.size(); ++k)
+      if (!fold_near(system, frozen_[k], of_frozen[k])) rest += of_frozen[k];
+    fold(system, rest);
+    past_.pass(h);
+    for (Id i = 0; i < p.size(); ++i) past_.add(i, mean_[i], h);
+  }
+
+  /// Adds r to the kinetic energy of all particles, relative to the centre of mass.
+  void fold(System<D>& system, double r) {
+    counters_->folded += std::abs(r);
+    if (r == 0) return;
+    auto& p = system.particles;
+    ExactSum kinetic;
+    for (Id i = 0; i < p.size(); ++i)
+      if (p.owns(i)) kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre_).squaredNorm());
+    const double share = r / of_all_ranks(system, kinetic).value();
+    if (!(std::abs(share) < 0.5)) return;  // at rest: nothing to scale
+    const double stretch = share / (1 + std::sqrt(1 + share));
+    for (auto& v : p.v) v += stretch * (v - centre_);
+  }
+
+  /// Adds r to the kinetic energy of particle i and those nearest to it, as many as it takes, relative to their centre
+  /// of mass. False where all are too few.
+  bool fold_near(System<D>& system, Id i, double r) {
+    auto& p = system.particles;
+    if (r == 0) return true;
+    std::vector<std::pair<double, Id>> near;
+    for (Id j = 0; j < p.size(); ++j) {
+      const Vec<D> d = p.x[j] - p.x[i];
+      near.push_back({(d + system.box.shift(system.box.nearest_image(d))).squaredNorm(), j});
+    }
+    for (std::size_t size = std::min(kLeastCluster, near.size());; size = std::min(2 * size, near.size())) {
+      std::ranges::partial_sort(near, near.begin() + static_cast<std::ptrdiff_t>(size));
+      Vec<D> momentum = Vec<D>::Zero();
+      double mass = 0, kinetic = 0;
+      for (std::size_t k = 0; k < size; ++k) {
+        momentum += p.mass[near[k].second] * p.v[near[k].second];
+        mass += p.mass[near[k].second];
+      }
+      const Vec<D> centre = momentum / mass;
+      for (std::size_t k = 0; k < size; ++k)
+        kinetic += 0.5 * p.mass[near[k].second] * (p.v[near[k].second] - centre).squaredNorm();
+      if (std::abs(r) <= kMostOfCluster * kinetic) {
+        const double share = r / kinetic, stretch = share / (1 + std::sqrt(1 + share));
+        for (std::size_t k = 0; k < size; ++k) p.v[near[k].second] += stretch * (p.v[near[k].second] - centre);
+        counters_->folded += std::abs(r);
+        return true;
+      }
+      if (size == near.size()) return false;
+    }
+  }
+
+  std::uint64_t max_events_;
+  double tolerance_;                    // what sweeps may leave of h a, relative to the speed scale
+  double speed_ = 0, strength_ = 0;     // root mean square velocity and acceleration at the start of the run
+  Vec<D> centre_ = Vec<D>::Zero();      // velocity of the centre of mass, where it is kept
+  std::optional<SlabCore<D>> core_;
+  Extrapolation<D> past_;
+  std::vector<Vec<D>> a_, mean_;        // flown on, and what that gives
+  std::vector<std::uint32_t> swaps_;    // of partners, by particle
+  std::vector<Id> swapping_, frozen_;   // particles with any, and with many
+  bool touching_ = true;                // contacts at the slab's start may need to be resolved
+  FlightEnd<D> cut_;                    // why the last slab was cut
+  Mixing mixing_;
+  Counters* counters_ = nullptr;
+};
+
+}  // namespace
+
+IntegratorInfo edda() {
+  return {
+      .name = "edda",
+      .title = "Event-Driven Discrete gradients",
+      .order = "2",
+      .conserves = "energy and linear momentum to rounding, for any step; angular momentum to the tolerance in slabs "
+                   "without collisions",
+      .parameters = {parameter::step(),
+                     {.name = "tolerance",
+                      .type = Parameter::Type::real,
+                      .fallback = "1e-10",
+                      .unit = "-",
+                      .meaning = "what sweeps may leave of a step's impulses, as a velocity and relative to the root "
+                                 "mean square velocity at the start; the energy stays exact: what it lacks is folded "
+                                 "into the velocities (energy.folded of summary.json); 0: rounding",
+                      .range = Parameter::Range::non_negative},
+                     parameter::max_events_per_step()},
+      .documentation =
+          "Each particle moves under a constant acceleration of its own over the step, through all its collisions; the "
+          "accelerations are the discrete gradient between the step's two ends, found by sweeps that cost a force pass "
+          "and the collisions each. Energy is exact whatever the step and the number of collisions.",
+      .source = "this project; relatives: LaBudde, Greenspan, Numer. Math. 25 (1976) 323; Gonzalez, J. Nonlinear Sci. "
+                "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 84 (2010) 1085",
+      .in_2d = make<EventDrivenDiscreteGradient, 2>,
+      .in_3d = make<EventDrivenDiscreteGradient, 3>};
+}
+
+}  // namespace carom::integrator
