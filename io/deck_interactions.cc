@@ -62,24 +62,26 @@ void try_interactions(const Deck::Source& source, const std::vector<bool>& skip,
 void read_potentials(DeckValues& values, const std::filesystem::path& folder, const TextReader& reader,
                      Problems& problems) {
   for (ValueTable& table : values.list("interaction")) {
-    const auto* name =
-        table.variant != nullptr && table.variant->name == "table" ? table.find<std::string>("file") : nullptr;
-    if (name == nullptr) continue;
-    if (table.given("r") || table.given("value")) {
-      problems.error(table.place("file"), "'file' and the points themselves exclude each other",
-                     "leave one of them out");
-      continue;
+    if (table.variant == nullptr || table.variant->name != "table") continue;
+    if (const auto* name = table.find<std::string>("file")) {
+      if (table.given("r") || table.given("value")) {
+        problems.error(table.place("file"), "'file' and the points themselves exclude each other",
+                       "leave one of them out");
+        continue;
+      }
+      const std::filesystem::path file = folder / *name;
+      const auto text = reader(file);
+      if (!text)
+        throw Error(Failure::file, file.string() + ": error: cannot read the points of a potential; check 'file'");
+      std::vector<double> r, v;
+      for (const auto& row : rows_in(*text, file, 2, "not a point of a potential"))
+        r.push_back(row[0]), v.push_back(row[1]);
+      table.values.erase("file");
+      table.values.insert_or_assign("r", std::move(r));
+      table.values.insert_or_assign("value", std::move(v));
     }
-    const std::filesystem::path file = folder / *name;
-    const auto text = reader(file);
-    if (!text)
-      throw Error(Failure::file, file.string() + ": error: cannot read the points of a potential; check 'file'");
-    std::vector<double> r, v;
-    for (const auto& row : rows_in(*text, file, 2, "not a point of a potential"))
-      r.push_back(row[0]), v.push_back(row[1]);
-    table.values.erase("file");
-    table.values.insert_or_assign("r", std::move(r));
-    table.values.insert_or_assign("value", std::move(v));
+    const auto* r = table.find<std::vector<double>>("r");
+    if (r != nullptr && !r->empty() && !table.given("cutoff")) table.values.insert_or_assign("cutoff", r->back());
   }
 }
 

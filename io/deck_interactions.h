@@ -5,8 +5,9 @@
 
 namespace carom {
 
-/// Puts the points of potentials that are given as files in the place of `file`: the values say them themselves from
-/// now on. Throws Error(Failure::file), or DeckError for what is wrong in a file.
+/// Puts the points of tables that are given as files in the place of `file`, and their last point where there is no
+/// cutoff: the values say them themselves from now on. Throws Error(Failure::file), or DeckError for what is wrong in a
+/// file.
 void read_potentials(DeckValues& values, const std::filesystem::path& folder, const TextReader& reader,
                      Problems& problems);
 
