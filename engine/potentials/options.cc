@@ -20,12 +20,10 @@ std::vector<Parameter> with_filter(std::vector<Parameter> own) {
   return own;
 }
 
-std::vector<Parameter> with_pair_options(std::vector<Parameter> own) {
+std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view absent_cutoff) {
   using enum Parameter::Type;
   own = with_filter(std::move(own));
-  own.push_back({"cutoff", real, "none", "length",
-                 "distance at which the potential ends; absent: never, which a periodic box does not allow",
-                 Parameter::Range::positive});
+  own.push_back({"cutoff", real, "none", "length", absent_cutoff, Parameter::Range::positive});
   own.push_back(
       {"cut",
        text,
@@ -40,7 +38,13 @@ std::vector<Parameter> with_pair_options(std::vector<Parameter> own) {
   own.push_back({"switch_from", real, "none", "length",
                  "where cut = 'switch' begins to differ from V; absent: 0.9 of the cutoff",
                  Parameter::Range::positive});
-  own.push_back({"tail", boolean, "false", "-",
+  return own;
+}
+
+std::vector<Parameter> with_pair_options(std::vector<Parameter> own) {
+  own = with_cut(std::move(own),
+                 "distance at which the potential ends; absent: never, which a periodic box does not allow");
+  own.push_back({"tail", Parameter::Type::boolean, "false", "-",
                  "add the long-range correction of a uniform fluid for what the cutoff takes away to the energy and "
                  "pressure that are reported; of 'shifted' that of the truncated potential, not the shift"});
   return own;

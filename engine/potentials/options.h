@@ -19,7 +19,10 @@ namespace carom::options {
 /// `own` followed by those that say between which particles a term acts.
 std::vector<Parameter> with_filter(std::vector<Parameter> own);
 
-/// The same, followed by cutoff, cut, switch_from and tail.
+/// The same, followed by cutoff, cut and switch_from.
+std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view absent_cutoff);
+
+/// The same, followed by tail: what a potential without an end of its own can be given.
 std::vector<Parameter> with_pair_options(std::vector<Parameter> own);
 
 [[noreturn]] void refuse(std::string_view type, const std::string& problem);
@@ -27,7 +30,7 @@ std::vector<Parameter> with_pair_options(std::vector<Parameter> own);
 /// The two species `species` names, as indices into `known`.
 SpeciesPair species_pair(std::string_view type, const Parameters& parameters, const std::vector<std::string>& known);
 
-/// A potential cut as `cutoff`, `cut` and `switch_from` say, or at `end` where there is no `cutoff`.
+/// What `cutoff`, `cut` and `switch_from` say; it ends at `end` where there is no `cutoff`.
 struct CutOptions {
   double cutoff;
   CutKind kind;
@@ -35,7 +38,7 @@ struct CutOptions {
 };
 CutOptions cut_options(std::string_view type, const Parameters& parameters, double end = 0);
 
-/// What is said of the end of a potential that has none.
+/// Refuses what is said of the end of a potential without `cutoff`.
 void refuse_cut_options(std::string_view type, const Parameters& parameters);
 
 /// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending; none for `within`.
@@ -120,35 +123,30 @@ std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential,
 }
 
 /// The long-range correction of a term over all particles on all ranks.
-template <int D, Potential P, class Weight>
+template <int D, KnowsTail P, class Weight>
 Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, Weight weight, const Parameters& parameters,
           const InteractionContext<D>& context) {
-  if constexpr (!KnowsTail<P>) {
-    refuse(type, "'tail' needs to know the potential beyond its end; leave it out");
-  } else {
-    if (kind == CutKind::force_shifted)
-      refuse(type,
-             "'tail' does not go with cut = \"force-shifted\", which changes V at all distances; take \"switch\"");
-    for (int k = 0; k < D; ++k)
-      if (!context.box.periodic(k))
-        refuse(type, "'tail' is for a fluid without borders; make the box periodic or leave it out");
-    if (!std::isfinite(cut.whole().tail(1, D)))
-      refuse(type, "the long-range correction diverges: V falls off too slowly; leave 'tail' out");
-    const SpeciesPair species = species_pair(type, parameters, context.species);
-    struct Sums {
-      std::array<ExactSum, 2> weight;  // of either species
-      void add(const Sums& other) {
-        for (int k = 0; k < 2; ++k) weight[k].add(other.weight[k]);
-      }
-    } sums;
-    for (Id i = 0; i < context.particles.mass.size(); ++i)
-      for (int k = 0; k < 2; ++k)
-        if (!species || context.particles.species[i] == (*species)[k]) sums.weight[k].add(weight.of(i));
-    if (context.ranks) sums = sum_of_all(*context.ranks, sums);
-    const double pairs = sums.weight[0].value() * sums.weight[1].value();
-    const bool alike = !species || (*species)[0] == (*species)[1];
-    return tail_of<D>(cut, alike ? pairs / 2 : pairs, context.box.volume());
-  }
+  if (kind == CutKind::force_shifted)
+    refuse(type, "'tail' does not go with cut = \"force-shifted\", which changes V at all distances; take \"switch\"");
+  for (int k = 0; k < D; ++k)
+    if (!context.box.periodic(k))
+      refuse(type, "'tail' is for a fluid without borders; make the box periodic or leave it out");
+  if (!std::isfinite(cut.whole().tail(1, D)))
+    refuse(type, "the long-range correction diverges: V falls off too slowly; leave 'tail' out");
+  const SpeciesPair species = species_pair(type, parameters, context.species);
+  struct Sums {
+    std::array<ExactSum, 2> weight;  // of either species
+    void add(const Sums& other) {
+      for (int k = 0; k < 2; ++k) weight[k].add(other.weight[k]);
+    }
+  } sums;
+  for (Id i = 0; i < context.particles.mass.size(); ++i)
+    for (int k = 0; k < 2; ++k)
+      if (!species || context.particles.species[i] == (*species)[k]) sums.weight[k].add(weight.of(i));
+  if (context.ranks) sums = sum_of_all(*context.ranks, sums);
+  const double pairs = sums.weight[0].value() * sums.weight[1].value();
+  const bool alike = !species || (*species)[0] == (*species)[1];
+  return tail_of<D>(cut, alike ? pairs / 2 : pairs, context.box.volume());
 }
 
 /// A term cut as said, with its long-range correction if the deck wants it.
@@ -156,9 +154,11 @@ template <int D, Potential P, class Weight>
 std::unique_ptr<Interaction<D>> cut_term(std::string_view type, P potential, Weight weight, const CutOptions& options,
                                          const Parameters& parameters, const InteractionContext<D>& context) {
   const Cut<P> cut(potential, options.cutoff, options.kind, options.switch_from);
-  const bool wanted = parameters.has("tail") && parameters.flag("tail");
-  return within_reach<D>(type, cut, weight, parameters, context,
-                         wanted ? tail<D>(type, cut, options.kind, weight, parameters, context) : Tail{});
+  Tail correction;
+  if constexpr (KnowsTail<P>)
+    if (parameters.has("tail") && parameters.flag("tail"))
+      correction = tail<D>(type, cut, options.kind, weight, parameters, context);
+  return within_reach<D>(type, cut, weight, parameters, context, correction);
 }
 
 /// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.
