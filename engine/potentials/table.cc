@@ -111,7 +111,7 @@ InteractionInfo table() {
   return {
       .name = "table",
       .kind = InteractionInfo::Kind::pair,
-      .parameters = options::with_pair_options(
+      .parameters = options::with_cut(
           {{"r", Type::real_list, "none", "length", "distances of the points, ascending", Range::positive},
            {"value", Type::real_list, "none", "energy", "V at each of them"},
            {"file", Type::text, "none", "-",
@@ -119,7 +119,8 @@ InteractionInfo table() {
             "the deck's folder"},
            {"slope", Type::real_list, "none", "energy/length",
             "dV/dr at the first and at the last point; absent: a natural spline, without second derivative in r^2 "
-            "there"}}),
+            "there"}},
+          "distance at which the potential ends, at most that of the last point; absent: there"),
       .formula = "sum over pairs of the cubic spline in r^2 through the given points",
       .documentation =
           "Any pair potential, from points. It ends at the last point, or at the cutoff where one is given before, and "

@@ -253,7 +253,6 @@ TEST(Refused, TablesThatCannotBe) {
   expect_contains(message({1, 2, 3}, {3, 2, 0}, {{"cutoff", 4.0}}), "beyond the last point");
   expect_contains(message({1, 2, 3}, {3, 2, 0}, {{"cutoff", 0.5}}), "before the first point");
   expect_contains(message({1, 2, 3}, {3, 2, 0}, {{"slope", Numbers{1}}}), "give two, dV/dr");
-  expect_contains(message({1, 2, 3}, {3, 2, 0}, {{"tail", true}}), "beyond its end");
 }
 
 TEST(Refused, BondsThatCannotBe) {
