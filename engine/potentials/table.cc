@@ -1,5 +1,6 @@
 #include "engine/potentials/table.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -11,7 +12,7 @@ namespace carom {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kMostCells = 1 << 16;
+constexpr double kMostCells = 65536;
 
 /// The spline's slopes at its knots: continuity of V″ in between, and at either end a given slope or V″ = 0. The matrix
 /// has three diagonals and is diagonally dominant.
@@ -48,26 +49,29 @@ Table::Table(std::span<const double> r, std::span<const double> values, std::spa
   std::vector<double> rho;
   for (const double each : r) rho.push_back(each * each);
   const std::vector<double> s = knot_slopes(rho, values, slopes);
-  pieces_.resize(1);
+  auto data = std::make_shared<Data>();
+  auto& pieces = data->pieces;
+  pieces.resize(1);
   double narrowest = kInfinity;
   for (std::size_t k = 0; k + 1 < rho.size(); ++k) {
     const double h = rho[k + 1] - rho[k], chord = (values[k + 1] - values[k]) / h;
-    pieces_.push_back({rho[k], rho[k], values[k], s[k], (3 * chord - 2 * s[k] - s[k + 1]) / h,
-                       (s[k] + s[k + 1] - 2 * chord) / (h * h)});
+    pieces.push_back({rho[k], rho[k], values[k], s[k], (3 * chord - 2 * s[k] - s[k + 1]) / h,
+                      (s[k] + s[k + 1] - 2 * chord) / (h * h)});
     narrowest = std::min(narrowest, h);
   }
   first_ = rho.front(), last_ = rho.back();
-  pieces_[0] = {-kInfinity, first_, values[0], s[0], pieces_[1].c2, 0};
-  pieces_.push_back({std::nextafter(last_, kInfinity), last_, values.back(), 0, 0, 0});
-  pieces_.push_back({kInfinity, last_, 0, 0, 0, 0});
-  const double wanted = std::ceil((last_ - first_) / narrowest);
-  const std::size_t cells = wanted < double{kMostCells} ? static_cast<std::size_t>(wanted) : kMostCells;
-  inverse_cell_ = static_cast<double>(cells) / (last_ - first_);
+  pieces[0] = {-kInfinity, first_, values[0], s[0], pieces[1].c2, 0};
+  pieces.push_back({std::nextafter(last_, kInfinity), last_, values.back(), 0, 0, 0});
+  pieces.push_back({kInfinity, last_, 0, 0, 0, 0});
+  const double cells = std::min(std::ceil((last_ - first_) / narrowest), kMostCells);
+  inverse_cell_ = cells / (last_ - first_), last_cell_ = cells - 1;
   std::uint32_t at = 1;
-  for (std::size_t cell = 0; cell < cells; ++cell) {
-    while (static_cast<double>(cell) >= (pieces_[at + 1].start - first_) * inverse_cell_) ++at;
-    cells_.push_back(at);
+  for (double cell = 0; cell < cells; ++cell) {
+    while (cell >= (pieces[at + 1].start - first_) * inverse_cell_) ++at;
+    data->cells.push_back(at);
   }
+  pieces_ = pieces.data(), cells_ = data->cells.data();
+  data_ = std::move(data);
 }
 
 namespace types {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -65,8 +65,7 @@ class Table {
   /// unless that were too many.
   const Piece& piece(double rho) const {
     const double cell = (rho - first_) * inverse_cell_;
-    const auto last = static_cast<double>(cells_.size() - 1);
-    const Piece* p = &pieces_[cells_[static_cast<std::size_t>(cell > 0 ? (cell < last ? cell : last) : 0)]];
+    const Piece* p = pieces_ + cells_[static_cast<std::size_t>(cell > 0 ? (cell < last_cell_ ? cell : last_cell_) : 0)];
     while (rho >= p[1].start) ++p;
     while (rho < p->start) --p;
     return *p;
@@ -94,9 +93,14 @@ class Table {
     return (rest + (second.c0 - next.c0) + begun) / (upper - lower);
   }
 
-  std::vector<Piece> pieces_;  ///< below the table, its pieces, beyond it, and one that never begins
-  std::vector<std::uint32_t> cells_;
-  double first_, last_, inverse_cell_;
+  struct Data {
+    std::vector<Piece> pieces;  ///< below the table, its pieces, beyond it, and one that never begins
+    std::vector<std::uint32_t> cells;
+  };
+  std::shared_ptr<const Data> data_;
+  const Piece* pieces_;         ///< data_'s; kernels call no functions of the library (lanes.h)
+  const std::uint32_t* cells_;  ///< the piece at the start of each cell
+  double first_, last_, inverse_cell_, last_cell_;
 };
 
 static_assert(Potential<Table>);
