@@ -58,12 +58,14 @@ class Table {
     double start;  ///< ρ from which it holds; the first: all below the first point
     double base;   ///< ρ of x = 0
     double c0, c1, c2, c3;
-    double quotient(double x, double y) const { return c1 + (c2 * (x + y) + c3 * (x * x + x * y + y * y)); }
+    [[gnu::always_inline]] double quotient(double x, double y) const {
+      return c1 + (c2 * (x + y) + c3 * (x * x + x * y + y * y));
+    }
   };
 
   /// The piece that a point lies in, found from that at the start of its cell; cells are no wider than any piece,
   /// unless that were too many.
-  const Piece& piece(double rho) const {
+  [[gnu::always_inline]] const Piece& piece(double rho) const {
     const double cell = (rho - first_) * inverse_cell_;
     const Piece* p = pieces_ + cells_[static_cast<std::size_t>(cell > 0 ? (cell < last_cell_ ? cell : last_cell_) : 0)];
     while (rho >= p[1].start) ++p;
@@ -83,7 +85,7 @@ class Table {
     }
   }
 
-  double ordered_quotient(double lower, double upper) const {
+  [[gnu::always_inline]] double ordered_quotient(double lower, double upper) const {
     const Piece &first = piece(lower), &second = piece(upper);
     const double x = lower - first.base, y = upper - second.base;
     if (&first == &second) return first.quotient(x, y);
