@@ -17,7 +17,7 @@ struct Counters {
   std::uint64_t sweeps = 0;  ///< iterations of implicit solves
   std::uint64_t pieces = 0;  ///< edda: in which steps were solved; more than the steps where one was cut
   std::uint64_t slabs_halved = 0;
-  std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; edda: solves that took Anderson mixing
+  std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; edda: searches for the highest frequency
   std::uint64_t frozen = 0;        ///< edda: particles that kept an acceleration of an earlier sweep
   double folded = 0;               ///< edda: Σ|r| of what was folded into velocities [energy]
   std::uint64_t divisions = 0;     ///< of the particles among ranks under forces

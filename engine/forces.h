@@ -19,12 +19,14 @@ Sums of_all_ranks(const System<D>& system, const Sums& mine) {
 
 /// The largest of what all ranks say, where each knows only some of the particles; else all know the same.
 template <int D>
-double largest_of_all(const System<D>& system, double value) {
-  return system.part && !system.part->knows_everybody() ? system.part->largest(value) : value;
+void largest_of_all(const System<D>& system, std::span<double> values) {
+  if (system.part && !system.part->knows_everybody()) system.part->ranks().largest(values);
 }
 template <int D>
 bool any_rank(const System<D>& system, bool value) {
-  return largest_of_all(system, value ? 1 : 0) > 0;
+  double any = value ? 1 : 0;
+  largest_of_all<D>(system, {&any, 1});
+  return any > 0;
 }
 
 /// For what only a rank that knows all particles can do.

@@ -53,6 +53,9 @@ class SlabCore {
   const std::vector<Vec<D>>& v() const { return v_; }  ///< velocities there [length/time]
   std::span<const Contact<D>> contacts() const { return contacts_; }  ///< of the last flight, in the order of their keys
 
+  /// Whether particle i has a contact in the last flight.
+  bool collides(Id i) const { return slot_[i] != 0; }
+
   /// The particles of which the sequence of partners is another than in the flight before, ascending.
   std::span<const Id> swapped() const { return swapped_; }
 

@@ -11,9 +11,9 @@
 #include "engine/part.h"
 #include "engine/placement.h"
 #include "engine/radial_distribution.h"
-#include "engine/random.h"
 #include "engine/shares.h"
 #include "engine/vicinity.h"
+#include "engine/stiffness.h"
 
 namespace carom {
 namespace {
@@ -138,29 +138,7 @@ void check_state(const Deck& deck, const System<D>& system, Problems& problems) 
 
 template <int D>
 double shortest_period(const System<D>& system) {
-  const Particles<D>& p = system.particles;
-  const std::size_t n = p.size();
-  std::vector<Vec<D>> u(n), w(n), force(n);
-  for (Id i = 0; i < n; ++i) {
-    RandomStream random(0, RandomPurpose::probe, p.id_of(i));
-    for (int k = 0; k < D; ++k) u[i][k] = random.uniform() - 0.5;
-  }
-  const auto norm = [&] {
-    ExactSum sum;
-    for (Id i = 0; i < n; ++i)
-      if (p.owns(i)) sum.add(u[i].squaredNorm());
-    return std::sqrt(of_all_ranks(system, sum).value());
-  };
-  Counters uncounted;
-  double curvature = norm();
-  for (int round = 0; round < 40; ++round) {
-    for (std::size_t i = 0; i < n; ++i) w[i] = u[i] / (curvature * std::sqrt(p.mass[i]));
-    evaluate_hessian_product<D>(system, p.x, w, force, uncounted);
-    for (std::size_t i = 0; i < n; ++i) u[i] = force[i] / std::sqrt(p.mass[i]);
-    curvature = norm();
-    if (!(curvature > 0)) return std::numeric_limits<double>::infinity();
-  }
-  return 2 * std::numbers::pi / std::sqrt(curvature);
+  return 2 * std::numbers::pi / std::sqrt(largest_squared_frequency(system));
 }
 
 template <int D>

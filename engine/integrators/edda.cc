@@ -20,9 +20,10 @@
 #include "engine/error.h"
 #include "engine/forces.h"
 #include "engine/integrators/extrapolation.h"
-#include "engine/integrators/mixing.h"
+#include "engine/integrators/chebyshev.h"
 #include "engine/integrators/registry.h"
 #include "engine/slab_core.h"
+#include "engine/stiffness.h"
 
 namespace carom::integrator {
 namespace {
@@ -31,7 +32,11 @@ constexpr int kMostSweeps = 60;
 constexpr int kMostPieces = 1 << 14;      // of a step
 constexpr int kPatience = 6;              // sweeps before particles may be frozen
 constexpr int kSwaps = 3;                 // of partners after that, until a particle is frozen
-constexpr double kSlow = 0.2;             // contraction of sweeps from which on they are mixed
+constexpr int kStart = 4;                 // sweeps after which contraction tells of stiffness
+constexpr double kSlow = 0.04;            // contraction of two sweeps that tells of it
+constexpr double kRoom = 1.1;             // for frequencies above the one found
+constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
+constexpr double kStalled = 0.1;          // contraction of kPatience sweeps that is too little
 constexpr double kSettled = 0.1;          // of the tolerance: such a particle keeps its path
 constexpr double kRounding = 1e-13;       // of the speed scale: increments below it that do not shrink are rounding
 constexpr std::size_t kLeastCluster = 16;  // particles that take up what a frozen one lacks
@@ -50,13 +55,13 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   void release() override {
     core_.reset();
     past_.release();
-    for (auto* each : {&a_, &mean_}) *each = {};
+    for (auto* each : {&a_, &mean_, &move_}) *each = {};
   }
   void regroup(System<D>& system) override {
     core_.emplace(system, max_events_);
     const std::size_t n = system.particles.size();
     past_.resize(n);
-    for (auto* each : {&a_, &mean_}) each->resize(n);
+    for (auto* each : {&a_, &mean_, &move_}) each->resize(n, Vec<D>::Zero());
     swaps_.assign(n, 0);
   }
 
@@ -87,6 +92,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
+    slab_ = slab.index;
     auto& p = system.particles;
     core_->begin_step(report.counters, report.contacts, past_.last(), slab.length);
     double done = 0, longest = slab.length;
@@ -147,10 +153,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (const Id i : swapping_) swaps_[i] = 0;
     frozen_.clear();
     swapping_.clear();
-    bool mixes = false;
+    Chebyshev chebyshev(0.25 * h * h * squared_frequency_);
     const double scale = std::max(speed_, h * strength_), wanted = tolerance_ * scale;
-    double last = 0, earlier = 0;
-    int since = 0;  // sweeps since partners swapped
+    double last = 0, before = 0, earlier = 0;  // largest, one, two and kPatience sweeps ago
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
       const FlightEnd<D> end = core_->fly(a_);
       if (!end.complete) {
@@ -164,32 +169,56 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       double largest = 0;
       for (Id i = 0; i < n; ++i)
         if (!frozen(i) && p.owns(i)) largest = std::max(largest, finite((mean_[i] - a_[i]).squaredNorm()));
-      largest = h * std::sqrt(largest_of_all(system, largest));
+      largest_of_all<D>(system, {&largest, 1});
+      largest = h * std::sqrt(largest);
       if (!std::isfinite(largest)) return Outcome::diverged;
       if (largest <= wanted) return Outcome::settled;
       if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * last) return Outcome::settled;
-      const bool alike = sweep > 1 && !any_rank(system, swaps_among_unfrozen());
-      since = alike ? since + 1 : 0;
-      if (sweep >= kPatience && !alike) freeze(system);
-      if (!mixes && since > 2 && largest > kSlow * kSlow * earlier) {
-        need_all(system);
-        mixes = true;
-        mixing_.clear();
+      if (sweep >= kPatience && any_rank(system, swaps_among_unfrozen())) freeze(system);
+      if (sweep % kPatience == 0) {
+        if (sweep > kPatience && largest > kStalled * earlier) freeze_stalled(system, largest / h);
+        earlier = largest;
+      }
+      if (sweep > kStart && chebyshev.plain() && largest > kSlow * before && measure(system)) {
+        chebyshev = Chebyshev(0.25 * h * h * squared_frequency_);
         ++counters_->fallbacks;
       }
-      if (mixes) mix(h, alike);
-      earlier = last;
+      chebyshev.next();
+      before = last;
       last = largest;
       const double settled = std::pow(kSettled * wanted / h, 2);
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
-        if (mixes)
-          a_[i] = mean_[i] + mixing_.correction().template segment<D>(static_cast<Eigen::Index>(D * i)) / h;
-        else if ((mean_[i] - a_[i]).squaredNorm() > settled)
+        const Vec<D> e = mean_[i] - a_[i];
+        if (!chebyshev.plain()) {
+          move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
+          a_[i] += move_[i];
+        } else if (e.squaredNorm() > settled) {
+          move_[i] = e;
           a_[i] = mean_[i];
+        }
       }
     }
     return Outcome::diverged;
+  }
+
+  /// Finds the highest frequency, not more often than it pays. Returns whether it did.
+  bool measure(const System<D>& system) {
+    if (slab_ < measured_ + kMeasured) return false;
+    measured_ = slab_;
+    squared_frequency_ = kRoom * largest_squared_frequency(system);
+    return true;
+  }
+
+  /// Particles in collisions whose paths do not settle: a grazing contact may turn a small change into a larger one.
+  void freeze_stalled(const System<D>& system, double largest) {
+    need_all(system);
+    for (Id i = 0; i < a_.size(); ++i)
+      if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= kStalled * largest) {
+        swaps_[i] = kSwaps + 1;
+        frozen_.push_back(i);
+        ++counters_->frozen;
+      }
   }
 
   bool frozen(Id i) const { return swaps_[i] > kSwaps; }
@@ -216,19 +245,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
               if (!frozen(j)) note(j);
       if (!frozen(i)) note(i);
     }
-  }
-
-  /// Accelerates slow sweeps, in terms of the velocities h a.
-  void mix(double h, bool alike) {
-    if (!alike) mixing_.clear();
-    const auto size = static_cast<Eigen::Index>(D * a_.size());
-    Eigen::VectorXd flown(size), lacking(size);
-    for (Id i = 0; i < a_.size(); ++i) {
-      flown.segment<D>(static_cast<Eigen::Index>(D * i)) = h * a_[i];
-      lacking.segment<D>(static_cast<Eigen::Index>(D * i)) =
-          frozen(i) ? Vec<D>(Vec<D>::Zero()) : Vec<D>(h * (mean_[i] - a_[i]));
-    }
-    mixing_.add(flown, lacking);
   }
 
   /// Adds the reactions λ(d + d′) of resting contacts, which do no work because they hold |d′| = |d|, to mean_.
@@ -328,7 +344,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::vector<Id> swapping_, frozen_;   // particles with any, and with many
   bool touching_ = true;                // contacts at the slab's start may need to be resolved
   FlightEnd<D> cut_;                    // why the last slab was cut
-  Mixing mixing_;
+  double squared_frequency_ = 0;        // the largest, once it matters
+  std::int64_t measured_ = -kMeasured;  // the slab in which it was found
+  std::int64_t slab_ = 0;
+  std::vector<Vec<D>> move_;            // of a_ by the last sweep
   Counters* counters_ = nullptr;
 };
 
