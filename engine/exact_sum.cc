@@ -32,6 +32,18 @@ void ExactSum::add(double term) {
   if (++pending_ == kTermsBeforeCarry) carry();
 }
 
+__extension__ void ExactSum::add(__int128 multiple, double power_of_two) {
+  for (double unit = power_of_two; multiple != 0; unit *= 0x1p48) {
+    const auto low = static_cast<std::int64_t>(multiple & 0xffffffffffff);
+    add(static_cast<double>(low) * unit);
+    multiple >>= 48;
+    if (multiple == -1) {  // a negative number: its upper part is −1 for ever
+      add(-unit * 0x1p48);
+      break;
+    }
+  }
+}
+
 void ExactSum::add(const ExactSum& other) {
   ExactSum tidy = other;
   tidy.carry();

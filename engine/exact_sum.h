@@ -14,6 +14,8 @@ class ExactSum {
  public:
   /// Adds one term. A NaN or infinity makes the whole sum NaN.
   void add(double term);
+  /// Adds so many times a power of two.
+  __extension__ void add(__int128 multiple, double power_of_two);
   /// Adds another sum: the parts of several ranks may be joined in any order.
   void add(const ExactSum& other);
   /// The sum, rounded once to nearest.

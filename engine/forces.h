@@ -1,7 +1,10 @@
 #pragma once
 // Sums over all interactions of a system.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <span>
 
 #include "engine/counters.h"
@@ -35,40 +38,103 @@ void need_all(const System<D>& system) {
   if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
 }
 
-/// One force pass: `add` adds each interaction's share to `out`, which begins at zero.
+/// The quanta of a system; a function of its parameters, masses, charges and box. Collective where ranks have shares.
+template <int D>
+Quanta quanta(const System<D>& system) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const double distance =
+      std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, system.size())), 1.0 / D);
+  std::array<double, 3> most = {-kNone, -kNone, 0};  // the smallest force and energy, negative; the largest force
+  for (const auto& term : system.interactions) {
+    const ForceScale scale = term->scale(distance);
+    if (scale.force > 0) most[0] = std::max(most[0], -scale.force), most[2] = std::max(most[2], scale.force);
+    if (scale.energy > 0) most[1] = std::max(most[1], -scale.energy);
+  }
+  if (system.ranks && system.sizes) system.ranks->largest(most);
+  const auto power = [](double x) { return x < kNone ? std::exp2(std::floor(std::log2(x))) : 1; };
+  // Not so small that the largest forces do not fit.
+  return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])), 0x1p-46 * power(-most[1])};
+}
+
+/// Those that were determined at the start of the run.
+template <int D>
+Quanta quanta_of(const System<D>& system) {
+  return system.quanta.force > 0 ? system.quanta : quanta(system);
+}
+
+/// The forces of one pass: `add` adds each interaction's share, `out` gets the sums.
 template <int D, class Add>
-void force_pass(const System<D>& system, Vectors<D> out, Counters& counters, Add&& add) {
+void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, Counters& counters, Add&& add) {
   const Stopwatch watch(counters.seconds.force);
-  for (auto& f : out) f.setZero();
   for (const auto& term : system.interactions) add(*term);
+  for (Id i = 0; i < out.size(); ++i) out[i] = forces.value(i);
   if (system.part) system.part->refresh(out);
   counters.force_passes += 1;
 }
 
-/// out[i] = force on particle i at positions x. One force pass.
+/// out[i] = force on particle i at positions x, and where `sums` is given V and its companions over what this rank
+/// owns. One force pass.
 template <int D>
-void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Counters& counters) {
-  force_pass<D>(system, out, counters, [&](const auto& term) { term.add_forces(x, out); });
+void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Counters& counters,
+                     PotentialSums* sums = nullptr) {
+  if (sums) *sums = {.quantum = quanta_of(system).energy};
+  ForceSums<D> forces(x.size(), quanta_of(system).force);
+  force_pass<D>(system, out, forces, counters, [&](const auto& term) { term.add_forces(x, forces, sums); });
 }
 
 /// out[i] = −∇̄_i V(x, x_new), the mean force of a discrete-gradient step. One force pass.
 template <int D>
 void evaluate_mean_forces(const System<D>& system, Positions<D> x, Positions<D> x_new, Vectors<D> out,
                           Counters& counters) {
-  force_pass<D>(system, out, counters, [&](const auto& term) { term.add_mean_forces(x, x_new, out); });
+  ForceSums<D> forces(x.size(), quanta_of(system).force);
+  force_pass<D>(system, out, forces, counters, [&](const auto& term) { term.add_mean_forces(x, x_new, forces); });
 }
+
+/// Mean forces over a step whose end is changed again and again, for some particles only.
+template <int D>
+class MeanForces {
+ public:
+  /// All pairs. Returns how many pairs of this rank are within reach.
+  std::uint64_t evaluate(const System<D>& system, Positions<D> x, Positions<D> x_new) {
+    forces_.reset(x.size(), quanta_of(system).force);
+    std::uint64_t pairs = 0;
+    for (const auto& term : system.interactions) pairs += term->add_mean_forces(x, x_new, forces_);
+    return pairs;
+  }
+  /// The same to the bit where only positions of `changed` particles are not those of the last call, `x_before`.
+  std::uint64_t update(const System<D>& system, Positions<D> x, Positions<D> x_before, Positions<D> x_new,
+                       const char* changed) {
+    if (!forces_.has_room()) return evaluate(system, x, x_new);
+    std::uint64_t pairs = 0;
+    for (const auto& term : system.interactions) {
+      pairs += term->add_mean_forces(x, x_before, forces_, changed, -1);
+      pairs += term->add_mean_forces(x, x_new, forces_, changed);
+    }
+    return pairs;
+  }
+  /// The force on an own particle.
+  Vec<D> operator[](Id i) const { return forces_.value(i); }
+  const ForceSums<D>& sums() const { return forces_; }
+
+ private:
+  ForceSums<D> forces_;
+};
 
 /// out = V″(x) w. One force pass.
 template <int D>
 void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions<D> w, Vectors<D> out,
                               Counters& counters) {
-  force_pass<D>(system, out, counters, [&](const auto& term) { term.add_hessian_product(x, w, out); });
+  const Stopwatch watch(counters.seconds.force);
+  for (auto& each : out) each.setZero();
+  for (const auto& term : system.interactions) term->add_hessian_product(x, w, out);
+  if (system.part) system.part->refresh(out);
+  counters.force_passes += 1;
 }
 
 /// V, Σ|V| and the virial at x; exact sums, not counted as a pass.
 template <int D>
 PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
-  PotentialSums sums;
+  PotentialSums sums{.quantum = quanta_of(system).energy};
   for (const auto& term : system.interactions) term->add_energy(x, sums);
   return of_all_ranks(system, sums);
 }

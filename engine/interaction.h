@@ -3,8 +3,8 @@
 //
 // An Interaction is one term of V: a pair potential over a list of bonds or over all pairs within a cutoff, or an
 // external field. It offers V, its gradient, its discrete gradient and its second derivative, each as a whole loop over
-// the particles. Positions are passed in as arrays in id order; contributions to one particle are summed in the order
-// of the partner's id, so that the sum does not depend on how the pairs were found.
+// the particles. Positions are passed in as arrays in id order. Forces, energies and virials are summed in fixed point
+// (force_sums.h): no sum depends on how the pairs were found.
 //
 // Where several ranks share a system (engine/part.h) sums over the system are over what this rank owns: its particles,
 // and the pairs whose lower id it owns. What acts on a ghost is left incomplete.
@@ -17,6 +17,7 @@
 
 #include "engine/box.h"
 #include "engine/exact_sum.h"
+#include "engine/force_sums.h"
 #include "engine/parameters.h"
 #include "engine/particles.h"
 
@@ -32,9 +33,10 @@ using Vectors = std::span<Vec<D>>;
 
 /// Sums over one evaluation of V; exact, so that they do not depend on the order of summation.
 struct PotentialSums {
-  ExactSum energy;     ///< V [energy]
-  ExactSum magnitude;  ///< Σ|V| over pairs and particles [energy]
-  ExactSum virial;     ///< Σ d·F over pairs, d = x_i − x_j, F the force on i [energy]; external fields add nothing
+  ExactSum energy{};     ///< V [energy]
+  ExactSum magnitude{};  ///< Σ|V| over pairs and particles [energy]
+  ExactSum virial{};  ///< Σ d·F over pairs, d = x_i − x_j, F the force on i [energy]; external fields add nothing
+  double quantum = 0x1p-46;  ///< of pairs: each pair's terms are rounded to a multiple of it [energy]
 
   void add(const PotentialSums& other) {
     energy.add(other.energy);
@@ -57,14 +59,18 @@ class Interaction {
   /// V and its companions at positions x.
   virtual void add_energy(Positions<D> x, PotentialSums& sums) const = 0;
 
-  /// force[i] −= ∂V/∂x_i.
-  virtual void add_forces(Positions<D> x, Vectors<D> force) const = 0;
+  /// Adds −∂V/∂x_i for each particle, and where `sums` is given V and its companions. This and the other loops over
+  /// forces throw Error(Failure::numerical) where one is not finite or too large to be summed, and name its particles.
+  virtual void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums = nullptr) const = 0;
 
-  /// force[i] −= ∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996;
-  /// for pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x.
-  virtual void add_mean_forces(Positions<D> x, Positions<D> x_new, Vectors<D> force) const = 0;
+  /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
+  /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:
+  /// only pairs with at least one such particle, and fields on these; sign −1: subtracts exactly what +1 has added.
+  /// Returns the number of pairs (or particles, for a field) of this rank within reach.
+  virtual std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces,
+                                        const char* changed = nullptr, int sign = 1) const = 0;
 
-  /// out += V″(x) w.
+  /// out += V″(x) w. Contributions to a particle are summed in the order of the partner's id.
   virtual void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const = 0;
 
   /// The same term for `some` of all particles, which outlive it; `made_for`: the particles it was made for, all or a
@@ -88,6 +94,10 @@ class Interaction {
 
   /// The bonds it stands for, by ids, where it was made for all particles or a share; null where it has none.
   virtual const PairList* bonds() const { return nullptr; }
+
+  /// How large its forces are where particles are so far apart on average [length]; a function of parameters and of
+  /// this rank's particles.
+  virtual ForceScale scale(double distance) const = 0;
 
   /// Whether the term is invariant under translation, so that it keeps the total momentum.
   virtual bool keeps_momentum() const { return true; }

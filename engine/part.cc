@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "engine/division.h"
+#include "engine/forces.h"
 #include "engine/shares.h"
 
 namespace carom {
@@ -40,6 +41,7 @@ template <int D>
 Part<D>::Part(System<D>& shares, bool local, double slab_length)
     : shares_(shares), ranks_(*shares.ranks), holders_(static_cast<std::size_t>(ranks_.size())), depth_(kLeastDepth) {
   shares_.part = this;
+  if (!(shares_.quanta.force > 0)) shares_.quanta = quanta(shares_);
   divide(nullptr, !local, slab_length);
   next_ = kSlabs;
 }
@@ -196,6 +198,7 @@ std::vector<typename Part<D>::Arrival> Part<D>::receive(const std::vector<Bytes>
   known_->box = shares_.box;
   known_->species = shares_.species;
   known_->ranks = shares_.ranks;
+  known_->quanta = shares_.quanta;
   known_->part = this;
   Particles<D>& p = known_->particles;
   for_each_array(p, [&](auto& array) { array.reserve(arrivals.size()); });

@@ -113,7 +113,7 @@ class Region {
  private:
   static constexpr std::uint32_t kNone = Trace<D>::kNone;
   static constexpr double kUnknown = -1;
-  static constexpr double kSlack = 20;                           // windows between looks at who is at the border
+  static constexpr double kSlack = 20;                          // windows between looks at who is at the border
   enum class Role : std::uint8_t { nobody, own, seen, ghost };  // seen: own, and a ghost elsewhere
 
   struct Edge {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/error.h"
+#include "engine/forces.h"
 #include "engine/monitor.h"
 #include "engine/shares.h"
 
@@ -43,6 +44,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
   if (system_->ranks && !system_->sizes) keep_share(*system_);
+  if (info_.smooth_forces) system_->quanta = quanta(*system_);
   std::optional<Part<D>> part;
   if (system_->ranks && info_.smooth_forces) {
     part.emplace(*system_, integrator_->local(), plan_.step);

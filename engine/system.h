@@ -17,6 +17,12 @@ class Exchange;
 template <int D>
 class Part;
 
+/// The units in which forces and energies of pairs are rounded: constants of a run, powers of two.
+struct Quanta {
+  double force = 0;   ///< 2^-44 of the smallest scale of the forces of all terms [force]; 0: not determined
+  double energy = 0;  ///< 2^-46 of the smallest scale of their energies [energy]
+};
+
 /// Lives on the heap and is never moved: interactions refer to its box and particles.
 template <int D>
 struct System {
@@ -30,6 +36,7 @@ struct System {
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
   Exchange* ranks = nullptr;   ///< that advance this system together; null: one
   std::optional<Sizes> sizes;  ///< of all particles, where each rank has only its share of them (engine/shares.h)
+  Quanta quanta{};             ///< set before the first force pass
   Part<D>* part = nullptr;     ///< what this rank does of it, where they share the work on forces
 
   /// How many particles there are, on all ranks together, also while they are in the cores.

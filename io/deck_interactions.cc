@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "engine/potentials/pair_filter.h"
+#include "engine/pair_filter.h"
 #include "engine/shares.h"
 #include "io/deck_build.h"
 #include "io/deck_interpret.h"

@@ -12,7 +12,7 @@ using Range = Parameter::Range;
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   constexpr std::string_view type = "coulomb";
-  const ProductWeight charges(context.particles.charge);
+  constexpr PairWeight charges = PairWeight::charges;
   if (p.text("form") == "plain") {
     if (p.has("cutoff") || p.has("damping"))
       options::refuse(type,
@@ -22,9 +22,9 @@ std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionConte
   }
   if (!p.has("cutoff") || !p.has("damping"))
     options::refuse(type, "form = \"damped-shifted\" needs 'damping' and 'cutoff'; give both (damping = 0 only cuts)");
-  const Cut<DampedCoulomb> cut(DampedCoulomb(p.real("constant"), p.real("damping")), p.real("cutoff"),
-                               CutKind::quadratic);
-  return options::within_reach<D>(type, cut, charges, p, context);
+  const DampedCoulomb whole(p.real("constant"), p.real("damping"));
+  return options::within_reach<D>(type, Cut<DampedCoulomb>(whole, p.real("cutoff"), CutKind::quadratic), charges, p,
+                                  context, whole);
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -21,6 +24,11 @@ namespace carom {
 class DampedCoulomb {
  public:
   DampedCoulomb(double constant, double damping) : c_(constant), alpha_(damping) {}
+
+  ForceScale scale(double distance) const {
+    const double near = std::min(distance, 1 / alpha_), energy = 0x1p-4 * std::abs(c_) / near;
+    return {energy / near, energy};
+  }
 
   template <class T>
   T value(T rho) const {

@@ -6,6 +6,7 @@
 //   gradient(i, x)                 ∇V_i
 //   mean_gradient(i, x, x_new)     a discrete gradient: · (x_new − x) = V_i(x_new) − V_i(x)
 //   hessian_product(i, x, w)       V_i″ w
+//   least_force(distance)          on a particle so far from where there is none [force]; 0: there is no telling
 //   among(particles)               itself for other particles
 // and, where it accelerates everybody alike, acceleration().
 
@@ -30,11 +31,22 @@ class FieldTerm final : public Interaction<D> {
       sums.magnitude.add(std::abs(v));
     }
   }
-  void add_forces(Positions<D> x, Vectors<D> force) const override {
-    for (Id i = 0; i < x.size(); ++i) force[i] -= field_.gradient(i, x[i]);
+  void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
+    const ForceLimits limits = forces.make_room(1);
+    for (Id i = 0; i < x.size(); ++i)
+      if (particles_.owns(i)) forces.add(i, -field_.gradient(i, x[i]), limits);
+    if (sums) add_energy(x, *sums);
   }
-  void add_mean_forces(Positions<D> x, Positions<D> x_new, Vectors<D> force) const override {
-    for (Id i = 0; i < x.size(); ++i) force[i] -= field_.mean_gradient(i, x[i], x_new[i]);
+  std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
+                                int sign) const override {
+    const ForceLimits limits = forces.make_room(1);
+    std::uint64_t count = 0;
+    for (Id i = 0; i < x.size(); ++i) {
+      if (!particles_.owns(i) || (changed && changed[i] == 0)) continue;
+      forces.add(i, -sign * field_.mean_gradient(i, x[i], x_new[i]), limits);
+      ++count;
+    }
+    return count;
   }
   void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
     for (Id i = 0; i < x.size(); ++i) out[i] += field_.hessian_product(i, x[i], w[i]);
@@ -50,6 +62,7 @@ class FieldTerm final : public Interaction<D> {
     else
       return nullptr;
   }
+  ForceScale scale(double distance) const override { return {kShare * field_.least_force(distance), 0}; }
   bool keeps_momentum() const override { return false; }
   std::unique_ptr<Interaction<D>> among(const Particles<D>&, const Particles<D>& some) const override {
     return std::make_unique<FieldTerm>(some, field_.among(some));
@@ -58,6 +71,8 @@ class FieldTerm final : public Interaction<D> {
   double reach(const Particles<D>&, Exchange&) const override { return 0; }
 
  private:
+  static constexpr double kShare = 0x1p-8;  // so that accelerations of light particles keep their digits
+
   const Particles<D>& particles_;
   Field field_;
 };

@@ -10,8 +10,8 @@ using Range = Parameter::Range;
 
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
-  return options::all_pairs<D>("gravity", InverseDistance(-p.real("constant")), ProductWeight(context.particles.mass),
-                               p, context, "make the boundaries 'wall' or 'open'");
+  return options::all_pairs<D>("gravity", InverseDistance(-p.real("constant")), PairWeight::masses, p, context,
+                               "make the boundaries 'wall' or 'open'");
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ using Range = Parameter::Range;
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   Bonds<D> bonds(context.box, options::bonds<D>("harmonic-bond", p, context));
-  return std::make_unique<PairTerm<D, HarmonicBond, UnitWeight, Bonds<D>>>(
-      context.particles, HarmonicBond(p.real("stiffness"), p.real("rest_length")), UnitWeight{}, std::move(bonds));
+  const HarmonicBond spring(p.real("stiffness"), p.real("rest_length"));
+  return options::term<D>(spring, PairWeight::one, context, std::move(bonds), spring);
 }
 
 }  // namespace

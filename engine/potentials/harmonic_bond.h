@@ -14,6 +14,11 @@ class HarmonicBond {
  public:
   HarmonicBond(double stiffness, double rest_length) : half_k_(0.5 * stiffness), length_(rest_length) {}
 
+  ForceScale scale(double distance) const {
+    const double stretch = 0x1p-6 * (length_ > 0 ? length_ : distance);
+    return {2 * half_k_ * stretch, half_k_ * stretch * stretch};
+  }
+
   template <class T>
   T value(T rho) const {
     const T stretch = elementary::sqrt(rho) - length_;

@@ -15,6 +15,7 @@ class HarmonicTrap {
   HarmonicTrap(double stiffness, const Vec<D>& centre) : k_(stiffness), centre_(centre) {}
 
   HarmonicTrap among(const Particles<D>&) const { return *this; }
+  double least_force(double distance) const { return k_ * distance; }
   double value(Id, const Vec<D>& x) const { return 0.5 * k_ * (x - centre_).squaredNorm(); }
   Vec<D> gradient(Id, const Vec<D>& x) const { return k_ * (x - centre_); }
   Vec<D> mean_gradient(Id, const Vec<D>& x, const Vec<D>& x_new) const {

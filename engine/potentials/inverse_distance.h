@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "engine/potentials/potential.h"
 
 namespace carom {
@@ -13,6 +15,11 @@ namespace carom {
 class InverseDistance {
  public:
   explicit InverseDistance(double constant) : c_(constant) {}
+
+  ForceScale scale(double distance) const {
+    const double energy = 0x1p-4 * std::abs(c_) / distance;
+    return {energy / distance, energy};
+  }
 
   template <class T>
   T value(T rho) const {

@@ -12,7 +12,7 @@ using Range = Parameter::Range;
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   return options::pair_term<D>("inverse-power", InversePower(p.real("epsilon"), p.real("sigma"), p.real("exponent")),
-                               UnitWeight{}, p, context);
+                               PairWeight::one, p, context);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -18,6 +19,12 @@ class InversePower {
  public:
   InversePower(double epsilon, double sigma, double exponent)
       : epsilon_(epsilon), sigma2_(sigma * sigma), n_(0.5 * exponent) {}
+
+  ForceScale scale(double distance) const {
+    const double energy = std::abs(value(distance * distance)), sigma = std::sqrt(sigma2_);
+    return {std::max(2 * n_ * energy / distance, 0x1p-16 * 2 * n_ * std::abs(epsilon_) / sigma),
+            std::max(energy, 0x1p-16 * std::abs(epsilon_))};
+  }
 
   template <class T>
   T value(T rho) const {

@@ -17,6 +17,8 @@ class LennardJones {
  public:
   LennardJones(double epsilon, double sigma) : epsilon_(epsilon), sigma2_(sigma * sigma) {}
 
+  ForceScale scale(double) const { return {24 * epsilon_ / std::sqrt(sigma2_), epsilon_}; }
+
   template <class T>
   T value(T rho) const {
     const T u = cube(sigma2_ / rho);

@@ -90,7 +90,10 @@ PairFilter filter(std::string_view type, const Parameters& parameters, const Int
   if (exclude && !context.bonds)
     refuse(type,
            "exclude = \"bonded\" leaves out bonded pairs, but there are no bonds; leave it out or add a harmonic-bond");
-  return {context.particles, species, exclude ? context.bonds : nullptr};
+  PairFilter filter;
+  if (species) filter.species = {&context.particles.species, (*species)[0], (*species)[1]};
+  if (exclude) filter.excluded = context.bonds, filter.id = &context.particles.id;
+  return filter;
 }
 
 template <int D>
@@ -100,31 +103,37 @@ bool any_periodic(const Box<D>& box) {
   return false;
 }
 
+/// A term over the pairs of a source, with the scale of the potential before it was cut.
+template <int D, Potential P, class Pairs>
+std::unique_ptr<Interaction<D>> term(P potential, PairWeight weight, const InteractionContext<D>& context, Pairs pairs,
+                                     const auto& whole, Tail tail = {}) {
+  const auto scale = [whole](double distance) { return whole.scale(distance); };
+  return std::make_unique<PairTerm<D, P, Pairs>>(context.particles, potential, weight, std::move(pairs), scale, tail);
+}
+
 /// A term over all pairs; `remedy` says what to write instead in a periodic box, where there is no such sum.
-template <int D, Potential P, class Weight>
-std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, Weight weight,
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, PairWeight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context,
                                           const std::string& remedy) {
   PairFilter pairs_of = filter(type, parameters, context);
   if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
-  AllPairs<D> pairs(context.total, std::move(pairs_of));
-  return std::make_unique<PairTerm<D, P, Weight, AllPairs<D>>>(context.particles, potential, weight, std::move(pairs));
+  return term<D>(potential, weight, context, AllPairs<D>(context.box, context.total, std::move(pairs_of)), potential);
 }
 
-/// A term over the pairs within the reach of a potential that ends by itself.
-template <int D, ShortRanged P, class Weight>
-std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, Weight weight,
+/// A term over the pairs within the reach of a potential that ends by itself, or of `whole` that was cut.
+template <int D, ShortRanged P>
+std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, PairWeight weight,
                                              const Parameters& parameters, const InteractionContext<D>& context,
-                                             Tail tail = {}) {
+                                             const auto& whole, Tail tail = {}) {
   const double reach = std::sqrt(potential.cutoff_squared()) * (1 + 1e-15);
-  PairsWithinCutoff<D> pairs(context.box, context.particles.size(), reach, filter(type, parameters, context));
-  return std::make_unique<PairTerm<D, P, Weight, PairsWithinCutoff<D>>>(context.particles, potential, weight,
-                                                                        std::move(pairs), tail);
+  PairsWithinCutoff<D> pairs(context.box, reach, filter(type, parameters, context));
+  return term<D>(potential, weight, context, std::move(pairs), whole, tail);
 }
 
 /// The long-range correction of a term over all particles on all ranks.
-template <int D, KnowsTail P, class Weight>
-Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, Weight weight, const Parameters& parameters,
+template <int D, KnowsTail P>
+Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, PairWeight weight, const Parameters& parameters,
           const InteractionContext<D>& context) {
   if (kind == CutKind::force_shifted)
     refuse(type, "'tail' does not go with cut = \"force-shifted\", which changes V at all distances; take \"switch\"");
@@ -140,9 +149,10 @@ Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, Weight weight,
       for (int k = 0; k < 2; ++k) weight[k].add(other.weight[k]);
     }
   } sums;
+  const auto* factor = pair_factors(weight, context.particles);
   for (Id i = 0; i < context.particles.mass.size(); ++i)
     for (int k = 0; k < 2; ++k)
-      if (!species || context.particles.species[i] == (*species)[k]) sums.weight[k].add(weight.of(i));
+      if (!species || context.particles.species[i] == (*species)[k]) sums.weight[k].add(factor ? (*factor)[i] : 1.0);
   if (context.ranks) sums = sum_of_all(*context.ranks, sums);
   const double pairs = sums.weight[0].value() * sums.weight[1].value();
   const bool alike = !species || (*species)[0] == (*species)[1];
@@ -150,20 +160,21 @@ Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, Weight weight,
 }
 
 /// A term cut as said, with its long-range correction if the deck wants it.
-template <int D, Potential P, class Weight>
-std::unique_ptr<Interaction<D>> cut_term(std::string_view type, P potential, Weight weight, const CutOptions& options,
-                                         const Parameters& parameters, const InteractionContext<D>& context) {
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> cut_term(std::string_view type, P potential, PairWeight weight,
+                                         const CutOptions& options, const Parameters& parameters,
+                                         const InteractionContext<D>& context) {
   const Cut<P> cut(potential, options.cutoff, options.kind, options.switch_from);
   Tail correction;
   if constexpr (KnowsTail<P>)
     if (parameters.has("tail") && parameters.flag("tail"))
       correction = tail<D>(type, cut, options.kind, weight, parameters, context);
-  return within_reach<D>(type, cut, weight, parameters, context, correction);
+  return within_reach<D>(type, cut, weight, parameters, context, potential, correction);
 }
 
 /// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.
-template <int D, Potential P, class Weight>
-std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, Weight weight,
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, PairWeight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context) {
   if (!parameters.has("cutoff")) {
     refuse_cut_options(type, parameters);

@@ -7,108 +7,66 @@
 //
 // Q is the divided difference of U; since ρ′ − ρ = (d + d′)·(d′ − d), the mean forces are a discrete gradient.
 
+#include <memory>
 #include <utility>
 
+#include "engine/potentials/pair_potentials.h"
 #include "engine/potentials/pairs.h"
-#include "engine/potentials/potential.h"
 
 namespace carom {
 
-/// w_ij = 1.
-struct UnitWeight {
-  double operator()(Id, Id) const { return 1; }
-  double of(Id) const { return 1; }
-  template <int D>
-  UnitWeight among(const Particles<D>&, const Particles<D>&) const {
-    return {};
-  }
-};
+/// w_ij = 1, m_i m_j or q_i q_j.
+enum class PairWeight { one, masses, charges };
 
-/// w_ij = m_i m_j or q_i q_j. The vector outlives the term.
-class ProductWeight {
- public:
-  explicit ProductWeight(const std::vector<double>& factor) : factor_(&factor) {}
-  double operator()(Id i, Id j) const { return of(i) * of(j); }
-  double of(Id i) const { return (*factor_)[i]; }
-  /// The same property of other particles.
-  template <int D>
-  ProductWeight among(const Particles<D>& made_for, const Particles<D>& some) const {
-    return ProductWeight(factor_ == &made_for.mass ? some.mass : some.charge);
-  }
+/// The factors of w_ij; null: all 1.
+template <int D>
+const std::vector<double>* pair_factors(PairWeight weight, const Particles<D>& particles) {
+  if (weight == PairWeight::one) return nullptr;
+  return weight == PairWeight::masses ? &particles.mass : &particles.charge;
+}
 
- private:
-  const std::vector<double>* factor_;
-};
-
-template <int D, Potential P, class Weight, class Pairs>
+template <int D, Potential P, class Pairs>
 class PairTerm final : public Interaction<D> {
  public:
-  /// `particles` tells who is a ghost, and outlives the term.
-  PairTerm(const Particles<D>& particles, P potential, Weight weight, Pairs pairs, Tail tail = {})
+  /// `particles` tells who is a ghost, and outlives the term. `scale`: of pairs of weight 1, at a given distance.
+  PairTerm(const Particles<D>& particles, P potential, PairWeight weight, Pairs pairs,
+           std::function<ForceScale(double)> scale, Tail tail = {})
       : particles_(particles),
         potential_(std::move(potential)),
         weight_(weight),
         pairs_(std::move(pairs)),
-        tail_(tail) {}
+        scale_(std::move(scale)),
+        tail_(tail),
+        batch_(std::make_unique<PairBatch>()) {}
 
-  void add_energy(Positions<D> x, PotentialSums& sums) const override {
-    // Pairs come with ascending i: what belongs to one i is summed in that order, and exactly from there on.
-    struct Partial {
-      double energy = 0, magnitude = 0, virial = 0;
-    } partial;
-    Id owner = 0;
-    auto pass_on = [&] {
-      sums.energy.add(partial.energy);
-      sums.magnitude.add(partial.magnitude);
-      sums.virial.add(partial.virial);
-      partial = {};
-    };
-    for_each_within_reach(x, [&](Id i, Id j, const Vec<D>&, double rho) {
-      if (!particles_.owns(i)) return;
-      if (i != owner) pass_on();
-      owner = i;
-      const double weight = weight_(i, j), v = weight * potential_.value(rho);
-      partial.energy += v;
-      partial.magnitude += std::abs(v);
-      partial.virial -= 2 * weight * potential_.derivative(rho) * rho;
-    });
-    pass_on();
+  void add_energy(Positions<D> x, PotentialSums& sums) const override { evaluate({x}, nullptr, &sums); }
+  void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
+    evaluate({x}, &forces, sums);
   }
-
-  void add_forces(Positions<D> x, Vectors<D> force) const override {
-    for_each_within_reach(x, [&](Id i, Id j, const Vec<D>& d, double rho) {
-      const Vec<D> f = (2 * weight_(i, j) * potential_.derivative(rho)) * d;
-      force[i] -= f;
-      force[j] += f;
-    });
-  }
-
-  void add_mean_forces(Positions<D> x, Positions<D> x_new, Vectors<D> force) const override {
-    pairs_.for_each(x, x_new, [&](Id i, Id j, const auto& shift) {
-      if (foreign(i, j)) return;
-      const Vec<D> d = separation<D>(x[i], x[j], shift), d_new = separation<D>(x_new[i], x_new[j], shift);
-      const double rho = d.squaredNorm(), rho_new = d_new.squaredNorm();
-      if (out_of_reach(rho) && out_of_reach(rho_new)) return;
-      const Vec<D> f = (weight_(i, j) * potential_.quotient(rho, rho_new)) * (d + d_new);
-      force[i] -= f;
-      force[j] += f;
-    });
+  std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
+                                int sign) const override {
+    return evaluate({.x = x, .x_new = x_new, .changed = changed}, &forces, nullptr, sign);
   }
 
   void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
-    for_each_within_reach(x, [&](Id i, Id j, const Vec<D>& d, double rho) {
+    pairs_.ascending({x}, particles_, [&](Id i, Id j, const Vec<D>& d) {
+      const double rho = d.squaredNorm();
+      if (!(rho < cutoff_squared()) || (!particles_.owns(i) && !particles_.owns(j))) return;
+      const auto* factor = factors();
+      const double weight = factor ? (*factor)[i] * (*factor)[j] : 1;
       const Vec<D> u = w[i] - w[j];
+      if (weight == 0 || u == Vec<D>::Zero()) return;
       const Vec<D> product =
-          weight_(i, j) * (2 * potential_.derivative(rho) * u + 4 * potential_.second_derivative(rho) * d.dot(u) * d);
+          weight * (2 * potential_.derivative(rho) * u + 4 * potential_.second_derivative(rho) * d.dot(u) * d);
       out[i] += product;
       out[j] -= product;
     });
   }
 
-  std::unique_ptr<Interaction<D>> among(const Particles<D>& made_for, const Particles<D>& some) const override {
+  std::unique_ptr<Interaction<D>> among(const Particles<D>& /*made_for*/, const Particles<D>& some) const override {
     auto pairs = pairs_.among(some);
     if (!pairs) return nullptr;
-    return std::make_unique<PairTerm>(some, potential_, weight_.among(made_for, some), std::move(*pairs), tail_);
+    return std::make_unique<PairTerm>(some, potential_, weight_, std::move(*pairs), scale_, tail_);
   }
   Tail tail() const override { return tail_; }
   const PairList* bonds() const override {
@@ -121,36 +79,111 @@ class PairTerm final : public Interaction<D> {
   double reach(const Particles<D>& share, Exchange& ranks) const override { return pairs_.reach(share, ranks); }
 
   std::uint64_t interacting_pairs(Positions<D> x) const override {
-    std::uint64_t within = 0;
-    for_each_within_reach(x, [&](Id i, Id, const Vec<D>&, double) { within += particles_.owns(i) ? 1 : 0; });
-    return within;
+    std::uint64_t own = 0;
+    pairs_.batches(step({x}), particles_, cutoff_squared(), *batch_, [&](bool shared) { own += owned(shared); });
+    return own;
+  }
+
+  ForceScale scale(double distance) const override {
+    ForceScale scale = scale_(distance);
+    if (const auto* factor = factors()) {
+      double least = std::numeric_limits<double>::infinity();
+      for (const double w : *factor)
+        if (w != 0) least = std::min(least, w * w);
+      if (!(least < std::numeric_limits<double>::infinity())) return {};
+      scale.force *= least;
+      scale.energy *= least;
+    }
+    return scale;
   }
 
  private:
-  /// Whether a pair is nobody's whom this rank owns.
-  bool foreign(Id i, Id j) const { return !particles_.owns(i) && !particles_.owns(j); }
-
-  bool out_of_reach(double rho) const {
+  double cutoff_squared() const {
     if constexpr (ShortRanged<P>)
-      return rho >= potential_.cutoff_squared();
+      return potential_.cutoff_squared();
     else
-      return false;
+      return std::numeric_limits<double>::infinity();
+  }
+  const std::vector<double>* factors() const { return pair_factors(weight_, particles_); }
+  PairStep<D> step(PairStep<D> given) const {
+    given.weight = factors();
+    return given;
   }
 
-  template <class Visit>
-  void for_each_within_reach(Positions<D> x, Visit&& visit) const {
-    pairs_.for_each(x, x, [&](Id i, Id j, const auto& shift) {
-      const Vec<D> d = separation<D>(x[i], x[j], shift);
-      const double rho = d.squaredNorm();
-      if (!out_of_reach(rho) && !foreign(i, j)) visit(i, j, d, rho);
+  /// How many pairs of the batch are this rank's: each pair is that of the rank that owns its lower particle.
+  std::uint64_t owned(bool shared) const {
+    if (!shared) return batch_->n;
+    std::uint64_t own = 0;
+    for (unsigned r = 0; r < batch_->rows; ++r)
+      for (unsigned k = batch_->row[r].begin; k < batch_->row[r + 1].begin; ++k)
+        own += particles_.owns(std::min(pairs_.id(batch_->row[r].row), pairs_.id(batch_->second[k]))) ? 1 : 0;
+    return own;
+  }
+
+  /// The loop over pairs. Returns how many are this rank's.
+  std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1) const {
+    const PairFormula& formula = kernels_.formulas[place_of<P>(PairPotentials{})];
+    const auto& function = sums ? formula.forces_and_sums : given.x_new.empty() ? formula.forces : formula.mean_forces;
+    constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+    PairUnits units{.limits = {kNoLimit, kNoLimit}};
+    if (sums) units.per_energy = 1 / sums->quantum;
+    PairTotals totals[2];  // of own pairs, and of those shared with another rank
+    std::uint64_t own = 0;
+    ForceWords* low = nullptr;
+    pairs_.batches(step(given), particles_, cutoff_squared(), *batch_, [&](bool shared) {
+      if (forces && !low) {
+        units.limits = forces->make_room(pairs_.most_partners());
+        units.per_force = sign / forces->quantum();
+        low = pairs_.low(*forces);
+      }
+      const bool wide = !function[0](&potential_, *batch_, units, &totals[shared ? 1 : 0]);
+      if (wide && !function[1](&potential_, *batch_, units, &totals[shared ? 1 : 0])) refuse(!given.x_new.empty());
+      if (forces) kernels_.scatter(*batch_, batch_->low, low);
+      if (forces && wide) kernels_.scatter(*batch_, batch_->high, pairs_.high(*forces));
+      own += owned(shared);
     });
+    if (low) pairs_.pass_on(*forces);
+    if (!sums) return own;
+    // A shared pair counts half here and half there.
+    const auto add = [&](ExactSum& sum, PairTotals::Whole PairTotals::*part) {
+      sum.add(2 * totals[0].*part + totals[1].*part, 0.5 * sums->quantum);
+    };
+    add(sums->energy, &PairTotals::energy);
+    add(sums->magnitude, &PairTotals::magnitude);
+    add(sums->virial, &PairTotals::virial);
+    return own;
+  }
+
+  /// Names the pair of the batch with the largest force, or one that is no number.
+  [[noreturn]] void refuse(bool mean) const {
+    unsigned worst = 0;
+    double largest = -1;
+    for (unsigned k = 0; k < batch_->n; ++k) {
+      const auto squared = [&](const auto& d) { return d[0][k] * d[0][k] + d[1][k] * d[1][k] + d[2][k] * d[2][k]; };
+      const double rho = squared(batch_->d);
+      const double slope = mean ? potential_.quotient(rho, squared(batch_->d_new)) : potential_.derivative(rho);
+      const double size = std::abs(batch_->weight[k] * slope) * std::sqrt(rho);
+      if (size <= largest) continue;
+      worst = k;
+      if (!(size >= 0)) break;
+      largest = size;
+    }
+    const Id i = pairs_.id(batch_->first_of(worst)), j = pairs_.id(batch_->second[worst]);
+    const auto name = [&](Id k) { return std::to_string(particles_.id_of(k)); };
+    throw Error(Failure::numerical, "the force between particles " + name(std::min(i, j)) + " and " +
+                                        name(std::max(i, j)) +
+                                        " is too large or no number; use a smaller integrator.step, or place them "
+                                        "farther apart");
   }
 
   const Particles<D>& particles_;
   P potential_;
-  Weight weight_;
+  PairWeight weight_;
   Pairs pairs_;
+  std::function<ForceScale(double)> scale_;
   Tail tail_;
+  const PairKernels& kernels_ = pair_kernels();
+  std::unique_ptr<PairBatch> batch_;
 };
 
 }  // namespace carom

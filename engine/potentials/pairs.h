@@ -2,17 +2,21 @@
 // Which pairs a term of V is summed over: a list of bonds, all pairs, or the pairs within a cutoff.
 //
 // Each source offers
-//   for_each(x, x_new, visit)   calls visit(i, j, shift) for its pairs in the order (i, j, image), i < j; the pair's
-//                               separation is separation(x[i], x[j], shift), at x_new with the same shift
+//   batches(step, particles, cutoff², batch, visit)   fills the batch again and again and calls visit(shared), shared:
+//                               of each pair another rank owns one particle; pairs of two ghosts are left out
+//   id(place)                   the particle that a batch means
+//   low(sums), high(sums)       words to which the forces of a batch are added; pass_on(sums) comes last
+//   most_partners()             of any particle in these batches, or more
+//   ascending(step, particles, visit)  calls visit(i, j, d) for its pairs in the order (i, j, image), i < j, d = x_i −
+//                               x_j + the image's shift
 // and
 //   reach(x), reach(share, ranks)           how far apart partners are at most; infinite: no end
 //   among(some)                             itself for some of the particles, if they are enough
-//
-// Where ranks share a system, pairs of two ghosts are visited like any other; the loops of PairTerm pass over them.
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -21,21 +25,19 @@
 #include "engine/error.h"
 #include "engine/exchange.h"
 #include "engine/interaction.h"
-#include "engine/neighbour_list.h"
-#include "engine/potentials/pair_filter.h"
+#include "engine/pair_list.h"
 
 namespace carom {
 
-/// The shift of a pair in a box without periodic axes.
-struct NoShift {};
-
-template <int D>
-Vec<D> separation(const Vec<D>& x_i, const Vec<D>& x_j, const Vec<D>& shift) {
-  return x_i - x_j + shift;
-}
-template <int D>
-Vec<D> separation(const Vec<D>& x_i, const Vec<D>& x_j, NoShift) {
-  return x_i - x_j;
+/// Fills the batch from a list, for each of the parts of the list.
+template <int D, class Visit>
+void collect_batches(PairRecords<D>& records, const Box<D>& box, const PairStep<D>& step, double cutoff_squared,
+                     const PairKernels& kernels, PairBatch& batch, Visit&& visit) {
+  for (const auto kind : {PairRecords<D>::kPlain, PairRecords<D>::kMoving, PairRecords<D>::kShared}) {
+    PairRows rows = records.rows(kind, box, step);
+    rows.cutoff_squared = cutoff_squared;
+    for (PairCursor cursor; kernels.collect(rows, cursor, batch);) visit(kind == PairRecords<D>::kShared);
+  }
 }
 
 /// Bonds, given with i < j in ascending order. A bond spans the image that is nearest at x; one that grows to nearly
@@ -43,7 +45,12 @@ Vec<D> separation(const Vec<D>& x_i, const Vec<D>& x_j, NoShift) {
 template <int D>
 class Bonds {
  public:
-  Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {}
+  Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {
+    std::unordered_map<Id, std::size_t> partners;
+    for (const auto& pair : pairs_)
+      for (const Id i : pair) most_partners_ = std::max(most_partners_, ++partners[i]);
+  }
+
   const PairList& list() const { return pairs_; }
 
   std::optional<Bonds> among(const Particles<D>& some) const {
@@ -64,9 +71,7 @@ class Bonds {
   }
   double reach(Positions<D> x) const {
     double longest = 0;
-    for_each(x, x, [&](Id i, Id j, const Vec<D>& shift) {
-      longest = std::max(longest, separation<D>(x[i], x[j], shift).norm());
-    });
+    for (const auto& [i, j] : pairs_) longest = std::max(longest, (x[i] - x[j] + shift_of(i, j, x)).norm());
     return longest;
   }
   double reach(const Particles<D>& share, Exchange& ranks) const {
@@ -91,84 +96,184 @@ class Bonds {
   }
 
   template <class Visit>
-  void for_each(Positions<D> x, Positions<D> /*x_new*/, Visit&& visit) const {
-    for (const auto& [i, j] : pairs_) {
-      const Vec<D> shift = box_.shift(box_.nearest_image(x[i] - x[j]));
-      check_length(i, j, x[i] - x[j] + shift);
-      visit(i, j, shift);
+  void batches(const PairStep<D>& step, const Particles<D>& particles, double /*cutoff_squared*/, PairBatch& batch,
+               Visit&& visit) const {
+    for (const bool shared : {false, true}) {
+      if (shared && particles.ghost.empty()) return;
+      batch.clear();
+      const auto flush = [&] {
+        batch.pad();
+        if (batch.n > 0) visit(shared);
+        batch.clear();
+      };
+      for (const auto& [i, j] : pairs_) {
+        const bool mine = particles.owns(i), theirs = particles.owns(j);
+        if (shared ? mine == theirs : !(mine && theirs)) continue;
+        if (step.changed && step.changed[i] == 0 && step.changed[j] == 0) continue;
+        const Vec<D> shift = shift_of(i, j, step.x), d = step.x[i] - step.x[j] + shift;
+        batch.begin_row(i);
+        for (int k = 0; k < 3; ++k) batch.d[k][batch.n] = k < D ? d[k] : 0;
+        if (!step.x_new.empty()) {
+          const Vec<D> d_new = step.x_new[i] - step.x_new[j] + shift;
+          for (int k = 0; k < 3; ++k) batch.d_new[k][batch.n] = k < D ? d_new[k] : 0;
+        }
+        batch.second[batch.n++] = j;
+        if (batch.n == PairBatch::kCapacity) flush();
+      }
+      flush();
     }
   }
+  template <class Visit>
+  void ascending(const PairStep<D>& step, const Particles<D>& /*particles*/, Visit&& visit) const {
+    for (const auto& [i, j] : pairs_) visit(i, j, Vec<D>(step.x[i] - step.x[j] + shift_of(i, j, step.x)));
+  }
+  Id id(std::uint32_t place) const { return place; }
+  ForceWords* low(ForceSums<D>& sums) const { return sums.low(); }
+  ForceWords* high(ForceSums<D>& sums) const { return sums.high(); }
+  void pass_on(ForceSums<D>&) const {}
+  std::size_t most_partners() const { return most_partners_; }
 
  private:
-  void check_length(Id i, Id j, const Vec<D>& d) const {
+  /// Of the image in which the bond is at x.
+  Vec<D> shift_of(Id i, Id j, Positions<D> x) const {
+    const Vec<D> straight = x[i] - x[j], shift = box_.shift(box_.nearest_image(straight));
     for (int k = 0; k < D; ++k)
-      if (box_.periodic(k) && std::abs(d[k]) > 0.48 * box_.edges[k])
+      if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > 0.48 * box_.edges[k])
         throw Error(Failure::numerical, "the bond of particles " + std::to_string(i) + " and " + std::to_string(j) +
                                             " spans nearly half the periodic box along axis " + std::to_string(k) +
                                             ", where its image is ambiguous; use a larger box");
+    return shift;
   }
 
   const Box<D>& box_;
   PairList pairs_;
+  std::size_t most_partners_ = 0;
 };
 
-/// All pairs of `particles` particles, in a box without periodic axes; nothing is stored.
+/// All pairs of `particles` particles, in a box without periodic axes. They are not stored: partners of one stand one
+/// after the other, sorted by species where these matter and by whether they are owned.
 template <int D>
 class AllPairs {
  public:
-  AllPairs(std::size_t particles, PairFilter filter)
-      : particles_(static_cast<Id>(particles)), filter_(std::move(filter)) {}
+  AllPairs(const Box<D>& box, std::size_t particles, PairFilter filter)
+      : box_(box), particles_(particles), filter_(std::move(filter)) {}
 
   std::optional<AllPairs> among(const Particles<D>& some) const {
     if (some.size() < particles_) return std::nullopt;
-    return AllPairs(particles_, filter_.among(some));
+    return AllPairs(box_, particles_, filter_.among(some));
   }
   double reach(Positions<D>) const { return std::numeric_limits<double>::infinity(); }
   double reach(const Particles<D>&, Exchange&) const { return std::numeric_limits<double>::infinity(); }
+
   template <class Visit>
-  void for_each(Positions<D> /*x*/, Positions<D> /*x_new*/, Visit&& visit) const {
+  void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
+               Visit&& visit) const {
+    if (records_.order.empty() || ghost_ != particles.ghost) arrange(particles);
+    for (Id i = 0; i < particles_; ++i)
+      if (!step.x[i].allFinite() || !(step.x_new.empty() || step.x_new[i].allFinite()))
+        throw Error(Failure::numerical,
+                    "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
+    records_.load(step);
+    collect_batches(records_, box_, step, cutoff_squared, kernels_, batch, visit);
+  }
+  template <class Visit>
+  void ascending(const PairStep<D>& step, const Particles<D>& /*particles*/, Visit&& visit) const {
     for (Id i = 0; i < particles_; ++i)
       for (Id j = i + 1; j < particles_; ++j)
-        if (filter_.contains(i, j)) visit(i, j, NoShift{});
+        if ((filter_.species.partner_code(filter_.species.code(i)) & filter_.species.code(j)) != 0 &&
+            !filter_.excludes(i, j))
+          visit(i, j, Vec<D>(step.x[i] - step.x[j]));
   }
+  Id id(std::uint32_t place) const { return records_.order[place]; }
+  ForceWords* low(ForceSums<D>&) const { return records_.low(); }
+  ForceWords* high(ForceSums<D>&) const { return records_.high(); }
+  void pass_on(ForceSums<D>& sums) const { records_.pass_on(sums); }
+  std::size_t most_partners() const { return particles_; }
 
  private:
-  Id particles_;
+  void arrange(const Particles<D>& particles) const {
+    ghost_ = particles.ghost;
+    records_.clear();
+    std::vector<std::uint32_t> end;  // of each group: by species and, within that, owned and not
+    const bool apart = !filter_.species.all() && filter_.species.a != filter_.species.b;
+    for (const std::uint64_t code : {PartnerSearch::kFirst, PartnerSearch::kSecond})
+      for (const bool owned : {true, false}) {
+        for (Id i = 0; i < particles_; ++i)
+          if (particles.owns(i) == owned && (filter_.species.code(i) & code) != 0 &&
+              (apart || code == PartnerSearch::kFirst))
+            records_.order.push_back(i);
+        end.push_back(static_cast<std::uint32_t>(records_.order.size()));
+      }
+    const auto add = [&](auto kind, std::uint32_t row, std::uint32_t first, std::uint32_t last) {
+      const auto run = [&](std::uint32_t stop) {
+        if (first < stop) records_.runs[kind].push_back({row, first, stop - first, {0, 0, 0}});
+      };
+      for (std::uint32_t r = first; filter_.excluded && r < last; ++r)
+        if (filter_.excludes(records_.order[row], records_.order[r])) run(r), first = r + 1;
+      run(last);
+    };
+    for (std::uint32_t row = 0; row < end[1]; ++row) {
+      const bool owned = row < end[0];
+      const std::uint32_t own = apart ? end[1] : owned ? row + 1 : end[1], owned_end = apart ? end[2] : end[0];
+      add(owned ? PairRecords<D>::kPlain : PairRecords<D>::kShared, row, own, owned_end);
+      if (owned) add(PairRecords<D>::kShared, row, owned_end, apart ? end[3] : end[1]);
+    }
+    for (const auto kind : {PairRecords<D>::kPlain, PairRecords<D>::kShared}) {
+      auto& partners = records_.partners[kind];
+      partners.resize(records_.order.size());
+      std::iota(partners.begin(), partners.end(), 0u);
+      partners.resize(partners.size() + 8);
+    }
+  }
+
+  const Box<D>& box_;
+  std::size_t particles_;
   PairFilter filter_;
+  const PairKernels& kernels_ = pair_kernels();
+  // Caches: their state never shows in the sums.
+  mutable PairRecords<D> records_;
+  mutable std::vector<char> ghost_;
 };
 
-/// The pairs within a cutoff, and some beyond: whoever visits them looks at the distance.
+/// The pairs within a cutoff.
 template <int D>
 class PairsWithinCutoff {
  public:
-  PairsWithinCutoff(const Box<D>& box, std::size_t particles, double cutoff, PairFilter filter)
-      : box_(box),
-        cutoff_(cutoff),
-        filter_(std::move(filter)),
-        list_(box, std::vector<double>(particles, 0.5 * cutoff), wanted(filter_)) {}
+  PairsWithinCutoff(const Box<D>& box, double cutoff, PairFilter filter)
+      : box_(box), cutoff_(cutoff), filter_(filter), list_(box, cutoff, std::move(filter)) {}
 
   std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
-    return PairsWithinCutoff(box_, some.size(), cutoff_, filter_.among(some));
+    return PairsWithinCutoff(box_, cutoff_, filter_.among(some));
   }
   double reach(Positions<D>) const { return cutoff_; }
   double reach(const Particles<D>&, Exchange&) const { return cutoff_; }
 
   template <class Visit>
-  void for_each(Positions<D> x, Positions<D> x_new, Visit&& visit) const {
-    for (const NeighbourPair<D>& pair : list_.cover(x, x_new)) visit(pair.i, pair.j, box_.shift(pair.image));
+  void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
+               Visit&& visit) const {
+    records_ = &list_.cover(step, particles.ghost);
+    collect_batches(*records_, box_, step, cutoff_squared, kernels_, batch, visit);
   }
+  template <class Visit>
+  void ascending(const PairStep<D>& step, const Particles<D>& particles, Visit&& visit) const {
+    records_ = &list_.cover(step, particles.ghost);
+    for (const NeighbourPair<D>& pair : list_.ascending())
+      visit(pair.i, pair.j, Vec<D>(step.x[pair.i] - step.x[pair.j] + box_.shift(list_.image(pair))));
+  }
+  Id id(std::uint32_t place) const { return records_->order[place]; }
+  ForceWords* low(ForceSums<D>&) const { return records_->low(); }
+  ForceWords* high(ForceSums<D>&) const { return records_->high(); }
+  void pass_on(ForceSums<D>& sums) const { records_->pass_on(sums); }
+  std::size_t most_partners() const { return records_->most_partners; }
 
  private:
-  static std::function<bool(Id, Id)> wanted(const PairFilter& filter) {
-    if (filter.all()) return {};
-    return [filter](Id i, Id j) { return filter.contains(i, j); };
-  }
-
   const Box<D>& box_;
   double cutoff_;
   PairFilter filter_;
+  const PairKernels& kernels_ = pair_kernels();
   // Caches: their state never shows in the sums.
-  mutable NeighbourList<D> list_;
+  mutable CutoffList<D> list_;
+  mutable PairRecords<D>* records_ = nullptr;
 };
 
 }  // namespace carom

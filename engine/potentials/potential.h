@@ -10,13 +10,17 @@
 // d + d′ (LaBudde, Greenspan, J. Comput. Phys. 15 (1974) 134). The quotient is always in closed form: never a
 // difference of values divided by a small a − b, and the same bits whichever of the two comes first.
 //
-// Each is a template over T, a double or a vector of doubles (lanes.h), so that the loops over pairs work on several
-// pairs at once: choices are written with ?:, never with if, and sqrt, exp, … are those of elementary.h. Each potential
-// stands in a file of its own, small enough to be read whole; loops over pairs are in pair_term.h.
+// and, for what is rounded in sums of forces (force_sums.h),
+//   scale(distance)       the force and energy of a pair that is typical, or less, where particles are so far apart
+//
+// The four are templates over T, a double or a vector of doubles (lanes.h), so that the loops over pairs work on
+// several pairs at once: choices are written with ?:, never with if, and sqrt, exp, … are those of elementary.h. Each
+// potential stands in a file of its own, small enough to be read whole; loops over pairs are in pair_term.h.
 
 #include <concepts>
 
 #include "engine/elementary.h"
+#include "engine/force_words.h"
 
 namespace carom {
 

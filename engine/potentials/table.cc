@@ -74,6 +74,19 @@ Table::Table(std::span<const double> r, std::span<const double> values, std::spa
   data_ = std::move(data);
 }
 
+/// That at the distance, in the table; 2^-16 of the largest at a point, where this is more.
+ForceScale Table::scale(double distance) const {
+  const auto size = [&](double rho) -> ForceScale {
+    return {2 * std::sqrt(rho) * std::abs(derivative(rho)), std::abs(value(rho))};
+  };
+  ForceScale scale = size(std::clamp(distance * distance, first_, last_));
+  for (std::size_t k = 1; k + 1 < data_->pieces.size(); ++k) {
+    const ForceScale at = size(data_->pieces[k].base);
+    scale = {std::max(scale.force, 0x1p-16 * at.force), std::max(scale.energy, 0x1p-16 * at.energy)};
+  }
+  return scale;
+}
+
 namespace types {
 namespace {
 
@@ -106,7 +119,7 @@ std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionConte
     options::refuse("table", "'cutoff' lies beyond the last point; give a shorter one or more points");
   if (!(cut.cutoff > r.front())) options::refuse("table", "'cutoff' lies before the first point; give a longer one");
   const Table table(r, values, slopes);
-  return options::cut_term<D>("table", table, UnitWeight{}, cut, p, context);
+  return options::cut_term<D>("table", table, PairWeight::one, cut, p, context);
 }
 
 }  // namespace

@@ -29,6 +29,8 @@ class Table {
   /// Where the table ends [length²].
   double end_squared() const { return last_; }
 
+  ForceScale scale(double distance) const;
+
   template <class T>
   T value(T rho) const {
     return evaluate(rho, [](const Piece& p, double x) { return p.c0 + x * (p.c1 + x * (p.c2 + x * p.c3)); });

@@ -14,6 +14,13 @@ class UniformField {
   UniformField(const std::vector<double>& mass, const Vec<D>& g) : mass_(&mass), g_(g) {}
 
   UniformField among(const Particles<D>& some) const { return {some.mass, g_}; }
+  double least_force(double) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const double m : *mass_)
+      for (int k = 0; k < D; ++k)
+        if (m * g_[k] != 0) least = std::min(least, std::abs(m * g_[k]));
+    return least < std::numeric_limits<double>::infinity() ? least : 0;
+  }
   double value(Id i, const Vec<D>& x) const { return -(*mass_)[i] * g_.dot(x); }
   Vec<D> gradient(Id i, const Vec<D>&) const { return -(*mass_)[i] * g_; }
   Vec<D> mean_gradient(Id i, const Vec<D>& x, const Vec<D>&) const { return gradient(i, x); }

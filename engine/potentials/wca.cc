@@ -11,7 +11,8 @@ using Range = Parameter::Range;
 
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
-  return options::within_reach<D>("wca", Wca(p.real("epsilon"), p.real("sigma")), UnitWeight{}, p, context);
+  const Wca potential(p.real("epsilon"), p.real("sigma"));
+  return options::within_reach<D>("wca", potential, PairWeight::one, p, context, potential);
 }
 
 }  // namespace

@@ -18,6 +18,8 @@ class Wca {
 
   double cutoff_squared() const { return cutoff2_; }
 
+  ForceScale scale(double distance) const { return inside_.scale(distance); }
+
   template <class T>
   T value(T rho) const {
     const T x = sigma2_ / rho;

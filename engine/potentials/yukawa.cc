@@ -12,9 +12,8 @@ using Range = Parameter::Range;
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   const Yukawa potential(p.real("amplitude"), p.real("kappa"));
-  if (p.flag("charges"))
-    return options::pair_term<D>("yukawa", potential, ProductWeight(context.particles.charge), p, context);
-  return options::pair_term<D>("yukawa", potential, UnitWeight{}, p, context);
+  return options::pair_term<D>("yukawa", potential, p.flag("charges") ? PairWeight::charges : PairWeight::one, p,
+                               context);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -18,6 +19,11 @@ namespace carom {
 class Yukawa {
  public:
   Yukawa(double amplitude, double kappa) : amplitude_(amplitude), kappa_(kappa) {}
+
+  ForceScale scale(double distance) const {
+    const double near = std::min(distance, 1 / kappa_), energy = 0x1p-2 * std::abs(value(near * near));
+    return {energy / near, energy};
+  }
 
   template <class T>
   T value(T rho) const {

@@ -4,8 +4,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "engine/pair_filter.h"
 #include "engine/placement.h"
-#include "engine/potentials/pair_filter.h"
 #include "engine/random.h"
 #include "engine/shares.h"
 

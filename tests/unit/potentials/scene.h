@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/interaction.h"
-#include "engine/potentials/pair_filter.h"
+#include "engine/pair_filter.h"
 
 namespace carom::test {
 
@@ -75,19 +75,28 @@ double energy(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
   return sums(term, x).energy.value();
 }
 
+inline constexpr double kQuantum = 0x1p-44;  ///< of forces
+
+template <int D>
+std::vector<Vec<D>> values(const ForceSums<D>& sums) {
+  std::vector<Vec<D>> f;
+  for (Id i = 0; i < sums.size(); ++i) f.push_back(sums.value(i));
+  return f;
+}
+
 template <int D>
 std::vector<Vec<D>> forces(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
-  std::vector<Vec<D>> f(x.size(), Vec<D>::Zero());
-  term.add_forces(x, f);
-  return f;
+  ForceSums<D> sums(x.size(), kQuantum);
+  term.add_forces(x, sums);
+  return values(sums);
 }
 
 template <int D>
 std::vector<Vec<D>> mean_forces(const Interaction<D>& term, const std::vector<Vec<D>>& x,
                                 const std::vector<Vec<D>>& x_new) {
-  std::vector<Vec<D>> f(x.size(), Vec<D>::Zero());
-  term.add_mean_forces(x, x_new, f);
-  return f;
+  ForceSums<D> sums(x.size(), kQuantum);
+  term.add_mean_forces(x, x_new, sums);
+  return values(sums);
 }
 
 template <int D>

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/pair_kernels.h"
 #include "engine/parameters.h"
 #include "engine/particles.h"
 
@@ -55,34 +56,42 @@ std::shared_ptr<const BondTable> bonds_of(const Terms& terms) {
 /// Two species, in either order; or no restriction.
 using SpeciesPair = std::optional<std::array<std::uint16_t, 2>>;
 
-class PairFilter {
- public:
-  /// All pairs.
-  PairFilter() = default;
-  /// The pairs of these species that `excluded` does not join (null: none). The particles outlive the filter.
-  template <int D>
-  PairFilter(const Particles<D>& particles, SpeciesPair species, std::shared_ptr<const BondTable> excluded)
-      : species_of_(&particles.species), id_(&particles.id), species_(species), excluded_(std::move(excluded)) {}
+/// Between which of two species a pair is wanted; both equal: within one.
+struct SpeciesRule {
+  const std::vector<std::uint16_t>* species_of = nullptr;  ///< null: all pairs
+  std::uint16_t a = 0, b = 0;
 
+  bool all() const { return species_of == nullptr; }
+  /// codes of PartnerSearch: those of a particle, and of which partners must have one.
+  std::uint64_t code(Id i) const {
+    if (all()) return PartnerSearch::kFirst;
+    const std::uint16_t s = (*species_of)[i];
+    return (s == a ? PartnerSearch::kFirst : 0u) | (s == b ? PartnerSearch::kSecond : 0u);
+  }
+  std::uint64_t partner_code(std::uint64_t code) const {
+    if (all()) return PartnerSearch::kFirst;
+    return ((code & PartnerSearch::kFirst) != 0 ? PartnerSearch::kSecond : 0u) |
+           ((code & PartnerSearch::kSecond) != 0 ? PartnerSearch::kFirst : 0u);
+  }
+};
+
+/// Which pairs a term acts between; the particles that it refers to outlive it.
+struct PairFilter {
+  SpeciesRule species;
+  std::shared_ptr<const BondTable> excluded;  ///< pairs that these join are left out; null: none
+  const std::vector<Id>* id = nullptr;        ///< where there are such
+
+  /// The same for other particles.
   template <int D>
   PairFilter among(const Particles<D>& some) const {
-    return PairFilter(some, species_, excluded_);
+    PairFilter other = *this;
+    if (!species.all()) other.species.species_of = &some.species;
+    other.id = &some.id;
+    return other;
   }
-  bool all() const { return !species_ && !excluded_; }
-  /// Particles by their numbers here.
-  bool contains(Id i, Id j) const {
-    if (species_) {
-      const std::array pair = {(*species_of_)[i], (*species_of_)[j]};
-      if (pair != *species_ && std::array{pair[1], pair[0]} != *species_) return false;
-    }
-    return !excluded_ || !excluded_->joins(id_->empty() ? i : (*id_)[i], id_->empty() ? j : (*id_)[j]);
+  bool excludes(Id i, Id j) const {
+    return excluded && excluded->joins(id->empty() ? i : (*id)[i], id->empty() ? j : (*id)[j]);
   }
-
- private:
-  const std::vector<std::uint16_t>* species_of_ = nullptr;
-  const std::vector<Id>* id_ = nullptr;
-  SpeciesPair species_;
-  std::shared_ptr<const BondTable> excluded_;
 };
 
 }  // namespace carom

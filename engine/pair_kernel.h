@@ -1,0 +1,401 @@
+// The kernels of pair_kernels.h, written once for any number of lanes. Included by pair_kernels_*.cc only, which are
+// compiled for different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so
+// that no function compiled for one machine can end up in another's binary.
+
+#include "engine/lanes.h"
+#include "engine/pair_kernels.h"
+#include "engine/potentials/pair_potentials.h"
+
+namespace carom {
+namespace {
+
+template <int W>
+struct Width {
+  typedef double Double __attribute__((vector_size(8 * W)));
+  typedef long long Long __attribute__((vector_size(8 * W)));
+};
+using Two = Width<2>::Double;
+using Four = Width<4>::Double;
+using Eight = Width<8>::Double;
+
+#define CAROM_INLINE [[gnu::always_inline]] inline
+
+template <class V>
+CAROM_INLINE V load(const void* at) {
+  V lanes;
+  __builtin_memcpy(&lanes, at, sizeof lanes);
+  return lanes;
+}
+template <class V>
+CAROM_INLINE void store(void* at, V lanes) {
+  __builtin_memcpy(at, &lanes, sizeof lanes);
+}
+
+template <class V>
+struct Fields {
+  V x, y, z, w;
+};
+
+/// The fields of W records that stand at `at(lane)`.
+template <class V>
+CAROM_INLINE Fields<V> transposed(const auto& at) {
+  if constexpr (sizeof(V) == 16) {
+    const V a = load<V>(&at(0)->x), b = load<V>(&at(1)->x), c = load<V>(&at(0)->z), d = load<V>(&at(1)->z);
+    return {__builtin_shufflevector(a, b, 0, 2), __builtin_shufflevector(a, b, 1, 3),
+            __builtin_shufflevector(c, d, 0, 2), __builtin_shufflevector(c, d, 1, 3)};
+  } else if constexpr (sizeof(V) == 32) {
+    const V a = load<V>(at(0)), b = load<V>(at(1)), c = load<V>(at(2)), d = load<V>(at(3));
+    const V xz01 = __builtin_shufflevector(a, b, 0, 4, 2, 6), yw01 = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    const V xz23 = __builtin_shufflevector(c, d, 0, 4, 2, 6), yw23 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    return {__builtin_shufflevector(xz01, xz23, 0, 1, 4, 5), __builtin_shufflevector(yw01, yw23, 0, 1, 4, 5),
+            __builtin_shufflevector(xz01, xz23, 2, 3, 6, 7), __builtin_shufflevector(yw01, yw23, 2, 3, 6, 7)};
+  } else {
+    const auto both = [&](int lane) __attribute__((always_inline)) {
+      return __builtin_shufflevector(load<Four>(at(lane)), load<Four>(at(lane + 4)), 0, 1, 2, 3, 4, 5, 6, 7);
+    };
+    const V a = both(0), b = both(1), c = both(2), d = both(3);
+    const V xz01 = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
+    const V yw01 = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+    const V xz23 = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14);
+    const V yw23 = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+    return {__builtin_shufflevector(xz01, xz23, 0, 1, 8, 9, 4, 5, 12, 13),
+            __builtin_shufflevector(yw01, yw23, 0, 1, 8, 9, 4, 5, 12, 13),
+            __builtin_shufflevector(xz01, xz23, 2, 3, 10, 11, 6, 7, 14, 15),
+            __builtin_shufflevector(yw01, yw23, 2, 3, 10, 11, 6, 7, 14, 15)};
+  }
+}
+
+/// One bit a lane.
+template <class M>
+CAROM_INLINE unsigned bits(M mask) {
+#if defined(__AVX512DQ__)
+  if constexpr (sizeof mask == 64) return _mm512_movepi64_mask((__m512i)mask);
+#endif
+#if defined(__AVX__)
+  if constexpr (sizeof mask == 32) return static_cast<unsigned>(_mm256_movemask_pd((__m256d)mask));
+#endif
+#if defined(__SSE2__)
+  if constexpr (sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
+#endif
+  unsigned all = 0;
+  for (unsigned l = 0; l < sizeof mask / 8; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
+  return all;
+}
+
+/// For each mask of four lanes the halves of those that are in it, first things first.
+struct Compression {
+  alignas(32) std::uint32_t half[16][8];
+  alignas(16) std::uint32_t lane[16][4];
+  constexpr Compression() : half{}, lane{} {
+    for (unsigned mask = 0; mask < 16; ++mask) {
+      unsigned n = 0;
+      for (unsigned l = 0; l < 4; ++l)
+        if ((mask >> l & 1) != 0) {
+          half[mask][2 * n] = 2 * l, half[mask][2 * n + 1] = 2 * l + 1;
+          lane[mask][n++] = l;
+        }
+    }
+  }
+};
+constexpr Compression kCompression;
+
+/// Stores the lanes in a mask one after another; may write up to W numbers.
+template <class V>
+CAROM_INLINE void compress(double* to, unsigned mask, V x) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof x == 64) {
+    store(to, _mm512_maskz_compress_pd(static_cast<__mmask8>(mask), (__m512d)x));
+    return;
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (sizeof x == 32) {
+    const __m256i which = _mm256_load_si256(reinterpret_cast<const __m256i*>(kCompression.half[mask]));
+    store(to, _mm256_permutevar8x32_ps((__m256)x, which));
+    return;
+  }
+#endif
+  for (unsigned l = 0, n = 0; l < sizeof x / 8; n += mask >> l & 1, ++l) to[n] = x[l];
+}
+template <int W>
+CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, const std::uint32_t* from) {
+#if defined(__AVX512F__)
+  if constexpr (W == 8) {
+    const __m512i some = _mm512_castsi256_si512(load<__m256i>(from));
+    store(to, _mm512_castsi512_si256(_mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), some)));
+    return;
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (W == 4) {
+    const __m128i which = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompression.lane[mask]));
+    store(to, _mm_permutevar_ps((__m128)load<__m128i>(from), which));
+    return;
+  }
+#endif
+  std::uint32_t some[W];
+  __builtin_memcpy(some, from, sizeof some);
+  for (unsigned l = 0, n = 0; l < W; n += mask >> l & 1, ++l) to[n] = some[l];
+}
+
+template <int W>
+CAROM_INLINE unsigned count(unsigned mask) {
+  if constexpr (W == 2)
+    return (mask & 1) + (mask >> 1);
+  else
+    return static_cast<unsigned>(__builtin_popcount(mask));  // all machines with so wide vectors have an instruction
+}
+
+template <int W>
+CAROM_INLINE unsigned first_lanes(std::uint32_t count) {
+  return count >= W ? (1u << W) - 1 : (1u << count) - 1;
+}
+
+template <int W, bool mean, bool moving, bool weighted>
+bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
+  using V = typename Width<W>::Double;
+  batch.clear();
+  unsigned n = 0;
+  const V cutoff = all<V>(rows.cutoff_squared);
+  for (; cursor.run < rows.runs; ++cursor.run, cursor.at = 0) {
+    const PairRun& run = rows.run[cursor.run];
+    const std::uint32_t* const partner = rows.partner + run.begin;
+    const PairRecord &own = rows.x[run.row], &own_new = mean ? rows.x_new[run.row] : own;
+    const V x = all<V>(own.x), y = all<V>(own.y), z = all<V>(own.z), w = all<V>(own.w);
+    const V x_new = all<V>(own_new.x), y_new = all<V>(own_new.y), z_new = all<V>(own_new.z);
+    V image[3], shift[3];
+    for (int k = 0; k < 3; ++k) {
+      const double* const box = moving ? &rows.box[run.row].x : nullptr;
+      image[k] = all<V>(run.image[k] - (moving ? box[k] : 0));
+      shift[k] = image[k] * rows.edges[k];
+    }
+    batch.n = n;
+    batch.begin_row(run.row);
+    for (; cursor.at < run.count; cursor.at += W) {
+      if (n + W > PairBatch::kCapacity) {
+        batch.n = n;
+        batch.pad();
+        return true;
+      }
+      const std::uint32_t* const j = partner + cursor.at;
+      const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x + j[l]; });
+      if constexpr (moving) {
+        const auto box = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.box + j[l]; });
+        shift[0] = (image[0] + box.x) * rows.edges[0];
+        shift[1] = (image[1] + box.y) * rows.edges[1];
+        shift[2] = (image[2] + box.z) * rows.edges[2];
+      }
+      const V dx = (x - other.x) + shift[0], dy = (y - other.y) + shift[1], dz = (z - other.z) + shift[2];
+      const V rho = dx * dx + dy * dy + dz * dz;
+      auto within = rho < cutoff;
+      V ex, ey, ez;
+      if constexpr (mean) {
+        const auto after = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x_new + j[l]; });
+        ex = (x_new - after.x) + shift[0], ey = (y_new - after.y) + shift[1], ez = (z_new - after.z) + shift[2];
+        within |= ex * ex + ey * ey + ez * ez < cutoff;
+      }
+      V product;
+      if constexpr (weighted) {
+        product = w * other.w;
+        within &= product != 0.0;
+      }
+      const unsigned mask = bits(within) & first_lanes<W>(run.count - cursor.at);
+      compress(batch.d[0] + n, mask, dx);
+      compress(batch.d[1] + n, mask, dy);
+      compress(batch.d[2] + n, mask, dz);
+      if constexpr (mean) {
+        compress(batch.d_new[0] + n, mask, ex);
+        compress(batch.d_new[1] + n, mask, ey);
+        compress(batch.d_new[2] + n, mask, ez);
+      }
+      if constexpr (weighted) compress(batch.weight + n, mask, product);
+      compress<W>(batch.second + n, mask, j);
+      n += count<W>(mask);
+    }
+  }
+  batch.n = n;
+  batch.pad();
+  return n > 0;
+}
+
+template <int W>
+bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
+  using Function = bool (*)(const PairRows&, PairCursor&, PairBatch&);
+  static constexpr Function all[8] = {collect_pairs<W, false, false, false>, collect_pairs<W, false, false, true>,
+                                      collect_pairs<W, false, true, false>,  collect_pairs<W, false, true, true>,
+                                      collect_pairs<W, true, false, false>,  collect_pairs<W, true, false, true>,
+                                      collect_pairs<W, true, true, false>,   collect_pairs<W, true, true, true>};
+  return all[(rows.x_new ? 4 : 0) + (rows.box ? 2 : 0) + (rows.weighted ? 1 : 0)](rows, cursor, batch);
+}
+
+/// Adds the words to the sums of both particles.
+template <int W>
+void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kCapacity], ForceWords* sums) {
+  constexpr int L = W < 4 ? W : 4;  // a record is no wider
+  using V = typename Width<L>::Double;
+  using I = typename Width<L>::Long;
+  constexpr unsigned kParts = 4 / L;
+  for (unsigned r = 0; r < batch.rows; ++r) {
+    const unsigned end = batch.row[r + 1].begin;
+    unsigned k = batch.row[r].begin;
+    I own[kParts] = {};
+    if constexpr (L == 4) {
+      for (; k + 4 <= end; k += 4) {
+        const V x = load<V>(words[0] + k), y = load<V>(words[1] + k), z = load<V>(words[2] + k), none = {};
+        const V xy02 = __builtin_shufflevector(x, y, 0, 4, 2, 6), xy13 = __builtin_shufflevector(x, y, 1, 5, 3, 7);
+        const V z02 = __builtin_shufflevector(z, none, 0, 4, 2, 6), z13 = __builtin_shufflevector(z, none, 1, 5, 3, 7);
+        const I term[4] = {
+            (I)__builtin_shufflevector(xy02, z02, 0, 1, 4, 5), (I)__builtin_shufflevector(xy13, z13, 0, 1, 4, 5),
+            (I)__builtin_shufflevector(xy02, z02, 2, 3, 6, 7), (I)__builtin_shufflevector(xy13, z13, 2, 3, 6, 7)};
+        own[0] += (term[0] + term[1]) + (term[2] + term[3]);
+        for (int l = 0; l < 4; ++l) {
+          std::int64_t* const other = sums[batch.second[k + l]].of;
+          store(other, load<I>(other) - term[l]);
+        }
+      }
+    }
+    for (; k < end; ++k) {
+      std::int64_t* const other = sums[batch.second[k]].of;
+      if constexpr (L == 4) {
+        const I term = {words[0][k], words[1][k], words[2][k], 0};
+        own[0] += term;
+        store(other, load<I>(other) - term);
+      } else {
+        const I xy = {words[0][k], words[1][k]}, z = {words[2][k], 0};
+        own[0] += xy;
+        own[kParts - 1] += z;
+        store(other, load<I>(other) - xy);
+        store(other + 2, load<I>(other + 2) - z);
+      }
+    }
+    std::int64_t* const first = sums[batch.row[r].row].of;
+    for (unsigned part = 0; part < kParts; ++part) store(first + L * part, load<I>(first + L * part) + own[part]);
+  }
+}
+
+template <int W>
+void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32_t end, PartnersFound& found) {
+  using V = typename Width<W>::Double;
+  using B = BitsOf<V>;
+  const V x = all<V>(search.own[0]), y = all<V>(search.own[1]), z = all<V>(search.own[2]);
+  const V reach = all<V>(search.reach_squared);
+  constexpr std::uint64_t kOdd = PartnerSearch::kMoving | PartnerSearch::kGhost;
+  for (std::uint32_t j = begin; j < end; j += W) {
+    const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return search.x + j + l; });
+    const V dx = x - other.x, dy = y - other.y, dz = z - other.z;
+    const B code = (B)other.w;
+    const auto near = dx * dx + dy * dy + dz * dz <= reach;
+    const unsigned odd = bits((code & kOdd) != 0u), wanted = bits((code & search.wanted) != 0u);
+    unsigned mask = bits(near) & wanted & first_lanes<W>(end - j);
+    if (!search.here && search.row - j < W) mask &= ~(1u << (search.row - j));
+    std::uint32_t index[W];
+    for (unsigned l = 0; l < W; ++l) index[l] = j + l;
+    const unsigned plain = search.plain ? mask & ~odd : 0;
+    compress<W>(found.plain, plain, index);
+    found.plain += count<W>(plain);
+    if (plain == mask) continue;
+    compress<W>(found.other, mask & ~plain, index);
+    found.other += count<W>(mask & ~plain);
+  }
+}
+
+/// x as integers, |x| < 2^51: to nearest, the even one of two.
+template <class V>
+CAROM_INLINE IntegerOf<V> integers(V x) {
+  return (IntegerOf<V>)(x + 0x1.8p52) - (IntegerOf<V>)all<V>(0x1.8p52);
+}
+
+/// Whether all lanes of x are less than a limit; false for what is no number.
+template <class V>
+CAROM_INLINE auto within(V x, double limit) {
+  return elementary::abs(x) < limit;
+}
+
+template <int W, class P, bool mean, bool sums, bool wide>
+[[gnu::flatten]] bool evaluate(const void* any_potential, PairBatch& batch, const PairUnits& units,
+                               PairTotals* totals) {
+  using V = typename Width<W>::Double;
+  using I = IntegerOf<V>;
+  const P potential = *static_cast<const P*>(any_potential);
+  constexpr int kWords = wide ? 2 : 1;
+  I sum[3][kWords] = {};  // energy, magnitude, virial
+  I fits = ~I{};
+  for (unsigned k = 0; k < batch.n; k += W) {
+    V d[3];
+    for (int axis = 0; axis < 3; ++axis) d[axis] = load<V>(batch.d[axis] + k);
+    const V rho = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], weight = load<V>(batch.weight + k);
+    V g;
+    if constexpr (mean) {
+      V e[3];
+      for (int axis = 0; axis < 3; ++axis) e[axis] = load<V>(batch.d_new[axis] + k);
+      const V rho_new = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+      g = -weight * potential.quotient(rho, rho_new);
+      for (int axis = 0; axis < 3; ++axis) d[axis] += e[axis];
+    } else {
+      g = -2.0 * weight * potential.derivative(rho);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      const V force = (g * d[axis]) * units.per_force;
+      if constexpr (wide) {
+        const V upper = elementary::nearest_integer(force * 0x1p-40);
+        fits &= (I)within(upper, units.limits.high);
+        store(batch.high[axis] + k, integers(upper));
+        store(batch.low[axis] + k, integers(force - upper * 0x1p40));
+      } else {
+        fits &= (I)within(force, units.limits.low);
+        store(batch.low[axis] + k, integers(force));
+      }
+    }
+    if constexpr (sums) {
+      const V energy = weight * potential.value(rho);
+      const V terms[3] = {energy * units.per_energy, elementary::abs(energy) * units.per_energy,
+                          (g * rho) * units.per_energy};
+      for (int s = 0; s < 3; ++s) {
+        if constexpr (wide) {
+          const V upper = elementary::nearest_integer(terms[s] * 0x1p-40);
+          fits &= (I)within(upper, 0x1p50);
+          sum[s][1] += integers(upper);
+          sum[s][0] += integers(terms[s] - upper * 0x1p40);
+        } else {
+          if (s != 1) fits &= (I)within(terms[s], 0x1p50);
+          sum[s][0] += integers(terms[s]);
+        }
+      }
+    }
+  }
+  if (bits(fits) != (1u << W) - 1) return false;
+  if constexpr (sums) {
+    PairTotals::Whole whole[3] = {0, 0, 0};
+    for (int s = 0; s < 3; ++s)
+      for (int l = 0; l < W; ++l) {
+        whole[s] += sum[s][0][l];
+        if constexpr (wide) whole[s] += static_cast<PairTotals::Whole>(sum[s][1][l]) << 40;
+      }
+    totals->energy += whole[0];
+    totals->magnitude += whole[1];
+    totals->virial += whole[2];
+  }
+  return true;
+}
+
+template <int W, class P>
+constexpr PairFormula formula() {
+  return {{evaluate<W, P, false, false, false>, evaluate<W, P, false, false, true>},
+          {evaluate<W, P, false, true, false>, evaluate<W, P, false, true, true>},
+          {evaluate<W, P, true, false, false>, evaluate<W, P, true, false, true>}};
+}
+
+template <int W, class... P>
+struct Formulas {
+  static constexpr PairFormula kAll[] = {formula<W, P>()...};
+};
+
+template <int W, class... P>
+constexpr PairKernels kernels_of(const char* name, PotentialList<P...>) {
+  return {name, collect<W>, scatter<W>, find_partners<W>, Formulas<W, P...>::kAll};
+}
+
+#undef CAROM_INLINE
+
+}  // namespace
+}  // namespace carom
