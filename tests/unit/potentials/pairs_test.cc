@@ -126,10 +126,10 @@ TEST(Pairs, AYukawaTermWithChargesIsTheirProductTimesThatWithout) {
     return scene.make("yukawa", all);
   };
   const double v = 1.5 * std::exp(-1.0);
-  EXPECT_NEAR(energy(*with(false), scene.particles.x), v, 1e-15);
-  EXPECT_NEAR(energy(*with(true), scene.particles.x), -v, 1e-15);
-  EXPECT_NEAR(forces(*with(true), scene.particles.x)[0][2], v * (1 + 0.5 * 2) / 2, 1e-15);  // attracted
-  EXPECT_NEAR(test::sums(*with(true), scene.particles.x).virial.value(), -2 * v, 1e-15);
+  EXPECT_NEAR(energy(*with(false), scene.particles.x), v, 1e-13);
+  EXPECT_NEAR(energy(*with(true), scene.particles.x), -v, 1e-13);
+  EXPECT_NEAR(forces(*with(true), scene.particles.x)[0][2], v * (1 + 0.5 * 2) / 2, 1e-13);  // attracted
+  EXPECT_NEAR(test::sums(*with(true), scene.particles.x).virial.value(), -2 * v, 1e-13);
 }
 
 TEST(Pairs, TailsCountThePairsOfTheirSpecies) {
