@@ -173,6 +173,8 @@ def test_bonded_pairs_left_out_and_tables_across_ranks(tmp_path):
         mpirun(ranks, RANK_0_AT_HOME + command("input.toml", tmp_path / str(ranks)), cwd=tmp_path)
         assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
         assert summary(tmp_path / str(ranks))["tail"] == done["tail"]
+    run(tmp_path / "input.toml", tmp_path / "narrow", env=os.environ | {"CAROM_SIMD": "sse2"})
+    assert compare.compare(tmp_path / "plain", tmp_path / "narrow") == []
     chains["interaction"] = [dict(table, exclude="none"), attraction, bonds]
     run(write_deck(tmp_path, toml_text(chains)), tmp_path / "all")
     assert summary(tmp_path / "all")["energy"]["initial"] > done["energy"]["initial"]  # the bonded repel each other
