@@ -20,10 +20,10 @@ Sums of_all_ranks(const System<D>& system, const Sums& mine) {
   return system.sizes ? sum_of_all(*system.ranks, mine) : mine;
 }
 
-/// The largest of what all ranks say, where each knows only some of the particles; else all know the same.
+/// Makes each value the largest of what all ranks say. Collective.
 template <int D>
 void largest_of_all(const System<D>& system, std::span<double> values) {
-  if (system.part && !system.part->knows_everybody()) system.part->ranks().largest(values);
+  if (system.part) system.part->ranks().largest(values);
 }
 template <int D>
 bool any_rank(const System<D>& system, bool value) {

@@ -25,11 +25,12 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
 }
 
 template <int D>
-void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length) {
+void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool resolved) {
   const Stopwatch watch(counters_->seconds.predict);
   start_v_ = v;
   a_ = a;
   length_ = length;
+  resolved_ = resolved;
   last_sequences_.clear();
   sequences_.clear();
   const std::size_t n = particles_.size();
@@ -140,6 +141,7 @@ FlightEnd<D> SlabCore<D>::serve() {
     const EventKey<D>& key = event.key;
     const bool pair = key.kind == EventKind::pair;
     if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
+    if (resolved_ && !(key.time > 0)) continue;  // rounding
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses nothing together: what does not approach needs no impulse.
     if (held || (approach(key) >= -scan_.resting_speed() && !a_.empty()))
@@ -265,18 +267,16 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     if (!(ContactScan<D>::inward(wall) * v < 0)) return;
     contact.impulse[axis] = -2 * mass * v;
     contact.x_hi[axis] = wall % 2 == 0 ? 0.0 : box_.edges[axis];
-    contact.overlap = std::max(0.0, -scan_.wall_gap(lo.x, key.lo, wall) / particles_.radius[key.lo]);
     v = -v;
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
-    const double mass_hi = particles_.mass[key.hi], sigma = scan_.contact_distance(key.lo, key.hi);
+    const double mass_hi = particles_.mass[key.hi];
     const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
     if (!(d.dot(v) < 0)) return;
     const double g = collision_factor<D>(d, v, mass, mass_hi);
     contact.impulse = g * d;
     contact.x_hi = hi.x - box_.shift(key.image);
     contact.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse);
-    contact.overlap = std::max(0.0, 1 - d.norm() / sigma);
     lo.v += (g / mass) * d;
     hi.v -= (g / mass_hi) * d;
     stays_near(hi);

@@ -43,8 +43,8 @@ class SlabCore {
   }
 
   /// Finds the pairs that may meet in a slab of this length [time] from the system's positions with velocities v, under
-  /// accelerations a or others not much larger.
-  void begin(Positions<D> v, Positions<D> a, double length);
+  /// accelerations a or others not much larger. `resolved`: ContactScan::resolve() has seen to what touches now.
+  void begin(Positions<D> v, Positions<D> a, double length, bool resolved = false);
 
   /// Flies from the start of the slab to its end. Empty `a`: straight.
   FlightEnd<D> fly(Positions<D> a);
@@ -120,7 +120,7 @@ class SlabCore {
   std::vector<Contact<D>>* log_ = nullptr;
   double length_ = 0, margin_ = 0;
   double strayed_ = 0;  // > 0: a particle came farther than margin_ in this flight
-  bool crowded_ = false;
+  bool crowded_ = false, resolved_ = false;
   Positions<D> start_v_, a_;  // of the slab
   std::span<const NeighbourPair<D>> pairs_;
   std::vector<std::uint32_t> near_;  // among the pairs: those that first flights may bring together

@@ -63,6 +63,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     past_.resize(n);
     for (auto* each : {&a_, &mean_, &move_}) each->resize(n, Vec<D>::Zero());
     swaps_.assign(n, 0);
+    swapping_.clear();
+    frozen_.clear();
   }
 
   void start(System<D>& system, Counters& counters) override {
@@ -97,6 +99,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     core_->begin_step(report.counters, report.contacts, past_.last(), slab.length);
     double done = 0, longest = slab.length;
     while (done < slab.length) {
+      resolved_ = touching_;
       if (touching_) touching_ = resolve(system, done);
       const double rest = slab.length - done, piece = std::min(longest, rest);
       const Outcome outcome = solve(system, piece);
@@ -148,13 +151,14 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     auto& p = system.particles;
     const std::size_t n = p.size();
     past_.expect(h, a_);
-    core_->begin(p.v, a_, h);
+    core_->begin(p.v, a_, h, resolved_);
     for (const Id i : frozen_) swaps_[i] = 0;
     for (const Id i : swapping_) swaps_[i] = 0;
     frozen_.clear();
     swapping_.clear();
     Chebyshev chebyshev(0.25 * h * h * squared_frequency_);
-    const double scale = std::max(speed_, h * strength_), wanted = tolerance_ * scale;
+    const double scale = std::max(speed_, h * strength_);
+    const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
     double last = 0, before = 0, earlier = 0;  // largest, one, two and kPatience sweeps ago
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
       const FlightEnd<D> end = core_->fly(a_);
@@ -285,7 +289,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (!fold_near(system, frozen_[k], of_frozen[k])) rest += of_frozen[k];
     fold(system, rest);
     past_.pass(h);
-    for (Id i = 0; i < p.size(); ++i) past_.add(i, mean_[i], h);
+    past_.last() = mean_;
   }
 
   /// Adds r to the kinetic energy of all particles, relative to the centre of mass.
@@ -343,6 +347,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::vector<std::uint32_t> swaps_;    // of partners, by particle
   std::vector<Id> swapping_, frozen_;   // particles with any, and with many
   bool touching_ = true;                // contacts at the slab's start may need to be resolved
+  bool resolved_ = false;               // and have been
   FlightEnd<D> cut_;                    // why the last slab was cut
   double squared_frequency_ = 0;        // the largest, once it matters
   std::int64_t measured_ = -kMeasured;  // the slab in which it was found

@@ -1,4 +1,4 @@
-// Large cold cations and small hot anions under acdda: the energy stays exact through the collisions, the species come
+// Large cold cations and small hot anions under edda: the energy stays exact through the collisions, the species come
 // to one temperature, and g(r) at contact is that of psa at a tiny step from the same start.
 //
 // Error bars are standard errors from 20 blocks after an equilibration of a fifth of the run. With 19 degrees of
@@ -115,23 +115,23 @@ Measured measure(const char* method, double step, double end_time) {
 /// so that to agree means something.
 void expect_equilibrium(std::uint64_t collisions, double share, double tiny, double largest_error) {
   const double end_time = static_cast<double>(collisions) / 1000;  // there are a few more in a unit of time
-  const auto acdda = measure("acdda", 0.02, end_time), psa = measure("psa", tiny, share * end_time);
-  for (const auto* m : {&acdda, &psa})
+  const auto edda = measure("edda", 0.02, end_time), psa = measure("psa", tiny, share * end_time);
+  for (const auto* m : {&edda, &psa})
     std::cout << m->statistics.counters.sphere_sphere << " collisions: relative energy error "
               << m->statistics.max_energy_error / m->statistics.energy_reference << "; temperature of the anions less "
               << "that of the cations " << m->difference_at_start << " at the start, later " << m->difference.value
               << " ± " << m->difference.error << "; g at contact " << m->contact_value.value << " ± "
               << m->contact_value.error << '\n';
-  const auto& s = acdda.statistics;
+  const auto& s = edda.statistics;
   EXPECT_GE(s.counters.sphere_sphere, collisions);
   EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);
   EXPECT_LE(s.counters.max_overlap, 1e-12);
-  EXPECT_GT(acdda.difference_at_start, 0.5);
-  EXPECT_LE(acdda.difference.error, largest_error);
-  EXPECT_NEAR(acdda.difference.value, 0, 5 * acdda.difference.error);
-  const double error = std::hypot(acdda.contact_value.error, psa.contact_value.error);
+  EXPECT_GT(edda.difference_at_start, 0.5);
+  EXPECT_LE(edda.difference.error, largest_error);
+  EXPECT_NEAR(edda.difference.value, 0, 5 * edda.difference.error);
+  const double error = std::hypot(edda.contact_value.error, psa.contact_value.error);
   EXPECT_LE(error, largest_error * psa.contact_value.value);
-  EXPECT_NEAR(acdda.contact_value.value, psa.contact_value.value, 5 * error);
+  EXPECT_NEAR(edda.contact_value.value, psa.contact_value.value, 5 * error);
 }
 
 TEST(ChargedMixture, ComesToEquilibrium) { expect_equilibrium(3000, 1, 0.002, 0.1); }

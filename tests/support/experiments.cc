@@ -146,6 +146,7 @@ std::unique_ptr<Simulation<D>> make_run(std::unique_ptr<System<D>> system, const
   parameters.set("max_events_per_step", std::int64_t{100000});
   parameters.set("order", std::int64_t{2});
   parameters.set("variant", std::string("grid"));
+  parameters.set("tolerance", 1e-10);
   for (const auto& [name, value] : given) parameters.set(name, value);
   const auto& info = integrator_named(integrator);
   return std::make_unique<Simulation<D>>(std::move(system), info, info.make<D>(parameters), plan);

@@ -169,7 +169,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, HardCases,
                          testing::Values(Method{"psa", 2, "grid", 0.1}, Method{"cva", 2, "grid", 3e-3},
                                          Method{"mcva", 2, "grid", 3e-3}, Method{"mcva", 2, "restart", 3e-3},
                                          Method{"cdda", 2, "grid", 1e-13}, Method{"cdda", 4, "grid", 1e-13},
-                                         Method{"acva", 2, "grid", 3e-3}, Method{"acdda", 2, "grid", 1e-13}),
+                                         Method{"edda", 2, "grid", 1e-13}),
                          [](const auto& test) {
                            std::string name = test.param.name;
                            if (name == "mcva") name += std::string("_") + test.param.variant;

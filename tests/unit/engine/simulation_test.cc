@@ -151,7 +151,7 @@ TEST(Simulation, StopsWhenAsked) {
 }
 
 TEST(Simulation, ReportsEveryContactInOrder) {
-  for (const char* method : {"free-flight", "psa", "cva", "mcva", "cdda", "acva", "acdda"}) {
+  for (const char* method : {"free-flight", "psa", "cva", "mcva", "cdda", "edda"}) {
     auto system = std::string(method) == "free-flight" ? test::hard_spheres<2>(4, 0.4) : test::nine_gravity();
     auto run = test::make_run<2>(std::move(system), method, {.step = 0.05, .steps = 150, .events = true});
     Notebook<2> notes;
@@ -165,7 +165,7 @@ TEST(Simulation, ReportsEveryContactInOrder) {
 }
 
 TEST(Simulation, ObservingChangesNoBit) {
-  for (const char* method : {"free-flight", "psa", "cva", "mcva", "cdda", "acva", "acdda"}) {
+  for (const char* method : {"free-flight", "psa", "cva", "mcva", "cdda", "edda"}) {
     for (const char* variant : {"grid", "restart"}) {
       if (std::string(variant) == "restart" && std::string(method) != "mcva") continue;
       auto final_state = [&](double frames, double rows, bool events, Sampling wanted = {}) {
