@@ -44,7 +44,7 @@ struct Box {
   bool wrap(Vec<D>& x, Image<D>& image) const {
     bool moved = false;
     for (int k = 0; k < D; ++k) {
-      if (!periodic(k)) continue;
+      if (!periodic(k) || (x[k] >= 0 && x[k] < edges[k])) continue;
       const double crossings = std::floor(x[k] / edges[k]);
       if (crossings == 0) continue;
       x[k] -= crossings * edges[k];

@@ -8,29 +8,7 @@ namespace carom {
 
 namespace {
 constexpr int kLowestBit = -1074;  // weight of the least bit of the least digit
-constexpr std::int64_t kLow32 = 0xffffffff;
-constexpr std::int64_t kTermsBeforeCarry = std::int64_t{1} << 30;
 }  // namespace
-
-void ExactSum::add(double term) {
-  const auto bits = std::bit_cast<std::uint64_t>(term);
-  const int biased = static_cast<int>(bits >> 52) & 0x7ff;
-  if (biased == 0x7ff) {
-    invalid_ = true;
-    return;
-  }
-  std::uint64_t mantissa = bits & 0xfffffffffffffULL;
-  if (biased != 0) mantissa |= 1ULL << 52;
-  const int position = biased == 0 ? 0 : biased - 1;  // of the mantissa's least bit, above kLowestBit
-  const int digit = position / 32, shift = position % 32;
-  const std::uint64_t low = mantissa << shift;
-  const std::uint64_t high = shift == 0 ? 0 : mantissa >> (64 - shift);
-  const std::int64_t sign = (bits >> 63) != 0 ? -1 : 1;
-  digit_[digit] += sign * static_cast<std::int64_t>(low & kLow32);
-  digit_[digit + 1] += sign * static_cast<std::int64_t>(low >> 32);
-  digit_[digit + 2] += sign * static_cast<std::int64_t>(high);
-  if (++pending_ == kTermsBeforeCarry) carry();
-}
 
 __extension__ void ExactSum::add(__int128 multiple, double power_of_two) {
   for (double unit = power_of_two; multiple != 0; unit *= 0x1p48) {

@@ -38,12 +38,18 @@ void need_all(const System<D>& system) {
   if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
 }
 
+/// (V/N)^(1/D) [length]; whoever knows only some of the particles takes the number of all.
+template <int D>
+double mean_distance(const System<D>& system) {
+  const std::size_t all = system.part ? system.part->total() : system.size();
+  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, all)), 1.0 / D);
+}
+
 /// The quanta of a system; a function of its parameters, masses, charges and box. Collective where ranks have shares.
 template <int D>
 Quanta quanta(const System<D>& system) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  const double distance =
-      std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, system.size())), 1.0 / D);
+  const double distance = mean_distance(system);
   std::array<double, 3> most = {-kNone, -kNone, 0};  // the smallest force and energy, negative; the largest force
   for (const auto& term : system.interactions) {
     const ForceScale scale = term->scale(distance);
@@ -124,11 +130,14 @@ class MeanForces {
 template <int D>
 void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions<D> w, Vectors<D> out,
                               Counters& counters) {
-  const Stopwatch watch(counters.seconds.force);
-  for (auto& each : out) each.setZero();
-  for (const auto& term : system.interactions) term->add_hessian_product(x, w, out);
-  if (system.part) system.part->refresh(out);
-  counters.force_passes += 1;
+  double most = 0;
+  for (Id i = 0; i < w.size(); ++i)
+    if (system.particles.owns(i)) most = std::max(most, w[i].template lpNorm<Eigen::Infinity>());
+  if (system.part) most = system.part->largest(most);
+  // The quantum of forces where particles are displaced by a part of their distance.
+  const double share = most > 0 && std::isfinite(most) ? most / mean_distance(system) : 1;
+  ForceSums<D> sums(x.size(), quanta_of(system).force * std::exp2(std::floor(std::log2(share)) - 4));
+  force_pass<D>(system, out, sums, counters, [&](const auto& term) { term.add_hessian_product(x, w, sums); });
 }
 
 /// V, Σ|V| and the virial at x; exact sums, not counted as a pass.

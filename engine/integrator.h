@@ -51,6 +51,9 @@ class Integrator : public Luggage<D> {
 
   /// The state at which energies are to be measured, where this is not the system itself (mcva, variant restart).
   virtual const Particles<D>* energy_state() const { return nullptr; }
+
+  /// V and its companions in that state, over what this rank owns, where the last force pass was there; else null.
+  virtual const PotentialSums* potential() const { return nullptr; }
 };
 
 /// The declaration of an integrator; engine/integrators/registry.cc lists them all.

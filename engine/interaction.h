@@ -70,8 +70,8 @@ class Interaction {
   virtual std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces,
                                         const char* changed = nullptr, int sign = 1) const = 0;
 
-  /// out += V″(x) w. Contributions to a particle are summed in the order of the partner's id.
-  virtual void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const = 0;
+  /// Adds V″(x) w.
+  virtual void add_hessian_product(Positions<D> x, Positions<D> w, ForceSums<D>& out) const = 0;
 
   /// The same term for `some` of all particles, which outlive it; `made_for`: the particles it was made for, all or a
   /// share. Null where they are not enough for those of them that are owned.

@@ -54,8 +54,8 @@ void Monitor<D>::regroup() {
 }
 
 template <int D>
-void Monitor<D>::start(const Particles<D>& nodes) {
-  shot_ = measure(0, known().particles, nodes, info_.shadow);
+void Monitor<D>::start(const Particles<D>& nodes, const PotentialSums* potential) {
+  shot_ = measure(0, known().particles, nodes, potential, info_.shadow);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   first_momentum_ = shot_.momentum;
   count_from(shot_);
@@ -90,7 +90,8 @@ std::vector<double> Monitor<D>::due_within(const Slab& slab) const {
 template <int D>
 void Monitor<D>::observe(double time, const Particles<D>& copies) {
   sample(time, copies);
-  if (std::min(frames_.due(), rows_.due()) <= time + time_slack()) show(measure(time, copies, copies, false), false);
+  if (std::min(frames_.due(), rows_.due()) <= time + time_slack())
+    show(measure(time, copies, copies, nullptr, false), false);
 }
 
 /// Shows the particles to those who look at times of their own.
@@ -105,12 +106,12 @@ void Monitor<D>::sample(double time, const Particles<D>& state) {
 }
 
 template <int D>
-void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool last) {
+void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, const PotentialSums* potential, bool last) {
   Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
   const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.size() <= kShadowAtEveryStep);
   const double speed = speed_;
-  shot_ = measure(s.end_time, known().particles, nodes, with_shadow);
+  shot_ = measure(s.end_time, known().particles, nodes, potential, with_shadow);
   s.energy_final = shot_.total();
   if (s.steps == 1 && info_.stepping) count_from(shot_);
   s.max_energy_error = std::max(s.max_energy_error, std::abs(energy_ - first_energy_));
@@ -138,14 +139,15 @@ void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, bool las
 }
 
 template <int D>
-Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Particles<D>& nodes, bool with_shadow) {
+Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Particles<D>& nodes,
+                                const PotentialSums* potential, bool with_shadow) {
   const Stopwatch watch(statistics_.counters.seconds.output);
   Snapshot<D> shot;
   shot.time = time;
   shot.step = statistics_.steps;
   shot.collisions = statistics_.counters.sphere_sphere;
   shot.particles = &state;
-  const PotentialSums sums = evaluate_energy<D>(known(), nodes.x);
+  const PotentialSums sums = potential ? of_all_ranks(known(), *potential) : evaluate_energy<D>(known(), nodes.x);
   const auto total = static_cast<double>(system_.size());
   const MotionSums<D> motion = evaluate_motion(known(), state, nodes);
   shot.kinetic = motion.kinetic.value();

@@ -37,8 +37,9 @@ class Monitor {
   Monitor(const System<D>& system, const IntegratorInfo& info, const Plan& plan,
           const std::vector<Observer<D>*>& observers, Statistics& statistics);
 
-  /// Measures and shows the state at the start. `nodes` is the state at which energies are measured.
-  void start(const Particles<D>& nodes);
+  /// Measures and shows the state at the start. `nodes` is the state at which energies are measured, `potential` what
+  /// this rank has of V there, if the integrator knows.
+  void start(const Particles<D>& nodes, const PotentialSums* potential);
 
   /// Due times inside a slab, for integrators that are exact at any time: since the slab's start, ascending.
   std::vector<double> due_within(const Slab& slab) const;
@@ -48,7 +49,7 @@ class Monitor {
 
   /// Measures the state at the end of a slab, updates the statistics, shows it where it is due or `last`.
   /// statistics.steps and end_time already tell of the slab, which advanced the time by `elapsed`.
-  void end_of_slab(double elapsed, const Particles<D>& nodes, bool last);
+  void end_of_slab(double elapsed, const Particles<D>& nodes, const PotentialSums* potential, bool last);
 
   /// Shows the last state again to those who have not seen it.
   void finish() { show(shot_, true); }
@@ -67,7 +68,8 @@ class Monitor {
   };
 
   void sample(double time, const Particles<D>& state);
-  Snapshot<D> measure(double time, const Particles<D>& state, const Particles<D>& nodes, bool with_shadow);
+  Snapshot<D> measure(double time, const Particles<D>& state, const Particles<D>& nodes, const PotentialSums* potential,
+                      bool with_shadow);
   void show(Snapshot<D> shot, bool last);
   void count_from(const Snapshot<D>& shot);
   double deepest_overlap();

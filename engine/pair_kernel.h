@@ -151,7 +151,10 @@ CAROM_INLINE unsigned first_lanes(std::uint32_t count) {
   return count >= W ? (1u << W) - 1 : (1u << count) - 1;
 }
 
-template <int W, bool mean, bool moving, bool weighted>
+/// What a batch has beside separations: nothing, new ones, or differences of vectors.
+enum class Beside { nothing, step, vectors };
+
+template <int W, Beside beside, bool moving, bool weighted>
 bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   using V = typename Width<W>::Double;
   batch.clear();
@@ -160,7 +163,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   for (; cursor.run < rows.runs; ++cursor.run, cursor.at = 0) {
     const PairRun& run = rows.run[cursor.run];
     const std::uint32_t* const partner = rows.partner + run.begin;
-    const PairRecord &own = rows.x[run.row], &own_new = mean ? rows.x_new[run.row] : own;
+    const PairRecord &own = rows.x[run.row], &own_new = beside == Beside::nothing ? own : rows.x_new[run.row];
     const V x = all<V>(own.x), y = all<V>(own.y), z = all<V>(own.z), w = all<V>(own.w);
     const V x_new = all<V>(own_new.x), y_new = all<V>(own_new.y), z_new = all<V>(own_new.z);
     V image[3], shift[3];
@@ -189,10 +192,13 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       const V rho = dx * dx + dy * dy + dz * dz;
       auto within = rho < cutoff;
       V ex, ey, ez;
-      if constexpr (mean) {
+      if constexpr (beside != Beside::nothing) {
         const auto after = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x_new + j[l]; });
-        ex = (x_new - after.x) + shift[0], ey = (y_new - after.y) + shift[1], ez = (z_new - after.z) + shift[2];
-        within |= ex * ex + ey * ey + ez * ez < cutoff;
+        ex = x_new - after.x, ey = y_new - after.y, ez = z_new - after.z;
+        if constexpr (beside == Beside::step) {
+          ex += shift[0], ey += shift[1], ez += shift[2];
+          within |= ex * ex + ey * ey + ez * ez < cutoff;
+        }
       }
       V product;
       if constexpr (weighted) {
@@ -203,7 +209,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       compress(batch.d[0] + n, mask, dx);
       compress(batch.d[1] + n, mask, dy);
       compress(batch.d[2] + n, mask, dz);
-      if constexpr (mean) {
+      if constexpr (beside != Beside::nothing) {
         compress(batch.d_new[0] + n, mask, ex);
         compress(batch.d_new[1] + n, mask, ey);
         compress(batch.d_new[2] + n, mask, ez);
@@ -218,14 +224,17 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   return n > 0;
 }
 
+template <int W, Beside beside>
+constexpr decltype(&collect_pairs<W, beside, false, false>) kCollect[4] = {
+    collect_pairs<W, beside, false, false>, collect_pairs<W, beside, false, true>,
+    collect_pairs<W, beside, true, false>, collect_pairs<W, beside, true, true>};
+
 template <int W>
 bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
-  using Function = bool (*)(const PairRows&, PairCursor&, PairBatch&);
-  static constexpr Function all[8] = {collect_pairs<W, false, false, false>, collect_pairs<W, false, false, true>,
-                                      collect_pairs<W, false, true, false>,  collect_pairs<W, false, true, true>,
-                                      collect_pairs<W, true, false, false>,  collect_pairs<W, true, false, true>,
-                                      collect_pairs<W, true, true, false>,   collect_pairs<W, true, true, true>};
-  return all[(rows.x_new ? 4 : 0) + (rows.box ? 2 : 0) + (rows.weighted ? 1 : 0)](rows, cursor, batch);
+  const unsigned which = (rows.box ? 2 : 0) + (rows.weighted ? 1 : 0);
+  if (!rows.x_new) return kCollect<W, Beside::nothing>[which](rows, cursor, batch);
+  if (rows.vectors) return kCollect<W, Beside::vectors>[which](rows, cursor, batch);
+  return kCollect<W, Beside::step>[which](rows, cursor, batch);
 }
 
 /// Adds the words to the sums of both particles.
@@ -311,7 +320,9 @@ CAROM_INLINE auto within(V x, double limit) {
   return elementary::abs(x) < limit;
 }
 
-template <int W, class P, bool mean, bool sums, bool wide>
+enum class Wanted { forces, forces_and_sums, mean_forces, hessian_product };
+
+template <int W, class P, Wanted wanted, bool wide>
 [[gnu::flatten]] bool evaluate(const void* any_potential, PairBatch& batch, const PairUnits& units,
                                PairTotals* totals) {
   using V = typename Width<W>::Double;
@@ -324,15 +335,19 @@ template <int W, class P, bool mean, bool sums, bool wide>
     V d[3];
     for (int axis = 0; axis < 3; ++axis) d[axis] = load<V>(batch.d[axis] + k);
     const V rho = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], weight = load<V>(batch.weight + k);
-    V g;
-    if constexpr (mean) {
-      V e[3];
+    V g, e[3];
+    if constexpr (wanted == Wanted::mean_forces || wanted == Wanted::hessian_product)
       for (int axis = 0; axis < 3; ++axis) e[axis] = load<V>(batch.d_new[axis] + k);
-      const V rho_new = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
-      g = -weight * potential.quotient(rho, rho_new);
+    if constexpr (wanted == Wanted::mean_forces) {
+      g = -weight * potential.quotient(rho, e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
       for (int axis = 0; axis < 3; ++axis) d[axis] += e[axis];
     } else {
       g = -2.0 * weight * potential.derivative(rho);
+      if constexpr (wanted == Wanted::hessian_product) {
+        const V along = 4.0 * weight * potential.second_derivative(rho) * (d[0] * e[0] + d[1] * e[1] + d[2] * e[2]);
+        for (int axis = 0; axis < 3; ++axis) d[axis] = along * d[axis] - g * e[axis];
+        g = all<V>(1);
+      }
     }
     for (int axis = 0; axis < 3; ++axis) {
       const V force = (g * d[axis]) * units.per_force;
@@ -346,10 +361,10 @@ template <int W, class P, bool mean, bool sums, bool wide>
         store(batch.low[axis] + k, integers(force));
       }
     }
-    if constexpr (sums) {
+    if constexpr (wanted == Wanted::forces_and_sums) {
       const V energy = weight * potential.value(rho);
       const V terms[3] = {energy * units.per_energy, elementary::abs(energy) * units.per_energy,
-                          (g * rho) * units.per_energy};
+                          (g * rho) * (0x1p-6 * units.per_energy)};
       for (int s = 0; s < 3; ++s) {
         if constexpr (wide) {
           const V upper = elementary::nearest_integer(terms[s] * 0x1p-40);
@@ -364,7 +379,7 @@ template <int W, class P, bool mean, bool sums, bool wide>
     }
   }
   if (bits(fits) != (1u << W) - 1) return false;
-  if constexpr (sums) {
+  if constexpr (wanted == Wanted::forces_and_sums) {
     PairTotals::Whole whole[3] = {0, 0, 0};
     for (int s = 0; s < 3; ++s)
       for (int l = 0; l < W; ++l) {
@@ -380,9 +395,11 @@ template <int W, class P, bool mean, bool sums, bool wide>
 
 template <int W, class P>
 constexpr PairFormula formula() {
-  return {{evaluate<W, P, false, false, false>, evaluate<W, P, false, false, true>},
-          {evaluate<W, P, false, true, false>, evaluate<W, P, false, true, true>},
-          {evaluate<W, P, true, false, false>, evaluate<W, P, true, false, true>}};
+  using enum Wanted;
+  return {{evaluate<W, P, forces, false>, evaluate<W, P, forces, true>},
+          {evaluate<W, P, forces_and_sums, false>, evaluate<W, P, forces_and_sums, true>},
+          {evaluate<W, P, mean_forces, false>, evaluate<W, P, mean_forces, true>},
+          {evaluate<W, P, hessian_product, false>, evaluate<W, P, hessian_product, true>}};
 }
 
 template <int W, class... P>

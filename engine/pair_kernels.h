@@ -26,7 +26,8 @@ struct PairRun {
 
 struct PairRows {
   const PairRecord* x = nullptr;           ///< positions; w: weight
-  const PairRecord* x_new = nullptr;       ///< for mean forces; else null
+  const PairRecord* x_new = nullptr;       ///< new positions, for mean forces, or other vectors; else null
+  bool vectors = false;                    ///< these are vectors of the particles: they have no images
   const PairRecord* box = nullptr;         ///< box numbers; null: all 0
   const std::uint32_t* partner = nullptr;  ///< eight more than there are can be read
   const PairRun* run = nullptr;
@@ -49,7 +50,7 @@ struct PairBatch {
   };
 
   alignas(64) double d[3][kCapacity];      ///< separation, first minus second
-  alignas(64) double d_new[3][kCapacity];  ///< of mean forces
+  alignas(64) double d_new[3][kCapacity];  ///< the new one, or the difference of vectors
   alignas(64) double weight[kCapacity];
   alignas(64) std::int64_t low[3][kCapacity];   ///< force on the first, in quanta
   alignas(64) std::int64_t high[3][kCapacity];  ///< where it took two words
@@ -67,6 +68,7 @@ struct PairBatch {
   }
   /// Begins the pairs of another first particle.
   void begin_row(std::uint32_t first) {
+    if (rows > 0 && row[rows - 1].begin == n) --rows;  // an empty one: there are never more rows than pairs, and one
     if (rows == 0 || row[rows - 1].row != first) row[rows++] = {first, n};
   }
   /// Makes the last vector whole by pairs of zero weight.
@@ -87,11 +89,11 @@ struct PairBatch {
 /// Units and limits of what formulas give.
 struct PairUnits {
   double per_force = 0;   ///< 1/quantum, or −1/quantum to subtract
-  double per_energy = 0;  ///< 1/quantum
+  double per_energy = 0;  ///< 1/quantum; virials, which are larger, are counted in 64 of these
   ForceLimits limits{0, 0};
 };
 
-/// Sums over a batch, in quanta.
+/// Sums over a batch, in quanta; the virial in 64 of these.
 struct PairTotals {
   __extension__ using Whole = __int128;
   Whole energy = 0, magnitude = 0, virial = 0;
@@ -100,7 +102,7 @@ struct PairTotals {
 /// One potential in one vector width. `wide`: in two words. False where something does not fit.
 struct PairFormula {
   using Function = bool (*)(const void* potential, PairBatch&, const PairUnits&, PairTotals*);
-  Function forces[2], forces_and_sums[2], mean_forces[2];  ///< by `wide`
+  Function forces[2], forces_and_sums[2], mean_forces[2], hessian_product[2];  ///< by `wide`
 };
 
 /// A look at some particles for the partners of one, when a list is made.

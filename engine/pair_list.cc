@@ -30,14 +30,17 @@ void PairRecords<D>::load(const PairStep<D>& step) {
   x_.resize(order.size());
   for (std::size_t r = 0; r < order.size(); ++r)
     x_[r] = record<D>(step.x[order[r]], step.weight ? (*step.weight)[order[r]] : 1);
-  if (step.x_new.empty()) return;
+  const auto& other = step.vectors.empty() ? step.x_new : step.vectors;
+  if (other.empty()) return;
   x_new_.resize(order.size());
-  for (std::size_t r = 0; r < order.size(); ++r) x_new_[r] = record<D>(step.x_new[order[r]], 1);
+  for (std::size_t r = 0; r < order.size(); ++r) x_new_[r] = record<D>(other[order[r]], 1);
 }
 
 template <int D>
 PairRows PairRecords<D>::rows(Kind kind, const Box<D>& in, const PairStep<D>& step) {
-  PairRows rows{.x = x_.data(), .x_new = step.x_new.empty() ? nullptr : x_new_.data()};
+  PairRows rows{.x = x_.data()};
+  rows.vectors = !step.vectors.empty();
+  if (rows.vectors || !step.x_new.empty()) rows.x_new = x_new_.data();
   if (kind != kPlain && !box.empty()) rows.box = box.data();
   for (int k = 0; k < D; ++k) rows.edges[k] = in.edges[k];
   rows.weighted = step.weight != nullptr;
@@ -104,6 +107,11 @@ std::uint64_t code_of(const PairRecord& place) { return std::bit_cast<std::uint6
 struct PartnerRange {
   std::uint32_t begin, end;
   std::array<std::int32_t, 3> image;
+
+  bool here() const { return (image[0] | image[1] | image[2]) == 0; }
+  bool as(const PartnerRange& other) const {
+    return ((image[0] ^ other.image[0]) | (image[1] ^ other.image[1]) | (image[2] ^ other.image[2])) == 0;
+  }
 };
 
 template <int D>
@@ -221,7 +229,7 @@ struct Cells {
             start[row + static_cast<std::size_t>(piece.begin)], start[row + static_cast<std::size_t>(piece.end)], {}};
         for (int k = 0; k < D - 1; ++k) part.image[k] = -boxes[k];
         part.image[D - 1] = -piece.boxes;
-        elsewhere = elsewhere || part.image != std::array<std::int32_t, 3>{};
+        elsewhere = elsewhere || !part.here();
         if (part.begin < part.end) found.push_back(part);
       }
     };
@@ -244,9 +252,8 @@ struct Cells {
       }
     }
     if (elsewhere)
-      std::ranges::stable_sort(found.begin() + 1, found.end(), {}, [](const PartnerRange& part) {
-        return std::pair(part.image != std::array<std::int32_t, 3>{}, part.image);
-      });
+      std::ranges::stable_sort(found.begin() + 1, found.end(), {},
+                               [](const PartnerRange& part) { return std::pair(!part.here(), part.image); });
   }
 };
 
@@ -258,7 +265,6 @@ void CutoffList<D>::build(const PairStep<D>& step) {
   calls_ = 0;
   particles_ = step.x.size();
   records_.clear();
-  ascending_.clear();
   plain_size_ = 0;
   std::vector<Id> members;
   Extent<D> extent;
@@ -341,11 +347,11 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
   for (std::size_t first = 0; first < ranges.size();) {
     const auto& image = ranges[first].image;
     std::size_t last = first, candidates = 16;
-    for (; last < ranges.size() && ranges[last].image == image; ++last)
+    for (; last < ranges.size() && ranges[last].as(ranges[first]); ++last)
       candidates += ranges[last].end - ranges[last].begin;
     if (plain_.size() < plain_size_ + candidates) plain_.resize(2 * (plain_size_ + candidates));
     if (other_.size() < candidates) other_.resize(candidates);
-    search.here = image == std::array<std::int32_t, 3>{};
+    search.here = ranges[first].here();
     for (int k = 0; k < 3; ++k) search.own[k] = (&own.x)[k] + (k < D ? image[k] * box_.edges[k] : 0.0);
     PartnersFound found{plain_.data() + plain_size_, other_.data()};
     for (; first < last; ++first) kernels_.find(search, ranges[first].begin, ranges[first].end, found);
@@ -375,33 +381,6 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
       add(kind, begin, partners.size());
     }
   }
-}
-
-template <int D>
-const std::vector<NeighbourPair<D>>& CutoffList<D>::ascending() {
-  if (!ascending_.empty()) return ascending_;
-  place_.resize(particles_);
-  for (std::uint32_t r = 0; r < records_.order.size(); ++r) place_[records_.order[r]] = r;
-  for (int kind = 0; kind < PairRecords<D>::kKinds; ++kind)
-    for (const PairRun& run : records_.runs[kind])
-      for (std::uint32_t k = 0; k < run.count; ++k) {
-        const Id i = records_.order[run.row], j = records_.order[records_.partners[kind][run.begin + k]];
-        NeighbourPair<D> pair{std::min(i, j), std::max(i, j), {}};
-        for (int axis = 0; axis < D; ++axis) pair.image[axis] = i < j ? run.image[axis] : -run.image[axis];
-        ascending_.push_back(pair);
-      }
-  std::ranges::sort(ascending_);
-  return ascending_;
-}
-
-template <int D>
-Image<D> CutoffList<D>::image(const NeighbourPair<D>& pair) const {
-  Image<D> image = pair.image;
-  if (!records_.box.empty())
-    for (int k = 0; k < D; ++k)
-      image[k] +=
-          static_cast<std::int32_t>((&records_.box[place_[pair.j]].x)[k] - (&records_.box[place_[pair.i]].x)[k]);
-  return image;
 }
 
 template class PairRecords<2>;

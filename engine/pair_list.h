@@ -11,7 +11,6 @@
 
 #include "engine/box.h"
 #include "engine/force_sums.h"
-#include "engine/neighbour_list.h"
 #include "engine/pair_filter.h"
 #include "engine/pair_kernels.h"
 #include "engine/particles.h"
@@ -23,6 +22,7 @@ template <int D>
 struct PairStep {
   std::span<const Vec<D>> x;
   std::span<const Vec<D>> x_new{};              ///< of mean forces; else empty
+  std::span<const Vec<D>> vectors{};            ///< of Hessian products, in place of new positions
   const std::vector<double>* weight = nullptr;  ///< pairs count by the product of these; null: as they are
   const char* changed = nullptr;                ///< only pairs with such a particle; null: all
 };
@@ -73,10 +73,6 @@ class CutoffList {
   /// Error(Failure::numerical) for positions that are not finite and for steps of several edges of a periodic box.
   PairRecords<D>& cover(const PairStep<D>& step, const std::vector<char>& ghost);
 
-  /// Pairs i < j in ascending order, with images as at x, which cover() was given last.
-  const std::vector<NeighbourPair<D>>& ascending();
-  Image<D> image(const NeighbourPair<D>& pair) const;
-
   std::uint64_t rebuilds() const { return rebuilds_; }
 
  private:
@@ -97,8 +93,6 @@ class CutoffList {
   std::vector<PairRecord> built_at_;  // positions in the box, with codes
   std::vector<std::uint32_t> plain_, other_;
   std::size_t plain_size_ = 0;
-  std::vector<NeighbourPair<D>> ascending_;
-  std::vector<std::uint32_t> place_;
 };
 
 }  // namespace carom

@@ -57,7 +57,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     return state ? *state : known().particles;
   };
   integrator_->start(known(), s.counters);
-  monitor.start(nodes());
+  monitor.start(nodes(), integrator_->potential());
 
   std::vector<Contact<D>> contacts;
   while (!finished(monitor.time_slack())) {
@@ -100,7 +100,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       const Stopwatch watch(s.counters.seconds.output);
       for (auto* observer : observers_) observer->contacts(slab.start, contacts);
     }
-    monitor.end_of_slab(report.reached, nodes(), finished(monitor.time_slack()));
+    monitor.end_of_slab(report.reached, nodes(), integrator_->potential(), finished(monitor.time_slack()));
     for (auto* observer : observers_) observer->progress(s);
   }
   if (s.stopped_early) monitor.finish();

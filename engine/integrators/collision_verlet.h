@@ -50,6 +50,7 @@ class VerletPieces {
 
   /// −M⁻¹∇V at the present positions.
   const std::vector<Vec<D>>& a() const { return accelerations_.a; }
+  const PotentialSums& potential() const { return accelerations_.sums; }
   /// The accelerations on which the spheres fly from here, fixed by next_contact().
   const std::vector<Vec<D>>& flight() const { return flight_; }
 

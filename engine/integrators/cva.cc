@@ -19,6 +19,8 @@ class CollisionVerlet : public Integrator<D> {
     pieces_->start(counters);
   }
 
+  const PotentialSums* potential() const override { return &pieces_->potential(); }
+
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     pieces_->begin_slab(report.counters, report.contacts, slab.length);
     double done = 0;

@@ -8,6 +8,7 @@ namespace carom::integrator {
 template <int D>
 struct Accelerations {
   std::vector<Vec<D>> a;  ///< [length/time²]
+  PotentialSums sums;     ///< at the positions of the last update
 
   void pack(Id i, Bytes& to) const { put(to, a[i]); }
   void unpack(Id i, Reader& from) { a[i] = from.get<Vec<D>>(); }
@@ -15,7 +16,7 @@ struct Accelerations {
   /// Evaluates a at the system's positions: one force pass.
   void update(const System<D>& system, Counters& counters) {
     a.resize(system.particles.size());
-    evaluate_forces<D>(system, system.particles.x, a, counters);
+    evaluate_forces<D>(system, system.particles.x, a, counters, &sums);
     for (std::size_t i = 0; i < a.size(); ++i) a[i] /= system.particles.mass[i];
   }
 };

@@ -34,6 +34,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     w_.assign(n, Vec<D>::Zero());
   }
 
+  const PotentialSums* potential() const override { return &pieces_->potential(); }
+
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     pieces_->begin_slab(report.counters, report.contacts, slab.length);

@@ -22,6 +22,7 @@ class PrimitiveSplitting : public Integrator<D> {
     accelerations_.update(system, counters);
   }
 
+  const PotentialSums* potential() const override { return &accelerations_.sums; }
   bool local() const override { return true; }
   void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
   void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }

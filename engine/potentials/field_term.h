@@ -48,8 +48,10 @@ class FieldTerm final : public Interaction<D> {
     }
     return count;
   }
-  void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
-    for (Id i = 0; i < x.size(); ++i) out[i] += field_.hessian_product(i, x[i], w[i]);
+  void add_hessian_product(Positions<D> x, Positions<D> w, ForceSums<D>& out) const override {
+    const ForceLimits limits = out.make_room(1);
+    for (Id i = 0; i < x.size(); ++i)
+      if (particles_.owns(i)) out.add(i, field_.hessian_product(i, x[i], w[i]), limits);
   }
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t owned = 0;

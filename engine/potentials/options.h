@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/interaction.h"
+#include "engine/neighbour_list.h"
 #include "engine/potentials/cut.h"
 #include "engine/potentials/pair_term.h"
 #include "engine/potentials/tail.h"

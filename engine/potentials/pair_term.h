@@ -39,28 +39,17 @@ class PairTerm final : public Interaction<D> {
         tail_(tail),
         batch_(std::make_unique<PairBatch>()) {}
 
-  void add_energy(Positions<D> x, PotentialSums& sums) const override { evaluate({x}, nullptr, &sums); }
+  void add_energy(Positions<D> x, PotentialSums& sums) const override { evaluate({.x = x}, nullptr, &sums); }
   void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
-    evaluate({x}, &forces, sums);
+    evaluate({.x = x}, &forces, sums);
   }
   std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
                                 int sign) const override {
     return evaluate({.x = x, .x_new = x_new, .changed = changed}, &forces, nullptr, sign);
   }
 
-  void add_hessian_product(Positions<D> x, Positions<D> w, Vectors<D> out) const override {
-    pairs_.ascending({x}, particles_, [&](Id i, Id j, const Vec<D>& d) {
-      const double rho = d.squaredNorm();
-      if (!(rho < cutoff_squared()) || (!particles_.owns(i) && !particles_.owns(j))) return;
-      const auto* factor = factors();
-      const double weight = factor ? (*factor)[i] * (*factor)[j] : 1;
-      const Vec<D> u = w[i] - w[j];
-      if (weight == 0 || u == Vec<D>::Zero()) return;
-      const Vec<D> product =
-          weight * (2 * potential_.derivative(rho) * u + 4 * potential_.second_derivative(rho) * d.dot(u) * d);
-      out[i] += product;
-      out[j] -= product;
-    });
+  void add_hessian_product(Positions<D> x, Positions<D> w, ForceSums<D>& out) const override {
+    evaluate({.x = x, .vectors = w}, &out, nullptr);
   }
 
   std::unique_ptr<Interaction<D>> among(const Particles<D>& /*made_for*/, const Particles<D>& some) const override {
@@ -123,7 +112,10 @@ class PairTerm final : public Interaction<D> {
   /// The loop over pairs. Returns how many are this rank's.
   std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1) const {
     const PairFormula& formula = kernels_.formulas[place_of<P>(PairPotentials{})];
-    const auto& function = sums ? formula.forces_and_sums : given.x_new.empty() ? formula.forces : formula.mean_forces;
+    const auto& function = sums                     ? formula.forces_and_sums
+                           : !given.vectors.empty() ? formula.hessian_product
+                           : given.x_new.empty()    ? formula.forces
+                                                    : formula.mean_forces;
     constexpr double kNoLimit = std::numeric_limits<double>::infinity();
     PairUnits units{.limits = {kNoLimit, kNoLimit}};
     if (sums) units.per_energy = 1 / sums->quantum;
@@ -145,12 +137,12 @@ class PairTerm final : public Interaction<D> {
     if (low) pairs_.pass_on(*forces);
     if (!sums) return own;
     // A shared pair counts half here and half there.
-    const auto add = [&](ExactSum& sum, PairTotals::Whole PairTotals::*part) {
-      sum.add(2 * totals[0].*part + totals[1].*part, 0.5 * sums->quantum);
+    const auto add = [&](ExactSum& sum, PairTotals::Whole PairTotals::*part, double quanta) {
+      sum.add(2 * totals[0].*part + totals[1].*part, 0.5 * quanta * sums->quantum);
     };
-    add(sums->energy, &PairTotals::energy);
-    add(sums->magnitude, &PairTotals::magnitude);
-    add(sums->virial, &PairTotals::virial);
+    add(sums->energy, &PairTotals::energy, 1);
+    add(sums->magnitude, &PairTotals::magnitude, 1);
+    add(sums->virial, &PairTotals::virial, 64);
     return own;
   }
 

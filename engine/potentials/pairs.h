@@ -7,8 +7,6 @@
 //   id(place)                   the particle that a batch means
 //   low(sums), high(sums)       words to which the forces of a batch are added; pass_on(sums) comes last
 //   most_partners()             of any particle in these batches, or more
-//   ascending(step, particles, visit)  calls visit(i, j, d) for its pairs in the order (i, j, image), i < j, d = x_i −
-//                               x_j + the image's shift
 // and
 //   reach(x), reach(share, ranks)           how far apart partners are at most; infinite: no end
 //   among(some)                             itself for some of the particles, if they are enough
@@ -113,8 +111,9 @@ class Bonds {
         const Vec<D> shift = shift_of(i, j, step.x), d = step.x[i] - step.x[j] + shift;
         batch.begin_row(i);
         for (int k = 0; k < 3; ++k) batch.d[k][batch.n] = k < D ? d[k] : 0;
-        if (!step.x_new.empty()) {
-          const Vec<D> d_new = step.x_new[i] - step.x_new[j] + shift;
+        if (!step.x_new.empty() || !step.vectors.empty()) {
+          const Vec<D> d_new = step.vectors.empty() ? Vec<D>(step.x_new[i] - step.x_new[j] + shift)
+                                                    : Vec<D>(step.vectors[i] - step.vectors[j]);
           for (int k = 0; k < 3; ++k) batch.d_new[k][batch.n] = k < D ? d_new[k] : 0;
         }
         batch.second[batch.n++] = j;
@@ -122,10 +121,6 @@ class Bonds {
       }
       flush();
     }
-  }
-  template <class Visit>
-  void ascending(const PairStep<D>& step, const Particles<D>& /*particles*/, Visit&& visit) const {
-    for (const auto& [i, j] : pairs_) visit(i, j, Vec<D>(step.x[i] - step.x[j] + shift_of(i, j, step.x)));
   }
   Id id(std::uint32_t place) const { return place; }
   ForceWords* low(ForceSums<D>& sums) const { return sums.low(); }
@@ -175,14 +170,6 @@ class AllPairs {
                     "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
     records_.load(step);
     collect_batches(records_, box_, step, cutoff_squared, kernels_, batch, visit);
-  }
-  template <class Visit>
-  void ascending(const PairStep<D>& step, const Particles<D>& /*particles*/, Visit&& visit) const {
-    for (Id i = 0; i < particles_; ++i)
-      for (Id j = i + 1; j < particles_; ++j)
-        if ((filter_.species.partner_code(filter_.species.code(i)) & filter_.species.code(j)) != 0 &&
-            !filter_.excludes(i, j))
-          visit(i, j, Vec<D>(step.x[i] - step.x[j]));
   }
   Id id(std::uint32_t place) const { return records_.order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_.low(); }
@@ -253,12 +240,6 @@ class PairsWithinCutoff {
                Visit&& visit) const {
     records_ = &list_.cover(step, particles.ghost);
     collect_batches(*records_, box_, step, cutoff_squared, kernels_, batch, visit);
-  }
-  template <class Visit>
-  void ascending(const PairStep<D>& step, const Particles<D>& particles, Visit&& visit) const {
-    records_ = &list_.cover(step, particles.ghost);
-    for (const NeighbourPair<D>& pair : list_.ascending())
-      visit(pair.i, pair.j, Vec<D>(step.x[pair.i] - step.x[pair.j] + box_.shift(list_.image(pair))));
   }
   Id id(std::uint32_t place) const { return records_->order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_->low(); }

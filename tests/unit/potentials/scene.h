@@ -63,9 +63,11 @@ struct Scene {
   std::mt19937_64 random{11};
 };
 
+inline constexpr double kQuantum = 0x1p-50;  ///< of forces and energies
+
 template <int D>
 PotentialSums sums(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
-  PotentialSums result;
+  PotentialSums result{.quantum = kQuantum};
   term.add_energy(x, result);
   return result;
 }
@@ -74,8 +76,6 @@ template <int D>
 double energy(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
   return sums(term, x).energy.value();
 }
-
-inline constexpr double kQuantum = 0x1p-44;  ///< of forces
 
 template <int D>
 std::vector<Vec<D>> values(const ForceSums<D>& sums) {
