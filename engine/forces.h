@@ -32,6 +32,14 @@ bool any_rank(const System<D>& system, bool value) {
   return any > 0;
 }
 
+/// Copies of particles that other ranks own get their positions and velocities from there.
+template <int D>
+void update_copies(System<D>& system) {
+  if (!system.part || system.part->knows_everybody()) return;
+  system.part->refresh(system.particles.x);
+  system.part->refresh(system.particles.v);
+}
+
 /// For what only a rank that knows all particles can do.
 template <int D>
 void need_all(const System<D>& system) {

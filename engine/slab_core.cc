@@ -336,15 +336,6 @@ void SlabCore<D>::commit(double time) {
     throw HaloTooSmall{};  // with all particles known the error can name them
 }
 
-template <int D>
-void SlabCore<D>::finish(Particles<D>& p) {
-  p.x.swap(x_);
-  p.v.swap(v_);
-  if (!system_.part || system_.part->knows_everybody()) return;
-  system_.part->refresh(p.x);
-  system_.part->refresh(p.v);
-}
-
 template class SlabCore<2>;
 template class SlabCore<3>;
 

@@ -62,8 +62,11 @@ class SlabCore {
   /// Counts and logs the contacts of the last flight; `time`: of the slab's start within the step.
   void commit(double time);
 
-  /// Moves the particles to the slab's end; copies of what other ranks own come from there.
-  void finish(Particles<D>& particles);
+  /// Moves the particles to the slab's end.
+  void finish(Particles<D>& particles) {
+    particles.x.swap(x_);
+    particles.v.swap(v_);
+  }
 
   /// Contacts at the slab's start, and those that rest.
   ContactScan<D>& scan() { return scan_; }

@@ -134,7 +134,7 @@ void make_interactions(const Deck::Source& source, const std::vector<bool>& skip
         problems.error(config.at,
                        std::string(source.integrator->name) + " cannot carry the interaction '" +
                            std::string(config.info->name) + "'",
-                       "it knows no forces but a uniform-field; leave the interaction out, or take psa, acva, acdda or "
+                       "it knows no forces but a uniform-field; leave the interaction out, or take psa, edda or "
                        "their relatives");
       terms[n] = std::move(term);
     } catch (const Error& e) {  // its message has the form "what; what to do"

@@ -2,7 +2,7 @@
 """What accuracy costs, and what size costs: time and force passes of the methods.
 
     tools/cost_study.py inputs/five-springs.toml --end-time 6 --steps 0.1,0.03,0.01,0.003,0.001
-    tools/cost_study.py inputs/spring-lattice.toml --counts 64,256,1024,4096 --methods cva,cdda,acva,acdda --end-time 1
+    tools/cost_study.py inputs/spring-lattice.toml --counts 64,256,1024,4096 --methods cva,cdda,edda --end-time 1
     tools/cost_study.py inputs/yukawa-fluid.toml --set particles.count=256 --end-time 0.5 --steps 0.02,0.01,0.005
 
 Without --counts: errors at the end time, of the energy (the largest |H - H1| / E_ref on the way) and of the positions (the
@@ -31,7 +31,7 @@ LONG = 20.0  # [s] what has taken so much is not repeated
 
 
 def parse_arguments(arguments=None):
-    parser = study_parser(__doc__, "psa,cva,mcva,cdda,acva,acdda")
+    parser = study_parser(__doc__, "psa,cva,mcva,cdda,edda")
     parser.set_defaults(end_time=6.0)
     parser.add_argument("--counts", help="numbers of particles to compare the cost of a step at")
     parser.add_argument("--reference", default="cdda:order=4", help="method whose positions are taken for exact, or none")

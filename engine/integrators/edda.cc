@@ -20,6 +20,7 @@
 #include "engine/error.h"
 #include "engine/forces.h"
 #include "engine/integrators/extrapolation.h"
+#include "engine/integrators/fold.h"
 #include "engine/integrators/chebyshev.h"
 #include "engine/integrators/registry.h"
 #include "engine/slab_core.h"
@@ -39,8 +40,6 @@ constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
 constexpr double kStalled = 0.1;          // contraction of kPatience sweeps that is too little
 constexpr double kSettled = 0.1;          // of the tolerance: such a particle keeps its path
 constexpr double kRounding = 1e-13;       // of the speed scale: increments below it that do not shrink are rounding
-constexpr std::size_t kLeastCluster = 16;  // particles that take up what a frozen one lacks
-constexpr double kMostOfCluster = 0.1;    // of their kinetic energy
 
 template <int D>
 class EventDrivenDiscreteGradient : public Integrator<D> {
@@ -64,7 +63,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (auto* each : {&a_, &mean_, &move_}) each->resize(n, Vec<D>::Zero());
     swaps_.assign(n, 0);
     swapping_.clear();
-    frozen_.clear();
   }
 
   void start(System<D>& system, Counters& counters) override {
@@ -152,10 +150,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const std::size_t n = p.size();
     past_.expect(h, a_);
     core_->begin(p.v, a_, h, resolved_);
-    for (const Id i : frozen_) swaps_[i] = 0;
     for (const Id i : swapping_) swaps_[i] = 0;
-    frozen_.clear();
     swapping_.clear();
+    any_freezes_ = false;
     Chebyshev chebyshev(0.25 * h * h * squared_frequency_);
     const double scale = std::max(speed_, h * strength_);
     const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
@@ -178,9 +175,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (!std::isfinite(largest)) return Outcome::diverged;
       if (largest <= wanted) return Outcome::settled;
       if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * last) return Outcome::settled;
-      if (sweep >= kPatience && any_rank(system, swaps_among_unfrozen())) freeze(system);
+      if (sweep >= kPatience && any_rank(system, swaps_among_unfrozen())) freeze();
       if (sweep % kPatience == 0) {
-        if (sweep > kPatience && largest > kStalled * earlier) freeze_stalled(system, largest / h);
+        if (sweep > kPatience && largest > kStalled * earlier) freeze_stalled(largest / h);
         earlier = largest;
       }
       if (sweep > kStart && chebyshev.plain() && largest > kSlow * before && measure(system)) {
@@ -215,13 +212,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   }
 
   /// Particles in collisions whose paths do not settle: a grazing contact may turn a small change into a larger one.
-  void freeze_stalled(const System<D>& system, double largest) {
-    need_all(system);
+  void freeze_stalled(double largest) {
+    any_freezes_ = true;
     for (Id i = 0; i < a_.size(); ++i)
       if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= kStalled * largest) {
+        if (swaps_[i] == 0) swapping_.push_back(i);
         swaps_[i] = kSwaps + 1;
-        frozen_.push_back(i);
-        ++counters_->frozen;
       }
   }
 
@@ -233,13 +229,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
 
   /// Counts the swaps of partners of each particle. One which swaps again and again keeps its acceleration from then on,
   /// and where it still swaps, so do its partners.
-  void freeze(const System<D>& system) {
-    need_all(system);
+  void freeze() {
+    any_freezes_ = true;
     const auto note = [&](Id i) {
-      if (swaps_[i] == 0) swapping_.push_back(i);
-      if (++swaps_[i] != kSwaps + 1) return;
-      frozen_.push_back(i);
-      ++counters_->frozen;
+      if (++swaps_[i] == 1) swapping_.push_back(i);
     };
     for (const Id i : core_->swapped()) {
       if (frozen(i) && ++swaps_[i] > 2 * kSwaps)
@@ -272,69 +265,33 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
-    const auto lacks = [&](Id i) -> double {
-      const Vec<D> e = mean_[i] - a_[i];
-      return p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
-    };
     ExactSum sum;
-    for (Id i = 0; i < p.size(); ++i)
-      if (p.owns(i) && !frozen(i)) sum.add(lacks(i));
-    double rest = of_all_ranks(system, sum).value();
-    std::ranges::sort(frozen_);
-    std::vector<double> of_frozen;
-    for (const Id i : frozen_) of_frozen.push_back(lacks(i));
+    std::vector<Lack<D>> of_frozen;
+    std::uint64_t frozen_here = 0;
+    for (Id i = 0; i < p.size(); ++i) {
+      if (!p.owns(i)) continue;
+      const Vec<D> e = mean_[i] - a_[i];
+      const double r =
+          p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
+      if (frozen(i))
+        of_frozen.push_back({p.id_of(i), core_->x()[i], r});
+      else
+        sum.add(r);
+    }
     core_->finish(p);
     for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
-    for (std::size_t k = 0; k < frozen_.size(); ++k)
-      if (!fold_near(system, frozen_[k], of_frozen[k])) rest += of_frozen[k];
-    fold(system, rest);
+    double rest = of_all_ranks(system, sum).value();
+    if (any_freezes_) {
+      rest += fold_near(system, of_frozen, counters_->folded);
+      frozen_here = of_frozen.size();
+      if (system.part) system.part->ranks().sum({&frozen_here, 1});
+      counters_->frozen += frozen_here;
+    }
+    counters_->folded += std::abs(rest);
+    fold(system, centre_, rest);
+    update_copies(system);
     past_.pass(h);
     past_.last() = mean_;
-  }
-
-  /// Adds r to the kinetic energy of all particles, relative to the centre of mass.
-  void fold(System<D>& system, double r) {
-    counters_->folded += std::abs(r);
-    if (r == 0) return;
-    auto& p = system.particles;
-    ExactSum kinetic;
-    for (Id i = 0; i < p.size(); ++i)
-      if (p.owns(i)) kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre_).squaredNorm());
-    const double share = r / of_all_ranks(system, kinetic).value();
-    if (!(std::abs(share) < 0.5)) return;  // at rest: nothing to scale
-    const double stretch = share / (1 + std::sqrt(1 + share));
-    for (auto& v : p.v) v += stretch * (v - centre_);
-  }
-
-  /// Adds r to the kinetic energy of particle i and those nearest to it, as many as it takes, relative to their centre
-  /// of mass. False where all are too few.
-  bool fold_near(System<D>& system, Id i, double r) {
-    auto& p = system.particles;
-    if (r == 0) return true;
-    std::vector<std::pair<double, Id>> near;
-    for (Id j = 0; j < p.size(); ++j) {
-      const Vec<D> d = p.x[j] - p.x[i];
-      near.push_back({(d + system.box.shift(system.box.nearest_image(d))).squaredNorm(), j});
-    }
-    for (std::size_t size = std::min(kLeastCluster, near.size());; size = std::min(2 * size, near.size())) {
-      std::ranges::partial_sort(near, near.begin() + static_cast<std::ptrdiff_t>(size));
-      Vec<D> momentum = Vec<D>::Zero();
-      double mass = 0, kinetic = 0;
-      for (std::size_t k = 0; k < size; ++k) {
-        momentum += p.mass[near[k].second] * p.v[near[k].second];
-        mass += p.mass[near[k].second];
-      }
-      const Vec<D> centre = momentum / mass;
-      for (std::size_t k = 0; k < size; ++k)
-        kinetic += 0.5 * p.mass[near[k].second] * (p.v[near[k].second] - centre).squaredNorm();
-      if (std::abs(r) <= kMostOfCluster * kinetic) {
-        const double share = r / kinetic, stretch = share / (1 + std::sqrt(1 + share));
-        for (std::size_t k = 0; k < size; ++k) p.v[near[k].second] += stretch * (p.v[near[k].second] - centre);
-        counters_->folded += std::abs(r);
-        return true;
-      }
-      if (size == near.size()) return false;
-    }
   }
 
   std::uint64_t max_events_;
@@ -345,7 +302,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   Extrapolation<D> past_;
   std::vector<Vec<D>> a_, mean_;        // flown on, and what that gives
   std::vector<std::uint32_t> swaps_;    // of partners, by particle
-  std::vector<Id> swapping_, frozen_;   // particles with any, and with many
+  std::vector<Id> swapping_;            // particles with any
+  bool any_freezes_ = false;            // on any rank, in this slab
   bool touching_ = true;                // contacts at the slab's start may need to be resolved
   bool resolved_ = false;               // and have been
   FlightEnd<D> cut_;                    // why the last slab was cut

@@ -41,6 +41,7 @@ class PrimitiveSplitting : public Integrator<D> {
     core_->fly({});
     core_->commit(0);
     core_->finish(p);
+    update_copies(system);
     accelerations_.update(system, report.counters);
     kick(p.v, accelerations_.a, 0.5 * slab.length);
     system.wrap();

@@ -20,7 +20,7 @@ DECKS = sorted((ROOT / "inputs").glob("*.toml"))
 # Largest |H − H₁| / E_ref allowed over the shortened run: rounding for the exact methods; what is left are methods of
 # first and second order, at steps their decks chose well.
 EXACT, APPROXIMATE = 1e-12, 1e-2
-EXACT_METHODS = {"free-flight", "cdda", "acdda"}
+EXACT_METHODS = {"free-flight", "cdda", "edda"}
 # Those of ten thousand particles under forces are run with fewer.
 FEWER = {"yukawa-fluid": ["particles.count=256"], "charged-mixture": ["particles.0.count=128", "particles.1.count=128"]}
 

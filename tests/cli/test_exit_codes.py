@@ -99,7 +99,7 @@ def test_standard_output_full(tmp_path):
     assert summary(out)["status"] == "done"
 
 
-@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "acva", "acdda"])
+@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "edda"])
 def test_too_many_events_in_a_step(method, tmp_path):
     out = tmp_path / "out"
     overrides = [f"integrator.type=\"{method}\"", "integrator.max_events_per_step=1", "integrator.step=0.5",

@@ -129,7 +129,7 @@ def test_positions_from_a_file_that_rank_0_sees(tmp_path):
     assert compare.compare(tmp_path / "plain", tmp_path / "two") == []
 
 
-@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "acva", "acdda"])
+@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "edda"])
 def test_forces_are_shared(method, tmp_path):
     deck = ROOT / "inputs" / "yukawa-fluid.toml"
     shorter = ["particles.count=256", "interaction.0.cutoff=2.5", "run.steps=20", "output.events=true", f"integrator.type={method}", "integrator.step=0.01",

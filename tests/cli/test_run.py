@@ -106,7 +106,7 @@ def test_resolved_deck_gives_the_same_run(text, tmp_path):
     assert (tmp_path / "a" / "thermo.csv").read_bytes() == (tmp_path / "b" / "thermo.csv").read_bytes()
 
 
-@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "acva", "acdda", "verlet", "free-flight", "collisions", "end_time"])
+@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "edda", "verlet", "free-flight", "collisions", "end_time"])
 def test_observing_changes_nothing(method, tmp_path):
     always = {"free-flight": [], "collisions": ["run.collisions=333"],
               "end_time": ["run.end_time=5.013", "integrator.type=\"cva\""]}.get(

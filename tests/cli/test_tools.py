@@ -274,13 +274,13 @@ def test_energy_study(tmp_path, capsys):
 
 @needs_carom
 def test_cost_study(tmp_path, capsys):
-    rows = rows_of(cost_study, "work", tmp_path, "five-springs", "--methods", "cva,cdda,acva,acdda",
+    rows = rows_of(cost_study, "work", tmp_path, "five-springs", "--methods", "cva,cdda,edda",
                    "--steps", "0.02,0.01", "--end-time", "3", "--repeats", "1")
     assert len(rows) == 4 * 2
     for coarse, fine in zip(rows[::2], rows[1::2]):
         assert float(coarse["position_error"]) / float(fine["position_error"]) == pytest.approx(4, rel=0.5)
         assert float(fine["energy_error"]) < (1e-12 if fine["method"].endswith("dda") else 1e-3)
-    rows = rows_of(cost_study, "cost", tmp_path, "spring-lattice", "--methods", "cdda,acdda", "--counts", "16,144",
+    rows = rows_of(cost_study, "cost", tmp_path, "spring-lattice", "--methods", "cdda,edda", "--counts", "16,144",
                    "--end-time", "1", "--repeats", "1")
     passes = [float(row["passes_per_step"]) for row in rows]
     assert passes[1] > 3 * passes[0]  # all of a system's collisions cut everybody's step
