@@ -194,7 +194,7 @@ std::unique_ptr<System<3>> chains() {
   return system;
 }
 TEST(Part, BondedPairsLeftOut) {
-  for (const char* method : {"psa", "cdda"}) compare<3>(chains, method, 0.01, 20, 20);
+  for (const char* method : {"psa", "cdda", "edda"}) compare<3>(chains, method, 0.01, 20, 20);
 }
 TEST(Part, Fluid) {
   for (const auto& [method, given] : kMethods) compare<3>(yukawa(0.35), method, 0.01, 12, 15, given);
