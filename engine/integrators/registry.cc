@@ -5,8 +5,7 @@ namespace carom {
 const std::vector<IntegratorInfo>& integrators() {
   static const std::vector<IntegratorInfo> all = {
       integrator::free_flight(), integrator::verlet(), integrator::psa(),  integrator::cva(),
-      integrator::mcva(),        integrator::cdda(),
-      integrator::edda(),
+      integrator::mcva(),        integrator::cdda(),   integrator::edda(),
   };
   return all;
 }
