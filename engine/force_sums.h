@@ -8,10 +8,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <string>
+#include <limits>
 #include <vector>
 
-#include "engine/error.h"
 #include "engine/force_words.h"
 #include "engine/vec.h"
 
@@ -31,6 +30,7 @@ class ForceSums {
     high_.clear();
     quantum_ = quantum;
     used_low_ = used_high_ = 0;
+    spoiled_ = false;
   }
   std::size_t size() const { return low_.size(); }
   double quantum() const { return quantum_; }
@@ -46,8 +46,8 @@ class ForceSums {
     used_high_ += count * limits.high;
     return limits;
   }
-  /// Whether more may be added without a look at high words: false after some hundred passes without reset().
-  bool has_room() const { return used_high_ < kForceRoom / 2; }
+  /// Whether more passes may add to them: not after some hundred without reset(), nor where they are spoiled.
+  bool has_room() const { return !spoiled_ && used_high_ < kForceRoom / 2; }
 
   /// The words themselves, to add to after make_room(); high() makes them where there were none.
   ForceWords* low() { return low_.data(); }
@@ -56,8 +56,8 @@ class ForceSums {
     return high_.data();
   }
 
-  /// Adds a force on one particle, for which there is room. Throws Error(Failure::numerical).
-  void add(Id i, const Vec<D>& force, const ForceLimits& limits) {
+  /// Adds a force on one particle, for which there is room. False where it is too large or no number.
+  bool add(Id i, const Vec<D>& force, const ForceLimits& limits) {
     for (int k = 0; k < D; ++k) {
       const double quanta = force[k] / quantum_;
       if (std::abs(quanta) < limits.low) {
@@ -65,17 +65,19 @@ class ForceSums {
         continue;
       }
       const double upper = std::nearbyint(quanta * 0x1p-40);
-      if (!(std::abs(upper) < limits.high))
-        throw Error(Failure::numerical,
-                    "the force on particle " + std::to_string(i) + " is too large; use a smaller integrator.step");
+      if (!(std::abs(upper) < limits.high)) return false;
       high()[i].of[k] += static_cast<std::int64_t>(upper);
       low_[i].of[k] += static_cast<std::int64_t>(std::nearbyint(quanta - upper * 0x1p40));
     }
+    return true;
   }
+  /// Some force could not be added: all values are no numbers until reset().
+  void spoil() { spoiled_ = true; }
 
   /// The force on a particle, rounded once.
   Vec<D> value(Id i) const {
     Vec<D> force;
+    if (spoiled_) return Vec<D>::Constant(std::numeric_limits<double>::quiet_NaN());
     for (int k = 0; k < D; ++k)
       force[k] = quantum_ * (high_.empty() ? static_cast<double>(low_[i].of[k])
                                            : static_cast<double>(whole(high_[i].of[k], low_[i].of[k])));
@@ -106,6 +108,7 @@ class ForceSums {
 
   std::vector<ForceWords> low_, high_;  // high_: empty while there are none
   double quantum_ = 1;
+  bool spoiled_ = false;
   double used_low_ = 0, used_high_ = 0;  // bounds of the sums [quanta]
 };
 

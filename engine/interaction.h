@@ -59,14 +59,15 @@ class Interaction {
   /// V and its companions at positions x.
   virtual void add_energy(Positions<D> x, PotentialSums& sums) const = 0;
 
-  /// Adds −∂V/∂x_i for each particle, and where `sums` is given V and its companions. This and the other loops over
-  /// forces throw Error(Failure::numerical) where one is not finite or too large to be summed, and name its particles.
+  /// Adds −∂V/∂x_i for each particle, and where `sums` is given V and its companions. Throws
+  /// Error(Failure::numerical) where a force is not finite or too large to be summed, and names its particles.
   virtual void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums = nullptr) const = 0;
 
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:
   /// only pairs with at least one such particle, and fields on these; sign −1: subtracts exactly what +1 has added.
-  /// Returns the number of pairs (or particles, for a field) of this rank within reach.
+  /// Returns the number of pairs (or particles, for a field) of this rank within reach. A step that is only tried may
+  /// be wild: forces that are not finite or too large spoil the sums.
   virtual std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces,
                                         const char* changed = nullptr, int sign = 1) const = 0;
 

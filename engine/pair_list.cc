@@ -99,6 +99,13 @@ constexpr double kCalls = 16;    // a skin is as wide as particles come in so ma
 constexpr double kWidest = 0.8;  // where it need not be wider than this for it [cutoff]
 constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
 
+/// The larger of two squared distances; a step to where there is no number does not count, its force will tell.
+template <int D>
+double farther(double squared, const Vec<D>& way) {
+  const double other = way.squaredNorm();
+  return other > squared && other <= std::numeric_limits<double>::max() ? other : squared;
+}
+
 std::uint64_t code_of(const PairRecord& place) { return std::bit_cast<std::uint64_t>(place.w); }
 
 }  // namespace
@@ -121,8 +128,7 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const std::vector<
   bool known = rebuilds_ > 0 && particles_ == step.x.size() && ghost_ == ghost;
   known = known && follow(step, squared_from_build, squared_step);
   if (!known && !still)
-    for (std::size_t i = 0; i < step.x.size(); ++i)
-      squared_step = std::max(squared_step, (step.x_new[i] - step.x[i]).squaredNorm());
+    for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
   const double length = std::sqrt(squared_step), from_build = std::sqrt(squared_from_build);
   const double to_last = kCalls * from_build / static_cast<double>(++calls_);
   const double room = known && to_last <= kWidest * cutoff_ ? to_last : 0;
@@ -130,7 +136,7 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const std::vector<
   const bool wasteful = length > 0 && skin_ > kTooWide * wanted;  // made for one wild step
   if (!(known && from_build <= 0.5 * skin_) || wasteful) {
     for (std::size_t i = 0; i < step.x.size(); ++i)
-      if (!step.x[i].allFinite() || !(still || step.x_new[i].allFinite()))
+      if (!step.x[i].allFinite())
         throw Error(Failure::numerical,
                     "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
     for (int k = 0; k < D; ++k)
@@ -174,10 +180,8 @@ bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, 
     }
     squared_from_build = std::max(squared_from_build, way.squaredNorm());
     if (step.x_new.empty()) continue;
-    const double after = in_box(step.x_new[i]).squaredNorm();
-    if (!(after <= std::numeric_limits<double>::max())) return false;
-    squared_from_build = std::max(squared_from_build, after);
-    squared_step = std::max(squared_step, (step.x_new[i] - step.x[i]).squaredNorm());
+    squared_from_build = farther<D>(squared_from_build, in_box(step.x_new[i]));
+    squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
   }
   return true;
 }

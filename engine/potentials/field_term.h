@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/error.h"
 #include "engine/interaction.h"
 
 namespace carom {
@@ -34,7 +35,9 @@ class FieldTerm final : public Interaction<D> {
   void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
     const ForceLimits limits = forces.make_room(1);
     for (Id i = 0; i < x.size(); ++i)
-      if (particles_.owns(i)) forces.add(i, -field_.gradient(i, x[i]), limits);
+      if (particles_.owns(i) && !forces.add(i, -field_.gradient(i, x[i]), limits))
+        throw Error(Failure::numerical, "the force on particle " + std::to_string(particles_.id_of(i)) +
+                                            " is too large or no number; use a smaller integrator.step");
     if (sums) add_energy(x, *sums);
   }
   std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
@@ -43,7 +46,7 @@ class FieldTerm final : public Interaction<D> {
     std::uint64_t count = 0;
     for (Id i = 0; i < x.size(); ++i) {
       if (!particles_.owns(i) || (changed && changed[i] == 0)) continue;
-      forces.add(i, -sign * field_.mean_gradient(i, x[i], x_new[i]), limits);
+      if (!forces.add(i, -sign * field_.mean_gradient(i, x[i], x_new[i]), limits)) forces.spoil();
       ++count;
     }
     return count;
@@ -51,7 +54,7 @@ class FieldTerm final : public Interaction<D> {
   void add_hessian_product(Positions<D> x, Positions<D> w, ForceSums<D>& out) const override {
     const ForceLimits limits = out.make_room(1);
     for (Id i = 0; i < x.size(); ++i)
-      if (particles_.owns(i)) out.add(i, field_.hessian_product(i, x[i], w[i]), limits);
+      if (particles_.owns(i) && !out.add(i, field_.hessian_product(i, x[i], w[i]), limits)) out.spoil();
   }
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t owned = 0;

@@ -129,7 +129,10 @@ class PairTerm final : public Interaction<D> {
         low = pairs_.low(*forces);
       }
       const bool wide = !function[0](&potential_, *batch_, units, &totals[shared ? 1 : 0]);
-      if (wide && !function[1](&potential_, *batch_, units, &totals[shared ? 1 : 0])) refuse(!given.x_new.empty());
+      if (wide && !function[1](&potential_, *batch_, units, &totals[shared ? 1 : 0])) {
+        if (given.x_new.empty() && given.vectors.empty()) refuse();
+        forces->spoil();
+      }
       if (forces) kernels_.scatter(*batch_, batch_->low, low);
       if (forces && wide) kernels_.scatter(*batch_, batch_->high, pairs_.high(*forces));
       own += owned(shared);
@@ -147,14 +150,13 @@ class PairTerm final : public Interaction<D> {
   }
 
   /// Names the pair of the batch with the largest force, or one that is no number.
-  [[noreturn]] void refuse(bool mean) const {
+  [[noreturn]] void refuse() const {
     unsigned worst = 0;
     double largest = -1;
     for (unsigned k = 0; k < batch_->n; ++k) {
-      const auto squared = [&](const auto& d) { return d[0][k] * d[0][k] + d[1][k] * d[1][k] + d[2][k] * d[2][k]; };
-      const double rho = squared(batch_->d);
-      const double slope = mean ? potential_.quotient(rho, squared(batch_->d_new)) : potential_.derivative(rho);
-      const double size = std::abs(batch_->weight[k] * slope) * std::sqrt(rho);
+      const auto& d = batch_->d;
+      const double rho = d[0][k] * d[0][k] + d[1][k] * d[1][k] + d[2][k] * d[2][k];
+      const double size = std::abs(batch_->weight[k] * potential_.derivative(rho)) * std::sqrt(rho);
       if (size <= largest) continue;
       worst = k;
       if (!(size >= 0)) break;

@@ -1,0 +1,82 @@
+#pragma once
+// Every type of interaction, in boxes that suit it.
+
+#include <gtest/gtest.h>
+
+#include <type_traits>
+
+#include "tests/unit/potentials/scene.h"
+
+namespace carom::test {
+
+using namespace std::string_literals;
+
+struct Case {
+  std::string type;
+  Boundary boundary;
+  std::vector<std::pair<std::string, ParameterValue>> parameters;
+};
+
+inline const PairList kPeriodicBonds = {{7, 2}, {0, 1}, {3, 5}, {0, 9}};
+
+inline const std::vector<Case>& cases() {
+  using Names = std::vector<std::string>;
+  static const std::vector<Case> all = {
+      {"harmonic-bond", Boundary::wall, {{"chain", true}, {"stiffness", 1.5}, {"rest_length", 1.2}}},
+      {"harmonic-bond", Boundary::periodic, {{"pairs", kPeriodicBonds}, {"stiffness", 1.5}, {"rest_length", 1.2}}},
+      {"gravity", Boundary::wall, {{"constant", 0.8}}},
+      {"gravity", Boundary::open, {{"constant", 0.8}, {"species", Names{"A", "B"}}}},
+      {"coulomb", Boundary::wall, {{"constant", 1.3}, {"form", "plain"s}}},
+      {"coulomb",
+       Boundary::periodic,
+       {{"constant", 1.3}, {"form", "damped-shifted"s}, {"damping", 0.9}, {"cutoff", 2.4}}},
+      {"yukawa", Boundary::wall, {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", true}}},
+      {"yukawa",
+       Boundary::periodic,
+       {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", false}, {"cutoff", 2.2}, {"cut", "switch"s}}},
+      {"lennard-jones", Boundary::open, {{"epsilon", 1.0}, {"sigma", 0.8}}},
+      {"lennard-jones",
+       Boundary::periodic,
+       {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "switch"s}, {"species", Names{"B", "B"}}}},
+      {"lennard-jones", Boundary::open, {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "force-shifted"s}}},
+      {"table",
+       Boundary::periodic,
+       {{"r", std::vector<double>{0.5, 0.7, 0.9, 1.2, 1.6, 2.0}},
+        {"value", std::vector<double>{9.0, 5.0, 1.0, -1.0, -0.4, -0.1}},
+        {"slope", std::vector<double>{-30.0, 0.2}},
+        {"cut", "switch"s},
+        {"switch_from", 1.3}}},
+      {"wca", Boundary::periodic, {{"epsilon", 1.0}, {"sigma", 1.1}}},
+      {"inverse-power",
+       Boundary::periodic,
+       {{"epsilon", 1.0}, {"sigma", 0.8}, {"exponent", 9.5}, {"cutoff", 2.0}, {"cut", "switch"s}}},
+      {"uniform-field", Boundary::wall, {}},
+      {"harmonic-trap", Boundary::wall, {{"stiffness", 0.7}}},
+  };
+  return all;
+}
+
+/// Calls check(scene, term) for every case, or check(scene, term, remake), where remake(scene) makes the same term for
+/// another scene. What the terms read from the environment they read again for each.
+template <int D, class Check>
+void for_each_case(Check&& check) {
+  for (const Case& each : cases()) {
+    SCOPED_TRACE(each.type + " in " + std::to_string(D) + " dimensions");
+    Scene<D> scene(D == 2 ? 24 : 40, 5, each.boundary, 0.75);
+    auto parameters = each.parameters;
+    if (each.type == "harmonic-bond" && each.boundary == Boundary::periodic)  // shorter than half the box, across edges
+      for (const auto& [i, j] : kPeriodicBonds) {
+        scene.particles.x[j] = scene.particles.x[i] + Vec<D>::Constant(0.9);
+        scene.box.wrap(scene.particles.x[j], scene.particles.image[j]);
+      }
+    if (each.type == "uniform-field") parameters.emplace_back("acceleration", std::vector<double>(D, -0.6));
+    const auto term = scene.make(each.type, parameters);
+    const auto remake = [&](const Scene<D>& other) { return other.make(each.type, parameters); };
+    if constexpr (std::is_invocable_v<Check, Scene<D>&, const Interaction<D>&, decltype(remake)>)
+      check(scene, *term, remake);
+    else
+      check(scene, *term);
+  }
+}
+
+}  // namespace carom::test
