@@ -104,6 +104,8 @@ class NodeReader {
   bool chosen(const toml::node& node, const std::string& value) {
     if (key_.choices.empty() || std::find(key_.choices.begin(), key_.choices.end(), value) != key_.choices.end())
       return true;
+    for (const auto& [former, remedy] : key_.former)
+      if (value == former) return complain(node, "can no longer be '" + value + "'", std::string(remedy)), false;
     complain(node, "cannot be '" + value + "'", suggestion(value, key_.choices));
     return false;
   }

@@ -41,7 +41,8 @@ Variant variant(std::string_view name, const std::vector<Parameter>& parameters)
                       std::string(p.unit),
                       std::string(p.meaning),
                       p.range,
-                      {p.choices.begin(), p.choices.end()}});
+                      {p.choices.begin(), p.choices.end()},
+                      p.former});
   return v;
 }
 

@@ -4,6 +4,7 @@
 // Reading and checking, `carom schema`, and the resolved deck are all made from it. The keys of integrators and
 // interactions come from their own declarations (engine/integrator.h, engine/interaction.h).
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,7 @@ struct Key {
   std::string meaning;
   Parameter::Range range = Parameter::Range::any;
   std::vector<std::string> choices{};
+  std::vector<std::array<std::string_view, 2>> former{};  ///< as in Parameter
 
   bool required() const { return fallback.empty(); }
   bool has_default() const { return !required() && fallback != "none"; }
