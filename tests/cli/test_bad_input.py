@@ -110,6 +110,11 @@ DECK_ERRORS = {
     "fraction for an integer": (changed("steps = 10", "steps = 10.5"), 27, ["'steps' has the wrong type", "integer"]),
     "wrong type in a list": (changed("[[2.0, 5.0]", '[[2.0, "5"]'), 11, ["'position' has the wrong type: string"]),
     "single table for a list": (changed("[[particles]]", "[particles]"), 9, ["write [[particles]]"]),
+    "integrator that is no more": (
+        changed('type = "cdda"', 'type = "acdda"'), 23, ["unknown integrator 'acdda'", 'write "edda"']),
+    "key that is no more": (
+        changed('type = "cdda"', 'type = "edda"\nadaptive = 1e-6'),
+        24, ["unknown key 'adaptive' in [integrator]", "take a shorter 'step'"]),
     "missing key": (changed("step = 0.01\n", ""), 22, ["missing key 'step' in [integrator]", "positive number"]),
     "missing position and count": (
         changed("position = [[2.0, 5.0], [5.0, 5.0]]\nvelocity = [[1.0, 0.0], [0.0, 0.0]]\n", ""),
