@@ -276,7 +276,7 @@ def test_energy_study(tmp_path, capsys):
 def test_cost_study(tmp_path, capsys):
     rows = rows_of(cost_study, "work", tmp_path, "five-springs", "--methods", "cva,cdda,edda",
                    "--steps", "0.02,0.01", "--end-time", "3", "--repeats", "1")
-    assert len(rows) == 4 * 2
+    assert len(rows) == 3 * 2
     for coarse, fine in zip(rows[::2], rows[1::2]):
         assert float(coarse["position_error"]) / float(fine["position_error"]) == pytest.approx(4, rel=0.5)
         assert float(fine["energy_error"]) < (1e-12 if fine["method"].endswith("dda") else 1e-3)

@@ -47,7 +47,8 @@ TEST(Thesis, EnergyErrorsAreOfTheReferencesMagnitudeAtEveryStep) {
       EXPECT_LE(edda.counters.max_overlap, 1e-12);
     } else {
       // The motion is chaotic: after many collisions only magnitudes agree; with few, digits do.
-      const double factor = h <= 0.003 ? 1.5 : 5;
+      // That of psa is a random walk of large errors: from 16 neighbouring starts at step 0.1 it is 0.2 to 1.7.
+      const double factor = h <= 0.003 ? 1.5 : method == "psa" && h >= 0.1 ? 12 : 5;
       EXPECT_LE(s.max_energy_error, factor * reference);
       EXPECT_GE(s.max_energy_error, reference / factor);
       if (!row.at(4).empty()) {
