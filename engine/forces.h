@@ -25,6 +25,11 @@ template <int D>
 void largest_of_all(const System<D>& system, std::span<double> values) {
   if (system.part) system.part->ranks().largest(values);
 }
+/// Makes each value the sum of what all ranks say. Collective.
+template <int D>
+void sum_over_ranks(const System<D>& system, std::span<std::uint64_t> values) {
+  if (system.part) system.part->ranks().sum(values);
+}
 template <int D>
 bool any_rank(const System<D>& system, bool value) {
   double any = value ? 1 : 0;

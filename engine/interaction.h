@@ -23,6 +23,7 @@
 
 namespace carom {
 
+class BondTable;
 class Exchange;
 
 template <int D>
@@ -42,6 +43,12 @@ struct PotentialSums {
     magnitude.add(other.magnitude);
     virial.add(other.virial);
   }
+};
+
+/// A constant that is added to what is reported of V (engine/potentials/tail.h).
+struct Tail {
+  double energy = 0;  ///< [energy]
+  double virial = 0;  ///< as in PotentialSums [energy]
 };
 
 template <int D>
@@ -83,6 +90,12 @@ class Interaction {
   /// Free flight can carry such a field exactly.
   virtual const Vec<D>* common_acceleration() const { return nullptr; }
 
+  /// What its cutoff takes away, estimated; of all particles, on each rank.
+  virtual Tail tail() const { return {}; }
+
+  /// The bonds it stands for, by ids, where it was made for all particles or a share; null where it has none.
+  virtual const PairList* bonds() const { return nullptr; }
+
   /// How large its forces are where particles are so far apart on average [length]; a function of parameters and of
   /// this rank's particles.
   virtual ForceScale scale(double distance) const = 0;
@@ -96,10 +109,11 @@ template <int D>
 struct InteractionContext {
   const Box<D>& box;
   const Particles<D>& particles;
-  const std::vector<std::string>& species;  ///< names, in the order of Particles::species
-  bool placed = true;                       ///< whether positions are known; else only the parameters count
-  std::size_t total = particles.size();     ///< how many there are on all ranks, where `particles` are a share of them
-  Exchange* ranks = nullptr;                ///< these ranks; null: all particles are here
+  const std::vector<std::string>& species;   ///< names, in the order of Particles::species
+  bool placed = true;                        ///< whether positions are known; else only the parameters count
+  std::size_t total = particles.size();      ///< how many there are on all ranks, where `particles` are a share of them
+  Exchange* ranks = nullptr;                 ///< these ranks; null: all particles are here
+  std::shared_ptr<const BondTable> bonds{};  ///< of all terms of bonds; null: there are no such terms
 };
 
 /// The declaration of one type of interaction; engine/potentials/registry.cc lists them all.

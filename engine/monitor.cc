@@ -30,7 +30,13 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
       rows_(plan.thermo_interval) {
   bool momentum_kept = true;
   for (int k = 0; k < D; ++k) momentum_kept = momentum_kept && !system.box.walled(k);
-  for (const auto& term : system.interactions) momentum_kept = momentum_kept && term->keeps_momentum();
+  for (const auto& term : system.interactions) {
+    momentum_kept = momentum_kept && term->keeps_momentum();
+    tail_.energy += term->tail().energy;
+    tail_.virial += term->tail().virial;
+  }
+  statistics.tail_energy = tail_.energy;
+  statistics.tail_pressure = tail_.virial / (D * system.box.volume());
   if (momentum_kept) statistics.max_momentum_error = 0;
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
@@ -59,9 +65,10 @@ void Monitor<D>::start(const Integrator<D>& integrator) {
 /// Energy errors count from this state on.
 template <int D>
 void Monitor<D>::count_from(const Snapshot<D>& shot) {
-  first_energy_ = statistics_.energy_after_first_step = shot.total();
+  statistics_.energy_after_first_step = shot.total();
+  first_energy_ = energy_;
   first_shadow_ = shot.shadow;
-  statistics_.energy_reference = std::max(std::abs(shot.total()), magnitude_);
+  statistics_.energy_reference = std::max(std::abs(energy_), magnitude_);
 }
 
 template <int D>
@@ -105,7 +112,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   shot_ = measure(s.end_time, known().particles, &integrator, with_shadow);
   s.energy_final = shot_.total();
   if (s.steps == 1 && info_.stepping) count_from(shot_);
-  s.max_energy_error = std::max(s.max_energy_error, std::abs(shot_.total() - first_energy_));
+  s.max_energy_error = std::max(s.max_energy_error, std::abs(energy_ - first_energy_));
   if (with_shadow)
     s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - first_shadow_));
   if (s.max_momentum_error)
@@ -146,9 +153,10 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   const auto total = static_cast<double>(system_.size());
   const MotionSums<D> motion = evaluate_motion(known(), state, nodes);
   shot.kinetic = motion.kinetic.value();
-  shot.potential = sums.energy.value();
+  energy_ = shot.kinetic + sums.energy.value();
+  shot.potential = sums.energy.value() + tail_.energy;
   magnitude_ = shot.kinetic + sums.magnitude.value();
-  virial_ = 2 * shot.kinetic + sums.virial.value();
+  virial_ = 2 * shot.kinetic + sums.virial.value() + tail_.virial;
   if (with_shadow) {
     Counters uncounted;
     const double g = shadow_term<D>(known(), nodes, integrator->accelerations(), scratch_, uncounted);

@@ -86,6 +86,8 @@ class Monitor {
   double last_frame_ = -1, last_row_ = -1;      // when they were shown; before the start, nobody was
   double last_row_virial_ = 0;                  // collision virial up to the last row
   Snapshot<D> shot_;                            // of the last slab's end
+  Tail tail_;                                   // added to what is shown, not to H and its errors
+  double energy_ = 0;                           // H of the last measurement
   double magnitude_ = 0, virial_ = 0;           // of the last measurement: K + Σ|V|, 2K + Σ d·F
   double virial_time_ = 0;                      // ∫ (2K + Σ d·F) dt
   double speed_ = 0, path_ = 0;                 // mean |v| at the last slab's end; ∫ mean |v| dt

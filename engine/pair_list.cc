@@ -269,7 +269,7 @@ void CutoffList<D>::build(const PairStep<D>& step) {
   std::vector<Id> members;
   Extent<D> extent;
   for (Id i = 0; i < step.x.size(); ++i)
-    if (species_.code(i) != 0) members.push_back(i), extent.add(step.x[i]);
+    if (filter_.species.code(i) != 0) members.push_back(i), extent.add(step.x[i]);
   const double reach = cutoff_ + skin_;
   Cells<D> cells(CellGrid<D>(box_, 0.5 * reach, extent), reach);
 
@@ -296,7 +296,7 @@ void CutoffList<D>::build(const PairStep<D>& step) {
     const Id i = records_.order[r];
     boxes[r] = cells.grid.boxes(cells.grid.cell(step.x[i]));
     const Vec<D> home = step.x[i] - box_.shift(boxes[r]);
-    std::uint64_t code = species_.code(i);
+    std::uint64_t code = filter_.species.code(i);
     if (!ghost_.empty() && ghost_[i] != 0) code |= PartnerSearch::kGhost;
     bool moving = boxes[r] != Image<D>{};
     for (int k = 0; k < D; ++k)
@@ -347,7 +347,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
                        .row = row,
                        .own = {},
                        .reach_squared = reach * reach};
-  search.wanted = species_.partner_code(code);
+  search.wanted = filter_.species.partner_code(code);
   search.plain = (code & (PartnerSearch::kMoving | PartnerSearch::kGhost)) == 0;
   for (std::size_t first = 0; first < ranges.size();) {
     const auto& image = ranges[first].image;
@@ -360,6 +360,11 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
     PartnersFound found{plain_.data() + plain_size_, other_.data()};
     for (; first < last; ++first) kernels_.find(search, ranges[first].begin, ranges[first].end, found);
+    if (filter_.excluded) {
+      const auto excluded = [&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); };
+      found.plain = std::remove_if(plain_.data() + plain_size_, found.plain, excluded);
+      found.other = std::remove_if(other_.data(), found.other, excluded);
+    }
     const auto add = [&](int kind, std::size_t begin, std::size_t end) {
       if (begin == end) return;
       records_.runs[kind].push_back({row,

@@ -11,6 +11,7 @@
 
 #include "engine/box.h"
 #include "engine/force_sums.h"
+#include "engine/pair_filter.h"
 #include "engine/pair_kernels.h"
 #include "engine/particles.h"
 
@@ -61,31 +62,12 @@ class PairRecords {
   std::vector<std::uint32_t> some_partners_;
 };
 
-/// Between which of two species a pair is wanted; both equal: within one.
-struct SpeciesRule {
-  const std::vector<std::uint16_t>* species_of = nullptr;  ///< null: all pairs
-  std::uint16_t a = 0, b = 0;
-
-  bool all() const { return species_of == nullptr; }
-  /// codes of PartnerSearch: those of a particle, and of which partners must have one.
-  std::uint64_t code(Id i) const {
-    if (all()) return PartnerSearch::kFirst;
-    const std::uint16_t s = (*species_of)[i];
-    return (s == a ? PartnerSearch::kFirst : 0u) | (s == b ? PartnerSearch::kSecond : 0u);
-  }
-  std::uint64_t partner_code(std::uint64_t code) const {
-    if (all()) return PartnerSearch::kFirst;
-    return ((code & PartnerSearch::kFirst) != 0 ? PartnerSearch::kSecond : 0u) |
-           ((code & PartnerSearch::kSecond) != 0 ? PartnerSearch::kFirst : 0u);
-  }
-};
-
 /// All pairs within a cutoff, and some beyond: a Verlet list (Phys. Rev. 159 (1967) 98) with a skin, made from cells.
 template <int D>
 class CutoffList {
  public:
-  CutoffList(const Box<D>& box, double cutoff, SpeciesRule species)
-      : box_(box), cutoff_(cutoff), skin_(kLeastSkin * cutoff), species_(species) {}
+  CutoffList(const Box<D>& box, double cutoff, PairFilter filter)
+      : box_(box), cutoff_(cutoff), skin_(kLeastSkin * cutoff), filter_(std::move(filter)) {}
 
   /// The pairs that are within the cutoff at x or x_new. A pair keeps the image it has at x. Throws
   /// Error(Failure::numerical) for positions that are not finite and for steps of several edges of a periodic box.
@@ -102,7 +84,7 @@ class CutoffList {
 
   const Box<D>& box_;
   double cutoff_, skin_;
-  SpeciesRule species_;
+  PairFilter filter_;
   const PairKernels& kernels_ = pair_kernels();
   std::vector<char> ghost_;
   std::size_t particles_ = 0;  // at the last build

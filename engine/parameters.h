@@ -25,7 +25,8 @@ struct Parameter {
   std::string_view unit;      ///< dimension, for instance "length", "energy/length^2", "-" for a pure number
   std::string_view meaning;   ///< one sentence for the manual
   Range range = Range::any;   ///< for integer and real (and each of real_list)
-  std::vector<std::string_view> choices{};  ///< for text: what it may be; empty = anything
+  std::vector<std::string_view> choices{};                ///< for text: what it may be; empty = anything
+  std::vector<std::array<std::string_view, 2>> former{};  ///< for text: what it may no longer be, and the remedy
 };
 
 /// Pairs of particle ids.

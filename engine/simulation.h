@@ -38,7 +38,7 @@ struct Snapshot {
   std::int64_t step = 0;                    ///< slabs completed (free flight: epochs begun or completed)
   std::uint64_t collisions = 0;             ///< pair collisions so far
   const Particles<D>* particles = nullptr;  ///< all of them; where ranks have shares, this rank's (with ids)
-  double kinetic = 0, potential = 0;        ///< [energy]
+  double kinetic = 0, potential = 0;        ///< [energy]; V with its long-range corrections
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN where the method has none
   double max_energy_error = 0;                               ///< largest |H − H₁| so far [energy]
   Vec<D> momentum = Vec<D>::Zero();
@@ -81,6 +81,9 @@ struct Statistics {
 
   double energy_initial = 0, energy_after_first_step = 0, energy_final = 0;
   double energy_reference = 0;  ///< max(|H₁|, K₁ + Σ|V|): what to divide energy errors by
+  /// The long-range corrections in the energies above and in pressures (engine/potentials/tail.h). They are constants;
+  /// energy_reference and the errors of H are without them.
+  double tail_energy = 0, tail_pressure = 0;
   double max_energy_error = 0;  ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the start)
   std::optional<double>
       max_shadow_energy_error;  ///< Verlet types; of more than 100 particles at thermo rows and frames only

@@ -35,7 +35,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   sequences_.clear();
   const std::size_t n = particles_.size();
   for (auto* each : {&room_, &reach_}) each->resize(n);
-  for (auto* each : {&x_, &v_}) each->resize(n);
+  for (auto* each : {&x_, &last_x_, &v_}) each->resize(n);
   held_.assign(scan_.resting().empty() ? 0 : n, 0);
   for (const auto& contact : scan_.resting()) {
     held_[contact.key.lo] = 1;
@@ -67,6 +67,7 @@ void SlabCore<D>::find_near() {
 template <int D>
 FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   a_ = a;
+  x_.swap(last_x_);
   FlightEnd<D> end;
   do {
     for (const Flight& each : flights_) slot_[each.id] = 0;

@@ -51,6 +51,7 @@ class SlabCore {
   FlightEnd<D> fly(Positions<D> a);
 
   const std::vector<Vec<D>>& x() const { return x_; }  ///< positions at the slab's end, not wrapped [length]
+  const std::vector<Vec<D>>& last_x() const { return last_x_; }  ///< the same of the flight before
   const std::vector<Vec<D>>& v() const { return v_; }  ///< velocities there [length/time]
   std::span<const Contact<D>> contacts() const {
     return contacts_;
@@ -134,7 +135,7 @@ class SlabCore {
   std::vector<double> room_;         // by particle: the largest |½ a h²| for which `near_` holds
   std::vector<Id> beyond_;           // particles with larger ones
   std::vector<char> held_;           // resting in contact; empty: none are
-  std::vector<Vec<D>> x_, v_;
+  std::vector<Vec<D>> x_, last_x_, v_;
   std::vector<std::uint32_t> slot_;  // by particle: 1 + its place in flights_, or 0
   std::vector<Flight> flights_;
   std::vector<Planned> queue_;  // a heap

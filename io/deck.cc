@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "io/deck_build.h"
+#include "io/deck_interactions.h"
 #include "io/deck_interpret.h"
 #include "io/deck_toml.h"
 
@@ -26,7 +27,9 @@ Deck read_deck(const std::filesystem::path& file, std::span<const std::string> o
   const DeckToml toml = parse_deck(file, *text, overrides, problems);
   Deck deck;
   deck.file = file;
-  interpret(read_values(toml, problems), deck, problems);
+  DeckValues values = read_values(toml, problems);
+  read_potentials(values, file.parent_path(), reader, problems);
+  interpret(std::move(values), deck, problems);
   problems.throw_errors(Failure::deck);
   PlacementConfig& placement = deck.source->placement;
   const auto& all = deck.source->species;
@@ -34,7 +37,7 @@ Deck read_deck(const std::filesystem::path& file, std::span<const std::string> o
     const auto table = reader(placement.file);
     if (!table)
       throw Error(Failure::file, placement.file.string() + ": error: cannot read the positions; check placement.file");
-    placement.positions = positions_in(*table, placement.file, static_cast<std::size_t>(deck.dimension));
+    placement.positions = rows_in(*table, placement.file, static_cast<std::size_t>(deck.dimension), "not a position");
   }
   deck.warnings = problems.warnings();
   deck.toml_text = write_deck(deck.source->values);

@@ -21,10 +21,10 @@ bool built_in_shares(const Deck::Source& source);
 template <int D>
 void place_particles(const Deck::Source& source, System<D>& system);
 
-/// Positions from the text of a table of numbers: `dimension` a line, separated by commas or blanks; # begins a
-/// comment, and the first line may be a heading. Throws DeckError.
-std::vector<std::vector<double>> positions_in(const std::string& text, const std::filesystem::path& file,
-                                              std::size_t dimension);
+/// The rows of a table of numbers: `columns` a line, separated by commas or blanks; # begins a comment, and the first
+/// line may be a heading. Throws DeckError, which says that a line is `not_what` it should be.
+std::vector<std::vector<double>> rows_in(const std::string& text, const std::filesystem::path& file,
+                                         std::size_t columns, const std::string& not_what);
 
 /// Forty mean free times of the fluid that the state would be (Enskog's theory), at most the time to fly 300
 /// diameters or to cross the box four times, rounded to two digits; 1 if nothing moves. Longer epochs cost digits:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/pair_filter.h"
 #include "engine/shares.h"
 #include "io/deck_build.h"
 #include "io/deck_interpret.h"
@@ -58,6 +59,32 @@ void try_interactions(const Deck::Source& source, const std::vector<bool>& skip,
 
 }  // namespace
 
+void read_potentials(DeckValues& values, const std::filesystem::path& folder, const TextReader& reader,
+                     Problems& problems) {
+  for (ValueTable& table : values.list("interaction")) {
+    if (table.variant == nullptr || table.variant->name != "table") continue;
+    if (const auto* name = table.find<std::string>("file")) {
+      if (table.given("r") || table.given("value")) {
+        problems.error(table.place("file"), "'file' and the points themselves exclude each other",
+                       "leave one of them out");
+        continue;
+      }
+      const std::filesystem::path file = folder / *name;
+      const auto text = reader(file);
+      if (!text)
+        throw Error(Failure::file, file.string() + ": error: cannot read the points of a potential; check 'file'");
+      std::vector<double> r, v;
+      for (const auto& row : rows_in(*text, file, 2, "not a point of a potential"))
+        r.push_back(row[0]), v.push_back(row[1]);
+      table.values.erase("file");
+      table.values.insert_or_assign("r", std::move(r));
+      table.values.insert_or_assign("value", std::move(v));
+    }
+    const auto* r = table.find<std::vector<double>>("r");
+    if (r != nullptr && !r->empty() && !table.given("cutoff")) table.values.insert_or_assign("cutoff", r->back());
+  }
+}
+
 void read_interactions(Deck::Source& source, std::size_t dimension, Problems& problems) {
   std::vector<bool> wrong;
   for (const ValueTable& table : source.values.list("interaction")) {
@@ -88,30 +115,44 @@ void read_interactions(Deck::Source& source, std::size_t dimension, Problems& pr
 template <int D>
 void make_interactions(const Deck::Source& source, const std::vector<bool>& skip, System<D>& system, bool placed,
                        Problems& problems) {
-  for (std::size_t n = 0; n < source.interactions.size(); ++n) {
+  InteractionContext<D> context{.box = system.box,
+                                .particles = system.particles,
+                                .species = system.species,
+                                .placed = placed,
+                                .total = source.particles(),
+                                .ranks = shared_by(system)};
+  const auto bonded = [](const InteractionConfig& config) {
+    return config.info->kind == InteractionInfo::Kind::bonded;
+  };
+  std::vector<std::unique_ptr<Interaction<D>>> terms(source.interactions.size());
+  const auto make = [&](std::size_t n) {
     const InteractionConfig& config = source.interactions[n];
-    if (n < skip.size() && skip[n]) continue;
+    if (n < skip.size() && skip[n]) return;
     try {
-      auto term = config.info->make<D>(config.parameters, {.box = system.box,
-                                                           .particles = system.particles,
-                                                           .species = system.species,
-                                                           .placed = placed,
-                                                           .total = source.particles(),
-                                                           .ranks = shared_by(system)});
+      auto term = config.info->make<D>(config.parameters, context);
       if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
         problems.error(config.at,
                        std::string(source.integrator->name) + " cannot carry the interaction '" +
                            std::string(config.info->name) + "'",
                        "it knows no forces but a uniform-field; leave the interaction out, or take psa, edda or "
                        "their relatives");
-      system.interactions.push_back(std::move(term));
+      terms[n] = std::move(term);
     } catch (const Error& e) {  // its message has the form "what; what to do"
       const std::string message = e.what();
       const std::size_t cut = std::min(message.find("; "), message.size());
       problems.error(config.at, message.substr(0, cut),
                      cut < message.size() ? message.substr(cut + 2) : "see `carom schema`");
     }
-  }
+  };
+  const auto& all = source.interactions;  // bonds before the terms that leave out bonded pairs
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (bonded(all[n])) make(n);
+  context.bonds = bonds_of(terms);
+  if (!context.bonds && std::ranges::any_of(all, bonded)) context.bonds = std::make_shared<BondTable>(PairList());
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (!bonded(all[n])) make(n);
+  for (auto& term : terms)
+    if (term) system.interactions.push_back(std::move(term));
 }
 
 template void make_interactions(const Deck::Source&, const std::vector<bool>&, System<2>&, bool, Problems&);

@@ -5,6 +5,12 @@
 
 namespace carom {
 
+/// Puts the points of tables that are given as files in the place of `file`, and their last point where there is no
+/// cutoff: the values say them themselves from now on. Throws Error(Failure::file), or DeckError for what is wrong in a
+/// file.
+void read_potentials(DeckValues& values, const std::filesystem::path& folder, const TextReader& reader,
+                     Problems& problems);
+
 /// Fills source.interactions from its values and tries to make each, so that what an interaction itself refuses is told
 /// together with everything else. The dimension is 0 where it is not known.
 void read_interactions(Deck::Source& source, std::size_t dimension, Problems& problems);

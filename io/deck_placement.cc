@@ -126,10 +126,10 @@ void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& sy
 
 }  // namespace
 
-std::vector<std::vector<double>> positions_in(const std::string& text, const std::filesystem::path& file,
-                                              std::size_t dimension) {
+std::vector<std::vector<double>> rows_in(const std::string& text, const std::filesystem::path& file,
+                                         std::size_t columns, const std::string& not_what) {
   std::istringstream in(text);
-  std::vector<std::vector<double>> positions;
+  std::vector<std::vector<double>> rows;
   Problems problems;
   std::string line;
   bool heading = true;
@@ -138,16 +138,16 @@ std::vector<std::vector<double>> positions_in(const std::string& text, const std
     const bool first = heading;
     if (!row || !row->empty()) heading = false;
     if ((row && row->empty()) || (!row && first)) continue;
-    const bool good = row && row->size() == dimension &&
+    const bool good = row && row->size() == columns &&
                       std::all_of(row->begin(), row->end(), [](double x) { return std::isfinite(x); });
     if (!good)
-      problems.error({file.string(), number, 1}, "not a position",
-                     "give " + std::to_string(dimension) + " finite numbers, separated by commas or blanks");
+      problems.error({file.string(), number, 1}, not_what,
+                     "give " + std::to_string(columns) + " finite numbers, separated by commas or blanks");
     else
-      positions.push_back(*row);
+      rows.push_back(*row);
   }
   problems.throw_errors(Failure::deck);
-  return positions;
+  return rows;
 }
 
 template <int D>

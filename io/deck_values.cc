@@ -104,6 +104,8 @@ class NodeReader {
   bool chosen(const toml::node& node, const std::string& value) {
     if (key_.choices.empty() || std::find(key_.choices.begin(), key_.choices.end(), value) != key_.choices.end())
       return true;
+    for (const auto& [former, remedy] : key_.former)
+      if (value == former) return complain(node, "can no longer be '" + value + "'", std::string(remedy)), false;
     complain(node, "cannot be '" + value + "'", suggestion(value, key_.choices));
     return false;
   }
@@ -180,6 +182,13 @@ void complete(ValueTable& table, const DeckToml& deck, Problems& problems) {
   });
 }
 
+/// What to write instead of a word that the schema does not know.
+std::string remedy(const TableSchema& schema, const std::string& word, const std::vector<std::string>& known) {
+  for (const auto& [former, instead] : schema.former)
+    if (former == word) return std::string(instead);
+  return suggestion(word, known);
+}
+
 const Variant* choose_variant(const toml::table& tables, const ValueTable& table, const DeckToml& deck,
                               Problems& problems) {
   const toml::node* type = tables.get("type");
@@ -189,7 +198,8 @@ const Variant* choose_variant(const toml::table& tables, const ValueTable& table
   if (chosen != nullptr) return chosen;
   std::vector<std::string> names;
   for (const Variant& variant : table.schema->variants) names.push_back(variant.name);
-  problems.error(deck.place(*type), "unknown " + table.schema->name + " '" + name + "'", suggestion(name, names));
+  problems.error(deck.place(*type), "unknown " + table.schema->name + " '" + name + "'",
+                 remedy(*table.schema, name, names));
   return nullptr;
 }
 
@@ -215,7 +225,7 @@ ValueTable read_table(const toml::table& from, const TableSchema& schema, const 
     const std::string name(key.str());
     if (type_unclear || std::find(known.begin(), known.end(), name) != known.end()) continue;
     problems.error(deck.place(key, node), "unknown key '" + name + "' in " + bracketed(schema),
-                   suggestion(name, known));
+                   remedy(schema, name, known));
   }
   complete(table, deck, problems);
   return table;

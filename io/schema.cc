@@ -41,7 +41,8 @@ Variant variant(std::string_view name, const std::vector<Parameter>& parameters)
                       std::string(p.unit),
                       std::string(p.meaning),
                       p.range,
-                      {p.choices.begin(), p.choices.end()}});
+                      {p.choices.begin(), p.choices.end()},
+                      p.former});
   return v;
 }
 
@@ -135,7 +136,10 @@ std::vector<TableSchema> make_schema() {
        true,
        "the method; `carom methods` tells more about each",
        {type_key("which one")},
-       integrator_variants()},
+       integrator_variants(),
+       {{"acdda", "write \"edda\", which keeps the energy as exactly"},
+        {"acva", "write \"edda\", which keeps the energy exactly, or \"cva\""},
+        {"adaptive", "leave it out, or take a shorter 'step'"}}},
       {"run",
        false,
        true,

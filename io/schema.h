@@ -4,6 +4,7 @@
 // Reading and checking, `carom schema`, and the resolved deck are all made from it. The keys of integrators and
 // interactions come from their own declarations (engine/integrator.h, engine/interaction.h).
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,7 @@ struct Key {
   std::string meaning;
   Parameter::Range range = Parameter::Range::any;
   std::vector<std::string> choices{};
+  std::vector<std::array<std::string_view, 2>> former{};  ///< as in Parameter
 
   bool required() const { return fallback.empty(); }
   bool has_default() const { return !required() && fallback != "none"; }
@@ -51,6 +53,7 @@ struct TableSchema {
   std::string meaning;
   std::vector<Key> keys;
   std::vector<Variant> variants{};  ///< non-empty: `type` chooses one of them
+  std::vector<std::array<std::string_view, 2>> former{};  ///< types and keys that are no more, and what to write instead
 
   const Variant* variant(std::string_view type) const;
 };

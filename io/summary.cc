@@ -38,6 +38,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
         {"reference", s.energy_reference},
         {"max_abs_error", s.max_energy_error},
         {"folded", s.energy_reference > 0 ? c.folded / s.energy_reference : 0.0}}},
+      {"tail", {{"energy", s.tail_energy}, {"pressure", s.tail_pressure}}},
       {"shadow_energy", {{"max_abs_error", number_or_null(s.max_shadow_energy_error)}}},
       {"momentum", {{"max_abs_error", number_or_null(s.max_momentum_error)}}},
       {"max_overlap", c.max_overlap},

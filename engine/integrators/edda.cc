@@ -31,6 +31,7 @@ namespace {
 
 constexpr int kMostSweeps = 60;
 constexpr int kMostPieces = 1 << 14;      // of a step
+constexpr std::uint64_t kFew = 5;         // one particle in so many has changed: only its pairs are evaluated
 constexpr int kPatience = 6;              // sweeps before particles may be frozen
 constexpr int kSwaps = 3;                 // of partners after that, until a particle is frozen
 constexpr int kStart = 4;                 // sweeps after which contraction tells of stiffness
@@ -38,7 +39,7 @@ constexpr double kSlow = 0.04;            // contraction of two sweeps that tell
 constexpr double kRoom = 1.1;             // for frequencies above the one found
 constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
 constexpr double kStalled = 0.1;          // contraction of kPatience sweeps that is too little
-constexpr double kSettled = 0.1;          // of the tolerance: such a particle keeps its path
+constexpr double kSettled = 0.5;          // of the tolerance: such a particle keeps its path
 constexpr double kRounding = 1e-13;       // of the speed scale: increments below it that do not shrink are rounding
 
 template <int D>
@@ -55,6 +56,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     core_.reset();
     past_.release();
     for (auto* each : {&a_, &mean_, &move_}) *each = {};
+    forces_ = {};
   }
   void regroup(System<D>& system) override {
     core_.emplace(system, max_events_);
@@ -163,9 +165,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         cut_ = end;
         return Outcome::cut;
       }
-      evaluate_mean_forces<D>(system, p.x, core_->x(), mean_, *counters_);
-      ++counters_->sweeps;
-      for (std::size_t i = 0; i < n; ++i) mean_[i] /= p.mass[i];
+      evaluate(system, sweep == 1);
       if (!core_->scan().resting().empty()) hold(system, h);
       double largest = 0;
       for (Id i = 0; i < n; ++i)
@@ -201,6 +201,30 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       }
     }
     return Outcome::diverged;
+  }
+
+  /// The accelerations that the flight gives. Where the ends of few particles have changed only their pairs are
+  /// evaluated again: sums of integers let them be subtracted exactly.
+  void evaluate(const System<D>& system, bool first) {
+    const Stopwatch watch(counters_->seconds.force);
+    const auto& p = system.particles;
+    const auto &x = core_->x(), &before = core_->last_x();
+    std::array<std::uint64_t, 3> count{};  // own particles, those of them that have changed, and pairs evaluated
+    changed_.resize(x.size());
+    for (Id i = 0; i < x.size(); ++i) {
+      changed_[i] = first || x[i] != before[i];
+      if (p.owns(i)) ++count[0], count[1] += changed_[i];
+    }
+    sum_over_ranks(system, count);
+    const bool all = first || kFew * count[1] > count[0];
+    count[2] = all ? forces_.evaluate(system, p.x, x) : forces_.update(system, p.x, before, x, changed_.data());
+    sum_over_ranks(system, {&count[2], 1});
+    if (first) pairs_ = count[2];
+    counters_->force_passes += pairs_ > 0 ? static_cast<double>(count[2]) / static_cast<double>(pairs_) : 0.0;
+    ++counters_->sweeps;
+    for (Id i = 0; i < x.size(); ++i) mean_[i] = forces_[i];
+    if (system.part) system.part->refresh(mean_);
+    for (Id i = 0; i < x.size(); ++i) mean_[i] /= p.mass[i];
   }
 
   /// Finds the highest frequency, not more often than it pays. Returns whether it did.
@@ -283,7 +307,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     if (any_freezes_) {
       rest += fold_near(system, of_frozen, counters_->folded);
       frozen_here = of_frozen.size();
-      if (system.part) system.part->ranks().sum({&frozen_here, 1});
+      sum_over_ranks(system, {&frozen_here, 1});
       counters_->frozen += frozen_here;
     }
     counters_->folded += std::abs(rest);
@@ -299,6 +323,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   Vec<D> centre_ = Vec<D>::Zero();   // velocity of the centre of mass, where it is kept
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> past_;
+  MeanForces<D> forces_;
+  std::vector<char> changed_;           // by the last sweep
+  std::uint64_t pairs_ = 0;             // within reach
   std::vector<Vec<D>> a_, mean_;        // flown on, and what that gives
   std::vector<std::uint32_t> swaps_;    // of partners, by particle
   std::vector<Id> swapping_;            // particles with any

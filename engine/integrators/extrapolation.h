@@ -62,7 +62,7 @@ class Extrapolation {
   std::vector<Vec<D>>& last() { return past_[0]; }
 
  private:
-  static constexpr std::size_t kOrder = 3;
+  static constexpr std::size_t kOrder = 2;
   static constexpr double kMostGrowth = 3;  // of slabs; beyond it only the last one counts
 
   std::array<std::vector<Vec<D>>, kOrder + 1> past_;

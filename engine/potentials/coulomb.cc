@@ -23,7 +23,7 @@ std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionConte
   if (!p.has("cutoff") || !p.has("damping"))
     options::refuse(type, "form = \"damped-shifted\" needs 'damping' and 'cutoff'; give both (damping = 0 only cuts)");
   const DampedCoulomb whole(p.real("constant"), p.real("damping"));
-  return options::within_reach<D>(type, Cut<DampedCoulomb>(whole, p.real("cutoff"), CutKind::smooth), charges, p,
+  return options::within_reach<D>(type, Cut<DampedCoulomb>(whole, p.real("cutoff"), CutKind::quadratic), charges, p,
                                   context, whole);
 }
 
@@ -33,18 +33,17 @@ InteractionInfo coulomb() {
   return {
       .name = "coulomb",
       .kind = InteractionInfo::Kind::pair,
-      .parameters = {{"constant", Type::real, "1.0", "energy*length/charge^2", "C, or 1/(4 pi epsilon)"},
-                     {"form",
-                      Type::text,
-                      "\"plain\"",
-                      "-",
-                      "plain: C q q'/r between all pairs; damped-shifted: damped and cut, for periodic boxes",
-                      Range::any,
-                      {"plain", "damped-shifted"}},
-                     {"damping", Type::real, "none", "1/length", "alpha of the form damped-shifted",
-                      Range::non_negative},
-                     {"cutoff", Type::real, "none", "length", "where the form damped-shifted ends", Range::positive},
-                     options::species()},
+      .parameters = options::with_filter(
+          {{"constant", Type::real, "1.0", "energy*length/charge^2", "C, or 1/(4 pi epsilon)"},
+           {"form",
+            Type::text,
+            "\"plain\"",
+            "-",
+            "plain: C q q'/r between all pairs; damped-shifted: damped and cut, for periodic boxes",
+            Range::any,
+            {"plain", "damped-shifted"}},
+           {"damping", Type::real, "none", "1/length", "alpha of the form damped-shifted", Range::non_negative},
+           {"cutoff", Type::real, "none", "length", "where the form damped-shifted ends", Range::positive}}),
       .formula = "sum over pairs of C q q'/r, or of C q q' [erfc(alpha r)/r - polynomial in r^2] up to the cutoff",
       .documentation =
           "Charges in vacuum (plain, all pairs summed directly, not in periodic boxes), or the damped-shifted sum that "

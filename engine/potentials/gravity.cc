@@ -19,7 +19,7 @@ std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionConte
 InteractionInfo gravity() {
   return {.name = "gravity",
           .kind = InteractionInfo::Kind::pair,
-          .parameters = {{"constant", Type::real, "1.0", "energy*length/mass^2", "G"}, options::species()},
+          .parameters = options::with_filter({{"constant", Type::real, "1.0", "energy*length/mass^2", "G"}}),
           .formula = "sum over pairs of -G m m'/r",
           .documentation = "Newton's gravitation between all pairs, summed directly. Not in periodic boxes.",
           .source = "Enomoto, thesis, 2011, experiment 2",

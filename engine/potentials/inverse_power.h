@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/potentials/potential.h"
 
@@ -43,6 +44,11 @@ class InversePower {
     const T growth = elementary::expm1(-n_ * elementary::log1p(difference / lower));
     const T v = value(lower);
     return difference == 0.0 ? -n_ * v / lower : v * growth / difference;
+  }
+  /// ∫_r^∞ V r^(D−1) dr = V r^D/(p − D), infinite for p ≤ D
+  double tail(double r, int dimension) const {
+    if (2 * n_ <= dimension) return std::numeric_limits<double>::infinity();
+    return value(r * r) * std::pow(r, dimension) / (2 * n_ - dimension);
   }
 
  private:

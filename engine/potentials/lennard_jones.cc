@@ -26,8 +26,7 @@ InteractionInfo lennard_jones() {
           .formula = "sum over pairs of 4 eps [(sigma/r)^12 - (sigma/r)^6]",
           .documentation =
               "Van der Waals attraction with a soft core. Literature values for 'cut and shifted' fluids need cut = "
-              "'shifted'; the smooth cut changes the potential by its polynomial, which is small at a cutoff of 2.5 "
-              "sigma or more.",
+              "'shifted'; those for the full potential, or the truncated one with long-range corrections, tail = true.",
           .source = "Jones, Proc. R. Soc. A 106 (1924) 463",
           .in_2d = make<2>,
           .in_3d = make<3>};

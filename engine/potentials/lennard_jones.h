@@ -39,6 +39,11 @@ class LennardJones {
     const T x = sigma2_ / rho_old, y = sigma2_ / rho_new;
     return -4 * epsilon_ / sigma2_ * (x * y) * (x * x + y * y + x * y) * (cube(x) + cube(y) - 1);
   }
+  /// ∫_r^∞ V r^(D−1) dr = 4ε r^D [u²/(12 − D) − u/(6 − D)]
+  double tail(double r, int dimension) const {
+    const double u = cube(sigma2_ / (r * r));
+    return 4 * epsilon_ * std::pow(r, dimension) * u * (u / (12 - dimension) - 1.0 / (6 - dimension));
+  }
 
  private:
   template <class T>

@@ -6,36 +6,65 @@
 
 namespace carom::options {
 
-Parameter species() {
-  return {"species", Parameter::Type::text_list, "none", "-",
-          "two species names: the term acts only between these; absent: between all particles"};
+std::vector<Parameter> with_filter(std::vector<Parameter> own) {
+  using enum Parameter::Type;
+  own.push_back({"species", text_list, "none", "-",
+                 "two species names: the term acts only between these; absent: between all particles"});
+  own.push_back({"exclude",
+                 text,
+                 "\"none\"",
+                 "-",
+                 "'bonded': pairs joined by any harmonic-bond do not feel this term",
+                 Parameter::Range::any,
+                 {"none", "bonded"}});
+  return own;
 }
 
-Parameter cutoff() {
-  return {"cutoff",
-          Parameter::Type::real,
-          "none",
-          "length",
-          "distance at which the potential ends; absent: never, which a periodic box does not allow",
-          Parameter::Range::positive};
-}
-
-Parameter cut() {
-  return {"cut",
-          Parameter::Type::text,
-          "\"smooth\"",
-          "-",
-          "how it ends: 'smooth' subtracts a polynomial in r^2 so that V, V' and V'' go to zero; 'shifted' subtracts a "
-          "constant, so that the force jumps at the cutoff and time steps lose their order there",
-          Parameter::Range::any,
-          {"smooth", "shifted"}};
+std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view absent_cutoff) {
+  using enum Parameter::Type;
+  own = with_filter(std::move(own));
+  own.push_back({"cutoff", real, "none", "length", absent_cutoff, Parameter::Range::positive});
+  own.push_back(
+      {"cut",
+       text,
+       "\"switch\"",
+       "-",
+       "how it ends: 'switch' leaves V as it is up to switch_from and brings V, V' and V'' to zero from there; "
+       "'shifted' subtracts V(cutoff), so that the force jumps at the cutoff and time steps lose their order "
+       "there; 'force-shifted' subtracts a function linear in r, so that V and the force go to zero",
+       Parameter::Range::any,
+       {"switch", "shifted", "force-shifted"},
+       {{"smooth", "write cut = \"switch\", which leaves V as it is up to switch_from"}}});
+  own.push_back({"switch_from", real, "none", "length",
+                 "where cut = 'switch' begins to differ from V; absent: 0.9 of the cutoff",
+                 Parameter::Range::positive});
+  return own;
 }
 
 std::vector<Parameter> with_pair_options(std::vector<Parameter> own) {
-  own.push_back(species());
-  own.push_back(cutoff());
-  own.push_back(cut());
+  own = with_cut(std::move(own),
+                 "distance at which the potential ends; absent: never, which a periodic box does not allow");
+  own.push_back({"tail", Parameter::Type::boolean, "false", "-",
+                 "add the long-range correction of a uniform fluid for what the cutoff takes away to the energy and "
+                 "pressure that are reported; of 'shifted' that of the truncated potential, not the shift"});
   return own;
+}
+
+CutOptions cut_options(std::string_view type, const Parameters& parameters, double end) {
+  const double cutoff = parameters.has("cutoff") ? parameters.real("cutoff") : end;
+  const std::string cut = parameters.has("cut") ? parameters.text("cut") : "switch";
+  const bool switched = cut == "switch";
+  if (!switched && parameters.has("switch_from"))
+    refuse(type, "'switch_from' belongs to cut = \"switch\"; leave it out or change 'cut'");
+  const double from = parameters.has("switch_from") ? parameters.real("switch_from") : 0.9 * cutoff;
+  if (from >= cutoff) refuse(type, "'switch_from' is not below the cutoff; give a smaller distance");
+  const CutKind kind = switched ? CutKind::switched : cut == "shifted" ? CutKind::shifted : CutKind::force_shifted;
+  return {cutoff, kind, from};
+}
+
+void refuse_cut_options(std::string_view type, const Parameters& parameters) {
+  if (parameters.has("switch_from") || (parameters.has("tail") && parameters.flag("tail")))
+    refuse(type, "'switch_from' and 'tail' are for potentials with an end; give 'cutoff'");
 }
 
 void refuse(std::string_view type, const std::string& problem) {
@@ -54,13 +83,12 @@ std::uint16_t species_index(std::string_view type, const std::string& name, cons
 
 }  // namespace
 
-std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters& parameters,
-                                        const std::vector<std::string>& known) {
+SpeciesPair species_pair(std::string_view type, const Parameters& parameters, const std::vector<std::string>& known) {
   if (!parameters.has("species")) return {};
   const auto& names = parameters.get<std::vector<std::string>>("species");
   if (names.size() != 2)
     refuse(type, "'species' has " + std::to_string(names.size()) + " entries; give the two species it acts between");
-  return {species_index(type, names[0], known), species_index(type, names[1], known)};
+  return std::array{species_index(type, names[0], known), species_index(type, names[1], known)};
 }
 
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles) {

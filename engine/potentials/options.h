@@ -12,23 +12,35 @@
 #include "engine/neighbour_list.h"
 #include "engine/potentials/cut.h"
 #include "engine/potentials/pair_term.h"
+#include "engine/potentials/tail.h"
 #include "engine/vicinity.h"
 
 namespace carom::options {
 
-/// Shared declarations.
-Parameter species();
-Parameter cutoff();
-Parameter cut();
+/// `own` followed by those that say between which particles a term acts.
+std::vector<Parameter> with_filter(std::vector<Parameter> own);
 
-/// `own` followed by species, cutoff and cut.
+/// The same, followed by cutoff, cut and switch_from.
+std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view absent_cutoff);
+
+/// The same, followed by tail: what a potential without an end of its own can be given.
 std::vector<Parameter> with_pair_options(std::vector<Parameter> own);
 
 [[noreturn]] void refuse(std::string_view type, const std::string& problem);
 
-/// The two species `species` names, as indices into `known`; empty if the key is absent.
-std::vector<std::uint16_t> species_pair(std::string_view type, const Parameters& parameters,
-                                        const std::vector<std::string>& known);
+/// The two species `species` names, as indices into `known`.
+SpeciesPair species_pair(std::string_view type, const Parameters& parameters, const std::vector<std::string>& known);
+
+/// What `cutoff`, `cut` and `switch_from` say; it ends at `end` where there is no `cutoff`.
+struct CutOptions {
+  double cutoff;
+  CutKind kind;
+  double switch_from;
+};
+CutOptions cut_options(std::string_view type, const Parameters& parameters, double end = 0);
+
+/// Refuses what is said of the end of a potential without `cutoff`.
+void refuse_cut_options(std::string_view type, const Parameters& parameters);
 
 /// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending; none for `within`.
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
@@ -71,10 +83,18 @@ Vec<D> vector(std::string_view type, const Parameters& parameters, std::string_v
   return Eigen::Map<const Vec<D>>(given.data());
 }
 
+/// What `species` and `exclude` say.
 template <int D>
-SpeciesRule species_rule(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
-  const auto pair = species_pair(type, parameters, context.species);
-  return pair.empty() ? SpeciesRule() : SpeciesRule{&context.particles.species, pair[0], pair[1]};
+PairFilter filter(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
+  const SpeciesPair species = species_pair(type, parameters, context.species);
+  const bool exclude = parameters.has("exclude") && parameters.text("exclude") == "bonded";
+  if (exclude && !context.bonds)
+    refuse(type,
+           "exclude = \"bonded\" leaves out bonded pairs, but there are no bonds; leave it out or add a harmonic-bond");
+  PairFilter filter;
+  if (species) filter.species = {&context.particles.species, (*species)[0], (*species)[1]};
+  if (exclude) filter.excluded = context.bonds, filter.id = &context.particles.id;
+  return filter;
 }
 
 template <int D>
@@ -87,9 +107,9 @@ bool any_periodic(const Box<D>& box) {
 /// A term over the pairs of a source, with the scale of the potential before it was cut.
 template <int D, Potential P, class Pairs>
 std::unique_ptr<Interaction<D>> term(P potential, PairWeight weight, const InteractionContext<D>& context, Pairs pairs,
-                                     const auto& whole) {
-  return std::make_unique<PairTerm<D, P, Pairs>>(context.particles, potential, weight, std::move(pairs),
-                                                 [whole](double distance) { return whole.scale(distance); });
+                                     const auto& whole, Tail tail = {}) {
+  const auto scale = [whole](double distance) { return whole.scale(distance); };
+  return std::make_unique<PairTerm<D, P, Pairs>>(context.particles, potential, weight, std::move(pairs), scale, tail);
 }
 
 /// A term over all pairs; `remedy` says what to write instead in a periodic box, where there is no such sum.
@@ -97,30 +117,71 @@ template <int D, Potential P>
 std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, PairWeight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context,
                                           const std::string& remedy) {
-  const SpeciesRule species = species_rule(type, parameters, context);
+  PairFilter pairs_of = filter(type, parameters, context);
   if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
-  return term<D>(potential, weight, context, AllPairs<D>(context.box, context.total, species), potential);
+  return term<D>(potential, weight, context, AllPairs<D>(context.box, context.total, std::move(pairs_of)), potential);
 }
 
-/// A term over the pairs within the reach of a potential that ends by itself.
+/// A term over the pairs within the reach of a potential that ends by itself, or of `whole` that was cut.
 template <int D, ShortRanged P>
 std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, PairWeight weight,
                                              const Parameters& parameters, const InteractionContext<D>& context,
-                                             const auto& whole) {
+                                             const auto& whole, Tail tail = {}) {
   const double reach = std::sqrt(potential.cutoff_squared()) * (1 + 1e-15);
-  return term<D>(potential, weight, context,
-                 PairsWithinCutoff<D>(context.box, reach, species_rule(type, parameters, context)), whole);
+  PairsWithinCutoff<D> pairs(context.box, reach, filter(type, parameters, context));
+  return term<D>(potential, weight, context, std::move(pairs), whole, tail);
+}
+
+/// The long-range correction of a term over all particles on all ranks.
+template <int D, KnowsTail P>
+Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, PairWeight weight, const Parameters& parameters,
+          const InteractionContext<D>& context) {
+  if (kind == CutKind::force_shifted)
+    refuse(type, "'tail' does not go with cut = \"force-shifted\", which changes V at all distances; take \"switch\"");
+  for (int k = 0; k < D; ++k)
+    if (!context.box.periodic(k))
+      refuse(type, "'tail' is for a fluid without borders; make the box periodic or leave it out");
+  if (!std::isfinite(cut.whole().tail(1, D)))
+    refuse(type, "the long-range correction diverges: V falls off too slowly; leave 'tail' out");
+  const SpeciesPair species = species_pair(type, parameters, context.species);
+  struct Sums {
+    std::array<ExactSum, 2> weight;  // of either species
+    void add(const Sums& other) {
+      for (int k = 0; k < 2; ++k) weight[k].add(other.weight[k]);
+    }
+  } sums;
+  const auto* factor = pair_factors(weight, context.particles);
+  for (Id i = 0; i < context.particles.mass.size(); ++i)
+    for (int k = 0; k < 2; ++k)
+      if (!species || context.particles.species[i] == (*species)[k]) sums.weight[k].add(factor ? (*factor)[i] : 1.0);
+  if (context.ranks) sums = sum_of_all(*context.ranks, sums);
+  const double pairs = sums.weight[0].value() * sums.weight[1].value();
+  const bool alike = !species || (*species)[0] == (*species)[1];
+  return tail_of<D>(cut, alike ? pairs / 2 : pairs, context.box.volume());
+}
+
+/// A term cut as said, with its long-range correction if the deck wants it.
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> cut_term(std::string_view type, P potential, PairWeight weight,
+                                         const CutOptions& options, const Parameters& parameters,
+                                         const InteractionContext<D>& context) {
+  const Cut<P> cut(potential, options.cutoff, options.kind, options.switch_from);
+  Tail correction;
+  if constexpr (KnowsTail<P>)
+    if (parameters.has("tail") && parameters.flag("tail"))
+      correction = tail<D>(type, cut, options.kind, weight, parameters, context);
+  return within_reach<D>(type, cut, weight, parameters, context, potential, correction);
 }
 
 /// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.
 template <int D, Potential P>
 std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, PairWeight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context) {
-  if (!parameters.has("cutoff"))
+  if (!parameters.has("cutoff")) {
+    refuse_cut_options(type, parameters);
     return all_pairs<D>(type, potential, weight, parameters, context, "give 'cutoff', at most half the shortest edge");
-  const CutKind kind = parameters.text("cut") == "shifted" ? CutKind::shifted : CutKind::smooth;
-  return within_reach<D>(type, Cut<P>(potential, parameters.real("cutoff"), kind), weight, parameters, context,
-                         potential);
+  }
+  return cut_term<D>(type, potential, weight, cut_options(type, parameters), parameters, context);
 }
 
 }  // namespace carom::options

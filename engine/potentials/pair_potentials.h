@@ -10,6 +10,7 @@
 #include "engine/potentials/inverse_distance.h"
 #include "engine/potentials/inverse_power.h"
 #include "engine/potentials/lennard_jones.h"
+#include "engine/potentials/table.h"
 #include "engine/potentials/wca.h"
 #include "engine/potentials/yukawa.h"
 
@@ -24,7 +25,8 @@ using PairPotentials = PotentialList<HarmonicBond,                     // bonds
                                      Yukawa, Cut<Yukawa>,              //
                                      LennardJones, Cut<LennardJones>,  //
                                      Wca,                              //
-                                     InversePower, Cut<InversePower>>;
+                                     InversePower, Cut<InversePower>,  //
+                                     Cut<Table>>;
 
 /// Where in the list a potential stands.
 template <class P, class First, class... Rest>

@@ -18,17 +18,25 @@ namespace carom {
 /// w_ij = 1, m_i m_j or q_i q_j.
 enum class PairWeight { one, masses, charges };
 
+/// The factors of w_ij; null: all 1.
+template <int D>
+const std::vector<double>* pair_factors(PairWeight weight, const Particles<D>& particles) {
+  if (weight == PairWeight::one) return nullptr;
+  return weight == PairWeight::masses ? &particles.mass : &particles.charge;
+}
+
 template <int D, Potential P, class Pairs>
 class PairTerm final : public Interaction<D> {
  public:
   /// `particles` tells who is a ghost, and outlives the term. `scale`: of pairs of weight 1, at a given distance.
   PairTerm(const Particles<D>& particles, P potential, PairWeight weight, Pairs pairs,
-           std::function<ForceScale(double)> scale)
+           std::function<ForceScale(double)> scale, Tail tail = {})
       : particles_(particles),
         potential_(std::move(potential)),
         weight_(weight),
         pairs_(std::move(pairs)),
         scale_(std::move(scale)),
+        tail_(tail),
         batch_(std::make_unique<PairBatch>()) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override { evaluate({.x = x}, nullptr, &sums); }
@@ -47,7 +55,14 @@ class PairTerm final : public Interaction<D> {
   std::unique_ptr<Interaction<D>> among(const Particles<D>& /*made_for*/, const Particles<D>& some) const override {
     auto pairs = pairs_.among(some);
     if (!pairs) return nullptr;
-    return std::make_unique<PairTerm>(some, potential_, weight_, std::move(*pairs), scale_);
+    return std::make_unique<PairTerm>(some, potential_, weight_, std::move(*pairs), scale_, tail_);
+  }
+  Tail tail() const override { return tail_; }
+  const PairList* bonds() const override {
+    if constexpr (requires { pairs_.list(); })
+      return &pairs_.list();
+    else
+      return nullptr;
   }
   double reach(Positions<D> x) const override { return pairs_.reach(x); }
   double reach(const Particles<D>& share, Exchange& ranks) const override { return pairs_.reach(share, ranks); }
@@ -78,10 +93,7 @@ class PairTerm final : public Interaction<D> {
     else
       return std::numeric_limits<double>::infinity();
   }
-  const std::vector<double>* factors() const {
-    if (weight_ == PairWeight::one) return nullptr;
-    return weight_ == PairWeight::masses ? &particles_.mass : &particles_.charge;
-  }
+  const std::vector<double>* factors() const { return pair_factors(weight_, particles_); }
   PairStep<D> step(PairStep<D> given) const {
     given.weight = factors();
     return given;
@@ -163,6 +175,7 @@ class PairTerm final : public Interaction<D> {
   PairWeight weight_;
   Pairs pairs_;
   std::function<ForceScale(double)> scale_;
+  Tail tail_;
   const PairKernels& kernels_ = pair_kernels();
   std::unique_ptr<PairBatch> batch_;
 };

@@ -27,13 +27,6 @@
 
 namespace carom {
 
-/// The same rule for other particles.
-template <int D>
-SpeciesRule among(SpeciesRule rule, const Particles<D>& some) {
-  if (!rule.all()) rule.species_of = &some.species;
-  return rule;
-}
-
 /// Fills the batch from a list, for each of the parts of the list.
 template <int D, class Visit>
 void collect_batches(PairRecords<D>& records, const Box<D>& box, const PairStep<D>& step, double cutoff_squared,
@@ -55,6 +48,8 @@ class Bonds {
     for (const auto& pair : pairs_)
       for (const Id i : pair) most_partners_ = std::max(most_partners_, ++partners[i]);
   }
+
+  const PairList& list() const { return pairs_; }
 
   std::optional<Bonds> among(const Particles<D>& some) const {
     if (some.id.empty()) return *this;
@@ -155,12 +150,12 @@ class Bonds {
 template <int D>
 class AllPairs {
  public:
-  AllPairs(const Box<D>& box, std::size_t particles, SpeciesRule species)
-      : box_(box), particles_(particles), species_(species) {}
+  AllPairs(const Box<D>& box, std::size_t particles, PairFilter filter)
+      : box_(box), particles_(particles), filter_(std::move(filter)) {}
 
   std::optional<AllPairs> among(const Particles<D>& some) const {
     if (some.size() < particles_) return std::nullopt;
-    return AllPairs(box_, particles_, carom::among(species_, some));
+    return AllPairs(box_, particles_, filter_.among(some));
   }
   double reach(Positions<D>) const { return std::numeric_limits<double>::infinity(); }
   double reach(const Particles<D>&, Exchange&) const { return std::numeric_limits<double>::infinity(); }
@@ -187,16 +182,22 @@ class AllPairs {
     ghost_ = particles.ghost;
     records_.clear();
     std::vector<std::uint32_t> end;  // of each group: by species and, within that, owned and not
-    const bool apart = !species_.all() && species_.a != species_.b;
+    const bool apart = !filter_.species.all() && filter_.species.a != filter_.species.b;
     for (const std::uint64_t code : {PartnerSearch::kFirst, PartnerSearch::kSecond})
       for (const bool owned : {true, false}) {
         for (Id i = 0; i < particles_; ++i)
-          if (particles.owns(i) == owned && (species_.code(i) & code) != 0 && (apart || code == PartnerSearch::kFirst))
+          if (particles.owns(i) == owned && (filter_.species.code(i) & code) != 0 &&
+              (apart || code == PartnerSearch::kFirst))
             records_.order.push_back(i);
         end.push_back(static_cast<std::uint32_t>(records_.order.size()));
       }
     const auto add = [&](auto kind, std::uint32_t row, std::uint32_t first, std::uint32_t last) {
-      if (first < last) records_.runs[kind].push_back({row, first, last - first, {0, 0, 0}});
+      const auto run = [&](std::uint32_t stop) {
+        if (first < stop) records_.runs[kind].push_back({row, first, stop - first, {0, 0, 0}});
+      };
+      for (std::uint32_t r = first; filter_.excluded && r < last; ++r)
+        if (filter_.excludes(records_.order[row], records_.order[r])) run(r), first = r + 1;
+      run(last);
     };
     for (std::uint32_t row = 0; row < end[1]; ++row) {
       const bool owned = row < end[0];
@@ -214,7 +215,7 @@ class AllPairs {
 
   const Box<D>& box_;
   std::size_t particles_;
-  SpeciesRule species_;
+  PairFilter filter_;
   const PairKernels& kernels_ = pair_kernels();
   // Caches: their state never shows in the sums.
   mutable PairRecords<D> records_;
@@ -225,11 +226,11 @@ class AllPairs {
 template <int D>
 class PairsWithinCutoff {
  public:
-  PairsWithinCutoff(const Box<D>& box, double cutoff, SpeciesRule species)
-      : box_(box), cutoff_(cutoff), species_(species), list_(box, cutoff, species) {}
+  PairsWithinCutoff(const Box<D>& box, double cutoff, PairFilter filter)
+      : box_(box), cutoff_(cutoff), filter_(filter), list_(box, cutoff, std::move(filter)) {}
 
   std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
-    return PairsWithinCutoff(box_, cutoff_, carom::among(species_, some));
+    return PairsWithinCutoff(box_, cutoff_, filter_.among(some));
   }
   double reach(Positions<D>) const { return cutoff_; }
   double reach(const Particles<D>&, Exchange&) const { return cutoff_; }
@@ -249,7 +250,7 @@ class PairsWithinCutoff {
  private:
   const Box<D>& box_;
   double cutoff_;
-  SpeciesRule species_;
+  PairFilter filter_;
   const PairKernels& kernels_ = pair_kernels();
   // Caches: their state never shows in the sums.
   mutable CutoffList<D> list_;

@@ -14,6 +14,7 @@ const std::vector<InteractionInfo>& interactions() {
       types::lennard_jones(),  // van der Waals
       types::wca(),            // its repulsive part
       types::inverse_power(),  // soft spheres
+      types::table(),          // any pair potential, from points
       types::uniform_field(),  // weight
       types::harmonic_trap(),  // a spring to one point
   };

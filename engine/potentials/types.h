@@ -12,6 +12,7 @@ InteractionInfo yukawa();
 InteractionInfo lennard_jones();
 InteractionInfo wca();
 InteractionInfo inverse_power();
+InteractionInfo table();
 InteractionInfo uniform_field();
 InteractionInfo harmonic_trap();
 

@@ -21,9 +21,9 @@ InteractionInfo wca() {
   return {
       .name = "wca",
       .kind = InteractionInfo::Kind::pair,
-      .parameters = {{"epsilon", Type::real, "", "energy", "V at r = sigma", Range::non_negative},
-                     {"sigma", Type::real, "", "length", "distance at which V = eps", Range::positive},
-                     options::species()},
+      .parameters =
+          options::with_filter({{"epsilon", Type::real, "", "energy", "V at r = sigma", Range::non_negative},
+                                {"sigma", Type::real, "", "length", "distance at which V = eps", Range::positive}}),
       .formula = "sum over pairs of 4 eps [(sigma/r)^12 - (sigma/r)^6] + eps up to r = 2^(1/6) sigma",
       .documentation =
           "The repulsive part of Lennard-Jones. V'' jumps at the cutoff: claims of order above 2 do not hold with it.",

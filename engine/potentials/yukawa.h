@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/potentials/potential.h"
 
@@ -63,6 +64,12 @@ class Yukawa {
       mean = far ? wide : mean;
     }
     return -amplitude_ * mean / (r * s * sum);
+  }
+  /// ∫_r^∞ V r^(D−1) dr = A e^(−κr) (1 + κr)/κ² or, in two dimensions, A e^(−κr)/κ; infinite for κ = 0
+  double tail(double r, int dimension) const {
+    if (kappa_ == 0) return std::numeric_limits<double>::infinity();
+    const double v = amplitude_ * elementary::exp(-kappa_ * r);
+    return dimension == 3 ? v * (1 + kappa_ * r) / (kappa_ * kappa_) : v / kappa_;
   }
 
  private:

@@ -77,6 +77,16 @@ def changed(old, new, deck=GOOD):
     return deck.replace(old, new)
 
 
+def lennard_jones(more):
+    return changed("[integrator]\ntype = \"free-flight\"",
+                   f'[[interaction]]\ntype = "lennard-jones"\nepsilon = 1\nsigma = 1\n{more}\n[integrator]\ntype = "verlet"\nstep = 0.1',
+                   FLUID)
+
+
+def table(more):
+    return lennard_jones(more).replace('"lennard-jones"\nepsilon = 1\nsigma = 1', '"table"')
+
+
 def test_good_decks_are_valid(tmp_path):
     for deck in (GOOD, FLUID):
         answer = validate(tmp_path, deck)
@@ -100,6 +110,11 @@ DECK_ERRORS = {
     "fraction for an integer": (changed("steps = 10", "steps = 10.5"), 27, ["'steps' has the wrong type", "integer"]),
     "wrong type in a list": (changed("[[2.0, 5.0]", '[[2.0, "5"]'), 11, ["'position' has the wrong type: string"]),
     "single table for a list": (changed("[[particles]]", "[particles]"), 9, ["write [[particles]]"]),
+    "integrator that is no more": (
+        changed('type = "cdda"', 'type = "acdda"'), 23, ["unknown integrator 'acdda'", 'write "edda"']),
+    "key that is no more": (
+        changed('type = "cdda"', 'type = "edda"\nadaptive = 1e-6'),
+        24, ["unknown key 'adaptive' in [integrator]", "take a shorter 'step'"]),
     "missing key": (changed("step = 0.01\n", ""), 22, ["missing key 'step' in [integrator]", "positive number"]),
     "missing position and count": (
         changed("position = [[2.0, 5.0], [5.0, 5.0]]\nvelocity = [[1.0, 0.0], [0.0, 0.0]]\n", ""),
@@ -168,6 +183,29 @@ DECK_ERRORS = {
     "forces in free flight": (
         changed("[integrator]", '[[interaction]]\ntype = "wca"\nepsilon = 1\nsigma = 1\n[integrator]', FLUID),
         17, ["free-flight cannot carry the interaction 'wca'", "uniform-field"]),
+    "the cut of earlier versions": (
+        lennard_jones('cutoff = 2\ncut = "smooth"'), 22, ["'cut' can no longer be 'smooth'", 'write cut = "switch"']),
+    "unknown cut": (lennard_jones('cutoff = 2\ncut = "swicth"'), 22, ["'cut' cannot be 'swicth'", "did you mean 'switch'?"]),
+    "switch beyond the cutoff": (lennard_jones("cutoff = 2\nswitch_from = 2.5"), 17, ["'switch_from' is not below the cutoff"]),
+    "switch of a shifted potential": (
+        lennard_jones('cutoff = 2\ncut = "shifted"\nswitch_from = 1'), 17, ["'switch_from' belongs to cut = \"switch\""]),
+    "negative switch": (lennard_jones("cutoff = 2\nswitch_from = -1"), 22, ["'switch_from' must be positive (is -1)"]),
+    "tail that diverges": (
+        lennard_jones("exponent = 3\ncutoff = 2\ntail = true").replace("lennard-jones", "inverse-power"),
+        17, ["the long-range correction diverges", "leave 'tail' out"]),
+    "tail of a shifted force": (
+        lennard_jones('cutoff = 2\ncut = "force-shifted"\ntail = true'), 17, ["'tail' does not go with", 'take "switch"']),
+    "tail between walls": (
+        lennard_jones("cutoff = 2\ntail = true").replace('"periodic"]', '"wall"]'), 17, ["for a fluid without borders"]),
+    "bonds left out that are not there": (
+        lennard_jones('cutoff = 2\nexclude = "bonded"'), 17, ["there are no bonds", "add a harmonic-bond"]),
+    "unknown exclusion": (
+        lennard_jones('cutoff = 2\nexclude = "bonds"'), 22, ["'exclude' cannot be 'bonds'", "did you mean 'bonded'?"]),
+    "table without points": (table(""), 17, ["no points are given", "'file'"]),
+    "table out of order": (table("r = [1, 3, 2]\nvalue = [2, 1, 0]"), 17, ["the distances do not ascend"]),
+    "table with a distance of zero": (table("r = [0, 1]\nvalue = [1, 0]"), 19, ["'r' must be positive (is 0)"]),
+    "cutoff beyond the table": (table("r = [1, 2]\nvalue = [1, 0]\ncutoff = 3"), 17, ["'cutoff' lies beyond the last point"]),
+    "table twice": (table('r = [1, 2]\nvalue = [1, 0]\nfile = "v.csv"'), 21, ["'file' and the points themselves exclude each other"]),
     "unknown species": (
         changed("[integrator]", '[[interaction]]\ntype = "wca"\nepsilon = 1\nsigma = 1\nspecies = ["sphere", "spere"]\n[integrator]', FLUID),
         21, ["unknown species 'spere'", "did you mean 'sphere'?"]),
@@ -285,6 +323,26 @@ def test_positions_file(tmp_path):
     assert "1 positions for 2 particles" in answer.stderr
     (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n2.5 1 +1  # on the floor\n")
     assert validate(tmp_path, deck).returncode == 0
+
+
+def test_potential_from_a_file(tmp_path):
+    deck = changed("collisions = 10", "steps = 10", table('file = "potential.csv"'))
+    answer = validate(tmp_path, deck)
+    assert (answer.returncode, "potential.csv" in answer.stderr) == (5, True)
+    (tmp_path / "potential.csv").write_text("r,V\n0.9,1\n1.2\n")
+    answer = validate(tmp_path, deck)
+    assert answer.returncode == 2
+    assert "potential.csv:3:1: error: not a point of a potential; give 2 finite numbers" in answer.stderr
+    (tmp_path / "potential.csv").write_text("r,V\n0.9,1\n1.2,0.5\n1.2,0\n")
+    answer = validate(tmp_path, deck)
+    assert answer.returncode == 2
+    assert "deck.toml:17:1: error: table: the distances do not ascend" in answer.stderr
+    (tmp_path / "potential.csv").write_text("r,V\n0.9 1\n1.2 0.5 # there\n1.5 0\n")
+    assert validate(tmp_path, deck).returncode == 0
+    run = carom("run", "deck.toml", "-o", "one", "--quiet", cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    resolved = (tmp_path / "one" / "deck.toml").read_text()
+    assert "r = [0.9, 1.2, 1.5]\nvalue = [1.0, 0.5, 0.0]" in resolved and "cutoff = 1.5" in resolved and "file" not in resolved
 
 
 def test_unreadable_deck(tmp_path):

@@ -154,6 +154,32 @@ def test_bonds_across_ranks(tmp_path):
         assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
 
 
+def test_bonded_pairs_left_out_and_tables_across_ranks(tmp_path):
+    (tmp_path / "potential.csv").write_text("r,V\n0.9,3.0\n1.2,0.8\n1.5,0.3\n2.0,0.0\n")
+    bonds = {"type": "harmonic-bond", "chain": True, "chain_length": 8, "stiffness": 50.0, "rest_length": 1.1}
+    table = {"type": "table", "file": "potential.csv", "exclude": "bonded"}
+    attraction = {"type": "lennard-jones", "epsilon": 0.5, "sigma": 1.0, "cutoff": 2.0, "exclude": "bonded", "tail": True}
+    chains = tomllib.loads(SPHERES) | {
+        "particles": [{"name": "bead", "count": 512, "temperature": 1.0, "radius": 0.5}],
+        "placement": {"type": "simple-cubic", "packing_fraction": 0.3},
+        "interaction": [table, attraction, bonds],
+        "integrator": {"type": "psa", "step": 0.005},
+        "run": {"steps": 40},
+        "output": {"directory": "unused", "frame_interval": 0.1, "thermo_interval": 0.05, "events": True}}
+    run(write_deck(tmp_path, toml_text(chains)), tmp_path / "plain")
+    done = summary(tmp_path / "plain")
+    assert done["events"]["sphere_sphere"] > 0 and done["tail"]["energy"] < 0
+    for ranks in 2, 3:
+        mpirun(ranks, RANK_0_AT_HOME + command("input.toml", tmp_path / str(ranks)), cwd=tmp_path)
+        assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
+        assert summary(tmp_path / str(ranks))["tail"] == done["tail"]
+    run(tmp_path / "input.toml", tmp_path / "narrow", env=os.environ | {"CAROM_SIMD": "sse2"})
+    assert compare.compare(tmp_path / "plain", tmp_path / "narrow") == []
+    chains["interaction"] = [dict(table, exclude="none"), attraction, bonds]
+    run(write_deck(tmp_path, toml_text(chains)), tmp_path / "all")
+    assert summary(tmp_path / "all")["energy"]["initial"] > done["energy"]["initial"]  # the bonded repel each other
+
+
 def test_too_few_particles_to_share(tmp_path):
     deck = write_deck(tmp_path, SPRINGS)
     run(deck, tmp_path / "one")

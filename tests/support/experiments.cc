@@ -4,6 +4,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "engine/pair_filter.h"
 #include "engine/placement.h"
 #include "engine/random.h"
 #include "engine/shares.h"
@@ -63,7 +64,8 @@ void add_interaction(System<D>& system, const std::string& type, const Given& gi
                                                                              .particles = system.particles,
                                                                              .species = system.species,
                                                                              .total = system.size(),
-                                                                             .ranks = shared_by(system)}));
+                                                                             .ranks = shared_by(system),
+                                                                             .bonds = bonds_of(system.interactions)}));
 }
 
 std::unique_ptr<System<2>> five_springs(unsigned start) {

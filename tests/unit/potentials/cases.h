@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
+#include <type_traits>
 
 #include "tests/unit/potentials/scene.h"
 
@@ -33,24 +33,33 @@ inline const std::vector<Case>& cases() {
       {"yukawa", Boundary::wall, {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", true}}},
       {"yukawa",
        Boundary::periodic,
-       {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", false}, {"cutoff", 2.2}, {"cut", "smooth"s}}},
+       {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", false}, {"cutoff", 2.2}, {"cut", "switch"s}}},
       {"lennard-jones", Boundary::open, {{"epsilon", 1.0}, {"sigma", 0.8}}},
       {"lennard-jones",
        Boundary::periodic,
-       {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "smooth"s}, {"species", Names{"B", "B"}}}},
+       {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "switch"s}, {"species", Names{"B", "B"}}}},
+      {"lennard-jones", Boundary::open, {{"epsilon", 1.0}, {"sigma", 0.8}, {"cutoff", 2.0}, {"cut", "force-shifted"s}}},
+      {"table",
+       Boundary::periodic,
+       {{"r", std::vector<double>{0.5, 0.7, 0.9, 1.2, 1.6, 2.0}},
+        {"value", std::vector<double>{9.0, 5.0, 1.0, -1.0, -0.4, -0.1}},
+        {"slope", std::vector<double>{-30.0, 0.2}},
+        {"cut", "switch"s},
+        {"switch_from", 1.3}}},
       {"wca", Boundary::periodic, {{"epsilon", 1.0}, {"sigma", 1.1}}},
       {"inverse-power",
        Boundary::periodic,
-       {{"epsilon", 1.0}, {"sigma", 0.8}, {"exponent", 9.5}, {"cutoff", 2.0}, {"cut", "smooth"s}}},
+       {{"epsilon", 1.0}, {"sigma", 0.8}, {"exponent", 9.5}, {"cutoff", 2.0}, {"cut", "switch"s}}},
       {"uniform-field", Boundary::wall, {}},
       {"harmonic-trap", Boundary::wall, {{"stiffness", 0.7}}},
   };
   return all;
 }
 
-/// Calls check(scene, term) for every case. What the terms read from the environment they read again for each.
-template <int D>
-void for_each_case(const std::function<void(Scene<D>&, const Interaction<D>&)>& check) {
+/// Calls check(scene, term) for every case, or check(scene, term, remake), where remake(scene) makes the same term for
+/// another scene. What the terms read from the environment they read again for each.
+template <int D, class Check>
+void for_each_case(Check&& check) {
   for (const Case& each : cases()) {
     SCOPED_TRACE(each.type + " in " + std::to_string(D) + " dimensions");
     Scene<D> scene(D == 2 ? 24 : 40, 5, each.boundary, 0.75);
@@ -62,7 +71,11 @@ void for_each_case(const std::function<void(Scene<D>&, const Interaction<D>&)>& 
       }
     if (each.type == "uniform-field") parameters.emplace_back("acceleration", std::vector<double>(D, -0.6));
     const auto term = scene.make(each.type, parameters);
-    check(scene, *term);
+    const auto remake = [&](const Scene<D>& other) { return other.make(each.type, parameters); };
+    if constexpr (std::is_invocable_v<Check, Scene<D>&, const Interaction<D>&, decltype(remake)>)
+      check(scene, *term, remake);
+    else
+      check(scene, *term);
   }
 }
 

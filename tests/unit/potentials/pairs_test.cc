@@ -105,6 +105,57 @@ TEST(Pairs, BondsWithinADistanceJoinTheNeighboursOfALattice) {
   EXPECT_DOUBLE_EQ(energy(*bonds, scene.particles.x), 32);
 }
 
+TEST(Pairs, APairByHand) {  // Lennard-Jones at r = 1.3: V = 4 (1.3⁻¹² − 1.3⁻⁶), d·F = 24 (2·1.3⁻¹² − 1.3⁻⁶)
+  Scene<3> scene(2, 10, Boundary::open, 0.5);
+  scene.particles.x = {Vec<3>(1, 1, 1), Vec<3>(1, 2.3, 1)};
+  const auto term = scene.make("lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}});
+  const auto at = test::sums(*term, scene.particles.x);
+  EXPECT_NEAR(at.energy.value(), -0.6570169145, 1e-9);
+  EXPECT_NEAR(at.virial.value(), -2.9119739087, 1e-9);
+  EXPECT_NEAR(forces(*term, scene.particles.x)[0][1], 2.9119739087 / 1.3, 1e-9);  // towards the other
+}
+
+TEST(Pairs, AYukawaTermWithChargesIsTheirProductTimesThatWithout) {
+  Scene<3> scene(2, 10, Boundary::open, 0.5);
+  scene.particles.x = {Vec<3>(1, 1, 1), Vec<3>(1, 1, 3)};
+  scene.particles.charge = {2, -0.5};
+  const Given given = {{"amplitude", 3.0}, {"kappa", 0.5}};
+  const auto with = [&](bool charges) {
+    Given all = given;
+    all.emplace_back("charges", charges);
+    return scene.make("yukawa", all);
+  };
+  const double v = 1.5 * std::exp(-1.0);
+  EXPECT_NEAR(energy(*with(false), scene.particles.x), v, 1e-13);
+  EXPECT_NEAR(energy(*with(true), scene.particles.x), -v, 1e-13);
+  EXPECT_NEAR(forces(*with(true), scene.particles.x)[0][2], v * (1 + 0.5 * 2) / 2, 1e-13);  // attracted
+  EXPECT_NEAR(test::sums(*with(true), scene.particles.x).virial.value(), -2 * v, 1e-13);
+}
+
+TEST(Pairs, TailsCountThePairsOfTheirSpecies) {
+  Scene<3> scene(12, 10, Boundary::periodic, 0.5);  // 8 A and 4 B; charges 1 and −0.5 in turns
+  Given given = {{"epsilon", 1.0}, {"sigma", 1.0}, {"cutoff", 2.0}, {"cut", "shifted"s}, {"tail", true}};
+  const auto tail = [&](const Names& names) {
+    Given all = given;
+    if (!names.empty()) all.emplace_back("species", names);
+    return scene.make("lennard-jones", all)->tail();
+  };
+  const double pair = 4 * std::numbers::pi / 1000 * 4 * (std::pow(2, -9) / 9 - std::pow(2, -3) / 3);
+  EXPECT_NEAR(tail({}).energy, 72 * pair, 1e-14);
+  EXPECT_NEAR(tail({"A", "B"}).energy, 32 * pair, 1e-14);
+  EXPECT_NEAR(tail({"B", "A"}).energy, 32 * pair, 1e-14);
+  EXPECT_NEAR(tail({"B", "B"}).energy, 8 * pair, 1e-14);
+  const Given screened = {{"amplitude", 1.0}, {"kappa", 1.0}, {"cutoff", 2.0}, {"cut", "switch"s}, {"tail", true}};
+  const auto yukawa = [&](bool charges) {
+    Given all = screened;
+    all.emplace_back("charges", charges);
+    return scene.make("yukawa", all)->tail().energy;
+  };
+  EXPECT_NEAR(yukawa(true) / yukawa(false), 9.0 / 144, 1e-14);  // the sum of the charges is 3
+  given.pop_back();
+  EXPECT_EQ(scene.make("lennard-jones", given)->tail().energy, 0);
+}
+
 TEST(Pairs, SpeciesSelectWhoFeelsATerm) {
   Scene<2> scene(3, 10, Boundary::open, 0.5);
   scene.particles.x = {Vec<2>(0, 0), Vec<2>(1, 0), Vec<2>(0, 1)};
@@ -120,6 +171,88 @@ TEST(Pairs, SpeciesSelectWhoFeelsATerm) {
   EXPECT_DOUBLE_EQ(between({"B", "A"}), 2);
   EXPECT_NEAR(between({"B", "B"}), std::sqrt(0.5), 2 * test::kQuantum);
   EXPECT_DOUBLE_EQ(between({"A", "A"}), 0);
+}
+
+TEST(Pairs, BondedPairsCanBeLeftOut) {
+  const PairList bonds = {{3, 1}, {0, 9}, {3, 4}, {7, 2}};
+  const auto table = std::make_shared<const BondTable>(bonds);
+  const auto count = [&](const PairList& left_out) {
+    return std::ranges::count_if(left_out, [&](const auto& b) { return table->joins(b[0], b[1]); });
+  };
+  EXPECT_EQ(count({{1, 3}, {3, 1}, {9, 0}, {4, 3}, {2, 7}}), 5);
+  EXPECT_EQ(count({{0, 1}, {1, 4}, {9, 10}, {0, 3}, {50, 51}}), 0);
+
+  for (const Boundary boundary : {Boundary::open, Boundary::periodic}) {
+    const Scene<3> scene(40, 6, boundary, 0.75);
+    const auto& x = scene.particles.x;
+    Given given = kLennardJones;
+    if (boundary == Boundary::open) given = {{"epsilon", 1.0}, {"sigma", 0.8}};
+    const auto all = scene.make("lennard-jones", given);
+    given.emplace_back("exclude", "bonded"s);
+    const auto some = scene.make("lennard-jones", given, table);
+    double expected = energy(*all, x);
+    for (const auto& [i, j] : bonds) {
+      Scene<3> two(2, 6, boundary, 0.75);
+      two.particles.x = {x[i], x[j]};
+      expected -= energy(*two.make("lennard-jones", Given(given.begin(), given.end() - 1)), two.particles.x);
+    }
+    EXPECT_NEAR(energy(*some, x), expected, 1e-12 * test::sums(*all, x).magnitude.value());
+  }
+}
+
+TEST(Pairs, BondedPairsAreLeftOutAlsoAmongSomeOfTheParticles) {
+  Scene<2> scene(5, 10, Boundary::periodic, 0.5);
+  for (int i = 0; i < 5; ++i) scene.particles.x[i] = Vec<2>(3 + 0.9 * i, 5);
+  Given given = kLennardJones;  // neighbours and next neighbours are within its cutoff
+  given.emplace_back("exclude", "bonded"s);
+  const auto all = scene.make("lennard-jones", given, std::make_shared<const BondTable>(PairList{{1, 3}, {0, 1}}));
+  EXPECT_EQ(all->interacting_pairs(scene.particles.x), 5u);
+  Particles<2> some;  // 1, 3 and 4
+  for (const Id i : {1u, 3u, 4u}) {
+    some.id.push_back(i);
+    some.x.push_back(scene.particles.x[i]);
+    some.species.push_back(scene.particles.species[i]);
+  }
+  EXPECT_EQ(all->among(scene.particles, some)->interacting_pairs(some.x), 1u);
+}
+
+TEST(Refused, ToLeaveOutBondsThatAreNotThere) {
+  const Scene<2> scene(5, 10, Boundary::wall, 0.5);
+  expect_contains(refusal(scene, "gravity", {{"constant", 1.0}, {"exclude", "bonded"s}}), "there are no bonds");
+}
+
+TEST(Refused, EndsThatCannotBe) {
+  const Scene<2> scene(5, 10, Boundary::periodic, 0.5);
+  const auto message = [&](Given given) {
+    given.insert(given.end(), {{"epsilon", 1.0}, {"sigma", 1.0}, {"exponent", 2.0}});
+    return refusal(scene, "inverse-power", given);
+  };
+  expect_contains(message({{"cutoff", 2.0}, {"cut", "switch"s}, {"switch_from", 2.0}}), "not below the cutoff");
+  expect_contains(message({{"cutoff", 2.0}, {"cut", "shifted"s}, {"switch_from", 1.0}}), "belongs to cut = \"switch\"");
+  expect_contains(message({{"tail", true}}), "give 'cutoff'");
+  expect_contains(message({{"switch_from", 1.0}}), "give 'cutoff'");
+  expect_contains(message({{"cutoff", 2.0}, {"cut", "switch"s}, {"tail", true}}), "diverges");
+  expect_contains(message({{"cutoff", 2.0}, {"cut", "force-shifted"s}, {"tail", true}}), "take \"switch\"");
+  const Scene<2> walls(5, 10, Boundary::wall, 0.5);
+  expect_contains(refusal(walls, "lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}, {"cutoff", 2.0}, {"tail", true}}),
+                  "without borders");
+}
+
+TEST(Refused, TablesThatCannotBe) {
+  const Scene<2> scene(5, 10, Boundary::wall, 0.5);
+  using Numbers = std::vector<double>;
+  const auto message = [&](const Numbers& r, const Numbers& v, Given more = {}) {
+    more.insert(more.end(), {{"r", r}, {"value", v}});
+    return refusal(scene, "table", more);
+  };
+  expect_contains(refusal(scene, "table", {}), "no points are given");
+  expect_contains(message({1, 2, 3}, {1, 2}), "'r' has 3 numbers and 'value' 2");
+  expect_contains(message({1}, {1}), "two points at least");
+  expect_contains(message({1, 2, 2}, {1, 2, 3}), "do not ascend");
+  expect_contains(message({0, 1, 2}, {1, 2, 3}), "not positive");
+  expect_contains(message({1, 2, 3}, {3, 2, 0}, {{"cutoff", 4.0}}), "beyond the last point");
+  expect_contains(message({1, 2, 3}, {3, 2, 0}, {{"cutoff", 0.5}}), "before the first point");
+  expect_contains(message({1, 2, 3}, {3, 2, 0}, {{"slope", Numbers{1}}}), "give two, dV/dr");
 }
 
 TEST(Refused, BondsThatCannotBe) {
@@ -159,7 +292,7 @@ TEST(Refused, WhatAPeriodicBoxDoesNotAllow) {
   const Scene<2> scene(5, 10, Boundary::periodic, 0.5);
   expect_contains(refusal(scene, "gravity", {{"constant", 1.0}}), "a periodic box does not allow");
   expect_contains(refusal(scene, "coulomb", {{"constant", 1.0}, {"form", "plain"s}}), "damped-shifted");
-  expect_contains(refusal(scene, "lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}, {"cut", "smooth"s}}),
+  expect_contains(refusal(scene, "lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}, {"cut", "switch"s}}),
                   "give 'cutoff'");
   expect_contains(refusal(scene, "harmonic-trap", {{"stiffness", 1.0}}), "periodic");
   expect_contains(refusal(scene, "uniform-field", {{"acceleration", std::vector<double>{0, 1}}}), "axis 1");
@@ -189,7 +322,7 @@ TEST(Registry, NamesEveryTypeOnceAndDocumentsIt) {
     EXPECT_FALSE(info.formula.empty() || info.documentation.empty() || info.source.empty()) << info.name;
     for (const Parameter& parameter : info.parameters) EXPECT_FALSE(parameter.meaning.empty()) << parameter.name;
   }
-  EXPECT_EQ(names.size(), 9u);
+  EXPECT_EQ(names.size(), 10u);
 }
 
 }  // namespace

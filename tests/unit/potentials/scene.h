@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/interaction.h"
+#include "engine/pair_filter.h"
 
 namespace carom::test {
 
@@ -49,11 +50,13 @@ struct Scene {
   }
 
   std::unique_ptr<Interaction<D>> make(const std::string& type,
-                                       const std::vector<std::pair<std::string, ParameterValue>>& given) const {
+                                       const std::vector<std::pair<std::string, ParameterValue>>& given,
+                                       std::shared_ptr<const BondTable> bonds = nullptr) const {
     Parameters parameters;
     for (const auto& [name, value] : given) parameters.set(name, value);
     for (const InteractionInfo& info : interactions())
-      if (info.name == type) return info.make<D>(parameters, {box, particles, species});
+      if (info.name == type)
+        return info.make<D>(parameters, {.box = box, .particles = particles, .species = species, .bonds = bonds});
     throw std::invalid_argument("no interaction '" + type + "'");
   }
 

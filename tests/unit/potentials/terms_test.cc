@@ -50,6 +50,26 @@ TYPED_TEST(InDimension, ForcesAreMinusTheGradientOfTheEnergy) {
   });
 }
 
+TYPED_TEST(InDimension, TheVirialIsMinusTheDerivativeOfTheEnergyByTheScaleOfTheBox) {
+  constexpr int D = TypeParam::value;
+  this->for_each_case([](Scene<D>& scene, const Interaction<D>& term, auto&& remake) {
+    if (!term.keeps_momentum()) return;  // fields have none
+    const auto scaled_energy = [&](double scale) {
+      Scene<D> scaled = scene;
+      scaled.box.edges *= scale;
+      for (auto& x : scaled.particles.x) x *= scale;
+      return energy(*remake(scaled), scaled.particles.x);
+    };
+    const auto at = test::sums(term, scene.particles.x);
+    const double h = 1e-4;
+    const double slope =
+        (8 * (scaled_energy(1 + h) - scaled_energy(1 - h)) - (scaled_energy(1 + 2 * h) - scaled_energy(1 - 2 * h))) /
+        (12 * h);
+    EXPECT_NEAR(at.virial.value(), -slope, 1e-6 * (std::abs(slope) + at.magnitude.value()));
+    EXPECT_GT(std::abs(slope), 1e-3 * at.magnitude.value());
+  });
+}
+
 TYPED_TEST(InDimension, HessianProductsAreTheDerivativeOfTheForces) {
   constexpr int D = TypeParam::value;
   this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
