@@ -7,6 +7,7 @@
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 
 namespace carom {
@@ -31,6 +32,47 @@ class ExactSum {
   std::array<std::int64_t, kDigits> digit_{};
   std::int64_t pending_ = 0;  // terms since the last carry
   bool invalid_ = false;
+};
+
+/// The same for many terms one after the other, most of them of about the size of the first that is not zero: those
+/// are added up in a register.
+class ExactSeries {
+ public:
+  void add(double term) {
+    const auto bits = std::bit_cast<std::uint64_t>(term);
+    const int exponent = static_cast<int>(bits >> 52) & 0x7ff;
+    if (left_ == 0) begin(exponent);
+    const int shift = exponent - lowest_;
+    if (shift < 0 || shift >= kShifts) return sum_.add(term);
+    const auto mantissa = static_cast<Whole>((bits & 0xfffffffffffffULL) | 1ULL << 52) << shift;
+    series_ += (bits >> 63) != 0 ? -mantissa : mantissa;
+    --left_;
+  }
+  ExactSum sum() {
+    flush();
+    return sum_;
+  }
+
+ private:
+  __extension__ using Whole = __int128;
+  static constexpr int kShifts = 64;  // below which a term is taken, so that 2^10 of them leave room in the register
+
+  void flush() {
+    sum_.add(series_, std::ldexp(1.0, lowest_ - 1075));
+    series_ = 0;
+    left_ = 0;
+  }
+  void begin(int exponent) {
+    flush();
+    if (exponent == 0) return;
+    lowest_ = exponent > 48 && exponent < 2000 ? exponent - 48 : 1;
+    left_ = 512;
+  }
+
+  ExactSum sum_;
+  Whole series_ = 0;
+  int lowest_ = 0x800;  // exponent field of the smallest term that is taken
+  int left_ = 0;        // terms before the register is emptied
 };
 
 inline void ExactSum::add(double term) {

@@ -149,7 +149,7 @@ void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions
   if (system.part) most = system.part->largest(most);
   // The quantum of forces where particles are displaced by a part of their distance.
   const double share = most > 0 && std::isfinite(most) ? most / mean_distance(system) : 1;
-  ForceSums<D> sums(x.size(), quanta_of(system).force * std::exp2(std::floor(std::log2(share)) - 4));
+  ForceSums<D> sums(x.size(), quanta_of(system).force * std::exp2(std::floor(std::log2(share)) + 2));
   force_pass<D>(system, out, sums, counters, [&](const auto& term) { term.add_hessian_product(x, w, sums); });
 }
 
@@ -178,30 +178,34 @@ struct MotionSums {
 /// Of all particles of a system: the momentum in one state, the rest in another.
 template <int D>
 MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
-  MotionSums<D> sums;
+  ExactSeries kinetic, speed;
+  std::array<ExactSeries, D> momentum;
   for (Id i = 0; i < at.size(); ++i) {
     if (!system.particles.owns(i)) continue;
-    sums.kinetic.add(0.5 * at.mass[i] * at.v[i].squaredNorm());
-    sums.speed.add(at.v[i].norm());
-    for (int k = 0; k < D; ++k) sums.momentum[k].add(state.mass[i] * state.v[i][k]);
+    const double squared = at.v[i].squaredNorm();
+    kinetic.add(0.5 * at.mass[i] * squared);
+    speed.add(std::sqrt(squared));
+    for (int k = 0; k < D; ++k) momentum[k].add(state.mass[i] * state.v[i][k]);
   }
+  MotionSums<D> sums{kinetic.sum(), speed.sum(), {}};
+  for (int k = 0; k < D; ++k) sums.momentum[k] = momentum[k].sum();
   return of_all_ranks(system, sums);
 }
 
 /// G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet follows to second order:
 /// G = (1/12) vᵀ V″ v − (1/24) ∇Vᵀ M⁻¹ ∇V (Hairer, Lubich, Wanner, Geometric Numerical Integration, IX.3).
-/// `force` = −∇V(x) is given; `scratch` is overwritten. One force pass.
+/// `a` = −M⁻¹∇V(x) is given; `scratch` is overwritten. One force pass.
 template <int D>
-double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D> force, Vectors<D> scratch,
+double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D> a, Vectors<D> scratch,
                    Counters& counters) {
   evaluate_hessian_product<D>(system, at.x, at.v, scratch, counters);
-  ExactSum sum;
+  ExactSeries sum;
   for (Id i = 0; i < at.size(); ++i) {
     if (!system.particles.owns(i)) continue;
     sum.add(at.v[i].dot(scratch[i]) / 12);
-    sum.add(-force[i].squaredNorm() / (24 * at.mass[i]));
+    sum.add(-at.mass[i] * a[i].squaredNorm() / 24);
   }
-  return of_all_ranks(system, sum).value();
+  return of_all_ranks(system, sum.sum()).value();
 }
 
 }  // namespace carom

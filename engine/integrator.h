@@ -54,6 +54,8 @@ class Integrator : public Luggage<D> {
 
   /// V and its companions in that state, over what this rank owns, where the last force pass was there; else null.
   virtual const PotentialSums* potential() const { return nullptr; }
+  /// a = −M⁻¹∇V there; Verlet types have it.
+  virtual Positions<D> accelerations() const { return {}; }
 };
 
 /// The declaration of an integrator; engine/integrators/registry.cc lists them all.

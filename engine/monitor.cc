@@ -49,13 +49,12 @@ void Monitor<D>::regroup() {
   const Particles<D>& p = known().particles;
   if (info_.hard_cores && !in_free_flight()) touching_.emplace(system_.box, p.radius);
   if (!info_.shadow) return;
-  force_.resize(p.size());
   scratch_.resize(p.size());
 }
 
 template <int D>
-void Monitor<D>::start(const Particles<D>& nodes, const PotentialSums* potential) {
-  shot_ = measure(0, known().particles, nodes, potential, info_.shadow);
+void Monitor<D>::start(const Integrator<D>& integrator) {
+  shot_ = measure(0, known().particles, &integrator, info_.shadow);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   first_momentum_ = shot_.momentum;
   count_from(shot_);
@@ -90,8 +89,7 @@ std::vector<double> Monitor<D>::due_within(const Slab& slab) const {
 template <int D>
 void Monitor<D>::observe(double time, const Particles<D>& copies) {
   sample(time, copies);
-  if (std::min(frames_.due(), rows_.due()) <= time + time_slack())
-    show(measure(time, copies, copies, nullptr, false), false);
+  if (std::min(frames_.due(), rows_.due()) <= time + time_slack()) show(measure(time, copies, nullptr, false), false);
 }
 
 /// Shows the particles to those who look at times of their own.
@@ -106,12 +104,12 @@ void Monitor<D>::sample(double time, const Particles<D>& state) {
 }
 
 template <int D>
-void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, const PotentialSums* potential, bool last) {
+void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bool last) {
   Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
   const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.size() <= kShadowAtEveryStep);
   const double speed = speed_;
-  shot_ = measure(s.end_time, known().particles, nodes, potential, with_shadow);
+  shot_ = measure(s.end_time, known().particles, &integrator, with_shadow);
   s.energy_final = shot_.total();
   if (s.steps == 1 && info_.stepping) count_from(shot_);
   s.max_energy_error = std::max(s.max_energy_error, std::abs(energy_ - first_energy_));
@@ -138,15 +136,19 @@ void Monitor<D>::end_of_slab(double elapsed, const Particles<D>& nodes, const Po
   show(shot_, last);
 }
 
+/// `integrator`: null where the particles are not its own.
 template <int D>
-Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Particles<D>& nodes,
-                                const PotentialSums* potential, bool with_shadow) {
+Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Integrator<D>* integrator,
+                                bool with_shadow) {
   const Stopwatch watch(statistics_.counters.seconds.output);
   Snapshot<D> shot;
   shot.time = time;
   shot.step = statistics_.steps;
   shot.collisions = statistics_.counters.sphere_sphere;
   shot.particles = &state;
+  const Particles<D>* elsewhere = integrator ? integrator->energy_state() : nullptr;
+  const Particles<D>& nodes = elsewhere ? *elsewhere : state;
+  const PotentialSums* potential = integrator ? integrator->potential() : nullptr;
   const PotentialSums sums = potential ? of_all_ranks(known(), *potential) : evaluate_energy<D>(known(), nodes.x);
   const auto total = static_cast<double>(system_.size());
   const MotionSums<D> motion = evaluate_motion(known(), state, nodes);
@@ -157,8 +159,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Pa
   virial_ = 2 * shot.kinetic + sums.virial.value() + tail_.virial;
   if (with_shadow) {
     Counters uncounted;
-    evaluate_forces<D>(known(), nodes.x, force_, uncounted);
-    const double g = shadow_term<D>(known(), nodes, force_, scratch_, uncounted);
+    const double g = shadow_term<D>(known(), nodes, integrator->accelerations(), scratch_, uncounted);
     shot.shadow = shot.total() + plan_.step * plan_.step * g;
   }
   for (int k = 0; k < D; ++k) shot.momentum[k] = motion.momentum[k].value();

@@ -37,9 +37,8 @@ class Monitor {
   Monitor(const System<D>& system, const IntegratorInfo& info, const Plan& plan,
           const std::vector<Observer<D>*>& observers, Statistics& statistics);
 
-  /// Measures and shows the state at the start. `nodes` is the state at which energies are measured, `potential` what
-  /// this rank has of V there, if the integrator knows.
-  void start(const Particles<D>& nodes, const PotentialSums* potential);
+  /// Measures and shows the state at the start; energies at the integrator's energy state.
+  void start(const Integrator<D>& integrator);
 
   /// Due times inside a slab, for integrators that are exact at any time: since the slab's start, ascending.
   std::vector<double> due_within(const Slab& slab) const;
@@ -49,7 +48,7 @@ class Monitor {
 
   /// Measures the state at the end of a slab, updates the statistics, shows it where it is due or `last`.
   /// statistics.steps and end_time already tell of the slab, which advanced the time by `elapsed`.
-  void end_of_slab(double elapsed, const Particles<D>& nodes, const PotentialSums* potential, bool last);
+  void end_of_slab(double elapsed, const Integrator<D>& integrator, bool last);
 
   /// Shows the last state again to those who have not seen it.
   void finish() { show(shot_, true); }
@@ -68,8 +67,7 @@ class Monitor {
   };
 
   void sample(double time, const Particles<D>& state);
-  Snapshot<D> measure(double time, const Particles<D>& state, const Particles<D>& nodes, const PotentialSums* potential,
-                      bool with_shadow);
+  Snapshot<D> measure(double time, const Particles<D>& state, const Integrator<D>* integrator, bool with_shadow);
   void show(Snapshot<D> shot, bool last);
   void count_from(const Snapshot<D>& shot);
   double deepest_overlap();
@@ -95,7 +93,7 @@ class Monitor {
   double speed_ = 0, path_ = 0;                 // mean |v| at the last slab's end; ∫ mean |v| dt
   double first_energy_ = 0, first_shadow_ = 0;  // H₁ and S_h,1
   Vec<D> first_momentum_ = Vec<D>::Zero();
-  std::vector<Vec<D>> force_, scratch_;       // for S_h
+  std::vector<Vec<D>> scratch_;               // for S_h
   std::optional<NeighbourList<D>> touching_;  // pairs that may overlap
   Particles<D> gathered_;                     // from the shares of all ranks
 };

@@ -313,12 +313,6 @@ CAROM_INLINE IntegerOf<V> integers(V x) {
   return (IntegerOf<V>)(x + 0x1.8p52) - (IntegerOf<V>)all<V>(0x1.8p52);
 }
 
-/// Whether all lanes of x are less than a limit; false for what is no number.
-template <class V>
-CAROM_INLINE auto within(V x, double limit) {
-  return elementary::abs(x) < limit;
-}
-
 enum class Wanted { forces, forces_and_sums, mean_forces, hessian_product };
 
 template <int W, class P, Wanted wanted, bool wide>
@@ -330,11 +324,13 @@ template <int W, class P, Wanted wanted, bool wide>
   constexpr int kWords = wide ? 2 : 1;
   I sum[3][kWords] = {};  // energy, magnitude, virial
   I fits = ~I{};
+  const double limit = wide ? units.limits.high : units.limits.low;
+  const double per_virial = 0x1p-6 * units.per_energy / units.per_force;  // virials are counted in 64 quanta
   for (unsigned k = 0; k < batch.n; k += W) {
     V d[3];
     for (int axis = 0; axis < 3; ++axis) d[axis] = load<V>(batch.d[axis] + k);
     const V rho = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], weight = load<V>(batch.weight + k);
-    V g, e[3];
+    V g, e[3];  // force = g d
     if constexpr (wanted == Wanted::mean_forces || wanted == Wanted::hessian_product)
       for (int axis = 0; axis < 3; ++axis) e[axis] = load<V>(batch.d_new[axis] + k);
     if constexpr (wanted == Wanted::mean_forces) {
@@ -348,30 +344,31 @@ template <int W, class P, Wanted wanted, bool wide>
         g = all<V>(1);
       }
     }
+    g *= units.per_force;  // a power of two: the same as of the product
+    V largest = all<V>(0);
     for (int axis = 0; axis < 3; ++axis) {
-      const V force = (g * d[axis]) * units.per_force;
+      const V force = g * d[axis];
       if constexpr (wide) {
         const V upper = elementary::nearest_integer(force * 0x1p-40);
-        fits &= (I)within(upper, units.limits.high);
+        largest += elementary::abs(upper);
         store(batch.high[axis] + k, integers(upper));
         store(batch.low[axis] + k, integers(force - upper * 0x1p40));
       } else {
-        fits &= (I)within(force, units.limits.low);
+        largest += elementary::abs(force);
         store(batch.low[axis] + k, integers(force));
       }
     }
+    fits &= (I)(largest < limit);  // not where one is no number
     if constexpr (wanted == Wanted::forces_and_sums) {
-      const V energy = weight * potential.value(rho);
-      const V terms[3] = {energy * units.per_energy, elementary::abs(energy) * units.per_energy,
-                          (g * rho) * (0x1p-6 * units.per_energy)};
+      const V energy = weight * potential.value(rho) * units.per_energy, virial = g * rho * per_virial;
+      const V magnitude = elementary::abs(energy), terms[3] = {energy, magnitude, virial};
+      fits &= (I)(magnitude + elementary::abs(virial) < (wide ? 0x1p90 : 0x1p50));
       for (int s = 0; s < 3; ++s) {
         if constexpr (wide) {
           const V upper = elementary::nearest_integer(terms[s] * 0x1p-40);
-          fits &= (I)within(upper, 0x1p50);
           sum[s][1] += integers(upper);
           sum[s][0] += integers(terms[s] - upper * 0x1p40);
         } else {
-          if (s != 1) fits &= (I)within(terms[s], 0x1p50);
           sum[s][0] += integers(terms[s]);
         }
       }

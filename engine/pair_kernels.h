@@ -88,7 +88,7 @@ struct PairBatch {
 
 /// Units and limits of what formulas give.
 struct PairUnits {
-  double per_force = 0;   ///< 1/quantum, or −1/quantum to subtract
+  double per_force = 1;   ///< 1/quantum, or −1/quantum to subtract
   double per_energy = 0;  ///< 1/quantum; virials, which are larger, are counted in 64 of these
   ForceLimits limits{0, 0};
 };

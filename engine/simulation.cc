@@ -52,12 +52,8 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
   }
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);
   const auto known = [&]() -> System<D>& { return part ? part->known() : *system_; };
-  const auto nodes = [&]() -> const Particles<D>& {
-    const auto* state = integrator_->energy_state();
-    return state ? *state : known().particles;
-  };
   integrator_->start(known(), s.counters);
-  monitor.start(nodes(), integrator_->potential());
+  monitor.start(*integrator_);
 
   std::vector<Contact<D>> contacts;
   while (!finished(monitor.time_slack())) {
@@ -100,7 +96,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       const Stopwatch watch(s.counters.seconds.output);
       for (auto* observer : observers_) observer->contacts(slab.start, contacts);
     }
-    monitor.end_of_slab(report.reached, nodes(), integrator_->potential(), finished(monitor.time_slack()));
+    monitor.end_of_slab(report.reached, *integrator_, finished(monitor.time_slack()));
     for (auto* observer : observers_) observer->progress(s);
   }
   if (s.stopped_early) monitor.finish();

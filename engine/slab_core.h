@@ -25,7 +25,8 @@ namespace carom {
 template <int D>
 struct FlightEnd {
   bool complete = true;
-  double time = 0;    ///< where it is not: the slab must end here, because a contact came to rest or a resting one was hit
+  double time =
+      0;  ///< where it is not: the slab must end here, because a contact came to rest or a resting one was hit
   EventKey<D> key{};  ///< by this event
 };
 
@@ -52,7 +53,9 @@ class SlabCore {
   const std::vector<Vec<D>>& x() const { return x_; }  ///< positions at the slab's end, not wrapped [length]
   const std::vector<Vec<D>>& last_x() const { return last_x_; }  ///< the same of the flight before
   const std::vector<Vec<D>>& v() const { return v_; }  ///< velocities there [length/time]
-  std::span<const Contact<D>> contacts() const { return contacts_; }  ///< of the last flight, in the order of their keys
+  std::span<const Contact<D>> contacts() const {
+    return contacts_;
+  }  ///< of the last flight, in the order of their keys
 
   /// Whether particle i has a contact in the last flight.
   bool collides(Id i) const { return slot_[i] != 0; }
@@ -83,7 +86,7 @@ class SlabCore {
   };
   struct Planned {
     EventKey<D> key;
-    std::uint32_t version_lo = 0, version_hi = 0;                            ///< of the flights that it is planned for
+    std::uint32_t version_lo = 0, version_hi = 0;                           ///< of the flights that it is planned for
     bool operator<(const Planned& other) const { return other.key < key; }  // the standard heap serves the largest
   };
   struct Sequence {

@@ -20,6 +20,7 @@ class CollisionVerlet : public Integrator<D> {
   }
 
   const PotentialSums* potential() const override { return &pieces_->potential(); }
+  Positions<D> accelerations() const override { return pieces_->a(); }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     pieces_->begin_slab(report.counters, report.contacts, slab.length);

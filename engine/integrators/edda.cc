@@ -6,8 +6,8 @@
 //   m_i a_i = −∇̄_i V(x(0), x(h)),
 //
 // the discrete gradient between the slab's two ends, Σ m_i a_i·Δx_i = −(V(x(h)) − V(x(0))), so H is exact. The equation
-// is solved by sweeps: fly on a, evaluate a′ at the ends, go on with a′. What the last sweep leaves, e = a′ − a, is given
-// as a kick, so that momentum is exact; the energy that lacks then,
+// is solved by sweeps: fly on a, evaluate a′ at the ends, go on with a′. What the last sweep leaves, e = a′ − a, is
+// given as a kick, so that momentum is exact; the energy that lacks then,
 //
 //   r = Σ m [e·(Δx − h v′) − ½ h² e²],   v′ before the kick,
 //
@@ -19,9 +19,9 @@
 
 #include "engine/error.h"
 #include "engine/forces.h"
+#include "engine/integrators/chebyshev.h"
 #include "engine/integrators/extrapolation.h"
 #include "engine/integrators/fold.h"
-#include "engine/integrators/chebyshev.h"
 #include "engine/integrators/registry.h"
 #include "engine/slab_core.h"
 #include "engine/stiffness.h"
@@ -251,8 +251,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     return std::ranges::any_of(core_->swapped(), [&](Id i) { return !frozen(i); });
   }
 
-  /// Counts the swaps of partners of each particle. One which swaps again and again keeps its acceleration from then on,
-  /// and where it still swaps, so do its partners.
+  /// Counts the swaps of partners of each particle. One which swaps again and again keeps its acceleration from then
+  /// on, and where it still swaps, so do its partners.
   void freeze() {
     any_freezes_ = true;
     const auto note = [&](Id i) {
@@ -295,8 +295,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
       const Vec<D> e = mean_[i] - a_[i];
-      const double r =
-          p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
+      const double r = p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
       if (frozen(i))
         of_frozen.push_back({p.id_of(i), core_->x()[i], r});
       else
@@ -319,9 +318,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   }
 
   std::uint64_t max_events_;
-  double tolerance_;                    // what sweeps may leave of h a, relative to the speed scale
-  double speed_ = 0, strength_ = 0;     // root mean square velocity and acceleration at the start of the run
-  Vec<D> centre_ = Vec<D>::Zero();      // velocity of the centre of mass, where it is kept
+  double tolerance_;                 // what sweeps may leave of h a, relative to the speed scale
+  double speed_ = 0, strength_ = 0;  // root mean square velocity and acceleration at the start of the run
+  Vec<D> centre_ = Vec<D>::Zero();   // velocity of the centre of mass, where it is kept
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> past_;
   MeanForces<D> forces_;
@@ -337,7 +336,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   double squared_frequency_ = 0;        // the largest, once it matters
   std::int64_t measured_ = -kMeasured;  // the slab in which it was found
   std::int64_t slab_ = 0;
-  std::vector<Vec<D>> move_;            // of a_ by the last sweep
+  std::vector<Vec<D>> move_;  // of a_ by the last sweep
   Counters* counters_ = nullptr;
 };
 
@@ -348,8 +347,9 @@ IntegratorInfo edda() {
       .name = "edda",
       .title = "Event-Driven Discrete gradients",
       .order = "2",
-      .conserves = "energy and linear momentum to rounding, for any step; angular momentum to the tolerance in slabs "
-                   "without collisions",
+      .conserves =
+          "energy and linear momentum to rounding, for any step; angular momentum to the tolerance in slabs "
+          "without collisions",
       .parameters = {parameter::step(),
                      {.name = "tolerance",
                       .type = Parameter::Type::real,
@@ -364,8 +364,9 @@ IntegratorInfo edda() {
           "Each particle moves under a constant acceleration of its own over the step, through all its collisions; the "
           "accelerations are the discrete gradient between the step's two ends, found by sweeps that cost a force pass "
           "and the collisions each. Energy is exact whatever the step and the number of collisions.",
-      .source = "this project; relatives: LaBudde, Greenspan, Numer. Math. 25 (1976) 323; Gonzalez, J. Nonlinear Sci. "
-                "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 84 (2010) 1085",
+      .source =
+          "this project; relatives: LaBudde, Greenspan, Numer. Math. 25 (1976) 323; Gonzalez, J. Nonlinear Sci. "
+          "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 84 (2010) 1085",
       .in_2d = make<EventDrivenDiscreteGradient, 2>,
       .in_3d = make<EventDrivenDiscreteGradient, 3>};
 }

@@ -35,6 +35,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
   }
 
   const PotentialSums* potential() const override { return &pieces_->potential(); }
+  Positions<D> accelerations() const override { return pieces_->a(); }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
@@ -105,8 +106,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
 
   double shadow(const System<D>& system) {
     const auto& p = system.particles;
-    for (std::size_t i = 0; i < p.size(); ++i) force_[i] = p.mass[i] * pieces_->a()[i];
-    return shadow_term<D>(system, p, force_, product_, *counters_);
+    return shadow_term<D>(system, p, pieces_->a(), product_, *counters_);
   }
 
   void collide(System<D>& system, double time) {

@@ -23,6 +23,7 @@ class PrimitiveSplitting : public Integrator<D> {
   }
 
   const PotentialSums* potential() const override { return &accelerations_.sums; }
+  Positions<D> accelerations() const override { return accelerations_.a; }
   bool local() const override { return true; }
   void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
   void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }

@@ -15,6 +15,7 @@ class Verlet : public Integrator<D> {
   void start(System<D>& system, Counters& counters) override { accelerations_.update(system, counters); }
 
   const PotentialSums* potential() const override { return &accelerations_.sums; }
+  Positions<D> accelerations() const override { return accelerations_.a; }
   bool local() const override { return true; }
   void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
   void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }

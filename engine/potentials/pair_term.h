@@ -116,7 +116,7 @@ class PairTerm final : public Interaction<D> {
                            : !given.vectors.empty() ? formula.hessian_product
                            : given.x_new.empty()    ? formula.forces
                                                     : formula.mean_forces;
-    constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+    constexpr double kNoLimit = std::numeric_limits<double>::infinity();  // of forces that are not asked for
     PairUnits units{.limits = {kNoLimit, kNoLimit}};
     if (sums) units.per_energy = 1 / sums->quantum;
     PairTotals totals[2];  // of own pairs, and of those shared with another rank

@@ -177,6 +177,19 @@ TEST(PairSums, HoldSeveralImagesOfAPairInASmallBox) {
   }
 }
 
+TEST(PairSums, PassOverManyPairsThatAreOnlyInTheSkin) {
+  for (const Boundary boundary : {Boundary::wall, Boundary::periodic}) {
+    Scene<2> scene(0, 61, boundary, 0);
+    for (int k = 0; k < 400; ++k)
+      for (const double beside : {0.0, k == 399 ? 0.9 : 1.25})
+        scene.particles.x.push_back(Vec<2>(0.01 + 3 * (k % 20) + beside, 0.01 + 3 * (k / 20)));
+    const auto& x = scene.particles.x;
+    scene.particles.mass.resize(x.size(), 1);
+    const Cut potential(LennardJones(1.0, 0.8), 1.2, CutKind::shifted);
+    expect_reference(scene, *scene.make("lennard-jones", cut_lennard_jones(0.8, 1.2)), potential, 1.44, nullptr, x, x);
+  }
+}
+
 /// Moves particles about, wraps them now and then, and compares with plain loops all the time.
 template <int D>
 void travel(double edge, int particles, double speed, const std::string& width) {
