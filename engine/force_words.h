@@ -17,6 +17,7 @@ struct alignas(32) ForceWords {
 /// Of a term of V: what is small beside it may be rounded. 0: it gives no hint.
 struct ForceScale {
   double force = 0, energy = 0;
+  double spread = 1;  ///< so many times larger are both between the particles of the largest weights
 };
 
 inline constexpr int kHighShift = 40;          // a high word counts so many times two low ones

@@ -63,16 +63,19 @@ template <int D>
 Quanta quanta(const System<D>& system) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const double distance = mean_distance(system);
-  std::array<double, 3> most = {-kNone, -kNone, 0};  // the smallest force and energy, negative; the largest force
+  std::array<double, 4> most = {-kNone, -kNone, 0, 0};  // the smallest force and energy, negative; the largest
   for (const auto& term : system.interactions) {
     const ForceScale scale = term->scale(distance);
-    if (scale.force > 0) most[0] = std::max(most[0], -scale.force), most[2] = std::max(most[2], scale.force);
+    if (scale.force > 0) most[0] = std::max(most[0], -scale.force);
     if (scale.energy > 0) most[1] = std::max(most[1], -scale.energy);
+    most[2] = std::max(most[2], scale.spread * scale.force);
+    most[3] = std::max(most[3], scale.spread * scale.energy);
   }
   if (system.ranks && system.sizes) system.ranks->largest(most);
   const auto power = [](double x) { return x < kNone ? std::exp2(std::floor(std::log2(x))) : 1; };
-  // Not so small that the largest forces do not fit.
-  return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])), 0x1p-46 * power(-most[1])};
+  // Not so small that the largest do not fit.
+  return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])),
+          std::max(0x1p-46 * power(-most[1]), 0x1p-70 * power(most[3]))};
 }
 
 /// Those that were determined at the start of the run.
@@ -133,7 +136,6 @@ class MeanForces {
   }
   /// The force on an own particle.
   Vec<D> operator[](Id i) const { return forces_.value(i); }
-  const ForceSums<D>& sums() const { return forces_; }
 
  private:
   ForceSums<D> forces_;

@@ -29,8 +29,7 @@ struct SizeClass {
 };
 
 template <int D>
-NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::function<bool(Id, Id)> wanted)
-    : box_(box), reach_(std::move(reach)), wanted_(std::move(wanted)) {
+NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach) : box_(box), reach_(std::move(reach)) {
   const double mean =
       std::accumulate(reach_.begin(), reach_.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, reach_.size()));
   least_skin_ = skin_ = 0.3 * mean;  // 15 % of a mean pair reach
@@ -112,8 +111,7 @@ void NeighbourList<D>::build(std::span<const Vec<D>> x) {
         if (j <= i) return;
         const Vec<D> d = x[i] - x[j] + box_.shift(image);
         const double reach = reach_[i] + reach_[j] + skin_;
-        if (d.squaredNorm() <= reach * reach && (!wanted_ || wanted_(static_cast<Id>(i), j)))
-          pairs_.push_back({static_cast<Id>(i), j, image});
+        if (d.squaredNorm() <= reach * reach) pairs_.push_back({static_cast<Id>(i), j, image});
       });
     std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
   }

@@ -6,7 +6,6 @@
 // wider list only adds pairs that are out of reach. A pair may stand there with several images where a periodic box is
 // small. (Verlet, Phys. Rev. 159 (1967) 98.)
 
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -31,8 +30,7 @@ template <int D>
 class NeighbourList {
  public:
   /// Lists pairs (i, j) whose distance can fall to reach(i) + reach(j).
-  /// Pairs for which `wanted` says no are left out; an empty function wants all.
-  NeighbourList(const Box<D>& box, std::vector<double> reach, std::function<bool(Id, Id)> wanted = {});
+  NeighbourList(const Box<D>& box, std::vector<double> reach);
 
   /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them
   /// (arcs that stray no farther from x than `margin` besides the straight displacement). Rebuilds where needed. Throws
@@ -52,7 +50,6 @@ class NeighbourList {
 
   const Box<D>& box_;
   std::vector<double> reach_;
-  std::function<bool(Id, Id)> wanted_;
   double least_skin_, skin_, widest_;
   std::uint64_t calls_ = 0;       // of cover() since the last build
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped

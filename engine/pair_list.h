@@ -73,8 +73,6 @@ class CutoffList {
   /// Error(Failure::numerical) for positions that are not finite and for steps of several edges of a periodic box.
   PairRecords<D>& cover(const PairStep<D>& step, const std::vector<char>& ghost);
 
-  std::uint64_t rebuilds() const { return rebuilds_; }
-
  private:
   static constexpr double kLeastSkin = 0.1;  // [cutoff]
 

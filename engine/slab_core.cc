@@ -48,6 +48,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
     margin_ = std::max(margin_, reach_[i]);
     room_[i] = (kRoom - 1) * straight + kRoom * bent;
   }
+  near_.clear();
   if (std::isfinite(margin_)) find_near();
 }
 
@@ -74,18 +75,14 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     flights_.clear();
     queue_.clear();
     contacts_.clear();
-    strayed_ = 0;
+    strayed_ = std::isfinite(margin_) ? 0 : kNever;
     crowded_ = false;
     plain_ends();
-    const Stopwatch watch(counters_->seconds.queue);
-    for (const std::uint32_t k : near_) predict_pair(pairs_[k].i, pairs_[k].j, pairs_[k].image);
-    for (const Id i : beyond_)
-      for (const auto& [j, pair] : scan_.candidate_partners().of(i))
-        predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
-    if (walls_)
-      for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
-    std::make_heap(queue_.begin(), queue_.end());
-    end = serve();
+    if (strayed_ == 0) {
+      const Stopwatch watch(counters_->seconds.queue);
+      predict_first();
+      end = serve();
+    }
     if (strayed_ > 0 && std::isfinite(strayed_)) {
       margin_ = kRoom * strayed_;
       find_near();
@@ -106,6 +103,18 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   }
   compare_sequences();
   return end;
+}
+
+/// The contacts of first flights.
+template <int D>
+void SlabCore<D>::predict_first() {
+  for (const std::uint32_t k : near_) predict_pair(pairs_[k].i, pairs_[k].j, pairs_[k].image);
+  for (const Id i : beyond_)
+    for (const auto& [j, pair] : scan_.candidate_partners().of(i))
+      predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
+  if (walls_)
+    for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
+  std::make_heap(queue_.begin(), queue_.end());
 }
 
 /// Where all particles come without contacts, and which of them may come farther than near_ knows.
@@ -129,7 +138,7 @@ void SlabCore<D>::plain_ends() {
     if (!(bent.squaredNorm() <= room_[i] * room_[i])) beyond_.push_back(static_cast<Id>(i));
   }
   for (const Id i : beyond_)
-    if (const double far = path(start_v_[i], a_[i], h); !(far <= margin_)) strayed_ = std::max(strayed_, far);
+    if (const double far = path(start_v_[i], a_[i], h); !(far <= margin_)) stray(far);
 }
 
 /// Serves the queue until it is empty.
@@ -260,7 +269,7 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   Contact<D> contact{key, lo.x, lo.x, Vec<D>::Zero()};
   const auto stays_near = [&](const Flight& f) {
     const double strays = (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t);
-    if (!(strays <= margin_)) strayed_ = std::isnan(strays) ? kNever : std::max(strayed_, strays);
+    if (!(strays <= margin_)) stray(strays);
   };
   if (key.kind == EventKind::wall) {
     const int axis = static_cast<int>(key.hi / 2), wall = static_cast<int>(key.hi);
@@ -308,10 +317,9 @@ void SlabCore<D>::agree(bool failed) {
   PathHashes<D> events(particles_);
   for (const Contact<D>& contact : contacts_) events.add(contact.key);
   bool agreed = true;
-  part.tell([&](Id i, Bytes& to) { put(to, events[i]); },
-            [&](Id i, Reader& from) {
-              agreed = (from.get<std::uint64_t>() == events[i] || !part.matters(i)) && agreed;
-            });
+  part.tell(
+      [&](Id i, Bytes& to) { put(to, events[i]); },
+      [&](Id i, Reader& from) { agreed = (from.get<std::uint64_t>() == events[i] || !part.matters(i)) && agreed; });
   if (part.largest(agreed ? 0 : 1) > 0) {
     part.deepen();
     throw HaloTooSmall{};

@@ -14,7 +14,7 @@
 // than what is known allows, fly() throws HaloTooSmall on all ranks. Nothing of the system has changed then.
 
 #include <algorithm>
-#include <optional>
+#include <cmath>
 
 #include "engine/contact_scan.h"
 #include "engine/part.h"
@@ -50,9 +50,9 @@ class SlabCore {
   /// Flies from the start of the slab to its end. Empty `a`: straight.
   FlightEnd<D> fly(Positions<D> a);
 
-  const std::vector<Vec<D>>& x() const { return x_; }  ///< positions at the slab's end, not wrapped [length]
+  const std::vector<Vec<D>>& x() const { return x_; }            ///< positions at the slab's end, not wrapped [length]
   const std::vector<Vec<D>>& last_x() const { return last_x_; }  ///< the same of the flight before
-  const std::vector<Vec<D>>& v() const { return v_; }  ///< velocities there [length/time]
+  const std::vector<Vec<D>>& v() const { return v_; }            ///< velocities there [length/time]
   std::span<const Contact<D>> contacts() const {
     return contacts_;
   }  ///< of the last flight, in the order of their keys
@@ -97,6 +97,7 @@ class SlabCore {
 
   void find_near();
   void plain_ends();
+  void predict_first();
   FlightEnd<D> serve();
   void predict_pair(Id i, Id j, const Image<D>& image);
   void predict_walls(Id i);
@@ -105,6 +106,8 @@ class SlabCore {
   void collide(const EventKey<D>& key);
   Flight& flight(Id i, const EventKey<D>& key);
   double path(const Vec<D>& v, const Vec<D>& a, double time) const { return time * (v.norm() + 0.5 * time * a.norm()); }
+  /// A particle comes so far.
+  void stray(double path) { strayed_ = std::isnan(path) ? kNever : std::max(strayed_, path); }
   void compare_sequences();
   void agree(bool failed);
 
@@ -126,7 +129,7 @@ class SlabCore {
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
   double length_ = 0, margin_ = 0;
-  double strayed_ = 0;  // > 0: a particle came farther than margin_ in this flight
+  double strayed_ = 0;  // > 0: how far a particle came, beyond margin_, in this flight
   bool crowded_ = false, resolved_ = false;
   Positions<D> start_v_, a_;  // of the slab
   std::span<const NeighbourPair<D>> pairs_;

@@ -1,8 +1,8 @@
 #pragma once
 // Fixed-point iterations that contract slowly, made faster by what is known of their spectrum.
 //
-// The sweeps of a discrete-gradient slab of length h are a ← F(a) with F′ ≈ −h²ω²/4 for a mode of frequency ω. Where the
-// largest λ = h²ω²/4 is known, Chebyshev's semi-iteration for eigenvalues 1 … 1 + λ of I − F′,
+// The sweeps of a discrete-gradient slab of length h are a ← F(a) with F′ ≈ −h²ω²/4 for a mode of frequency ω. Where
+// the largest λ = h²ω²/4 is known, Chebyshev's semi-iteration for eigenvalues 1 … 1 + λ of I − F′,
 //
 //   a ← a + Δ,   Δ ← memory · Δ + gain · e,   e = F(a) − a,
 //
@@ -13,8 +13,8 @@ namespace carom::integrator {
 
 class Chebyshev {
  public:
-  /// Plain sweeps for small λ.
-  explicit Chebyshev(double lambda = 0) : middle_(1 + lambda / 2), half_(lambda < kSmall ? 0 : lambda / 2) {}
+  /// Plain sweeps for small λ, and for one that is no number.
+  explicit Chebyshev(double lambda = 0) : middle_(1 + lambda / 2), half_(lambda >= kSmall ? lambda / 2 : 0) {}
 
   /// Gives memory() and gain() for the next sweep.
   void next() {

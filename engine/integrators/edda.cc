@@ -95,38 +95,13 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     slab_ = slab.index;
-    auto& p = system.particles;
     core_->begin_step(report.counters, report.contacts, past_.last(), slab.length);
-    double done = 0, longest = slab.length;
-    while (done < slab.length) {
-      resolved_ = touching_;
-      if (touching_) touching_ = resolve(system, done);
-      const double rest = slab.length - done, piece = std::min(longest, rest);
-      const Outcome outcome = solve(system, piece);
-      if (outcome == Outcome::settled) {
-        core_->commit(done);
-        finish(system, piece);
-        if (touching_) core_->scan().slide(p.x, p.v);
-        ++report.counters.pieces;
-        done = piece == rest ? slab.length : done + piece;
-        longest = std::max(2 * piece, slab.length / kMostPieces);
-        touching_ = touching_ || cut_.time > 0;
-        cut_ = {};
-        continue;
-      }
-      need_all(system);
-      if (outcome == Outcome::cut) {
-        core_->scan().count_event(cut_.key);
-        touching_ = touching_ || cut_.time == 0;
-        longest = cut_.time > 0 ? cut_.time : longest;
-        continue;
-      }
-      ++report.counters.slabs_halved;
-      longest = 0.5 * piece;
-      if (longest * kMostPieces < slab.length)
-        throw Error(Failure::numerical, "the sweeps do not settle even in " + std::to_string(kMostPieces) +
-                                            " pieces; the forces are not finite or far too stiff for step = " +
-                                            std::to_string(slab.length));
+    const auto before = found_;
+    try {
+      advance(system, slab);
+    } catch (HaloTooSmall) {
+      found_ = before;  // the step is done again as if this had not been tried
+      throw;
     }
     system.wrap();
     report.reached = slab.length;
@@ -134,6 +109,49 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
 
  private:
   enum class Outcome { settled, cut, diverged };
+
+  /// What one step finds out and later ones use.
+  struct Found {
+    bool touching = true;                // contacts at the slab's start may need to be resolved
+    double squared_frequency = 0;        // the largest, once it matters
+    std::int64_t measured = -kMeasured;  // the slab in which it was found
+  };
+
+  /// The pieces of a step.
+  void advance(System<D>& system, const Slab& slab) {
+    auto& p = system.particles;
+    double done = 0, longest = slab.length;
+    while (done < slab.length) {
+      resolved_ = found_.touching;
+      if (found_.touching) found_.touching = resolve(system, done);
+      const double rest = slab.length - done, piece = std::min(longest, rest);
+      const Outcome outcome = solve(system, piece);
+      if (outcome == Outcome::settled) {
+        core_->commit(done);
+        finish(system, piece);
+        if (found_.touching) core_->scan().slide(p.x, p.v);
+        ++counters_->pieces;
+        done = piece == rest ? slab.length : done + piece;
+        longest = std::max(2 * piece, slab.length / kMostPieces);
+        found_.touching = found_.touching || cut_.time > 0;
+        cut_ = {};
+        continue;
+      }
+      need_all(system);
+      if (outcome == Outcome::cut) {
+        core_->scan().count_event(cut_.key);
+        found_.touching = found_.touching || cut_.time == 0;
+        longest = cut_.time > 0 ? cut_.time : longest;
+        continue;
+      }
+      ++counters_->slabs_halved;
+      longest = 0.5 * piece;
+      if (longest * kMostPieces < slab.length)
+        throw Error(Failure::numerical, "the sweeps do not settle even in " + std::to_string(kMostPieces) +
+                                            " pieces; the forces are not finite or far too stiff for step = " +
+                                            std::to_string(slab.length));
+    }
+  }
 
   /// Impulses of what touches and approaches now, and which contacts rest. Returns whether any do.
   bool resolve(System<D>& system, double done) {
@@ -155,7 +173,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (const Id i : swapping_) swaps_[i] = 0;
     swapping_.clear();
     any_freezes_ = false;
-    Chebyshev chebyshev(0.25 * h * h * squared_frequency_);
+    Chebyshev chebyshev(0.25 * h * h * found_.squared_frequency);
     const double scale = std::max(speed_, h * strength_);
     const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
     double last = 0, before = 0, earlier = 0;  // largest, one, two and kPatience sweeps ago
@@ -181,7 +199,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         earlier = largest;
       }
       if (sweep > kStart && chebyshev.plain() && largest > kSlow * before && measure(system)) {
-        chebyshev = Chebyshev(0.25 * h * h * squared_frequency_);
+        chebyshev = Chebyshev(0.25 * h * h * found_.squared_frequency);
         ++counters_->fallbacks;
       }
       chebyshev.next();
@@ -229,9 +247,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
 
   /// Finds the highest frequency, not more often than it pays. Returns whether it did.
   bool measure(const System<D>& system) {
-    if (slab_ < measured_ + kMeasured) return false;
-    measured_ = slab_;
-    squared_frequency_ = kRoom * largest_squared_frequency(system);
+    if (slab_ < found_.measured + kMeasured) return false;
+    found_.measured = slab_;
+    found_.squared_frequency = kRoom * largest_squared_frequency(system);
     return true;
   }
 
@@ -324,17 +342,15 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> past_;
   MeanForces<D> forces_;
-  std::vector<char> changed_;           // by the last sweep
-  std::uint64_t pairs_ = 0;             // within reach
-  std::vector<Vec<D>> a_, mean_;        // flown on, and what that gives
-  std::vector<std::uint32_t> swaps_;    // of partners, by particle
-  std::vector<Id> swapping_;            // particles with any
-  bool any_freezes_ = false;            // on any rank, in this slab
-  bool touching_ = true;                // contacts at the slab's start may need to be resolved
-  bool resolved_ = false;               // and have been
-  FlightEnd<D> cut_;                    // why the last slab was cut
-  double squared_frequency_ = 0;        // the largest, once it matters
-  std::int64_t measured_ = -kMeasured;  // the slab in which it was found
+  std::vector<char> changed_;         // by the last sweep
+  std::uint64_t pairs_ = 0;           // within reach
+  std::vector<Vec<D>> a_, mean_;      // flown on, and what that gives
+  std::vector<std::uint32_t> swaps_;  // of partners, by particle
+  std::vector<Id> swapping_;          // particles with any
+  bool any_freezes_ = false;          // on any rank, in this slab
+  Found found_;
+  bool resolved_ = false;  // contacts at the slab's start have been resolved
+  FlightEnd<D> cut_;       // why the last slab was cut
   std::int64_t slab_ = 0;
   std::vector<Vec<D>> move_;  // of a_ by the last sweep
   Counters* counters_ = nullptr;

@@ -7,6 +7,7 @@
 //
 // Q is the divided difference of U; since ρ′ − ρ = (d + d′)·(d′ − d), the mean forces are a discrete gradient.
 
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -76,10 +77,11 @@ class PairTerm final : public Interaction<D> {
   ForceScale scale(double distance) const override {
     ForceScale scale = scale_(distance);
     if (const auto* factor = factors()) {
-      double least = std::numeric_limits<double>::infinity();
+      double least = std::numeric_limits<double>::infinity(), largest = 0;
       for (const double w : *factor)
-        if (w != 0) least = std::min(least, w * w);
-      if (!(least < std::numeric_limits<double>::infinity())) return {};
+        if (w != 0) least = std::min(least, w * w), largest = std::max(largest, w * w);
+      if (largest == 0) return {};
+      scale.spread = largest / least;
       scale.force *= least;
       scale.energy *= least;
     }

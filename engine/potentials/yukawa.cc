@@ -11,7 +11,8 @@ using Range = Parameter::Range;
 
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
-  const Yukawa potential(p.real("amplitude"), p.real("kappa"));
+  const double contact = options::least_contact<D>("yukawa", p, context);
+  const Yukawa potential(p.real("amplitude"), p.real("kappa"), contact);
   return options::pair_term<D>("yukawa", potential, p.flag("charges") ? PairWeight::charges : PairWeight::one, p,
                                context);
 }

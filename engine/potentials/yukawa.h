@@ -18,10 +18,13 @@ namespace carom {
 /// Errors: a few ulp, and κr ulp more from rounding the exponent.
 class Yukawa {
  public:
-  Yukawa(double amplitude, double kappa) : amplitude_(amplitude), kappa_(kappa) {}
+  /// `contact` [length]: no pair is nearer. Only scale() needs it: V(1/κ) says nothing of cores that are wider.
+  Yukawa(double amplitude, double kappa, double contact = 0)
+      : amplitude_(amplitude), kappa_(kappa), contact_(contact) {}
 
   ForceScale scale(double distance) const {
-    const double near = std::min(distance, 1 / kappa_), energy = 0x1p-2 * std::abs(value(near * near));
+    const double near = std::max(contact_, std::min(distance, 1 / kappa_));
+    const double energy = 0x1p-2 * std::abs(value(near * near));
     return {energy / near, energy};
   }
 
@@ -75,6 +78,7 @@ class Yukawa {
  private:
   double amplitude_;  ///< [energy·length]
   double kappa_;      ///< [1/length]
+  double contact_;    ///< [length]
 };
 
 static_assert(Potential<Yukawa>);

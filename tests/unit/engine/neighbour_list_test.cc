@@ -124,18 +124,6 @@ TEST(NeighbourList, RecoversFromOneWildStep) {
   EXPECT_THROW(NeighbourList<2>(box, {0.1, 0.1, 0.1}).cover(wild), Error);
 }
 
-TEST(NeighbourList, LeavesOutWhatIsNotWanted) {
-  Box<2> box;
-  box.edges = {10, 10};
-  box.boundary.fill(Boundary::wall);
-  const std::vector<Vec<2>> x = {{1, 1}, {2, 1}, {3, 1}};
-  NeighbourList<2> list(box, {2, 2, 2}, [](Id i, Id j) { return i + j != 2; });
-  const auto pairs = list.cover(x);
-  ASSERT_EQ(pairs.size(), 2u);
-  EXPECT_EQ(pairs[0].j, 1u);
-  EXPECT_EQ(pairs[1].i, 1u);
-}
-
 template <int D>
 void list_unequal(Boundary boundary) {
   Box<D> box;

@@ -325,5 +325,26 @@ TEST(Registry, NamesEveryTypeOnceAndDocumentsIt) {
   EXPECT_EQ(names.size(), 10u);
 }
 
+TEST(Pairs, ScaleOfAShortRangedAttractionIsThatAtContact) {
+  Scene<3> scene(20, 8, Boundary::periodic, 1);
+  for (double& radius : scene.particles.radius) radius = 0.5;
+  for (const double kappa : {1.0, 7.0, 40.0}) {
+    const auto term = scene.make(
+        "yukawa",
+        {{"amplitude", -std::exp(kappa)}, {"kappa", kappa}, {"charges", false}, {"cutoff", 3.0}, {"cut", "switch"s}});
+    const double energy = term->scale(1.5).energy;  // V at contact is -1
+    EXPECT_GT(energy, 0.1) << kappa;
+    EXPECT_LT(energy, 1) << kappa;
+  }
+}
+
+TEST(Pairs, ScaleKnowsTheLargestWeights) {
+  Scene<2> scene(6, 8, Boundary::wall, 1);
+  scene.particles.mass = {1, 1e-7, 1e-7, 0.5, 1e-7, 1e-7};
+  const ForceScale scale = scene.make("gravity", {{"constant", 1.0}})->scale(2);
+  EXPECT_NEAR(scale.spread * 1e-14, 1, 1e-12);
+  EXPECT_NEAR(scale.force * 64e14, 1, 1e-12);  // 2^-4/r^2
+}
+
 }  // namespace
 }  // namespace carom
