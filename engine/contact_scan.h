@@ -1,5 +1,6 @@
 #pragma once
-// Contacts for the integrators that move everybody at once (cva, mcva, cdda): who touches now, who touches first.
+// Contacts for the integrators that cut the step of all particles (cva, mcva, cdda): which touch now, which first. The
+// slab core takes its candidates and contacts at rest from here, too.
 //
 // Pairs come from a Verlet list with the radii as reach, walls from the box. Keys are those of the event core, so the
 // order of simultaneous impulses is the same everywhere.
@@ -35,11 +36,11 @@ class ContactScan {
   void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length);
 
   /// Applies `impulse` to every contact that touches and approaches at x, in key order, again until none approaches,
-  /// and notes who is left resting in contact. `impulse` changes the velocities in `v`. Throws
+  /// and notes which contacts are left at rest. `impulse` changes the velocities in `v`. Throws
   /// Error(Failure::numerical) beyond max_events.
   void resolve(double time, Positions<D> x, Vectors<D> v, const std::function<void(const Touch<D>&)>& impulse);
 
-  /// Whether nobody touches and approaches, or rests in contact.
+  /// Whether nothing touches and approaches, or rests in contact.
   bool quiet(Positions<D> x, Positions<D> v) {
     collect(0, x, v);
     return approaching_.empty() && resting_.empty();
@@ -68,7 +69,8 @@ class ContactScan {
   /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, Positions<D> x_new) { return list_.cover(x, x_new); }
 
-  /// The candidates while nobody strays farther than `margin` from x; and for each particle its partners among them.
+  /// The candidates while no particle strays farther than `margin` from x; and for each particle its partners among
+  /// them.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, double margin) { return list_.cover(x, margin); }
   const Partners& candidate_partners() { return list_.partners(); }
 

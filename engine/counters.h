@@ -22,7 +22,7 @@ struct Counters {
   double folded = 0;               ///< edda: Σ|r| of what was folded into velocities [energy]
   std::uint64_t divisions = 0;     ///< of the particles among ranks under forces
   std::uint64_t slabs_again = 0;   ///< done again, with more particles known
-  std::uint64_t slabs_by_all = 0;  ///< of these, with everybody known
+  std::uint64_t slabs_by_all = 0;  ///< of these, with all particles known
   double max_overlap = 0;          ///< deepest overlap met, relative to the contact distance
   ExactSum collision_virial;       ///< Σ d·impulse over pair collisions [mass·length²/time]
   EventCounts events;              ///< of the event core, at the end of the last slab; 0 where a method has none

@@ -29,7 +29,7 @@ struct Slab {
 template <int D>
 struct SlabReport {
   Counters& counters;
-  std::vector<Contact<D>>* contacts = nullptr;  ///< where to put the executed contacts, in key order; null: nobody asks
+  std::vector<Contact<D>>* contacts = nullptr;  ///< where to put the executed contacts, in key order; null: not wanted
   std::span<const double> observe{};  ///< ascending times within the slab at which to observe (free flight only)
   std::function<void(double, const Particles<D>&)> observer{};  ///< given copies flown to each of these times
   double reached =

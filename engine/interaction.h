@@ -77,7 +77,7 @@ class Interaction {
   /// The same term for `some` of all particles, which outlive it; `made_for`: the particles it was made for, all or a
   /// share. Null where they are not enough for those of them that are owned.
   virtual std::unique_ptr<Interaction> among(const Particles<D>& made_for, const Particles<D>& some) const = 0;
-  /// How far it reaches from positions x, as far as this rank knows [length]; infinite: it needs everybody.
+  /// How far it reaches from positions x, as far as this rank knows [length]; infinite: it needs all particles.
   virtual double reach(Positions<D> x) const = 0;
   /// The same of a term that was made for a share of the particles. Collective.
   virtual double reach(const Particles<D>& share, Exchange& ranks) const = 0;

@@ -92,13 +92,13 @@ void Monitor<D>::observe(double time, const Particles<D>& copies) {
   if (std::min(frames_.due(), rows_.due()) <= time + time_slack()) show(measure(time, copies, nullptr, false), false);
 }
 
-/// Shows the particles to those who look at times of their own.
+/// Shows the particles to observers that look at times of their own.
 template <int D>
 void Monitor<D>::sample(double time, const Particles<D>& state) {
   for (Sampler& sampler : samplers_) {
     if (sampler.due.due() > time + time_slack()) continue;
     const Stopwatch watch(statistics_.counters.seconds.output);
-    sampler.observer->sample(time, everybody(state));
+    sampler.observer->sample(time, all_particles(state));
     sampler.due.pass(time + time_slack());
   }
 }
@@ -227,9 +227,9 @@ double Monitor<D>::deepest_overlap() {
   return deepest;
 }
 
-/// Everybody in a state of this rank's particles; where there are several ranks, on rank 0 only.
+/// All particles, in a state of this rank's particles; where there are several ranks, on rank 0 only.
 template <int D>
-const Particles<D>& Monitor<D>::everybody(const Particles<D>& state) {
+const Particles<D>& Monitor<D>::all_particles(const Particles<D>& state) {
   if (!system_.sizes) return state;
   if (system_.part) system_.part->collect();
   return gathered_ = gathered(*system_.ranks, system_.part ? system_.particles : state);

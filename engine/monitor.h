@@ -1,5 +1,5 @@
 #pragma once
-// What is measured while a run goes on, and who is shown it when. The run itself never looks at it.
+// What is measured while a run goes on, and when observers are shown it. The run itself never looks at it.
 
 #include <optional>
 #include <span>
@@ -50,7 +50,7 @@ class Monitor {
   /// statistics.steps and end_time already tell of the slab, which advanced the time by `elapsed`.
   void end_of_slab(double elapsed, const Integrator<D>& integrator, bool last);
 
-  /// Shows the last state again to those who have not seen it.
+  /// Shows the last state, unless it has been shown.
   void finish() { show(shot_, true); }
 
   /// The ranks have divided the particles anew.
@@ -71,7 +71,7 @@ class Monitor {
   void show(Snapshot<D> shot, bool last);
   void count_from(const Snapshot<D>& shot);
   double deepest_overlap();
-  const Particles<D>& everybody(const Particles<D>& state);
+  const Particles<D>& all_particles(const Particles<D>& state);
   bool in_free_flight() const { return system_.sizes && !system_.part; }  // of shares
   const System<D>& known() const { return system_.part ? system_.part->known() : system_; }
 
@@ -83,7 +83,7 @@ class Monitor {
 
   Schedule frames_, rows_;
   std::vector<Sampler> samplers_;
-  double last_frame_ = -1, last_row_ = -1;      // when they were shown; before the start, nobody was
+  double last_frame_ = -1, last_row_ = -1;      // when they were last shown; −1: not yet
   double last_row_virial_ = 0;                  // collision virial up to the last row
   Snapshot<D> shot_;                            // of the last slab's end
   Tail tail_;                                   // added to what is shown, not to H and its errors

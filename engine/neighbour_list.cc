@@ -12,7 +12,7 @@ namespace carom {
 
 namespace {
 constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
-constexpr double kCalls = 6;     // a skin that is half as wide as anybody comes in so many calls; so it lasts three,
+constexpr double kCalls = 6;  // a skin that is half as wide as any particle comes in so many calls; so it lasts three,
 constexpr double kWidest = 1.6;  // where it need not be wider than this for it [mean reach]
 constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
 }  // namespace
@@ -25,7 +25,7 @@ struct SizeClass {
   Id id(Id member) const { return ids.empty() ? member : ids[member]; }
   double largest;  ///< reach
   CellTable<D> table;
-  std::vector<Id> ids;  ///< of the members; empty: everybody
+  std::vector<Id> ids;  ///< of the members; empty: all particles
 };
 
 template <int D>
@@ -41,7 +41,7 @@ std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>
                                                           double margin) {
   const bool known = built_at_.size() == x.size(), still = x.data() == x_new.data();
   std::vector<Image<D>> crossed;
-  double squared_from_build = 0, squared_step = 0;  // the largest distances: two bounds for everybody
+  double squared_from_build = 0, squared_step = 0;  // the largest distances: two bounds for all
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (known) {
       follow_wrap(static_cast<Id>(i), x, crossed);

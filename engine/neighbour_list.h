@@ -1,8 +1,8 @@
 #pragma once
-// A Verlet list: the pairs that come within reach while nobody moves far.
+// A Verlet list: the pairs that come within reach while no particle moves far.
 //
 // The list is built from a cell grid with a skin and rebuilt when a particle has moved more than half of it. Pairs are
-// held in the order (lower id, higher id, image), so that loops over the list sum in id order whatever the skin: a
+// held in the order (lower id, higher id, image), so that loops over the list go in id order whatever the skin: a
 // wider list only adds pairs that are out of reach. A pair may stand there with several images where a periodic box is
 // small. (Verlet, Phys. Rev. 159 (1967) 98.)
 

@@ -2,15 +2,15 @@
 // What one rank does of a system that several ranks advance together.
 //
 // Every particle is owned by one rank, by where it is; others have copies of it, ghosts (Particles::ghost). What acts
-// on a particle is computed by its owner, with all its pairs in the order of their ids, and told to the others: the
-// sums are those of one rank alone, bit for bit. What is cheap beside that everybody does for the particles he knows.
+// on a particle is computed by its owner, with all its pairs, in sums of integers, and told to the others: the sums are
+// those of one rank alone, bit for bit. What is cheap beside that each rank does for all particles that it knows.
 //
-// A rank knows either everybody, or its own particles and those near them. For methods that can do with these
+// A rank knows either all particles, or its own particles and those near them. For methods that can do with these
 // (Integrator::local()) it runs its ghosts like its own particles; those at the rim of what it knows may go wrong, for
 // they miss partners, so it is checked that those near enough to matter did what they did at their owners'. If they did
-// not, the slab is done again with more ghosts, in the end with everybody known. Particles are divided anew before
-// anybody has come too far: each goes from its owner to those who know it from then on. The system itself keeps to
-// shares (engine/shares.h), which are brought up to date when somebody looks.
+// not, the slab is done again with more ghosts, in the end with all particles known. Particles are divided anew before
+// one has come too far: each goes from its owner to the ranks that know it from then on. The system itself keeps to
+// shares (engine/shares.h), which are brought up to date when an observer looks.
 
 #include <memory>
 #include <span>
@@ -57,10 +57,10 @@ class Part {
   /// How many particles there are, known or not.
   std::size_t total() const { return shares_.size(); }
 
-  /// At the start of a slab: says anew who owns whom, by where everybody is, and whom this rank knows, if it is time
-  /// for that; returns whether it was. `local`: those are enough that own particles may meet.
+  /// At the start of a slab: says anew which rank owns each particle, by where it is, and which this rank knows, if it
+  /// is time for that; returns whether it was. `local`: those are enough that own particles may meet.
   bool divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, double slab_length);
-  /// Those who are known were not enough for a slab: knows more of them, where that was what lacked, or everybody.
+  /// Those that are known were not enough for a slab: knows more of them, where that was what lacked, or all.
   void know_more(Luggage<D>& luggage, std::int64_t slab, double slab_length);
   /// Ghosts went wrong that matter: more of them are to be known.
   void deepen() {

@@ -1,5 +1,5 @@
 #pragma once
-// The particles of a run, in the order of their ids, as integrators and observers see them: everybody at the same time.
+// The particles of a run, in the order of their ids, as integrators and observers see them: all at the same time.
 //
 // Where several ranks share a system (engine/part.h) each has the particles it owns and copies of others, ghosts. It
 // may have only some of all then: their numbers here follow the order of their ids.

@@ -60,7 +60,8 @@ class Observer {
   /// Asked once, before the run begins.
   virtual Sampling sampling() const { return {}; }
   /// Copies of all particles at a time of sampling(): exactly then with free flight, else at the first step end at or
-  /// after it. Costs no measurement: this is the way to look often. Where ranks have shares rank 0 alone sees somebody.
+  /// after it. Costs no measurement: this is the way to look often. Where ranks have shares rank 0 alone sees
+  /// particles.
   virtual void sample(double /*time*/, const Particles<D>&) {}
   virtual void frame(const Snapshot<D>&) {}
   virtual void thermo(const Snapshot<D>&) {}
@@ -92,7 +93,7 @@ struct Statistics {
   double collision_rate = 0;  ///< pair collisions a unit time and particle, times two: what one sphere suffers
   /// Of the flight of one sphere from one pair collision to the next: its mean time N t/(2 collisions), and its mean
   /// length, that time × the mean speed. The mean of |v| over all particles is taken at slab ends and averaged over
-  /// time by the trapezoidal rule. Absent while nobody has collided.
+  /// time by the trapezoidal rule. Absent while nothing has collided.
   std::optional<double> mean_free_time, mean_free_path;
   double wall_seconds = 0;     ///< of the run's loop
   bool stopped_early = false;  ///< should_stop said so

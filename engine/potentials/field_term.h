@@ -8,7 +8,7 @@
 //   hessian_product(i, x, w)       V_i″ w
 //   least_force(distance)          on a particle so far from where there is none [force]; 0: there is no telling
 //   among(particles)               itself for other particles
-// and, where it accelerates everybody alike, acceleration().
+// and, where it accelerates all particles alike, acceleration().
 
 #include <algorithm>
 #include <utility>
@@ -21,7 +21,7 @@ namespace carom {
 template <int D, class Field>
 class FieldTerm final : public Interaction<D> {
  public:
-  /// `particles` tells who is a ghost, and outlives the term.
+  /// `particles` tells which are ghosts, and outlives the term.
   FieldTerm(const Particles<D>& particles, Field field) : particles_(particles), field_(std::move(field)) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override {

@@ -53,16 +53,16 @@ class Bonds {
 
   std::optional<Bonds> among(const Particles<D>& some) const {
     if (some.id.empty()) return *this;
-    constexpr Id kNobody = std::numeric_limits<Id>::max();
-    std::vector<Id> number(some.id.back() + 1, kNobody);
+    constexpr Id kUnknown = std::numeric_limits<Id>::max();
+    std::vector<Id> number(some.id.back() + 1, kUnknown);
     for (Id i = 0; i < some.id.size(); ++i) number[some.id[i]] = i;
-    const auto of = [&](Id id) { return id < number.size() ? number[id] : kNobody; };
+    const auto of = [&](Id id) { return id < number.size() ? number[id] : kUnknown; };
     PairList known;
     for (const auto& [a, b] : pairs_) {
       const Id i = of(a), j = of(b);
-      if (i != kNobody && j != kNobody)
+      if (i != kUnknown && j != kUnknown)
         known.push_back({i, j});
-      else if ((i != kNobody && some.owns(i)) || (j != kNobody && some.owns(j)))
+      else if ((i != kUnknown && some.owns(i)) || (j != kUnknown && some.owns(j)))
         return std::nullopt;
     }
     return Bonds(box_, std::move(known));
@@ -75,7 +75,7 @@ class Bonds {
   double reach(const Particles<D>& share, Exchange& ranks) const {
     const Id first = share.size() > 0 ? share.id_of(0) : 0;
     const auto here = [&](Id id) { return id >= first && id - first < share.size(); };
-    Bytes told;  // of whom another has the lower partner
+    Bytes told;  // the higher partners of bonds, where another rank has the lower one
     for (const auto& [i, j] : pairs_)
       if (!here(i) && here(j)) put(told, j), put(told, share.x[j - first]);
     std::unordered_map<Id, Vec<D>> elsewhere;

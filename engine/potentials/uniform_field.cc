@@ -7,7 +7,7 @@ namespace {
 
 using Type = Parameter::Type;
 
-/// V_i = −m_i g·x: everybody falls with the acceleration g.
+/// V_i = −m_i g·x: all particles fall with the acceleration g.
 template <int D>
 class UniformField {
  public:
