@@ -26,9 +26,6 @@ class Table {
   /// `r` ascending and positive, at least two; V there; dV/dr at the first and the last point, or empty.
   Table(std::span<const double> r, std::span<const double> values, std::span<const double> slopes);
 
-  /// Where the table ends [length²].
-  double end_squared() const { return last_; }
-
   ForceScale scale(double distance) const;
 
   template <class T>
