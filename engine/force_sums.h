@@ -2,8 +2,8 @@
 // Sums of forces in fixed point: integers, so that the order of the terms does not matter.
 //
 // Each component of each force is rounded to a multiple of a quantum, a power of two that is constant in a run
-// (quanta() in forces.h). Forces of pairs then cancel exactly in the sum over all particles. A sum has a low word, and a
-// high one for forces that are too large for it: the value is (2^40 high + low) quanta whichever pair took which.
+// (quanta() in forces.h). Forces of pairs then cancel exactly in the sum over all particles. A sum has a low word, and
+// a high one for forces that are too large for it: the value is (2^40 high + low) quanta whichever pair took which.
 
 #include <array>
 #include <cmath>
