@@ -180,7 +180,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         if (sweep > kPatience && largest > kStalled * earlier) freeze_stalled(largest / h);
         earlier = largest;
       }
-      if (sweep > kStart && chebyshev.plain() && largest > kSlow * before && measure(system)) {
+      if (sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * before) && measure(system)) {
         chebyshev = Chebyshev(0.25 * h * h * squared_frequency_);
         ++counters_->fallbacks;
       }
