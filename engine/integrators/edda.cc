@@ -289,9 +289,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
-    ExactSum sum;
+    ExactSeries sum;
     std::vector<Lack<D>> of_frozen;
-    std::uint64_t frozen_here = 0;
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
       const Vec<D> e = mean_[i] - a_[i];
@@ -303,10 +302,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     }
     core_->finish(p);
     for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
-    double rest = of_all_ranks(system, sum).value();
+    double rest = of_all_ranks(system, sum.sum()).value();
     if (any_freezes_) {
       rest += fold_near(system, of_frozen, counters_->folded);
-      frozen_here = of_frozen.size();
+      std::uint64_t frozen_here = of_frozen.size();
       sum_over_ranks(system, {&frozen_here, 1});
       counters_->frozen += frozen_here;
     }
