@@ -1,5 +1,5 @@
 #pragma once
-// Sums of forces in fixed point: integers, so that neither the order of the terms nor who found them matters.
+// Sums of forces in fixed point: integers, so that the order of the terms does not matter.
 //
 // Each component of each force is rounded to a multiple of a quantum, a power of two that is constant in a run
 // (force_quantum()). Forces of pairs then cancel exactly in the sum over all particles. A sum has a low word, and a

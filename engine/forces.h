@@ -51,7 +51,7 @@ void need_all(const System<D>& system) {
   if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
 }
 
-/// (V/N)^(1/D) [length]; whoever knows only some of the particles takes the number of all.
+/// (V/N)^(1/D) [length]; N counts the particles of all ranks.
 template <int D>
 double mean_distance(const System<D>& system) {
   const std::size_t all = system.part ? system.part->total() : system.size();

@@ -1,4 +1,4 @@
-#include "engine/pair_kernel.h"
+#include "engine/pair_formulas.h"
 
 namespace carom::kernels {
 constinit const PairKernels pairs_avx2 = kernels_of<4>("avx2", PairPotentials{});

@@ -1,4 +1,4 @@
-#include "engine/pair_kernel.h"
+#include "engine/pair_formulas.h"
 
 namespace carom::kernels {
 constinit const PairKernels pairs_sse2 = kernels_of<2>("sse2", PairPotentials{});

@@ -149,8 +149,8 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const std::vector<
   return records_;
 }
 
-/// The largest distances from the places at the last build. Notes who has been wrapped since the last time; false
-/// where this was nobody who could be expected to, or where a position is not finite.
+/// The largest distances from the places at the last build. Notes which particles have been wrapped since the last
+/// time; false where one has that was not expected to, or where a position is not finite.
 template <int D>
 bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, double& squared_step) {
   const double allowed = 0.25 * skin_ * skin_;

@@ -1,5 +1,5 @@
 #pragma once
-// The potentials that pair kernels are made for: whoever adds one adds a line.
+// The potentials that pair kernels are made for: a new one takes a line here.
 
 #include <cstddef>
 #include <type_traits>

@@ -28,7 +28,7 @@ const std::vector<double>* pair_factors(PairWeight weight, const Particles<D>& p
 template <int D, Potential P, class Pairs>
 class PairTerm final : public Interaction<D> {
  public:
-  /// `particles` tells who is a ghost, and outlives the term. `scale`: of pairs of weight 1, at a given distance.
+  /// `particles` tells which are ghosts, and outlives the term. `scale`: of pairs of weight 1, at a given distance.
   PairTerm(const Particles<D>& particles, P potential, PairWeight weight, Pairs pairs,
            std::function<ForceScale(double)> scale, Tail tail = {})
       : particles_(particles),

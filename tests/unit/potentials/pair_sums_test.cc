@@ -181,7 +181,7 @@ TEST(PairSums, PassOverManyPairsThatAreOnlyInTheSkin) {
   for (const Boundary boundary : {Boundary::wall, Boundary::periodic}) {
     Scene<2> scene(0, 61, boundary, 0);
     for (int k = 0; k < 400; ++k)
-      for (const double beside : {0.0, k == 399 ? 0.9 : 1.25})
+      for (const double beside : {0.0, k % 399 == 0 ? 0.9 : 1.25})
         scene.particles.x.push_back(Vec<2>(0.01 + 3 * (k % 20) + beside, 0.01 + 3 * (k / 20)));
     const auto& x = scene.particles.x;
     scene.particles.mass.resize(x.size(), 1);
