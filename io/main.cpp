@@ -34,7 +34,7 @@ void add_set(CLI::App& command, std::vector<std::string>& set) {
 void add_bench(CLI::App& app, carom::BenchOptions& options) {
   CLI::App& bench = *app.add_subcommand("bench", "The speed of the event core on this machine, or of forces");
   auto* forces = bench.add_flag("--forces", options.forces, "Measure the loops over pairs instead of the event core");
-  auto* n = bench.add_option("--n", options.n, "Numbers of particles; 1000 … 1000000, of --forces 32000");
+  auto* n = bench.add_option("--n", options.n, "Numbers of particles; 1000 10000 100000 1000000, of --forces 32000");
   n->type_name("N")->check(CLI::Range(std::uint64_t{10}, std::uint64_t{4000000000}));
   auto* filled = bench.add_option("--packing-fraction", options.packing_fraction, "Packing fractions");
   filled->capture_default_str()->type_name("PHI")->check(CLI::Range(1e-6, 0.91));
