@@ -73,8 +73,8 @@ steps = {6}
 directory = "unused"
 )";
   const double edge = std::cbrt(static_cast<double>(n) / kDensity);
-  const std::string deck = fmt::format(text, edge, n / 2, n - n / 2, kSeed, each.name, each.interaction, steps);
-  return read_deck("bench.toml", {}, [&](const std::filesystem::path&) { return deck; });
+  std::string deck = fmt::format(text, edge, n / 2, n - n / 2, kSeed, each.name, each.interaction, steps);
+  return read_deck("bench.toml", {}, [&](const std::filesystem::path&) { return std::optional(deck); });
 }
 
 /// Each coordinate changed at random by up to `most`.
