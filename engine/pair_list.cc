@@ -359,7 +359,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     search.here = ranges[first].here();
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
     PartnersFound found{plain_.data() + plain_size_, other_.data()};
-    for (; first < last; ++first) kernels_.find(search, ranges[first].begin, ranges[first].end, found);
+    for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
     if (filter_.excluded) {
       const auto excluded = [&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); };
       found.plain = std::remove_if(plain_.data() + plain_size_, found.plain, excluded);
