@@ -308,10 +308,9 @@ void SlabCore<D>::agree(bool failed) {
   PathHashes<D> events(particles_);
   for (const Contact<D>& contact : contacts_) events.add(contact.key);
   bool agreed = true;
-  part.tell([&](Id i, Bytes& to) { put(to, events[i]); },
-            [&](Id i, Reader& from) {
-              agreed = (from.get<std::uint64_t>() == events[i] || !part.matters(i)) && agreed;
-            });
+  part.tell(
+      [&](Id i, Bytes& to) { put(to, events[i]); },
+      [&](Id i, Reader& from) { agreed = (from.get<std::uint64_t>() == events[i] || !part.matters(i)) && agreed; });
   if (part.largest(agreed ? 0 : 1) > 0) {
     part.deepen();
     throw HaloTooSmall{};

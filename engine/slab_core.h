@@ -50,9 +50,9 @@ class SlabCore {
   /// Flies from the start of the slab to its end. Empty `a`: straight.
   FlightEnd<D> fly(Positions<D> a);
 
-  const std::vector<Vec<D>>& x() const { return x_; }  ///< positions at the slab's end, not wrapped [length]
+  const std::vector<Vec<D>>& x() const { return x_; }            ///< positions at the slab's end, not wrapped [length]
   const std::vector<Vec<D>>& last_x() const { return last_x_; }  ///< the same of the flight before
-  const std::vector<Vec<D>>& v() const { return v_; }  ///< velocities there [length/time]
+  const std::vector<Vec<D>>& v() const { return v_; }            ///< velocities there [length/time]
   std::span<const Contact<D>> contacts() const {
     return contacts_;
   }  ///< of the last flight, in the order of their keys

@@ -1,8 +1,8 @@
 #pragma once
 // Fixed-point iterations that contract slowly, made faster by what is known of their spectrum.
 //
-// The sweeps of a discrete-gradient slab of length h are a ← F(a) with F′ ≈ −h²ω²/4 for a mode of frequency ω. Where the
-// largest λ = h²ω²/4 is known, Chebyshev's semi-iteration for eigenvalues 1 … 1 + λ of I − F′,
+// The sweeps of a discrete-gradient slab of length h are a ← F(a) with F′ ≈ −h²ω²/4 for a mode of frequency ω. Where
+// the largest λ = h²ω²/4 is known, Chebyshev's semi-iteration for eigenvalues 1 … 1 + λ of I − F′,
 //
 //   a ← a + Δ,   Δ ← memory · Δ + gain · e,   e = F(a) − a,
 //
