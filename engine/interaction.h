@@ -25,6 +25,7 @@ namespace carom {
 
 class BondTable;
 class Exchange;
+struct PairKernels;
 
 template <int D>
 using Positions = std::span<const Vec<D>>;
@@ -99,6 +100,9 @@ class Interaction {
   /// How large its forces are where particles are so far apart on average [length]; a function of parameters and of
   /// this rank's particles.
   virtual ForceScale scale(double distance) const = 0;
+
+  /// Takes these kernels instead of pair_kernels(). The sums are the same to the bit; fields have none.
+  virtual void use(const PairKernels&) {}
 
   /// Whether the term is invariant under translation, so that it keeps the total momentum.
   virtual bool keeps_momentum() const { return true; }

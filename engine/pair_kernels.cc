@@ -20,15 +20,19 @@ bool available(const PairKernels& kernels) {
 
 }  // namespace
 
-const PairKernels& pair_kernels() {
-  const PairKernels* const all[] = {&kernels::pairs_avx512, &kernels::pairs_avx2, &kernels::pairs_sse2};
+std::vector<const PairKernels*> available_pair_kernels() {
+  std::vector<const PairKernels*> all = {&kernels::pairs_avx512, &kernels::pairs_avx2, &kernels::pairs_sse2};
   const char* const wanted = std::getenv("CAROM_SIMD");
-  for (const PairKernels* each : all) {
-    if (wanted && std::string_view(wanted) != each->name) continue;
-    if (available(*each)) return *each;
-    if (wanted) break;
-  }
-  throw Error(Failure::deck, "CAROM_SIMD=" + std::string(wanted) +
+  std::erase_if(all, [&](const PairKernels* each) {
+    return (wanted && std::string_view(wanted) != each->name) || !available(*each);
+  });
+  return all;
+}
+
+const PairKernels& pair_kernels() {
+  const auto all = available_pair_kernels();
+  if (!all.empty()) return *all.front();
+  throw Error(Failure::deck, "CAROM_SIMD=" + std::string(std::getenv("CAROM_SIMD")) +
                                  " names no vector width of this machine; use sse2, avx2 or avx512, or unset it");
 }
 

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "engine/force_words.h"
 
@@ -133,7 +134,9 @@ struct PairKernels {
   const PairFormula* formulas;  ///< of each of PairPotentials
 };
 
-/// The widest that this machine has, or what CAROM_SIMD says: sse2, avx2 or avx512. Throws Error(Failure::deck).
+/// Those that this machine has, the widest first; only what CAROM_SIMD says, where it does: sse2, avx2 or avx512.
+std::vector<const PairKernels*> available_pair_kernels();
+/// The first of these. Throws Error(Failure::deck) where there is none.
 const PairKernels& pair_kernels();
 namespace kernels {
 extern const PairKernels pairs_sse2, pairs_avx2, pairs_avx512;

@@ -313,6 +313,10 @@ void CutoffList<D>::build(const PairStep<D>& step) {
       for (int k = 0; k < D; ++k) (&records_.box.back().x)[k] = box[k];
     }
 
+  std::vector<std::uint32_t> owned(members.size() + 1);  // records of own particles before this one
+  for (std::size_t r = 0; r < members.size(); ++r)
+    owned[r + 1] = owned[r] + ((code_[r] & PartnerSearch::kGhost) == 0 ? 1 : 0);
+  const auto all_ghosts = [&](const PartnerRange& range) { return owned[range.begin] == owned[range.end]; };
   std::vector<PartnerRange> ranges;
   Cell<D> centre{};
   for (std::size_t c = 0; c + 1 < cells.start.size(); ++c) {
@@ -324,8 +328,11 @@ void CutoffList<D>::build(const PairStep<D>& step) {
         rest /= count;
       }
       cells.partners(centre, ranges);
-      for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1]; ++r) {
-        ranges[0].begin = r + 1;
+      const bool ghosts = owned[cells.start[c]] == owned[cells.start[c + 1]];
+      const bool among = !ghosts || !all_ghosts(ranges[0]);  // the first range begins with the cell itself
+      if (ghosts) std::erase_if(ranges, all_ghosts);
+      for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
+        if (among) ranges[0].begin = r + 1;
         find_pairs(r, ranges);
       }
     }
@@ -359,7 +366,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     search.here = ranges[first].here();
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
     PartnersFound found{plain_.data() + plain_size_, other_.data()};
-    for (; first < last; ++first) kernels_.find(search, ranges[first].begin, ranges[first].end, found);
+    for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
     if (filter_.excluded) {
       const auto excluded = [&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); };
       found.plain = std::remove_if(plain_.data() + plain_size_, found.plain, excluded);

@@ -73,6 +73,8 @@ class CutoffList {
   /// Error(Failure::numerical) for positions that are not finite and for steps of several edges of a periodic box.
   PairRecords<D>& cover(const PairStep<D>& step, const std::vector<char>& ghost);
 
+  void use(const PairKernels& kernels) { kernels_ = &kernels; }
+
  private:
   static constexpr double kLeastSkin = 0.1;  // [cutoff]
 
@@ -83,7 +85,7 @@ class CutoffList {
   const Box<D>& box_;
   double cutoff_, skin_;
   PairFilter filter_;
-  const PairKernels& kernels_ = pair_kernels();
+  const PairKernels* kernels_ = &pair_kernels();
   std::vector<char> ghost_;
   std::size_t particles_ = 0;  // at the last build
   std::uint64_t calls_ = 0, rebuilds_ = 0;

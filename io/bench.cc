@@ -4,26 +4,21 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "engine/error.h"
 #include "engine/integrator.h"
 #include "engine/placement.h"
+#include "io/bench_forces.h"
 #include "io/bench_state.h"
+#include "io/bench_table.h"
 #include "io/deck_build.h"
-#include "io/text_file.h"
-#include "io/version.h"
 
 namespace carom {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-constexpr std::uint64_t kSeed = 20240117;
+using namespace bench;
 
 /// A size in the table of /proc/self/status [bytes]; nothing where there is no such table.
 std::optional<double> process_memory(const std::string& name) {
@@ -59,11 +54,6 @@ class PeakMemory {
   std::optional<double> before_;
 };
 
-const IntegratorInfo& free_flight() {
-  const auto& all = integrators();
-  return *std::find_if(all.begin(), all.end(), [](const IntegratorInfo& info) { return info.name == "free-flight"; });
-}
-
 Parameters free_flight_parameters(double epoch) {
   Parameters parameters;
   parameters.set("step", epoch);
@@ -85,7 +75,7 @@ class Flow {
   explicit Flow(std::unique_ptr<System<D>> system)
       : system_(std::move(system)),
         epoch_(default_epoch(*system_)),
-        integrator_(free_flight().make<D>(free_flight_parameters(epoch_))) {
+        integrator_(integrator_named("free-flight").make<D>(free_flight_parameters(epoch_))) {
     integrator_->start(*system_, counters_);
   }
 
@@ -93,7 +83,7 @@ class Flow {
   Stretch run(std::uint64_t epochs, std::uint64_t collisions) {
     constexpr std::uint64_t kPatience = 1000;  // epochs, each of forty mean free times
     const std::uint64_t before = counters_.sphere_sphere;
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     Stretch done;
     for (std::uint64_t k = 0; k < epochs || done.collisions < collisions; ++k) {
       if (k == kPatience && done.collisions == 0)
@@ -105,7 +95,7 @@ class Flow {
       done.collisions = counters_.sphere_sphere - before;
       done.time += epoch_;
     }
-    done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    done.seconds = seconds_since(start);
     return done;
   }
 
@@ -125,12 +115,6 @@ class Flow {
 
 double ratio(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
-}
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
 /// pV/(N k T) of a stretch, from the virial: it tells a fluid from a crystal that has not melted.
@@ -185,10 +169,7 @@ Json measure(std::unique_ptr<System<D>> state, const BenchOptions& options, Peak
       {"equilibration_epochs", options.epochs_before()},
       {"equilibration_collisions", melting.collisions},
       {"collisions", all.collisions},
-      {"collisions_per_second",
-       {{"median", median(rates)},
-        {"min", *std::min_element(rates.begin(), rates.end())},
-        {"max", *std::max_element(rates.begin(), rates.end())}}},
+      {"collisions_per_second", spread(rates)},
       {"repeats", repeats},
       {"bytes_per_particle", bytes ? Json(*bytes / static_cast<double>(n)) : Json(nullptr)},
       {"per_collision",
@@ -216,13 +197,8 @@ Json file_point(const BenchOptions& options) {
   return measure(read_state<D>(*options.state), options, memory);
 }
 
-void say(const std::string& text) {
-  if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
-    throw Error(Failure::file, "standard output: cannot write to it");
-}
-
 std::string heading(const BenchOptions& options) {
-  return "carom " + version_string() + "\n" + compiler_string() + "\n" +
+  return title() +
          fmt::format(
              "Hard spheres in a periodic box, free-flight, one core. Equilibrated for {} epochs of about forty mean "
              "free times,\n"
@@ -241,8 +217,7 @@ std::string row(const Json& point) {
   const auto number = [](const Json& value) { return value.get<double>(); };
   return fmt::format(
       "{:>8} {:>6.3f} {:>12.0f} {:>21} {:>7} {:>7.3f} {:>9.3f} {:>8.4f} {:>7.3f} {:>7.3f} {:>6.1f} {:>7.3f} {:>7.3f}\n",
-      point["n"].get<std::uint64_t>(), number(point["packing_fraction"]), number(rate["median"]),
-      fmt::format("{:.0f} .. {:.0f}", number(rate["min"]), number(rate["max"])),
+      point["n"].get<std::uint64_t>(), number(point["packing_fraction"]), number(rate["median"]), range(rate),
       bytes.is_null() ? "-" : fmt::format("{:.0f}", number(bytes)), number(point["compressibility_factor"]),
       number(per["crossings"]), number(per["rebuilds"]), number(per["stale"]), number(per["predictions"]),
       number(point["candidates_per_prediction"]), number(per["scheduled"]), number(point["stale_fraction"]));
@@ -251,26 +226,26 @@ std::string row(const Json& point) {
 }  // namespace
 
 int bench_command(const BenchOptions& options) {
-  if (options.save_state && !options.state && options.n.size() * options.packing_fraction.size() != 1)
+  if (options.forces) {
+    bench_forces(options);
+    return 0;
+  }
+  if (options.save_state && !options.state && options.sizes().size() * options.packing_fraction.size() != 1)
     throw Error(Failure::deck,
                 "--save-state: error: there are several states; give one --n and one --packing-fraction");
   const int dimension = options.state ? state_dimension(*options.state) : options.dimension;
   Json points = Json::array();
-  const auto store = [&] {
-    const Json all = {{"version", version_string()}, {"compiler", compiler_string()}, {"points", points}};
-    if (options.json) write_file_atomically(*options.json, all.dump(2) + "\n");
-  };
   const auto add = [&](Json point) {
     say(row(point));
     points.push_back(std::move(point));
-    store();
+    store(options, {{"points", points}});
   };
-  store();  // a file that cannot be written is better known before an hour of work
+  store(options, {{"points", points}});  // a file that cannot be written is better known before an hour of work
   say(heading(options));
   if (options.state) {
     add(dimension == 2 ? file_point<2>(options) : file_point<3>(options));
   } else {
-    for (const std::uint64_t n : options.n)
+    for (const std::uint64_t n : options.sizes())
       for (const double filled : options.packing_fraction)
         add(dimension == 2 ? lattice_point<2>(n, filled, options) : lattice_point<3>(n, filled, options));
   }

@@ -1,5 +1,5 @@
 #pragma once
-// `carom bench`: how fast the event core is on this machine.
+// `carom bench`: how fast the event core is on this machine; `--forces`: the loops over pairs (bench_forces.h).
 //
 // Every point of the table is a periodic fluid of hard spheres, run by the free-flight integrator slab after slab as a
 // run does it, first to equilibrate and then, a number of times, to measure. Slabs are whole epochs, so the cost of
@@ -8,12 +8,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace carom {
 
 struct BenchOptions {
-  std::vector<std::uint64_t> n{1000, 10000, 100000, 1000000};
+  bool forces = false;           ///< measure forces instead of the event core
+  std::vector<std::uint64_t> n;  ///< empty: see sizes()
   std::vector<double> packing_fraction{0.10, 0.30, 0.49};
   int dimension = 3;
   std::optional<std::uint64_t> equilibrate;         ///< epochs of forty mean free times before; default epochs_before()
@@ -23,7 +25,18 @@ struct BenchOptions {
   std::optional<std::filesystem::path> state;       ///< measure this state instead of the table
   std::optional<std::filesystem::path> save_state;  ///< write the equilibrated state of the only point here
 
+  // With `forces`:
+  std::vector<std::string> potential;  ///< these of bench_potentials(); empty: all
+  std::optional<std::string> kind;     ///< "forces" or "mean forces"; absent: both
+  std::uint64_t pairs = 20000000;      ///< of a measurement, at least: whole passes are measured
+  std::uint64_t steps = 200;           ///< of a measurement of the melt; 0: none
+
   static constexpr std::uint64_t kWarmUp = 1;  ///< epochs of the measured core before it is measured
+  std::vector<std::uint64_t> sizes() const {
+    if (!n.empty()) return n;
+    if (forces) return {32000};
+    return {1000, 10000, 100000, 1000000};
+  }
   std::uint64_t epochs_before() const { return equilibrate.value_or(state ? 0 : 3); }
 };
 

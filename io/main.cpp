@@ -13,6 +13,7 @@
 
 #include "engine/error.h"
 #include "io/bench.h"
+#include "io/bench_forces.h"
 #include "io/command.h"
 #include "io/info.h"
 #include "io/options.h"
@@ -31,35 +32,48 @@ void add_set(CLI::App& command, std::vector<std::string>& set) {
 }
 
 void add_bench(CLI::App& app, carom::BenchOptions& options) {
-  CLI::App& bench = *app.add_subcommand("bench", "The event core's speed on this machine");
-  auto* n = bench.add_option("--n", options.n, "Numbers of spheres")->capture_default_str();
+  CLI::App& bench = *app.add_subcommand("bench", "The speed of the event core on this machine, or of forces");
+  auto* forces = bench.add_flag("--forces", options.forces, "Measure the loops over pairs instead of the event core");
+  auto* n = bench.add_option("--n", options.n, "Numbers of particles; 1000 10000 100000 1000000, of --forces 32000");
   n->type_name("N")->check(CLI::Range(std::uint64_t{10}, std::uint64_t{4000000000}));
   auto* filled = bench.add_option("--packing-fraction", options.packing_fraction, "Packing fractions");
   filled->capture_default_str()->type_name("PHI")->check(CLI::Range(1e-6, 0.91));
   auto* dimension = bench.add_option("--dimension", options.dimension, "2 or 3")->capture_default_str();
   dimension->check(CLI::IsMember({2, 3}));
-  bench
-      .add_option("--equilibrate", options.equilibrate,
-                  "Epochs of ten mean free times before measuring; 10, of a state 0")
-      ->type_name("NUMBER")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
-  bench
-      .add_option("--collisions", options.collisions,
-                  "Collisions of a measurement, at least; whole epochs are measured")
-      ->capture_default_str()
-      ->type_name("NUMBER")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 50));
+  auto* equilibrate = bench.add_option("--equilibrate", options.equilibrate,
+                                       "Epochs of forty mean free times before measuring; 3, of a state 0");
+  equilibrate->type_name("NUMBER")->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
+  auto* collisions = bench.add_option("--collisions", options.collisions,
+                                      "Collisions of a measurement, at least; whole epochs are measured");
+  collisions->capture_default_str()->type_name("NUMBER")->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 50));
   bench.add_option("--repeat", options.repeat, "Measurements of each state")
       ->capture_default_str()
       ->type_name("NUMBER")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1000000}));
   bench.add_option("--json", options.json, "Also write all results to this file")->type_name("FILE");
-  bench.add_option("--save-state", options.save_state, "Write the equilibrated state, as text")->type_name("FILE");
-  bench.add_option("--state", options.state, "Measure this state instead of a table")
-      ->type_name("FILE")
-      ->excludes(n)
-      ->excludes(filled)
-      ->excludes(dimension);
+  auto* save = bench.add_option("--save-state", options.save_state, "Write the equilibrated state, as text");
+  save->type_name("FILE");
+  auto* state = bench.add_option("--state", options.state, "Measure this state instead of a table");
+  state->type_name("FILE")->excludes(n)->excludes(filled)->excludes(dimension);
+  for (auto* other : {filled, dimension, equilibrate, collisions, save, state}) forces->excludes(other);
+
+  bench.add_option("--potential", options.potential, "Of --forces: these potentials; all")
+      ->needs(forces)
+      ->check(CLI::IsMember(carom::bench_potentials()));
+  bench.add_option("--kind", options.kind, "Of --forces: forces or 'mean forces'; both")
+      ->needs(forces)
+      ->check(CLI::IsMember({"forces", "mean forces"}));
+  bench
+      .add_option("--pairs", options.pairs, "Of --forces: pairs of a measurement, at least; whole passes are measured")
+      ->needs(forces)
+      ->capture_default_str()
+      ->type_name("NUMBER")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 50));
+  bench.add_option("--steps", options.steps, "Of --forces: steps of a measurement of the melt; 0: none")
+      ->needs(forces)
+      ->capture_default_str()
+      ->type_name("NUMBER")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
 }
 
 /// One process does it, however many a launcher has started.

@@ -120,8 +120,7 @@ std::string methods_page() {
   std::ostringstream out;
   for (const IntegratorInfo& info : integrators()) {
     out << info.name << " – " << info.title << "\n  order:     " << info.order
-        << "\n  conserves: " << wrapped(std::string(info.conserves), 13)
-        << '\n';
+        << "\n  conserves: " << wrapped(std::string(info.conserves), 13) << '\n';
     out << "  " << wrapped(std::string(info.documentation), 2) << "\n  parameters:\n";
     plain_keys(out, table_schema("integrator").variant(info.name)->keys, 4);
     out << "  source: " << wrapped(std::string(info.source), 10) << "\n\n";

@@ -12,8 +12,8 @@
 #include "engine/placement.h"
 #include "engine/radial_distribution.h"
 #include "engine/shares.h"
-#include "engine/vicinity.h"
 #include "engine/stiffness.h"
+#include "engine/vicinity.h"
 
 namespace carom {
 namespace {

@@ -198,7 +198,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         if (sweep > kPatience && largest > kStalled * earlier) freeze_stalled(largest / h);
         earlier = largest;
       }
-      if (sweep > kStart && chebyshev.plain() && largest > kSlow * before && measure(system)) {
+      if (sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * before) && measure(system)) {
         chebyshev = Chebyshev(0.25 * h * h * found_.squared_frequency);
         ++counters_->fallbacks;
       }
@@ -307,9 +307,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
-    ExactSum sum;
+    ExactSeries sum;
     std::vector<Lack<D>> of_frozen;
-    std::uint64_t frozen_here = 0;
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
       const Vec<D> e = mean_[i] - a_[i];
@@ -321,10 +320,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     }
     core_->finish(p);
     for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
-    double rest = of_all_ranks(system, sum).value();
+    double rest = of_all_ranks(system, sum.sum()).value();
     if (any_freezes_) {
       rest += fold_near(system, of_frozen, counters_->folded);
-      frozen_here = of_frozen.size();
+      std::uint64_t frozen_here = of_frozen.size();
       sum_over_ranks(system, {&frozen_here, 1});
       counters_->frozen += frozen_here;
     }

@@ -19,10 +19,10 @@ inline double stretch(double share) { return share / (1 + std::sqrt(1 + share));
 template <int D>
 void fold(System<D>& system, const Vec<D>& centre, double r) {
   Particles<D>& p = system.particles;
-  ExactSum kinetic;
+  ExactSeries kinetic;
   for (Id i = 0; i < p.size(); ++i)
     if (p.owns(i)) kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre).squaredNorm());
-  const double share = r / of_all_ranks(system, kinetic).value();
+  const double share = r / of_all_ranks(system, kinetic.sum()).value();
   if (!(std::abs(share) < 0.5) || share == 0) return;
   const double s = stretch(share);
   for (auto& v : p.v) v += s * (v - centre);

@@ -37,7 +37,11 @@ class Cut {
  public:
   /// `switch_from` [length] counts for the kind switched only; 0 < switch_from < cutoff.
   Cut(P potential, double cutoff, CutKind kind, double switch_from = 0)
-      : potential_(potential), switched_(kind == CutKind::switched), cutoff2_(cutoff * cutoff) {
+      : potential_(potential),
+        switched_(kind == CutKind::switched),
+        cutoff_(cutoff),
+        cutoff2_(cutoff * cutoff),
+        at_cutoff_(potential_.value(cutoff2_)) {
     if (switched_) {
       from2_ = switch_from * switch_from;
       inverse_width_ = 1 / (cutoff2_ - from2_);
@@ -59,8 +63,10 @@ class Cut {
   template <class T>
   T value(T rho) const {
     if (switched_) return potential_.value(rho) * factor(rho);
-    const T within = at_most_cutoff(rho), z = within - cutoff2_;
-    return z * taken_off_quotient(within, all<T>(cutoff2_));
+    const T z = rho - cutoff2_;
+    T value = potential_.value(rho) - at_cutoff_ - z * (slope_ + half_curvature_ * z);
+    if (slope_in_r_ != 0) value -= slope_in_r_ * (elementary::sqrt(rho) - cutoff_);
+    return rho < cutoff2_ ? value : all<T>(0);
   }
   template <class T>
   T derivative(T rho) const {
@@ -147,7 +153,8 @@ class Cut {
 
   P potential_;
   bool switched_;
-  double cutoff2_;             ///< ρ_c [length²]
+  double cutoff_, cutoff2_;    ///< r_c [length], ρ_c [length²]
+  double at_cutoff_;           ///< V(ρ_c)
   double from2_ = 0;           ///< ρ_s [length²]
   double inverse_width_ = 0;   ///< 1/(ρ_c − ρ_s)
   double slope_ = 0;           ///< c₁

@@ -56,7 +56,13 @@ class PairTerm final : public Interaction<D> {
   std::unique_ptr<Interaction<D>> among(const Particles<D>& /*made_for*/, const Particles<D>& some) const override {
     auto pairs = pairs_.among(some);
     if (!pairs) return nullptr;
-    return std::make_unique<PairTerm>(some, potential_, weight_, std::move(*pairs), scale_, tail_);
+    auto term = std::make_unique<PairTerm>(some, potential_, weight_, std::move(*pairs), scale_, tail_);
+    term->use(*kernels_);
+    return term;
+  }
+  void use(const PairKernels& kernels) override {
+    kernels_ = &kernels;
+    pairs_.use(kernels);
   }
   Tail tail() const override { return tail_; }
   const PairList* bonds() const override {
@@ -113,7 +119,7 @@ class PairTerm final : public Interaction<D> {
 
   /// The loop over pairs. Returns how many are this rank's.
   std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1) const {
-    const PairFormula& formula = kernels_.formulas[place_of<P>(PairPotentials{})];
+    const PairFormula& formula = kernels_->formulas[place_of<P>(PairPotentials{})];
     const auto& function = sums                     ? formula.forces_and_sums
                            : !given.vectors.empty() ? formula.hessian_product
                            : given.x_new.empty()    ? formula.forces
@@ -135,8 +141,8 @@ class PairTerm final : public Interaction<D> {
         if (given.x_new.empty() && given.vectors.empty()) refuse();
         forces->spoil();
       }
-      if (forces) kernels_.scatter(*batch_, batch_->low, low);
-      if (forces && wide) kernels_.scatter(*batch_, batch_->high, pairs_.high(*forces));
+      if (forces) kernels_->scatter(*batch_, batch_->low, low);
+      if (forces && wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
       own += owned(shared);
     });
     if (low) pairs_.pass_on(*forces);
@@ -178,7 +184,7 @@ class PairTerm final : public Interaction<D> {
   Pairs pairs_;
   std::function<ForceScale(double)> scale_;
   Tail tail_;
-  const PairKernels& kernels_ = pair_kernels();
+  const PairKernels* kernels_ = &pair_kernels();
   std::unique_ptr<PairBatch> batch_;
 };
 

@@ -7,6 +7,7 @@
 //   id(place)                   the particle that a batch means
 //   low(sums), high(sums)       words to which the forces of a batch are added; pass_on(sums) comes last
 //   most_partners()             of any particle in these batches, or more
+//   use(kernels)                instead of pair_kernels()
 // and
 //   reach(x), reach(share, ranks)           how far apart partners are at most; infinite: no end
 //   among(some)                             itself for some of the particles, if they are enough
@@ -127,6 +128,7 @@ class Bonds {
   ForceWords* high(ForceSums<D>& sums) const { return sums.high(); }
   void pass_on(ForceSums<D>&) const {}
   std::size_t most_partners() const { return most_partners_; }
+  void use(const PairKernels&) {}
 
  private:
   /// Of the image in which the bond is at x.
@@ -169,13 +171,14 @@ class AllPairs {
         throw Error(Failure::numerical,
                     "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
     records_.load(step);
-    collect_batches(records_, box_, step, cutoff_squared, kernels_, batch, visit);
+    collect_batches(records_, box_, step, cutoff_squared, *kernels_, batch, visit);
   }
   Id id(std::uint32_t place) const { return records_.order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_.low(); }
   ForceWords* high(ForceSums<D>&) const { return records_.high(); }
   void pass_on(ForceSums<D>& sums) const { records_.pass_on(sums); }
   std::size_t most_partners() const { return particles_; }
+  void use(const PairKernels& kernels) { kernels_ = &kernels; }
 
  private:
   void arrange(const Particles<D>& particles) const {
@@ -216,7 +219,7 @@ class AllPairs {
   const Box<D>& box_;
   std::size_t particles_;
   PairFilter filter_;
-  const PairKernels& kernels_ = pair_kernels();
+  const PairKernels* kernels_ = &pair_kernels();
   // Caches: their state never shows in the sums.
   mutable PairRecords<D> records_;
   mutable std::vector<char> ghost_;
@@ -239,19 +242,23 @@ class PairsWithinCutoff {
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
                Visit&& visit) const {
     records_ = &list_.cover(step, particles.ghost);
-    collect_batches(*records_, box_, step, cutoff_squared, kernels_, batch, visit);
+    collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit);
   }
   Id id(std::uint32_t place) const { return records_->order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_->low(); }
   ForceWords* high(ForceSums<D>&) const { return records_->high(); }
   void pass_on(ForceSums<D>& sums) const { records_->pass_on(sums); }
   std::size_t most_partners() const { return records_->most_partners; }
+  void use(const PairKernels& kernels) {
+    kernels_ = &kernels;
+    list_.use(kernels);
+  }
 
  private:
   const Box<D>& box_;
   double cutoff_;
   PairFilter filter_;
-  const PairKernels& kernels_ = pair_kernels();
+  const PairKernels* kernels_ = &pair_kernels();
   // Caches: their state never shows in the sums.
   mutable CutoffList<D> list_;
   mutable PairRecords<D>* records_ = nullptr;

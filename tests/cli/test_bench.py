@@ -1,7 +1,8 @@
-"""`carom bench`, tiny: what it reports, states written and read back, bad usage. And what tools/count-instructions makes
-of it, with a stand-in for valgrind. No times are checked."""
+"""`carom bench`, tiny: what it reports, states written and read back, forces, bad usage. And what
+tools/count-instructions makes of it, with a stand-in for valgrind. No times are checked."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -90,7 +91,52 @@ def test_state(dimension, tmp_path):
         assert measured[key] == made[key]  # the same run
 
 
+def force_results(tmp_path, *arguments, **environment):
+    done = subprocess.run([CAROM, "bench", "--forces", "--json", tmp_path / "bench.json", *map(str, arguments)],
+                          capture_output=True, text=True, timeout=120, env=os.environ | environment)
+    assert done.returncode == 0, (done.stdout, done.stderr)
+    results = json.loads((tmp_path / "bench.json").read_text())
+    assert results["version"] and "flags" in results["compiler"]
+    assert sum(line.split()[:1] == ["108"] for line in done.stdout.splitlines()) == len(results["forces"] + results["steps"])
+    for entry in results["forces"] + results["steps"]:
+        rate = entry["pairs_per_second" if "pairs" in entry else "steps_per_second"]
+        assert 0 < rate["min"] <= rate["median"] <= rate["max"]
+        assert entry["n"] == 108 and len(entry["repeats"]) == 2
+        assert all(repeat["seconds"] > 0 for repeat in entry["repeats"])
+    return results
+
+
+def test_forces(tmp_path):
+    quick = ["--n", 108, "--pairs", 5000, "--steps", 5, "--repeat", 2]
+    results = force_results(tmp_path, *quick)
+    potentials = ["lennard-jones", "wca", "yukawa", "inverse-power", "coulomb"]
+    widths = [entry["width"] for entry in results["steps"]]
+    assert widths[-1] == "sse2" and set(widths) <= {"sse2", "avx2", "avx512"}
+    assert ([(e["potential"], e["kind"], e["width"]) for e in results["forces"]]
+            == [(p, kind, width) for p in potentials for kind in ("forces", "mean forces") for width in widths])
+    outcomes = {}  # identical bits in all widths, and nothing else is
+    for entry in results["forces"] + results["steps"]:
+        assert all(repeat.get("passes", 0) * entry.get("pairs", 0) >= 5000 or repeat.get("steps") == 5
+                   for repeat in entry["repeats"])
+        key = entry["potential"], entry.get("kind")
+        outcomes.setdefault(key, set()).add((entry["energy"], entry["checksum"], entry.get("pairs")))
+    assert all(len(each) == 1 for each in outcomes.values()), outcomes
+    assert len(set.union(*outcomes.values())) == len(outcomes) == 11
+    pairs = [e["pairs"] for e in results["forces"] if e["potential"] == "yukawa" and e["kind"] == "forces"][0]
+    assert abs(pairs / (108 / 2 * 0.8442 * 4 / 3 * math.pi * 2.5**3) - 1) < 0.1
+
+    few = force_results(tmp_path, "--n", 108, "--pairs", 5000, "--repeat", 2, "--steps", 0, "--potential", "wca",
+                        "--kind", "mean forces", CAROM_SIMD="sse2")
+    (entry,) = few["forces"]
+    assert (entry["potential"], entry["kind"], entry["width"]) == ("wca", "mean forces", "sse2") and not few["steps"]
+    assert outcomes["wca", "mean forces"] == {(entry["energy"], entry["checksum"], entry["pairs"])}
+
+
 @pytest.mark.parametrize("arguments, words", [
+    (["--forces", "--collisions", "10"], "--collisions"),
+    (["--forces", "--potential", "gravity"], "--potential"),
+    (["--forces", "--kind", "strong"], "--kind"),
+    (["--potential", "wca"], "--forces"),
     (["--n", "0"], "--n"),
     (["--n", "many"], "--n"),
     (["--packing-fraction", "1.5"], "--packing-fraction"),
@@ -136,15 +182,17 @@ def test_files_that_cannot_be_used(tmp_path):
     assert "nowhere" in done.stderr and done.stdout == ""  # said before any work
 
 
-# Runs the command and counts a set-up of 10⁷ instructions and $COST instructions a collision.
+# Runs the command and counts a set-up of 10⁷ instructions and $COST instructions a collision or pair.
 VALGRIND = f"""#!{sys.executable}
 import json, os, subprocess, sys
 command = [word for word in sys.argv[1:] if not word.startswith("--tool") and not word.startswith("--callgrind")]
 subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 results = json.load(open(command[command.index("--json") + 1]))
 out = next(word.split("=")[1] for word in sys.argv if word.startswith("--callgrind-out-file="))
-open(out, "w").write(f"totals: {{10**7 + int(os.environ['COST']) * results['points'][0]['collisions']}}\\n")
-assert os.environ["CAROM_SIMD"] == "avx2"
+forces = results.get("forces")
+count = forces[0]["pairs"] * forces[0]["repeats"][0]["passes"] if forces else results["points"][0]["collisions"]
+open(out, "w").write(f"totals: {{10**7 + int(os.environ['COST']) * count}}\\n")
+assert os.environ["CAROM_SIMD"] == (forces[0]["width"] if forces else "avx2")
 """
 
 
@@ -153,20 +201,25 @@ def test_count_instructions(tmp_path):
     (tmp_path / "valgrind").chmod(0o755)
     record = tmp_path / "record.json"
 
-    def count(cost, *arguments, path=f"{tmp_path}:{os.environ['PATH']}"):
-        return subprocess.run([sys.executable, ROOT / "tools" / "count-instructions", "--n", "1000", "--record", record,
-                               *arguments], env=os.environ | {"PATH": path, "COST": str(cost)},
-                              capture_output=True, text=True, timeout=120)
+    def count(cost, *arguments, path=f"{tmp_path}:{os.environ['PATH']}", part=("--n", "1000")):
+        return subprocess.run([sys.executable, ROOT / "tools" / "count-instructions", *part, "--record", record, *arguments],
+                              env=os.environ | {"PATH": path, "COST": str(cost)}, capture_output=True, text=True,
+                              timeout=120)
 
     assert count(1000).returncode == 2  # nothing to compare with
     bench("--n", 100, "--packing-fraction", 0.3, "--json", tmp_path / "bench.json", *QUICK)
     compiler = json.loads((tmp_path / "bench.json").read_text())["compiler"]
     values = [{"n": 1000, "packing_fraction": f, "instructions_per_collision": 1000.0} for f in (0.1, 0.3, 0.49)]
+    values += [{"potential": potential, "kind": kind, "width": width, "instructions_per_pair": 100.0}
+               for potential, kind in (("lennard-jones", "forces"), ("yukawa", "mean forces")) for width in ("sse2", "avx2")]
     record.write_text(json.dumps({"compiler": compiler, "points": values}))
     for cost, code in ((1000, 0), (1029, 0), (1031, 1), (500, 0)):
         done = count(cost)
         assert done.returncode == code, (cost, done.stdout, done.stderr)
     assert f"{0.031:+.1%}" in count(1031).stdout
+    for cost, code in ((100, 0), (104, 1)):
+        done = count(cost, part=["--forces"])
+        assert done.returncode == code and done.stdout.count(f"{cost / 100 - 1:+.1%}") == 4, (done.stdout, done.stderr)
     assert count(1000, "--renew").returncode == 2  # part of the points only
     record.write_text(json.dumps({"compiler": "another", "points": values}))
     assert count(2000).returncode == 77

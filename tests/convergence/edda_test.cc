@@ -270,8 +270,7 @@ TEST(Edda, OneAndTwoParticlesUnderFields) {
       const auto& s = run->statistics();
       EXPECT_GT(s.counters.sphere_wall, 10u) << method << " " << n;
       EXPECT_LE(s.counters.max_overlap, 1e-12) << method << " " << n;
-      EXPECT_LE(s.max_energy_error, 1e-13 * s.energy_reference)
-          << method << " " << n;
+      EXPECT_LE(s.max_energy_error, 1e-13 * s.energy_reference) << method << " " << n;
     }
 }
 

@@ -164,14 +164,11 @@ std::unique_ptr<System<3>> rod() {
   return system;
 }
 
-const std::vector<std::pair<std::string, Given>> kMethods = {{"psa", {}},
-                                                             {"cva", {}},
-                                                             {"mcva", {}},
-                                                             {"mcva", {{"variant", std::string("restart")}}},
-                                                             {"cdda", {}},
-                                                             {"cdda", {{"order", std::int64_t{4}}}},
-                                                             {"edda", {}},
-                                                             {"edda", {{"tolerance", 0.0}}}};
+const std::vector<std::pair<std::string, Given>> kMethods = {
+    {"psa", {}},  {"cva", {}},
+    {"mcva", {}}, {"mcva", {{"variant", std::string("restart")}}},
+    {"cdda", {}}, {"cdda", {{"order", std::int64_t{4}}}},
+    {"edda", {}}, {"edda", {{"tolerance", 0.0}}}};
 
 TEST(Part, Springs) {
   for (const auto& [method, given] : kMethods) compare<2>([] { return springs(7); }, method, 0.02, 25, 20, given);

@@ -175,7 +175,7 @@ TEST(Cut, IsTwiceContinuouslyDifferentiableAtTheCutoff) {
     for (const double step : {1e-3, 1e-5, 1e-7}) {  // V, V′, V″ fall as the third, second and first power
       const double z = step * rho_c, inside = rho_c - z;
       const double v = 2000 * whole.value(rho_c);  // the switch: 10 t³, t = z/0.19 ρ_c
-      EXPECT_LE(std::abs(potential.value(inside)), v * step * step * step + 1e-23);
+      EXPECT_LE(std::abs(potential.value(inside)), v * step * step * step + 1e-17);
       EXPECT_LE(std::abs(potential.derivative(inside)), 3 * v / rho_c * step * step + 1e-17);
       EXPECT_LE(std::abs(potential.second_derivative(inside)), 6 * v / (rho_c * rho_c) * step + 1e-16);
       EXPECT_LT(std::abs(potential.second_derivative(inside)), last);

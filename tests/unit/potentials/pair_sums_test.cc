@@ -59,15 +59,7 @@ Outcome<D> outcome(const Interaction<D>& term, const std::vector<Vec<D>>& x, con
 /// The vector widths of this machine.
 std::vector<std::string> widths() {
   std::vector<std::string> found;
-  for (const char* width : {"sse2", "avx2", "avx512"}) {
-    setenv("CAROM_SIMD", width, 1);
-    try {
-      pair_kernels();
-      found.emplace_back(width);
-    } catch (const Error&) {
-    }
-  }
-  unsetenv("CAROM_SIMD");
+  for (const PairKernels* kernels : available_pair_kernels()) found.emplace_back(kernels->name);
   return found;
 }
 
@@ -91,6 +83,26 @@ void expect_the_same_in_all_widths() {
 TEST(PairSums, AreTheSameInEveryVectorWidth) {
   expect_the_same_in_all_widths<2>();
   expect_the_same_in_all_widths<3>();
+}
+
+TEST(PairSums, AreOfTheKernelsThatAreToBeUsed) {
+  test::for_each_case<3>([](Scene<3>& scene, Interaction<3>& term) {
+    const auto& x = scene.particles.x;
+    const auto forces = [&] {
+      ForceSums<3> sums(x.size(), kQuantum);
+      term.add_forces(x, sums);
+      return quanta(sums);
+    };
+    const auto expected = forces();
+    PairKernels broken = pair_kernels();
+    broken.scatter = [](const PairBatch&, const std::int64_t(*)[PairBatch::kCapacity], ForceWords*) {};
+    term.use(broken);
+    EXPECT_TRUE(forces() == (term.keeps_momentum() ? Quanta<3>(x.size()) : expected));  // fields have no kernels
+    for (const PairKernels* kernels : available_pair_kernels()) {
+      term.use(*kernels);
+      EXPECT_TRUE(forces() == expected) << kernels->name;
+    }
+  });
 }
 
 /// Sums of a potential by plain double loops over pairs and images.
