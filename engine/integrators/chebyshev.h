@@ -9,6 +9,8 @@
 // contracts by (√κ − 1)/(√κ + 1) a sweep, κ = 1 + λ, and converges where plain sweeps do not, λ > 1. It takes no inner
 // products, so all ranks do the same. (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., algorithm 12.1.)
 
+#include <cmath>
+
 namespace carom::integrator {
 
 class Chebyshev {
@@ -26,6 +28,7 @@ class Chebyshev {
   }
 
   bool plain() const { return half_ == 0; }  ///< memory 0 and gain 1
+  double rate() const { return half_ == 0 ? 0 : (middle_ - std::sqrt(middle_ * middle_ - half_ * half_)) / half_; }
   double memory() const { return memory_; }
   double gain() const { return gain_; }
 

@@ -38,6 +38,8 @@ constexpr int kStart = 4;                 // sweeps after which contraction tell
 constexpr double kSlow = 0.04;            // contraction of two sweeps that tells of it
 constexpr double kRoom = 1.1;             // for frequencies above the one found
 constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
+constexpr std::size_t kSmooth = 3;        // past slabs that the start is extrapolated from
+constexpr double kWild = 4;               // mean distances of ½ h² a: such a step is halved before it is flown
 constexpr double kStalled = 0.1;          // contraction of kPatience sweeps that is too little
 constexpr double kSettled = 0.5;          // of the tolerance: such a particle keeps its path
 constexpr double kRounding = 1e-13;       // of the speed scale: increments below it that do not shrink are rounding
@@ -85,7 +87,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       mass.add(p.mass[i]);
       for (int k = 0; k < D; ++k) momentum[k].add(p.mass[i] * p.v[i][k]);
     }
-    const double n = static_cast<double>(system.part ? system.part->total() : system.size());
+    const auto n = static_cast<double>(std::max<std::size_t>(1, system.part ? system.part->total() : system.size()));
     speed_ = std::sqrt(of_all_ranks(system, squares).value() / n);
     strength_ = std::sqrt(of_all_ranks(system, forces).value() / n);
     const double total = of_all_ranks(system, mass).value();
@@ -168,16 +170,22 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const Stopwatch watch(counters_->seconds.sweep);
     auto& p = system.particles;
     const std::size_t n = p.size();
-    past_.expect(h, a_);
+    Chebyshev chebyshev(0.25 * h * h * found_.squared_frequency);
+    past_.expect(h, a_, chebyshev.plain() ? kSmooth : 1);  // stiff motion is not smooth from slab to slab
+    double strongest = 0;  // acceleration to be flown on
+    for (Id i = 0; i < n; ++i)
+      if (p.owns(i)) strongest = std::max(strongest, finite(a_[i].squaredNorm()));
+    largest_of_all<D>(system, {&strongest, 1});
+    strongest = std::sqrt(strongest);
     core_->begin(p.v, a_, h, resolved_);
     for (const Id i : swapping_) swaps_[i] = 0;
     swapping_.clear();
     any_freezes_ = false;
-    Chebyshev chebyshev(0.25 * h * h * found_.squared_frequency);
     const double scale = std::max(speed_, h * strength_);
     const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
     double last = 0, before = 0, earlier = 0;  // largest, one, two and kPatience sweeps ago
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
+      if (!(0.5 * h * h * strongest <= kWild * mean_distance(system))) return Outcome::diverged;
       const FlightEnd<D> end = core_->fly(a_);
       if (!end.complete) {
         cut_ = end;
@@ -185,17 +193,22 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       }
       evaluate(system, sweep == 1);
       if (!core_->scan().resting().empty()) hold(system, h);
-      double largest = 0;
-      for (Id i = 0; i < n; ++i)
-        if (!frozen(i) && p.owns(i)) largest = std::max(largest, finite((mean_[i] - a_[i]).squaredNorm()));
-      largest_of_all<D>(system, {&largest, 1});
-      largest = h * std::sqrt(largest);
+      std::array<double, 2> most{};  // |e|² and |a′|²
+      for (Id i = 0; i < n; ++i) {
+        if (frozen(i) || !p.owns(i)) continue;
+        most[0] = std::max(most[0], finite((mean_[i] - a_[i]).squaredNorm()));
+        most[1] = std::max(most[1], mean_[i].squaredNorm());
+      }
+      largest_of_all<D>(system, most);
+      const double largest = h * std::sqrt(most[0]);
+      strongest = std::sqrt(most[1]);
       if (!std::isfinite(largest)) return Outcome::diverged;
       if (largest <= wanted) return Outcome::settled;
       if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * last) return Outcome::settled;
       if (sweep >= kPatience && any_rank(system, swaps_among_unfrozen())) freeze();
       if (sweep % kPatience == 0) {
-        if (sweep > kPatience && largest > kStalled * earlier) freeze_stalled(largest / h);
+        const double slow = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kPatience));
+        if (sweep > kPatience && largest > slow * earlier) freeze_stalled(largest / h);
         earlier = largest;
       }
       if (sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * before) && measure(system)) {
@@ -327,8 +340,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       sum_over_ranks(system, {&frozen_here, 1});
       counters_->frozen += frozen_here;
     }
-    counters_->folded += std::abs(rest);
-    fold(system, centre_, rest);
+    if (fold(system, centre_, rest)) counters_->folded += std::abs(rest);
     update_copies(system);
     past_.pass(h);
     past_.last() = mean_;

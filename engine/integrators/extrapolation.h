@@ -40,23 +40,24 @@ class Extrapolation {
     known_ = std::min(known_ + 1, kOrder + 1);
   }
   /// The accelerations of a slab of this length. The integral of the acceleration is known at the slabs' ends, −s_k
-  /// before now, and continued by Lagrange's polynomial.
-  void expect(double length, Vectors<D> a) {
+  /// before now, and continued by Lagrange's polynomial; `most`: of so many slabs.
+  void expect(double length, Vectors<D> a, std::size_t most = kOrder + 1) {
     if (length > kMostGrowth * length_[0]) known_ = 0;
+    const std::size_t known = std::min(known_, most);
     std::array<double, kOrder + 1> weight{1};
     std::array<double, kOrder + 2> s{};
-    for (std::size_t k = 0; k < known_; ++k) s[k + 1] = s[k] + length_[k];
+    for (std::size_t k = 0; k < known; ++k) s[k + 1] = s[k] + length_[k];
     double sum = 0;
-    for (std::size_t k = known_; k > 0; --k) {
+    for (std::size_t k = known; k > 0; --k) {
       double basis = 1;
-      for (std::size_t l = 0; l <= known_; ++l)
+      for (std::size_t l = 0; l <= known; ++l)
         if (l != k) basis *= (length + s[l]) / (s[l] - s[k]);
       sum += basis;
       weight[k - 1] = -sum * length_[k - 1] / length;
     }
     for (std::size_t i = 0; i < a.size(); ++i) {
       a[i] = weight[0] * past_[0][i];
-      for (std::size_t k = 1; k < known_; ++k) a[i] += weight[k] * past_[k][i];
+      for (std::size_t k = 1; k < known; ++k) a[i] += weight[k] * past_[k][i];
     }
   }
   std::vector<Vec<D>>& last() { return past_[0]; }

@@ -15,17 +15,18 @@ namespace carom::integrator {
 inline double stretch(double share) { return share / (1 + std::sqrt(1 + share)); }
 
 /// Adds r [energy] to the kinetic energy relative to `centre` of all particles that this rank owns and all other ranks
-/// do. Nothing where the particles are at rest. Collective.
+/// do. False, and nothing is done, where they have too little. Collective.
 template <int D>
-void fold(System<D>& system, const Vec<D>& centre, double r) {
+bool fold(System<D>& system, const Vec<D>& centre, double r) {
   Particles<D>& p = system.particles;
   ExactSeries kinetic;
   for (Id i = 0; i < p.size(); ++i)
     if (p.owns(i)) kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre).squaredNorm());
   const double share = r / of_all_ranks(system, kinetic.sum()).value();
-  if (!(std::abs(share) < 0.5) || share == 0) return;
+  if (!(std::abs(share) < 0.5) || share == 0) return r == 0;
   const double s = stretch(share);
   for (auto& v : p.v) v += s * (v - centre);
+  return true;
 }
 
 /// What one particle lacks.
