@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "engine/prefetch.h"
 #include "engine/vec.h"
 
 namespace carom {
@@ -36,10 +35,6 @@ class Partners {
       partner_[start_[j + 1]++] = {i, static_cast<std::uint32_t>(k)};
     }
   }
-
-  /// Fetch what of(i) reads, and what it gives, into the cache: the one some time before the other.
-  void prefetch_place(Id i) const { prefetch_line(&start_[i]); }
-  void prefetch(Id i) const { prefetch_line(partner_.data() + start_[i]); }
 
   std::span<const Partner> of(Id i) const { return {partner_.data() + start_[i], start_[i + 1] - start_[i]}; }
 

@@ -75,7 +75,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     evaluate_forces<D>(system, p.x, a_, counters);
     for (std::size_t i = 0; i < a_.size(); ++i) a_[i] /= p.mass[i];
     past_.start(a_);
-    bool free = system.size() > 1;  // the total momentum is kept, and more than it moves
+    const auto n = static_cast<double>(std::max<std::size_t>(1, system.part ? system.part->total() : system.size()));
+    bool free = n > 1;  // the total momentum is kept, and more than it moves
     for (int k = 0; k < D; ++k) free = free && !system.box.walled(k);
     for (const auto& term : system.interactions) free = free && term->keeps_momentum();
     ExactSum squares, mass, forces;
@@ -87,7 +88,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       mass.add(p.mass[i]);
       for (int k = 0; k < D; ++k) momentum[k].add(p.mass[i] * p.v[i][k]);
     }
-    const auto n = static_cast<double>(std::max<std::size_t>(1, system.part ? system.part->total() : system.size()));
     speed_ = std::sqrt(of_all_ranks(system, squares).value() / n);
     strength_ = std::sqrt(of_all_ranks(system, forces).value() / n);
     const double total = of_all_ranks(system, mass).value();

@@ -1,7 +1,5 @@
 // psa: K(h/2), then the drift D(h) resolved event by event, then K(h/2).
 
-#include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include "engine/integrators/kicks.h"
