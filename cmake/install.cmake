@@ -3,10 +3,14 @@
 include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/carom)
 
-install(TARGETS carom RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+if(NOT CAROM_ENGINE_ONLY)
+  install(TARGETS carom RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
 install(TARGETS carom_engine EXPORT carom_targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
                                                   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(DIRECTORY engine DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+install(FILES engine/carom.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/carom)
+install(DIRECTORY engine DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/carom
+        FILES_MATCHING PATTERN "*.h" PATTERN carom.h EXCLUDE PATTERN "*_kernel.h" EXCLUDE PATTERN examples EXCLUDE)
 install(EXPORT carom_targets NAMESPACE carom:: DESTINATION ${package_folder})
 
 configure_package_config_file(cmake/carom-config.cmake.in ${PROJECT_BINARY_DIR}/carom-config.cmake

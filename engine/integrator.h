@@ -86,6 +86,16 @@ struct IntegratorInfo {
 /// Every integrator there is, in the order of the manual.
 const std::vector<IntegratorInfo>& integrators();
 
+/// The one of that name; throws Error(Failure::deck), which lists the names.
+const IntegratorInfo& find_integrator(std::string_view name);
+
+/// It, made with these parameters and defaults for those left out. Throws Error(Failure::deck).
+template <int D>
+std::unique_ptr<Integrator<D>> make_integrator(std::string_view name, Parameters given) {
+  const IntegratorInfo& info = find_integrator(name);
+  return info.make<D>(completed(info.name, info.parameters, std::move(given)));
+}
+
 /// Parameters that several integrators share.
 namespace parameter {
 Parameter step();

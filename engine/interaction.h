@@ -144,4 +144,7 @@ struct InteractionInfo {
 /// Every type of interaction there is, in the order of the manual.
 const std::vector<InteractionInfo>& interactions();
 
+/// The one of that name; throws Error(Failure::deck), which lists the names.
+const InteractionInfo& find_interaction(std::string_view name);
+
 }  // namespace carom

@@ -4,12 +4,16 @@
 // A declaration is written once, beside the code that uses the value. The deck's schema, its validation, the
 // `carom schema` and `carom methods` pages and the resolved deck are all made from it.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <map>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -38,6 +42,8 @@ using ParameterValue =
 /// Validated values by name. Every declared parameter with a default is present; those with "none" only where given.
 class Parameters {
  public:
+  Parameters() = default;
+  Parameters(std::initializer_list<std::pair<const std::string, ParameterValue>> values) : values_(values) {}
   void set(std::string name, ParameterValue value) { values_[std::move(name)] = std::move(value); }
   bool has(std::string_view name) const { return values_.find(name) != values_.end(); }
   /// The value of a declared parameter; std::out_of_range if it is absent, std::bad_variant_access on the wrong type.
@@ -56,5 +62,23 @@ class Parameters {
  private:
   std::map<std::string, ParameterValue, std::less<>> values_;
 };
+
+/// `given` with the defaults of what it leaves out. Throws Error(Failure::deck) where a value is missing, unknown, of
+/// another type, out of its range or none of the choices; `of` names what the parameters are for. A whole number is
+/// taken for a real one.
+Parameters completed(std::string_view of, std::span<const Parameter> declared, Parameters given);
+
+/// Throws Error(Failure::deck): there is no such `kind` of thing, and `known` are those there are.
+[[noreturn]] void throw_unknown(std::string_view kind, std::string_view name, std::span<const std::string_view> known);
+
+/// The declaration of that name in a registry.
+template <class Info>
+const Info& find_named(const std::vector<Info>& registry, std::string_view kind, std::string_view name) {
+  const auto found = std::ranges::find(registry, name, &Info::name);
+  if (found != registry.end()) return *found;
+  std::vector<std::string_view> known;
+  for (const Info& each : registry) known.push_back(each.name);
+  throw_unknown(kind, name, known);
+}
 
 }  // namespace carom

@@ -11,6 +11,17 @@
 
 namespace carom {
 
+/// What Particles::add() takes.
+template <int D>
+struct Particle {
+  Vec<D> x;                   ///< position of the centre [length]
+  Vec<D> v = Vec<D>::Zero();  ///< velocity [length/time]
+  double radius = 0.5;        ///< of the hard core [length]
+  double mass = 1;            ///< [mass]
+  double charge = 0;          ///< [charge]
+  std::uint16_t species = 0;  ///< index into System::species
+};
+
 template <int D>
 struct Particles {
   std::vector<Vec<D>> x;               ///< position of the centre [length]
@@ -24,6 +35,17 @@ struct Particles {
   std::vector<Id> id{};         ///< ascending; empty: 0, 1, …
 
   std::size_t size() const { return x.size(); }
+  /// Appends a particle; returns its id.
+  Id add(const Particle<D>& particle) {
+    x.push_back(particle.x);
+    v.push_back(particle.v);
+    mass.push_back(particle.mass);
+    radius.push_back(particle.radius);
+    charge.push_back(particle.charge);
+    species.push_back(particle.species);
+    image.push_back({});
+    return static_cast<Id>(x.size() - 1);
+  }
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
   Id id_of(Id i) const { return id.empty() ? i : id[i]; }
 };

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 
+#include "engine/epoch.h"
 #include "engine/error.h"
 #include "engine/forces.h"
 #include "engine/monitor.h"
+#include "engine/placement.h"
 #include "engine/shares.h"
 
 namespace carom {
@@ -12,6 +14,19 @@ namespace carom {
 namespace {
 /// Output intervals shorter than this share of a step are refused: there would be no end to counting them.
 constexpr double kLeastInterval = 1e-6;
+
+template <int D>
+void check_spheres(const System<D>& system) {
+  const Particles<D>& p = system.particles;
+  if (const Outsiders out = find_outsiders<D>(system.box, p.x, p.radius); out.spheres > 0)
+    throw Error(Failure::initial_state, "particle " + std::to_string(out.worst) + " is not inside the walls of axis " +
+                                            std::to_string(out.axis) +
+                                            "; keep it a radius from every wall, or enlarge the box");
+  if (const Overlaps overlaps = find_overlaps<D>(system.box, p.x, p.radius); overlaps.pairs > 0)
+    throw Error(Failure::initial_state, "particles " + std::to_string(overlaps.lo) + " and " +
+                                            std::to_string(overlaps.hi) + " overlap, at distance " +
+                                            std::to_string(overlaps.distance) + "; move them apart");
+}
 
 void check_interval(double interval, double step) {
   if (interval > 0 && interval < kLeastInterval * step)
@@ -28,6 +43,31 @@ Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInf
   if (!plan_.steps && !plan_.end_time && !plan_.collisions)
     throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
   for (const double interval : {plan_.frame_interval, plan_.thermo_interval}) check_interval(interval, plan_.step);
+}
+
+template <int D>
+Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan)
+    : Simulation(prepare(std::move(system), info, std::move(given), plan)) {}
+
+template <int D>
+typename Simulation<D>::Prepared Simulation<D>::prepare(std::unique_ptr<System<D>> system, const IntegratorInfo& info,
+                                                        Parameters given, Plan plan) {
+  const std::string name(info.name);
+  system->check();
+  for (const std::uint16_t s : system->particles.species)
+    while (system->species.size() <= s) system->species.push_back("species " + std::to_string(system->species.size()));
+  for (const auto& term : system->interactions)
+    if (!info.smooth_forces && !term->common_acceleration())
+      throw Error(Failure::deck, name + " knows no forces but a uniform-field; take psa, edda or their relatives");
+  if (info.hard_cores) check_spheres(*system);
+  if (plan.step != 0 && given.has("step"))
+    throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
+  if (plan.step != 0) given.set("step", plan.step);
+  if (!given.has("step") && !info.stepping) given.set("step", default_epoch(*system));
+  given = completed(info.name, info.parameters, std::move(given));
+  plan.step = given.real("step");
+  auto integrator = info.make<D>(given);
+  return {std::move(system), info, std::move(integrator), plan};
 }
 
 template <int D>

@@ -1,7 +1,7 @@
 #pragma once
 // A run: slab after slab, with energies kept in view and observers told at their due times.
 //
-//   Simulation<2> run(std::move(system), info, info.make<2>(parameters), plan);
+//   Simulation<2> run(std::move(system), "edda", {{"step", 0.01}}, {.end_time = 6});
 //   run.add(writer);
 //   run.run();
 //
@@ -105,6 +105,14 @@ class Simulation {
   /// The integrator and its info must belong together.
   Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator,
              Plan plan);
+  /// An integrator by its name in the deck, with defaults for the parameters that are not given. The step is given
+  /// once, there or in the plan; free flight chooses one by itself. Throws Error(Failure::deck) about parameters,
+  /// forces that the integrator does not know and plans, and Error(Failure::initial_state) about the system
+  /// (System::check(), spheres that overlap or are not inside the walls).
+  Simulation(std::unique_ptr<System<D>> system, std::string_view integrator, Parameters given, Plan plan)
+      : Simulation(std::move(system), find_integrator(integrator), std::move(given), plan) {}
+  /// The same by a declaration, which outlives the run.
+  Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan);
   ~Simulation();
 
   /// Observers outlive the run. Throws Error(deck) where one wants samples at intervals that cannot be counted.
@@ -117,6 +125,15 @@ class Simulation {
   const System<D>& system() const { return *system_; }
 
  private:
+  struct Prepared {
+    std::unique_ptr<System<D>> system;
+    const IntegratorInfo& info;
+    std::unique_ptr<Integrator<D>> integrator;
+    Plan plan;
+  };
+  static Prepared prepare(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan);
+  explicit Simulation(Prepared p) : Simulation(std::move(p.system), p.info, std::move(p.integrator), p.plan) {}
+
   Slab next_slab(double slack) const;
   bool finished(double slack) const;
   double fraction_done() const;

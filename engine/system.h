@@ -32,7 +32,7 @@ struct System {
 
   Box<D> box;
   Particles<D> particles;
-  std::vector<std::string> species;
+  std::vector<std::string> species;  ///< names; empty: a run gives them
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
   Exchange* ranks = nullptr;   ///< that advance this system together; null: one
   std::optional<Sizes> sizes;  ///< of all particles, where each rank has only its share of them (engine/shares.h)
@@ -44,7 +44,16 @@ struct System {
 
   /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
   void wrap();
+
+  /// Throws Error(Failure::initial_state) where arrays of the particles differ in length, or a value cannot be:
+  /// positions or velocities that are not finite, masses, radii or edges that are not positive, unknown species.
+  void check() const;
 };
+
+/// Adds a term to V by its name in the deck, with defaults for the parameters that are not given. Throws
+/// Error(Failure::deck). Particles must be there, and bonds before terms that exclude bonded pairs.
+template <int D>
+void add_interaction(System<D>& system, std::string_view type, Parameters given);
 
 template <int D>
 void System<D>::wrap() {

@@ -13,6 +13,7 @@
 #include "io/bench_forces.h"
 #include "io/bench_state.h"
 #include "io/bench_table.h"
+#include "engine/epoch.h"
 #include "io/deck_build.h"
 
 namespace carom {
@@ -54,13 +55,6 @@ class PeakMemory {
   std::optional<double> before_;
 };
 
-Parameters free_flight_parameters(double epoch) {
-  Parameters parameters;
-  parameters.set("step", epoch);
-  parameters.set("max_events_per_step", std::int64_t{100000});
-  return parameters;
-}
-
 /// A stretch of a run.
 struct Stretch {
   std::uint64_t collisions = 0;
@@ -75,7 +69,7 @@ class Flow {
   explicit Flow(std::unique_ptr<System<D>> system)
       : system_(std::move(system)),
         epoch_(default_epoch(*system_)),
-        integrator_(integrator_named("free-flight").make<D>(free_flight_parameters(epoch_))) {
+        integrator_(make_integrator<D>("free-flight", {{"step", epoch_}})) {
     integrator_->start(*system_, counters_);
   }
 

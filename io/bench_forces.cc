@@ -172,7 +172,7 @@ Json measure_steps(std::uint64_t n, const PairKernels& kernels, const BenchOptio
   Deck deck = deck_of(kCases[0], n, kMelting + options.repeat * options.steps);
   auto system = build_system<3>(deck);
   system->interactions[0]->use(kernels);
-  const IntegratorInfo& verlet = integrator_named(deck.integrator);
+  const IntegratorInfo& verlet = find_integrator(deck.integrator);
   Simulation<3> run(std::move(system), verlet, verlet.make<3>(deck.integrator_parameters), deck.plan);
   StepClock clock(options.steps);
   run.add(clock);

@@ -36,9 +36,4 @@ void store(const BenchOptions& options, const Json& results) {
   write_file_atomically(*options.json, all.dump(2) + "\n");
 }
 
-const IntegratorInfo& integrator_named(std::string_view name) {
-  const auto& all = integrators();
-  return *std::find_if(all.begin(), all.end(), [&](const IntegratorInfo& info) { return info.name == name; });
-}
-
 }  // namespace carom::bench

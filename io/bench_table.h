@@ -35,7 +35,4 @@ std::string range(const Json& spread, double unit = 1);
 /// Writes {version, compiler, then `results`} to the file of --json, if there is one.
 void store(const BenchOptions& options, const Json& results);
 
-/// One of integrators(), by its name.
-const IntegratorInfo& integrator_named(std::string_view name);
-
 }  // namespace carom::bench

@@ -26,10 +26,4 @@ void place_particles(const Deck::Source& source, System<D>& system);
 std::vector<std::vector<double>> rows_in(const std::string& text, const std::filesystem::path& file,
                                          std::size_t columns, const std::string& not_what);
 
-/// Forty mean free times of the fluid that the state would be (Enskog's theory), at most the time to fly 300
-/// diameters or to cross the box four times, rounded to two digits; 1 if nothing moves. Longer epochs cost digits:
-/// times and unwrapped positions grow in them.
-template <int D>
-double default_epoch(const System<D>& system);
-
 }  // namespace carom

@@ -49,12 +49,6 @@ class Deadline {
 /// Forces on fewer particles than these are done sooner than told.
 constexpr std::size_t kFewestToShare = 64;
 
-const IntegratorInfo& integrator_named(const std::string& name) {
-  for (const IntegratorInfo& info : integrators())
-    if (info.name == name) return info;
-  throw Error(Failure::deck, "there is no integrator '" + name + "'; `carom methods` lists those there are");
-}
-
 /// Does something that may fail while another failure is being reported: only the first one counts.
 template <class Action>
 void at_best(Action&& action) {
@@ -78,7 +72,7 @@ TextReader reader_for(Exchange& ranks) {
 
 template <int D>
 Simulation<D> simulation_of(Deck& deck, Exchange& ranks) {
-  const IntegratorInfo& info = integrator_named(deck.integrator);
+  const IntegratorInfo& info = find_integrator(deck.integrator);
   auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr);
   auto integrator = info.make<D>(deck.integrator_parameters);
   return Simulation<D>(std::move(system), info, std::move(integrator), deck.plan);
@@ -188,7 +182,7 @@ int run_command(const RunOptions& options) {
     return deck.dimension == 2 ? run_on_rank<2>(deck, options, at_work, ranks.size(), deadline)
                                : run_on_rank<3>(deck, options, at_work, ranks.size(), deadline);
   };
-  const bool few = integrator_named(deck.integrator).smooth_forces && particle_count(deck) < kFewestToShare;
+  const bool few = find_integrator(deck.integrator).smooth_forces && particle_count(deck) < kFewestToShare;
   if (few) return ranks.on_first([&] { return run(alone); });
   return ranks.on_all([&] { return run(all); });
 }

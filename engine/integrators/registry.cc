@@ -10,6 +10,8 @@ const std::vector<IntegratorInfo>& integrators() {
   return all;
 }
 
+const IntegratorInfo& find_integrator(std::string_view name) { return find_named(integrators(), "integrator", name); }
+
 namespace parameter {
 
 Parameter step() {

@@ -21,4 +21,8 @@ const std::vector<InteractionInfo>& interactions() {
   return all;
 }
 
+const InteractionInfo& find_interaction(std::string_view name) {
+  return find_named(interactions(), "interaction", name);
+}
+
 }  // namespace carom

@@ -50,7 +50,7 @@ Rows melted(int cells, double density, double temperature, const Given& end, con
   for (Id i = 0; i < n; ++i) all[i] = i;
   draw_velocities<3>(system->particles, all, std::vector<double>(n, temperature), 1);
   Given given = {{"epsilon", 1.0}, {"sigma", 1.0}};
-  given.insert(given.end(), end.begin(), end.end());
+  for (const auto& [name, value] : end.all()) given.set(name, value);
   test::add_interaction(*system, "lennard-jones", given);
   Rows rows(length.equilibration, box.volume());
   auto run = test::make_run<3>(std::move(system), "verlet",

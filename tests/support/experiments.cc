@@ -12,18 +12,6 @@
 namespace carom::test {
 
 namespace {
-const InteractionInfo& interaction_named(const std::string& type) {
-  for (const auto& info : interactions())
-    if (info.name == type) return info;
-  throw std::invalid_argument("no interaction " + type);
-}
-
-const IntegratorInfo& integrator_named(const std::string& name) {
-  for (const auto& info : integrators())
-    if (info.name == name) return info;
-  throw std::invalid_argument("no integrator " + name);
-}
-
 /// Perturbs the velocities of whatever moves by up to a percent; start 0 leaves them.
 template <int D>
 std::unique_ptr<System<D>> perturbed(std::unique_ptr<System<D>> system, unsigned start) {
@@ -41,31 +29,13 @@ template <int D>
 std::unique_ptr<System<D>> make_system(const Vec<D>& edges, Boundary boundary, std::vector<Vec<D>> x,
                                        std::vector<Vec<D>> v, std::vector<double> radius, std::vector<double> mass) {
   auto system = std::make_unique<System<D>>();
-  const std::size_t n = x.size();
   system->box.edges = edges;
   system->box.boundary.fill(boundary);
   system->species = {"sphere"};
-  auto& p = system->particles;
-  p.x = std::move(x);
-  p.v = std::move(v);
-  p.radius = radius.empty() ? std::vector<double>(n, 0.5) : std::move(radius);
-  p.mass = mass.empty() ? std::vector<double>(n, 1.0) : std::move(mass);
-  p.charge.assign(n, 0.0);
-  p.species.assign(n, 0);
-  p.image.resize(n);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    system->particles.add(
+        {.x = x[i], .v = v[i], .radius = radius.empty() ? 0.5 : radius[i], .mass = mass.empty() ? 1.0 : mass[i]});
   return system;
-}
-
-template <int D>
-void add_interaction(System<D>& system, const std::string& type, const Given& given) {
-  Parameters parameters;
-  for (const auto& [name, value] : given) parameters.set(name, value);
-  system.interactions.push_back(interaction_named(type).make<D>(parameters, {.box = system.box,
-                                                                             .particles = system.particles,
-                                                                             .species = system.species,
-                                                                             .total = system.size(),
-                                                                             .ranks = shared_by(system),
-                                                                             .bonds = bonds_of(system.interactions)}));
 }
 
 std::unique_ptr<System<2>> five_springs(unsigned start) {
@@ -141,15 +111,10 @@ std::unique_ptr<System<D>> hard_spheres(int cells, double packing_fraction, unsi
 template <int D>
 std::unique_ptr<Simulation<D>> make_run(std::unique_ptr<System<D>> system, const std::string& integrator, Plan plan,
                                         const Given& given) {
-  Parameters parameters;
-  parameters.set("step", plan.step);
-  parameters.set("max_events_per_step", std::int64_t{100000});
-  parameters.set("order", std::int64_t{2});
-  parameters.set("variant", std::string("grid"));
-  parameters.set("tolerance", 1e-10);
-  for (const auto& [name, value] : given) parameters.set(name, value);
-  const auto& info = integrator_named(integrator);
-  return std::make_unique<Simulation<D>>(std::move(system), info, info.make<D>(parameters), plan);
+  Parameters parameters = given;
+  if (!parameters.has("step")) parameters.set("step", plan.step);
+  return std::make_unique<Simulation<D>>(std::move(system), find_integrator(integrator),
+                                         make_integrator<D>(integrator, std::move(parameters)), plan);
 }
 
 template <int D>
@@ -188,7 +153,6 @@ double fitted_order(const std::vector<double>& x, const std::vector<double>& y) 
 #define CAROM_FOR_DIMENSION(D)                                                                                         \
   template std::unique_ptr<System<D>> make_system<D>(const Vec<D>&, Boundary, std::vector<Vec<D>>,                     \
                                                      std::vector<Vec<D>>, std::vector<double>, std::vector<double>);   \
-  template void add_interaction<D>(System<D>&, const std::string&, const Given&);                                      \
   template std::unique_ptr<System<D>> hard_spheres<D>(int, double, unsigned);                                          \
   template std::unique_ptr<Simulation<D>> make_run<D>(std::unique_ptr<System<D>>, const std::string&, Plan,            \
                                                       const Given&);                                                   \

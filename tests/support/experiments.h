@@ -10,7 +10,7 @@
 
 namespace carom::test {
 
-using Given = std::vector<std::pair<std::string, ParameterValue>>;
+using Given = Parameters;
 
 /// A system in a box with the same boundary on all axes; particles of one species.
 template <int D>
@@ -18,9 +18,7 @@ std::unique_ptr<System<D>> make_system(const Vec<D>& edges, Boundary boundary, s
                                        std::vector<Vec<D>> v, std::vector<double> radius = {},
                                        std::vector<double> mass = {});
 
-/// Adds an interaction by its name in the deck.
-template <int D>
-void add_interaction(System<D>& system, const std::string& type, const Given& given);
+using carom::add_interaction;
 
 /// First experiment of the thesis: five discs in a box joined by springs. A start other than 0 moves the moving discs'
 /// velocities by up to a percent, at random.

@@ -13,18 +13,19 @@ namespace carom {
 namespace {
 
 struct Method {
+  std::string label;
   const char* name;
-  std::int64_t order = 2;
-  const char* variant = "grid";
+  Parameters given;
   double energy;  // the relative energy error it may make at step 0.01 in these cases
 };
+
+void PrintTo(const Method& method, std::ostream* out) { *out << method.label; }
 
 class HardCases : public testing::TestWithParam<Method> {
  protected:
   template <int D>
   std::unique_ptr<Simulation<D>> run(std::unique_ptr<System<D>> system, double h, std::int64_t steps) {
-    return test::run_steps<D>(std::move(system), GetParam().name, h, steps,
-                              {{"order", GetParam().order}, {"variant", std::string(GetParam().variant)}});
+    return test::run_steps<D>(std::move(system), GetParam().name, h, steps, GetParam().given);
   }
 
   template <int D>
@@ -153,10 +154,9 @@ TEST_P(HardCases, OneParticleAlone) {
 TEST_P(HardCases, MoreContactsThanAllowedNameTheParticles) {
   auto system = test::make_system<2>({5, 4}, Boundary::wall, {{1, 2}, {3, 2}}, {{50, 0}, {-50, 0}});
   try {
-    test::run_steps<2>(std::move(system), GetParam().name, 1.0, 1,
-                       {{"order", GetParam().order},
-                        {"variant", std::string(GetParam().variant)},
-                        {"max_events_per_step", std::int64_t{8}}});
+    Parameters given = GetParam().given;
+    given.set("max_events_per_step", std::int64_t{8});
+    test::run_steps<2>(std::move(system), GetParam().name, 1.0, 1, given);
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(error.failure(), Failure::numerical);
@@ -165,17 +165,18 @@ TEST_P(HardCases, MoreContactsThanAllowedNameTheParticles) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, HardCases,
-                         testing::Values(Method{"psa", 2, "grid", 0.1}, Method{"cva", 2, "grid", 3e-3},
-                                         Method{"mcva", 2, "grid", 3e-3}, Method{"mcva", 2, "restart", 3e-3},
-                                         Method{"cdda", 2, "grid", 1e-13}, Method{"cdda", 4, "grid", 1e-13},
-                                         Method{"edda", 2, "grid", 1e-13}),
-                         [](const auto& test) {
-                           std::string name = test.param.name;
-                           if (name == "mcva") name += std::string("_") + test.param.variant;
-                           if (name == "cdda") name += "_order_" + std::to_string(test.param.order);
-                           return name;
-                         });
+const std::vector<Method> kMethods = {
+    {"psa", "psa", {}, 0.1},
+    {"cva", "cva", {}, 3e-3},
+    {"mcva_grid", "mcva", {}, 3e-3},
+    {"mcva_restart", "mcva", {{"variant", std::string("restart")}}, 3e-3},
+    {"cdda_order_2", "cdda", {}, 1e-13},
+    {"cdda_order_4", "cdda", {{"order", std::int64_t{4}}}, 1e-13},
+    {"edda", "edda", {}, 1e-13},
+};
+
+INSTANTIATE_TEST_SUITE_P(Methods, HardCases, testing::ValuesIn(kMethods),
+                         [](const auto& test) { return test.param.label; });
 
 }  // namespace
 }  // namespace carom

@@ -173,7 +173,7 @@ TEST(Simulation, ObservingChangesNoBit) {
         auto run = test::make_run<2>(
             std::move(system), method,
             {.step = 0.05, .steps = 200, .frame_interval = frames, .thermo_interval = rows, .events = events},
-            {{"variant", std::string(variant)}});
+            std::string(method) == "mcva" ? Parameters{{"variant", std::string(variant)}} : Parameters{});
         Notebook<2> notes;
         notes.wanted = wanted;
         run->add(notes);

@@ -1,0 +1,24 @@
+#pragma once
+// The library: what a program includes that runs carom by itself (engine/examples/).
+//
+//   auto system = std::make_unique<carom::System<2>>();
+//   system->box.edges = {12, 6};                                             // hard walls, unless said otherwise
+//   for (int k = 0; k < 5; ++k) system->particles.add({.x = {2.0 + 2 * k, 3.0}, .radius = 0.5});
+//   add_interaction(*system, "harmonic-bond", {{"chain", true}, {"stiffness", 1.0}, {"rest_length", 2.0}});
+//   carom::Simulation<2> run(std::move(system), "edda", {{"step", 0.01}}, {.end_time = 6});
+//   run.run();
+//   run.statistics().max_energy_error, run.system().particles.x …
+//
+// Integrators, interactions and their parameters have the names that they have in decks (`carom methods`, `carom
+// schema`). Mistakes throw carom::Error, whose message says what to do.
+
+#include "engine/error.h"
+#include "engine/forces.h"
+#include "engine/integrator.h"
+#include "engine/interaction.h"
+#include "engine/mean_squared_displacement.h"
+#include "engine/placement.h"
+#include "engine/radial_distribution.h"
+#include "engine/simulation.h"
+#include "engine/slab_core.h"
+#include "engine/system.h"

@@ -1,0 +1,59 @@
+"""The library as a program finds it: installed, with the examples built on it."""
+
+import os
+import pathlib
+import re
+import subprocess
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(os.environ["CAROM"]).parents[1]
+
+
+def run(*command):
+    return subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True).stdout
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory):
+    """The folder of the built examples."""
+    prefix, folder = tmp_path_factory.mktemp("prefix"), tmp_path_factory.mktemp("examples")
+    run("cmake", "--install", BUILD, "--prefix", prefix)
+    run("cmake", "-S", ROOT / "engine/examples", "-B", folder, f"-DCMAKE_PREFIX_PATH={prefix}",
+        "-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_CXX_FLAGS={sanitizers()}")
+    run("cmake", "--build", folder, "-j2")
+    assert not list(prefix.rglob("*_kernel.h"))
+    return folder
+
+
+def sanitizers():
+    """What the library was built with must be linked into the examples, too."""
+    cache = (BUILD / "CMakeCache.txt").read_text()
+    found = re.search(r"^CAROM_SANITIZE:\w+=(.+)$", cache, re.M)
+    return f"-fsanitize={found[1]}" if found else ""
+
+
+def test_five_springs_keep_their_energy(examples):
+    out = run(examples / "five_springs")
+    assert float(re.search(r"energy error (\S+)", out)[1]) < 1e-12
+    assert len(out.splitlines()) == 6
+
+
+def test_nine_gravity_compares_the_methods(examples):
+    error = {line.split()[0]: float(re.search(r"energy error ([^,]+)", line)[1])
+             for line in run(examples / "nine_gravity", "0.01").splitlines()}
+    assert error["edda"] < 1e-12 and error["cdda"] < 1e-12 and error["psa"] > 1e-6
+
+
+def test_the_fluid_has_a_first_peak_at_contact(examples):
+    out = run(examples / "fluid", "256")
+    assert float(re.search(r"energy error ([^,]+)", out)[1]) < 1e-12
+    rows = [[float(x) for x in line.split()] for line in out.splitlines() if not line.startswith("#")]
+    assert all(g == 0 for r, g in rows if r < 0.97)
+    assert 2 < max(g for r, g in rows) == max(g for r, g in rows if 1 < r < 1.1)
+
+
+def test_an_integrator_of_ones_own_has_order_one(examples):
+    errors = [float(re.search(r"energy error ([^,]+)", line)[1]) for line in run(examples / "own_integrator").splitlines()]
+    assert all(1.7 < a / b < 2.3 for a, b in zip(errors, errors[1:]))
