@@ -45,8 +45,8 @@ std::uint8_t SkinLists<D>::octave(double largest, double radius) {
 }
 
 template <int D>
-void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>& extent, double astray) {
-  const std::size_t n = flights.size();
+void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent,
+                         double astray) {
   // 1. Cells for each size.
   levels_.clear();
   const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
@@ -67,7 +67,11 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
     const double edge = std::max(reach, roomy);
     Level level{
         .grid = CellGrid<D>(box_, edge, extent), .largest_radius = largest, .lines = {}, .next = {}, .steps = {}};
-    if (n < extent.particles) level.grid.confine(flights.places(now), kMargin);
+    if (n < extent.particles) {
+      std::vector<Vec<D>> places;
+      for (Slot i = 0; i < n; ++i) places.push_back(place(i));
+      level.grid.confine(places, kMargin);
+    }
     levels_.push_back(std::move(level));
   }
   widest_ = 0;
@@ -76,7 +80,7 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
   // 2. Everybody into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec<D> x = flights.at(static_cast<Slot>(i), now).x;
+    const Vec<D> x = place(static_cast<Slot>(i));
     for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[k];
     insert(static_cast<Slot>(i), x);
   }

@@ -7,11 +7,12 @@
 // through cells as large as the largest one. Lists are symmetric. (Verlet, Phys. Rev. 159 (1967) 98; event-driven:
 // Donev, Torquato, Stillinger, J. Comput. Phys. 202 (2005) 737.)
 
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "engine/agenda.h"
-#include "engine/flights.h"
+#include "engine/cell_grid.h"
 #include "engine/pages.h"
 #include "engine/prefetch.h"
 #include "engine/scan.h"
@@ -29,8 +30,8 @@ class SkinLists {
   double skin() const { return skin_; }
   const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
 
-  /// Makes all lists for spheres where they are at time `now`. find_near() will be asked for `astray`.
-  void build(const Flights<D>& flights, double now, const Extent<D>& extent, double astray = 0);
+  /// Makes all lists for n spheres, each where `place` says. find_near() will be asked for `astray`.
+  void build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent, double astray = 0);
 
   /// The sphere is now at x: makes its list anew and mends those of its neighbours. Returns who is new in it, padded
   /// like a list; good until the next call.
