@@ -1,10 +1,10 @@
 #pragma once
-// A regular grid of search cells over the box, and a table of who is in which.
+// A regular grid of search cells over the box, and a table of the particles in each.
 //
 // Positions are mapped to *unwrapped* integer cells: a particle outside a periodic box, or an image of one, has its own
-// cell numbers there, and the difference of two unwrapped cells tells which image of a neighbour is meant. (The nearest
-// image of two positions is wrong where the box is dilute or small.) Along open and walled axes the outermost cells
-// reach to infinity. Which cells there are is nobody's business but the search's: results never depend on them.
+// cell numbers there, and the difference of two unwrapped cells gives the image of a neighbour that is meant. (The
+// nearest image of two positions is wrong where the box is dilute or small.) Along open and walled axes the outermost
+// cells reach to infinity. Only the search uses the cells: results never depend on them.
 
 #include <algorithm>
 #include <boost/container/small_vector.hpp>
@@ -199,7 +199,7 @@ class CellGrid {
   Vec<D> origin_, edge_, inverse_;
 };
 
-/// Who is in which cell, for one set of positions: built once, by counting, and read.
+/// The particles of each cell, for one set of positions: built once, by counting, and read.
 template <int D>
 class CellTable {
  public:

@@ -15,7 +15,7 @@ typename Region<D>::Tally Domains<D>::tally() const {
   return all;
 }
 
-/// When somebody may first have come farther than the stray in the window; infinite: never.
+/// When a sphere may first have come farther than the stray in the window; infinite: never.
 template <int D>
 double Domains<D>::first_astray(double end) {
   double speed = 0, first = std::numeric_limits<double>::infinity();
