@@ -204,7 +204,7 @@ template <int D>
 class CellTable {
  public:
   CellTable(const CellGrid<D>& grid, std::span<const Vec<D>> x)
-      : grid_(grid), start_(grid.cells() + 2), who_(x.size()), boxes_(x.size()) {
+      : grid_(grid), start_(grid.cells() + 2), ids_(x.size()), boxes_(x.size()) {
     std::vector<std::uint32_t> at(x.size());
     for (std::size_t i = 0; i < x.size(); ++i) {
       const Cell<D> c = grid.cell(x[i]);
@@ -214,11 +214,11 @@ class CellTable {
     }
     // While filling, start_[c + 1] is where the next one in cell c goes.
     for (std::size_t c = 0; c + 1 < start_.size(); ++c) start_[c + 1] += start_[c];
-    for (std::size_t i = 0; i < x.size(); ++i) who_[start_[at[i] + 1]++] = static_cast<Id>(i);
+    for (std::size_t i = 0; i < x.size(); ++i) ids_[start_[at[i] + 1]++] = static_cast<Id>(i);
   }
 
-  /// Calls visit(j, image) for every particle j (the one at `x` among them) whose image may lie within `reach` of x:
-  /// that image stands at x_j − shift(image).
+  /// Calls visit(j, image) for every particle j (the one at `x` among them) with an image that may lie within `reach`
+  /// of x: that image stands at x_j − shift(image).
   template <class Visit>
   void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
     Cell<D> range;
@@ -233,13 +233,13 @@ class CellTable {
       const auto length = static_cast<std::size_t>(2 * range[D - 1] + 1);
       do {
         const std::size_t first = grid_.index(row);
-        for (std::uint32_t q = start_[first]; q < start_[first + length]; ++q) visit(who_[q], boxes_[who_[q]]);
+        for (std::uint32_t q = start_[first]; q < start_[first + length]; ++q) visit(ids_[q], boxes_[ids_[q]]);
       } while (next_row(row, centre, range));
       return;
     }
     grid_.for_each_around(centre, range, [&](std::size_t cell, const Image<D>& away) {
       for (std::uint32_t q = start_[cell]; q < start_[cell + 1]; ++q) {
-        const Id j = who_[q];
+        const Id j = ids_[q];
         Image<D> image;
         for (int k = 0; k < D; ++k) image[k] = boxes_[j][k] - away[k];
         visit(j, image);
@@ -261,7 +261,7 @@ class CellTable {
 
   CellGrid<D> grid_;
   std::vector<std::uint32_t> start_;
-  std::vector<Id> who_;
+  std::vector<Id> ids_;
   std::vector<Image<D>> boxes_;
 };
 

@@ -43,7 +43,7 @@ template <int D>
 std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_t count, double margin);
 
 /// Edges of a box of this volume in which `count` sites make an undistorted lattice: a cube or square, except for the
-/// hexagonal lattice (centred, 2-D), whose box has the proportions of its cells.
+/// hexagonal lattice (centred, 2-D): its box has the proportions of its cells.
 template <int D>
 Vec<D> commensurate_edges(Lattice lattice, std::size_t count, double volume);
 

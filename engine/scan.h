@@ -71,7 +71,7 @@ struct HeadStep {
   std::uint32_t away;     ///< the boxes it leads through, in the bits that an image has in a candidate
 };
 
-/// Rows of cells whose heads are wanted: candidates in the boxes they stand in, or kEmpty.
+/// Rows of cells to read the heads of: candidates in the boxes they stand in, or kEmpty.
 struct HeadsTask {
   const std::uint32_t* first;  ///< the first cell of the row that no step leads to
   const HeadStep* step[2];     ///< to the rows

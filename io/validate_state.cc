@@ -18,7 +18,7 @@
 namespace carom {
 namespace {
 
-/// Text with enough digits to tell a distance from a contact distance.
+/// Text with enough digits to distinguish a distance from a contact distance.
 template <class... Items>
 std::string say(const Items&... items) {
   std::ostringstream text;
