@@ -44,7 +44,7 @@ double Domains<D>::astray_at(Region<D>& region, Slot i, double end) const {
   return std::numeric_limits<double>::infinity();
 }
 
-/// Forgets what happened from a time on, and returns it.
+/// Removes the events from a time on, and returns it.
 template <int D>
 double Domains<D>::cut_at(double time) {
   ++counts_.cut;

@@ -93,7 +93,7 @@ class EventCore {
   const Packing<D>& packing() const { return packing_; }
   /// Takes a sphere in; false: there is no room left, load anew.
   bool admit(const Record<D>& r, double now, Slot& slot);
-  /// Forgets a sphere; its slot will be given to another one.
+  /// Removes a sphere; its slot will be given to another one.
   void dismiss(Slot i);
   /// Replaces the records of these spheres.
   void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
@@ -165,7 +165,7 @@ class EventCore {
   bool walled_ = false;
   PageVector<Agenda<D>> agenda_;
   std::vector<std::uint32_t> near_;
-  double astray_ = 0, largest_ = 0;      // how far spheres may be from where they are thought; largest radius
+  double astray_ = 0, largest_ = 0;      // how far spheres may be from where the core has them; largest radius
   std::vector<std::uint8_t> at_border_;  // by slot; empty: no sphere is
   std::vector<Slot> free_;               // slots of dismissed spheres
   std::vector<double> radii_;            // that lists or cells are made for; one where all are equal

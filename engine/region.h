@@ -101,7 +101,7 @@ class Region {
   double fastest() const { return std::sqrt(std::max(trace_.fastest_squared(), mended_fastest_squared_)); }
   /// Whether, before a time, all ghosts have the same events here as with their owners.
   bool agrees(double end);
-  /// Forgets all events after `last`. The core is of no use then; load() again.
+  /// Removes all events after `last`. The core is invalid then; load() again.
   void cut(const EventKey<D>& last);
   /// Ends the window.
   void commit();

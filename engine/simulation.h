@@ -47,7 +47,7 @@ struct Snapshot {
   double total() const { return kinetic + potential; }
 };
 
-/// The times at which an observer wants to see the particles: start, start + interval, …
+/// The times at which an observer needs the particles: start, start + interval, …
 struct Sampling {
   double interval = 0;  ///< simulated time; 0: never
   double start = 0;     ///< ≥ 0

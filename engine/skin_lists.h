@@ -44,7 +44,7 @@ class SkinLists {
 
   /// Takes in a sphere at x, in an empty slot; `radius` as in the constructor.
   void admit(Slot i, const Vec<D>& x, std::span<const double> radius);
-  /// Forgets a sphere.
+  /// Removes a sphere.
   void dismiss(Slot i);
   /// The sphere is now at x: renews its list where that is farther than `room` from the centre of its region; whether
   /// it was.

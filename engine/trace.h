@@ -54,7 +54,7 @@ class Trace {
   };
   // A share in an event has the number 2·event + 0 or 1.
 
-  /// Forgets all, and gets ready for so many slots.
+  /// Removes all events, and makes room for so many slots.
   void clear(std::size_t slots) {
     base_ += 2 * static_cast<std::uint32_t>(events_.size());
     if (base_ > kNone / 4) {

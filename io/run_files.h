@@ -14,7 +14,7 @@
 
 namespace carom {
 
-/// The times at which the files want to see the particles, besides frames and rows.
+/// The times at which the files need the particles, besides frames and rows.
 std::vector<Sampling> samplings(const OutputConfig& output);
 
 /// Looks at the particles when the files of another rank do, so that all ranks stop at the same times.

@@ -166,7 +166,7 @@ TEST(Domains, UnevenWork) {
       1500);
 }
 
-/// One sphere is so fast that each region would have more neighbours than can be told apart.
+/// One sphere is so fast that each region would have more neighbours than there are bits for.
 TEST(Domains, MoreRegionsThanTheBoxHasRoomFor) {
   const Case<3> c{.system = test::hard_spheres<3>(6, 0.49), .slab = 0.05, .slabs = 2};
   c.system->particles.v[5] *= 100;
