@@ -11,7 +11,7 @@ namespace carom {
 enum class Boundary : std::uint8_t {
   wall,      ///< hard, elastic: a sphere touches it when its centre is a radius away
   periodic,  ///< what leaves on one side comes in on the other
-  open       ///< nothing there; the edge only tells where the box is drawn
+  open       ///< nothing there; the edge is only where the box is drawn
 };
 
 template <int D>

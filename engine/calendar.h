@@ -3,9 +3,9 @@
 //
 // Entries of later bins are only appended, to a few cache lines that stay hot; what lies beyond the ring waits in a
 // list of its own. When its time has come a bin is sorted once and then served in order, beside a heap that holds what
-// is scheduled into the present. Nothing is ever removed: the caller tells which entries no longer hold, when a bin is
-// opened and again when an entry is served. Bins adapt to the rate of events. (Brown, Commun. ACM 31 (1988) 1220; Paul,
-// J. Comput. Phys. 221 (2007) 615.)
+// is scheduled into the present. Nothing is ever removed: the caller decides which entries no longer hold, when a bin
+// is opened and again when an entry is served. Bins adapt to the rate of events. (Brown, Commun. ACM 31 (1988) 1220;
+// Paul, J. Comput. Phys. 221 (2007) 615.)
 
 #include <algorithm>
 #include <boost/heap/d_ary_heap.hpp>
@@ -21,7 +21,7 @@ namespace carom {
 #pragma pack(push, 4)
 struct CalendarEntry {
   double time;
-  std::uint32_t slot;  ///< whose event it is
+  std::uint32_t slot;  ///< of the sphere that has the event
 };
 #pragma pack(pop)
 static_assert(sizeof(CalendarEntry) == 12);  // there are some for every particle

@@ -1,10 +1,10 @@
 #pragma once
-// A regular grid of search cells over the box, and a table of who is in which.
+// A regular grid of search cells over the box, and a table of the particles in each.
 //
 // Positions are mapped to *unwrapped* integer cells: a particle outside a periodic box, or an image of one, has its own
-// cell numbers there, and the difference of two unwrapped cells tells which image of a neighbour is meant. (The nearest
-// image of two positions is wrong where the box is dilute or small.) Along open and walled axes the outermost cells
-// reach to infinity. Which cells there are is nobody's business but the search's: results never depend on them.
+// cell numbers there, and the difference of two unwrapped cells gives the image of a neighbour that is meant. (The
+// nearest image of two positions is wrong where the box is dilute or small.) Along open and walled axes the outermost
+// cells reach to infinity. Only the search uses the cells: results never depend on them.
 
 #include <algorithm>
 #include <boost/container/small_vector.hpp>
@@ -199,12 +199,12 @@ class CellGrid {
   Vec<D> origin_, edge_, inverse_;
 };
 
-/// Who is in which cell, for one set of positions: built once, by counting, and read.
+/// The particles of each cell, for one set of positions: built once, by counting, and read.
 template <int D>
 class CellTable {
  public:
   CellTable(const CellGrid<D>& grid, std::span<const Vec<D>> x)
-      : grid_(grid), start_(grid.cells() + 2), who_(x.size()), boxes_(x.size()) {
+      : grid_(grid), start_(grid.cells() + 2), ids_(x.size()), boxes_(x.size()) {
     std::vector<std::uint32_t> at(x.size());
     for (std::size_t i = 0; i < x.size(); ++i) {
       const Cell<D> c = grid.cell(x[i]);
@@ -214,11 +214,11 @@ class CellTable {
     }
     // While filling, start_[c + 1] is where the next one in cell c goes.
     for (std::size_t c = 0; c + 1 < start_.size(); ++c) start_[c + 1] += start_[c];
-    for (std::size_t i = 0; i < x.size(); ++i) who_[start_[at[i] + 1]++] = static_cast<Id>(i);
+    for (std::size_t i = 0; i < x.size(); ++i) ids_[start_[at[i] + 1]++] = static_cast<Id>(i);
   }
 
-  /// Calls visit(j, image) for every particle j (the one at `x` among them) whose image may lie within `reach` of x:
-  /// that image stands at x_j − shift(image).
+  /// Calls visit(j, image) for every particle j (the one at `x` among them) with an image that may lie within `reach`
+  /// of x: that image stands at x_j − shift(image).
   template <class Visit>
   void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
     Cell<D> range;
@@ -233,13 +233,13 @@ class CellTable {
       const auto length = static_cast<std::size_t>(2 * range[D - 1] + 1);
       do {
         const std::size_t first = grid_.index(row);
-        for (std::uint32_t q = start_[first]; q < start_[first + length]; ++q) visit(who_[q], boxes_[who_[q]]);
+        for (std::uint32_t q = start_[first]; q < start_[first + length]; ++q) visit(ids_[q], boxes_[ids_[q]]);
       } while (next_row(row, centre, range));
       return;
     }
     grid_.for_each_around(centre, range, [&](std::size_t cell, const Image<D>& away) {
       for (std::uint32_t q = start_[cell]; q < start_[cell + 1]; ++q) {
-        const Id j = who_[q];
+        const Id j = ids_[q];
         Image<D> image;
         for (int k = 0; k < D; ++k) image[k] = boxes_[j][k] - away[k];
         visit(j, image);
@@ -261,7 +261,7 @@ class CellTable {
 
   CellGrid<D> grid_;
   std::vector<std::uint32_t> start_;
-  std::vector<Id> who_;
+  std::vector<Id> ids_;
   std::vector<Image<D>> boxes_;
 };
 

@@ -13,7 +13,7 @@ namespace {
 constexpr double kFull = 1 + 1e-13;      // the factor aimed at: touching by rounding is not overlapping
 constexpr double kShare = 0.1;           // of the free volume that a slab takes, …
 constexpr double kLongest = 10;          // … and its length at most, in diameters at the thermal speed
-constexpr double kJammedPressure = 300;  // from here on free-volume theory tells where the spheres jam …
+constexpr double kJammedPressure = 300;  // from here on free-volume theory predicts where the spheres jam …
 constexpr double kHopeless = 5;          // … and a target so many times farther away is out of reach
 
 template <int D>
@@ -44,21 +44,21 @@ class Compressor {
   bool start() {
     for (int k = 0; k < D; ++k)
       if (box_.edges[k] < 2 * kFull * largest_) return false;
-    std::vector<Id> everybody(radius_.size());
-    std::iota(everybody.begin(), everybody.end(), Id{0});
+    std::vector<Id> all(radius_.size());
+    std::iota(all.begin(), all.end(), Id{0});
     constexpr double dilute = D == 2 ? 0.2 : 0.1, least = 1e-3;
     const double filled = packing_fraction<D>(box_.volume(), radius_);
     result_.factor = std::min(0.8, D == 2 ? std::sqrt(dilute / filled) : std::cbrt(dilute / filled));
-    for (const double first = result_.factor; !insert(everybody); result_.factor *= 0.8)
+    for (const double first = result_.factor; !insert(all); result_.factor *= 0.8)
       if (result_.factor < least * first) return false;
-    draw_velocities<D>(particles_, everybody, std::vector<double>(radius_.size(), 1.0), options_.seed,
+    draw_velocities<D>(particles_, all, std::vector<double>(radius_.size(), 1.0), options_.seed,
                        RandomPurpose::compression);
     return true;
   }
 
-  bool insert(const std::vector<Id>& everybody) {
+  bool insert(const std::vector<Id>& all) {
     scale_radii();
-    return insert_at_random<D>(box_, particles_.x, particles_.radius, everybody, options_.seed) == everybody.size();
+    return insert_at_random<D>(box_, particles_.x, particles_.radius, all, options_.seed) == all.size();
   }
 
   void scale_radii() {

@@ -16,7 +16,7 @@
 //   const Compression<3> done = compress<3>(box, radius, {.seed = 7});
 //   if (done.reached()) use(done.x);     // no overlap
 //
-// Everybody has mass 1, whatever the masses of the run: the state is a function of box, radii and options only.
+// All spheres have mass 1, whatever the masses of the run: the state is a function of box, radii and options only.
 
 #include <span>
 #include <vector>
@@ -35,7 +35,7 @@ template <int D>
 struct Compression {
   enum class End { reached, no_room, jammed, too_many_collisions };
   End end = End::reached;
-  std::vector<Vec<D>> x;        ///< where everybody stands, in the box
+  std::vector<Vec<D>> x;        ///< the centres, in the box
   double factor = 0;            ///< of the radii up to which they don't overlap; where the end was reached ≥ 1
   double reduced_pressure = 1;  ///< at the end
   double collisions = 0;        ///< a particle
@@ -43,7 +43,7 @@ struct Compression {
 };
 
 /// Places spheres of these radii in a box without open axes. Ends by `no_room` where a sphere is larger than the box or
-/// insertion finds no start, and by `jammed` where the pressure says that the spheres jam well before their sizes.
+/// insertion finds no start, and by `jammed` where the pressure shows that the spheres jam well before their sizes.
 template <int D>
 Compression<D> compress(const Box<D>& box, std::span<const double> radius, const CompressionOptions& options);
 

@@ -19,7 +19,7 @@
 
 namespace carom {
 
-/// Rounding level of d·v for two touching spheres whose velocities have the given sizes.
+/// Rounding level of d·v for two touching spheres with velocities of the given sizes.
 inline double approach_slack(double sigma, double speed_i, double speed_j) {
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   return 8 * kEpsilon * sigma * (speed_i + speed_j);

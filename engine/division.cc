@@ -19,18 +19,18 @@ double from_ordered(std::uint64_t key) {
   return std::bit_cast<double>((key & kSign) != 0 ? key & ~kSign : ~key);
 }
 
-/// Which element is asked for of a sorted sequence that all ranks have parts of.
+/// The position of the wanted element in a sorted sequence that all ranks have parts of.
 struct OrderStatistic {
   struct Element {
     std::uint64_t key;
     std::uint32_t weight;  // it stands there so many times
   };
   std::vector<Element> elements;  // of this rank; in the end those that are left
-  std::uint64_t number;           // from 0, less than there are; none are asked for where there is nobody
+  std::uint64_t number;           // from 0, less than there are; unused where there are no elements
   std::uint64_t found = 0;        // the bits known so far
 };
 
-/// Finds the elements asked for, digit by digit from the highest, by counting: all ranks find the same.
+/// Finds the wanted elements, digit by digit from the highest, by counting: all ranks find the same.
 void select(std::span<OrderStatistic> wanted, Exchange& ranks) {
   constexpr int kBits = 8;
   constexpr std::size_t kDigits = std::size_t{1} << kBits;

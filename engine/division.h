@@ -1,8 +1,8 @@
 #pragma once
 // How the box is divided among regions: by recursive bisection, so that each has about as much work.
 //
-// Which region owns a sphere never reaches the physics; all that matters is that everybody computes the same: cuts come
-// from sums of whole numbers, whichever rank has which spheres.
+// Which region owns a sphere never reaches the physics; all that matters is that all ranks compute the same cuts: they
+// come from sums of whole numbers, whichever rank has which spheres.
 
 #include <algorithm>
 #include <limits>
@@ -18,8 +18,8 @@ template <int D>
 class Division {
  public:
   /// Regions for the spheres of all ranks, of which this one has those at x; so that each has about as much `work`, of
-  /// each sphere (empty: the same). Places that are nearer to a region than `reach` concern it. Collective; the cuts
-  /// are the same whoever has whom.
+  /// each sphere (empty: the same). Places that are nearer to a region than `reach` concern it. Collective; the cuts do
+  /// not depend on which rank has which spheres.
   Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks,
            std::span<const std::uint32_t> work = {});
 
@@ -50,7 +50,7 @@ class Division {
   }
   /// Whether a place concerns a region.
   bool near(std::uint32_t region, const Vec<D>& at) const { return squared_distance(region, at) <= reach_ * reach_; }
-  /// Whether a place is so deep in a region that it concerns nobody else, however distances are rounded.
+  /// Whether a place is so deep in a region that it concerns no other, however distances are rounded.
   bool deep(double depth) const { return depth > (1 + 1e-6) * reach_; }
   /// Of a place from a region.
   double squared_distance(std::uint32_t region, const Vec<D>& at) const {

@@ -71,9 +71,9 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
   while (!divide(regions)) regions -= (regions + 7) / 8;  // the box is too small for so many
   if (regions < regions_) make_regions(regions);
   find_partners();
-  load(0, [&](auto&& tell) {
+  load(0, [&](auto&& add) {
     for (Id i = 0; i < particles.size(); ++i)
-      tell(Record<D>{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]});
+      add(Record<D>{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]});
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
@@ -108,30 +108,30 @@ void Domains<D>::find_partners() {
       if (rank_of(r) != exchange_.rank()) partners_.push_back(rank_of(r));
   std::sort(partners_.begin(), partners_.end());
   partners_.erase(std::unique(partners_.begin(), partners_.end()), partners_.end());
-  letters_.assign(partners_.size() + 1, {});
+  outgoing_.assign(partners_.size() + 1, {});
 }
 
-/// What is going to be sent to a region that is a neighbour of one here.
+/// The message to a region that is a neighbour of one here, begun with its number.
 template <int D>
-Bytes& Domains<D>::letter_to(std::uint32_t region) {
+Bytes& Domains<D>::message_to(std::uint32_t region) {
   const int rank = rank_of(region);
-  Bytes& letter = rank == exchange_.rank()
-                      ? letters_.back()
-                      : letters_[static_cast<std::size_t>(std::lower_bound(partners_.begin(), partners_.end(), rank) -
-                                                          partners_.begin())];
-  put(letter, region);
-  return letter;
+  Bytes& message = rank == exchange_.rank()
+                       ? outgoing_.back()
+                       : outgoing_[static_cast<std::size_t>(std::lower_bound(partners_.begin(), partners_.end(), rank) -
+                                                            partners_.begin())];
+  put(message, region);
+  return message;
 }
 
-/// Sends all letters; returns those that have come.
+/// Sends all messages; returns those that have come.
 template <int D>
-std::vector<Bytes> Domains<D>::post() {
-  Bytes here = std::move(letters_.back());
-  letters_.pop_back();
-  std::vector<Bytes> mail = exchange_.swap(std::move(letters_), partners_);
-  mail.push_back(std::move(here));
-  letters_.assign(partners_.size() + 1, {});
-  return mail;
+std::vector<Bytes> Domains<D>::exchange_messages() {
+  Bytes here = std::move(outgoing_.back());
+  outgoing_.pop_back();
+  std::vector<Bytes> received = exchange_.swap(std::move(outgoing_), partners_);
+  received.push_back(std::move(here));
+  outgoing_.assign(partners_.size() + 1, {});
+  return received;
 }
 
 /// Where a sphere is, as Flights has it, bit for bit.
@@ -143,12 +143,12 @@ Vec<D> Domains<D>::place(const Record<D>& r, double now) const {
   return division_->wrapped(x);
 }
 
-/// Starts all regions anew. `spheres` tells a function of all spheres, each on one rank.
+/// Starts all regions anew. `spheres(add)` calls add(record) for each sphere, on one of the ranks.
 template <int D>
 template <class Spheres>
 void Domains<D>::load(double now, Spheres&& spheres) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
-  std::vector<Id> last(outgoing.size(), std::numeric_limits<Id>::max());  // that a rank was told of
+  std::vector<Id> last(outgoing.size(), std::numeric_limits<Id>::max());  // that was sent to a rank
   spheres([&](const Record<D>& r) {
     division_->for_each_near(place(r, now), [&](std::uint32_t region) {
       const auto rank = static_cast<std::size_t>(rank_of(region));
@@ -176,24 +176,24 @@ void Domains<D>::load(double now, Spheres&& spheres) {
 /// Starts all regions anew from what they have now.
 template <int D>
 void Domains<D>::reload() {
-  load(now_, [&](auto&& tell) {
+  load(now_, [&](auto&& add) {
     for (const Local& region : local_)
-      for (const Slot i : region->own()) tell(region->after(i));
+      for (const Slot i : region->own()) add(region->after(i));
   });
 }
 
-/// At the start of a window: says anew who is whose, and gives neighbours the ghosts that they do not have. Where
+/// At the start of a window: updates ownership and ghosts, and sends neighbours the ghosts that they lack. Where
 /// regions have just been loaded they have them all.
 template <int D>
 void Domains<D>::sort_out(bool loaded) {
   sorted_ = true;
   for (const Local& region : local_)
     region->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
-      if (!loaded) put(letter_to(division_->neighbours(region->number())[neighbour]), record);
+      if (!loaded) put(message_to(division_->neighbours(region->number())[neighbour]), record);
     });
   if (loaded) return;
   double full = 0;
-  for (const Bytes& bytes : post())
+  for (const Bytes& bytes : exchange_messages())
     for (Reader reader(bytes); reader.more();) {
       const auto number = reader.get<std::uint32_t>();
       const auto record = reader.get<Record<D>>();
@@ -262,11 +262,11 @@ double Domains<D>::run(double end, const Report& report) {
 /// Sends paths and mends them until nothing changes.
 template <int D>
 void Domains<D>::agree() {
-  mail_.clear();
+  received_.clear();
   for (double more = 1; more > 0;) {
     ++counts_.rounds;
     send_paths();
-    for (const Bytes& bytes : mail_.emplace_back(post()))
+    for (const Bytes& bytes : received_.emplace_back(exchange_messages()))
       for (Reader reader(bytes); reader.more();) {
         const auto number = reader.get<std::uint32_t>();
         const auto id = reader.get<Id>();
@@ -287,7 +287,7 @@ void Domains<D>::send_paths() {
     const auto neighbours = division_->neighbours(region->number());
     for (const Slot i : region->changed())
       for (std::uint64_t holders = region->holders(i); holders != 0; holders &= holders - 1) {
-        Bytes& bytes = letter_to(neighbours[static_cast<std::size_t>(std::countr_zero(holders))]);
+        Bytes& bytes = message_to(neighbours[static_cast<std::size_t>(std::countr_zero(holders))]);
         put(bytes, region->flights()[i].id);
         region->write_path(i, bytes);
       }
@@ -305,7 +305,7 @@ void Domains<D>::give_back(double time, Particles<D>& particles) {
   collect(time, particles, &work_);
 }
 
-/// So that the next division gives less to regions whose spheres have more to do.
+/// So that the next division gives fewer spheres to regions with more events a sphere.
 template <int D>
 void Domains<D>::measure_work() {
   std::vector<std::uint64_t> events, spheres;
@@ -326,7 +326,7 @@ void Domains<D>::measure_work() {
   }
 }
 
-/// Brings the spheres, flown to a time, to those who have them in their shares; and what region_work_ says of them.
+/// Sends the spheres, flown to a time, to the ranks that have them in their shares; and their work by region_work_.
 template <int D>
 void Domains<D>::collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const {
   struct Place {

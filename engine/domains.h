@@ -2,9 +2,9 @@
 // Free flight of a system divided into regions: several on one process, or on many ranks, with the bits of one core.
 //
 // Time goes in windows (engine/region.h). In each no sphere may come farther than `stray` from where it was at its
-// start, so that a region needs to know those only that start within a diameter and two strays of it; where somebody is
-// faster than was thought the window is cut to the time at which it would have mattered. A sphere belongs to the region
-// that it is in at a window's start, which everybody who knows it computes alike.
+// start, so that a region needs to know those only that start within a diameter and two strays of it; where a sphere is
+// faster than expected the window is cut to the time at which it would have mattered. A sphere belongs to the region
+// that it is in at a window's start, which all regions that have it compute alike.
 //
 //   Domains<3> domains(box, particles, exchange, 4 * exchange.size());
 //   domains.take(particles, g, horizon);
@@ -46,7 +46,7 @@ class Domains {
 
  private:
   using Local = std::unique_ptr<Region<D>>;
-  static constexpr double kFaster = 1.15;  // than anyone is, somebody may come to be
+  static constexpr double kFaster = 1.15;  // factor between the largest speed and the one allowed for
 
   Shares shares() const { return {sizes_.spheres, static_cast<std::size_t>(exchange_.size())}; }
   void make_regions(std::size_t regions);
@@ -62,8 +62,8 @@ class Domains {
   void sort_out(bool loaded);
   void agree();
   void find_partners();
-  Bytes& letter_to(std::uint32_t region);
-  std::vector<Bytes> post();
+  Bytes& message_to(std::uint32_t region);
+  std::vector<Bytes> exchange_messages();
   void send_paths();
   double window_end(double end);
   double first_astray(double end);
@@ -82,18 +82,18 @@ class Domains {
   SearchOptions options_;
   std::function<double()> forced_window_;
   std::optional<Division<D>> division_;
-  std::vector<Local> local_;              // the regions of this rank
-  std::vector<int> partners_;             // ranks that have neighbours of these, ascending
-  std::vector<Bytes> letters_;            // to each partner, and to the regions here
-  std::vector<std::vector<Bytes>> mail_;  // of the window: paths that were sent here
+  std::vector<Local> local_;                  // the regions of this rank
+  std::vector<int> partners_;                 // ranks that have neighbours of these, ascending
+  std::vector<Bytes> outgoing_;               // to each partner, and to the regions here
+  std::vector<std::vector<Bytes>> received_;  // of the window: paths that were sent here
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
   double diameter_ = 0;       // the largest
-  double stray_ = 0;          // how far anyone comes in a window
-  double fastest_ = 0;        // that anyone is expected to be
+  double stray_ = 0;          // how far a sphere comes in a window at most
+  double fastest_ = 0;        // the largest speed expected
   double pace_ = 0;           // time in which a sphere collides kCollisions times, about
-  bool sorted_ = false;       // everybody is known to be whose at now_
-  bool cut_ = false;          // the last window was, and regions must be loaded again
+  bool sorted_ = false;       // owners and ghosts are those of now_
+  bool cut_ = false;          // the last window was cut, and regions must be loaded again
   std::uint64_t events_ = 0;  // contacts since take()
   // How much each region had to do in the epoch, a sphere of it, the mean of all being kUsualWork; and each sphere of
   // this rank's share.

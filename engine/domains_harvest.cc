@@ -15,7 +15,7 @@ typename Region<D>::Tally Domains<D>::tally() const {
   return all;
 }
 
-/// When somebody may first have come farther than the stray in the window; infinite: never.
+/// When a sphere may first have come farther than the stray in the window; infinite: never.
 template <int D>
 double Domains<D>::first_astray(double end) {
   double speed = 0, first = std::numeric_limits<double>::infinity();
@@ -44,7 +44,7 @@ double Domains<D>::astray_at(Region<D>& region, Slot i, double end) const {
   return std::numeric_limits<double>::infinity();
 }
 
-/// Forgets what happened from a time on, and returns it.
+/// Removes the events from a time on, and returns it.
 template <int D>
 double Domains<D>::cut_at(double time) {
   ++counts_.cut;

@@ -1,5 +1,5 @@
 #pragma once
-// Elementary functions whose bits are the same on every machine, of a double or of the lanes of a vector (lanes.h).
+// Elementary functions with the same bits on every machine, of a double or of the lanes of a vector (lanes.h).
 //
 // The C library picks its exp, log, … by the processor it finds (with or without fused multiply-add), so their last
 // bits differ from machine to machine; a chaotic run would follow. These are plain double arithmetic, compiled like the

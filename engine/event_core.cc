@@ -73,7 +73,7 @@ bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
       slot = entry.slot;
       time = entry.time;
       if (!calendar_.more_at(time)) return true;
-      settle();  // from here on it matters who is stale
+      settle();  // from here on it matters which plans are stale
       // Often it is the same contact, planned by both partners: the other's plan falls with this one.
       Slot other = slot;
       if (const CalendarEntry* const next = calendar_.top(holds); mirrored(slot, next->slot)) {
@@ -167,7 +167,7 @@ void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
   }
 }
 
-/// Looks for the next contact of a sphere whose record, or whose partner's, has changed, and puts it into the calendar.
+/// Finds the next contact of a sphere after a change of its record, or its partner's, and puts it into the calendar.
 template <int D>
 void EventCore<D>::predict(Slot i, double now) {
   foresee(i, now);
@@ -322,7 +322,7 @@ void EventCore<D>::predict_crossing(Slot i, double now) {
   const Record<D>& r = flights_[i];
   const CellGrid<D>& grid = cells_->grid();
   Agenda<D>& a = agenda_[i];
-  // Without a branch, because nobody can foretell it: times that are not negative are in the order of their bits.
+  // Without a branch, which could not be predicted: times that are not negative are in the order of their bits.
   std::uint64_t first = std::bit_cast<std::uint64_t>(kNever);
   unsigned face = 0;
   for (int k = 0; k < D; ++k) {
@@ -384,7 +384,7 @@ void EventCore<D>::update(Slot i, double now) {
   }
   ++counts_.rebuilds;
   const std::span<const std::uint32_t> fresh = lists_->renew(i, r.x);
-  // The planned contact stands; only those who are new in the list are looked at.
+  // The planned contact stands; only those that are new in the list are looked at.
   if (!fresh.empty()) predict_pairs({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
   predict_leaving(i, now);
   schedule(i);

@@ -2,17 +2,17 @@
 // The event core: runs flights through their contacts, in the order of their keys, to a given time.
 //
 // Every sphere is on a flight x + v s + g s²/2 (g the same for all: 0, or a uniform field) that is known from its
-// record; an event changes the records of the spheres that take part in it and of nobody else. One pending event a
-// particle is kept, with the particle that was scanned last; it is stale when its partner has had an event since, and
-// the particle is scanned again when a stale event comes up (Lubachevsky, J. Comput. Phys. 94 (1991) 255). Neighbour
-// lists prune the candidates, or cells where the system is dilute; neither changes a record. Nothing that the search
-// does can therefore reach the physics.
+// record; an event changes the records of the spheres that take part in it and no others. One pending event a particle
+// is kept, with the particle that was scanned last; it is stale when its partner has had an event since, and the
+// particle is scanned again when a stale event comes up (Lubachevsky, J. Comput. Phys. 94 (1991) 255). Neighbour lists
+// prune the candidates, or cells where the system is dilute; neither changes a record. Nothing that the search does can
+// therefore reach the physics.
 //
 // Spheres may grow meanwhile, all by a common factor (engine/compression.h): their contact distances and their
 // distances from walls are then functions of time like their positions.
 //
 //   EventCore<3> core(box, particles);
-//   core.load(particles, g, horizon);             // everybody at time 0
+//   core.load(particles, g, horizon);             // all spheres at time 0
 //   core.run(end, report);                        // events with time < end
 //   core.fly_to(end, particles);                  // copies at `end`
 
@@ -52,23 +52,23 @@ class EventCore {
   /// Masses and radii are read from `particles` at the start of each slab.
   EventCore(const Box<D>& box, const Particles<D>& /*particles*/, const SearchOptions& options = {})
       : EventCore(box, nullptr, options) {}
-  /// For a core that runs a part of a larger system; `sizes` tells masses and radii of all of it, and outlives the
+  /// For a core that runs a part of a larger system; `sizes` has the masses and radii of all of it, and outlives the
   /// core.
   EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options);
   ~EventCore();
   EventCore(const EventCore&) = delete;
   EventCore& operator=(const EventCore&) = delete;
 
-  /// Starts a slab: everybody at time 0 at particles.x with particles.v, under the acceleration g. No event at or after
-  /// `horizon` will be asked for. All radii are those of the particles times 1 + growth·t, t since the start of the
-  /// slab; `growth` ≥ 0 [1/time].
+  /// Starts a slab: all spheres at time 0 at particles.x with particles.v, under the acceleration g. No event at or
+  /// after `horizon` will be required. All radii are those of the particles times 1 + growth·t, t since the start of
+  /// the slab; `growth` ≥ 0 [1/time].
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth = 0);
 
   /// The same for those that are too many to be kept twice: their positions and velocities are taken out of
   /// `particles`, until give_back().
   void take(Particles<D>& particles, const Vec<D>& g, double horizon, double growth = 0);
 
-  /// Ends a slab that began with take(): everybody is at `time`, which no event precedes any more.
+  /// Ends a slab that began with take(): all spheres are flown to `time`, which no event precedes any more.
   void give_back(double time, Particles<D>& particles);
 
   /// Executes every event before `end`, or up to the collision limit; returns the time reached: `end`, or that of the
@@ -87,20 +87,20 @@ class EventCore {
   // For a core that runs a part of a larger system (engine/region.h). All of this happens at a time `now` that no event
   // precedes any more.
 
-  /// Starts with these spheres only; no record is of a later time than `now`. find_near() will be asked for `astray`.
+  /// Starts with these spheres only; no record is of a later time than `now`. find_near() will use `astray`.
   void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double astray);
   const Flights<D>& flights() const { return flights_; }
   const Packing<D>& packing() const { return packing_; }
   /// Takes a sphere in; false: there is no room left, load anew.
   bool admit(const Record<D>& r, double now, Slot& slot);
-  /// Forgets a sphere; its slot will be given to another one.
+  /// Removes a sphere; its slot will be given to another one.
   void dismiss(Slot i);
-  /// These spheres have other records than this core thought.
+  /// Replaces the records of these spheres.
   void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
-  /// Says which spheres are at the border of a region: lists of theirs are good for each other wherever they come in a
-  /// window, and need not be searched for.
+  /// Sets the spheres at the border of a region: their lists are good for each other wherever they come in a window,
+  /// and need not be searched for.
   void set_border(std::span<const Slot> slots, double now);
-  /// Candidates for contacts of a sphere: whoever may touch it where each of the two has come up to `astray` (load)
+  /// Candidates for contacts of a sphere: all that may touch it where each of the two has come up to `astray` (load)
   /// from where the core knows it to be. Good until the next call.
   std::span<const std::uint32_t> find_near(Slot i);
   /// The same for one at the border, where only others matter that are at the border and between two corners.
@@ -165,9 +165,9 @@ class EventCore {
   bool walled_ = false;
   PageVector<Agenda<D>> agenda_;
   std::vector<std::uint32_t> near_;
-  double astray_ = 0, largest_ = 0;      // how far spheres may be from where they are thought; largest radius
-  std::vector<std::uint8_t> at_border_;  // by slot; empty where nobody is
-  std::vector<Slot> free_;               // slots of those who have been dismissed
+  double astray_ = 0, largest_ = 0;      // how far spheres may be from where the core has them; largest radius
+  std::vector<std::uint8_t> at_border_;  // by slot; empty: no sphere is
+  std::vector<Slot> free_;               // slots of dismissed spheres
   std::vector<double> radii_;            // that lists or cells are made for; one where all are equal
   Packing<D> packing_;
   ScanSetting setting_;

@@ -1,7 +1,7 @@
 // What the next events will need is fetched while this one is at work.
 //
-// What an event needs is known step by step: the sphere, whom it meets and where those around are written down, who
-// they are, their records. Each step takes a wait for memory, so they are spread over the events before.
+// What an event needs is known step by step: the sphere, its partner and its list or cells, the candidates in these,
+// their records. Each step takes a wait for memory, so they are spread over the events before.
 
 #include "engine/event_core.h"
 
@@ -46,7 +46,7 @@ void EventCore<D>::prefetch_few_cells() const {
   if (const CalendarEntry* const next = calendar_.upcoming(1)) cells_->prefetch(agenda_[next->slot].where.cell, 0, 0);
 }
 
-/// A core that is larger: to look at the cells twice costs less than to wait for who is in them.
+/// A core that is larger: to look at the cells twice costs less than to wait for the spheres in them.
 template <int D>
 void EventCore<D>::prefetch_cells() {
   const auto fetch = [&](Slot j) { prefetch_line(&flights_[j]); };

@@ -1,4 +1,4 @@
-// Who is in the core: spheres loaded, taken in and forgotten, and what is planned when a slab begins.
+// The spheres of a core: loading, admitting and dismissing them, and planning at the start of a slab.
 
 #include "engine/contact.h"
 #include "engine/event_core.h"
@@ -72,7 +72,7 @@ void EventCore<D>::give_back(double time, Particles<D>& particles) {
   fly_to(time, particles);
 }
 
-/// Takes over the records; tells whether the slots have changed.
+/// Takes over the records; returns whether the slots have changed.
 template <int D>
 bool EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
   const std::size_t n = particles.size();
@@ -91,7 +91,7 @@ bool EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double h
   return anew;
 }
 
-/// Plans everybody's first event.
+/// Plans the first event of every sphere.
 template <int D>
 void EventCore<D>::plan(bool anew, double now) {
   const std::size_t n = flights_.size();
@@ -120,7 +120,7 @@ void EventCore<D>::plan(bool anew, double now) {
 
 template <int D>
 void EventCore<D>::choose_search(double now) {
-  // A region is as dense as the whole, of which it has a part only, or nobody yet; and larger spheres may come.
+  // The density is that of the whole system: a region has a part of it, or no spheres yet; larger ones may come.
   const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : radii_;
   if (counts_.predictions == 0) tuning_ = SearchTuning(options_);
   Extent<D> extent = flights_.extent();
@@ -148,7 +148,7 @@ void EventCore<D>::choose_search(double now) {
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
   lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, flights_.equal(), largest_, skin, agenda_);
-  lists_->build(flights_, now, extent, astray_);
+  lists_->build(flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, astray_);
 }
 
 template <int D>
@@ -185,7 +185,7 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
 template <int D>
 void EventCore<D>::dismiss(Slot i) {
   Agenda<D>& a = agenda_[i];
-  ++a.version;  // whoever plans a contact with it looks again
+  ++a.version;  // contacts planned with it are stale
   a.contact = a.update = kNever;
   if (lists_)
     lists_->dismiss(i);

@@ -28,10 +28,10 @@ struct EventCounts {
 
 /// What agreement between regions took on one rank (engine/domains.h).
 struct DomainCounts {
-  std::uint64_t regions = 0;  ///< of all ranks; fewer than asked for where the box has no room for more
+  std::uint64_t regions = 0;  ///< of all ranks; fewer than requested where the box has no room for more
   std::uint64_t windows = 0;
   std::uint64_t rounds = 0;         ///< of exchange and repair
-  std::uint64_t cut = 0;            ///< windows that were cut because somebody was too fast
+  std::uint64_t cut = 0;            ///< windows that were cut because a sphere was too fast
   std::uint64_t events = 0;         ///< of own spheres, as they are in the end
   std::uint64_t run_events = 0;     ///< in first runs, those of ghosts among them
   std::uint64_t redone_events = 0;  ///< in repairs

@@ -1,7 +1,7 @@
 #pragma once
-// How the ranks of a run talk to each other, as far as the engine knows: bytes, sums and maxima.
+// Communication among the ranks of a run, as far as the engine knows: bytes, sums and maxima.
 //
-// A process alone is a team of one. parallel/ has the one for MPI. Every call is collective: all ranks make the same
+// By default there is one rank. parallel/ has the class for MPI. Every call is collective: all ranks make the same
 // calls in the same order.
 
 #include <cstddef>
@@ -51,13 +51,12 @@ class Exchange {
   virtual int rank() const { return 0; }
   virtual int size() const { return 1; }
 
-  /// Sends outgoing[r] to rank r and returns what each rank has sent here, by rank. Nothing goes where there is nothing
-  /// to say.
+  /// Sends outgoing[r] to rank r and returns what each rank has sent here, by rank. Empty messages are not sent.
   virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing) { return outgoing; }
-  /// The same among neighbours: outgoing[k] goes to partners[k], who has this rank among its own partners; returns what
-  /// they have sent, in their order. Others are not waited for.
+  /// The same among neighbours: outgoing[k] goes to partners[k], and this rank is among the partners of that one;
+  /// returns what they have sent, in their order. Others are not waited for.
   virtual std::vector<Bytes> swap(std::vector<Bytes> /*outgoing*/, std::span<const int> /*partners*/) { return {}; }
-  /// What every rank has to say, by rank.
+  /// The messages of all ranks, by rank.
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
   /// Makes each value the largest among all ranks.
   virtual void largest(std::span<double> /*values*/) {}
@@ -65,14 +64,14 @@ class Exchange {
   virtual void sum(std::span<std::uint64_t> /*values*/) {}
 };
 
-/// Tells rank 0 what every rank has to say, by rank; the others hear nothing. Collective.
+/// The messages of all ranks, by rank, on rank 0; empty ones elsewhere. Collective.
 inline std::vector<Bytes> gather_on_first(Exchange& ranks, Bytes mine) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
   outgoing[0] = std::move(mine);
   return ranks.swap(std::move(outgoing));
 }
 
-/// What becomes of a value that is handed from rank to rank, each of which does add(value): as if one had done it all.
+/// Hands a value from rank to rank, each of which does add(value): the result is that of one rank that does it all.
 template <class Value, class Add>
 Value handed_on(Exchange& ranks, Value value, Add&& add) {
   for (int rank = 0; rank < ranks.size(); ++rank) {
@@ -81,8 +80,8 @@ Value handed_on(Exchange& ranks, Value value, Add&& add) {
       add(value);
       put(mine, value);
     }
-    const auto told = ranks.gather(mine);
-    value = Reader(told[static_cast<std::size_t>(rank)]).template get<Value>();
+    const auto received = ranks.gather(mine);
+    value = Reader(received[static_cast<std::size_t>(rank)]).template get<Value>();
   }
   return value;
 }

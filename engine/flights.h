@@ -1,9 +1,9 @@
 #pragma once
-// The spheres of one core and all that may happen to them: flight, contact, collision. What is here is physics; who is
-// asked about whom, and when, is the business of event_core.h.
+// The spheres of one core and all that may happen to them: flight, contact, collision. The physics is here;
+// event_core.h decides for which pairs contacts are computed, and when.
 //
 // Between contacts every sphere flies on x + v s + g s²/2 from its record. All radii may grow by a common factor
-// 1 + growth·t. A contact is a pure function of two records: no time of asking and no list is in it.
+// 1 + growth·t. A contact is a pure function of two records: neither the time of its computation nor a list is in it.
 
 #include <span>
 
@@ -31,10 +31,10 @@ class Flights {
  public:
   explicit Flights(const Box<D>& box) : box_(box) {}
 
-  /// Gives everybody a slot.
+  /// Gives every particle a slot.
   void assign(std::span<const Id> order);
 
-  /// Starts a slab: everybody at time 0, in the slots given before.
+  /// Starts a slab: all spheres at time 0, in the slots given before.
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
 
   /// The same for records of other times, in their order; with room for more that come meanwhile.
@@ -50,7 +50,7 @@ class Flights {
 
   /// One radius where all are equal, else by slot; as they are at a time.
   std::vector<double> radii(double t) const;
-  /// Where everybody is at a time, by slot.
+  /// The positions of all spheres at a time, by slot.
   std::vector<Vec<D>> places(double t) const {
     std::vector<Vec<D>> places;
     places.reserve(size());

@@ -13,7 +13,7 @@ class IdTable {
  public:
   static constexpr Slot kNowhere = std::numeric_limits<Slot>::max();
 
-  /// Forgets all, and makes room for so many.
+  /// Removes all, and makes room for so many.
   void clear(std::size_t most) {
     mask_ = std::bit_ceil(2 * most + 2) - 1;
     entries_.assign(mask_ + 1, {});
@@ -29,7 +29,7 @@ class IdTable {
     while (entries_[at].slot != kNowhere && entries_[at].id != id) at = (at + 1) & mask_;
     entries_[at] = {id, slot};
   }
-  /// Forgets one that is there; those behind it close the gap.
+  /// Removes one that is there; those behind it close the gap.
   void remove(Id id) {
     std::size_t gap = home(id);
     while (entries_[gap].id != id || entries_[gap].slot == kNowhere) gap = (gap + 1) & mask_;

@@ -7,7 +7,7 @@
 // (force_sums.h): no sum depends on how the pairs were found.
 //
 // Where several ranks share a system (engine/part.h) sums over the system are over what this rank owns: its particles,
-// and the pairs whose lower id it owns. What acts on a ghost is left incomplete.
+// and the pairs of which it owns the lower id. What acts on a ghost is left incomplete.
 
 #include <memory>
 #include <span>

@@ -1,6 +1,6 @@
 #pragma once
-// Who is in which cell, for dilute systems: cells as small as a diameter, most of them empty, with a list through the
-// spheres of each. A sphere that crosses into another cell looks at the new ones around it.
+// The spheres of each cell, for dilute systems: cells as small as a diameter, most of them empty, with a list through
+// the spheres of each. A sphere that crosses into another cell looks at the new ones around it.
 
 #include "engine/agenda.h"
 #include "engine/pages.h"
@@ -36,7 +36,7 @@ class LinkedCells {
     lay_out();
   }
 
-  /// Before anyone is in: most spheres will stay near these places, and memory for cells elsewhere is saved.
+  /// Before any sphere is inserted: most spheres will stay near these places, and memory for cells elsewhere is saved.
   void confine(std::span<const Vec<D>> places) {
     grid_.confine(places, kMargin, D - 1);
     lay_out();
@@ -69,7 +69,7 @@ class LinkedCells {
         prefetch_line(row + 3);
       }
   }
-  /// Starts to fetch who is behind the first spheres of these cells, and calls fetch(slot) for the first ones; `found`
+  /// Starts to fetch the links of the first spheres of these cells, and calls fetch(slot) for the first ones; `found`
   /// is room to work in.
   template <class Fetch>
   void prefetch_spheres(const Place& place, int axis, int step, Candidates& found, Fetch&& fetch) const {
@@ -93,7 +93,7 @@ class LinkedCells {
     if (confined_ && !grid_.holds(wrapped(place))) spread();
     std::uint32_t& first = first_[index(place)];
     link_[i] = {first, place.boxes};
-    first = packing_.pack(i, place.boxes) | (first != kNobody ? kMore : 0);
+    first = packing_.pack(i, place.boxes) | (first != kEmpty ? kMore : 0);
     mirror(place);
   }
   void remove(Slot i, const Place& place) {
@@ -103,7 +103,7 @@ class LinkedCells {
       at = &link_[packing_.slot(*at)].next;
     }
     *at = link_[i].next;
-    if (before && *at == kNobody) *before &= ~kMore;
+    if (before && *at == kEmpty) *before &= ~kMore;
     mirror(place);
   }
 
@@ -124,7 +124,7 @@ class LinkedCells {
     insert(i, place);
   }
 
-  /// Everybody in the cells that may hold places up to `reach` from those in a sphere's cell, itself among them.
+  /// All spheres in the cells that may hold places up to `reach` from those in a sphere's cell, itself among them.
   void find_near(const Place& place, double reach, std::vector<std::uint32_t>& found) const {
     found.clear();
     Cell<D> low, high;
@@ -135,23 +135,23 @@ class LinkedCells {
     }
     collect(low, high, found);
   }
-  /// Everybody in the cells between two corners, as seen from the box that holds the origin.
+  /// All spheres in the cells between two corners, as seen from the box that holds the origin.
   void find_between(const Vec<D>& low, const Vec<D>& high, std::vector<std::uint32_t>& found) const {
     found.clear();
     collect(grid_.cell(low), grid_.cell(high), found);
   }
 
-  /// Everybody in the sphere's cell and those around it, itself among them.
+  /// All spheres in the sphere's cell and those around it, itself among them.
   void around(Slot self, const Place& place, Candidates& found) const { search(self, place, D, 0, found); }
 
-  /// Everybody in the cells that came into view when the sphere crossed along an axis.
+  /// All spheres in the cells that came into view when the sphere crossed along an axis.
   void ahead(Slot self, const Place& place, int axis, int step, Candidates& found) const {
     search(self, place, axis, step, found);
   }
 
  private:
   struct Link {
-    std::uint32_t next;  // who is behind the sphere in its cell, as first_ has it
+    std::uint32_t next;  // the one behind the sphere in its cell, as in first_
     std::int32_t boxes;  // of its place
   };
   static constexpr std::uint32_t kMore = std::uint32_t{1} << 31;  ///< beside a sphere: another one is behind it
@@ -184,10 +184,10 @@ class LinkedCells {
       }
       cells *= grid_.rows(k);
     }
-    first_.assign(static_cast<std::size_t>(cells + 3), kNobody);
+    first_.assign(static_cast<std::size_t>(cells + 3), kEmpty);
   }
 
-  /// Somebody has come to where nobody was expected: from now on there are cells everywhere.
+  /// A sphere is outside the cells: from now on there are cells everywhere.
   void spread() {
     const CellGrid<D> before = grid_;
     const auto old_steps = steps_;
@@ -216,8 +216,8 @@ class LinkedCells {
     const std::size_t at = index(place);
     const std::uint32_t first = first_[at], box = shifted(one_[D - 1]);
     const auto row = static_cast<std::size_t>(last + 1);
-    if (z == 0) first_[at + row] = first == kNobody ? first : first - box;
-    if (z == last) first_[at - row] = first == kNobody ? first : first + box;
+    if (z == 0) first_[at + row] = first == kEmpty ? first : first - box;
+    if (z == last) first_[at - row] = first == kEmpty ? first : first + box;
   }
 
   /// The cells around a place, or only those a step away along an axis.
@@ -249,7 +249,7 @@ class LinkedCells {
     return rows(place, axis, 2 * step);
   }
 
-  /// Takes everybody in such cells for a candidate.
+  /// Finds the candidates in the cells of rows().
   void search(Slot self, const Place& place, int axis, int step, Candidates& found) const {
     const Heads heads = kernels_.heads(rows(place, axis, step), found.packed.data());
     found.count = heads.count;
@@ -261,7 +261,7 @@ class LinkedCells {
     std::fill_n(found.packed.data() + found.count, 8, packing_.pack(self, 0));  // follow() may have moved them
   }
 
-  /// Appends everybody in the cells between two, `at` and `away` being those of the axes before `axis`.
+  /// Appends all spheres in the cells between two, `at` and `away` being those of the axes before `axis`.
   void collect(const Cell<D>& low, const Cell<D>& high, std::vector<std::uint32_t>& found, int axis = 0,
                std::ptrdiff_t at = 1, std::int32_t away = 0) const {
     const std::int32_t count = grid_.count(axis);
@@ -277,10 +277,10 @@ class LinkedCells {
         continue;
       }
       std::uint32_t next = first_[static_cast<std::size_t>(cell)];
-      while (next != kNobody) {
+      while (next != kEmpty) {
         const Slot j = packing_.slot(next & ~kMore);
         found.push_back(packing_.pack(j, link_[j].boxes - seen));
-        next = (next & kMore) != 0 ? link_[j].next : kNobody;
+        next = (next & kMore) != 0 ? link_[j].next : kEmpty;
       }
     }
   }
@@ -293,7 +293,7 @@ class LinkedCells {
       if ((candidate & kMore) == 0) continue;
       found.packed[q] = candidate & ~kMore;
       const Slot slot = packing_.slot(candidate);
-      // The box that was taken from the candidate is taken from who comes next, too.
+      // The box that was subtracted from the candidate is subtracted from the next one, too.
       const Link& link = link_[slot];
       const std::uint32_t box = packing_.pack(slot, link.boxes) - (candidate & ~kMore), next = link.next - box;
       any |= next ^ here_;
@@ -320,11 +320,11 @@ class LinkedCells {
   std::int32_t one_[D];                             // a box along each axis, as a linear image
   bool periodic_[D];
   bool confined_ = false;
-  // Of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kNobody.
+  // Of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kEmpty.
   PageVector<std::uint32_t> first_;
   PageVector<Link> link_;    // by slot
   std::uint32_t here_;       // a candidate in the same box, but for its slot
-  std::int32_t widest_ = 0;  // the farthest box anyone has come to
+  std::int32_t widest_ = 0;  // the farthest box that a sphere has reached
 };
 
 }  // namespace carom

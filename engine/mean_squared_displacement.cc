@@ -29,7 +29,7 @@ void MeanSquaredDisplacement<D>::sample(double time, const Particles<D>& particl
       add(decades_[n].lag[lag], time, decades_[n]);
       return;
     }
-    // The window is over. It is one lag of the next decade, whose first window began where this one's first did.
+    // The window is over. It is one lag of the next decade: the first windows of both began at the same time.
     if (n + 1 == decades_.size()) decades_.push_back({decades_[n].origin_time, std::move(decades_[n].origin), {}});
     decades_[n].origin_time = time;
     decades_[n].origin = now_;
@@ -46,7 +46,7 @@ void MeanSquaredDisplacement<D>::add(Lag& lag, double time, const Decade& from) 
 
 template <int D>
 auto MeanSquaredDisplacement<D>::rows() const -> std::vector<Row> {
-  const double everybody = std::accumulate(number_.begin(), number_.end(), 0.0);
+  const double particles = std::accumulate(number_.begin(), number_.end(), 0.0);
   std::vector<Row> rows;
   for (const Decade& decade : decades_)
     for (const Lag& lag : decade.lag) {
@@ -58,7 +58,7 @@ auto MeanSquaredDisplacement<D>::rows() const -> std::vector<Row> {
         all.add(lag.squares[s]);
         row.of.push_back(lag.squares[s].value() / (origins * number_[s]));
       }
-      row.msd = all.value() / (origins * everybody);
+      row.msd = all.value() / (origins * particles);
       rows.push_back(std::move(row));
     }
   return rows;

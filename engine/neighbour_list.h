@@ -29,7 +29,7 @@ struct SizeClass;  // neighbour_list.cc
 template <int D>
 class NeighbourList {
  public:
-  /// Lists pairs (i, j) whose distance can fall to reach(i) + reach(j).
+  /// Lists pairs (i, j) that can come as near as reach(i) + reach(j).
   NeighbourList(const Box<D>& box, std::vector<double> reach);
 
   /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them
@@ -54,7 +54,7 @@ class NeighbourList {
   std::uint64_t calls_ = 0;       // of cover() since the last build
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
   std::vector<NeighbourPair<D>> pairs_;
-  Partners partners_;  // empty: not asked for since the last build
+  Partners partners_;  // empty: not used since the last build
   std::uint64_t rebuilds_ = 0;
 };
 

@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "engine/division.h"
-#include "engine/forces.h"
 #include "engine/shares.h"
 
 namespace carom {
@@ -41,7 +40,6 @@ template <int D>
 Part<D>::Part(System<D>& shares, bool local, double slab_length)
     : shares_(shares), ranks_(*shares.ranks), holders_(static_cast<std::size_t>(ranks_.size())), depth_(kLeastDepth) {
   shares_.part = this;
-  if (!(shares_.quanta.force > 0)) shares_.quanta = quanta(shares_);
   divide(nullptr, !local, slab_length);
   next_ = kSlabs;
 }

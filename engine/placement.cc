@@ -150,14 +150,14 @@ std::vector<int> distribute(std::size_t sites, std::span<const std::size_t> coun
 
 template <int D>
 std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<const double> radius,
-                             std::span<const Id> who, std::uint64_t seed, std::uint64_t tries) {
+                             std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries) {
   std::vector<bool> waiting(x.size(), false);
-  for (const Id i : who) waiting[i] = true;
+  for (const Id i : ids) waiting[i] = true;
   PlacementGrid<D> grid(box, radius);
   for (Id i = 0; i < x.size(); ++i)
     if (!waiting[i]) grid.insert(i, x[i]);
 
-  std::vector<Id> order(who.begin(), who.end());
+  std::vector<Id> order(ids.begin(), ids.end());
   std::stable_sort(order.begin(), order.end(), [&](Id a, Id b) { return radius[a] > radius[b]; });
   std::size_t placed = 0;
   for (const Id i : order) {
@@ -236,11 +236,11 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
 }
 
 template <int D>
-void draw_velocities(Particles<D>& particles, std::span<const Id> who, std::span<const double> temperature,
+void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::span<const double> temperature,
                      std::uint64_t seed, RandomPurpose purpose, Exchange* ranks) {
   Exchange alone;
-  for (std::size_t n = 0; n < who.size(); ++n) {
-    const Id i = who[n];
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    const Id i = chosen[n];
     RandomStream random(seed, purpose, particles.id_of(i));
     const auto first = random.normal_pair(), second = random.normal_pair();
     const std::array<double, 4> normal{first[0], first[1], second[0], second[1]};
@@ -252,22 +252,22 @@ void draw_velocities(Particles<D>& particles, std::span<const Id> who, std::span
     Vec<D> momentum = Vec<D>::Zero();
   };
   const Sums drawn = handed_on(ranks ? *ranks : alone, Sums{}, [&](Sums& sums) {
-    sums.particles += who.size();
-    for (std::size_t n = 0; n < who.size(); ++n) {
-      const Id i = who[n];
+    sums.particles += chosen.size();
+    for (std::size_t n = 0; n < chosen.size(); ++n) {
+      const Id i = chosen[n];
       sums.mass += particles.mass[i];
       sums.momentum += particles.mass[i] * particles.v[i];
       sums.twice_kinetic_wanted += D * temperature[n];
     }
   });
   const Sums centred = handed_on(ranks ? *ranks : alone, drawn, [&](Sums& sums) {
-    for (const Id i : who) {
+    for (const Id i : chosen) {
       if (sums.particles > 1) particles.v[i] -= sums.momentum / sums.mass;
       sums.twice_kinetic += particles.mass[i] * particles.v[i].squaredNorm();
     }
   });
   const double scale = centred.twice_kinetic > 0 ? std::sqrt(centred.twice_kinetic_wanted / centred.twice_kinetic) : 0;
-  for (const Id i : who) particles.v[i] *= scale;
+  for (const Id i : chosen) particles.v[i] *= scale;
 }
 
 template <int D>

@@ -1,7 +1,7 @@
 #pragma once
-// Cells for the making of initial states: spheres go in one by one and ask who is near, through periodic images too.
-// Spheres of a size (up to a factor of two) share a grid, so that small ones don't have the cells of large ones. The
-// event core has cells of its own, built for speed; these are built for correctness in any box.
+// Cells for the making of initial states: spheres are inserted one by one, and each finds those near it, through
+// periodic images too. Spheres of a size (up to a factor of two) share a grid, so that small ones don't have the cells
+// of large ones. The event core has cells of its own, built for speed; these are built for correctness in any box.
 
 #include <algorithm>
 #include <cmath>
@@ -31,8 +31,8 @@ class PlacementGrid {
     at.members[index].push_back(id);
   }
 
-  /// Calls visit(id, shift) for everybody whom a sphere of this radius at x may touch (and for some more); id's
-  /// position plus shift is the image that is near x. x lies in the box on periodic axes.
+  /// Calls visit(id, shift) for every sphere that one of this radius at x may touch (and for some more); id's position
+  /// plus shift is the image that is near x. x lies in the box on periodic axes.
   template <class Visit>
   void near(const Vec<D>& x, double radius, Visit&& visit) const {
     for (const Level& at : levels_)

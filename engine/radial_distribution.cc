@@ -109,7 +109,7 @@ void list_runs(const Grid<D>& grid, const Box<D>& box, const std::vector<std::ui
 }
 
 /// The volume in which an ideal gas finds a partner at distances from a to b, on average over the region of these
-/// edges; along the axes that are walled there is nobody beyond the edge.
+/// edges; along the axes that are walled there is none beyond the edge.
 template <int D>
 double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bool, D>& walled) {
   // Averages of |u_x|, |u_x u_y|, |u_x u_y u_z| over directions u.
@@ -183,7 +183,7 @@ void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particle
   const std::size_t n = particles.size(), bins = static_cast<std::size_t>(options_.bins);
   const Grid<D> grid(system_.box, options_.range, n);
 
-  // Everybody in the order of the cells.
+  // Sorts the particles in the order of the cells.
   start_.assign(grid.cells() + 1, 0);
   cell_.resize(n);
   species_.resize(n);
@@ -203,7 +203,7 @@ void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particle
     species_[at] = particles.species[i];
   }
 
-  // Everybody who is looked at is counted, so that nothing branches; those beyond the range are left out in the end.
+  // All partners that are looked at are counted, without a branch; those beyond the range are left out in the end.
   const double shells = static_cast<double>(bins) / options_.range;
   const double last = std::floor(grid.farthest() * shells) + 1;
   const std::size_t kinds = number_.size(), all = static_cast<std::size_t>(last) + 1;
@@ -212,7 +212,7 @@ void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particle
   for (std::size_t a = 0; a < kinds; ++a)
     for (std::size_t b = 0; b < kinds; ++b) histogram[a * kinds + b] = &counted[pair_index(a, b) * all];
   std::vector<Run<D>> runs;
-  std::array<Eigen::ArrayXd, D> partner;  // who may be near the particles of a cell: themselves first
+  std::array<Eigen::ArrayXd, D> partner;  // those that may be near the particles of a cell: themselves first
   std::vector<std::uint16_t> kind;
   Eigen::ArrayXd squared;
   Eigen::ArrayXi shell;

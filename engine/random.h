@@ -1,6 +1,6 @@
 #pragma once
 // Counter-based random numbers: the same (seed, purpose, id, index) gives the same number on every machine, for any
-// number of ranks and in any order of asking. There is no state to carry or to store.
+// number of ranks and in any order of calls. There is no state to carry or to store.
 //
 //   RandomStream random(seed, RandomPurpose::velocity, id);
 //   const double u = random.uniform();   // in (0, 1)

@@ -26,14 +26,14 @@ struct alignas(64) Record {
 static_assert(sizeof(Record<3>) == 64 && offsetof(Record<3>, v) == 24 && offsetof(Record<3>, t) == 48);
 static_assert(sizeof(Record<2>) == 64 && offsetof(Record<2>, v) == 16 && offsetof(Record<2>, t) == 32);
 
-/// What to say where an image does not fit into the bits of a candidate.
+/// The error where an image does not fit into the bits of a candidate.
 [[noreturn]] inline void throw_too_far() {
   throw Error(Failure::numerical,
               "spheres fly through too many periodic boxes in one epoch; give integrator.step a smaller value");
 }
 
 /// A candidate for a contact in 31 bits: the slot in the low bits, above it the image as a number of few bits an axis.
-/// The last bit is for lists of them. Images are also handled as one integer, `linear`, whose sums and differences are
+/// The last bit is for lists of them. Images are also handled as one integer, `linear`: its sums and differences are
 /// those of the images.
 template <int D>
 class Packing {

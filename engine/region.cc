@@ -17,7 +17,7 @@ void Region<D>::run(double now, double end) {
   index();
 }
 
-/// Finds out whose paths matter to others, or to whom others' paths do.
+/// Lists the spheres with events that are ghosts elsewhere, and the ghosts with events.
 template <int D>
 void Region<D>::index() {
   changed_.clear();
@@ -120,7 +120,7 @@ std::span<const Node<D>> Region<D>::script_of(Slot g) {
   return script.nodes;
 }
 
-/// Whether a ghost did here what its script says.
+/// Whether the path of a ghost here is its script.
 template <int D>
 bool Region<D>::matches(Slot g) {
   if (agreed_[g] == window_) return true;
@@ -150,8 +150,8 @@ bool Region<D>::agrees(double end) {
     const auto seen = until(path(g)), script = until(script_of(g));
     return std::equal(seen.begin(), seen.end(), script.begin(), script.end());
   };
-  return std::ranges::all_of(scripts_.who(), agree) && std::ranges::all_of(touched_ghosts_, agree) &&
-         std::ranges::all_of(paths_.who(), agree);
+  return std::ranges::all_of(scripts_.slots(), agree) && std::ranges::all_of(touched_ghosts_, agree) &&
+         std::ranges::all_of(paths_.slots(), agree);
 }
 
 template <int D>
@@ -165,7 +165,7 @@ typename Region<D>::Tally Region<D>::tally() const {
   for (const auto& event : trace_.events())
     if (const Slot lo = event.slot[0]; is_own(lo) && rewritten_[lo] == 0)
       count(event.slot[1] != kNone, event.virial, event.overlap);
-  for (const Slot i : paths_.who()) {
+  for (const Slot i : paths_.slots()) {
     if (!is_own(i) || rewritten_[i] == 0) continue;
     for (const Node<D>& node : paths_.at(i).nodes)
       if (node.key.lo == node.after.id) count(node.key.kind == EventKind::pair, node.virial, node.overlap);
@@ -175,7 +175,7 @@ typename Region<D>::Tally Region<D>::tally() const {
 
 template <int D>
 void Region<D>::cut(const EventKey<D>& last) {
-  std::vector<Slot> touched(paths_.who().begin(), paths_.who().end());
+  std::vector<Slot> touched(paths_.slots().begin(), paths_.slots().end());
   for_each_touched([&](Slot i) { touched.push_back(i); });
   for (const Slot i : touched) {
     Nodes& path = rewritten(i).nodes;
@@ -186,7 +186,7 @@ void Region<D>::cut(const EventKey<D>& last) {
 template <int D>
 void Region<D>::commit() {
   other_.clear();
-  for (const Slot slot : paths_.who()) {
+  for (const Slot slot : paths_.slots()) {
     if (rewritten_[slot] == 0) continue;
     rewritten_[slot] = 0;
     const Record<D>& now = after(slot);

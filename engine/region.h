@@ -2,12 +2,12 @@
 // One region of a system that is divided among several event cores, and what makes it agree with its neighbours.
 //
 // A region owns the spheres in it and has copies of those near it, ghosts, which other regions own. Time goes in
-// windows. In each the region runs what it has as if nobody else were there, and writes down everybody's path. Then
-// the owners send the paths of their spheres, which for the others are scripts of their ghosts; where a script differs
-// from what was seen here the window is repaired, from the first difference on and only as far as that reaches, in the
-// order of keys. Paths that have changed are sent again, until nothing changes: then every ghost was seen as its owner
-// has it, and since a contact is a pure function of two records, all is as in a run by one core. (The smallest key at
-// which anybody is wrong grows with each round.)
+// windows. In each the region runs what it has as if there were no others, and records all paths. Then the owners send
+// the paths of their spheres, which for the others are scripts of their ghosts; where a script differs from what was
+// seen here the window is repaired, from the first difference on and only as far as that reaches, in the order of keys.
+// Paths that have changed are sent again, until nothing changes: then every ghost was seen as its owner has it, and
+// since a contact is a pure function of two records, all is as in a run by one core. (The smallest key at which any
+// path is wrong grows with each round.)
 //
 //   region.load(records, division, number, …);
 //   region.run(now, end);
@@ -32,7 +32,7 @@ class Region {
  public:
   using Nodes = std::vector<Node<D>>;
 
-  /// What own spheres did in a window; each collision counts where its lower id is at home.
+  /// What own spheres did in a window; each collision counts where its lower id is owned.
   struct Tally {
     std::uint64_t collisions = 0, bounces = 0;
     ExactSum virial;
@@ -46,12 +46,12 @@ class Region {
     }
   };
 
-  /// `sizes` tells masses and radii of everybody, and outlives the region.
+  /// `sizes` has the masses and radii of all spheres, and outlives the region.
   Region(const Box<D>& box, const Sizes& sizes, const SearchOptions& options)
       : box_(box), core_(box, &sizes, options) {}
 
-  /// Starts anew at time `now` as region `number` of a division, with all spheres that concern it. In no window will
-  /// anyone come farther than `stray`.
+  /// Starts anew at time `now` as region `number` of a division, with all spheres that concern it. In no window will a
+  /// sphere come farther than `stray`.
   void load(std::vector<Record<D>> records, const Division<D>& division, std::uint32_t number, const Vec<D>& g,
             double horizon, double now, double stray);
 
@@ -61,8 +61,8 @@ class Region {
   /// Own spheres, all of them.
   std::vector<Slot> own() const;
   const Flights<D>& flights() const { return core_.flights(); }
-  /// Says anew who is whose, who is a ghost here, and who elsewhere; others are forgotten. Calls send(k, record) for
-  /// spheres that the k-th neighbour does not have yet and must take in.
+  /// Updates ownership and ghosts, those here and those elsewhere; spheres that are neither own nor ghosts are removed.
+  /// Calls send(k, record) for spheres that the k-th neighbour does not have yet and must admit.
   template <class Send>
   void sort_out(double now, Send&& send);
   /// Takes in a ghost; false: load anew, there is no room left.
@@ -70,12 +70,12 @@ class Region {
 
   // In a window.
 
-  /// Runs from `now` to `end`. Whoever comes farther than the stray from where he was at the start makes the window of
-  /// no use: cut it before that.
+  /// Runs from `now` to `end`. Where a sphere comes farther than the stray from its start the window is invalid: cut it
+  /// before that.
   void run(double now, double end);
   /// Appends the path of a sphere to a message.
   void write_path(Slot i, Bytes& to) const;
-  /// Reads what a ghost did according to its owner; the message must stay until the end of the window.
+  /// Reads the path of a ghost that its owner has sent; the message must stay until the end of the window.
   void follow(Id id, Reader& message);
   /// Mends the window after scripts have come.
   void repair();
@@ -91,17 +91,17 @@ class Region {
   /// Calls visit(slot) for each own sphere that had events at any time.
   template <class Visit>
   void for_each_touched(Visit&& visit) const;
-  /// Own spheres that are ghosts elsewhere, whose paths are not what they were before the last run() or repair().
+  /// Own spheres that are ghosts elsewhere, and have other paths than before the last run() or repair().
   std::span<const Slot> changed() const { return changed_; }
   /// Which neighbours have an own sphere as a ghost: a bit for each.
   std::uint64_t holders(Slot i) const { return holders_[i]; }
   Slot slot_of(Id id) const { return slots_.find(id); }
   Tally tally() const;
-  /// The largest speed that anyone had after an event.
+  /// The largest speed of any sphere after an event.
   double fastest() const { return std::sqrt(std::max(trace_.fastest_squared(), mended_fastest_squared_)); }
-  /// Whether all ghosts did here, before a time, what they did at their owners'.
+  /// Whether, before a time, all ghosts have the same events here as with their owners.
   bool agrees(double end);
-  /// Forgets all events after `last`. The core is of no use then; load() again.
+  /// Removes all events after `last`. The core is invalid then; load() again.
   void cut(const EventKey<D>& last);
   /// Ends the window.
   void commit();
@@ -113,13 +113,13 @@ class Region {
  private:
   static constexpr std::uint32_t kNone = Trace<D>::kNone;
   static constexpr double kUnknown = -1;
-  static constexpr double kSlack = 20;                          // windows between looks at who is at the border
-  enum class Role : std::uint8_t { nobody, own, seen, ghost };  // seen: own, and a ghost elsewhere
+  static constexpr double kSlack = 20;                        // windows between searches for spheres at the border
+  enum class Role : std::uint8_t { none, own, seen, ghost };  // none: no sphere; seen: own, and a ghost elsewhere
 
   struct Edge {
     Slot slot;
     double quiet;             // how far it may come before it must be looked at again
-    double speed = kUnknown;  // until its next event; unknown: as large as anyone's
+    double speed = kUnknown;  // until its next event; unknown: as large as any
   };
   struct Path {
     Record<D> start;  // at the start of the window
@@ -133,12 +133,12 @@ class Region {
     Node<D> node(std::size_t k) const;
   };
 
-  /// A sphere whose path is being mended.
+  /// The repair of the path of a sphere.
   struct Mended {
     Slot slot;
     Record<D> now;              // at the time that repair has come to
     std::uint32_t version = 0;  // grows with every change: what was planned before no longer holds
-    bool strays = false;        // a ghost that no longer does what its script says
+    bool strays = false;        // a ghost that no longer follows its script
     std::size_t script = 0;     // the next node of its script
     std::size_t kept = 0;       // nodes of its old path that stand
     Nodes old;                  // the others
@@ -164,7 +164,7 @@ class Region {
   void watch(double now);
   Edge look_at(Slot i, double now);
   void index();
-  bool met_nobody(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
+  bool has_no_events(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
   Path& path_of(Slot i);
   Path& rewritten(Slot i);
   EventKey<D> key_of(const typename Trace<D>::Event& event) const;
@@ -203,10 +203,10 @@ class Region {
   std::vector<std::uint8_t> rewritten_;  // by slot: its path is not that of the trace
   BySlot<Script> scripts_;               // of ghosts
   std::vector<Slot> touched_ghosts_;     // that had events in the first run
-  std::vector<std::uint32_t> agreed_;    // by slot: the window in which a ghost was found to do what its script says
+  std::vector<std::uint32_t> agreed_;    // by slot: the window in which the path of a ghost was found to be its script
   std::uint32_t window_ = 0;             // its number
   std::vector<Slot> changed_;
-  std::vector<std::pair<Slot, Record<D>>> other_;  // records that the core is told
+  std::vector<std::pair<Slot, Record<D>>> other_;  // records that differ from those of the core
   std::vector<std::uint8_t> disturbed_;            // by slot: it is among them
   double mended_fastest_squared_ = 0;
 
@@ -228,7 +228,7 @@ void Region<D>::sort_out(double now, Send&& send) {
     if (!(edge.quiet > 0)) {
       const std::uint64_t before = holders_[i];
       edge = look_at(i, now);
-      if (role_[i] == Role::nobody) continue;
+      if (role_[i] == Role::none) continue;
       for (std::uint64_t fresh = holders_[i] & ~before; fresh != 0; fresh &= fresh - 1)
         send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
     }
@@ -245,8 +245,8 @@ void Region<D>::for_each_touched(Visit&& visit) const {
     for (const int which : {0, 1})
       if (event.last[which] == kNone && event.slot[which] != kNone && is_own(event.slot[which]))
         visit(event.slot[which]);
-  for (std::size_t k = 0; k < paths_.who().size(); ++k)  // visit() may ask for more paths
-    if (const Slot i = paths_.who()[k]; is_own(i) && rewritten_[i] != 0 && !trace_.has(i)) visit(i);
+  for (std::size_t k = 0; k < paths_.slots().size(); ++k)  // visit() may add paths
+    if (const Slot i = paths_.slots()[k]; is_own(i) && rewritten_[i] != 0 && !trace_.has(i)) visit(i);
 }
 
 }  // namespace carom

@@ -1,4 +1,4 @@
-// Who is in a region, and who is at its border.
+// The spheres in a region, and those at its border.
 
 #include "engine/region.h"
 
@@ -27,7 +27,7 @@ void Region<D>::load(std::vector<Record<D>> records, const Division<D>& division
   disturbed_.assign(room, 0);
   other_.clear();
   mended_of_.assign(room, kNone);
-  role_.assign(room, Role::nobody);
+  role_.assign(room, Role::none);
   for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, core_.flights()[i].id, Role::own);
   unwatched_ = std::numeric_limits<double>::infinity();
 }
@@ -40,7 +40,7 @@ void Region<D>::enlist(Slot i, Id id, Role role) {
 
 template <int D>
 void Region<D>::forget(Slot i) {
-  role_[i] = Role::nobody;
+  role_[i] = Role::none;
   slots_.remove(core_.flights()[i].id);
   core_.dismiss(i);
 }
@@ -67,8 +67,8 @@ void Region<D>::watch(double now) {
   core_.set_border(slots, now);
 }
 
-/// Says whose a sphere is and where it is a ghost, from where it is now, and how far it may come until something of
-/// that changes; others who know it find the same.
+/// Finds the owner of a sphere and the regions in which it is a ghost, from its position now, and how far it may come
+/// until one of these changes; other regions that have it find the same.
 template <int D>
 typename Region<D>::Edge Region<D>::look_at(Slot i, double now) {
   const Flights<D>& flights = core_.flights();

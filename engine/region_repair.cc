@@ -1,4 +1,4 @@
-// How a region mends a window where what it saw of its ghosts is not what their owners say.
+// How a region repairs a window where paths of its ghosts are not those that their owners sent.
 
 #include <algorithm>
 
@@ -9,10 +9,10 @@ namespace carom {
 template <int D>
 void Region<D>::repair() {
   repairs_.clear();
-  for (const Slot g : scripts_.who()) seed(g);
+  for (const Slot g : scripts_.slots()) seed(g);
   for (const Slot i : touched_ghosts_)
     if (!scripts_.has(i)) seed(i);
-  for (const Slot i : paths_.who())
+  for (const Slot i : paths_.slots())
     if (role_[i] == Role::ghost && !scripts_.has(i) && !trace_.has(i)) seed(i);
   while (!tasks_.empty()) {
     const Task task = tasks_.top();
@@ -43,8 +43,8 @@ void Region<D>::repair() {
   }
 }
 
-/// Where what was seen of a ghost differs from its script, and the ghost is to blame, it must be mended from there.
-/// What it does with own spheres of this region is not its owner's to know first.
+/// Where the path of a ghost differs from its script, and not by a contact with own spheres, it is repaired from there.
+/// Contacts with own spheres are decided by this region, not by the owner of the ghost.
 template <int D>
 void Region<D>::seed(Slot g) {
   if (matches(g)) return;
@@ -60,7 +60,7 @@ void Region<D>::seed(Slot g) {
   }
 }
 
-/// Takes back what a sphere did from `key` on; who met it there must be looked at.
+/// Cuts the path of a sphere at `key`; the partners of the events taken back must be checked.
 template <int D>
 typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
   Nodes& path = rewritten(i).nodes;
@@ -123,7 +123,7 @@ bool Region<D>::may_meet(const Mended& m, Slot j, const Image<D>& image) const {
   return d.squaredNorm() <= close * close;
 }
 
-/// Whether what a ghost does next according to its script is at this very key.
+/// Whether the next event in the script of a ghost is at this very key.
 template <int D>
 bool Region<D>::follows_at_once(const Mended& m, const EventKey<D>& key) {
   const auto script = script_of(m.slot);
@@ -172,7 +172,7 @@ void Region<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>
     return;
   }
   // Along its path: a contact counts only before the path turns.
-  const auto path = met_nobody(j) ? std::span<const Node<D>>() : this->path(j);
+  const auto path = has_no_events(j) ? std::span<const Node<D>>() : this->path(j);
   std::size_t k = 0;
   while (k < path.size() && path[k].key < now) ++k;
   for (;; ++k) {
@@ -228,7 +228,7 @@ void Region<D>::contact(const Task& task) {
   predict(b, key);
 }
 
-/// Adds a node to a path. A ghost whose script has the same goes on with it.
+/// Adds a node to a path. A ghost follows its script as long as the script has the same node.
 template <int D>
 void Region<D>::append(Mended& m, const Node<D>& node) {
   rewritten(m.slot).nodes.push_back(node);
@@ -242,13 +242,13 @@ void Region<D>::append(Mended& m, const Node<D>& node) {
   plan_script(m);
 }
 
-/// A ghost does what its owner says it did with others.
+/// A ghost follows its script in an event without own spheres.
 template <int D>
 void Region<D>::script(const Task& task) {
   Mended& m = repairs_[mended_of_[task.a]];
   if (m.strays || m.script != task.version_a) return;
   const Node<D>& node = script_of(task.a)[m.script];
-  if (is_own_id(node.partner())) {  // who knows better: they did not meet
+  if (is_own_id(node.partner())) {  // here they did not meet, and this region decides that
     m.strays = true;
     predict(m, task.key);
     return;

@@ -3,7 +3,7 @@
 //
 // A pair at rest in contact under attraction would collide without end. It is held instead: a reaction λ ≥ 0 along the
 // normal keeps the pair from approaching and does no work; where the pair is drawn apart λ is zero and the pair leaves.
-// What is asked of accelerations, velocities or mean velocities alike is a linear complementarity problem,
+// For accelerations, velocities and mean velocities alike this is a linear complementarity problem,
 //   w_lo += λ n/m_lo, w_hi −= λ n/m_hi,   λ ≥ 0,   n·(w_lo − w_hi) ≥ bound,   one of the two with equality,
 // solved by projected Gauss–Seidel (Moreau, 1988; Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235).
 
@@ -19,7 +19,7 @@ inline constexpr double kRestingSpeed = 1e-12;
 
 template <int D>
 struct RestingContact {
-  EventKey<D> key;    ///< who; a pair or a wall
+  EventKey<D> key;    ///< of the pair, or of the sphere and the wall
   Vec<D> normal;      ///< gradient of the gap up to a positive factor, acting on lo and, negated, on hi
   double bound = 0;   ///< see above
   double lambda = 0;  ///< the reaction found

@@ -37,12 +37,12 @@ struct ScanTask {
   unsigned same;  ///< the first so many are in the same box as the sphere; others may be
 };
 
-/// Eight spheres of a cell: places in 1024ths of the cell, ten bits an axis, and slots (kNobody where there is none).
+/// Eight spheres of a cell: places in 1024ths of the cell, ten bits an axis, and slots (kEmpty where there is none).
 struct alignas(64) CellLine {
   std::uint32_t place[8];
   std::uint32_t slot[8];
 };
-inline constexpr std::uint32_t kNobody = 0xffffffff;
+inline constexpr std::uint32_t kEmpty = 0xffffffff;
 
 /// A step to a cell along one axis.
 struct CellStep {
@@ -58,7 +58,7 @@ struct CellView : CellStep {
 
 struct NearTask {
   const CellLine* lines;
-  const std::uint32_t* next;  ///< by line: the next line of the same cell, or kNobody
+  const std::uint32_t* next;  ///< by line: the next line of the same cell, or kEmpty
   const CellView* view[3];    ///< along each axis
   unsigned views[3];
   float scale[3];  ///< length of 1/1024 of a cell, by axis
@@ -71,7 +71,7 @@ struct HeadStep {
   std::uint32_t away;     ///< the boxes it leads through, in the bits that an image has in a candidate
 };
 
-/// Rows of cells whose heads are wanted: candidates in the boxes they stand in, or kNobody.
+/// Rows of cells to read the heads of: candidates in the boxes they stand in, or kEmpty.
 struct HeadsTask {
   const std::uint32_t* first;  ///< the first cell of the row that no step leads to
   const HeadStep* step[2];     ///< to the rows
@@ -92,16 +92,16 @@ struct ScanKernels {
   /// The first contact of a sphere with one of its candidates. `latest`: none of their records is of a later time than
   /// its own. By dimension − 2.
   ScanResult (*scan[2])(const ScanSetting&, const ScanTask&, bool latest);
-  /// The same for the two spheres of a collision, whose records are the latest there are.
+  /// The same for the two spheres of a collision: no record is of a later time than theirs.
   void (*scan_two[2])(const ScanSetting&, const ScanTask* task, ScanResult* result);
   /// Writes slots and linear images of the cells of all spheres within the limit; returns how many. The arrays must
   /// hold as many as there are in the cells.
   unsigned (*near)(const NearTask&, std::uint32_t* slots, std::int32_t* away);
-  /// Compares n candidates with a list, which is read by eight: copies those that are not in it to `fresh` and
-  /// returns how many, and sets a bit in `kept` (zeros before) for everybody in the list who is among them.
+  /// Compares n candidates with a list, which is read by eight: copies those that are not in it to `fresh` and returns
+  /// how many, and sets a bit in `kept` (zeros before) for each one of the list that is among them.
   unsigned (*compare)(const std::uint32_t* list, unsigned length, const std::uint32_t* candidates, unsigned n,
                       std::uint32_t* fresh, std::uint64_t* kept);
-  /// Writes those who head the cells, as they are seen from the sphere; there must be room for four more.
+  /// Writes the first sphere of each cell, as seen from the sphere of the task; there must be room for four more.
   Heads (*heads)(const HeadsTask&, std::uint32_t* candidates);
 };
 

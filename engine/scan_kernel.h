@@ -127,7 +127,7 @@ inline Double<W> least(Double<W> a, Double<W> b) {
   return a < b ? a : b;
 }
 
-constexpr unsigned kBlock = 64;  // candidates whose times are kept until the first is known
+constexpr unsigned kBlock = 64;  // candidates per block: their times are kept until the first is known
 
 /// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: never, if it
 /// is infinite or no number; −infinite where the two overlap and approach. Returns the least in each lane.
@@ -217,7 +217,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
   return best;
 }
 
-/// The first of n times, whose least in each lane are given.
+/// The first of n times, given the least in each lane.
 template <int W>
 inline ScanResult first_of(const double* times, unsigned n, Double<W> best) {
   const double first = smallest<W>(best);
@@ -323,7 +323,7 @@ inline unsigned bits(Ints mask) {
     for (unsigned l = 0; l < lines; ++l) {
       const Place& at = places[l];
       hits |= static_cast<std::uint64_t>(within(at, task.lines[at.line])) << (8 * l);
-      for (std::uint32_t more = task.next[at.line]; more != kNobody; more = task.next[more])  // crowded cells
+      for (std::uint32_t more = task.next[at.line]; more != kEmpty; more = task.next[more])  // crowded cells
         for (unsigned m = within(at, task.lines[more]); m != 0; m &= m - 1)
           take(task.lines[more].slot[__builtin_ctz(m)], at.boxes);
     }
@@ -419,10 +419,10 @@ inline unsigned bits(Quad mask) {
     for (unsigned b = 0; b < steps; ++b) {
       Quad four;
       __builtin_memcpy(&four, row + inner[b].offset, sizeof four);
-      const Quad somebody = ~(Quad)(four == kNobody) & wanted;
-      const unsigned mask = bits(somebody);
+      const Quad filled = ~(Quad)(four == kEmpty) & wanted;
+      const unsigned mask = bits(filled);
       const Quad seen = four - (box + inner[b].away);
-      any |= (seen ^ here) & somebody;
+      any |= (seen ^ here) & filled;
       const Quad front = pack(seen, mask);
       __builtin_memcpy(end, &front, sizeof front);
       end += __builtin_popcount(mask);

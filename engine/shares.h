@@ -1,6 +1,6 @@
 #pragma once
-// Who keeps which particles of a system that several ranks share: each has those of consecutive ids, its share, at the
-// start and whenever somebody looks. Else they are where they belong (domains.h, part.h).
+// Which rank keeps which particles of a system that several ranks share: each has those of consecutive ids, its share,
+// at the start and whenever the system is observed. Else they are with their owners (domains.h, part.h).
 
 #include <cstring>
 #include <span>
@@ -24,13 +24,13 @@ struct Shares {
   }
 };
 
-/// The ranks that have shares of a system; null: everybody is here.
+/// The ranks that have shares of a system; null: all particles are here.
 template <int D>
 Exchange* shared_by(const System<D>& system) {
   return system.sizes ? system.ranks : nullptr;
 }
 
-/// Calls visit(vector) for everything that is kept of each particle, but for its id and whose it is.
+/// Calls visit(vector) for everything that is kept of each particle, but for its id and owner.
 template <int D, class Visit>
 void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.x);
@@ -42,7 +42,7 @@ void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.species);
 }
 
-/// Leaves this rank its share of a system whose particles are all here.
+/// Leaves this rank its share of a system that it has in full.
 template <int D>
 void keep_share(System<D>& system) {
   Particles<D>& p = system.particles;
@@ -54,17 +54,17 @@ void keep_share(System<D>& system) {
   for (Id i = first; i < end; ++i) p.id.push_back(i);
 }
 
-/// Has rank 0 look at what every rank has to say, at one after the other: it never holds more than one message. pack()
-/// makes a rank's message, visit(rank, message) is called on rank 0. Collective.
+/// Sends the messages of all ranks to rank 0 one after the other, so that it never holds more than one. pack() makes a
+/// rank's message, visit(rank, message) is called on rank 0. Collective.
 template <class Pack, class Visit>
 void one_after_the_other(Exchange& ranks, Pack&& pack, Visit&& visit) {
   for (int rank = 0; rank < ranks.size(); ++rank) {
-    const auto told = gather_on_first(ranks, rank == ranks.rank() ? pack() : Bytes());
-    if (ranks.rank() == 0) visit(rank, told[static_cast<std::size_t>(rank)]);
+    const auto received = gather_on_first(ranks, rank == ranks.rank() ? pack() : Bytes());
+    if (ranks.rank() == 0) visit(rank, received[static_cast<std::size_t>(rank)]);
   }
 }
 
-/// Copies of all particles on rank 0, by id, from the shares of all ranks; of nobody elsewhere. Collective.
+/// Copies of all particles on rank 0, by id, from the shares of all ranks; none elsewhere. Collective.
 template <int D>
 Particles<D> gathered(Exchange& ranks, const Particles<D>& share) {
   Bytes mine;

@@ -1,5 +1,5 @@
 #pragma once
-// A run: slab after slab, with energies kept in view and observers told at their due times.
+// A run: slab after slab, with energies measured and observers called at their due times.
 //
 //   Simulation<2> run(std::move(system), "edda", {{"step", 0.01}}, {.end_time = 6});
 //   run.add(writer);
@@ -47,7 +47,7 @@ struct Snapshot {
   double total() const { return kinetic + potential; }
 };
 
-/// The times at which an observer wants to see the particles: start, start + interval, …
+/// The times at which an observer needs the particles: start, start + interval, …
 struct Sampling {
   double interval = 0;  ///< simulated time; 0: never
   double start = 0;     ///< ≥ 0
@@ -57,16 +57,16 @@ template <int D>
 class Observer {
  public:
   virtual ~Observer() = default;
-  /// Asked once, before the run begins.
+  /// Called once, before the run begins.
   virtual Sampling sampling() const { return {}; }
   /// Copies of all particles at a time of sampling(): exactly then with free flight, else at the first step end at or
-  /// after it. Costs no measurement: this is the way to look often. Where ranks have shares rank 0 alone sees
+  /// after it. Costs no measurement: this is the way to look often. Where ranks have shares rank 0 alone has the
   /// particles.
   virtual void sample(double /*time*/, const Particles<D>&) {}
   virtual void frame(const Snapshot<D>&) {}
   virtual void thermo(const Snapshot<D>&) {}
-  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`. Where ranks have shares rank 0
-  /// alone is told.
+  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`. Where ranks have shares on rank
+  /// 0 only.
   virtual void contacts(double /*slab_start*/, std::span<const Contact<D>>) {}
   /// After every slab: how far the run has come. Cheap; called often.
   virtual void progress(const struct Statistics&) {}
@@ -96,7 +96,7 @@ struct Statistics {
   /// time by the trapezoidal rule. Absent while nothing has collided.
   std::optional<double> mean_free_time, mean_free_path;
   double wall_seconds = 0;     ///< of the run's loop
-  bool stopped_early = false;  ///< should_stop said so
+  bool stopped_early = false;  ///< by should_stop
 };
 
 template <int D>
@@ -118,7 +118,7 @@ class Simulation {
   /// Observers outlive the run. Throws Error(deck) where one wants samples at intervals that cannot be counted.
   void add(Observer<D>& observer);
 
-  /// Runs to the end of the plan, or until should_stop() says so at the end of a slab. Throws Error.
+  /// Runs to the end of the plan, or until should_stop() returns true at the end of a slab. Throws Error.
   void run(const std::function<bool()>& should_stop = {});
 
   const Statistics& statistics() const { return statistics_; }

@@ -1,6 +1,6 @@
 #pragma once
-// Radii and masses of all spheres of a system, whoever of them is here: one for each species, or, where a species has
-// several, one for each sphere.
+// Radii and masses of all spheres of a system, on every rank: one for each species, or, where a species has several,
+// one for each sphere.
 
 #include <algorithm>
 #include <cstdint>
@@ -18,7 +18,7 @@ struct Sizes {
   std::vector<double> number;        ///< of spheres of each species; empty: by id
 
   Sizes() = default;
-  /// Of a system whose particles are all here.
+  /// Of a system of which all particles are here.
   template <int D>
   Sizes(const Particles<D>& all) : spheres(all.radius.size()) {
     const std::size_t species = spheres > 0 ? *std::ranges::max_element(all.species) + std::size_t{1} : 0;

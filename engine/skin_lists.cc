@@ -45,8 +45,8 @@ std::uint8_t SkinLists<D>::octave(double largest, double radius) {
 }
 
 template <int D>
-void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>& extent, double astray) {
-  const std::size_t n = flights.size();
+void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent,
+                         double astray) {
   // 1. Cells for each size.
   levels_.clear();
   const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
@@ -67,16 +67,20 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
     const double edge = std::max(reach, roomy);
     Level level{
         .grid = CellGrid<D>(box_, edge, extent), .largest_radius = largest, .lines = {}, .next = {}, .steps = {}};
-    if (n < extent.particles) level.grid.confine(flights.places(now), kMargin);
+    if (n < extent.particles) {
+      std::vector<Vec<D>> places;
+      for (Slot i = 0; i < n; ++i) places.push_back(place(i));
+      level.grid.confine(places, kMargin);
+    }
     levels_.push_back(std::move(level));
   }
   widest_ = 0;
   astray_ = astray;
   for (Level& level : levels_) lay_out(level, astray);
-  // 2. Everybody into a cell.
+  // 2. Every sphere into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec<D> x = flights.at(static_cast<Slot>(i), now).x;
+    const Vec<D> x = place(static_cast<Slot>(i));
     for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[k];
     insert(static_cast<Slot>(i), x);
   }
@@ -95,9 +99,9 @@ void SkinLists<D>::build(const Flights<D>& flights, double now, const Extent<D>&
 template <int D>
 void SkinLists<D>::lay_out(Level& level, double astray) {
   level.lines.resize(level.grid.cells());
-  for (auto& line : level.lines) std::fill_n(line.slot, 8, kNobody);
-  level.next.assign(level.grid.cells(), kNobody);
-  level.free = kNobody;
+  for (auto& line : level.lines) std::fill_n(line.slot, 8, kEmpty);
+  level.next.assign(level.grid.cells(), kEmpty);
+  level.free = kEmpty;
   level.steps = {};
   for (int k = 0; k < D; ++k) {
     const double places = most_places(levels_[0].largest_radius, level, astray);
@@ -107,7 +111,7 @@ void SkinLists<D>::lay_out(Level& level, double astray) {
     const std::int32_t unit = 1 << (packing_.field_bits * k), count = level.grid.count(k);
     for (std::int32_t c = -level.margin; c < count + level.margin; ++c) {
       typename CellGrid<D>::Step step{0, 0};
-      level.grid.step(k, c, step);  // leads nowhere beyond walls: nobody takes it
+      level.grid.step(k, c, step);  // leads nowhere beyond walls: not used there
       widest_ = std::max(widest_, std::abs(step.boxes));
       level.steps[k].push_back({static_cast<std::uint32_t>(step.offset), step.boxes * unit});
     }
@@ -146,35 +150,35 @@ void SkinLists<D>::insert(Slot i, const Vec<D>& x) {
   std::uint32_t line = static_cast<std::uint32_t>(level.grid.index(cell));
   for (;;) {
     for (int q = 0; q < 8; ++q)
-      if (level.lines[line].slot[q] == kNobody) {
+      if (level.lines[line].slot[q] == kEmpty) {
         level.lines[line].slot[q] = i;
         level.lines[line].place[q] = code;
         return;
       }
-    if (level.next[line] == kNobody) {
+    if (level.next[line] == kEmpty) {
       std::uint32_t fresh = level.free;
-      if (fresh != kNobody) {
+      if (fresh != kEmpty) {
         level.free = level.next[fresh];
       } else {
         fresh = static_cast<std::uint32_t>(level.lines.size());
         level.lines.emplace_back();
-        level.next.push_back(kNobody);
+        level.next.push_back(kEmpty);
       }
-      std::fill_n(level.lines[fresh].slot, 8, kNobody);
-      level.next[fresh] = kNobody;
+      std::fill_n(level.lines[fresh].slot, 8, kEmpty);
+      level.next[fresh] = kEmpty;
       level.next[line] = fresh;
     }
     line = level.next[line];
   }
 }
 
-/// Somebody has come to where nobody was expected: from now on there are cells everywhere.
+/// A sphere is outside the cells: from now on there are cells everywhere.
 template <int D>
 void SkinLists<D>::spread(Level& level) {
   std::vector<Slot> members;
   for (const CellLine& line : level.lines)
     for (const Slot i : line.slot)
-      if (i != kNobody) members.push_back(i);
+      if (i != kEmpty) members.push_back(i);
   level.grid.spread();
   level.lines.clear();
   lay_out(level, astray_);
@@ -185,13 +189,13 @@ template <int D>
 void SkinLists<D>::remove(Slot i, const Vec<D>& x) {
   Level& level = levels_[level_of(i)];
   const std::uint32_t first = static_cast<std::uint32_t>(level.grid.index(level.grid.cell(x)));
-  for (std::uint32_t line = first, before = kNobody;; before = line, line = level.next[line]) {
+  for (std::uint32_t line = first, before = kEmpty;; before = line, line = level.next[line]) {
     CellLine& cell = level.lines[line];
     for (int q = 0; q < 8; ++q) {
       if (cell.slot[q] != i) continue;
-      cell.slot[q] = kNobody;
-      const bool empty = std::all_of(cell.slot, cell.slot + 8, [](auto s) { return s == kNobody; });
-      if (before != kNobody && empty) {
+      cell.slot[q] = kEmpty;
+      const bool empty = std::all_of(cell.slot, cell.slot + 8, [](auto s) { return s == kEmpty; });
+      if (before != kEmpty && empty) {
         level.next[before] = level.next[line];
         level.next[line] = level.free;
         level.free = line;
@@ -307,7 +311,7 @@ void SkinLists<D>::assign(Slot i, unsigned n) {
   divide(a);
 }
 
-/// Those of a list who are in the same box come first.
+/// Moves those in the same box to the start of a list.
 template <int D>
 void SkinLists<D>::divide(Agenda<D>& a) {
   std::uint32_t* const list = start_of(a);
@@ -339,7 +343,7 @@ void SkinLists<D>::drop(Slot i, std::uint32_t candidate) {
   remove_from_list(i, static_cast<unsigned>(std::find(list, list + agenda_[i].count, candidate) - list));
 }
 
-/// The same, given its place; someone from behind comes there.
+/// The same, given its place; one from behind moves there.
 template <int D>
 void SkinLists<D>::remove_from_list(Slot i, unsigned q) {
   Agenda<D>& a = agenda_[i];
@@ -364,7 +368,7 @@ std::span<const std::uint32_t> SkinLists<D>::renew(Slot i, const Vec<D>& x) {
   kept_.assign(a.count / 64 + 1u, 0);
   const std::uint32_t* const list = candidates(a);
   const unsigned fresh = kernels_.compare(list, a.count, found_.data(), n, fresh_.data(), kept_.data());
-  for (unsigned q = a.count; q-- > 0;) {  // from the end: who takes the place of one that is gone has been looked at
+  for (unsigned q = a.count; q-- > 0;) {  // from the end: the one that moves up has been looked at
     if ((kept_[q / 64] >> (q % 64) & 1) != 0) continue;
     drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
     remove_from_list(i, q);

@@ -1,17 +1,19 @@
 #pragma once
 // Neighbour lists with a skin: for each sphere all others that it could touch while both stay within `skin` of where
-// they were when their lists were made. A sphere that leaves that region gets a new list, and its neighbours are told.
+// they were when their lists were made. A sphere that leaves that region gets a new list, and those of its neighbours
+// are updated.
 //
 // The centres of the regions stand in cells, eight to a cache line with their places in ten bits an axis; spheres of
 // very different sizes have cells of their own, a factor of two in radius each, so that a small sphere does not look
 // through cells as large as the largest one. Lists are symmetric. (Verlet, Phys. Rev. 159 (1967) 98; event-driven:
 // Donev, Torquato, Stillinger, J. Comput. Phys. 202 (2005) 737.)
 
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "engine/agenda.h"
-#include "engine/flights.h"
+#include "engine/cell_grid.h"
 #include "engine/pages.h"
 #include "engine/prefetch.h"
 #include "engine/scan.h"
@@ -21,18 +23,18 @@ namespace carom {
 template <int D>
 class SkinLists {
  public:
-  /// `radius` by slot, the largest one they will have; where all are `equal`, for ever, of the first one alone. Nobody
-  /// who comes later is larger than `largest`.
+  /// `radius` by slot, the largest one they will have; where all are `equal`, for ever, of the first one alone. Spheres
+  /// admitted later are not larger than `largest`.
   SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> radius,
             bool equal, double largest, double skin, PageVector<Agenda<D>>& agenda);
 
   double skin() const { return skin_; }
   const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
 
-  /// Makes all lists for spheres where they are at time `now`. find_near() will be asked for `astray`.
-  void build(const Flights<D>& flights, double now, const Extent<D>& extent, double astray = 0);
+  /// Makes all lists for n spheres, with centres place(slot). find_near() will be called with `astray`.
+  void build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent, double astray = 0);
 
-  /// The sphere is now at x: makes its list anew and mends those of its neighbours. Returns who is new in it, padded
+  /// The sphere is now at x: makes its list anew and mends those of its neighbours. Returns what is new in it, padded
   /// like a list; good until the next call.
   std::span<const std::uint32_t> renew(Slot i, const Vec<D>& x);
 
@@ -40,9 +42,9 @@ class SkinLists {
   /// left their regions.
   void follow(std::span<const Record<D>> records);
 
-  /// Takes in a sphere at x, in a slot that had nobody; `radius` as in the constructor.
+  /// Takes in a sphere at x, in an empty slot; `radius` as in the constructor.
   void admit(Slot i, const Vec<D>& x, std::span<const double> radius);
-  /// Forgets a sphere.
+  /// Removes a sphere.
   void dismiss(Slot i);
   /// The sphere is now at x: renews its list where that is farther than `room` from the centre of its region; whether
   /// it was.
@@ -51,7 +53,7 @@ class SkinLists {
   void prefetch(const Agenda<D>& a) const {
     for (const unsigned q : {0u, 16u, 32u}) prefetch_line(candidates(a) + q);
   }
-  /// Everybody whom a sphere may touch where both have come up to `astray` from their regions.
+  /// All spheres that a sphere may touch where both have come up to `astray` from their regions.
   std::span<const std::uint32_t> find_near(Slot i, double astray);
 
  private:
@@ -60,7 +62,7 @@ class SkinLists {
     double largest_radius;
     PageVector<CellLine> lines;
     std::vector<std::uint32_t> next;  // by line
-    std::uint32_t free = kNobody;
+    std::uint32_t free = kEmpty;
     std::int32_t margin = 1;                     // cells that the largest reach extends beyond one's own
     std::array<std::vector<CellStep>, D> steps;  // by axis: to the cells −margin … count + margin
   };
@@ -106,8 +108,8 @@ class SkinLists {
   std::vector<std::uint32_t> slots_, found_, fresh_;
   std::vector<std::int32_t> away_;
   std::vector<std::uint64_t> kept_;
-  std::int32_t widest_ = 0;  // boxes: the farthest that anyone has come, or can see
-  bool exact_ = false;       // places in cells do not tell all
+  std::int32_t widest_ = 0;  // boxes: the farthest that a sphere has come, or can see
+  bool exact_ = false;       // rounded places do not suffice: distances are computed
 };
 
 }  // namespace carom

@@ -1,5 +1,5 @@
 #pragma once
-// The highest frequency of small vibrations: what tells how long a step may be.
+// The highest frequency of small vibrations: it limits how long a step may be.
 
 #include "engine/forces.h"
 #include "engine/random.h"

@@ -1,5 +1,5 @@
 #pragma once
-// Everything that moves and what it feels: the state an integrator advances.
+// The particles and what acts on them: the state that an integrator advances.
 
 #include <memory>
 #include <optional>

@@ -1,6 +1,5 @@
 #pragma once
-// What happened in a window, as the event core writes it down: enough to take any event back, and to tell the path of
-// any sphere.
+// The log of a window that the event core writes: enough to take any event back, and to read the path of any sphere.
 //
 // The log is in the order of keys and costs an event three cache lines, one after the other. Paths are read from it
 // where they are wanted, which is for the few spheres near the border of a region (engine/region.h).
@@ -55,7 +54,7 @@ class Trace {
   };
   // A share in an event has the number 2·event + 0 or 1.
 
-  /// Forgets all, and gets ready for so many slots.
+  /// Removes all events, and makes room for so many slots.
   void clear(std::size_t slots) {
     base_ += 2 * static_cast<std::uint32_t>(events_.size());
     if (base_ > kNone / 4) {

@@ -1,5 +1,5 @@
 #pragma once
-// Particles sorted by place for a look at who is near whom, where each rank has only some of them.
+// Particles sorted by place, to find those near each other where each rank has only some of them.
 
 #include <algorithm>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace carom {
 
-/// Those in this rank's part of the box, and copies of those near it; by id, ascending.
+/// The particles in this rank's part of the box, and copies of those near it; by id, ascending.
 template <int D>
 struct Vicinity {
   std::vector<Vec<D>> x;

@@ -4,7 +4,7 @@
 // rdf.csv: r (middle of a shell), g (of all particles), and where there are several species g_A_B for each pair of
 // their names, in the order of the deck. msd.csv: time (the lag), origins (averaged over, besides the particles), msd,
 // and where there are several species msd_A for each. Reduced units; numbers in the fewest digits that give them back
-// exactly. What is measured how is told in engine/radial_distribution.h and engine/mean_squared_displacement.h.
+// exactly. What is measured is defined in engine/radial_distribution.h and engine/mean_squared_displacement.h.
 //
 // The files are put in place anew as a whole, whenever the number of samples has doubled, and at the end: after a kill
 // at least half of the samples are there.

@@ -29,7 +29,7 @@ std::optional<double> process_memory(const std::string& name) {
   return {};
 }
 
-/// The peak of resident memory above what was resident at its making [bytes]. Linux forgets the earlier peak when asked
+/// The peak of resident memory above what was resident at its making [bytes]. Linux resets the earlier peak on request
 /// (proc(5), clear_refs); where it does not, there is no answer.
 class PeakMemory {
  public:
@@ -93,7 +93,7 @@ class Flow {
     return done;
   }
 
-  /// Gives the system away; nothing else may be asked any more.
+  /// Gives the system away; nothing else may be called any more.
   std::unique_ptr<System<D>> release() { return std::move(system_); }
   const System<D>& system() const { return *system_; }
   const Counters& counters() const { return counters_; }
@@ -111,7 +111,7 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// pV/(N k T) of a stretch, from the virial: it tells a fluid from a crystal that has not melted.
+/// pV/(N k T) of a stretch, from the virial: it distinguishes a fluid from a crystal that has not melted.
 template <int D>
 double compressibility(const System<D>& system, double virial, double time) {
   double twice_kinetic = 0;

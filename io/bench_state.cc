@@ -45,7 +45,7 @@ Overlaps overlaps(const System<D>& system) {
   return find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
 }
 
-/// Puts everybody on sites drawn at random from those of a lattice.
+/// Puts all spheres on sites drawn at random from those of a lattice.
 template <int D>
 void place(Lattice lattice, double volume, std::uint64_t seed, System<D>& system) {
   Particles<D>& p = system.particles;
@@ -125,9 +125,9 @@ std::unique_ptr<System<D>> lattice_state(std::uint64_t n, double packing_fractio
   if (overlaps(*system).pairs > 0) place(Lattice::centred, volume, seed, *system);
   refuse(overlaps(*system),
          "a lattice of " + std::to_string(n) + " spheres at packing fraction " + std::to_string(packing_fraction));
-  std::vector<Id> everybody(n);
-  std::iota(everybody.begin(), everybody.end(), Id{0});
-  draw_velocities<D>(system->particles, everybody, std::vector<double>(n, 1.0), seed);
+  std::vector<Id> all(n);
+  std::iota(all.begin(), all.end(), Id{0});
+  draw_velocities<D>(system->particles, all, std::vector<double>(n, 1.0), seed);
   return system;
 }
 

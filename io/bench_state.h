@@ -2,8 +2,8 @@
 // The states that `carom bench` measures: a lattice with Maxwell–Boltzmann velocities, or a file.
 //
 // The file is plain text, so that any other program can be measured on the same state: the number of spheres; the edges
-// of the periodic box (their number tells the dimension); then a line for each sphere with position, velocity and
-// radius. Masses are 1. Numbers have 17 digits: what is read is what was written, bit for bit.
+// of the periodic box (their number is the dimension); then a line for each sphere with position, velocity and radius.
+// Masses are 1. Numbers have 17 digits: what is read is what was written, bit for bit.
 
 #include <cstdint>
 #include <filesystem>

@@ -1,5 +1,5 @@
 #pragma once
-// The sub-commands of `carom` that read a deck or tell what the program knows. Each returns the exit code of the
+// The sub-commands of `carom` that read a deck or print what the program knows. Each returns the exit code of the
 // process and throws Error.
 
 #include <filesystem>

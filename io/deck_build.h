@@ -13,7 +13,7 @@ void fill_box(const Deck::Source& source, System<D>& system);
 template <int D>
 void fill_particles(const Deck::Source& source, System<D>& system);
 
-/// Whether ranks can build their shares of the initial state, each for itself: lattices of species whose particles are
+/// Whether ranks can build their shares of the initial state, each for itself: lattices of species with particles all
 /// alike.
 bool built_in_shares(const Deck::Source& source);
 

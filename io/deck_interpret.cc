@@ -87,7 +87,7 @@ class Interpreter {
       if (const auto* fraction = table->find<double>("packing_fraction")) packing(*table, *fraction);
       if (table->variant != nullptr) placement.type = table->variant->name;
       if (!some && !all.empty() && !placement.type.empty())
-        problems_.warning(table->at, "[placement] places nobody: all positions are explicit",
+        problems_.warning(table->at, "[placement] places no particles: all positions are explicit",
                           "leave it out, or give a species by count");
       const bool flat = placement.type == "hexagonal" || placement.type == "square";
       const bool deep = placement.type == "fcc" || placement.type == "simple-cubic";
@@ -112,7 +112,7 @@ class Interpreter {
     if (const auto* rate = table.find<double>("growth_rate")) placement.growth_rate = *rate;
     if (const auto* most = table.find<double>("max_collisions")) placement.max_collisions = *most;
     if (mixed)
-      problems_.error(table.place("type"), "compression moves everybody, explicit positions too",
+      problems_.error(table.place("type"), "compression moves all particles, those with explicit positions too",
                       "take type = \"random\", or give all species by count");
     const auto& boundary = source_.boundary;
     if (std::find(boundary.begin(), boundary.end(), Boundary::open) != boundary.end())

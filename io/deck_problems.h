@@ -1,5 +1,5 @@
 #pragma once
-// Collects what is wrong with a deck, so that all of it can be told at once.
+// Collects what is wrong with a deck, so that all of it can be reported at once.
 //
 //   problems.error(place, "radius must be positive (is -1)", "give a number above 0");
 //   problems.throw_errors(Failure::deck);

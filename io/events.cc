@@ -65,7 +65,7 @@ struct EventWriter<D>::Contents {
     kind.write();
     image.write();
     file.flush();
-    time.write();  // its length tells how many rows are whole, also after a kill in the middle of a batch
+    time.write();  // its length is the number of complete rows, also after a kill in the middle of a batch
     file.flush();
   }
 

@@ -1,7 +1,8 @@
 #pragma once
 // events.h5: every collision of a run, exactly as it was executed, in the order of the event keys.
 //
-// One group /events of data sets, a row a collision; a kill may leave columns longer than `time`, whose rows are whole:
+// One group /events of data sets, a row a collision; after a kill columns may be longer than `time`, which has the
+// complete rows:
 //   time          simulated time (slab start + time_in_slab, rounded)
 //   slab          number of the slab or epoch, from 0
 //   time_in_slab  the exact time, since the start of the slab

@@ -29,7 +29,7 @@ std::vector<T> three_columns(const Vectors& vectors, int dimension) {
 
 /// Arrays as a message, one after the other.
 template <class... Arrays>
-Bytes told(const Arrays&... arrays) {
+Bytes packed(const Arrays&... arrays) {
   Bytes bytes;
   bytes.reserve((std::as_bytes(std::span(arrays)).size() + ...));
   const auto add = [&](std::span<const std::byte> more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
@@ -145,7 +145,7 @@ struct TrajectoryWriter<D>::Contents {
     const Particles<D>& p = system.particles;
     if (!system.sizes) return write(p.species, p.mass, p.radius, p.charge);
     one_after_the_other(
-        *ranks, [&] { return told(p.mass, p.radius, p.charge, p.species); },
+        *ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); },
         [&](int /*rank*/, const Bytes& message) {
           const std::size_t here = message.size() / (3 * sizeof(double) + sizeof(std::uint16_t));
           Reader reader(message);
@@ -166,7 +166,7 @@ struct TrajectoryWriter<D>::Contents {
     std::size_t first = 0;
     try {
       one_after_the_other(
-          *ranks, [&] { return told(p.x, p.v, p.image); },
+          *ranks, [&] { return packed(p.x, p.v, p.image); },
           [&](int /*rank*/, const Bytes& message) {
             const std::size_t n = message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>));
             Reader reader(message);
@@ -226,9 +226,9 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   for (const auto& [name, value] : scalars) c.observables.at(name).value.append(value);
   c.time.append(s.time);
   c.file.flush();
-  // The frames there are, are those that have a step: to MDAnalysis a missing step is the end of the file, and a
-  // missing position an error. So the step goes in when all else is safe; a kill in between leaves rows nobody looks
-  // at.
+  // The frames of the file are those that have a step: to MDAnalysis a missing step is the end of the file, and a
+  // missing position an error. So the step goes in when all else is safe; a kill in between leaves rows that are not
+  // read.
   c.step.append(s.step);
   c.file.flush();
 }
@@ -242,13 +242,13 @@ template <int D>
 ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system) : ranks_(ranks) {
   const Particles<D>& p = system.particles;
   one_after_the_other(
-      ranks, [&] { return told(p.mass, p.radius, p.charge, p.species); }, [](int, const Bytes&) {});
+      ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); }, [](int, const Bytes&) {});
 }
 
 template <int D>
 void ShareTeller<D>::frame(const Snapshot<D>& s) {
   one_after_the_other(
-      ranks_, [&] { return told(s.particles->x, s.particles->v, s.particles->image); }, [](int, const Bytes&) {});
+      ranks_, [&] { return packed(s.particles->x, s.particles->v, s.particles->image); }, [](int, const Bytes&) {});
 }
 
 template class TrajectoryWriter<2>;

@@ -9,9 +9,9 @@
 // Written so that MDAnalysis 2.4 can read it: three columns also in two dimensions (z = 0, a box edge of 1 and no
 // boundary along z; the true dimension and boundaries stand in /parameters), box edges at every frame, every `step` and
 // `time` explicit and shared by hard links, texts of fixed length, observables without subgroups. Units are reduced:
-// there are no `unit` attributes, so readers must be told not to convert. Positions are wrapped; unwrapped position =
-// position + image · edge. Every frame is flushed: it
-// survives the end of the process; steps go in last, and their number is the number of whole frames.
+// there are no `unit` attributes, so readers must be set not to convert. Positions are wrapped; unwrapped position =
+// position + image · edge. Every frame is flushed: it survives the end of the process; steps go in last, and their
+// number is the number of whole frames.
 //
 // Where ranks have shares of the particles (engine/shares.h) rank 0 writes one after the other, as a piece of the same
 // row: it never has more than one of them. The others have a ShareTeller each.
@@ -44,7 +44,7 @@ class TrajectoryWriter : public Observer<D> {
   std::unique_ptr<Contents> contents_;
 };
 
-/// Tells the writer of rank 0 what it is to write, on all other ranks.
+/// Sends the particles of all other ranks to the writer on rank 0.
 template <int D>
 class ShareTeller : public Observer<D> {
  public:

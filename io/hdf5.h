@@ -1,6 +1,6 @@
 #pragma once
-// A thin layer over the HDF5 C library: identifiers that close themselves, errors that say what happened, data sets
-// that grow row by row.
+// A thin layer over the HDF5 C library: identifiers that close themselves, errors with their cause, data sets that grow
+// row by row.
 //
 //   hdf5::File file = hdf5::File::create("a.h5");
 //   hdf5::Handle group = file.group("observables");
@@ -71,8 +71,8 @@ class File {
 
   /// Creates a group, and those on the way to it.
   Handle group(const std::string& name);
-  /// Throws Error(Failure::file) with the reason from HDF5 if `result` (an identifier or status) tells of a failure;
-  /// else returns it.
+  /// Throws Error(Failure::file) with the reason from HDF5 if `result` (an identifier or status) is a failure; else
+  /// returns it.
   template <class R>
   R check(R result, const std::string& action) const {
     if (result < 0) fail(action);
@@ -82,7 +82,7 @@ class File {
   void reserve(std::uint64_t bytes);
   /// Hands everything to the operating system: from now on it survives the end of this process.
   void flush();
-  /// Flushes and closes. The destructor does so too, but cannot tell of errors.
+  /// Flushes and closes. The destructor does so too, but cannot report errors.
   void close();
 
   /// Attributes and small data sets of a group or of the file; texts are stored with fixed length.
@@ -140,7 +140,7 @@ class SeriesBase {
   std::uint64_t row_elements_ = 1, row_bytes_ = 0, rows_ = 0;
 };
 
-/// A data set whose first axis grows: one row an append, or several. The file must outlive it and not move.
+/// A data set with a first axis that grows: one row an append, or several. The file must outlive it and not move.
 template <class T>
 class Series : public SeriesBase {
  public:

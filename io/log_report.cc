@@ -138,7 +138,7 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
                         c.slabs_halved, c.fallbacks);
   if (c.divisions > 0)
     text += fmt::format(
-        "\nparticles divided among {} ranks {} times, {} steps done again with more known, {} of them with everybody",
+        "\nparticles divided among {} ranks {} times, {} steps redone with more ghosts, {} of them with all particles",
         ranks.size(), c.divisions, c.slabs_again, c.slabs_by_all);
   text += domains_text(ranks) + memory_text(ranks);
   return text + "\n" + breakdown_text(ranks) + "\nfiles in " + deck.output.directory.string();

@@ -11,7 +11,7 @@
 
 namespace carom {
 
-/// Who runs what, where and with which libraries. `particles`: their number; `ranks`: of MPI.
+/// Version, libraries, host, deck and method of a run. `particles`: their number; `ranks`: of MPI.
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 
 /// How the run ended, what it found and where the time of the ranks went: of several, least, mean and most.

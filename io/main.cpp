@@ -83,7 +83,7 @@ int once(const std::function<int()>& work) {
 }
 
 int carom_main(int argc, char** argv) {
-  // 1. What can be asked.
+  // 1. The options.
   CLI::App app{"Carom: event-driven molecular dynamics with smooth forces"};
   app.set_version_flag("--version", carom::version_page, "Version, git hash, compiler, flags, library versions");
   app.require_subcommand(1);
@@ -123,7 +123,7 @@ int carom_main(int argc, char** argv) {
   carom::BenchOptions bench;
   add_bench(app, bench);
 
-  // 2. What is asked.
+  // 2. The command.
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -15,7 +15,7 @@ struct RunOptions {
   std::optional<std::filesystem::path> output;   ///< instead of output.directory; relative to the working directory
   std::optional<std::filesystem::path> restart;  ///< a checkpoint to go on from
   std::optional<double> max_wall_seconds;        ///< stop early after this much wall time
-  double silence = 600;  ///< seconds after which ranks of which nothing is heard are given up; 0: never
+  double silence = 600;  ///< seconds after which ranks that do not answer are given up; 0: never
   bool quiet = false;    ///< no progress line, no banner
 };
 

@@ -14,7 +14,7 @@ std::optional<fs::path> prepare_output_directory(const fs::path& directory) try 
   for (const char* name : run_file::all) {
     if (!fs::exists(fs::symlink_status(directory / name))) continue;
     for (int n = 1; !backup; ++n) {
-      // create_directory tells by its result whether the name was free, also if two runs start at once.
+      // create_directory returns whether the name was free, also if two runs start at once.
       const fs::path candidate = directory / ("backup." + std::to_string(n));
       if (!fs::exists(fs::symlink_status(candidate)) && fs::create_directory(candidate)) backup = candidate;
     }

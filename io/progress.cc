@@ -43,7 +43,7 @@ template <int D>
 void Progress<D>::progress(const Statistics& s) {
   constexpr double kTerminal = 0.2, kFirstPlain = 10, kRarestPlain = 600;  // seconds between lines
   const double wall = std::chrono::duration<double>(Clock::now() - start_).count();
-  if (next_ == 0) {  // the first slab: from here on rates can be told
+  if (next_ == 0) {  // the first slab: from here on rates are known
     rates_.add(wall, s.fraction_done, s.counters.sphere_sphere);
     next_ = wall + (terminal_ ? kTerminal : kFirstPlain);
   }

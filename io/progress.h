@@ -1,6 +1,5 @@
 #pragma once
-// How a run is getting on, for whoever watches: one line that renews itself on a terminal, plain lines now and then
-// elsewhere.
+// The progress of a run: one line that renews itself on a terminal, plain lines now and then elsewhere.
 
 #include <chrono>
 #include <cstdint>
@@ -20,7 +19,7 @@ class RecentRates {
 
   /// The state of the run after `wall` seconds; called with growing times.
   void add(double wall, double fraction_done, std::uint64_t collisions);
-  /// Wall seconds until the end; nothing while it cannot be told.
+  /// Wall seconds until the end; nothing while it is unknown.
   std::optional<double> seconds_left() const;
   double collisions_per_second() const;
 
@@ -39,7 +38,7 @@ std::string progress_text(const Statistics& statistics, const RecentRates& rates
 /// hh:mm:ss
 std::string clock_text(double seconds);
 
-/// Shows progress on a stream. Write errors of the stream do not disturb the run; ask the stream at the end.
+/// Shows progress on a stream. Write errors of the stream do not disturb the run; check the stream at the end.
 template <int D>
 class Progress : public Observer<D> {
  public:

@@ -1,5 +1,5 @@
 #pragma once
-// What each rank tells rank 0 at the end of a run: where its time went, how much memory it took.
+// What each rank sends to rank 0 at the end of a run: the time of its parts, and its memory.
 
 #include <cstdint>
 #include <span>

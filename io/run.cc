@@ -46,7 +46,7 @@ class Deadline {
   std::optional<double> seconds_;
 };
 
-/// Forces on fewer particles than these are done sooner than told.
+/// Forces on fewer particles than these cost less than sending them.
 constexpr std::size_t kFewestToShare = 64;
 
 /// Does something that may fail while another failure is being reported: only the first one counts.
@@ -64,9 +64,9 @@ TextReader reader_for(Exchange& ranks) {
     auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
     if (text) text->push_back('.');  // it can be read, and may be empty
     const auto bytes = std::as_bytes(std::span(text ? std::string_view(*text) : std::string_view()));
-    const Bytes told = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
-    if (told.empty()) return {};
-    return std::string(reinterpret_cast<const char*>(told.data()), told.size() - 1);
+    const Bytes received = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
+    if (received.empty()) return {};
+    return std::string(reinterpret_cast<const char*>(received.data()), received.size() - 1);
   };
 }
 

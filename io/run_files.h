@@ -14,7 +14,7 @@
 
 namespace carom {
 
-/// The times at which the files want to see the particles, besides frames and rows.
+/// The times at which the files need the particles, besides frames and rows.
 std::vector<Sampling> samplings(const OutputConfig& output);
 
 /// Looks at the particles when the files of another rank do, so that all ranks stop at the same times.
@@ -34,7 +34,7 @@ class RunFiles {
   /// Creates them in deck.output.directory. Throws Error(Failure::file).
   RunFiles(const Deck& deck, const System<D>& system);
 
-  /// Lets the run tell them what happens. They must outlive it.
+  /// Adds them as observers to the run. They must outlive it.
   void add_to(Simulation<D>& simulation);
 
   /// Writes what is left and closes. Throws Error(Failure::file).
@@ -49,7 +49,7 @@ class RunFiles {
  private:
   TrajectoryWriter<D> trajectory_;
   ThermoWriter<D> thermo_;
-  // Null where they are not asked for.
+  // Null where the deck does not want them.
   std::unique_ptr<EventWriter<D>> events_;
   std::unique_ptr<RdfWriter<D>> rdf_;
   std::unique_ptr<MsdWriter<D>> msd_;

@@ -134,7 +134,7 @@ std::vector<TableSchema> make_schema() {
       {"integrator",
        false,
        true,
-       "the method; `carom methods` tells more about each",
+       "the method; `carom methods` describes each",
        {type_key("which one")},
        integrator_variants(),
        {{"acdda", "write \"edda\", which keeps the energy as exactly"},

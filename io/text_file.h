@@ -18,7 +18,7 @@ class TextFile {
   TextFile& operator=(const TextFile&) = delete;
 
   void append(std::string_view piece);
-  /// Puts everything on the disk and closes; network file systems tell of a full disk only here.
+  /// Puts everything on the disk and closes; network file systems report a full disk only here.
   void close();
 
  private:

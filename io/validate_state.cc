@@ -18,7 +18,7 @@
 namespace carom {
 namespace {
 
-/// Text with enough digits to tell a distance from a contact distance.
+/// Text with enough digits to distinguish a distance from a contact distance.
 template <class... Items>
 std::string say(const Items&... items) {
   std::ostringstream text;
@@ -169,6 +169,7 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
   constexpr std::uint64_t affordable = 500'000;  // particles or pairs: below a second of work
   if (!source.integrator->stepping || system.interactions.empty() || system.size() > affordable) return;
   std::optional<Part<D>> part;
+  system.quanta = quanta(system);
   if (shared_by(system)) part.emplace(system, true, deck.plan.step);
   const System<D>& known = part ? part->known() : system;
   std::uint64_t pairs = 0;

@@ -10,7 +10,7 @@ namespace carom {
 template <int D>
 void check_state(const Deck& deck, const System<D>& system, Problems& problems);
 
-/// What [output] asks for must have a meaning in this box: g(r) needs a density, and room.
+/// What [output] requires must have a meaning in this box: g(r) needs a density, and room.
 template <int D>
 void check_output(const Deck& deck, const System<D>& system, Problems& problems);
 

@@ -18,7 +18,7 @@ namespace carom {
 class Communicator {
  public:
   /// Starts MPI (MPI_THREAD_FUNNELED) and duplicates the world communicator. One object a process, once. `silence`:
-  /// seconds after which ranks that work together give up those of which nothing is heard; 0: never.
+  /// seconds after which ranks that work together give up those that do not answer; 0: never.
   explicit Communicator(double silence = 0);
   ~Communicator();
   Communicator(const Communicator&) = delete;
@@ -33,9 +33,9 @@ class Communicator {
   /// To wait by; only where there are several ranks.
   Watch& watch() const { return *watch_; }
 
-  /// Runs `work` on all ranks, which may talk to each other in it. Returns the exit code of all: what it returns, or
-  /// that of the first failure. An exception is told on stderr, once where all ranks meet the same Error, else with
-  /// the names of the ranks; ranks that cannot learn of it are ended (MPI_Abort).
+  /// Runs `work` on all ranks, which may communicate in it. Returns the exit code of all: what it returns, or that of
+  /// the first failure. An exception is reported on stderr, once where all ranks meet the same Error, else with the
+  /// names of the ranks; ranks that cannot be reached are ended (MPI_Abort).
   int on_all(const std::function<int()>& work) const;
 
   /// Runs `work` on rank 0, while the others sleep. Otherwise the same.

@@ -100,7 +100,7 @@ std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing) {
   return incoming;
 }
 
-/// The first message to a neighbour tells how much there is, and has as much of it as goes in; few need a second one.
+/// The first message to a neighbour has the length, and as much of the data as fits; few need a second one.
 std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing, std::span<const int> partners) {
   ranks_.watch().begin_call();
   outgoing_ = std::move(outgoing);

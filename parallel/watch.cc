@@ -19,7 +19,7 @@ namespace {
 constexpr int kSpins = 200;           // polls before anything else is looked at
 constexpr double kShortRest = 1e-3;   // seconds, while others work
 constexpr double kLongRest = 50e-3;   // while there is nothing left to do
-constexpr double kAskAgain = 0.1;     // seconds between questions to those who have not ended
+constexpr double kQueryAgain = 0.1;   // seconds between queries to ranks that have not ended
 constexpr double kTimeToAnswer = 2;   // seconds
 constexpr double kLongestNotice = 1;  // seconds between two polls; more, and the process was not running
 
@@ -56,7 +56,7 @@ Watch::Watch(MPI_Comm world, double silence) : silence_(silence) {
   MPI_Comm_dup(world, &side_);
   MPI_Comm_rank(side_, &rank_);
   MPI_Comm_size(side_, &size_);
-  words_.resize(static_cast<std::size_t>(size_));
+  states_.resize(static_cast<std::size_t>(size_));
   receive_next();
 }
 
@@ -84,7 +84,7 @@ void Watch::send(int to, Kind kind, const Outcome& outcome) {
             &sent.request);
 }
 
-void Watch::listen() {
+void Watch::receive_notices() {
   for (;;) {
     int arrived = 0;
     MPI_Status status;
@@ -92,23 +92,23 @@ void Watch::listen() {
     if (arrived == 0) return;
     const Notice notice = incoming_;
     receive_next();
-    heard(status.MPI_SOURCE, notice);
+    process(status.MPI_SOURCE, notice);
   }
 }
 
-void Watch::heard(int from, const Notice& notice) {
-  Word& word = words_[static_cast<std::size_t>(from)];
-  word.calls = notice.calls;
+void Watch::process(int from, const Notice& notice) {
+  State& state = states_[static_cast<std::size_t>(from)];
+  state.calls = notice.calls;
   switch (notice.kind) {
     case Kind::question:
       send(from, Kind::answer);
       break;
     case Kind::answer:
-      word.answered = true;
+      state.answered = true;
       break;
     case Kind::ended:
-      word.outcome = Outcome{notice.code, notice.failure.data()};
-      if (!failed_ && !word.outcome->failure.empty()) failed_ = from;
+      state.outcome = Outcome{notice.code, notice.failure.data()};
+      if (!failed_ && !state.outcome->failure.empty()) failed_ = from;
       break;
     case Kind::verdict:
       verdict_ = notice.code;
@@ -116,10 +116,10 @@ void Watch::heard(int from, const Notice& notice) {
   }
 }
 
-/// Asks all that have not ended.
-void Watch::ask() {
+/// Sends a question to all that have not ended.
+void Watch::query_ranks() {
   for (int r = 0; r < size_; ++r)
-    if (r != rank_ && !words_[static_cast<std::size_t>(r)].outcome) send(r, Kind::question);
+    if (r != rank_ && !states_[static_cast<std::size_t>(r)].outcome) send(r, Kind::question);
 }
 
 // ---- Waiting ----
@@ -134,12 +134,12 @@ void Watch::wait(std::span<MPI_Request> requests) {
     if (complete()) return;
   Patience patience, since_failure;
   while (!complete()) {
-    listen();
+    receive_notices();
     if (failed_) {
-      // Who has failed after this call lets it complete.
-      const Word& word = words_[static_cast<std::size_t>(*failed_)];
-      if (word.calls < calls_ || since_failure.waited() > kGrace)
-        throw RankFailure(names({&*failed_, 1}) + ": " + word.outcome->failure);
+      // A rank that failed after this call lets it complete.
+      const State& state = states_[static_cast<std::size_t>(*failed_)];
+      if (state.calls < calls_ || since_failure.waited() > kGrace)
+        throw RankFailure(names({&*failed_, 1}) + ": " + state.outcome->failure);
     }
     if (const double waited = patience.waited(); silence_ > 0 && waited > silence_) {
       if (const std::string silence = silence_of(complete); !silence.empty()) throw SilentRanks(silence);
@@ -149,54 +149,54 @@ void Watch::wait(std::span<MPI_Request> requests) {
   }
 }
 
-/// Who is silent, in words; empty where the wait is over while it asks: those who answer may have come just now.
+/// Names the silent ranks; empty where the wait ends meanwhile: ranks that answer may have come just now.
 std::string Watch::silence_of(const std::function<bool()>& is_over) {
-  for (Word& word : words_) word.answered = false;
-  ask();
+  for (State& state : states_) state.answered = false;
+  query_ranks();
   std::vector<int> silent;
   for (Patience patience; patience.waited() < kTimeToAnswer; patience.rest(kShortRest)) {
     if (is_over()) return {};
-    listen();
+    receive_notices();
     silent.clear();
     for (int r = 0; r < size_; ++r)
-      if (const Word& word = words_[static_cast<std::size_t>(r)]; r != rank_ && !word.answered && !word.outcome)
+      if (const State& state = states_[static_cast<std::size_t>(r)]; r != rank_ && !state.answered && !state.outcome)
         silent.push_back(r);
   }
   char seconds[32];
   std::snprintf(seconds, sizeof seconds, "%g", silence_);
   if (silent.empty())
     return "all ranks have waited for each other for " + std::string(seconds) + " s: a fault of the program";
-  return "nothing was heard of " + names(silent) + " for " + seconds +
+  return "no answer from " + names(silent) + " for " + seconds +
          " s: stopped, cut off or still at work; --silence allows longer waits";
 }
 
 // ---- Ending ----
 
 int Watch::settle(const Outcome& mine, bool alone) {
-  // Everything must be said before the others know: the first of them to end with an error makes mpirun end the rest.
+  // Output comes first: when another rank ends with an error, mpirun ends the rest.
   flush_all();
   return rank_ == 0 ? settle_first(mine, alone) : settle_other(mine, alone);
 }
 
 int Watch::settle_first(const Outcome& mine, bool alone) {
   const auto end = [this](const Outcome& outcome) {
-    words_[0] = {.calls = calls_, .outcome = outcome};
+    states_[0] = {.calls = calls_, .outcome = outcome};
     if (!failed_ && !outcome.failure.empty()) failed_ = 0;
   };
   end(mine);
   Patience patience, since_failure;
-  double ask_next = 0;
+  double query_next = 0;
   const auto all_ended = [&] {
-    return std::all_of(words_.begin(), words_.end(), [](const Word& word) { return word.outcome.has_value(); });
+    return std::all_of(states_.begin(), states_.end(), [](const State& state) { return state.outcome.has_value(); });
   };
-  for (Word& word : words_) word.answered = false;
-  for (listen(); !all_ended() && !mine.left; listen()) {
+  for (State& state : states_) state.answered = false;
+  for (receive_notices(); !all_ended() && !mine.left; receive_notices()) {
     if (failed_) {
       const double waited = since_failure.waited();
-      if (somebody_waits_in_vain() || waited > kGrace) break;
-      if (waited >= ask_next) {
-        ask();
-        ask_next = waited + kAskAgain;
+      if (some_wait_is_in_vain() || waited > kGrace) break;
+      if (waited >= query_next) {
+        query_ranks();
+        query_next = waited + kQueryAgain;
       }
     } else if (silence_ > 0 && patience.waited() > silence_) {
       const std::string silence = silence_of(all_ended);
@@ -208,10 +208,10 @@ int Watch::settle_first(const Outcome& mine, bool alone) {
     patience.rest(kLongRest);
   }
 
-  const int code = words_[static_cast<std::size_t>(failed_.value_or(0))].outcome->code;
+  const int code = states_[static_cast<std::size_t>(failed_.value_or(0))].outcome->code;
   if (!all_ended() || mine.left) abort(code, account(alone));
   if (failed_) say(account(alone));
-  for (Word& word : words_) word = {};
+  for (State& state : states_) state = {};
   failed_.reset();
   for (int r = 1; r < size_; ++r) send(r, Kind::verdict, {code});
   return code;
@@ -221,7 +221,7 @@ int Watch::settle_other(const Outcome& mine, bool alone) {
   verdict_.reset();
   send(0, Kind::ended, mine);
   Patience patience;
-  for (listen(); !verdict_; listen()) {
+  for (receive_notices(); !verdict_; receive_notices()) {
     const double waited = patience.waited();
     if (!mine.failure.empty()) {
       if (waited > 2 * kGrace) abort(mine.code, "carom: " + names({&rank_, 1}) + ": " + mine.failure);
@@ -235,12 +235,12 @@ int Watch::settle_other(const Outcome& mine, bool alone) {
 }
 
 /// Whether a rank is in a call that one of the failed has not made.
-bool Watch::somebody_waits_in_vain() const {
+bool Watch::some_wait_is_in_vain() const {
   auto last_call = std::numeric_limits<std::uint64_t>::max();
-  for (const Word& word : words_)
-    if (word.outcome && !word.outcome->failure.empty()) last_call = std::min(last_call, word.calls);
-  return std::any_of(words_.begin(), words_.end(),
-                     [&](const Word& word) { return !word.outcome && word.answered && word.calls > last_call; });
+  for (const State& state : states_)
+    if (state.outcome && !state.outcome->failure.empty()) last_call = std::min(last_call, state.calls);
+  return std::any_of(states_.begin(), states_.end(),
+                     [&](const State& state) { return !state.outcome && state.answered && state.calls > last_call; });
 }
 
 /// What has failed, a line each; ranks that have failed alike in one.
@@ -249,13 +249,13 @@ std::string Watch::account(bool alone) const {
     return text.substr(0, std::tuple_size_v<decltype(Notice::failure)> - 1);
   };
   std::string text;
-  std::vector<bool> done(words_.size());
-  for (std::size_t r = 0; r < words_.size(); ++r) {
-    const auto& outcome = words_[r].outcome;
+  std::vector<bool> done(states_.size());
+  for (std::size_t r = 0; r < states_.size(); ++r) {
+    const auto& outcome = states_[r].outcome;
     if (done[r] || !outcome || outcome->failure.empty()) continue;
     std::vector<int> alike;
-    for (std::size_t s = r; s < words_.size(); ++s)
-      if (const auto& other = words_[s].outcome; other && beginning(other->failure) == beginning(outcome->failure)) {
+    for (std::size_t s = r; s < states_.size(); ++s)
+      if (const auto& other = states_[s].outcome; other && beginning(other->failure) == beginning(outcome->failure)) {
         alike.push_back(static_cast<int>(s));
         done[s] = true;
       }

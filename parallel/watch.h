@@ -1,13 +1,13 @@
 #pragma once
 // How ranks wait for each other, and how they end together when one of them cannot go on.
 //
-// Nobody waits blindly: a rank that waits looks for notices of others on the side. A rank that fails tells rank 0,
-// which asks the others. Who waits in a call that the failed rank will never make answers so: then the failure is not
-// one that all meet, and rank 0 leaves its work (RankFailure), closes its files, names the rank and ends all. Where all
-// have failed alike (a bad deck, a step that cannot be done) it is told once, and all return its exit code. A rank that
-// does not answer within kGrace, because it computes or is stopped, is not waited for.
+// A rank that waits polls for notices of other ranks meanwhile. A rank that fails sends a notice to rank 0, which
+// queries the others. Where one of them waits in a call that the failed rank will never make, the failure is not common
+// to all: rank 0 leaves its work (RankFailure), closes its files, names the rank and ends all. Where all have failed
+// alike (a bad deck, a step that cannot be done) it is reported once, and all return its exit code. A rank that does
+// not answer within kGrace, because it computes or is stopped, is not waited for.
 //
-// Where a wait lasts longer than the silence allowed, the rank that waits asks who is there; those who do not answer
+// Where a wait lasts longer than the silence allowed, the rank that waits queries the others; those that do not answer
 // are the silent ones. Time in which the process itself does not run does not count: a job may be suspended as a whole.
 
 #include <mpi.h>
@@ -24,12 +24,12 @@
 
 namespace carom {
 
-/// Another rank has told that it failed; the message names it.
+/// Another rank has failed; the message names it.
 class RankFailure : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Nothing is heard of the ranks that the message names.
+/// The ranks that the message names do not answer.
 class SilentRanks : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -60,13 +60,13 @@ class Watch {
  public:
   static constexpr double kGrace = 5;  ///< seconds
 
-  /// Collective. `silence`: seconds after which ranks of which nothing is heard are given up; 0: never.
+  /// Collective. `silence`: seconds after which ranks that do not answer are given up; 0: never.
   Watch(MPI_Comm world, double silence);
   ~Watch();
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// To be called at the beginning of each collective call of the work, so that ranks can tell who is how far.
+  /// To be called at the beginning of each collective call of the work, so that ranks can compare how far they are.
   void begin_call() { ++calls_; }
 
   /// Waits until all are complete. Throws RankFailure where another rank will never come, and SilentRanks.
@@ -88,19 +88,19 @@ class Watch {
     Notice notice;
     MPI_Request request = MPI_REQUEST_NULL;
   };
-  /// What has been heard of a rank.
-  struct Word {
+  /// What is known of a rank.
+  struct State {
     std::uint64_t calls = 0;
     bool answered = false;
     std::optional<Outcome> outcome{};
   };
 
   void receive_next();
-  void listen();
-  void heard(int from, const Notice& notice);
+  void receive_notices();
+  void process(int from, const Notice& notice);
   void send(int to, Kind kind, const Outcome& outcome = {});
-  void ask();
-  bool somebody_waits_in_vain() const;
+  void query_ranks();
+  bool some_wait_is_in_vain() const;
   std::string silence_of(const std::function<bool()>& is_over);
   int settle_first(const Outcome& mine, bool alone);
   int settle_other(const Outcome& mine, bool alone);
@@ -112,8 +112,8 @@ class Watch {
   int rank_ = 0, size_ = 1;
   double silence_;
   std::uint64_t calls_ = 0;
-  std::vector<Word> words_;     ///< by rank; outcomes are told to rank 0 only
-  std::optional<int> failed_;   ///< the rank that was the first to tell of a failure
+  std::vector<State> states_;   ///< by rank; outcomes are sent to rank 0 only
+  std::optional<int> failed_;   ///< the rank with the first notice of a failure
   std::optional<int> verdict_;  ///< of rank 0
   Notice incoming_{};
   MPI_Request receive_ = MPI_REQUEST_NULL;

@@ -49,8 +49,8 @@ class Checker:
         return self.file[path].attrs[name]
 
     def element(self, path):
-        """A time-dependent element: value, step and time of equal length, but for a frame whose step was not written any
-        more when the run was killed. Returns whether it can be read."""
+        """A time-dependent element: value, step and time of equal length, but for a last frame that has no step after a
+        kill. Returns whether it can be read."""
         if not self.has(path, h5py.Group):
             return False
         if not all([self.has(f"{path}/{part}", h5py.Dataset) for part in ("value", "step", "time")]):

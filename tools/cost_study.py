@@ -34,7 +34,7 @@ def parse_arguments(arguments=None):
     parser = study_parser(__doc__, "psa,cva,mcva,cdda,edda")
     parser.set_defaults(end_time=6.0)
     parser.add_argument("--counts", help="numbers of particles to compare the cost of a step at")
-    parser.add_argument("--reference", default="cdda:order=4", help="method whose positions are taken for exact, or none")
+    parser.add_argument("--reference", default="cdda:order=4", help="method with positions taken for exact, or none")
     parser.add_argument("--repeats", type=int, default=3)
     options = parse(parser, arguments, "cost-study")
     options.counts = [int(count) for count in options.counts.split(",")] if options.counts else []

@@ -57,9 +57,9 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
         raise SystemExit("g(r) needs a density: there is none in a box with an open boundary.")
     if unknown := set(species or []) - set(trajectory.species_names):
         raise SystemExit(f"There is no species {', '.join(unknown)}, only {', '.join(trajectory.species_names)}.")
-    everybody = np.arange(len(trajectory.species))
-    chosen = [everybody[trajectory.species == trajectory.species_names.index(name)] for name in species or []]
-    chosen = chosen or [everybody, everybody]
+    every = np.arange(len(trajectory.species))
+    chosen = [every[trajectory.species == trajectory.species_names.index(name)] for name in species or []]
+    chosen = chosen or [every, every]
     walled = ~trajectory.periodic
     # Centres keep a radius away from a wall.
     margin = np.where(walled, min(trajectory.radius[np.concatenate(chosen)]), 0.0)
@@ -69,8 +69,8 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
         raise SystemExit("r can't go beyond half the shortest periodic edge.")
     radii = np.linspace(0, largest, bins + 1)
     frames = range(first_frame, len(trajectory))
-    counts = sum(pair_counts(*(_into(trajectory.position(frame)[who] - margin, edges, trajectory.periodic)
-                               for who in chosen), radii, edges, trajectory.periodic) for frame in frames)
+    counts = sum(pair_counts(*(_into(trajectory.position(frame)[ids] - margin, edges, trajectory.periodic)
+                               for ids in chosen), radii, edges, trajectory.periodic) for frame in frames)
     pairs = len(chosen[0]) * len(chosen[1]) - len(np.intersect1d(*chosen))
     if pairs == 0:
         raise SystemExit("g(r) needs two particles.")

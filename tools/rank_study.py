@@ -5,12 +5,12 @@
     tools/rank_study.py --ranks 8,64 --per-rank 500,2000 --collisions 20 --rate 1e6
     tools/rank_study.py --mpirun --ranks 8,16,64 --per-rank 500,2000
 
-Measured, for a deck of free flight: windows, rounds a window, events run twice at borders, events redone, as run.log tells
-them. All regions are in one process (CAROM_REGIONS), with the windows and rounds of as many ranks; with --mpirun they are
+Measured, for a deck of free flight: windows, rounds a window, events run twice at borders, events redone, as in
+run.log. All regions are in one process (CAROM_REGIONS), with the windows and rounds of as many ranks; with --mpirun they are
 ranks, and the imbalance of the whole run is measured too. Spheres start at random places (--placement): cut between the
 layers of a crystal, regions get unequal shares until they are made anew.
 
-Fitted to the runs whose regions have neighbours on all sides, with s = (spheres a region)^(-1/D):
+Fitted to the runs with regions that have neighbours on all sides, with s = (spheres a region)^(-1/D):
 events run twice (1 + h s)^D - 1, a shell around a cube; events redone r s, a surface; rounds a window a + b log2(spheres
 at all borders), a chain of repairs that gets longer by one with a probability.
 
@@ -74,7 +74,7 @@ def counts_of(log):
     """The line about regions in a run.log: windows, rounds a window, and the shares of events."""
     found = COUNTS.search(log)
     if not found:
-        raise SystemExit("run.log tells nothing of windows: is the deck one of free flight, and are there several regions?")
+        raise SystemExit("run.log has nothing about windows: is the deck one of free flight, and are there several regions?")
     windows, rounds, *percent = found.groups()
     return {"windows": int(windows), "rounds": float(rounds)} | {
         name: float(value) / 100 for name, value in zip(("twice", "redone", "imbalance"), percent)}

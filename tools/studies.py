@@ -16,7 +16,7 @@ from carom_files import RunFailed, find_carom, run_carom, toml_text
 
 
 def study_parser(description, methods):
-    """A parser of what every study is told; `methods` are the ones it compares unless told otherwise."""
+    """A parser of the options of every study; `methods` are the ones that it compares by default."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("deck", type=pathlib.Path)
     parser.add_argument("--methods", default=methods, help="names, each with keys: cdda:order=4")

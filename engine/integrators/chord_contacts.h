@@ -16,12 +16,12 @@ namespace carom::integrator {
 /// How a piece of size τ ends.
 template <int D>
 struct PieceEnd {
-  bool converged = true;    ///< the solver's word; nothing else is set if it failed
+  bool converged = true;    ///< of the solver; nothing else is set if it is false
   bool violates = false;    ///< some sphere has gone into another or a wall, or through it
   bool touches = false;     ///< some gap is closed to tolerance
   double contact = kNever;  ///< c(τ)
-  EventKey<D> key{};        ///< whose contact that is
-  EventKey<D> violator{};   ///< who has gone into whom
+  EventKey<D> key{};        ///< of that contact
+  EventKey<D> violator{};   ///< of an overlap
 };
 
 template <int D>
@@ -63,7 +63,7 @@ class ChordContacts {
   }
 
  private:
-  static constexpr double kProlongation = 4;  // contacts are still told this far beyond the end of the chord (squared)
+  static constexpr double kProlongation = 4;  // contacts are still found this far beyond the end of the chord (squared)
 
   static void violate(const EventKey<D>& key, PieceEnd<D>& end) {
     end.violates = true;

@@ -2,7 +2,7 @@
 // Kick-drift-kick pieces that end at contacts: what cva and mcva share.
 //
 // A piece that starts at (x, v) with a = −M⁻¹∇V(x) carries every particle along x + v s + ½ a s² and ends exactly
-// there, whatever its length; so the first contact on the parabolas tells how long the piece may be.
+// there, whatever its length; so the first contact on the parabolas limits the length of the piece.
 
 #include <algorithm>
 

@@ -86,7 +86,7 @@ class FreeFlight : public Integrator<D> {
 
   double seconds_waited() const { return domains_ ? domains_->seconds_waited() : 0; }
 
-  /// What CAROM_REGIONS says; else one.
+  /// The value of CAROM_REGIONS; else one.
   static std::size_t regions_a_rank() {
     const char* const forced = std::getenv("CAROM_REGIONS");
     if (!forced) return 1;

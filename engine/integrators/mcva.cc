@@ -1,4 +1,4 @@
-// mcva: CVA whose impulses keep the shadow Hamiltonian S_h = H + h² G instead of H.
+// mcva: CVA with impulses that keep the shadow Hamiltonian S_h = H + h² G instead of H.
 //
 // With n the gradient of the gap, w = M⁻¹n and K = V″, an impulse λn changes S_h by bλ + ½aλ² exactly:
 //   a = nᵀw + (h²/6) wᵀKw,   b = nᵀv + (h²/6) wᵀKv.

@@ -6,7 +6,7 @@
 //   gradient(i, x)                 ∇V_i
 //   mean_gradient(i, x, x_new)     a discrete gradient: · (x_new − x) = V_i(x_new) − V_i(x)
 //   hessian_product(i, x, w)       V_i″ w
-//   least_force(distance)          on a particle so far from where there is none [force]; 0: there is no telling
+//   least_force(distance)          on a particle so far from where there is none [force]; 0: unknown
 //   among(particles)               itself for other particles
 // and, where it accelerates all particles alike, acceleration().
 
@@ -21,7 +21,7 @@ namespace carom {
 template <int D, class Field>
 class FieldTerm final : public Interaction<D> {
  public:
-  /// `particles` tells which are ghosts, and outlives the term.
+  /// `particles` marks ghosts, and outlives the term.
   FieldTerm(const Particles<D>& particles, Field field) : particles_(particles), field_(std::move(field)) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override {

@@ -1,7 +1,7 @@
 #pragma once
 // What the types of interaction have in common in a deck: shared parameters, and how they are read.
 //
-// All functions throw Error(Failure::deck) whose message begins with the type's name and says what to do.
+// All functions throw Error(Failure::deck); its message begins with the type's name and says what to do.
 
 #include <memory>
 #include <string>

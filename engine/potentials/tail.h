@@ -7,7 +7,7 @@
 //
 // Ω the volume, S_D = 4π or 2π. Of the kind
 //   switched:  ΔV = V − W from r_s to infinity; then virial = D E;
-//   shifted:   ΔV = V beyond r_c, the correction of the truncated potential, whose forces these are: its pressure is
+//   shifted:   ΔV = V beyond r_c, the correction of the truncated potential (the same forces): its pressure is
 //              corrected, but V(r_c) of each pair within the cutoff stays missing in the energy.
 // (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.8.) They act on no particle.
 

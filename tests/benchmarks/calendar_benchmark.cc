@@ -8,7 +8,7 @@
 namespace carom {
 namespace {
 
-/// An epoch of ten mean times between the events of a particle: everybody is scheduled, then each that is served is
+/// An epoch of ten mean times between the events of a particle: all are scheduled, then each that is served is
 /// scheduled anew after an exponential time.
 void calendar_epoch(benchmark::State& state) {
   const auto n = static_cast<std::uint32_t>(state.range(0));

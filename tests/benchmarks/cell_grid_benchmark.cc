@@ -1,4 +1,4 @@
-// Search cells: where a sphere is, who is near it, and the table of who is where.
+// Search cells: the cell of a sphere, the spheres near it, and the table of all.
 
 #include <benchmark/benchmark.h>
 

@@ -172,7 +172,7 @@ DECK_ERRORS = {
     "compression of explicit positions": (
         changed('"fcc"', '"compressed"', changed(
             "[placement]", '[[particles]]\nname = "b"\nposition = [[1, 1, 1]]\nradius = 0.5\n[placement]', FLUID)),
-        19, ["compression moves everybody", "by count"]),
+        19, ["compression moves all particles", "by count"]),
     "growth that stands still": (
         changed('"fcc"', '"compressed"\ngrowth_rate = 0', FLUID), 16, ["'growth_rate' must be positive (is 0)"]),
     "growth of a lattice": (changed('"fcc"', '"fcc"\ngrowth_rate = 1', FLUID), 16, ["unknown key 'growth_rate'"]),
@@ -269,7 +269,7 @@ def test_g_of_r_without_a_density_or_room(tmp_path):
     assert too_far.returncode == 2 and "error: g(r) cannot be taken to 9.1 in this box; take at most 9" in too_far.stderr
 
 
-def test_every_problem_is_told_in_the_order_of_the_deck(tmp_path):
+def test_every_problem_is_reported_in_the_order_of_the_deck(tmp_path):
     deck = GOOD.replace("radius = 0.5", "radius = -1").replace("step = 0.01", "step = 0").replace("[[0, 1]]", "[[0, 7]]")
     messages = validate(tmp_path, deck).stderr.splitlines()
     assert [m.split(":")[1] for m in messages] == ["13", "18", "24"]

@@ -44,7 +44,7 @@ def check(point):
     assert per.keys() == {"crossings", "rebuilds", "stale", "predictions", "scheduled"}
     assert per["predictions"] >= 2  # both partners of a collision
     assert per["scheduled"] >= 1 and per["stale"] >= 0
-    assert per["crossings"] + per["rebuilds"] > 0  # no core sees everybody all the time
+    assert per["crossings"] + per["rebuilds"] > 0  # no core has all spheres as candidates all the time
     assert point["candidates_per_prediction"] > 0
     assert 0 <= point["stale_fraction"] < 1
     assert point["bytes_per_particle"] is None or point["bytes_per_particle"] > 0
@@ -59,7 +59,7 @@ def test_table(tmp_path):
         assert point["dimension"] == 3 and len(point["repeats"]) == 2
         assert point["equilibration_epochs"] == 5
         assert point["equilibration_collisions"] > 10 * point["n"]  # ten mean free times an epoch
-        filled = point["packing_fraction"]  # Carnahan–Starling: it is the fluid that was asked for
+        filled = point["packing_fraction"]  # Carnahan–Starling: it is the fluid requested
         expected = (1 + filled + filled**2 - filled**3) / (1 - filled) ** 3
         assert abs(point["compressibility_factor"] / expected - 1) < 0.1
 
@@ -179,7 +179,7 @@ def test_bad_state(text, line, code, tmp_path):
 def test_files_that_cannot_be_used(tmp_path):
     assert "missing" in bench("--state", tmp_path / "missing", code=5).stderr
     done = bench("--n", 100, "--packing-fraction", 0.3, "--json", tmp_path / "nowhere" / "bench.json", *QUICK, code=5)
-    assert "nowhere" in done.stderr and done.stdout == ""  # said before any work
+    assert "nowhere" in done.stderr and done.stdout == ""  # reported before any work
 
 
 # Runs the command and counts a set-up of 10⁷ instructions and $COST instructions a collision or pair.

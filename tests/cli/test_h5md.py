@@ -28,7 +28,7 @@ def output(request, tmp_path_factory):
 
 
 def universe(path):
-    """Reduced units have no names: MDAnalysis must be told not to convert them, which in 2.4 only load_new can be."""
+    """Reduced units have no names: MDAnalysis must be set not to convert them, which in 2.4 only load_new can be."""
     with h5py.File(path) as file:
         n = file["particles/trajectory/position/value"].shape[1]
     u = MDAnalysis.Universe.empty(n, trajectory=True, velocities=True)
@@ -44,8 +44,8 @@ def test_a_frame_cut_off_by_a_kill_is_the_end_of_the_file(output, tmp_path):
         step.resize(whole, axis=0)  # written last
     assert len([ts.frame for ts in universe(path).trajectory]) == whole
     assert check_h5md.violations(path) == []
-    told = subprocess.run([CAROM, "info", str(path)], capture_output=True, text=True, check=True).stdout
-    assert any(line.split() == ["frames", str(whole)] for line in told.splitlines())
+    info = subprocess.run([CAROM, "info", str(path)], capture_output=True, text=True, check=True).stdout
+    assert any(line.split() == ["frames", str(whole)] for line in info.splitlines())
 
 
 def test_mdanalysis_reads_what_was_written(output):
@@ -85,7 +85,7 @@ def test_images_unwrap_the_path(output):
         edge = g["box/edges/value"][0].diagonal()
         x = g["position/value"][()] + g["image/value"][()] * edge
         assert (g["image/value"][-1] != 0).any()
-    # Nobody flies far between frames: an image that is off by one would show as a jump of half an edge or more.
+    # No sphere flies far between frames: an image that is off by one would show as a jump of half an edge or more.
     assert np.abs(np.diff(x, axis=0)).max() < edge.min() / 2
 
 
@@ -97,13 +97,13 @@ def test_info(output):
     flat = "2-D" in str(output)
     done = info(output / "trajectory.h5md")
     assert done.returncode == 0, done.stderr
-    told = dict(line.split(None, 1) for line in done.stdout.splitlines())
-    assert told["frames"] == ("17" if flat else "7") and told["particles"] == ("4" if flat else "108")
-    assert told["times"] == ("0 to 8" if flat else "0 to 3") and told["dimension"] == ("2" if flat else "3")
-    assert told["boundary"] == ("wall, wall" if flat else "periodic, periodic, periodic")
-    assert told["title"] == ("four discs on springs" if flat else "periodic hard spheres")
+    info = dict(line.split(None, 1) for line in done.stdout.splitlines())
+    assert info["frames"] == ("17" if flat else "7") and info["particles"] == ("4" if flat else "108")
+    assert info["times"] == ("0 to 8" if flat else "0 to 3") and info["dimension"] == ("2" if flat else "3")
+    assert info["boundary"] == ("wall, wall" if flat else "periodic, periodic, periodic")
+    assert info["title"] == ("four discs on springs" if flat else "periodic hard spheres")
     if flat:
-        assert told["box"] == "9, 5"
+        assert info["box"] == "9, 5"
     done = info(output / "events.h5")
     with h5py.File(output / "events.h5") as file:
         assert f"collisions    {len(file['events/time'])}" in done.stdout

@@ -60,7 +60,7 @@ def running(output):
         try:
             arguments = (process / "cmdline").read_bytes().split(b"\0")
             rank = re.search(rb"(?:^|\0)OMPI_COMM_WORLD_RANK=(\d+)", (process / "environ").read_bytes())
-        except OSError:  # it has just ended, or is somebody else's
+        except OSError:  # it has just ended, or belongs to another user
             continue
         if rank and str(output).encode() in arguments and arguments[0] == CAROM.encode():
             found[int(rank[1])] = int(process.name)
@@ -231,14 +231,14 @@ def test_rank_0_stops_all(tmp_path):
     ("placement.packing_fraction=0.9", 3, "overlap"),
     ("integrator.max_events_per_step=1", 4, "max_events_per_step"),
 ])
-def test_an_error_of_all_ranks_is_told_once(change, code, words, tmp_path):
+def test_an_error_of_all_ranks_is_reported_once(change, code, words, tmp_path):
     deck, out = write_deck(tmp_path, SPHERES), tmp_path / "out"
-    told = run(deck, tmp_path / "plain", [change], code=code).stderr
+    errors = run(deck, tmp_path / "plain", [change], code=code).stderr
     done = mpirun(3, command(deck, out, [change]), code=code)
-    assert words in told
+    assert words in errors
     # Of a step that cannot be done, one rank may know more than several.
-    assert code == 4 or done.stderr.count(told.strip()) == 1
-    assert done.stderr.count(words) == told.count(words)
+    assert code == 4 or done.stderr.count(errors.strip()) == 1
+    assert done.stderr.count(words) == errors.count(words)
     assert "carom: rank" not in done.stderr and "MPI_ABORT" not in done.stderr
     assert out.exists() == (tmp_path / "plain").exists() == (code == 4)
     assert code != 4 or summary(out)["status"] == "failed"
@@ -257,8 +257,8 @@ def test_a_killed_rank(tmp_path):
     out = tmp_path / "out"
     job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS))
     os.kill(when_it_runs(job, out)[1], signal.SIGKILL)
-    told = job.communicate(timeout=60)[1]
-    assert job.returncode != 0 and "rank 1" in told and "Killed" in told
+    errors = job.communicate(timeout=60)[1]
+    assert job.returncode != 0 and "rank 1" in errors and "Killed" in errors
     when_it_has_ended(out)
     assert len(data_sets(out / "trajectory.h5md")["particles/trajectory/position/step"]) >= 3
     assert len(thermo(out)["time"]) >= 3
@@ -268,8 +268,8 @@ def test_a_stopped_rank(tmp_path):
     out = tmp_path / "out"
     job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--silence", "2")))
     os.kill(when_it_runs(job, out)[1], signal.SIGSTOP)
-    told = job.communicate(timeout=60)[1]
-    assert job.returncode == 70 and "nothing was heard of rank 1 of 3 for 2 s" in told
+    errors = job.communicate(timeout=60)[1]
+    assert job.returncode == 70 and "no answer from rank 1 of 3 for 2 s" in errors
     assert summary(out)["status"] == "failed" and "rank 1 of 3" in summary(out)["error"]
     assert frames_are_sound(out) >= 3
 
@@ -281,8 +281,8 @@ def test_rank_0_cannot_write(tmp_path):
     rank_0 = when_it_runs(job, out)[0]
     room = (out / "trajectory.h5md").stat().st_size + 1000000
     resource.prlimit(rank_0, resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
-    told = job.communicate(timeout=60)[1]
-    assert job.returncode == 5 and "carom: rank 0 of 3: " in told and "File too large" in told
+    errors = job.communicate(timeout=60)[1]
+    assert job.returncode == 5 and "carom: rank 0 of 3: " in errors and "File too large" in errors
     assert summary(out)["status"] == "failed" and "File too large" in summary(out)["error"]
     assert frames_are_sound(out) >= 3
 

@@ -100,7 +100,7 @@ def test_resolved_deck_gives_the_same_run(text, tmp_path):
     run(write_deck(tmp_path, text), tmp_path / "a")
     run(tmp_path / "a" / "deck.toml", tmp_path / "b")
     a, b = (data_sets(tmp_path / name / "trajectory.h5md") for name in "ab")
-    for sets in (a, b):  # the resolved decks may differ in where they say the output goes
+    for sets in (a, b):  # the resolved decks may differ in where the output goes
         del sets["parameters/deck"]
     assert same(a, b)
     assert (tmp_path / "a" / "thermo.csv").read_bytes() == (tmp_path / "b" / "thermo.csv").read_bytes()

@@ -1,4 +1,4 @@
-"""tools/setup.sh on machines that it can't be run on here: what it would install, and how it asks for it."""
+"""tools/setup.sh on machines that it can't be run on here: what it would install, and by which commands."""
 
 import os
 import pathlib
@@ -12,7 +12,7 @@ WANTED = [line for line in (SETUP.parent / "packages.txt").read_text().split("\n
 
 @pytest.fixture
 def machine(tmp_path):
-    """A machine with some packages installed; returns its exit code, what it said, and the apt-get calls."""
+    """A machine with some packages installed; returns its exit code, its output, and the apt-get calls."""
     calls = tmp_path / "calls"
 
     def install(installed, uid, sudo):

@@ -1,4 +1,4 @@
-"""The Python tools against files whose contents are known, and the studies against the command itself ($CAROM)."""
+"""The Python tools against files with known contents, and the studies against the command itself ($CAROM)."""
 
 import csv
 import sys
@@ -111,7 +111,7 @@ def test_every_missing_object_is_found(tmp_path):
     for name in names:
         (run / "trajectory.h5md").write_bytes(sound)
         with h5py.File(run / "trajectory.h5md", "r+") as file:
-            # visit() tells one name of a linked data set; whichever it is, the others remain.
+            # visit() gives one name of a linked data set; whichever it is, the others remain.
             del file[name]
         assert check_h5md.violations(run, with_mdanalysis=False), name
 
@@ -283,7 +283,7 @@ def test_cost_study(tmp_path, capsys):
     rows = rows_of(cost_study, "cost", tmp_path, "spring-lattice", "--methods", "cdda,edda", "--counts", "16,144",
                    "--end-time", "1", "--repeats", "1")
     passes = [float(row["passes_per_step"]) for row in rows]
-    assert passes[1] > 3 * passes[0]  # all of a system's collisions cut everybody's step
+    assert passes[1] > 3 * passes[0]  # each collision cuts the step of all particles
     assert passes[3] == pytest.approx(passes[2], rel=0.3)
 
 
@@ -322,8 +322,8 @@ def test_rank_study(tmp_path, capsys):
         assert 0 < float(row["redone"]) < 0.05
     twice = [float(row["twice"]) for row in rows]
     assert twice[0] < twice[1] and twice[4] < twice[1]  # more for regions with neighbours on all sides, and for small ones
-    told = capsys.readouterr().out
-    assert "One core: 1e+06 collisions/s (given)" in told
+    printed = capsys.readouterr().out
+    assert "One core: 1e+06 collisions/s (given)" in printed
     with open(tmp_path / "model.csv", newline="") as file:
         model = {(int(row["regions"]), int(row["per_region"])): float(row["efficiency"]) for row in csv.DictReader(file)}
     assert 0 < model[10000, 10**4] < model[64, 10**4] < model[64, 10**6] < 1

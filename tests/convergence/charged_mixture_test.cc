@@ -22,7 +22,7 @@ using test::Mean;
 constexpr double cold = 0.5, hot = 1.5;
 
 /// 54 ions of each kind, charges 1 and −1, diameters 1 and 0.5, masses 1 and 0.25, at packing fraction 0.35: on fcc
-/// sites whose owners are drawn.
+/// sites assigned at random.
 std::unique_ptr<System<3>> charged_mixture(unsigned seed) {
   const std::size_t n = 108;
   const double volume = n / 2 * std::numbers::pi / 6 * (1 + 0.125) / 0.35;

@@ -141,7 +141,7 @@ void expect_contact_value(double eta, double tolerance) {
   EXPECT_GE(rdf.samples(), 20u);
   const double expected = literature::contact_value<D>(eta);
   EXPECT_NEAR(rdf.contact_value(0, 0).value(), expected, tolerance * expected);
-  EXPECT_EQ(rdf.g()[99], 0);  // nobody overlaps: contact is the edge of shell 99
+  EXPECT_EQ(rdf.g()[99], 0);  // no overlaps: contact is the edge of shell 99
   EXPECT_GT(rdf.g()[100], 1);
 }
 
@@ -160,7 +160,7 @@ void expect_lorentz(int cells, double barred, std::uint64_t collisions) {
   auto& p = system->particles;
   for (auto& v : p.v) v.setZero();
   for (auto& m : p.mass) m = 1e30;
-  // A place for it where nobody is near.
+  // A place for it with no sphere near.
   Vec<D> place = Vec<D>::Zero(), v = Vec<D>::Zero();
   const auto taken = [&] {
     return std::ranges::any_of(p.x, [&](const Vec<D>& x) {

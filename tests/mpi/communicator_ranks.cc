@@ -64,27 +64,27 @@ Bytes filled(std::size_t size, int from, int to) {
 void check_calls(MpiExchange& ranks) {
   const int rank = ranks.rank(), size = ranks.size();
   for (const std::size_t length : {std::size_t{0}, std::size_t{1}, std::size_t{1000}, std::size_t{3000000}}) {
-    // Rank a says something to b where a + b is not a multiple of 3.
-    const auto says = [](int a, int b) { return (a + b) % 3 != 0; };
+    // Rank a sends something to b where a + b is not a multiple of 3.
+    const auto sends = [](int a, int b) { return (a + b) % 3 != 0; };
     std::vector<Bytes> outgoing(static_cast<std::size_t>(size));
     for (int r = 0; r < size; ++r)
-      if (says(rank, r)) outgoing[static_cast<std::size_t>(r)] = filled(length + static_cast<std::size_t>(r), rank, r);
+      if (sends(rank, r)) outgoing[static_cast<std::size_t>(r)] = filled(length + static_cast<std::size_t>(r), rank, r);
     const auto incoming = ranks.swap(std::move(outgoing));
     require(incoming.size() == static_cast<std::size_t>(size), "number of messages");
     for (int r = 0; r < size; ++r)
       require(incoming[static_cast<std::size_t>(r)] ==
-                  (says(r, rank) ? filled(length + static_cast<std::size_t>(rank), r, rank) : Bytes{}),
+                  (sends(r, rank) ? filled(length + static_cast<std::size_t>(rank), r, rank) : Bytes{}),
               "swap");
     // In a ring, where with two ranks both neighbours are one, and with one there are none.
     std::vector<int> partners;
     for (const int r : {(rank + 1) % size, (rank + size - 1) % size})
       if (r != rank && std::find(partners.begin(), partners.end(), r) == partners.end()) partners.push_back(r);
-    std::vector<Bytes> letters;
-    for (const int r : partners) letters.push_back(filled(says(rank, r) ? length : length / 7, rank, r));
-    const auto mail = ranks.swap(std::move(letters), partners);
-    require(mail.size() == partners.size(), "number of letters");
+    std::vector<Bytes> messages;
+    for (const int r : partners) messages.push_back(filled(sends(rank, r) ? length : length / 7, rank, r));
+    const auto received = ranks.swap(std::move(messages), partners);
+    require(received.size() == partners.size(), "number of messages");
     for (std::size_t k = 0; k < partners.size(); ++k)
-      require(mail[k] == filled(says(partners[k], rank) ? length : length / 7, partners[k], rank),
+      require(received[k] == filled(sends(partners[k], rank) ? length : length / 7, partners[k], rank),
               "swap of neighbours");
     const auto all = ranks.gather(filled(length * static_cast<std::size_t>(rank), rank, 0));
     for (int r = 0; r < size; ++r)
@@ -125,8 +125,8 @@ void measure(MpiExchange& ranks, MPI_Comm world) {
   show("swap, 1000 bytes each", [&] { ranks.swap(some); });
   const int other = ranks.rank() ^ 1;  // the last of an odd number is alone
   const std::vector<int> partners(other < ranks.size() ? 1 : 0, other);
-  const std::vector<Bytes> letters(partners.size(), Bytes(1000));
-  show("swap in pairs, 1000 bytes", [&] { ranks.swap(letters, partners); });
+  const std::vector<Bytes> messages(partners.size(), Bytes(1000));
+  show("swap in pairs, 1000 bytes", [&] { ranks.swap(messages, partners); });
 }
 
 int all(const std::string& what, MpiExchange& ranks, MPI_Comm world) {
@@ -140,7 +140,7 @@ int all(const std::string& what, MpiExchange& ranks, MPI_Comm world) {
   if (what == "latency") measure(ranks, world);
   if (what == "alike") {
     sleep(0.3 * ranks.rank());
-    throw Error(Failure::numerical, "nobody can do this");
+    throw Error(Failure::numerical, "no rank can do this");
   }
   if (what == "one" && is_one) throw std::logic_error("a bug");
   if (what == "memory" && is_one) throw std::bad_alloc();
@@ -179,7 +179,7 @@ int main(int argc, char** argv) {
     try {
       return all(what, exchange, ranks.handle());
     } catch (const carom::RankFailure& e) {
-      std::cout << "told: " << e.what() << std::endl;
+      std::cout << "received: " << e.what() << std::endl;
       throw;
     }
   };

@@ -1,24 +1,24 @@
 #!/bin/sh
 # expect.sh SETTINGS CODE WORDS RANKS PROGRAM [ARGUMENT…]: runs the program on that many ranks (0: without mpirun) and
-# succeeds if it ends with the exit code and says the words (a regular expression, any case; with ^ and $ once only).
+# succeeds if it ends with the exit code and prints the words (a regular expression, any case; with ^ and $ once only).
 # shellcheck source=/dev/null
 . "$1"
 code=$2 words=$3 ranks=$4
 shift 4
 if [ "$ranks" != 0 ]; then set -- timeout -k 10 60 mpirun --timeout 40 -n "$ranks" "$@"; fi
-said=$("$@" 2>&1)
+output=$("$@" 2>&1)
 got=$?
-printf '%s\n' "$said"
+printf '%s\n' "$output"
 if [ "$got" != "$code" ]; then
   echo "exit code $got instead of $code"
   exit 1
 fi
-times=$(printf '%s\n' "$said" | grep -ci -- "$words")
+times=$(printf '%s\n' "$output" | grep -ci -- "$words")
 case $words in
   ^*$) wanted=1 ;;
   *) wanted=$((times > 0 ? times : 1)) ;;
 esac
 if [ "$times" != "$wanted" ]; then
-  echo "it says $times times: $words"
+  echo "it prints $times times: $words"
   exit 1
 fi

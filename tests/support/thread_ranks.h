@@ -15,12 +15,13 @@ namespace carom::test {
 
 class ThreadRanks {
  public:
-  explicit ThreadRanks(int size) : post_(static_cast<std::size_t>(size)), failures_(static_cast<std::size_t>(size)) {}
+  explicit ThreadRanks(int size)
+      : messages_(static_cast<std::size_t>(size)), failures_(static_cast<std::size_t>(size)) {}
 
   /// Does this on all ranks. Where it throws on any of them all end, and the first one's exception is thrown.
   void run(const std::function<void(Exchange&)>& work) {
     std::vector<std::thread> threads;
-    for (std::size_t rank = 0; rank < post_.size(); ++rank)
+    for (std::size_t rank = 0; rank < messages_.size(); ++rank)
       threads.emplace_back([&, rank] {
         Rank exchange(*this, rank);
         try {
@@ -39,24 +40,26 @@ class ThreadRanks {
    public:
     Rank(ThreadRanks& team, std::size_t rank) : team_(team), rank_(rank) {}
     int rank() const override { return static_cast<int>(rank_); }
-    int size() const override { return static_cast<int>(team_.post_.size()); }
+    int size() const override { return static_cast<int>(team_.messages_.size()); }
     std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
-      team_.post_[rank_] = std::move(outgoing);
+      team_.messages_[rank_] = std::move(outgoing);
       team_.meet(rank_);
       std::vector<Bytes> incoming;
-      for (auto& from : team_.post_) incoming.push_back(from[rank_]);
+      for (auto& from : team_.messages_) incoming.push_back(from[rank_]);
       team_.meet(rank_);
       return incoming;
     }
     std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override {
-      std::vector<Bytes> to(team_.post_.size()), incoming;
+      std::vector<Bytes> to(team_.messages_.size()), incoming;
       for (std::size_t k = 0; k < partners.size(); ++k)
         to[static_cast<std::size_t>(partners[k])] = std::move(outgoing[k]);
       std::vector<Bytes> from = swap(std::move(to));
       for (const int partner : partners) incoming.push_back(std::move(from[static_cast<std::size_t>(partner)]));
       return incoming;
     }
-    std::vector<Bytes> gather(const Bytes& mine) override { return swap(std::vector<Bytes>(team_.post_.size(), mine)); }
+    std::vector<Bytes> gather(const Bytes& mine) override {
+      return swap(std::vector<Bytes>(team_.messages_.size(), mine));
+    }
     void largest(std::span<double> values) override {
       combine(values, [](double a, double b) { return std::max(a, b); });
     }
@@ -86,27 +89,27 @@ class ThreadRanks {
   void meet(std::size_t rank) {
     std::unique_lock lock(mutex_);
     const std::uint64_t round = round_;
-    if (++waiting_ == post_.size()) {
+    if (++waiting_ == messages_.size()) {
       waiting_ = 0;
       ++round_;
       all_there_.notify_all();
     }
-    all_there_.wait(lock, [&] { return round_ != round || first_failed_ < post_.size(); });
+    all_there_.wait(lock, [&] { return round_ != round || first_failed_ < messages_.size(); });
     if (round_ == round) throw Error(Failure::numerical, "rank " + std::to_string(rank) + " was left alone");
   }
   void give_up() {
     const std::lock_guard lock(mutex_);
-    for (std::size_t rank = 0; rank < failures_.size() && first_failed_ == kNobody; ++rank)
+    for (std::size_t rank = 0; rank < failures_.size() && first_failed_ == kNone; ++rank)
       if (failures_[rank]) first_failed_ = rank;
     all_there_.notify_all();
   }
 
-  static constexpr std::size_t kNobody = ~std::size_t{0};
+  static constexpr std::size_t kNone = ~std::size_t{0};
 
-  std::vector<std::vector<Bytes>> post_;
+  std::vector<std::vector<Bytes>> messages_;
   std::mutex mutex_;
   std::condition_variable all_there_;
-  std::size_t waiting_ = 0, first_failed_ = kNobody;
+  std::size_t waiting_ = 0, first_failed_ = kNone;
   std::uint64_t round_ = 0;
   std::vector<std::exception_ptr> failures_;
 };

@@ -26,7 +26,7 @@ std::vector<double> two_sizes(std::size_t n, std::size_t large, double ratio) {
   return radius;
 }
 
-/// Not a single overlap, not even by rounding, through any image; everybody in the box and off its walls.
+/// Not a single overlap, not even by rounding, through any image; all spheres in the box and off its walls.
 template <int D>
 void expect_sound(const Box<D>& box, const std::vector<double>& radius, const Compression<D>& done) {
   ASSERT_TRUE(done.reached()) << "factor " << done.factor << ", pressure " << done.reduced_pressure;

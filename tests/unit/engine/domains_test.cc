@@ -104,7 +104,7 @@ TEST(Domains, ManySizes) {
       {.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3, .slabs = 2}, 200);
 }
 
-/// All in one line across the longest edge, at its end or in its middle: regions can have nobody, or one sphere, before
+/// All in one line across the longest edge, at its end or in its middle: regions can have no sphere, or one, before
 /// others come, in the same epoch or in the next.
 TEST(Domains, EmptyRegions) {
   for (const double column : {5.0, 100.0}) {
@@ -124,7 +124,7 @@ TEST(Domains, EmptyRegions) {
   }
 }
 
-/// The core of a region has cells near its spheres only, until one comes to where nobody was expected: here all, out of
+/// The core of a region has cells near its spheres only, until one comes to where none was expected: here all, out of
 /// one end of a periodic box into all of it.
 TEST(Domains, SpheresFarFromTheirRegion) {
   for (const double radius : {0.4, 0.2})  // equal ones, and others
@@ -159,14 +159,14 @@ TEST(Domains, WallsAndFields) {
       {.system = random_system<2>(40, {7, 12}, {W, W}, 0.3, 0.5, 8), .g = {0, -0.5}, .slab = 1}, 200);
 }
 
-/// Regions whose spheres have more to do become smaller: that reaches nobody's path.
+/// Regions with more events a sphere become smaller: that changes no path.
 TEST(Domains, UnevenWork) {
   expect_the_same_however_divided<3>(
       {.system = random_system<3>(200, {6, 6, 24}, {P, P, W}, 0.4, 0.4, 17), .g = {0, 0, -2}, .slab = 1.5, .slabs = 5},
       1500);
 }
 
-/// One sphere is so fast that each region would have more neighbours than can be told apart.
+/// One sphere is so fast that each region would have more neighbours than there are bits for.
 TEST(Domains, MoreRegionsThanTheBoxHasRoomFor) {
   const Case<3> c{.system = test::hard_spheres<3>(6, 0.49), .slab = 0.05, .slabs = 2};
   c.system->particles.v[5] *= 100;

@@ -68,10 +68,10 @@ std::unique_ptr<System<D>> random_system(int n, const Vec<D>& edges, std::array<
   std::vector<Vec<D>> x(n, Vec<D>::Zero()), v(n, Vec<D>::Zero());
   auto system = test::make_system<D>(edges, P, x, v, radius, mass);
   system->box.boundary = boundary;
-  std::vector<Id> everybody(n);
-  for (int i = 0; i < n; ++i) everybody[i] = static_cast<Id>(i);
-  EXPECT_EQ(insert_at_random<D>(system->box, system->particles.x, radius, everybody, seed), everybody.size());
-  draw_velocities<D>(system->particles, everybody, std::vector<double>(n, 1.0), seed);
+  std::vector<Id> ids(n);
+  for (int i = 0; i < n; ++i) ids[i] = static_cast<Id>(i);
+  EXPECT_EQ(insert_at_random<D>(system->box, system->particles.x, radius, ids, seed), ids.size());
+  draw_velocities<D>(system->particles, ids, std::vector<double>(n, 1.0), seed);
   return system;
 }
 

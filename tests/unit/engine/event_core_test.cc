@@ -20,7 +20,8 @@ struct Hit {
   Id lo, hi;
 };
 
-/// Event-driven dynamics the slow and obvious way: everybody is moved to every event, all pairs and images are tried.
+/// Event-driven dynamics the slow and obvious way: all spheres are moved to every event, all pairs and images are
+/// tried.
 template <int D>
 std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g, double end) {
   std::vector<Hit> hits;

@@ -247,6 +247,7 @@ TEST(Part, NobodyHasEverybody) {
     double reach = system->interactions[0]->reach(system->particles, exchange);
     exchange.largest({&reach, 1});
     EXPECT_EQ(reach, whole->interactions[0]->reach(all.x));
+    system->quanta = quanta(*system);
     Part<2> part(*system, true, 0.02);
     System<2>& known = part.known();
     Particles<2>& p = known.particles;

@@ -140,7 +140,7 @@ TEST(Sizes, AreThoseOfTheSpeciesWhereTheyAreEqual) {
   EXPECT_EQ(by_id.largest_radius(), 0.5);
 }
 
-/// Whoever knows whom, and with many at the same coordinates.
+/// Whichever rank has which spheres, and with many at the same coordinates.
 TEST(Division, HasTheSameCutsOnAnyNumberOfRanks) {
   for (const bool layers : {false, true}) {
     auto system = random_system<3>(500, {30, 12, 12}, {O, P, W}, 0.3, 0.3, 3);
@@ -153,7 +153,7 @@ TEST(Division, HasTheSameCutsOnAnyNumberOfRanks) {
     for (const Vec<3>& at : x) ++spheres[whole.owner(at)];
     for (const std::size_t n : spheres) EXPECT_NEAR(static_cast<double>(n), 500.0 / 7, layers ? 40 : 5);
     test::ThreadRanks(3).run([&](Exchange& ranks) {
-      std::vector<Vec<3>> some;  // one rank has nobody
+      std::vector<Vec<3>> some;  // one rank has none
       for (std::size_t i = 0; i < x.size(); ++i)
         if (static_cast<int>(i % 2) == ranks.rank()) some.push_back(x[i]);
       const Division<3> division(system->box, some, 7, 1.0, ranks);

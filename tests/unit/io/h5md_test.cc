@@ -96,7 +96,7 @@ TYPED_TEST(Trajectory, IsReadableAfterEveryFrame) {
   }
 }
 
-/// Another rank that has nobody, and is lost in the middle of the second frame.
+/// Another rank that has no particles, and is lost in the middle of the second frame.
 TEST(TrajectoryFile, HasNoPartOfAFrameInWhichARankIsLost) {
   struct Lost : Exchange {
     int calls = 0;

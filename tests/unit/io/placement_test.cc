@@ -84,9 +84,9 @@ TEST(RandomInsertion, PlacesUnequalSpheresWithoutOverlap) {
     std::vector<double> radius(100, 0.3);
     std::fill_n(radius.begin() + 50, 20, 0.8);
     std::vector<Vec<2>> x(radius.size(), Vec<2>::Constant(6));  // the first one stands there already
-    std::vector<Id> who(radius.size() - 1);
-    std::iota(who.begin(), who.end(), 1);
-    ASSERT_EQ(insert_at_random<2>(box, x, radius, who, 5), who.size());
+    std::vector<Id> ids(radius.size() - 1);
+    std::iota(ids.begin(), ids.end(), 1);
+    ASSERT_EQ(insert_at_random<2>(box, x, radius, ids, 5), ids.size());
     EXPECT_EQ(x[0], Vec<2>::Constant(6));
     EXPECT_EQ(find_overlaps<2>(box, x, radius).pairs, 0u);
     EXPECT_EQ(find_outsiders<2>(box, x, radius).spheres, 0u);
@@ -99,9 +99,9 @@ TEST(RandomInsertion, PlacesSpheresOfTenToOneInThreeDimensions) {
   for (std::size_t i = 5; i < radius.size(); i += 20) radius[i] = 0.35;
   const auto box = box_of<3>({5, 6, 7}, Boundary::periodic);
   std::vector<Vec<3>> x(radius.size());
-  std::vector<Id> who(radius.size());
-  std::iota(who.begin(), who.end(), 0);
-  ASSERT_EQ(insert_at_random<3>(box, x, radius, who, 5), who.size());
+  std::vector<Id> ids(radius.size());
+  std::iota(ids.begin(), ids.end(), 0);
+  ASSERT_EQ(insert_at_random<3>(box, x, radius, ids, 5), ids.size());
   for (std::size_t i = 0; i < x.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       Vec<3> d = x[i] - x[j];
@@ -114,9 +114,9 @@ TEST(RandomInsertion, TellsHowFarItCame) {
   const auto box = box_of<2>(Vec<2>::Constant(5), Boundary::periodic);
   const std::vector<double> radius(30, 0.5);  // packing fraction 0.94
   std::vector<Vec<2>> x(radius.size());
-  std::vector<Id> who(radius.size());
-  std::iota(who.begin(), who.end(), 0);
-  const std::size_t placed = insert_at_random<2>(box, x, radius, who, 5, 2000);
+  std::vector<Id> ids(radius.size());
+  std::iota(ids.begin(), ids.end(), 0);
+  const std::size_t placed = insert_at_random<2>(box, x, radius, ids, 5, 2000);
   EXPECT_GT(placed, 10u);
   EXPECT_LT(placed, 21u);  // 0.547 of the box at most, but for the finite size
 }
@@ -172,10 +172,10 @@ TEST(Velocities, HaveTheTemperatureAskedForAndNoMomentum) {
   Particles<3> p;
   p.v.assign(n, Vec<3>::Zero());
   for (std::size_t i = 0; i < n; ++i) p.mass.push_back(i % 2 == 0 ? 1 : 7.5);
-  std::vector<Id> who(n);
-  std::iota(who.begin(), who.end(), 0);
+  std::vector<Id> ids(n);
+  std::iota(ids.begin(), ids.end(), 0);
   const std::vector<double> temperature(n, 1.7);
-  draw_velocities<3>(p, who, temperature, 11);
+  draw_velocities<3>(p, ids, temperature, 11);
   double twice_kinetic = 0, light = 0;
   Vec<3> momentum = Vec<3>::Zero();
   for (std::size_t i = 0; i < n; ++i) {
@@ -189,8 +189,8 @@ TEST(Velocities, HaveTheTemperatureAskedForAndNoMomentum) {
               5 * 1.7 * std::sqrt(2 / (1.5 * n)));  // equipartition, five standard deviations
 
   Particles<3> again = p, other = p;
-  draw_velocities<3>(again, who, temperature, 11);
-  draw_velocities<3>(other, who, temperature, 12);
+  draw_velocities<3>(again, ids, temperature, 11);
+  draw_velocities<3>(other, ids, temperature, 12);
   EXPECT_EQ(again.v, p.v);
   EXPECT_NE(other.v, p.v);
 }
@@ -199,9 +199,9 @@ TEST(Velocities, SingleParticleKeepsItsMomentum) {
   Particles<2> p;
   p.v.assign(1, Vec<2>::Zero());
   p.mass = {4};
-  const std::vector<Id> who{0};
+  const std::vector<Id> ids{0};
   const std::vector<double> temperature{2};
-  draw_velocities<2>(p, who, temperature, 1);
+  draw_velocities<2>(p, ids, temperature, 1);
   EXPECT_NEAR(4 * p.v[0].squaredNorm(), 2 * 2, 1e-14);
 }
 
