@@ -97,13 +97,13 @@ def test_info(output):
     flat = "2-D" in str(output)
     done = info(output / "trajectory.h5md")
     assert done.returncode == 0, done.stderr
-    info = dict(line.split(None, 1) for line in done.stdout.splitlines())
-    assert info["frames"] == ("17" if flat else "7") and info["particles"] == ("4" if flat else "108")
-    assert info["times"] == ("0 to 8" if flat else "0 to 3") and info["dimension"] == ("2" if flat else "3")
-    assert info["boundary"] == ("wall, wall" if flat else "periodic, periodic, periodic")
-    assert info["title"] == ("four discs on springs" if flat else "periodic hard spheres")
+    shown = dict(line.split(None, 1) for line in done.stdout.splitlines())
+    assert shown["frames"] == ("17" if flat else "7") and shown["particles"] == ("4" if flat else "108")
+    assert shown["times"] == ("0 to 8" if flat else "0 to 3") and shown["dimension"] == ("2" if flat else "3")
+    assert shown["boundary"] == ("wall, wall" if flat else "periodic, periodic, periodic")
+    assert shown["title"] == ("four discs on springs" if flat else "periodic hard spheres")
     if flat:
-        assert info["box"] == "9, 5"
+        assert shown["box"] == "9, 5"
     done = info(output / "events.h5")
     with h5py.File(output / "events.h5") as file:
         assert f"collisions    {len(file['events/time'])}" in done.stdout
