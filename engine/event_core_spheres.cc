@@ -148,7 +148,8 @@ void EventCore<D>::choose_search(double now) {
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
   lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, flights_.equal(), largest_, skin, agenda_);
-  lists_->build(flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, astray_);
+  lists_->build(
+      flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, astray_);
 }
 
 template <int D>

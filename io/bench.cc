@@ -7,13 +7,13 @@
 #include <fstream>
 #include <string>
 
+#include "engine/epoch.h"
 #include "engine/error.h"
 #include "engine/integrator.h"
 #include "engine/placement.h"
 #include "io/bench_forces.h"
 #include "io/bench_state.h"
 #include "io/bench_table.h"
-#include "engine/epoch.h"
 #include "io/deck_build.h"
 
 namespace carom {

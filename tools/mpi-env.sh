@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Settings of Open MPI for tests and small boxes; read with `.` before mpirun. tests/cli and tests/mpi read the same
 # lines, so that they stand in one place only: keep to `NAME=value`.
 # Run as root (containers), more ranks than cores, ranks that give way while they wait.

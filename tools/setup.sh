@@ -2,7 +2,7 @@
 # Sourced by tools/run, tools/test and tools/renew-regression: from a bare Debian 12 to a built Carom.
 #
 #   source tools/setup.sh
-#   install_packages                # what tools/packages.txt names and is not there yet
+#   install_packages [LIST…]        # what tools/packages.txt, or these lists, name and is not there yet
 #   build release carom             # a CMake preset and its targets; none = all
 #
 # Both return at once where there is nothing to do. Messages go to standard error.
@@ -10,10 +10,10 @@
 carom_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [ -f "$carom_root/tools/mpi-env.sh" ]; then source "$carom_root/tools/mpi-env.sh"; fi
 
-# Prints the packages that are not installed, one a line.
+# Prints the packages of lists that are not installed, one a line.
 missing_packages() {
   local wanted
-  wanted=$(grep -v '^#' "$carom_root/tools/packages.txt")
+  wanted=$(grep -hv '^#' "$@")
   # dpkg-query complains about names it has never seen; these are missing like the others.
   comm -23 <(sort <<<"$wanted") \
     <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $wanted 2>/dev/null | sed -n 's/^installed //p' | sort -u)
@@ -25,7 +25,8 @@ install_packages() {
     return
   fi
   local missing as_root=()
-  missing=$(missing_packages | tr '\n' ' ')
+  if [ $# = 0 ]; then set -- "$carom_root/tools/packages.txt"; fi
+  missing=$(missing_packages "$@" | tr '\n' ' ')
   if [ -z "$missing" ]; then return; fi
   if [ "$(id -u)" != 0 ]; then
     if ! sudo -n true 2>/dev/null; then

@@ -1,7 +1,6 @@
 """Trouble at run time: exit code, message, and what is left to read."""
 
 import os
-import shutil
 import subprocess
 
 import pytest

@@ -13,8 +13,7 @@ import tomllib
 
 import pytest
 
-from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, data_sets, frames_are_sound, mpi_environment, needs_carom, run,
-                  same, summary, thermo, write_deck)
+from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, data_sets, frames_are_sound, mpi_environment, needs_carom, run, summary, thermo, write_deck)
 
 sys.path.insert(0, str(ROOT / "tools"))
 import compare
