@@ -18,36 +18,22 @@ constexpr double kUneven = 0.1;                               // what differs le
 }  // namespace
 
 template <int D>
-Domains<D>::Domains(const Box<D>& box, Sizes sizes, Exchange& exchange, std::size_t regions,
-                    const SearchOptions& options, std::function<double()> window)
+Domains<D>::Domains(const Box<D>& box, Sizes sizes, Exchange& exchange, const SearchOptions& options,
+                    std::function<double()> window)
     : box_(box), sizes_(std::move(sizes)), exchange_(exchange), options_(options), forced_window_(std::move(window)) {
   diameter_ = 2 * sizes_.largest_radius();
-  make_regions(std::clamp<std::size_t>(regions, 1, std::max<std::size_t>(sizes_.spheres / kFewest, 1)));
+  make_region(std::clamp<std::size_t>(sizes_.spheres / kFewest, 1, static_cast<std::size_t>(exchange_.size())));
 }
 
 template <int D>
-void Domains<D>::make_regions(std::size_t regions) {
+void Domains<D>::make_region(std::size_t regions) {
   event_counts_ = counts();
   counts_ = domain_counts();
   regions_ = regions;
   counts_.regions = regions;
-  local_.clear();
-  for (std::size_t r = first_region(exchange_.rank()); r < first_region(exchange_.rank() + 1); ++r)
-    local_.push_back(std::make_unique<Region<D>>(box_, sizes_, options_));
-}
-
-/// Regions go to ranks in their order, as evenly as may be.
-template <int D>
-std::size_t Domains<D>::first_region(int rank) const {
-  return regions_ * static_cast<std::size_t>(rank) / static_cast<std::size_t>(exchange_.size());
-}
-
-template <int D>
-int Domains<D>::rank_of(std::uint32_t region) const {
-  int rank = static_cast<int>(region * static_cast<std::size_t>(exchange_.size()) / regions_);
-  while (first_region(rank + 1) <= region) ++rank;
-  while (first_region(rank) > region) --rank;
-  return rank;
+  region_.reset();
+  if (static_cast<std::size_t>(exchange_.rank()) < regions)
+    region_ = std::make_unique<Region<D>>(box_, sizes_, options_);
 }
 
 template <int D>
@@ -69,16 +55,19 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
   };
   std::size_t regions = regions_;
   while (!divide(regions)) regions -= (regions + 7) / 8;  // the box is too small for so many
-  if (regions < regions_) make_regions(regions);
-  find_partners();
+  if (regions < regions_) make_region(regions);
+  partners_.clear();
+  if (region_)
+    for (const std::uint32_t r : division_->neighbours(static_cast<std::uint32_t>(exchange_.rank())))
+      partners_.push_back(static_cast<int>(r));
+  outgoing_.assign(partners_.size(), {});
   load(0, [&](auto&& add) {
     for (Id i = 0; i < particles.size(); ++i)
       add(Record<D>{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]});
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
-  run_before_.clear();
-  for (const Local& region : local_) run_before_.push_back(region->run_events());
+  run_before_ = region_ ? region_->run_events() : 0;
 }
 
 /// The time in which a sphere collides kCollisions times, by Enskog's theory.
@@ -100,37 +89,11 @@ double Domains<D>::first_pace(const Particles<D>& particles) const {
   return kCollisions / (contacts_a_length(situation_of<D>(box_, sizes_.radius, extent, sizes_.number)) * thermal);
 }
 
-template <int D>
-void Domains<D>::find_partners() {
-  partners_.clear();
-  for (std::size_t q = first_region(exchange_.rank()); q < first_region(exchange_.rank() + 1); ++q)
-    for (const std::uint32_t r : division_->neighbours(static_cast<std::uint32_t>(q)))
-      if (rank_of(r) != exchange_.rank()) partners_.push_back(rank_of(r));
-  std::sort(partners_.begin(), partners_.end());
-  partners_.erase(std::unique(partners_.begin(), partners_.end()), partners_.end());
-  outgoing_.assign(partners_.size() + 1, {});
-}
-
-/// The message to a region that is a neighbour of one here, begun with its number.
-template <int D>
-Bytes& Domains<D>::message_to(std::uint32_t region) {
-  const int rank = rank_of(region);
-  Bytes& message = rank == exchange_.rank()
-                       ? outgoing_.back()
-                       : outgoing_[static_cast<std::size_t>(std::lower_bound(partners_.begin(), partners_.end(), rank) -
-                                                            partners_.begin())];
-  put(message, region);
-  return message;
-}
-
-/// Sends all messages; returns those that have come.
+/// Sends all messages to neighbours; returns those that have come from them.
 template <int D>
 std::vector<Bytes> Domains<D>::exchange_messages() {
-  Bytes here = std::move(outgoing_.back());
-  outgoing_.pop_back();
   std::vector<Bytes> received = exchange_.swap(std::move(outgoing_), partners_);
-  received.push_back(std::move(here));
-  outgoing_.assign(partners_.size() + 1, {});
+  outgoing_.assign(partners_.size(), {});
   return received;
 }
 
@@ -148,26 +111,16 @@ template <int D>
 template <class Spheres>
 void Domains<D>::load(double now, Spheres&& spheres) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
-  std::vector<Id> last(outgoing.size(), std::numeric_limits<Id>::max());  // that was sent to a rank
   spheres([&](const Record<D>& r) {
-    division_->for_each_near(place(r, now), [&](std::uint32_t region) {
-      const auto rank = static_cast<std::size_t>(rank_of(region));
-      if (std::exchange(last[rank], r.id) != r.id) put(outgoing[rank], r);
-    });
+    division_->for_each_near(place(r, now), [&](std::uint32_t region) { put(outgoing[region], r); });
   });
-  const std::size_t first = first_region(exchange_.rank());
-  std::vector<std::vector<Record<D>>> near(local_.size());
+  std::vector<Record<D>> near;
   for (Bytes& bytes : exchange_.swap(std::move(outgoing))) {
-    for (Reader reader(bytes); reader.more();) {
-      const auto r = reader.get<Record<D>>();
-      division_->for_each_near(place(r, now), [&](std::uint32_t region) {
-        if (region >= first && region < first + near.size()) near[region - first].push_back(r);
-      });
-    }
+    for (Reader reader(bytes); reader.more();) near.push_back(reader.get<Record<D>>());
     Bytes().swap(bytes);
   }
-  for (std::size_t k = 0; k < local_.size(); ++k)
-    local_[k]->load(std::move(near[k]), *division_, static_cast<std::uint32_t>(first + k), g_, horizon_, now, stray_);
+  if (region_)
+    region_->load(std::move(near), *division_, static_cast<std::uint32_t>(exchange_.rank()), g_, horizon_, now, stray_);
   now_ = now;
   cut_ = false;
   sort_out(true);
@@ -177,8 +130,8 @@ void Domains<D>::load(double now, Spheres&& spheres) {
 template <int D>
 void Domains<D>::reload() {
   load(now_, [&](auto&& add) {
-    for (const Local& region : local_)
-      for (const Slot i : region->own()) add(region->after(i));
+    if (region_)
+      for (const Slot i : region_->own()) add(region_->after(i));
   });
 }
 
@@ -187,18 +140,15 @@ void Domains<D>::reload() {
 template <int D>
 void Domains<D>::sort_out(bool loaded) {
   sorted_ = true;
-  for (const Local& region : local_)
-    region->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
-      if (!loaded) put(message_to(division_->neighbours(region->number())[neighbour]), record);
+  if (region_)
+    region_->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
+      if (!loaded) put(outgoing_[neighbour], record);
     });
   if (loaded) return;
   double full = 0;
   for (const Bytes& bytes : exchange_messages())
-    for (Reader reader(bytes); reader.more();) {
-      const auto number = reader.get<std::uint32_t>();
-      const auto record = reader.get<Record<D>>();
-      if (!local_[number - first_region(exchange_.rank())]->admit(record, now_)) full = 1;
-    }
+    for (Reader reader(bytes); reader.more();)
+      if (!region_->admit(reader.get<Record<D>>(), now_)) full = 1;
   exchange_.largest({&full, 1});
   if (full > 0) reload();
 }
@@ -223,20 +173,19 @@ double Domains<D>::run(double end, const Report& report) {
     if (cut_) reload();
     if (!sorted_) sort_out(false);
     double stop = window_end(end);
-    for (const Local& region : local_) region->run(now_, stop);
+    if (region_) region_->run(now_, stop);
     ++counts_.windows;
     agree();
     if (const double astray = first_astray(stop); astray < stop) stop = cut_at(astray);
-    for (const Local& region : local_)
-      if (!region->agrees(stop))
-        throw Error(Failure::numerical, "internal error: regions do not agree about a window; please report this");
+    if (region_ && !region_->agrees(stop))
+      throw Error(Failure::numerical, "internal error: regions do not agree about a window; please report this");
     typename Region<D>::Tally got = tally();
     std::uint64_t count = got.collisions;
     exchange_.sum({&count, 1});
     if (collisions + count >= report.collision_limit) {  // there are enough
       count = report.collision_limit - collisions;
       const EventKey<D> last = *key_of_collision(count);
-      for (const Local& region : local_) region->cut(last);
+      if (region_) region_->cut(last);
       cut_ = true;
       got = tally();
       reached = stop = last.time;
@@ -249,7 +198,7 @@ double Domains<D>::run(double end, const Report& report) {
     now_ = stop;
     sorted_ = false;
     if (cut_) continue;
-    for (const Local& region : local_) region->commit();
+    if (region_) region_->commit();
     if (count > 0) {
       const double pace = length * kCollisions * n / (2 * static_cast<double>(count));
       pace_ = pace_ > 0 ? 0.9 * pace_ + 0.1 * pace : pace;
@@ -268,14 +217,13 @@ void Domains<D>::agree() {
     send_paths();
     for (const Bytes& bytes : received_.emplace_back(exchange_messages()))
       for (Reader reader(bytes); reader.more();) {
-        const auto number = reader.get<std::uint32_t>();
         const auto id = reader.get<Id>();
-        local_[number - first_region(exchange_.rank())]->follow(id, reader);
+        region_->follow(id, reader);
       }
     more = 0;
-    for (const Local& region : local_) {
-      region->repair();
-      for (const Slot i : region->changed()) more = region->holders(i) != 0 ? 1 : more;
+    if (region_) {
+      region_->repair();
+      for (const Slot i : region_->changed()) more = region_->holders(i) != 0 ? 1 : more;
     }
     exchange_.largest({&more, 1});
   }
@@ -283,15 +231,13 @@ void Domains<D>::agree() {
 
 template <int D>
 void Domains<D>::send_paths() {
-  for (const Local& region : local_) {
-    const auto neighbours = division_->neighbours(region->number());
-    for (const Slot i : region->changed())
-      for (std::uint64_t holders = region->holders(i); holders != 0; holders &= holders - 1) {
-        Bytes& bytes = message_to(neighbours[static_cast<std::size_t>(std::countr_zero(holders))]);
-        put(bytes, region->flights()[i].id);
-        region->write_path(i, bytes);
-      }
-  }
+  if (!region_) return;
+  for (const Slot i : region_->changed())
+    for (std::uint64_t holders = region_->holders(i); holders != 0; holders &= holders - 1) {
+      Bytes& bytes = outgoing_[static_cast<std::size_t>(std::countr_zero(holders))];
+      put(bytes, region_->flights()[i].id);
+      region_->write_path(i, bytes);
+    }
 }
 
 template <int D>
@@ -308,22 +254,14 @@ void Domains<D>::give_back(double time, Particles<D>& particles) {
 /// So that the next division gives fewer spheres to regions with more events a sphere.
 template <int D>
 void Domains<D>::measure_work() {
-  std::vector<std::uint64_t> events, spheres;
-  std::array<std::uint64_t, 2> all{};
-  for (std::size_t k = 0; k < local_.size(); ++k) {
-    events.push_back(local_[k]->run_events() - run_before_[k]);
-    spheres.push_back(local_[k]->own().size());
-    all[0] += events[k];
-    all[1] += spheres[k];
-  }
+  const std::uint64_t events = region_ ? region_->run_events() - run_before_ : 0;
+  const std::uint64_t spheres = region_ ? region_->own().size() : 0;
+  std::array<std::uint64_t, 2> all{events, spheres};
   exchange_.sum(all);
-  region_work_.clear();
-  for (std::size_t k = 0; k < local_.size(); ++k) {
-    const double expected = static_cast<double>(all[0]) / static_cast<double>(all[1]) * static_cast<double>(spheres[k]);
-    double work = expected > 0 ? static_cast<double>(events[k]) / expected : 1;
-    if (std::abs(work - 1) < kUneven) work = 1;
-    region_work_.push_back(static_cast<std::uint32_t>(std::clamp(std::round(work * kUsualWork), 1.0, kMostWork)));
-  }
+  const double expected = static_cast<double>(all[0]) / static_cast<double>(all[1]) * static_cast<double>(spheres);
+  double work = expected > 0 ? static_cast<double>(events) / expected : 1;
+  if (std::abs(work - 1) < kUneven) work = 1;
+  region_work_ = static_cast<std::uint32_t>(std::clamp(std::round(work * kUsualWork), 1.0, kMostWork));
 }
 
 /// Sends the spheres, flown to a time, to the ranks that have them in their shares; and their work by region_work_.
@@ -336,10 +274,10 @@ void Domains<D>::collect(double time, Particles<D>& copies, std::vector<std::uin
   };
   const Shares shares = this->shares();
   std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
-  for (std::size_t k = 0; k < local_.size(); ++k)
-    for (const Slot i : local_[k]->own()) {
-      const Record<D> r = local_[k]->flights().at(local_[k]->after(i), time);
-      put(outgoing[static_cast<std::size_t>(shares.rank_of(r.id))], Place{r.id, work ? region_work_[k] : 0, r.x, r.v});
+  if (region_)
+    for (const Slot i : region_->own()) {
+      const Record<D> r = region_->flights().at(region_->after(i), time);
+      put(outgoing[static_cast<std::size_t>(shares.rank_of(r.id))], Place{r.id, region_work_, r.x, r.v});
     }
   const Id first = shares.first(exchange_.rank()), end = shares.first(exchange_.rank() + 1);
   copies.x.resize(end - first);
@@ -357,17 +295,16 @@ void Domains<D>::collect(double time, Particles<D>& copies, std::vector<std::uin
 template <int D>
 EventCounts Domains<D>::counts() const {
   EventCounts all = event_counts_;
-  for (const Local& region : local_) all += region->counts();
+  if (region_) all += region_->counts();
   return all;
 }
 
 template <int D>
 DomainCounts Domains<D>::domain_counts() const {
   DomainCounts all = counts_;
-  for (const Local& region : local_) {
-    all.run_events += region->run_events();
-    all.redone_events += region->redone_events();
-  }
+  if (!region_) return all;
+  all.run_events += region_->run_events();
+  all.redone_events += region_->redone_events();
   return all;
 }
 

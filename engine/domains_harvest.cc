@@ -7,22 +7,17 @@
 
 namespace carom {
 
-/// Of all regions of this rank.
 template <int D>
 typename Region<D>::Tally Domains<D>::tally() const {
-  typename Region<D>::Tally all;
-  for (const Local& region : local_) all.add(region->tally());
-  return all;
+  return region_ ? region_->tally() : typename Region<D>::Tally{};
 }
 
 /// When a sphere may first have come farther than the stray in the window; infinite: never.
 template <int D>
 double Domains<D>::first_astray(double end) {
   double speed = 0, first = std::numeric_limits<double>::infinity();
-  for (const Local& region : local_) speed = std::max(speed, region->fastest() + g_.norm() * horizon_);
-  if (speed > fastest_)
-    for (const Local& region : local_)
-      region->for_each_touched([&](Slot i) { first = std::min(first, astray_at(*region, i, end)); });
+  if (region_) speed = region_->fastest() + g_.norm() * horizon_;
+  if (speed > fastest_) region_->for_each_touched([&](Slot i) { first = std::min(first, astray_at(i, end)); });
   std::array<double, 2> worst{speed, -first};
   exchange_.largest(worst);
   if (worst[0] > fastest_) fastest_ = kFaster * worst[0];
@@ -31,11 +26,11 @@ double Domains<D>::first_astray(double end) {
 
 /// When a sphere may have come farther than the stray in the window, by the length of its path; infinite: never.
 template <int D>
-double Domains<D>::astray_at(Region<D>& region, Slot i, double end) const {
-  const auto path = region.path(i);
+double Domains<D>::astray_at(Slot i, double end) const {
+  const auto path = region_->path(i);
   double now = now_, left = stray_;
   for (std::size_t k = 0; k <= path.size(); ++k) {
-    const double speed = region.before(i, k).v.norm() + g_.norm() * horizon_;
+    const double speed = region_->before(i, k).v.norm() + g_.norm() * horizon_;
     const double until = k < path.size() ? path[k].key.time : end;
     if (speed * (until - now) > left) return now + left / speed;
     left -= speed * (until - now);
@@ -51,19 +46,19 @@ double Domains<D>::cut_at(double time) {
   cut_ = true;
   EventKey<D> last{.time = time};
   for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
-  for (const Local& region : local_) region->cut(last);
+  if (region_) region_->cut(last);
   return time;
 }
 
 /// The contacts of the window.
 template <int D>
 void Domains<D>::add_contacts(std::vector<Contact<D>>& contacts) const {
-  for (const Local& region : local_)
-    region->for_each_touched([&](Slot i) {
-      const auto path = region->path(i);
-      for (std::size_t k = 0; k < path.size(); ++k)
-        if (path[k].key.lo == path[k].after.id) contacts.push_back(contact_of(*region, i, k));
-    });
+  if (!region_) return;
+  region_->for_each_touched([&](Slot i) {
+    const auto path = region_->path(i);
+    for (std::size_t k = 0; k < path.size(); ++k)
+      if (path[k].key.lo == path[k].after.id) contacts.push_back(contact_of(i, k));
+  });
 }
 
 /// Adds up what all ranks have to report of a run.
@@ -87,19 +82,19 @@ void Domains<D>::report_all(const typename Region<D>::Tally& sum, const std::vec
 
 /// The contact that node k of a path stands for.
 template <int D>
-Contact<D> Domains<D>::contact_of(Region<D>& region, Slot lo, std::size_t k) const {
-  const EventKey<D> key = region.path(lo)[k].key;
-  const Flights<D>& flights = region.flights();
-  Record<D> a = region.before(lo, k);
+Contact<D> Domains<D>::contact_of(Slot lo, std::size_t k) const {
+  const EventKey<D> key = region_->path(lo)[k].key;
+  const Flights<D>& flights = region_->flights();
+  Record<D> a = region_->before(lo, k);
   if (key.kind == EventKind::wall) {
     const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
     const Blow<D> blow = flights.bounce(lo, a, axis, side, key.time, key.generation);
     return flights.contact_of(key, a, blow);
   }
-  const Slot hi = region.slot_of(key.hi);
-  const auto path = region.path(hi);
+  const Slot hi = region_->slot_of(key.hi);
+  const auto path = region_->path(hi);
   const auto met = std::ranges::find(path, key, &Node<D>::key) - path.begin();
-  Record<D> b = region.before(hi, static_cast<std::size_t>(met));
+  Record<D> b = region_->before(hi, static_cast<std::size_t>(met));
   const Vec<D> shift = box_.shift(key.image);
   const Blow<D> blow = flights.collide(lo, a, hi, b, shift, key.time, key.generation);
   return flights.contact_of(key, a, b, shift, blow);
@@ -109,9 +104,9 @@ Contact<D> Domains<D>::contact_of(Region<D>& region, Slot lo, std::size_t k) con
 template <int D>
 std::optional<EventKey<D>> Domains<D>::key_of_collision(std::uint64_t number) const {
   Bytes mine;
-  for (const Local& region : local_)
-    region->for_each_touched([&](Slot i) {
-      for (const Node<D>& node : region->path(i))
+  if (region_)
+    region_->for_each_touched([&](Slot i) {
+      for (const Node<D>& node : region_->path(i))
         if (node.key.kind == EventKind::pair && node.key.lo == node.after.id) put(mine, node.key);
     });
   std::vector<EventKey<D>> keys;

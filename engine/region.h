@@ -57,7 +57,6 @@ class Region {
 
   // Between windows, at a time `now` that no event precedes any more.
 
-  std::uint32_t number() const { return number_; }
   /// Own spheres, all of them.
   std::vector<Slot> own() const;
   const Flights<D>& flights() const { return core_.flights(); }

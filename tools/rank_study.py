@@ -3,11 +3,9 @@
 
     tools/rank_study.py
     tools/rank_study.py --ranks 8,64 --per-rank 500,2000 --collisions 20 --rate 1e6
-    tools/rank_study.py --mpirun --ranks 8,16,64 --per-rank 500,2000
 
-Measured, for a deck of free flight: windows, rounds a window, events run twice at borders, events redone, as in
-run.log. All regions are in one process (CAROM_REGIONS), with the windows and rounds of as many ranks; with --mpirun they are
-ranks, and the imbalance of the whole run is measured too. Spheres start at random places (--placement): cut between the
+Measured, for a deck of free flight on so many ranks: windows, rounds a window, events run twice at borders, events redone, and
+the imbalance of the whole run, as in run.log. Where there are more ranks than cores, `. tools/mpi-env.sh` first. Spheres start at random places (--placement): cut between the
 layers of a crystal, regions get unequal shares until they are made anew.
 
 Fitted to the runs with regions that have neighbours on all sides, with s = (spheres a region)^(-1/D):
@@ -22,7 +20,6 @@ bookkeeping of windows, and starts and ends of epochs and frames, at which ranks
 """
 
 import argparse
-import os
 import pathlib
 import re
 import tempfile
@@ -44,17 +41,13 @@ def parse_arguments(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     default = pathlib.Path(__file__).resolve().parent.parent / "inputs" / "hard-sphere-fluid.toml"
     parser.add_argument("deck", type=pathlib.Path, nargs="?", default=default, help="default: inputs/hard-sphere-fluid.toml")
-    parser.add_argument("--ranks", default="2,4,8,16,32,64", help="numbers of regions")
+    parser.add_argument("--ranks", default="2,4,8,16,32,64", help="numbers of ranks, a region each")
     parser.add_argument("--per-rank", default="500,2000,10000", help="spheres a region")
     parser.add_argument("--most", type=int, default=130000, help="spheres of a run; larger ones are left out")
     parser.add_argument("--collisions", type=float, default=10, help="of a sphere in a run")
-    how = parser.add_mutually_exclusive_group()
-    how.add_argument("--regions", action="store_true", help="all in one process: the default")
-    how.add_argument("--mpirun", action="store_true", help="ranks; where they are more than cores, . tools/mpi-env.sh first")
     parser.add_argument("--placement", default="random", help="of the spheres, instead of the deck's")
     parser.add_argument("--imbalance", type=float,
-                        help="factor by which the imbalance exceeds that of independent events; default: fitted with "
-                             "--mpirun, else 1")
+                        help="factor by which the imbalance exceeds that of independent events; default: fitted")
     parser.add_argument("--rate", type=float, help="collisions a second of one core; default: measured without regions")
     parser.add_argument("--latency", type=float, default=5e-6, help="of a message [s], an assumption")
     parser.add_argument("--overhead", type=float, default=5e-7, help="of each further message of an exchange [s], likewise")
@@ -95,27 +88,20 @@ def run(options, deck, particles, collisions, **how):
 def measure(options, deck, regions, per_region):
     """A row of the table of counts."""
     particles = regions * per_region
-    environment = {name: value for name, value in os.environ.items() if name != "CAROM_REGIONS"}
-    if options.mpirun:
-        how = {"launcher": ["mpirun", "-n", str(regions)]}
-    else:
-        how, environment["CAROM_REGIONS"] = {}, str(regions)
-    summary, log, _ = run(options, deck, particles, particles * options.collisions / 2, environment=environment, **how)
+    summary, log, _ = run(options, deck, particles, particles * options.collisions / 2,
+                          launcher=["mpirun", "-n", str(regions)])
     row = counts_of(log) | {"regions": regions, "per_region": per_region, "particles": particles}
     row["events"] = sum(summary["events"].values()) / row["windows"] / regions
     row["redone_events"] = row["redone"] * row["events"]
-    if not options.mpirun:
-        row["imbalance"] = np.nan  # run.log has that of ranks
     print("{regions:7} {per_region:10} {windows:8} {events:8.0f} {rounds:7.2f} {twice:8.1%} {redone:8.2%} "
-          "{redone_events:8.2f}".format(**row), f"{row['imbalance']:9.1%}" if options.mpirun else "        -", flush=True)
+          "{redone_events:8.2f} {imbalance:9.1%}".format(**row), flush=True)
     return row
 
 
 def measured_rate(options, deck):
     """Collisions a second of one core, without regions, and the number of spheres."""
-    environment = {name: value for name, value in os.environ.items() if name != "CAROM_REGIONS"}
     particles = options.per_rank[-1]
-    summary, _, seconds = run(options, deck, particles, RATE_COLLISIONS, environment=environment)
+    summary, _, seconds = run(options, deck, particles, RATE_COLLISIONS)
     return summary["events"]["sphere_sphere"] / seconds, particles
 
 
@@ -134,7 +120,7 @@ def fit(rows, dimension, imbalance=None):
     b, a = np.polyfit(border(column("regions"), column("per_region"), dimension), column("rounds"), 1)
     if imbalance is None:
         factors = column("imbalance") * np.sqrt(column("events") * column("windows") / (2 * np.log(column("regions"))))
-        imbalance = 1.0 if np.isnan(factors).any() else np.mean(factors)
+        imbalance = np.mean(factors)
     return {"dimension": dimension, "h": np.mean(((1 + column("twice")) ** (1 / dimension) - 1) / s),
             "r": np.mean(column("redone") / s), "a": a, "b": b,
             "events": np.mean(column("events") / column("per_region")), "imbalance": imbalance}
@@ -171,8 +157,7 @@ def main(arguments=None):
     options = parse_arguments(arguments)
     deck = read_deck(options)
     options.output.mkdir(parents=True, exist_ok=True)
-    print(f"Measured with {'ranks' if options.mpirun else 'regions of one process'}; events, and events redone, are of a "
-          "region in a window:")
+    print("Measured; events, and events redone, are of a region in a window.")
     print("regions per region  windows   events  rounds    twice   redone   events imbalance")
     rows = [measure(options, deck, regions, per_region) for per_region in options.per_rank for regions in options.ranks
             if regions * per_region <= options.most]

@@ -3,10 +3,7 @@
 // The slab is an epoch: at its end all records are flown to one time and wrapped, so that times stay small and their
 // last digits fine. Between events x(t) = x + v s + ½ g s² holds exactly; there is no step and no truncation error.
 
-#include <charconv>
-#include <cstdlib>
 #include <optional>
-#include <string_view>
 
 #include "engine/domains.h"
 #include "engine/error.h"
@@ -24,10 +21,8 @@ class FreeFlight : public Integrator<D> {
 
   void start(System<D>& system, Counters&) override {
     if (system.ranks) ranks_ = system.ranks;
-    const std::size_t regions = regions_a_rank();
-    if (ranks_->size() > 1 || regions > 1)
-      domains_.emplace(system.box, system.sizes ? *system.sizes : Sizes(system.particles), *ranks_,
-                       regions * static_cast<std::size_t>(ranks_->size()));
+    if (ranks_->size() > 1)
+      domains_.emplace(system.box, system.sizes ? *system.sizes : Sizes(system.particles), *ranks_);
     else
       core_.emplace(system.box, system.particles);
     for (const auto& term : system.interactions) {
@@ -85,19 +80,6 @@ class FreeFlight : public Integrator<D> {
   }
 
   double seconds_waited() const { return domains_ ? domains_->seconds_waited() : 0; }
-
-  /// The value of CAROM_REGIONS; else one.
-  static std::size_t regions_a_rank() {
-    const char* const forced = std::getenv("CAROM_REGIONS");
-    if (!forced) return 1;
-    const std::string_view text(forced);
-    std::size_t regions = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), regions);
-    if (error != std::errc{} || end != text.data() + text.size() || regions == 0)
-      throw Error(Failure::deck,
-                  "CAROM_REGIONS=" + std::string(text) + ": give the number of regions a rank, 1 or more");
-    return regions;
-  }
 
   std::uint64_t max_events_;
   Vec<D> g_ = Vec<D>::Zero();

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from runs import ROOT, needs_carom
+from runs import ROOT, mpi_environment, needs_carom
 
 sys.path.insert(0, str(ROOT / "tools"))
 
@@ -310,7 +310,9 @@ def test_the_model_of_ranks_takes_from_counts_what_is_in_them(capsys):
 
 
 @needs_carom
-def test_rank_study(tmp_path, capsys):
+def test_rank_study(tmp_path, capsys, monkeypatch):
+    for name, value in mpi_environment().items():
+        monkeypatch.setenv(name, value)
     rows = rows_of(rank_study, "ranks", tmp_path, "hard-sphere-fluid", "--ranks", "2,8,16", "--per-rank", "100,400",
                    "--most", "3200", "--rate", "1e6")
     assert [(int(row["regions"]), int(row["per_region"])) for row in rows] == [
