@@ -4,9 +4,9 @@
     tools/rank_study.py
     tools/rank_study.py --ranks 8,64 --per-rank 500,2000 --collisions 20 --rate 1e6
 
-Measured, for a deck of free flight on so many ranks: windows, rounds a window, events run twice at borders, events redone, and
-the imbalance of the whole run, as in run.log. Where there are more ranks than cores, `. tools/mpi-env.sh` first. Spheres start at random places (--placement): cut between the
-layers of a crystal, regions get unequal shares until they are made anew.
+Measured, for a deck of free flight on so many ranks: windows, rounds a window, events run twice at borders, events redone,
+and the imbalance of the whole run, as in run.log. Where there are more ranks than cores, `. tools/mpi-env.sh` first. Spheres
+start at random places (--placement): cut between the layers of a crystal, regions get unequal shares until they are made anew.
 
 Fitted to the runs with regions that have neighbours on all sides, with s = (spheres a region)^(-1/D):
 events run twice (1 + h s)^D - 1, a shell around a cube; events redone r s, a surface; rounds a window a + b log2(spheres

@@ -57,3 +57,10 @@ def test_the_fluid_has_a_first_peak_at_contact(examples):
 def test_an_integrator_of_ones_own_has_order_one(examples):
     errors = [float(re.search(r"energy error ([^,]+)", line)[1]) for line in run(examples / "own_integrator").splitlines()]
     assert all(1.7 < a / b < 2.3 for a, b in zip(errors, errors[1:]))
+
+
+def test_the_engine_alone_needs_neither_mpi_nor_hdf5(tmp_path):
+    absent = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("MPI", "HDF5", "spdlog", "CLI11", "nlohmann_json")]
+    run("cmake", "-S", ROOT, "-B", tmp_path, "-DCAROM_ENGINE_ONLY=ON", *absent)
+    commands = (tmp_path / "compile_commands.json").read_text()
+    assert "/engine/" in commands and "/io/" not in commands and "/parallel/" not in commands
