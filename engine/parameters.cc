@@ -17,6 +17,8 @@ constexpr std::array kTypes = {"true or false", "a whole number",  "a number",  
   throw Error(Failure::deck, std::string(of) + ": " + what + "; " + remedy);
 }
 
+std::string quoted(std::string_view name) { return std::string(1, '\'').append(name) + '\''; }
+
 /// A default, which is true, false, a number or a quoted word (Parameter::fallback).
 ParameterValue default_value(const Parameter& parameter) {
   const std::string_view text = parameter.fallback;
@@ -29,7 +31,7 @@ ParameterValue default_value(const Parameter& parameter) {
   }
   double real = 0;
   if (parameter.type != Parameter::Type::real || std::from_chars(text.data(), end, real).ec != std::errc{})
-    throw std::logic_error("the default of '" + std::string(parameter.name) + "' cannot be read");
+    throw std::logic_error("the default of " + quoted(parameter.name) + " cannot be read");
   return real;
 }
 
@@ -40,19 +42,18 @@ std::string listed(std::span<const std::string_view> words) {
 }
 
 void check_number(std::string_view of, const Parameter& parameter, double value) {
-  const std::string quoted = "'" + std::string(parameter.name) + "'";
-  if (!std::isfinite(value)) refuse(of, quoted + " is not finite", "give a finite number");
+  const std::string name = quoted(parameter.name);
+  if (!std::isfinite(value)) refuse(of, name + " is not finite", "give a finite number");
   if (parameter.range == Parameter::Range::positive && !(value > 0))
-    refuse(of, quoted + " is " + std::to_string(value), "give a positive number");
+    refuse(of, name + " is " + std::to_string(value), "give a positive number");
   if (parameter.range == Parameter::Range::non_negative && value < 0)
-    refuse(of, quoted + " is negative", "give zero or a positive number");
+    refuse(of, name + " is negative", "give zero or a positive number");
 }
 
 void check(std::string_view of, const Parameter& parameter, const ParameterValue& value) {
   const auto type = static_cast<std::size_t>(parameter.type);
   if (value.index() != type)
-    refuse(of, "'" + std::string(parameter.name) + "' is " + kTypes[value.index()],
-           std::string("give ") + kTypes[type]);
+    refuse(of, quoted(parameter.name) + " is " + kTypes[value.index()], std::string("give ") + kTypes[type]);
   if (const auto* real = std::get_if<double>(&value)) check_number(of, parameter, *real);
   if (const auto* whole = std::get_if<std::int64_t>(&value)) check_number(of, parameter, static_cast<double>(*whole));
   if (const auto* list = std::get_if<std::vector<double>>(&value))
@@ -60,8 +61,7 @@ void check(std::string_view of, const Parameter& parameter, const ParameterValue
   const auto* text = std::get_if<std::string>(&value);
   if (!text || parameter.choices.empty() || std::ranges::find(parameter.choices, *text) != parameter.choices.end())
     return;
-  refuse(of, "'" + std::string(parameter.name) + "' cannot be '" + *text + "'",
-         "give one of: " + listed(parameter.choices));
+  refuse(of, quoted(parameter.name) + " cannot be " + quoted(*text), "give one of: " + listed(parameter.choices));
 }
 
 }  // namespace
@@ -71,13 +71,13 @@ Parameters completed(std::string_view of, std::span<const Parameter> declared, P
     if (std::ranges::find(declared, name, &Parameter::name) == declared.end()) {
       std::vector<std::string_view> known;
       for (const Parameter& each : declared) known.push_back(each.name);
-      refuse(of, "unknown parameter '" + name + "'", "the parameters are: " + listed(known));
+      refuse(of, "unknown parameter " + quoted(name), "the parameters are: " + listed(known));
     }
   for (const Parameter& parameter : declared) {
     const std::string name(parameter.name);
     if (!given.has(name)) {
       if (parameter.fallback.empty())
-        refuse(of, "missing parameter '" + name + "'", "give it: " + std::string(parameter.meaning));
+        refuse(of, "missing parameter " + quoted(name), "give it: " + std::string(parameter.meaning));
       if (parameter.fallback != "none") given.set(name, default_value(parameter));
       continue;
     }
@@ -91,8 +91,7 @@ Parameters completed(std::string_view of, std::span<const Parameter> declared, P
 }
 
 void throw_unknown(std::string_view kind, std::string_view name, std::span<const std::string_view> known) {
-  throw Error(Failure::deck,
-              "unknown " + std::string(kind) + " '" + std::string(name) + "'; give one of: " + listed(known));
+  throw Error(Failure::deck, "unknown " + std::string(kind) + " " + quoted(name) + "; give one of: " + listed(known));
 }
 
 }  // namespace carom
