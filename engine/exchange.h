@@ -59,10 +59,10 @@ class Exchange {
   virtual std::vector<Bytes> swap(std::vector<Bytes> /*outgoing*/, std::span<const int> /*partners*/) { return {}; }
   /// What every rank has to say, by rank.
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
-  /// Makes each value the largest among all ranks.
-  virtual void largest(std::span<double> /*values*/) {}
-  /// Makes each value the sum over all ranks.
-  virtual void sum(std::span<std::uint64_t> /*values*/) {}
+  /// Makes each of `most` the largest among all ranks and each of `sums` the sum over them.
+  virtual void combine(std::span<double> /*most*/, std::span<std::uint64_t> /*sums*/) {}
+  void largest(std::span<double> values) { combine(values, {}); }
+  void sum(std::span<std::uint64_t> values) { combine({}, values); }
 };
 
 /// Tells rank 0 what every rank has to say, by rank; the others hear nothing. Collective.
@@ -115,13 +115,9 @@ class TimedExchange final : public Exchange {
     const Stopwatch watch(seconds_);
     return ranks_.gather(mine);
   }
-  void largest(std::span<double> values) override {
+  void combine(std::span<double> most, std::span<std::uint64_t> sums) override {
     const Stopwatch watch(seconds_);
-    ranks_.largest(values);
-  }
-  void sum(std::span<std::uint64_t> values) override {
-    const Stopwatch watch(seconds_);
-    ranks_.sum(values);
+    ranks_.combine(most, sums);
   }
   double seconds() const { return seconds_; }
 

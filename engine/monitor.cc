@@ -28,16 +28,13 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
       statistics_(statistics),
       frames_(plan.frame_interval),
       rows_(plan.thermo_interval) {
-  bool momentum_kept = true;
-  for (int k = 0; k < D; ++k) momentum_kept = momentum_kept && !system.box.walled(k);
   for (const auto& term : system.interactions) {
-    momentum_kept = momentum_kept && term->keeps_momentum();
     tail_.energy += term->tail().energy;
     tail_.virial += term->tail().virial;
   }
   statistics.tail_energy = tail_.energy;
   statistics.tail_pressure = tail_.virial / (D * system.box.volume());
-  if (momentum_kept) statistics.max_momentum_error = 0;
+  if (system.keeps_momentum()) statistics.max_momentum_error = 0;
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
   if (info.shadow) statistics.max_shadow_energy_error = 0;

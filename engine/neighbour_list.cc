@@ -12,7 +12,7 @@ namespace carom {
 
 namespace {
 constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
-constexpr double kCalls = 6;  // a skin that is half as wide as any particle comes in so many calls; so it lasts three,
+constexpr double kCalls = 24;  // a skin that is half as wide as any particle comes in so many calls; so it lasts three,
 constexpr double kWidest = 1.6;  // where it need not be wider than this for it [mean reach]
 constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
 }  // namespace

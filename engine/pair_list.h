@@ -71,7 +71,7 @@ class CutoffList {
 
   /// The pairs that are within the cutoff at x or x_new. A pair keeps the image it has at x. Throws
   /// Error(Failure::numerical) for positions that are not finite and for steps of several edges of a periodic box.
-  PairRecords<D>& cover(const PairStep<D>& step, const std::vector<char>& ghost);
+  PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles);
 
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
 

@@ -18,7 +18,7 @@ constexpr double kFaster = 2;                        // than anybody is, somebod
 constexpr double kRoom = 1.25;                       // for a path that was too long
 constexpr std::int64_t kSlabs = 64;                  // between divisions while everybody is known
 constexpr double kLeastDepth = 3;                    // of ghosts that do not matter [largest diameter]
-constexpr double kMost = 0.7;                        // of all particles; a rank that would know more knows everybody
+constexpr double kMost = 0.9;                        // of all particles; a rank that would know more knows everybody
 
 /// What ranks tell each other of a particle, beside its luggage.
 template <int D>
@@ -38,8 +38,12 @@ Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
 }  // namespace
 
 template <int D>
-Part<D>::Part(System<D>& shares, bool local, double slab_length)
-    : shares_(shares), ranks_(*shares.ranks), holders_(static_cast<std::size_t>(ranks_.size())), depth_(kLeastDepth) {
+Part<D>::Part(System<D>& shares, bool local, double slab_length, bool cores)
+    : shares_(shares),
+      ranks_(*shares.ranks),
+      holders_(static_cast<std::size_t>(ranks_.size())),
+      least_depth_(cores ? kLeastDepth : 0),
+      depth_(least_depth_) {
   shares_.part = this;
   if (!(shares_.quanta.force > 0)) shares_.quanta = quanta(shares_);
   divide(nullptr, !local, slab_length);
@@ -81,7 +85,7 @@ bool Part<D>::divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, 
   if (everybody_ ? slab < next_ : !outdated()) return false;
   if (!everybody_) {  // all has gone well since the last time
     patience_ = std::max<std::int64_t>(patience_ / 2, 1);
-    depth_ = std::max(0.75 * depth_, kLeastDepth);
+    depth_ = std::max(0.75 * depth_, least_depth_);
     wanted_path_ *= 0.75;
   }
   divide(&luggage, !local, slab_length);
@@ -274,7 +278,7 @@ void Part<D>::assign(const Division<D>& division, double near) {
 
 template <int D>
 bool Part<D>::covers(double path) {
-  if (everybody_ || (path = largest(path)) <= path_) return true;
+  if (everybody_ || path <= path_) return true;
   more_ = std::isfinite(path);
   if (more_) wanted_path_ = kRoom * path;
   return false;
@@ -285,7 +289,7 @@ bool Part<D>::covers(const Particles<D>& p, std::span<const Vec<D>> a, double le
   if (everybody_) return true;
   double farthest = 0;
   for (Id i = 0; i < p.size(); ++i) farthest = std::max(farthest, length * (p.v[i] + 0.5 * length * a[i]).norm());
-  return covers(farthest);
+  return covers(largest(farthest));
 }
 
 /// Whether somebody has come so far that the particles are to be divided anew.
