@@ -40,11 +40,15 @@ void need_all(const System<D>& system) {
   if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
 }
 
-/// (V/N)^(1/D) [length]; N counts the particles of all ranks.
+/// How many particles all ranks have together.
+template <int D>
+std::size_t count_of_all(const System<D>& system) {
+  return system.part ? system.part->total() : system.size();
+}
+/// (V/N)^(1/D) [length].
 template <int D>
 double mean_distance(const System<D>& system) {
-  const std::size_t all = system.part ? system.part->total() : system.size();
-  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, all)), 1.0 / D);
+  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, count_of_all(system))), 1.0 / D);
 }
 
 /// The quanta of a system; a function of its parameters, masses, charges and box. Collective where ranks have shares.

@@ -44,7 +44,7 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
 template <int D>
 void Monitor<D>::regroup() {
   const Particles<D>& p = known().particles;
-  if (info_.hard_cores && !in_free_flight()) touching_.emplace(system_.box, p.radius);
+  if (info_.hard_cores && !in_free_flight()) touching_.emplace(system_.box, p.radius, p.ghost);
   if (!info_.shadow) return;
   scratch_.resize(p.size());
 }
@@ -205,9 +205,8 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
 template <int D>
 double Monitor<D>::deepest_overlap() {
   double deepest = 0;
-  const auto look = [&](NeighbourList<D>& list, const auto& p, auto&& counts) {
+  const auto look = [&](NeighbourList<D>& list, const auto& p) {
     for (const auto& pair : list.cover(p.x)) {
-      if (!counts(pair.i)) continue;
       const double sigma = p.radius[pair.i] + p.radius[pair.j];
       const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
       if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
@@ -216,10 +215,10 @@ double Monitor<D>::deepest_overlap() {
   const Particles<D>& p = known().particles;
   if (in_free_flight()) {
     const Vicinity<D> near = vicinity(system_.box, 2 * system_.sizes->largest_radius(), *system_.ranks, p);
-    NeighbourList<D> touching(system_.box, near.radius);
-    look(touching, near, [&](Id i) { return near.beyond[i] == 0; });
+    NeighbourList<D> touching(system_.box, near.radius, near.beyond);
+    look(touching, near);
   } else {
-    look(*touching_, p, [&](Id i) { return p.owns(i); });
+    look(*touching_, p);
   }
   return deepest;
 }

@@ -138,7 +138,8 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
         throw Error(Failure::numerical,
                     "a particle moves farther than " + std::to_string(kMostBoxes) +
                         " edges of the periodic box within one step; use a smaller integrator.step");
-    skin_ = std::max(wanted, wasteful ? 0.0 : 0.5 * skin_);
+    const double kept = rebuilds_ == 0 ? *learned_ : 0.5 * skin_;
+    *learned_ = skin_ = std::max(wanted, wasteful ? 0.0 : kept);
     ghost_ = particles.ghost;
     build(step);
   }

@@ -257,6 +257,7 @@ void Part<D>::assign(const Division<D>& division, double near) {
   ghosts_ = holders_;
   matters_.clear();
   at_.clear();
+  safe_slabs_ = 0;
   const auto me = static_cast<std::uint32_t>(ranks_.rank());
   for (Id i = 0; i < p.size(); ++i) {
     const Vec<D> x = division.wrapped(p.x[i]);
@@ -288,18 +289,25 @@ template <int D>
 bool Part<D>::covers(const Particles<D>& p, std::span<const Vec<D>> a, double length) {
   if (everybody_) return true;
   double farthest = 0;
-  for (Id i = 0; i < p.size(); ++i) farthest = std::max(farthest, length * (p.v[i] + 0.5 * length * a[i]).norm());
-  return covers(largest(farthest));
+  for (Id i = 0; i < p.size(); ++i)
+    if (p.owns(i)) farthest = std::max(farthest, (p.v[i] + 0.5 * length * a[i]).squaredNorm());
+  return covers(length * std::sqrt(largest(farthest)));
 }
 
-/// Whether somebody has come so far that the particles are to be divided anew.
+/// Whether somebody has come so far that the particles are to be divided anew. Looks only where somebody may have.
 template <int D>
 bool Part<D>::outdated() {
+  if (safe_slabs_ >= 1) {
+    --safe_slabs_;
+    return false;
+  }
   const Particles<D>& p = known_->particles;
   double farthest = 0;
   for (Id i = 0; i < p.size(); ++i)
     if (p.owns(i)) farthest = std::max(farthest, (unwrapped(known_->box, p, i) - at_[i]).squaredNorm());
-  return largest(farthest) > 0.64 * slack_ * slack_;
+  const double left = 0.8 * slack_ - std::sqrt(largest(farthest));
+  safe_slabs_ = left / path_;
+  return left < 0;
 }
 
 template class Part<2>;

@@ -130,6 +130,7 @@ class Part {
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
   double path_ = 0, slack_ = 0;
+  double safe_slabs_ = 0;       // until somebody may have come too far
   double wanted_path_ = 0;      // at least that, since one was too long not long ago
   bool more_ = false;           // ghosts would have been enough for the slab
   double least_depth_, depth_;  // of ghosts that do not matter [largest diameter]

@@ -74,33 +74,27 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     evaluate_forces<D>(system, p.x, a_, counters);
     for (std::size_t i = 0; i < a_.size(); ++i) a_[i] /= p.mass[i];
     past_.start(a_);
-    const auto n = static_cast<double>(std::max<std::size_t>(1, system.part ? system.part->total() : system.size()));
-    ExactSum squares, mass, forces;
-    for (Id i = 0; i < p.size(); ++i) {
-      if (!p.owns(i)) continue;
-      squares.add(p.v[i].squaredNorm());
-      forces.add(a_[i].squaredNorm());
-      mass.add(p.mass[i]);
-    }
-    speed_ = std::sqrt(of_all_ranks(system, squares).value() / n);
-    strength_ = std::sqrt(of_all_ranks(system, forces).value() / n);
-    const double total = of_all_ranks(system, mass).value();
+    const auto sum = [&](auto&& term) {
+      ExactSum own;
+      for (Id i = 0; i < p.size(); ++i)
+        if (p.owns(i)) own.add(term(i));
+      return of_all_ranks(system, own).value();
+    };
+    const double n = static_cast<double>(std::max<std::size_t>(1, count_of_all(system)));
+    speed_ = std::sqrt(sum([&](Id i) { return p.v[i].squaredNorm(); }) / n);
+    strength_ = std::sqrt(sum([&](Id i) { return a_[i].squaredNorm(); }) / n);
+    const double mass = sum([&](Id i) { return p.mass[i]; });
     const bool free = n > 1 && system.keeps_momentum();  // and more than it moves
-    const auto momentum = evaluate_motion(system, p, p).momentum;
-    for (int k = 0; k < D; ++k) centre_[k] = free ? momentum[k].value() / total : 0.0;
+    for (int k = 0; k < D; ++k) centre_[k] = free ? sum([&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass : 0.0;
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     slab_ = slab.index;
     core_->begin_step(report.counters, report.contacts, past_.last(), slab.length);
-    const auto before = found_;
-    try {
-      advance(system, slab);
-    } catch (HaloTooSmall) {
-      found_ = before;  // the step is done again as if this had not been tried
-      throw;
-    }
+    found_ = kept_;  // of a step that is done again nothing is known
+    advance(system, slab);
+    kept_ = found_;
     system.wrap();
     report.reached = slab.length;
   }
@@ -116,16 +110,21 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// The pieces of a step.
   void advance(System<D>& system, const Slab& slab) {
     auto& p = system.particles;
+    auto& scan = core_->scan();
     double done = 0, longest = slab.length;
     bool to_contact = false;  // `longest` ends where a contact at rest is met or begins
     while (done < slab.length) {
       const bool resolved = found_.touching;
-      if (resolved) found_.touching = resolve(system, done);
+      if (resolved && (found_.touching = any_rank(system, !scan.quiet(p.x, p.v)))) {
+        need_all(system);
+        scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
+        found_.touching = !scan.resting().empty();
+      }
       const double rest = slab.length - done, piece = std::min(longest, rest);
       if (solve(system, piece, resolved)) {
         core_->commit(done);
         finish(system, piece);
-        if (found_.touching) core_->scan().slide(p.x, p.v);
+        if (found_.touching) scan.slide(p.x, p.v);
         ++counters_->pieces;
         done = piece == rest ? slab.length : done + piece;
         longest = std::max(2 * piece, slab.length / kMostPieces);
@@ -134,12 +133,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       }
       need_all(system);
       if (!end_.complete && !end_.wild) {
-        core_->scan().count_event(end_.key);
+        scan.count_event(end_.key);
         to_contact = end_.time > 0;
-        if (to_contact)
-          longest = end_.time;
-        else
-          found_.touching = true;
+        longest = to_contact ? end_.time : longest;
+        found_.touching = found_.touching || !to_contact;
         continue;
       }
       ++counters_->slabs_halved;
@@ -149,16 +146,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
                                             " pieces; the forces are not finite or far too stiff for step = " +
                                             std::to_string(slab.length));
     }
-  }
-
-  /// Impulses of what touches and approaches now, and which contacts rest. Returns whether any do.
-  bool resolve(System<D>& system, double done) {
-    auto& p = system.particles;
-    auto& scan = core_->scan();
-    if (!any_rank(system, !scan.quiet(p.x, p.v))) return false;
-    need_all(system);
-    scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
-    return !scan.resting().empty();
   }
 
   /// Sweeps over a slab from the present state. True: core_ has the flight on a_, mean_ the accelerations it gives;
@@ -171,25 +158,25 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     past_.expect(h, a_, chebyshev.plain() ? kSmooth : 1);  // stiff motion is not smooth from slab to slab
     core_->begin(p.v, a_, h, resolved);
     std::ranges::fill(swaps_, 0);
+    std::ranges::fill(move_, Vec<D>::Zero());
     any_freezes_ = false;
     const double scale = std::max(speed_, h * strength_);
     const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
-    double last = 0, before = 0, earlier = 0;  // largest, one, two and kPatience sweeps ago
+    std::array<double, kMostSweeps + 1> residual{};                                  // by sweep
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
       end_ = core_->fly(a_);
       if (!end_.complete) return false;
       const auto [squared, swaps] = evaluate(system, h, sweep == 1);
-      const double largest = h * std::sqrt(squared);
+      const double largest = residual[sweep] = h * std::sqrt(squared);
       if (!std::isfinite(largest)) return false;
       if (largest <= wanted) return true;
-      if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * last) return true;
+      if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * residual[sweep - 1]) return true;
       if (sweep >= kPatience && swaps > 0) freeze();
-      if (sweep % kPatience == 0) {
-        const double stalled = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kPatience));
-        if (sweep > kPatience && largest > stalled * earlier) freeze_stalled(largest / h);
-        earlier = largest;
-      }
-      const bool slow = sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * before);
+      const double stalled = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kPatience));
+      if (sweep > kPatience && sweep % kPatience == 0 && largest > stalled * residual[sweep - kPatience])
+        freeze_stalled(largest / h);
+      const bool slow =
+          sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * residual[sweep - 2]);
       if (slow && slab_ >= found_.measured + kMeasured) {
         found_.measured = slab_;
         found_.squared_frequency = kRoom * largest_squared_frequency(system);
@@ -197,19 +184,14 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         ++counters_->fallbacks;
       }
       chebyshev.next();
-      before = last;
-      last = largest;
       const double settled = std::pow(kSettled * wanted / h, 2);
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
         const Vec<D> e = mean_[i] - a_[i];
-        if (!chebyshev.plain()) {
-          move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
-          a_[i] += move_[i];
-        } else if (e.squaredNorm() > settled) {
-          move_[i] = e;
+        if (!chebyshev.plain())
+          a_[i] += move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
+        else if (e.squaredNorm() > settled)
           a_[i] = mean_[i];
-        }
       }
     }
     return false;
@@ -222,7 +204,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const Stopwatch watch(counters_->seconds.force);
     const auto& p = system.particles;
     const auto& x = core_->x();
-    const bool all = first || kFew * core_->all_moved() > (system.part ? system.part->total() : x.size());
+    const bool all = first || kFew * core_->all_moved() > count_of_all(system);
     std::uint64_t pairs =
         all ? forces_.evaluate(system, p.x, x) : forces_.update(system, p.x, core_->last_x(), x, core_->moved().data());
     for (Id i = 0; i < x.size(); ++i) mean_[i] = forces_[i];
@@ -312,8 +294,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::vector<Vec<D>> a_, mean_;      // flown on, and what that gives
   std::vector<std::uint32_t> swaps_;  // of partners, by particle
   bool any_freezes_ = false;          // on any rank, in this slab
-  Found found_;
-  FlightEnd<D> end_;  // of the last flight
+  Found found_, kept_;                // kept_: at the end of the last step
+  FlightEnd<D> end_;                  // of the last flight
   std::int64_t slab_ = 0;
   std::vector<Vec<D>> move_;  // of a_ by the last sweep
   Counters* counters_ = nullptr;

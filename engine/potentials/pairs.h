@@ -236,11 +236,11 @@ class AllPairs {
 template <int D>
 class PairsWithinCutoff {
  public:
-  PairsWithinCutoff(const Box<D>& box, double cutoff, PairFilter filter)
-      : box_(box), cutoff_(cutoff), filter_(filter), list_(box, cutoff, std::move(filter)) {}
+  PairsWithinCutoff(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList<D>* like = nullptr)
+      : box_(box), cutoff_(cutoff), filter_(filter), list_(box, cutoff, std::move(filter), like) {}
 
   std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
-    return PairsWithinCutoff(box_, cutoff_, filter_.among(some));
+    return PairsWithinCutoff(box_, cutoff_, filter_.among(some), &list_);
   }
   double reach(Positions<D>) const { return cutoff_; }
   double reach(const Particles<D>&, Exchange&) const { return cutoff_; }
