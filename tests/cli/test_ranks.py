@@ -249,8 +249,8 @@ def test_an_error_of_all_ranks_is_told_once(change, code, words, tmp_path):
 APART = {
     "format": 1, "title": "an error that one rank meets",
     "system": {"dimension": 2, "box": [80.0, 40.0], "boundary": ["periodic", "periodic"]},
-    "particles": [{"name": "disc", "radius": 0.5, "position": [[1 + 2.0 * (k // 20), 1 + 2.0 * (k % 20)] for k in range(800)],
-                   "velocity": [[0.0, 0.0]] * 800}],
+    "particles": [{"name": "disc", "radius": 0.5, "velocity": [[0.0, 0.0]] * 800,
+                   "position": [[1 + 2.0 * (k // 20), 1 + 2.0 * (k % 20)] for k in range(800)]}],
     "interaction": [{"type": "lennard-jones", "epsilon": 1.0, "sigma": 1.0, "cutoff": 1.5}],
     "integrator": {"type": "verlet", "step": 0.01},
     "run": {"steps": 10},
