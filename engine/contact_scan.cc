@@ -1,6 +1,7 @@
 #include "engine/contact_scan.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 
 #include "engine/collision.h"
@@ -25,14 +26,11 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   contacts_ = contacts;
   events_ = 0;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
-  double fastest = 0, strongest = 0;
-  for (const auto& v : particles_.v) fastest = std::max(fastest, v.squaredNorm());
-  for (const auto& each : a) strongest = std::max(strongest, each.squaredNorm());
-  if (part_) {
-    fastest = part_->largest(fastest);
-    strongest = part_->largest(strongest);
-  }
-  resting_speed_ = kRestingSpeed * (std::sqrt(fastest) + length * std::sqrt(strongest));
+  std::array<double, 2> most{};  // squared speed and acceleration
+  for (const auto& v : particles_.v) most[0] = std::max(most[0], v.squaredNorm());
+  for (const auto& each : a) most[1] = std::max(most[1], each.squaredNorm());
+  if (part_) part_->ranks().largest(most);
+  resting_speed_ = kRestingSpeed * (std::sqrt(most[0]) + length * std::sqrt(most[1]));
 }
 
 template <int D>

@@ -58,10 +58,10 @@ class Exchange {
   virtual std::vector<Bytes> swap(std::vector<Bytes> /*outgoing*/, std::span<const int> /*partners*/) { return {}; }
   /// The messages of all ranks, by rank.
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
-  /// Makes each value the largest among all ranks.
-  virtual void largest(std::span<double> /*values*/) {}
-  /// Makes each value the sum over all ranks.
-  virtual void sum(std::span<std::uint64_t> /*values*/) {}
+  /// Makes each of `most` the largest among all ranks and each of `sums` the sum over them.
+  virtual void combine(std::span<double> /*most*/, std::span<std::uint64_t> /*sums*/) {}
+  void largest(std::span<double> values) { combine(values, {}); }
+  void sum(std::span<std::uint64_t> values) { combine({}, values); }
 };
 
 /// The messages of all ranks, by rank, on rank 0; empty ones elsewhere. Collective.
@@ -114,13 +114,9 @@ class TimedExchange final : public Exchange {
     const Stopwatch watch(seconds_);
     return ranks_.gather(mine);
   }
-  void largest(std::span<double> values) override {
+  void combine(std::span<double> most, std::span<std::uint64_t> sums) override {
     const Stopwatch watch(seconds_);
-    ranks_.largest(values);
-  }
-  void sum(std::span<std::uint64_t> values) override {
-    const Stopwatch watch(seconds_);
-    ranks_.sum(values);
+    ranks_.combine(most, sums);
   }
   double seconds() const { return seconds_; }
 

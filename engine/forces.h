@@ -20,29 +20,18 @@ Sums of_all_ranks(const System<D>& system, const Sums& mine) {
   return system.sizes ? sum_of_all(*system.ranks, mine) : mine;
 }
 
-/// Makes each value the largest of what all ranks say. Collective.
-template <int D>
-void largest_of_all(const System<D>& system, std::span<double> values) {
-  if (system.part) system.part->ranks().largest(values);
-}
-/// Makes each value the sum of what all ranks say. Collective.
-template <int D>
-void sum_over_ranks(const System<D>& system, std::span<std::uint64_t> values) {
-  if (system.part) system.part->ranks().sum(values);
-}
 template <int D>
 bool any_rank(const System<D>& system, bool value) {
-  double any = value ? 1 : 0;
-  largest_of_all<D>(system, {&any, 1});
-  return any > 0;
+  return system.part ? system.part->largest(value ? 1 : 0) > 0 : value;
 }
 
 /// Copies of particles that other ranks own get their positions and velocities from there.
 template <int D>
 void update_copies(System<D>& system) {
   if (!system.part || system.part->knows_everybody()) return;
-  system.part->refresh(system.particles.x);
-  system.part->refresh(system.particles.v);
+  Particles<D>& p = system.particles;
+  system.part->tell([&](Id i, Bytes& to) { put(to, p.x[i]), put(to, p.v[i]); },
+                    [&](Id i, Reader& from) { p.x[i] = from.get<Vec<D>>(), p.v[i] = from.get<Vec<D>>(); });
 }
 
 /// For what only a rank that knows all particles can do.
@@ -51,11 +40,15 @@ void need_all(const System<D>& system) {
   if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
 }
 
-/// (V/N)^(1/D) [length]; N counts the particles of all ranks.
+/// How many particles all ranks have together.
+template <int D>
+std::size_t count_of_all(const System<D>& system) {
+  return system.part ? system.part->total() : system.size();
+}
+/// (V/N)^(1/D) [length].
 template <int D>
 double mean_distance(const System<D>& system) {
-  const std::size_t all = system.part ? system.part->total() : system.size();
-  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, all)), 1.0 / D);
+  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, count_of_all(system))), 1.0 / D);
 }
 
 /// The quanta of a system; a function of its parameters, masses, charges and box. Collective where ranks have shares.

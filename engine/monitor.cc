@@ -28,16 +28,13 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
       statistics_(statistics),
       frames_(plan.frame_interval),
       rows_(plan.thermo_interval) {
-  bool momentum_kept = true;
-  for (int k = 0; k < D; ++k) momentum_kept = momentum_kept && !system.box.walled(k);
   for (const auto& term : system.interactions) {
-    momentum_kept = momentum_kept && term->keeps_momentum();
     tail_.energy += term->tail().energy;
     tail_.virial += term->tail().virial;
   }
   statistics.tail_energy = tail_.energy;
   statistics.tail_pressure = tail_.virial / (D * system.box.volume());
-  if (momentum_kept) statistics.max_momentum_error = 0;
+  if (system.keeps_momentum()) statistics.max_momentum_error = 0;
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
   if (info.shadow) statistics.max_shadow_energy_error = 0;
@@ -47,7 +44,7 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
 template <int D>
 void Monitor<D>::regroup() {
   const Particles<D>& p = known().particles;
-  if (info_.hard_cores && !in_free_flight()) touching_.emplace(system_.box, p.radius);
+  if (info_.hard_cores && !in_free_flight()) touching_.emplace(system_.box, p.radius, p.ghost);
   if (!info_.shadow) return;
   scratch_.resize(p.size());
 }
@@ -208,9 +205,8 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
 template <int D>
 double Monitor<D>::deepest_overlap() {
   double deepest = 0;
-  const auto look = [&](NeighbourList<D>& list, const auto& p, auto&& counts) {
+  const auto look = [&](NeighbourList<D>& list, const auto& p) {
     for (const auto& pair : list.cover(p.x)) {
-      if (!counts(pair.i)) continue;
       const double sigma = p.radius[pair.i] + p.radius[pair.j];
       const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
       if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
@@ -219,10 +215,10 @@ double Monitor<D>::deepest_overlap() {
   const Particles<D>& p = known().particles;
   if (in_free_flight()) {
     const Vicinity<D> near = vicinity(system_.box, 2 * system_.sizes->largest_radius(), *system_.ranks, p);
-    NeighbourList<D> touching(system_.box, near.radius);
-    look(touching, near, [&](Id i) { return near.beyond[i] == 0; });
+    NeighbourList<D> touching(system_.box, near.radius, near.beyond);
+    look(touching, near);
   } else {
-    look(*touching_, p, [&](Id i) { return p.owns(i); });
+    look(*touching_, p);
   }
   return deepest;
 }

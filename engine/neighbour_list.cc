@@ -29,7 +29,8 @@ struct SizeClass {
 };
 
 template <int D>
-NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach) : box_(box), reach_(std::move(reach)) {
+NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without)
+    : box_(box), reach_(std::move(reach)), without_(without) {
   const double mean =
       std::accumulate(reach_.begin(), reach_.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, reach_.size()));
   least_skin_ = skin_ = 0.3 * mean;  // 15 % of a mean pair reach
@@ -104,6 +105,7 @@ void NeighbourList<D>::build(std::span<const Vec<D>> x) {
   partners_.clear();
   const std::vector<SizeClass<D>> sizes = group(x);
   for (std::size_t i = 0; i < x.size(); ++i) {
+    if (!without_.empty() && without_[i] != 0) continue;
     const std::size_t first = pairs_.size();
     for (const SizeClass<D>& size : sizes)
       size.table.for_each_near(x[i], reach_[i] + size.largest + skin_, [&](Id member, const Image<D>& image) {

@@ -29,8 +29,9 @@ struct SizeClass;  // neighbour_list.cc
 template <int D>
 class NeighbourList {
  public:
-  /// Lists pairs (i, j) that can come as near as reach(i) + reach(j).
-  NeighbourList(const Box<D>& box, std::vector<double> reach);
+  /// Lists pairs (i, j) that can come as near as reach(i) + reach(j). `without`: not those with a lower particle that is
+  /// marked there; it outlives the list, and empty: all.
+  NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without = {});
 
   /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them
   /// (arcs that stray no farther from x than `margin` besides the straight displacement). Rebuilds where needed. Throws
@@ -50,6 +51,7 @@ class NeighbourList {
 
   const Box<D>& box_;
   std::vector<double> reach_;
+  std::span<const char> without_;
   double least_skin_, skin_, widest_;
   std::uint64_t calls_ = 0;       // of cover() since the last build
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped

@@ -119,10 +119,10 @@ struct PartnerRange {
 };
 
 template <int D>
-PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const std::vector<char>& ghost) {
+PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>& particles) {
   const bool still = step.x_new.empty();
   double squared_from_build = 0, squared_step = 0;
-  bool known = rebuilds_ > 0 && particles_ == step.x.size() && ghost_ == ghost;
+  bool known = rebuilds_ > 0 && particles_ == step.x.size() && ghost_ == particles.ghost;
   known = known && follow(step, squared_from_build, squared_step);
   if (!known && !still)
     for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
@@ -132,17 +132,15 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const std::vector<
   const double wanted = std::max({kLeastSkin * cutoff_, 4 * length, room});
   const bool wasteful = length > 0 && skin_ > kTooWide * wanted;  // made for one wild step
   if (!(known && from_build <= 0.5 * skin_) || wasteful) {
-    for (std::size_t i = 0; i < step.x.size(); ++i)
-      if (!step.x[i].allFinite())
-        throw Error(Failure::numerical,
-                    "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
+    need_finite(particles, step.x);
     for (int k = 0; k < D; ++k)
       if (box_.periodic(k) && !(length <= kMostBoxes * box_.edges[k]))
         throw Error(Failure::numerical,
                     "a particle moves farther than " + std::to_string(kMostBoxes) +
                         " edges of the periodic box within one step; use a smaller integrator.step");
-    skin_ = std::max(wanted, wasteful ? 0.0 : 0.5 * skin_);
-    ghost_ = ghost;
+    const double kept = rebuilds_ == 0 ? *learned_ : 0.5 * skin_;
+    *learned_ = skin_ = std::max(wanted, wasteful ? 0.0 : kept);
+    ghost_ = particles.ghost;
     build(step);
   }
   records_.load(step);

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -66,12 +67,15 @@ class PairRecords {
 template <int D>
 class CutoffList {
  public:
-  CutoffList(const Box<D>& box, double cutoff, PairFilter filter)
-      : box_(box), cutoff_(cutoff), skin_(kLeastSkin * cutoff), filter_(std::move(filter)) {}
+  /// `like`: a list whose skin is a good one to begin with; null: there is none.
+  CutoffList(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList* like = nullptr)
+      : box_(box), cutoff_(cutoff), filter_(std::move(filter)) {
+    if (like) learned_ = like->learned_;
+  }
 
   /// The pairs that are within the cutoff at x or x_new. A pair keeps the image it has at x. Throws
   /// Error(Failure::numerical) for positions that are not finite and for steps of several edges of a periodic box.
-  PairRecords<D>& cover(const PairStep<D>& step, const std::vector<char>& ghost);
+  PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles);
 
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
 
@@ -83,7 +87,8 @@ class CutoffList {
   void find_pairs(std::uint32_t row, std::span<const struct PartnerRange> ranges);
 
   const Box<D>& box_;
-  double cutoff_, skin_;
+  double cutoff_, skin_ = 0;
+  std::shared_ptr<double> learned_ = std::make_shared<double>(0);  // the last skin of this list and those made like it
   PairFilter filter_;
   const PairKernels* kernels_ = &pair_kernels();
   std::vector<char> ghost_;

@@ -17,7 +17,7 @@ constexpr double kFaster = 2;                        // than anybody is, somebod
 constexpr double kRoom = 1.25;                       // for a path that was too long
 constexpr std::int64_t kSlabs = 64;                  // between divisions while everybody is known
 constexpr double kLeastDepth = 3;                    // of ghosts that do not matter [largest diameter]
-constexpr double kMost = 0.7;                        // of all particles; a rank that would know more knows everybody
+constexpr double kMost = 0.9;                        // of all particles; a rank that would know more knows everybody
 
 /// What ranks tell each other of a particle, beside its luggage.
 template <int D>
@@ -37,8 +37,12 @@ Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
 }  // namespace
 
 template <int D>
-Part<D>::Part(System<D>& shares, bool local, double slab_length)
-    : shares_(shares), ranks_(*shares.ranks), holders_(static_cast<std::size_t>(ranks_.size())), depth_(kLeastDepth) {
+Part<D>::Part(System<D>& shares, bool local, double slab_length, bool cores)
+    : shares_(shares),
+      ranks_(*shares.ranks),
+      holders_(static_cast<std::size_t>(ranks_.size())),
+      least_depth_(cores ? kLeastDepth : 0),
+      depth_(least_depth_) {
   shares_.part = this;
   divide(nullptr, !local, slab_length);
   next_ = kSlabs;
@@ -79,7 +83,7 @@ bool Part<D>::divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, 
   if (everybody_ ? slab < next_ : !outdated()) return false;
   if (!everybody_) {  // all has gone well since the last time
     patience_ = std::max<std::int64_t>(patience_ / 2, 1);
-    depth_ = std::max(0.75 * depth_, kLeastDepth);
+    depth_ = std::max(0.75 * depth_, least_depth_);
     wanted_path_ *= 0.75;
   }
   divide(&luggage, !local, slab_length);
@@ -251,6 +255,7 @@ void Part<D>::assign(const Division<D>& division, double near) {
   ghosts_ = holders_;
   matters_.clear();
   at_.clear();
+  safe_slabs_ = 0;
   const auto me = static_cast<std::uint32_t>(ranks_.rank());
   for (Id i = 0; i < p.size(); ++i) {
     const Vec<D> x = division.wrapped(p.x[i]);
@@ -272,7 +277,7 @@ void Part<D>::assign(const Division<D>& division, double near) {
 
 template <int D>
 bool Part<D>::covers(double path) {
-  if (everybody_ || (path = largest(path)) <= path_) return true;
+  if (everybody_ || path <= path_) return true;
   more_ = std::isfinite(path);
   if (more_) wanted_path_ = kRoom * path;
   return false;
@@ -282,18 +287,25 @@ template <int D>
 bool Part<D>::covers(const Particles<D>& p, std::span<const Vec<D>> a, double length) {
   if (everybody_) return true;
   double farthest = 0;
-  for (Id i = 0; i < p.size(); ++i) farthest = std::max(farthest, length * (p.v[i] + 0.5 * length * a[i]).norm());
-  return covers(farthest);
+  for (Id i = 0; i < p.size(); ++i)
+    if (p.owns(i)) farthest = std::max(farthest, (p.v[i] + 0.5 * length * a[i]).squaredNorm());
+  return covers(length * std::sqrt(largest(farthest)));
 }
 
-/// Whether somebody has come so far that the particles are to be divided anew.
+/// Whether somebody has come so far that the particles are to be divided anew. Looks only where somebody may have.
 template <int D>
 bool Part<D>::outdated() {
+  if (safe_slabs_ >= 1) {
+    --safe_slabs_;
+    return false;
+  }
   const Particles<D>& p = known_->particles;
   double farthest = 0;
   for (Id i = 0; i < p.size(); ++i)
     if (p.owns(i)) farthest = std::max(farthest, (unwrapped(known_->box, p, i) - at_[i]).squaredNorm());
-  return largest(farthest) > 0.64 * slack_ * slack_;
+  const double left = 0.8 * slack_ - std::sqrt(largest(farthest));
+  safe_slabs_ = left / path_;
+  return left < 0;
 }
 
 template class Part<2>;

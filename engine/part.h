@@ -45,8 +45,8 @@ template <int D>
 class Part {
  public:
   /// Of a system that is kept in shares, which outlives the part. `local`: a rank's own particles and those near them
-  /// are enough for slabs of this length. Collective.
-  Part(System<D>& shares, bool local, double slab_length);
+  /// are enough for slabs of this length. `cores`: particles collide. Collective.
+  Part(System<D>& shares, bool local, double slab_length, bool cores = true);
   ~Part();
   Part(const Part&) = delete;
   Part& operator=(const Part&) = delete;
@@ -70,9 +70,9 @@ class Part {
   /// Brings the positions, velocities and images of the shares up to date. Collective.
   void collect();
 
-  /// Whether the particles that are known are enough for paths so long in a slab [length].
+  /// Whether the particles that are known are enough for paths so long in a slab, those of all ranks [length].
   bool covers(double path);
-  /// The same for a step of a kick-drift-kick method.
+  /// The same for a step of a kick-drift-kick method. Collective.
   bool covers(const Particles<D>& p, std::span<const Vec<D>> a, double length);
   /// Whether what a ghost does matters to own particles.
   bool matters(Id i) const { return matters_[i] != 0; }
@@ -82,7 +82,10 @@ class Part {
   void tell(Pack&& pack, Unpack&& unpack) {
     std::vector<Bytes> outgoing(partners_.size());
     for (std::size_t k = 0; k < partners_.size(); ++k)
-      for (const Id i : holders_[static_cast<std::size_t>(partners_[k])]) pack(i, outgoing[k]);
+      for (const auto& mine = holders_[static_cast<std::size_t>(partners_[k])]; const Id i : mine) {
+        pack(i, outgoing[k]);
+        if (i == mine.front()) outgoing[k].reserve(mine.size() * outgoing[k].size());
+      }
     const std::vector<Bytes> incoming = ranks_.swap(std::move(outgoing), partners_);
     for (std::size_t k = 0; k < partners_.size(); ++k) {
       Reader from(incoming[k]);
@@ -127,10 +130,11 @@ class Part {
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
   double path_ = 0, slack_ = 0;
-  double wanted_path_ = 0;  // at least that, since one was too long not long ago
-  bool more_ = false;       // ghosts would have been enough for the slab
-  double depth_;            // of ghosts that do not matter [largest diameter]
-  std::int64_t next_ = 0;   // while everybody is known: the slab before which to divide
+  double safe_slabs_ = 0;       // until somebody may have come too far
+  double wanted_path_ = 0;      // at least that, since one was too long not long ago
+  bool more_ = false;           // ghosts would have been enough for the slab
+  double least_depth_, depth_;  // of ghosts that do not matter [largest diameter]
+  std::int64_t next_ = 0;       // while everybody is known: the slab before which to divide
   std::int64_t patience_ = 1;
 };
 

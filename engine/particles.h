@@ -4,9 +4,11 @@
 // Where several ranks share a system (engine/part.h) each has the particles it owns and copies of others, ghosts. It
 // may have only some of all then: their numbers here follow the order of their ids.
 
+#include <span>
 #include <string>
 #include <vector>
 
+#include "engine/error.h"
 #include "engine/vec.h"
 
 namespace carom {
@@ -49,5 +51,14 @@ struct Particles {
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
   Id id_of(Id i) const { return id.empty() ? i : id[i]; }
 };
+
+/// Throws Error(Failure::numerical) where one of these positions of the particles is not finite.
+template <int D>
+void need_finite(const Particles<D>& particles, std::span<const Vec<D>> x) {
+  for (Id i = 0; i < x.size(); ++i)
+    if (!x[i].allFinite())
+      throw Error(Failure::numerical, "the position of particle " + std::to_string(particles.id_of(i)) +
+                                          " is not finite; use a smaller integrator.step");
+}
 
 }  // namespace carom

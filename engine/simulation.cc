@@ -87,7 +87,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
   if (info_.smooth_forces) system_->quanta = quanta(*system_);
   std::optional<Part<D>> part;
   if (system_->ranks && info_.smooth_forces) {
-    part.emplace(*system_, integrator_->local(), plan_.step);
+    part.emplace(*system_, integrator_->local(), plan_.step, info_.hard_cores);
     ++s.counters.divisions;
   }
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);

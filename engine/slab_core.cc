@@ -1,9 +1,11 @@
 #include "engine/slab_core.h"
 
+#include <array>
 #include <cmath>
 
 #include "engine/collision.h"
 #include "engine/error.h"
+#include "engine/forces.h"
 #include "engine/path_hash.h"
 #include "engine/shared_contacts.h"
 
@@ -11,7 +13,8 @@ namespace carom {
 
 namespace {
 constexpr double kRoom = 1.25;  // for paths under other accelerations, in parts of the first ones
-}
+constexpr double kWild = 4;     // mean distances of ½ h² a
+}  // namespace
 
 template <int D>
 SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
@@ -20,6 +23,7 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       particles_(system.particles),
       scan_(system, max_events),
       max_events_(max_events),
+      wild_(kWild * mean_distance(system)),
       slot_(system.particles.size()) {
   for (int axis = 0; axis < D; ++axis) walls_ = walls_ || box_.walled(axis);
 }
@@ -36,16 +40,18 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   const std::size_t n = particles_.size();
   for (auto* each : {&room_, &reach_}) each->resize(n);
   for (auto* each : {&x_, &last_x_, &v_}) each->resize(n);
+  moved_.resize(n);
   held_.assign(scan_.resting().empty() ? 0 : n, 0);
   for (const auto& contact : scan_.resting()) {
     held_[contact.key.lo] = 1;
     if (contact.key.kind == EventKind::pair) held_[contact.key.hi] = 1;
   }
-  margin_ = 0;
+  margin_ = own_reach_ = 0;
   for (Id i = 0; i < n; ++i) {
     const double straight = length * v[i].norm(), bent = 0.5 * length * length * acceleration(i).norm();
     reach_[i] = kRoom * (straight + bent);
-    margin_ = std::max(margin_, reach_[i]);
+    margin_ = bent <= wild_ ? std::max(margin_, reach_[i]) : kNever;
+    if (particles_.owns(i)) own_reach_ = std::max(own_reach_, reach_[i]);
     room_[i] = (kRoom - 1) * straight + kRoom * bent;
   }
   near_.clear();
@@ -88,19 +94,26 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
       find_near();
     }
   } while (strayed_ > 0 && std::isfinite(strayed_));
-  if (system_.part && !system_.part->knows_everybody()) {
-    agree(!end.complete || crowded_ || strayed_ > 0);
-  } else if (crowded_) {
-    scan_.too_many(end.key);
-  } else if (strayed_ > 0) {
-    throw Error(Failure::numerical, "a position or velocity is not finite; use a smaller integrator.step");
-  }
   for (const Flight& each : flights_) {
     const double rest = length_ - each.t;
     const Vec<D> a_i = acceleration(each.id);
     x_[each.id] = each.x + rest * each.v + (0.5 * rest * rest) * a_i;
     v_[each.id] = each.v + rest * a_i;
   }
+  const bool shared = system_.part && !system_.part->knows_everybody();
+  all_moved_ = 0;
+  for (Id i = 0; i < x_.size(); ++i) {
+    moved_[i] = x_[i] != last_x_[i];
+    if (!shared || particles_.owns(i)) all_moved_ += moved_[i];
+  }
+  if (shared)
+    agree(!end.complete || crowded_ || strayed_ > 0);
+  else if (crowded_)
+    scan_.too_many(end.key);
+  else if (strayed_ > 0 && a_.empty())
+    throw Error(Failure::numerical, "a position or velocity is not finite; use a smaller integrator.step");
+  else if (strayed_ > 0)
+    return {.complete = false, .wild = true};
   compare_sequences();
   return end;
 }
@@ -138,7 +151,8 @@ void SlabCore<D>::plain_ends() {
     if (!(bent.squaredNorm() <= room_[i] * room_[i])) beyond_.push_back(static_cast<Id>(i));
   }
   for (const Id i : beyond_)
-    if (const double far = path(start_v_[i], a_[i], h); !(far <= margin_)) stray(far);
+    if (const double far = path(start_v_[i], a_[i], h); !(far <= margin_))
+      stray(half * a_[i].norm() <= wild_ ? far : kNever);
 }
 
 /// Serves the queue until it is empty.
@@ -313,28 +327,22 @@ void SlabCore<D>::compare_sequences() {
 template <int D>
 void SlabCore<D>::agree(bool failed) {
   Part<D>& part = *system_.part;
-  if (part.largest(failed ? 1 : 0) > 0) throw HaloTooSmall{};
   PathHashes<D> events(particles_);
   for (const Contact<D>& contact : contacts_) events.add(contact.key);
   bool agreed = true;
   part.tell(
       [&](Id i, Bytes& to) { put(to, events[i]); },
       [&](Id i, Reader& from) { agreed = (from.get<std::uint64_t>() == events[i] || !part.matters(i)) && agreed; });
-  if (part.largest(agreed ? 0 : 1) > 0) {
-    part.deepen();
-    throw HaloTooSmall{};
-  }
-  double farthest = 0;
-  for (Id i = 0; i < x_.size(); ++i) {
-    if (!particles_.owns(i)) continue;
-    double far = path(start_v_[i], acceleration(i), length_);
-    if (slot_[i] != 0) {
-      const Flight& f = flights_[slot_[i] - 1];
-      far = std::max(far, (f.x - particles_.x[i]).norm() + path(f.v, acceleration(i), length_ - f.t));
-    }
-    farthest = std::max(farthest, far);
-  }
-  if (!part.covers(farthest)) throw HaloTooSmall{};
+  std::array<double, 3> most = {failed ? 1.0 : 0.0, agreed ? 0.0 : 1.0, own_reach_};
+  auto& [any_failed, any_wrong, farthest] = most;
+  for (const Id i : beyond_)
+    if (particles_.owns(i)) farthest = std::max(farthest, path(start_v_[i], a_[i], length_));
+  for (const Flight& f : flights_)
+    if (particles_.owns(f.id))
+      farthest = std::max(farthest, (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t));
+  part.ranks().combine(most, {&all_moved_, 1});
+  if (any_wrong > 0 && any_failed == 0) part.deepen();
+  if (any_failed > 0 || any_wrong > 0 || !part.covers(farthest)) throw HaloTooSmall{};
 }
 
 template <int D>

@@ -25,8 +25,8 @@ namespace carom {
 template <int D>
 struct FlightEnd {
   bool complete = true;
-  double time =
-      0;  ///< where it is not: the slab must end here, because a contact came to rest or a resting one was hit
+  bool wild = false;  ///< where it is not: an acceleration is far too strong for the slab, or no number
+  double time = 0;    ///< else the slab must end here, because a contact came to rest or a resting one was hit
   EventKey<D> key{};  ///< by this event
 };
 
@@ -53,9 +53,11 @@ class SlabCore {
   const std::vector<Vec<D>>& x() const { return x_; }            ///< positions at the slab's end, not wrapped [length]
   const std::vector<Vec<D>>& last_x() const { return last_x_; }  ///< the same of the flight before
   const std::vector<Vec<D>>& v() const { return v_; }            ///< velocities there [length/time]
-  std::span<const Contact<D>> contacts() const {
-    return contacts_;
-  }  ///< of the last flight, in the order of their keys
+  /// By particle, whether the flight before ended elsewhere; and how many these are on all ranks.
+  const std::vector<char>& moved() const { return moved_; }
+  std::uint64_t all_moved() const { return all_moved_; }
+  /// Of the last flight, in the order of their keys.
+  std::span<const Contact<D>> contacts() const { return contacts_; }
 
   /// Whether particle i has a contact in the last flight.
   bool collides(Id i) const { return slot_[i] != 0; }
@@ -125,10 +127,11 @@ class SlabCore {
   const Particles<D>& particles_;
   ContactScan<D> scan_;
   std::uint64_t max_events_;
+  double wild_;  // path that an acceleration may bend in a slab [length]
   bool walls_ = false;
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
-  double length_ = 0, margin_ = 0;
+  double length_ = 0, margin_ = 0, own_reach_ = 0;
   double strayed_ = 0;  // > 0: how far a particle came, beyond margin_, in this flight
   bool crowded_ = false, resolved_ = false;
   Positions<D> start_v_, a_;  // of the slab
@@ -139,6 +142,8 @@ class SlabCore {
   std::vector<Id> beyond_;           // particles with larger ones
   std::vector<char> held_;           // resting in contact; empty: none are
   std::vector<Vec<D>> x_, last_x_, v_;
+  std::vector<char> moved_;
+  std::uint64_t all_moved_ = 0;
   std::vector<std::uint32_t> slot_;  // by particle: 1 + its place in flights_, or 0
   std::vector<Flight> flights_;
   std::vector<Planned> queue_;  // a heap

@@ -1,6 +1,7 @@
 #pragma once
 // The particles and what acts on them: the state that an integrator advances.
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -41,6 +42,13 @@ struct System {
 
   /// How many particles there are, on all ranks together, also while they are in the cores.
   std::size_t size() const { return sizes ? sizes->spheres : particles.mass.size(); }
+
+  /// Whether nothing changes the total momentum: no wall, no field.
+  bool keeps_momentum() const {
+    for (int k = 0; k < D; ++k)
+      if (box.walled(k)) return false;
+    return std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
+  }
 
   /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
   void wrap();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstring>
 
 namespace carom {
@@ -22,26 +23,28 @@ void in_pieces(std::size_t size, Start&& start) {
 
 }  // namespace
 
-/// Combines the values of all ranks by recursive doubling: log2 P messages, each of which is waited for with an eye on
-/// failures. (MPI_Allreduce cannot be left; MPI_Iallreduce takes thrice as long.) The value of the lower rank comes
-/// first, so that all get the same bits.
-template <class T, class Combine>
-void MpiExchange::combine_all(std::span<T> values, Combine combine) {
+/// By recursive doubling: log2 P messages, each of which is waited for with an eye on failures. (MPI_Allreduce cannot
+/// be left; MPI_Iallreduce takes thrice as long.) The value of the lower rank comes first, so that all get the same
+/// bits.
+void MpiExchange::combine(std::span<double> most, std::span<std::uint64_t> sums) {
   ranks_.watch().begin_call();
-  const int rank = ranks_.rank(), size = ranks_.size(), length = bytes(values.size_bytes());
-  theirs_.resize(values.size_bytes());
+  mine_.assign(sums.begin(), sums.end());
+  for (const double value : most) mine_.push_back(std::bit_cast<std::uint64_t>(value));
+  theirs_.resize(mine_.size());
+  const int rank = ranks_.rank(), size = ranks_.size(), length = bytes(mine_.size() * sizeof(std::uint64_t));
   const auto swap_with = [&](int partner, Tag tag, bool sends, bool receives) {
     std::array<MPI_Request, 2> requests = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
     if (receives) MPI_Irecv(theirs_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &requests[0]);
-    if (sends) MPI_Isend(values.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &requests[1]);
+    if (sends) MPI_Isend(mine_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &requests[1]);
     ranks_.watch().wait(requests);
   };
+  const auto larger = [](std::uint64_t a, std::uint64_t b) {
+    return std::bit_cast<std::uint64_t>(std::max(std::bit_cast<double>(a), std::bit_cast<double>(b)));
+  };
   const auto take_in = [&](bool mine_first) {
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      T theirs;
-      std::memcpy(&theirs, theirs_.data() + k * sizeof(T), sizeof(T));
-      values[k] = mine_first ? combine(values[k], theirs) : combine(theirs, values[k]);
-    }
+    if (!mine_first) mine_.swap(theirs_);
+    for (std::size_t k = 0; k < mine_.size(); ++k)
+      mine_[k] = k < sums.size() ? mine_[k] + theirs_[k] : larger(mine_[k], theirs_[k]);
   };
   // Ranks beyond the largest power of two give their values to one below, and get the result from it.
   int whole = 1;
@@ -49,18 +52,20 @@ void MpiExchange::combine_all(std::span<T> values, Combine combine) {
   if (rank >= whole) {
     swap_with(rank - whole, fold, true, false);
     swap_with(rank - whole, fold, false, true);
-    std::memcpy(values.data(), theirs_.data(), theirs_.size());
-    return;
+    mine_.swap(theirs_);
+  } else {
+    if (rank + whole < size) {
+      swap_with(rank + whole, fold, false, true);
+      take_in(true);
+    }
+    for (int bit = 1; bit < whole; bit *= 2) {
+      swap_with(rank ^ bit, step, true, true);
+      take_in((rank & bit) == 0);
+    }
+    if (rank + whole < size) swap_with(rank + whole, fold, true, false);
   }
-  if (rank + whole < size) {
-    swap_with(rank + whole, fold, false, true);
-    take_in(true);
-  }
-  for (int bit = 1; bit < whole; bit *= 2) {
-    swap_with(rank ^ bit, step, true, true);
-    take_in((rank & bit) == 0);
-  }
-  if (rank + whole < size) swap_with(rank + whole, fold, true, false);
+  for (std::size_t k = 0; k < sums.size(); ++k) sums[k] = mine_[k];
+  for (std::size_t k = 0; k < most.size(); ++k) most[k] = std::bit_cast<double>(mine_[sums.size() + k]);
 }
 
 std::vector<Bytes> MpiExchange::trade(const std::function<const Bytes&(std::size_t)>& outgoing) {
@@ -145,14 +150,6 @@ std::vector<Bytes> MpiExchange::gather(const Bytes& mine) {
   auto incoming = trade([&mine](std::size_t) -> const Bytes& { return mine; });
   incoming[static_cast<std::size_t>(rank())] = mine;
   return incoming;
-}
-
-void MpiExchange::largest(std::span<double> values) {
-  combine_all(values, [](double a, double b) { return std::max(a, b); });
-}
-
-void MpiExchange::sum(std::span<std::uint64_t> values) {
-  combine_all(values, [](std::uint64_t a, std::uint64_t b) { return a + b; });
 }
 
 }  // namespace carom

@@ -20,20 +20,17 @@ class MpiExchange : public Exchange {
   std::vector<Bytes> swap(std::vector<Bytes> outgoing) override;
   std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override;
   std::vector<Bytes> gather(const Bytes& mine) override;
-  void largest(std::span<double> values) override;
-  void sum(std::span<std::uint64_t> values) override;
+  void combine(std::span<double> most, std::span<std::uint64_t> sums) override;
 
  private:
   std::vector<Bytes> trade(const std::function<const Bytes&(std::size_t)>& outgoing);
-  template <class T, class Combine>
-  void combine_all(std::span<T> values, Combine combine);
 
   const Communicator& ranks_;
   // Where messages arrive; what leaves in swap().
   std::vector<std::uint64_t> leaving_, coming_;
   std::vector<Bytes> incoming_, outgoing_;
-  std::vector<Bytes> first_in_, first_out_;  // the first messages among neighbours
-  Bytes theirs_;
+  std::vector<Bytes> first_in_, first_out_;   // the first messages among neighbours
+  std::vector<std::uint64_t> mine_, theirs_;  // values that are combined
 };
 
 }  // namespace carom

@@ -14,6 +14,7 @@
 // is folded into the velocities by a common factor.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -39,7 +40,6 @@ constexpr double kSlow = 0.04;            // contraction of two sweeps that tell
 constexpr double kRoom = 1.1;             // for frequencies above the one found
 constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
 constexpr std::size_t kSmooth = 3;        // past slabs that the start is extrapolated from
-constexpr double kWild = 4;               // mean distances of ½ h² a: such a step is halved before it is flown
 constexpr double kStalled = 0.1;          // contraction of kPatience sweeps that is too little
 constexpr double kSettled = 0.5;          // of the tolerance: such a particle keeps its path
 constexpr double kRounding = 1e-13;       // of the speed scale: increments below it that do not shrink are rounding
@@ -65,8 +65,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const std::size_t n = system.particles.size();
     past_.resize(n);
     for (auto* each : {&a_, &mean_, &move_}) each->resize(n, Vec<D>::Zero());
-    swaps_.assign(n, 0);
-    swapping_.clear();
+    swaps_.resize(n);
   }
 
   void start(System<D>& system, Counters& counters) override {
@@ -75,43 +74,32 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     evaluate_forces<D>(system, p.x, a_, counters);
     for (std::size_t i = 0; i < a_.size(); ++i) a_[i] /= p.mass[i];
     past_.start(a_);
-    const auto n = static_cast<double>(std::max<std::size_t>(1, system.part ? system.part->total() : system.size()));
-    bool free = n > 1;  // the total momentum is kept, and more than it moves
-    for (int k = 0; k < D; ++k) free = free && !system.box.walled(k);
-    for (const auto& term : system.interactions) free = free && term->keeps_momentum();
-    ExactSum squares, mass, forces;
-    std::array<ExactSum, D> momentum;
-    for (Id i = 0; i < p.size(); ++i) {
-      if (!p.owns(i)) continue;
-      squares.add(p.v[i].squaredNorm());
-      forces.add(a_[i].squaredNorm());
-      mass.add(p.mass[i]);
-      for (int k = 0; k < D; ++k) momentum[k].add(p.mass[i] * p.v[i][k]);
-    }
-    speed_ = std::sqrt(of_all_ranks(system, squares).value() / n);
-    strength_ = std::sqrt(of_all_ranks(system, forces).value() / n);
-    const double total = of_all_ranks(system, mass).value();
-    for (int k = 0; k < D; ++k) centre_[k] = free ? of_all_ranks(system, momentum[k]).value() / total : 0.0;
+    const auto sum = [&](auto&& term) {
+      ExactSum own;
+      for (Id i = 0; i < p.size(); ++i)
+        if (p.owns(i)) own.add(term(i));
+      return of_all_ranks(system, own).value();
+    };
+    const double n = static_cast<double>(std::max<std::size_t>(1, count_of_all(system)));
+    speed_ = std::sqrt(sum([&](Id i) { return p.v[i].squaredNorm(); }) / n);
+    strength_ = std::sqrt(sum([&](Id i) { return a_[i].squaredNorm(); }) / n);
+    const double mass = sum([&](Id i) { return p.mass[i]; });
+    const bool free = n > 1 && system.keeps_momentum();  // and more than it moves
+    for (int k = 0; k < D; ++k) centre_[k] = free ? sum([&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass : 0.0;
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     slab_ = slab.index;
     core_->begin_step(report.counters, report.contacts, past_.last(), slab.length);
-    const auto before = found_;
-    try {
-      advance(system, slab);
-    } catch (HaloTooSmall) {
-      found_ = before;  // the step is done again as if this had not been tried
-      throw;
-    }
+    found_ = kept_;  // of a step that is done again nothing is known
+    advance(system, slab);
+    kept_ = found_;
     system.wrap();
     report.reached = slab.length;
   }
 
  private:
-  enum class Outcome { settled, cut, diverged };
-
   /// What one step finds out and later ones use.
   struct Found {
     bool touching = true;                // contacts at the slab's start may need to be resolved
@@ -122,28 +110,33 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// The pieces of a step.
   void advance(System<D>& system, const Slab& slab) {
     auto& p = system.particles;
+    auto& scan = core_->scan();
     double done = 0, longest = slab.length;
+    bool to_contact = false;  // `longest` ends where a contact at rest is met or begins
     while (done < slab.length) {
-      resolved_ = found_.touching;
-      if (found_.touching) found_.touching = resolve(system, done);
+      const bool resolved = found_.touching;
+      if (resolved && (found_.touching = any_rank(system, !scan.quiet(p.x, p.v)))) {
+        need_all(system);
+        scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
+        found_.touching = !scan.resting().empty();
+      }
       const double rest = slab.length - done, piece = std::min(longest, rest);
-      const Outcome outcome = solve(system, piece);
-      if (outcome == Outcome::settled) {
+      if (solve(system, piece, resolved)) {
         core_->commit(done);
         finish(system, piece);
-        if (found_.touching) core_->scan().slide(p.x, p.v);
+        if (found_.touching) scan.slide(p.x, p.v);
         ++counters_->pieces;
         done = piece == rest ? slab.length : done + piece;
         longest = std::max(2 * piece, slab.length / kMostPieces);
-        found_.touching = found_.touching || cut_.time > 0;
-        cut_ = {};
+        found_.touching = found_.touching || std::exchange(to_contact, false);
         continue;
       }
       need_all(system);
-      if (outcome == Outcome::cut) {
-        core_->scan().count_event(cut_.key);
-        found_.touching = found_.touching || cut_.time == 0;
-        longest = cut_.time > 0 ? cut_.time : longest;
+      if (!end_.complete && !end_.wild) {
+        scan.count_event(end_.key);
+        to_contact = end_.time > 0;
+        longest = to_contact ? end_.time : longest;
+        found_.touching = found_.touching || !to_contact;
         continue;
       }
       ++counters_->slabs_halved;
@@ -155,148 +148,99 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     }
   }
 
-  /// Impulses of what touches and approaches now, and which contacts rest. Returns whether any do.
-  bool resolve(System<D>& system, double done) {
-    auto& p = system.particles;
-    auto& scan = core_->scan();
-    if (!any_rank(system, !scan.quiet(p.x, p.v))) return false;
-    need_all(system);
-    scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
-    return !scan.resting().empty();
-  }
-
-  /// Sweeps over a slab from the present state. settled: core_ has the flight on a_, mean_ the accelerations it gives.
-  Outcome solve(System<D>& system, double h) {
+  /// Sweeps over a slab from the present state. True: core_ has the flight on a_, mean_ the accelerations it gives;
+  /// false: it is to be shorter. `resolved`: what touches now has been seen to.
+  bool solve(System<D>& system, double h, bool resolved) {
     const Stopwatch watch(counters_->seconds.sweep);
     auto& p = system.particles;
     const std::size_t n = p.size();
     Chebyshev chebyshev(0.25 * h * h * found_.squared_frequency);
     past_.expect(h, a_, chebyshev.plain() ? kSmooth : 1);  // stiff motion is not smooth from slab to slab
-    double strongest = 0;  // acceleration to be flown on
-    for (Id i = 0; i < n; ++i)
-      if (p.owns(i)) strongest = std::max(strongest, finite(a_[i].squaredNorm()));
-    largest_of_all<D>(system, {&strongest, 1});
-    strongest = std::sqrt(strongest);
-    core_->begin(p.v, a_, h, resolved_);
-    for (const Id i : swapping_) swaps_[i] = 0;
-    swapping_.clear();
+    core_->begin(p.v, a_, h, resolved);
+    std::ranges::fill(swaps_, 0);
+    std::ranges::fill(move_, Vec<D>::Zero());
     any_freezes_ = false;
     const double scale = std::max(speed_, h * strength_);
     const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
-    double last = 0, before = 0, earlier = 0;  // largest, one, two and kPatience sweeps ago
+    std::array<double, kMostSweeps + 1> residual{};                                  // by sweep
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
-      if (!(0.5 * h * h * strongest <= kWild * mean_distance(system))) return Outcome::diverged;
-      const FlightEnd<D> end = core_->fly(a_);
-      if (!end.complete) {
-        cut_ = end;
-        return Outcome::cut;
-      }
-      evaluate(system, sweep == 1);
-      if (!core_->scan().resting().empty()) hold(system, h);
-      std::array<double, 2> most{};  // |e|² and |a′|²
-      for (Id i = 0; i < n; ++i) {
-        if (frozen(i) || !p.owns(i)) continue;
-        most[0] = std::max(most[0], finite((mean_[i] - a_[i]).squaredNorm()));
-        most[1] = std::max(most[1], mean_[i].squaredNorm());
-      }
-      largest_of_all<D>(system, most);
-      const double largest = h * std::sqrt(most[0]);
-      strongest = std::sqrt(most[1]);
-      if (!std::isfinite(largest)) return Outcome::diverged;
-      if (largest <= wanted) return Outcome::settled;
-      if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * last) return Outcome::settled;
-      if (sweep >= kPatience && any_rank(system, swaps_among_unfrozen())) freeze();
-      if (sweep % kPatience == 0) {
-        const double slow = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kPatience));
-        if (sweep > kPatience && largest > slow * earlier) freeze_stalled(largest / h);
-        earlier = largest;
-      }
-      if (sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * before) && measure(system)) {
+      end_ = core_->fly(a_);
+      if (!end_.complete) return false;
+      const auto [squared, swaps] = evaluate(system, h, sweep == 1);
+      const double largest = residual[sweep] = h * std::sqrt(squared);
+      if (!std::isfinite(largest)) return false;
+      if (largest <= wanted) return true;
+      if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * residual[sweep - 1]) return true;
+      if (sweep >= kPatience && swaps > 0) freeze();
+      const double stalled = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kPatience));
+      if (sweep > kPatience && sweep % kPatience == 0 && largest > stalled * residual[sweep - kPatience])
+        freeze_stalled(largest / h);
+      const bool slow =
+          sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * residual[sweep - 2]);
+      if (slow && slab_ >= found_.measured + kMeasured) {
+        found_.measured = slab_;
+        found_.squared_frequency = kRoom * largest_squared_frequency(system);
         chebyshev = Chebyshev(0.25 * h * h * found_.squared_frequency);
         ++counters_->fallbacks;
       }
       chebyshev.next();
-      before = last;
-      last = largest;
       const double settled = std::pow(kSettled * wanted / h, 2);
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
         const Vec<D> e = mean_[i] - a_[i];
-        if (!chebyshev.plain()) {
-          move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
-          a_[i] += move_[i];
-        } else if (e.squaredNorm() > settled) {
-          move_[i] = e;
+        if (!chebyshev.plain())
+          a_[i] += move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
+        else if (e.squaredNorm() > settled)
           a_[i] = mean_[i];
-        }
       }
     }
-    return Outcome::diverged;
+    return false;
   }
 
   /// The accelerations that the flight gives. Where the ends of few particles have changed only their pairs are
-  /// evaluated again: sums of integers let them be subtracted exactly.
-  void evaluate(const System<D>& system, bool first) {
+  /// evaluated again: sums of integers let them be subtracted exactly. Returns the largest |e|² and, above 0, whether
+  /// partners are still swapped, of all particles that are not frozen.
+  std::array<double, 2> evaluate(const System<D>& system, double h, bool first) {
     const Stopwatch watch(counters_->seconds.force);
     const auto& p = system.particles;
-    const auto &x = core_->x(), &before = core_->last_x();
-    std::array<std::uint64_t, 3> count{};  // own particles, those of them that have changed, and pairs evaluated
-    changed_.resize(x.size());
-    for (Id i = 0; i < x.size(); ++i) {
-      changed_[i] = first || x[i] != before[i];
-      if (p.owns(i)) ++count[0], count[1] += changed_[i];
-    }
-    sum_over_ranks(system, count);
-    const bool all = first || kFew * count[1] > count[0];
-    count[2] = all ? forces_.evaluate(system, p.x, x) : forces_.update(system, p.x, before, x, changed_.data());
-    sum_over_ranks(system, {&count[2], 1});
-    if (first) pairs_ = count[2];
-    counters_->force_passes += pairs_ > 0 ? static_cast<double>(count[2]) / static_cast<double>(pairs_) : 0.0;
-    ++counters_->sweeps;
+    const auto& x = core_->x();
+    const bool all = first || kFew * core_->all_moved() > count_of_all(system);
+    std::uint64_t pairs =
+        all ? forces_.evaluate(system, p.x, x) : forces_.update(system, p.x, core_->last_x(), x, core_->moved().data());
     for (Id i = 0; i < x.size(); ++i) mean_[i] = forces_[i];
     if (system.part) system.part->refresh(mean_);
     for (Id i = 0; i < x.size(); ++i) mean_[i] /= p.mass[i];
-  }
-
-  /// Finds the highest frequency, not more often than it pays. Returns whether it did.
-  bool measure(const System<D>& system) {
-    if (slab_ < found_.measured + kMeasured) return false;
-    found_.measured = slab_;
-    found_.squared_frequency = kRoom * largest_squared_frequency(system);
-    return true;
+    if (!core_->scan().resting().empty()) hold(system, h);
+    std::array<double, 2> most{};
+    for (Id i = 0; i < x.size(); ++i)
+      if (p.owns(i) && !frozen(i)) most[0] = std::max(most[0], finite((mean_[i] - a_[i]).squaredNorm()));
+    for (const Id i : core_->swapped()) most[1] = std::max(most[1], frozen(i) ? 0.0 : 1.0);
+    if (system.part) system.part->ranks().combine(most, {&pairs, 1});
+    if (first) pairs_ = pairs;
+    counters_->force_passes += pairs_ > 0 ? static_cast<double>(pairs) / static_cast<double>(pairs_) : 0.0;
+    ++counters_->sweeps;
+    return most;
   }
 
   /// Particles in collisions whose paths do not settle: a grazing contact may turn a small change into a larger one.
   void freeze_stalled(double largest) {
     any_freezes_ = true;
     for (Id i = 0; i < a_.size(); ++i)
-      if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= kStalled * largest) {
-        if (swaps_[i] == 0) swapping_.push_back(i);
-        swaps_[i] = kSwaps + 1;
-      }
+      if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= kStalled * largest) swaps_[i] = kSwaps + 1;
   }
 
   bool frozen(Id i) const { return swaps_[i] > kSwaps; }
   static double finite(double value) { return std::isnan(value) ? kNever : value; }
-  bool swaps_among_unfrozen() const {
-    return std::ranges::any_of(core_->swapped(), [&](Id i) { return !frozen(i); });
-  }
 
   /// Counts the swaps of partners of each particle. One which swaps again and again keeps its acceleration from then
   /// on, and where it still swaps, so do its partners.
   void freeze() {
     any_freezes_ = true;
-    const auto note = [&](Id i) {
-      if (++swaps_[i] == 1) swapping_.push_back(i);
-    };
-    for (const Id i : core_->swapped()) {
-      if (frozen(i) && ++swaps_[i] > 2 * kSwaps)
+    for (const Id i : core_->swapped())
+      if (++swaps_[i] > 2 * kSwaps)
         for (const Contact<D>& contact : core_->contacts())
-          if (contact.key.kind == EventKind::pair && (contact.key.lo == i || contact.key.hi == i))
-            for (const Id j : {contact.key.lo, contact.key.hi})
-              if (!frozen(j)) note(j);
-      if (!frozen(i)) note(i);
-    }
+          if (const auto& key = contact.key; key.kind == EventKind::pair && (key.lo == i || key.hi == i))
+            for (const Id j : {key.lo, key.hi}) swaps_[j] += frozen(j) ? 0 : 1;
   }
 
   /// Adds the reactions λ(d + d′) of resting contacts, which do no work because they hold |d′| = |d|, to mean_.
@@ -320,7 +264,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
-    ExactSeries sum;
+    ExactSeries lack;
     std::vector<Lack<D>> of_frozen;
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
@@ -329,21 +273,14 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (frozen(i))
         of_frozen.push_back({p.id_of(i), core_->x()[i], r});
       else
-        sum.add(r);
+        lack.add(r);
     }
     core_->finish(p);
     for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
-    double rest = of_all_ranks(system, sum.sum()).value();
-    if (any_freezes_) {
-      rest += fold_near(system, of_frozen, counters_->folded);
-      std::uint64_t frozen_here = of_frozen.size();
-      sum_over_ranks(system, {&frozen_here, 1});
-      counters_->frozen += frozen_here;
-    }
-    if (fold(system, centre_, rest)) counters_->folded += std::abs(rest);
+    const double left = any_freezes_ ? fold_near(system, of_frozen, *counters_) : 0;
+    fold(system, centre_, lack.sum(), left, *counters_);
     update_copies(system);
-    past_.pass(h);
-    past_.last() = mean_;
+    past_.pass(h, mean_);
   }
 
   std::uint64_t max_events_;
@@ -353,15 +290,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> past_;
   MeanForces<D> forces_;
-  std::vector<char> changed_;         // by the last sweep
   std::uint64_t pairs_ = 0;           // within reach
   std::vector<Vec<D>> a_, mean_;      // flown on, and what that gives
   std::vector<std::uint32_t> swaps_;  // of partners, by particle
-  std::vector<Id> swapping_;          // particles with any
   bool any_freezes_ = false;          // on any rank, in this slab
-  Found found_;
-  bool resolved_ = false;  // contacts at the slab's start have been resolved
-  FlightEnd<D> cut_;       // why the last slab was cut
+  Found found_, kept_;                // kept_: at the end of the last step
+  FlightEnd<D> end_;                  // of the last flight
   std::int64_t slab_ = 0;
   std::vector<Vec<D>> move_;  // of a_ by the last sweep
   Counters* counters_ = nullptr;

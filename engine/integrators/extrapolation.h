@@ -32,11 +32,12 @@ class Extrapolation {
   void unpack(Id i, Reader& from) {
     for (auto& past : past_) past[i] = from.get<Vec<D>>();
   }
-  /// A slab of this length is done; last() is to be filled with its accelerations.
-  void pass(double length) {
+  /// A slab of this length is done, with these accelerations.
+  void pass(double length, const std::vector<Vec<D>>& a) {
     std::ranges::rotate(length_, length_.end() - 1);
     std::ranges::rotate(past_, past_.end() - 1);
     length_[0] = length;
+    past_[0] = a;
     known_ = std::min(known_ + 1, kOrder + 1);
   }
   /// The accelerations of a slab of this length. The integral of the acceleration is known at the slabs' ends, −s_k
@@ -60,7 +61,7 @@ class Extrapolation {
       for (std::size_t k = 1; k < known; ++k) a[i] += weight[k] * past_[k][i];
     }
   }
-  std::vector<Vec<D>>& last() { return past_[0]; }
+  const std::vector<Vec<D>>& last() const { return past_[0]; }
 
  private:
   static constexpr std::size_t kOrder = 2;

@@ -14,19 +14,24 @@ namespace carom::integrator {
 /// s of v ← v + s (v − centre), which changes a kinetic energy K by r = share · K.
 inline double stretch(double share) { return share / (1 + std::sqrt(1 + share)); }
 
-/// Adds r [energy] to the kinetic energy relative to `centre` of all particles that this rank owns and all other ranks
-/// do. False, and nothing is done, where they have too little. Collective.
+/// Adds what all ranks lack, and `more`, to the kinetic energy of all particles relative to `centre`; nothing where
+/// they have too little. Collective.
 template <int D>
-bool fold(System<D>& system, const Vec<D>& centre, double r) {
+void fold(System<D>& system, const Vec<D>& centre, const ExactSum& lack, double more, Counters& counters) {
+  struct Sums {
+    ExactSum lack, kinetic;
+    void add(const Sums& other) { lack.add(other.lack), kinetic.add(other.kinetic); }
+  };
   Particles<D>& p = system.particles;
   ExactSeries kinetic;
   for (Id i = 0; i < p.size(); ++i)
     if (p.owns(i)) kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre).squaredNorm());
-  const double share = r / of_all_ranks(system, kinetic.sum()).value();
-  if (!(std::abs(share) < 0.5) || share == 0) return r == 0;
+  const Sums sums = of_all_ranks(system, Sums{lack, kinetic.sum()});
+  const double r = sums.lack.value() + more, share = r / sums.kinetic.value();
+  if (!(std::abs(share) < 0.5) || share == 0) return;
   const double s = stretch(share);
   for (auto& v : p.v) v += s * (v - centre);
-  return true;
+  counters.folded += std::abs(r);
 }
 
 /// What one particle lacks.
@@ -39,10 +44,10 @@ struct Lack {
 
 /// Adds each r to the kinetic energy of the particle and those nearest to it, relative to their centre of mass: of 16,
 /// or of more, up to 64, until it is no more than a tenth of what these have. `mine`: of particles that this rank owns,
-/// by ascending id. Returns what is left over where all were too few, and leaves in `folded` the sum of |r| of the
-/// others. The velocities of own particles change. Collective.
+/// by ascending id. Returns what is left over where all were too few. The velocities of own particles change.
+/// Collective.
 template <int D>
-double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, double& folded) {
+double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, Counters& counters) {
   constexpr std::size_t kLeast = 16, kMost = 64;
   constexpr double kShare = 0.1;
   struct Near {
@@ -63,6 +68,7 @@ double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, double& fo
   for (const Bytes& bytes : ranks.gather(told))
     for (Reader reader(bytes); reader.more();) lacks.push_back(reader.get<Lack<D>>());
   if (lacks.empty()) return 0;
+  counters.frozen += lacks.size();
   std::ranges::sort(lacks, {}, &Lack<D>::id);
 
   std::vector<std::vector<Near>> near(lacks.size());
@@ -114,7 +120,7 @@ double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, double& fo
       left += lacks[k].r;
       continue;
     }
-    folded += std::abs(lacks[k].r);
+    counters.folded += std::abs(lacks[k].r);
     for (std::size_t n = 0; n < size; ++n) {
       const Vec<D> v = velocity(near[k][n]);
       changed[near[k][n].id] = v + stretch(share) * (v - centre);

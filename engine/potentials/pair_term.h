@@ -117,7 +117,7 @@ class PairTerm final : public Interaction<D> {
     return own;
   }
 
-  /// The loop over pairs. Returns how many are this rank's.
+  /// The loop over pairs. Returns how many are this rank's, for mean forces.
   std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1) const {
     const PairFormula& formula = kernels_->formulas[place_of<P>(PairPotentials{})];
     const auto& function = sums                     ? formula.forces_and_sums
@@ -143,7 +143,7 @@ class PairTerm final : public Interaction<D> {
       }
       if (forces) kernels_->scatter(*batch_, batch_->low, low);
       if (forces && wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
-      own += owned(shared);
+      if (!given.x_new.empty()) own += owned(shared);
     });
     if (low) pairs_.pass_on(*forces);
     if (!sums) return own;

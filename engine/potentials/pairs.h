@@ -61,12 +61,13 @@ class Bonds {
     PairList known;
     for (const auto& [a, b] : pairs_) {
       const Id i = of(a), j = of(b);
-      if (i != kUnknown && j != kUnknown)
-        known.push_back({i, j});
-      else if ((i != kUnknown && some.owns(i)) || (j != kUnknown && some.owns(j)))
-        return std::nullopt;
+      if (!(i != kUnknown && some.owns(i)) && !(j != kUnknown && some.owns(j))) continue;
+      if (i == kUnknown || j == kUnknown) return std::nullopt;
+      known.push_back({i, j});
     }
-    return Bonds(box_, std::move(known));
+    Bonds bonds(box_, std::move(known));
+    bonds.ids_ = some.id;
+    return bonds;
   }
   double reach(Positions<D> x) const {
     double longest = 0;
@@ -97,18 +98,20 @@ class Bonds {
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double /*cutoff_squared*/, PairBatch& batch,
                Visit&& visit) const {
+    shared_.clear();
     for (const bool shared : {false, true}) {
-      if (shared && particles.ghost.empty()) return;
       batch.clear();
       const auto flush = [&] {
         batch.pad();
         if (batch.n > 0) visit(shared);
         batch.clear();
       };
-      for (const auto& [i, j] : pairs_) {
-        const bool mine = particles.owns(i), theirs = particles.owns(j);
-        if (shared ? mine == theirs : !(mine && theirs)) continue;
+      for (const auto& [i, j] : shared ? shared_ : pairs_) {
         if (step.changed && step.changed[i] == 0 && step.changed[j] == 0) continue;
+        if (!shared && !(particles.owns(i) && particles.owns(j))) {
+          if (particles.owns(i) || particles.owns(j)) shared_.push_back({i, j});
+          continue;
+        }
         const Vec<D> shift = shift_of(i, j, step.x), d = step.x[i] - step.x[j] + shift;
         batch.begin_row(i);
         for (int k = 0; k < 3; ++k) batch.d[k][batch.n] = k < D ? d[k] : 0;
@@ -133,17 +136,24 @@ class Bonds {
  private:
   /// Of the image in which the bond is at x.
   Vec<D> shift_of(Id i, Id j, Positions<D> x) const {
-    const Vec<D> straight = x[i] - x[j], shift = box_.shift(box_.nearest_image(straight));
+    const Vec<D> straight = x[i] - x[j];
+    if ((straight.array().abs() <= kLongest * box_.edges.array()).all()) return Vec<D>::Zero();
+    const Vec<D> shift = box_.shift(box_.nearest_image(straight));
     for (int k = 0; k < D; ++k)
-      if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > 0.48 * box_.edges[k])
-        throw Error(Failure::numerical, "the bond of particles " + std::to_string(i) + " and " + std::to_string(j) +
+      if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > kLongest * box_.edges[k])
+        throw Error(Failure::numerical, "the bond of particles " + std::to_string(ids_.empty() ? i : ids_[i]) +
+                                            " and " + std::to_string(ids_.empty() ? j : ids_[j]) +
                                             " spans nearly half the periodic box along axis " + std::to_string(k) +
                                             ", where its image is ambiguous; use a larger box");
     return shift;
   }
 
+  static constexpr double kLongest = 0.48;  // of a bond along a periodic axis [edge]
+
   const Box<D>& box_;
   PairList pairs_;
+  mutable PairList shared_;  // with other ranks, in batches()
+  std::span<const Id> ids_;  // that all ranks know; empty: those of pairs_
   std::size_t most_partners_ = 0;
 };
 
@@ -166,10 +176,7 @@ class AllPairs {
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
                Visit&& visit) const {
     if (records_.order.empty() || ghost_ != particles.ghost) arrange(particles);
-    for (Id i = 0; i < particles_; ++i)
-      if (!step.x[i].allFinite())
-        throw Error(Failure::numerical,
-                    "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
+    need_finite(particles, step.x);
     records_.load(step);
     collect_batches(records_, box_, step, cutoff_squared, *kernels_, batch, visit);
   }
@@ -229,11 +236,11 @@ class AllPairs {
 template <int D>
 class PairsWithinCutoff {
  public:
-  PairsWithinCutoff(const Box<D>& box, double cutoff, PairFilter filter)
-      : box_(box), cutoff_(cutoff), filter_(filter), list_(box, cutoff, std::move(filter)) {}
+  PairsWithinCutoff(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList<D>* like = nullptr)
+      : box_(box), cutoff_(cutoff), filter_(filter), list_(box, cutoff, std::move(filter), like) {}
 
   std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
-    return PairsWithinCutoff(box_, cutoff_, filter_.among(some));
+    return PairsWithinCutoff(box_, cutoff_, filter_.among(some), &list_);
   }
   double reach(Positions<D>) const { return cutoff_; }
   double reach(const Particles<D>&, Exchange&) const { return cutoff_; }
@@ -241,7 +248,7 @@ class PairsWithinCutoff {
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
                Visit&& visit) const {
-    records_ = &list_.cover(step, particles.ghost);
+    records_ = &list_.cover(step, particles);
     collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit);
   }
   Id id(std::uint32_t place) const { return records_->order[place]; }

@@ -1,5 +1,6 @@
 """`mpirun carom run`: the same files on any number of ranks; what happens when one of them fails."""
 
+import copy
 import filecmp
 import os
 import pathlib
@@ -241,6 +242,49 @@ def test_an_error_of_all_ranks_is_reported_once(change, code, words, tmp_path):
     assert "carom: rank" not in done.stderr and "MPI_ABORT" not in done.stderr
     assert out.exists() == (tmp_path / "plain").exists() == (code == 4)
     assert code != 4 or summary(out)["status"] == "failed"
+
+
+# 800 discs far from each other, of which the ranks have halves of the box. What is wrong is wrong at its right end.
+APART = {
+    "format": 1, "title": "an error that one rank meets",
+    "system": {"dimension": 2, "box": [80.0, 40.0], "boundary": ["periodic", "periodic"]},
+    "particles": [{"name": "disc", "radius": 0.5, "velocity": [[0.0, 0.0]] * 800,
+                   "position": [[1 + 2.0 * (k // 20), 1 + 2.0 * (k % 20)] for k in range(800)]}],
+    "interaction": [{"type": "lennard-jones", "epsilon": 1.0, "sigma": 1.0, "cutoff": 1.5}],
+    "integrator": {"type": "verlet", "step": 0.01},
+    "run": {"steps": 10},
+    "output": {"directory": "unused", "frame_interval": 0.05, "thermo_interval": 0.05}}
+
+
+def on_each_other(deck):
+    deck["particles"][0]["position"][797] = deck["particles"][0]["position"][796][:]
+
+
+def far_apart(deck):
+    deck["integrator"]["type"] = "edda"
+    deck["particles"][0]["velocity"][785:795] = [[0.0, -8.0]] + 8 * [[0.0, 0.0]] + [[0.0, 8.0]]
+    deck["interaction"] = [{"type": "harmonic-bond", "pairs": [[785, 794]], "stiffness": 1e-3, "rest_length": 18.0}]
+
+
+def too_many_collisions(deck):
+    deck["integrator"] = {"type": "edda", "step": 0.5, "max_events_per_step": 1}
+    deck["particles"][0]["velocity"][794:798] = 2 * [[0.0, 3.0], [0.0, -3.0]]
+
+
+@pytest.mark.parametrize("spoil, words, of_one", [
+    (on_each_other, "the force between particles 796 and 797 is too large or no number", True),
+    (far_apart, "the bond of particles 785 and 794 spans nearly half the periodic box", True),
+    (too_many_collisions, "more than max_events_per_step = 1 collisions in one step, the last between", False),
+])
+def test_an_error_of_one_rank_ends_all(spoil, words, of_one, tmp_path):
+    deck = copy.deepcopy(APART)
+    spoil(deck)
+    path = write_deck(tmp_path, toml_text(deck))
+    assert words in run(path, tmp_path / "plain", code=4).stderr
+    for ranks in 2, 4:
+        done = mpirun(ranks, command(path, tmp_path / str(ranks)), code=4)
+        assert done.stderr.count(words) == 1
+        assert ("carom: rank" in done.stderr) == of_one
 
 
 def test_other_commands_speak_once(tmp_path):

@@ -60,28 +60,23 @@ class ThreadRanks {
     std::vector<Bytes> gather(const Bytes& mine) override {
       return swap(std::vector<Bytes>(team_.messages_.size(), mine));
     }
-    void largest(std::span<double> values) override {
-      combine(values, [](double a, double b) { return std::max(a, b); });
-    }
-    void sum(std::span<std::uint64_t> values) override {
-      combine(values, [](std::uint64_t a, std::uint64_t b) { return a + b; });
-    }
-
-   private:
-    template <class T, class Combine>
-    void combine(std::span<T> values, Combine&& combine) {
+    void combine(std::span<double> most, std::span<std::uint64_t> sums) override {
       Bytes mine;
-      for (const T& value : values) put(mine, value);
+      for (const double value : most) put(mine, value);
+      for (const std::uint64_t value : sums) put(mine, value);
       bool first = true;
       for (const Bytes& bytes : gather(mine)) {
         Reader reader(bytes);
-        for (T& value : values) {
-          const T theirs = reader.get<T>();
-          value = first ? theirs : combine(value, theirs);
+        for (double& value : most) {
+          const auto theirs = reader.get<double>();
+          value = first ? theirs : std::max(value, theirs);
         }
+        for (std::uint64_t& value : sums) value = reader.get<std::uint64_t>() + (first ? 0 : value);
         first = false;
       }
     }
+
+   private:
     ThreadRanks& team_;
     std::size_t rank_;
   };

@@ -201,8 +201,11 @@ TEST(Part, Cloud) {
 }
 /// So many that each rank knows only some.
 TEST(Part, ManySprings) {
-  for (const char* method : {"verlet", "psa", "edda"})
-    compare<2>([] { return springs(40); }, method, 0.02, 60, std::string(method) == "verlet" ? 0 : 400);
+  for (const char* method : {"verlet", "psa", "edda"}) {
+    const std::uint64_t contacts = std::string(method) == "verlet" ? 0 : 400;
+    const Counters c = compare<2>([] { return springs(40); }, method, 0.02, 60, contacts).counters;
+    EXPECT_EQ(c.slabs_again, 0u) << method;  // ghosts that go wrong at the rim are right again in the next slab
+  }
 }
 TEST(Part, Rod) {
   for (const char* method : {"psa", "edda"}) {
@@ -271,7 +274,7 @@ TEST(Part, NobodyHasEverybody) {
 }
 /// In such long steps a collision is felt farther away than a rank knows.
 TEST(Part, StepsThatTakeEverybody) {
-  EXPECT_GT(compare<2>([] { return springs(40); }, "psa", 0.3, 4, 1000).counters.slabs_by_all, 0u);
+  EXPECT_GT(compare<2>([] { return springs(40); }, "psa", 0.5, 2, 1000).counters.slabs_by_all, 0u);
 }
 TEST(Part, WithoutCores) {
   for (const auto& scene : {yukawa(0.1), yukawa(0.3)}) compare<3>(scene, "verlet", 0.01, 150, 0);
