@@ -12,6 +12,7 @@ template <int W>
 struct Width {
   typedef double Double __attribute__((vector_size(8 * W)));
   typedef long long Long __attribute__((vector_size(8 * W)));
+  typedef std::uint32_t Places __attribute__((vector_size(4 * W)));
 };
 using Two = Width<2>::Double;
 using Four = Width<4>::Double;
@@ -81,6 +82,15 @@ CAROM_INLINE unsigned bits(M mask) {
   return all;
 }
 
+/// Where a < b, one bit a lane.
+template <class V>
+CAROM_INLINE unsigned less(V a, V b) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof a == 64) return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ);
+#endif
+  return bits(a < b);
+}
+
 /// For each mask of four lanes the halves of those that are in it, first things first.
 struct Compression {
   alignas(32) std::uint32_t half[16][8];
@@ -116,11 +126,11 @@ CAROM_INLINE void compress(double* to, unsigned mask, V x) {
 #endif
   for (unsigned l = 0, n = 0; l < sizeof x / 8; n += mask >> l & 1, ++l) to[n] = x[l];
 }
-template <int W>
-CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, const std::uint32_t* from) {
+template <int W, class Places>
+CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, Places places) {
 #if defined(__AVX512F__)
   if constexpr (W == 8) {
-    const __m512i some = _mm512_castsi256_si512(load<__m256i>(from));
+    const __m512i some = _mm512_castsi256_si512((__m256i)places);
     store(to, _mm512_castsi512_si256(_mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), some)));
     return;
   }
@@ -128,13 +138,11 @@ CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, const std::uint32_t
 #if defined(__AVX2__)
   if constexpr (W == 4) {
     const __m128i which = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompression.lane[mask]));
-    store(to, _mm_permutevar_ps((__m128)load<__m128i>(from), which));
+    store(to, _mm_permutevar_ps((__m128)places, which));
     return;
   }
 #endif
-  std::uint32_t some[W];
-  __builtin_memcpy(some, from, sizeof some);
-  for (unsigned l = 0, n = 0; l < W; n += mask >> l & 1, ++l) to[n] = some[l];
+  for (unsigned l = 0, n = 0; l < W; n += mask >> l & 1, ++l) to[n] = places[l];
 }
 
 template <int W>
@@ -147,7 +155,7 @@ CAROM_INLINE unsigned count(unsigned mask) {
 
 template <int W>
 CAROM_INLINE unsigned first_lanes(std::uint32_t count) {
-  return count >= W ? (1u << W) - 1 : (1u << count) - 1;
+  return (1u << (count < W ? count : W)) - 1;
 }
 
 /// What a batch has beside separations: nothing, new ones, or differences of vectors.
@@ -189,22 +197,22 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       }
       const V dx = (x - other.x) + shift[0], dy = (y - other.y) + shift[1], dz = (z - other.z) + shift[2];
       const V rho = dx * dx + dy * dy + dz * dz;
-      auto within = rho < cutoff;
+      unsigned mask = less(rho, cutoff);
       V ex, ey, ez;
       if constexpr (beside != Beside::nothing) {
         const auto after = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x_new + j[l]; });
         ex = x_new - after.x, ey = y_new - after.y, ez = z_new - after.z;
         if constexpr (beside == Beside::step) {
           ex += shift[0], ey += shift[1], ez += shift[2];
-          within |= ex * ex + ey * ey + ez * ez < cutoff;
+          mask |= less(ex * ex + ey * ey + ez * ez, cutoff);
         }
       }
       V product;
       if constexpr (weighted) {
         product = w * other.w;
-        within &= product != 0.0;
+        mask &= bits(product != 0.0);
       }
-      const unsigned mask = bits(within) & first_lanes<W>(run.count - cursor.at);
+      mask &= first_lanes<W>(run.count - cursor.at);
       compress(batch.d[0] + n, mask, dx);
       compress(batch.d[1] + n, mask, dy);
       compress(batch.d[2] + n, mask, dz);
@@ -214,7 +222,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         compress(batch.d_new[2] + n, mask, ez);
       }
       if constexpr (weighted) compress(batch.weight + n, mask, product);
-      compress<W>(batch.second + n, mask, j);
+      compress<W>(batch.second + n, mask, load<typename Width<W>::Places>(j));
       n += count<W>(mask);
     }
   }
@@ -285,23 +293,23 @@ template <int W>
 void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32_t end, PartnersFound& found) {
   using V = typename Width<W>::Double;
   using B = BitsOf<V>;
+  using Places = typename Width<W>::Places;
   const V x = all<V>(search.own[0]), y = all<V>(search.own[1]), z = all<V>(search.own[2]);
   const V reach = all<V>(search.reach_squared);
   constexpr std::uint64_t kOdd = PartnerSearch::kMoving | PartnerSearch::kGhost;
-  for (std::uint32_t j = begin; j < end; j += W) {
+  Places places;
+  for (unsigned l = 0; l < W; ++l) places[l] = begin + l;
+  for (std::uint32_t j = begin; j < end; j += W, places += W) {
     const V dx = x - load<V>(search.x[0] + j), dy = y - load<V>(search.x[1] + j), dz = z - load<V>(search.x[2] + j);
     const B code = load<B>(search.code + j);
-    const auto near = dx * dx + dy * dy + dz * dz <= reach;
     const unsigned odd = bits((code & kOdd) != 0u), wanted = bits((code & search.wanted) != 0u);
-    unsigned mask = bits(near) & wanted & first_lanes<W>(end - j);
+    unsigned mask = ~less(reach, dx * dx + dy * dy + dz * dz) & wanted & first_lanes<W>(end - j);
     if (!search.here && search.row - j < W) mask &= ~(1u << (search.row - j));
-    std::uint32_t index[W];
-    for (unsigned l = 0; l < W; ++l) index[l] = j + l;
     const unsigned plain = search.plain ? mask & ~odd : 0;
-    compress<W>(found.plain, plain, index);
+    compress<W>(found.plain, plain, places);
     found.plain += count<W>(plain);
     if (plain == mask) continue;
-    compress<W>(found.other, mask & ~plain, index);
+    compress<W>(found.other, mask & ~plain, places);
     found.other += count<W>(mask & ~plain);
   }
 }
