@@ -128,10 +128,9 @@ CAROM_INLINE void compress(double* to, unsigned mask, V x) {
 }
 template <int W, class Places>
 CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, Places places) {
-#if defined(__AVX512F__)
+#if defined(__AVX512VL__)
   if constexpr (W == 8) {
-    const __m512i some = _mm512_castsi256_si512((__m256i)places);
-    store(to, _mm512_castsi512_si256(_mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), some)));
+    store(to, _mm256_maskz_compress_epi32(static_cast<__mmask8>(mask), (__m256i)places));
     return;
   }
 #endif
@@ -146,7 +145,7 @@ CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, Places places) {
 }
 
 template <int W>
-CAROM_INLINE unsigned count(unsigned mask) {
+CAROM_INLINE unsigned bits_in(unsigned mask) {
   if constexpr (W == 2)
     return (mask & 1) + (mask >> 1);
   else
@@ -167,6 +166,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   batch.clear();
   unsigned n = 0;
   const V cutoff = all<V>(rows.cutoff_squared);
+  const PairRecord* const records = rows.x;
   for (; cursor.run < rows.runs; ++cursor.run, cursor.at = 0) {
     const PairRun& run = rows.run[cursor.run];
     const std::uint32_t* const partner = rows.partner + run.begin;
@@ -181,14 +181,11 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
     }
     batch.n = n;
     batch.begin_row(run.row);
-    for (; cursor.at < run.count; cursor.at += W) {
-      if (n + W > PairBatch::kCapacity) {
-        batch.n = n;
-        batch.pad();
-        return true;
-      }
-      const std::uint32_t* const j = partner + cursor.at;
-      const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x + j[l]; });
+    const std::uint32_t count = run.count, first = cursor.at, most = (PairBatch::kCapacity - n) / W * W;
+    const std::uint32_t end = count - first < most ? count : first + most;
+    for (std::uint32_t at = first; at < end; at += W) {
+      const std::uint32_t* const j = partner + at;
+      const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return records + j[l]; });
       if constexpr (moving) {
         const auto box = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.box + j[l]; });
         shift[0] = (image[0] + box.x) * rows.edges[0];
@@ -212,7 +209,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         product = w * other.w;
         mask &= bits(product != 0.0);
       }
-      mask &= first_lanes<W>(run.count - cursor.at);
+      mask &= first_lanes<W>(count - at);
       compress(batch.d[0] + n, mask, dx);
       compress(batch.d[1] + n, mask, dy);
       compress(batch.d[2] + n, mask, dz);
@@ -223,7 +220,11 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       }
       if constexpr (weighted) compress(batch.weight + n, mask, product);
       compress<W>(batch.second + n, mask, load<typename Width<W>::Places>(j));
-      n += count<W>(mask);
+      n += bits_in<W>(mask);
+    }
+    if (end < count) {
+      cursor.at = end;
+      break;
     }
   }
   batch.n = n;
@@ -246,37 +247,29 @@ bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
 
 /// Adds the words to the sums of both particles.
 template <int W>
-void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kCapacity], ForceWords* sums) {
-  constexpr int L = W < 4 ? W : 4;  // a record is no wider
-  using V = typename Width<L>::Double;
+void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums) {
+  constexpr unsigned L = W < 4 ? W : 4, kParts = 4 / L;  // a record is no wider
   using I = typename Width<L>::Long;
-  constexpr unsigned kParts = 4 / L;
   for (unsigned r = 0; r < batch.rows; ++r) {
     const unsigned end = batch.row[r + 1].begin;
-    unsigned k = batch.row[r].begin;
     I own[kParts] = {};
-    if constexpr (L == 4) {
-      for (; k + 4 <= end; k += 4) {
-        const V x = load<V>(words[0] + k), y = load<V>(words[1] + k), z = load<V>(words[2] + k), none = {};
-        const V xy02 = __builtin_shufflevector(x, y, 0, 4, 2, 6), xy13 = __builtin_shufflevector(x, y, 1, 5, 3, 7);
-        const V z02 = __builtin_shufflevector(z, none, 0, 4, 2, 6), z13 = __builtin_shufflevector(z, none, 1, 5, 3, 7);
+    for (unsigned k = batch.row[r].begin; k < end; k += L == 4 ? 4 : 1) {
+      if constexpr (L == 4) {  // pairs of the next row count as zero
+        static constexpr std::int64_t kLanes[8] = {-1, -1, -1, -1};
+        const I some = load<I>(kLanes + 4 - (end - k < 4 ? end - k : 4)), none = {};
+        const I x = load<I>(words[0] + k) & some, y = load<I>(words[1] + k) & some, z = load<I>(words[2] + k) & some;
+        const I xy02 = __builtin_shufflevector(x, y, 0, 4, 2, 6), xy13 = __builtin_shufflevector(x, y, 1, 5, 3, 7);
+        const I z02 = __builtin_shufflevector(z, none, 0, 4, 2, 6), z13 = __builtin_shufflevector(z, none, 1, 5, 3, 7);
         const I term[4] = {
-            (I)__builtin_shufflevector(xy02, z02, 0, 1, 4, 5), (I)__builtin_shufflevector(xy13, z13, 0, 1, 4, 5),
-            (I)__builtin_shufflevector(xy02, z02, 2, 3, 6, 7), (I)__builtin_shufflevector(xy13, z13, 2, 3, 6, 7)};
+            __builtin_shufflevector(xy02, z02, 0, 1, 4, 5), __builtin_shufflevector(xy13, z13, 0, 1, 4, 5),
+            __builtin_shufflevector(xy02, z02, 2, 3, 6, 7), __builtin_shufflevector(xy13, z13, 2, 3, 6, 7)};
         own[0] += (term[0] + term[1]) + (term[2] + term[3]);
         for (int l = 0; l < 4; ++l) {
           std::int64_t* const other = sums[batch.second[k + l]].of;
           store(other, load<I>(other) - term[l]);
         }
-      }
-    }
-    for (; k < end; ++k) {
-      std::int64_t* const other = sums[batch.second[k]].of;
-      if constexpr (L == 4) {
-        const I term = {words[0][k], words[1][k], words[2][k], 0};
-        own[0] += term;
-        store(other, load<I>(other) - term);
       } else {
+        std::int64_t* const other = sums[batch.second[k]].of;
         const I xy = {words[0][k], words[1][k]}, z = {words[2][k], 0};
         own[0] += xy;
         own[kParts - 1] += z;
@@ -307,10 +300,10 @@ void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32
     if (!search.here && search.row - j < W) mask &= ~(1u << (search.row - j));
     const unsigned plain = search.plain ? mask & ~odd : 0;
     compress<W>(found.plain, plain, places);
-    found.plain += count<W>(plain);
+    found.plain += bits_in<W>(plain);
     if (plain == mask) continue;
     compress<W>(found.other, mask & ~plain, places);
-    found.other += count<W>(mask & ~plain);
+    found.other += bits_in<W>(mask & ~plain);
   }
 }
 
