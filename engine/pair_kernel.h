@@ -65,7 +65,7 @@ CAROM_INLINE Fields<V> transposed(const auto& at) {
   }
 }
 
-/// One bit a lane.
+/// The sign of each lane, one bit a lane.
 template <class M>
 CAROM_INLINE unsigned bits(M mask) {
 #if defined(__AVX512DQ__)
@@ -78,7 +78,7 @@ CAROM_INLINE unsigned bits(M mask) {
   if constexpr (sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
 #endif
   unsigned all = 0;
-  for (unsigned l = 0; l < sizeof mask / 8; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
+  for (unsigned l = 0; l < sizeof mask / 8; ++l) all |= (static_cast<long long>(mask[l]) < 0 ? 1u : 0u) << l;
   return all;
 }
 
@@ -289,13 +289,13 @@ void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32
   using Places = typename Width<W>::Places;
   const V x = all<V>(search.own[0]), y = all<V>(search.own[1]), z = all<V>(search.own[2]);
   const V reach = all<V>(search.reach_squared);
-  constexpr std::uint64_t kOdd = PartnerSearch::kMoving | PartnerSearch::kGhost;
+  const int to_sign = __builtin_clzll(search.wanted);
   Places places;
   for (unsigned l = 0; l < W; ++l) places[l] = begin + l;
   for (std::uint32_t j = begin; j < end; j += W, places += W) {
     const V dx = x - load<V>(search.x[0] + j), dy = y - load<V>(search.x[1] + j), dz = z - load<V>(search.x[2] + j);
     const B code = load<B>(search.code + j);
-    const unsigned odd = bits((code & kOdd) != 0u), wanted = bits((code & search.wanted) != 0u);
+    const unsigned odd = bits(code), wanted = bits(code << to_sign);
     unsigned mask = ~less(reach, dx * dx + dy * dy + dz * dz) & wanted & first_lanes<W>(end - j);
     if (!search.here && search.row - j < W) mask &= ~(1u << (search.row - j));
     const unsigned plain = search.plain ? mask & ~odd : 0;

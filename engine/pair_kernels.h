@@ -109,15 +109,15 @@ struct PairFormula {
 
 /// A look at some particles for the partners of one, when a list is made.
 struct PartnerSearch {
-  // Codes of particles: may leave the box, a ghost, of the first and of the second species.
-  static constexpr std::uint64_t kMoving = 1, kGhost = 2, kFirst = 4, kSecond = 8;
+  // Codes of particles: may leave the box, a ghost, of the first and of the second species; one of the former two.
+  static constexpr std::uint64_t kMoving = 1, kGhost = 2, kFirst = 4, kSecond = 8, kOdd = 1ULL << 63;
   const double* x[3] = {};  ///< coordinates in the box
   const std::uint64_t* code = nullptr;
   std::uint32_t row = 0;
   double own[3];  ///< its position, with the image's shift
   double reach_squared = 0;
-  std::uint64_t wanted = 0;  ///< some of these bits of the partner's code
-  bool plain = false;        ///< neither moving nor a ghost
+  std::uint64_t wanted = 0;  ///< the highest of these bits of the partner's code
+  bool plain = false;        ///< not odd
   bool here = false;         ///< no other image
 };
 /// Where it goes: pairs that are plain, and others. Room for `count` more of each, and eight.
