@@ -38,15 +38,15 @@ class ExactSum {
 /// are split into multiples of two powers of two, whose sums are exact in a double.
 class ExactSeries {
  public:
-  void add(double term) {
+  [[gnu::always_inline]] void add(double term) {
     if (left_ == 0) begin(term);
-    if (!(std::abs(term) < limit_)) return sum_.add(term);
+    if (!(std::abs(term) < limit_)) return add_alone(term);
     const double high = (term + to_high_) - to_high_, rest = term - high;
     const double low = (rest + to_low_) - to_low_;
     high_ += high;
     low_ += low;
     --left_;
-    if (low != rest) sum_.add(rest - low);
+    if (low != rest) add_alone(rest - low);
   }
   ExactSum sum() {
     flush();
@@ -54,23 +54,9 @@ class ExactSeries {
   }
 
  private:
-  static constexpr int kTerms = 512;  // to one pair of sums
-
-  void flush() {
-    sum_.add(high_);
-    sum_.add(low_);
-    high_ = low_ = 0;
-  }
-  void begin(double first) {
-    flush();
-    limit_ = 0;
-    if (!(std::abs(first) > 0x1p-900 && std::abs(first) < 0x1p900)) return;
-    limit_ = std::ldexp(1.0, std::ilogb(first) + 13);
-    // To add these rounds to multiples of 2^-44 and 2^-89 of the limit: 512 terms, or rests, stay below 2^53 of them.
-    to_high_ = 0x1.8p8 * limit_;
-    to_low_ = 0x1.8p-37 * limit_;
-    left_ = kTerms;
-  }
+  void add_alone(double term);
+  void flush();
+  void begin(double first);
 
   ExactSum sum_;
   double limit_ = 0;  // of the terms that are taken

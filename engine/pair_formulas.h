@@ -56,7 +56,7 @@ template <int W, class P, Wanted wanted, bool wide>
       if constexpr (wanted == Wanted::forces_and_sums) {
         const V energy = weight * units.per_energy * potential.value(rho), virial = along * per_virial;
         const V magnitude = elementary::abs(energy), terms[3] = {energy, magnitude, virial};
-        fits &= (I)(magnitude + elementary::abs(virial) < (wide ? 0x1p90 : 0x1p50));
+        fits &= below(magnitude + elementary::abs(virial), all<V>(wide ? 0x1p90 : 0x1p50));
         for (int s = 0; s < 3; ++s) {
           const V upper = wide ? elementary::nearest_integer(terms[s] * 0x1p-40) : V{};
           sum[s][0] += (I)((wide ? terms[s] - upper * 0x1p40 : terms[s]) + kToInteger);
@@ -64,7 +64,7 @@ template <int W, class P, Wanted wanted, bool wide>
         }
       }
     }
-    fits &= (I)(squared < limit * limit);  // not where one is no number
+    fits &= below(squared, all<V>(limit * limit));  // not where one is no number
     for (int axis = 0; axis < 3; ++axis) {
       if constexpr (wide) {
         const V upper = elementary::nearest_integer(force[axis] * 0x1p-40);

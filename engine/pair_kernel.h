@@ -82,6 +82,14 @@ CAROM_INLINE unsigned bits(M mask) {
   return all;
 }
 
+/// a < b, a mask: GCC for SSE2 takes the conjunction of two comparisons to pieces.
+template <class V>
+CAROM_INLINE IntegerOf<V> below(V a, V b) {
+#if defined(__SSE2__)
+  if constexpr (sizeof a == 16) return (IntegerOf<V>)_mm_cmplt_pd((__m128d)a, (__m128d)b);
+#endif
+  return (IntegerOf<V>)(a < b);
+}
 /// Where a < b, one bit a lane.
 template <class V>
 CAROM_INLINE unsigned less(V a, V b) {
