@@ -160,11 +160,6 @@ CAROM_INLINE unsigned bits_in(unsigned mask) {
     return static_cast<unsigned>(__builtin_popcount(mask));  // all machines with so wide vectors have an instruction
 }
 
-template <int W>
-CAROM_INLINE unsigned first_lanes(std::uint32_t count) {
-  return (1u << (count < W ? count : W)) - 1;
-}
-
 /// What a batch has beside separations: nothing, new ones, or differences of vectors.
 enum class Beside { nothing, step, vectors };
 
@@ -189,9 +184,16 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
     }
     batch.n = n;
     batch.begin_row(run.row);
-    const std::uint32_t count = run.count, first = cursor.at, most = (PairBatch::kCapacity - n) / W * W;
-    const std::uint32_t end = count - first < most ? count : first + most;
-    for (std::uint32_t at = first; at < end; at += W) {
+    const std::uint32_t count = run.count;
+    std::uint32_t at = cursor.at, end = at;  // there is room for the partners before `end`
+    unsigned mask = 0;
+    for (;; at += W) {
+      if (at >= end) {
+        n -= bits_in<W>(mask >> (W - (at - end)));  // partners of the next row
+        const std::uint32_t most = (PairBatch::kCapacity - n) / W * W;
+        if (at >= count || most == 0) break;
+        end = count - at < most ? count : at + most;
+      }
       const std::uint32_t* const j = partner + at;
       const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return records + j[l]; });
       if constexpr (moving) {
@@ -202,7 +204,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       }
       const V dx = (x - other.x) + shift[0], dy = (y - other.y) + shift[1], dz = (z - other.z) + shift[2];
       const V rho = dx * dx + dy * dy + dz * dz;
-      unsigned mask = less(rho, cutoff);
+      mask = less(rho, cutoff);
       V ex, ey, ez;
       if constexpr (beside != Beside::nothing) {
         const auto after = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x_new + j[l]; });
@@ -217,7 +219,6 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         product = w * other.w;
         mask &= bits(product != 0.0);
       }
-      mask &= first_lanes<W>(count - at);
       compress(batch.d[0] + n, mask, dx);
       compress(batch.d[1] + n, mask, dy);
       compress(batch.d[2] + n, mask, dz);
@@ -230,8 +231,8 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       compress<W>(batch.second + n, mask, load<typename Width<W>::Places>(j));
       n += bits_in<W>(mask);
     }
-    if (end < count) {
-      cursor.at = end;
+    if (at < count) {
+      cursor.at = at;
       break;
     }
   }
@@ -303,10 +304,10 @@ void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32
   for (std::uint32_t j = begin; j < end; j += W, places += W) {
     const V dx = x - load<V>(search.x[0] + j), dy = y - load<V>(search.x[1] + j), dz = z - load<V>(search.x[2] + j);
     const B code = load<B>(search.code + j);
-    const unsigned odd = bits(code), wanted = bits(code << to_sign);
-    unsigned mask = ~less(reach, dx * dx + dy * dy + dz * dz) & wanted & first_lanes<W>(end - j);
+    unsigned mask = ~less(reach, dx * dx + dy * dy + dz * dz) & bits(code << to_sign);
+    mask &= (1u << (end - j < W ? end - j : W)) - 1;
     if (!search.here && search.row - j < W) mask &= ~(1u << (search.row - j));
-    const unsigned plain = search.plain ? mask & ~odd : 0;
+    const unsigned plain = search.plain ? mask & ~bits(code) : 0;
     compress<W>(found.plain, plain, places);
     found.plain += bits_in<W>(plain);
     if (plain == mask) continue;

@@ -212,7 +212,7 @@ struct Cells {
   Cells(const CellGrid<D>& cells, double reach) : grid(cells), start(kSlices * cells.cells() + 1) {
     for (int k = 0; k < D; ++k) {
       const double edges = reach / grid.edge(k);
-      range[k] = static_cast<std::int32_t>(std::min(std::ceil(k < D - 1 ? edges : kSlices * edges), 1e8));
+      range[k] = static_cast<std::int32_t>(std::clamp(std::ceil(k < D - 1 ? edges : kSlices * edges), 1.0, 1e8));
     }
     const std::int32_t count = kSlices * grid.count(D - 1), far = range[D - 1];
     const bool periodic = grid.box().periodic(D - 1);

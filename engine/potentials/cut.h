@@ -155,7 +155,7 @@ class Cut {
   }
 
   P potential_;
-  bool switched_, bent_;   ///< bent_: of the kind quadratic
+  bool switched_, bent_;       ///< bent_: of the kind quadratic
   double cutoff_, cutoff2_;    ///< r_c [length], ρ_c [length²]
   double at_cutoff_;           ///< V(ρ_c)
   double from2_ = 0;           ///< ρ_s [length²]

@@ -52,8 +52,8 @@ class LennardJones {
     return x * x * x;
   }
 
-  double epsilon_;  ///< depth of the well [energy]
-  double sigma2_;   ///< [length²]
+  double epsilon_;        ///< depth of the well [energy]
+  double sigma2_;         ///< [length²]
   double slope_, chord_;  ///< factors of V′ and of the quotient [energy/length²]
 };
 
