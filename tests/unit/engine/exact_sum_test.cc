@@ -48,8 +48,8 @@ TEST(ExactSeries, IsTheSameSum) {
   }
 }
 
-TEST(ExactSeries, HasRoomForTheLargestTerms) {  // all just below what a pair of sums takes, with bits in both
-  const double largest = 0x1.fffffffffffffp12;
+TEST(ExactSeries, HasRoomForTheLargestTerms) {  // each has all bits that the first of both sums holds
+  const double largest = 0x1.ffffffffffep12;
   ExactSeries series;
   std::vector<double> terms(2000, largest);
   terms[0] = 1;

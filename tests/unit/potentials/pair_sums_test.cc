@@ -202,6 +202,14 @@ TEST(PairSums, PassOverManyPairsThatAreOnlyInTheSkin) {
   }
 }
 
+TEST(PairSums, PassOverManyPairsOfNoWeight) {
+  Scene<2> scene(600, 30, Boundary::wall, 0.2);
+  for (std::size_t i = 1; i < 599; ++i) scene.particles.charge[i] = 0;
+  const auto& x = scene.particles.x;
+  expect_reference(scene, *scene.make("yukawa", {{"amplitude", 2.0}, {"kappa", 0.1}, {"charges", true}}),
+                   Yukawa(2, 0.1), std::numeric_limits<double>::infinity(), &scene.particles.charge, x, x);
+}
+
 /// Moves particles about, wraps them now and then, and compares with plain loops all the time.
 template <int D>
 void travel(double edge, int particles, double speed, const std::string& width) {
