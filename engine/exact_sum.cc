@@ -62,4 +62,23 @@ double ExactSum::value() const {
   return negative ? -magnitude : magnitude;
 }
 
+void ExactSeries::add_alone(double term) { sum_.add(term); }
+
+void ExactSeries::flush() {
+  sum_.add(high_);
+  sum_.add(low_);
+  high_ = low_ = 0;
+}
+
+void ExactSeries::begin(double first) {
+  flush();
+  limit_ = 0;
+  if (!(std::abs(first) > 0x1p-900 && std::abs(first) < 0x1p900)) return;
+  limit_ = std::ldexp(1.0, std::ilogb(first) + 13);
+  // To add these rounds to multiples of 2^-44 and 2^-89 of the limit: 512 terms, or rests, stay below 2^53 of them.
+  to_high_ = 0x1.8p8 * limit_;
+  to_low_ = 0x1.8p-37 * limit_;
+  left_ = 512;
+}
+
 }  // namespace carom

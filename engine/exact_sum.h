@@ -35,18 +35,18 @@ class ExactSum {
 };
 
 /// The same for many terms one after the other, most of them of about the size of the first that is not zero: those
-/// are added up in a register.
+/// are split into multiples of two powers of two, whose sums are exact in a double.
 class ExactSeries {
  public:
-  void add(double term) {
-    const auto bits = std::bit_cast<std::uint64_t>(term);
-    const int exponent = static_cast<int>(bits >> 52) & 0x7ff;
-    if (left_ == 0) begin(exponent);
-    const int shift = exponent - lowest_;
-    if (shift < 0 || shift >= kShifts) return sum_.add(term);
-    const auto mantissa = static_cast<Whole>((bits & 0xfffffffffffffULL) | 1ULL << 52) << shift;
-    series_ += (bits >> 63) != 0 ? -mantissa : mantissa;
+  [[gnu::always_inline]] void add(double term) {
+    if (left_ == 0) begin(term);
+    if (!(std::abs(term) < limit_)) return add_alone(term);
+    const double high = (term + to_high_) - to_high_, rest = term - high;
+    const double low = (rest + to_low_) - to_low_;
+    high_ += high;
+    low_ += low;
     --left_;
+    if (low != rest) add_alone(rest - low);
   }
   ExactSum sum() {
     flush();
@@ -54,25 +54,14 @@ class ExactSeries {
   }
 
  private:
-  __extension__ using Whole = __int128;
-  static constexpr int kShifts = 64;  // below which a term is taken, so that 2^10 of them leave room in the register
-
-  void flush() {
-    sum_.add(series_, std::ldexp(1.0, lowest_ - 1075));
-    series_ = 0;
-    left_ = 0;
-  }
-  void begin(int exponent) {
-    flush();
-    if (exponent == 0) return;
-    lowest_ = exponent > 48 && exponent < 2000 ? exponent - 48 : 1;
-    left_ = 512;
-  }
+  void add_alone(double term);
+  void flush();
+  void begin(double first);
 
   ExactSum sum_;
-  Whole series_ = 0;
-  int lowest_ = 0x800;  // exponent field of the smallest term that is taken
-  int left_ = 0;        // terms before the register is emptied
+  double limit_ = 0;  // of the terms that are taken
+  double to_high_ = 0, to_low_ = 0, high_ = 0, low_ = 0;
+  int left_ = 0;  // terms before the sums are emptied
 };
 
 inline void ExactSum::add(double term) {

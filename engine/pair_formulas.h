@@ -9,10 +9,12 @@
 namespace carom {
 namespace {
 
+constexpr double kToInteger = 0x1.8p52;  // the bits of |x| < 2^51 plus this are an integer, and those of this
+
 /// x as integers, |x| < 2^51: to nearest, the even one of two.
 template <class V>
 CAROM_INLINE IntegerOf<V> integers(V x) {
-  return (IntegerOf<V>)(x + 0x1.8p52) - (IntegerOf<V>)all<V>(0x1.8p52);
+  return (IntegerOf<V>)(x + kToInteger) - (IntegerOf<V>)all<V>(kToInteger);
 }
 
 enum class Wanted { forces, forces_and_sums, mean_forces, hessian_product };
@@ -28,67 +30,62 @@ template <int W, class P, Wanted wanted, bool wide>
   constexpr int kWords = wide ? 2 : 1;
   I sum[3][kWords] = {};  // energy, magnitude, virial
   I fits = ~I{};
-  const double limit = wide ? units.limits.high : units.limits.low;
+  constexpr double kFactor = wanted == Wanted::mean_forces ? -1 : wanted == Wanted::hessian_product ? 1 : -2;
+  const double limit = wide ? units.limits.high * 0x1p40 : units.limits.low;
   const double per_virial = 0x1p-6 * units.per_energy / units.per_force;  // virials are counted in 64 quanta
   for (unsigned k = 0; k < batch.n; k += W) {
-    V d[3];
+    V d[3], force[3], e[3], squared;
     for (int axis = 0; axis < 3; ++axis) d[axis] = load<V>(batch.d[axis] + k);
     const V rho = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], weight = load<V>(batch.weight + k);
-    V g, e[3];  // force = g d
-    if constexpr (wanted == Wanted::mean_forces || wanted == Wanted::hessian_product)
+    const V w = weight * (kFactor * units.per_force);  // a power of two: the same as of the product
+    if constexpr (wanted == Wanted::mean_forces || wanted == Wanted::hessian_product) {
       for (int axis = 0; axis < 3; ++axis) e[axis] = load<V>(batch.d_new[axis] + k);
-    if constexpr (wanted == Wanted::mean_forces) {
-      g = -weight * potential.quotient(rho, e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-      for (int axis = 0; axis < 3; ++axis) d[axis] += e[axis];
-    } else {
-      g = -2.0 * weight * potential.derivative(rho);
-      if constexpr (wanted == Wanted::hessian_product) {
-        const V along = 4.0 * weight * potential.second_derivative(rho) * (d[0] * e[0] + d[1] * e[1] + d[2] * e[2]);
-        for (int axis = 0; axis < 3; ++axis) d[axis] = along * d[axis] - g * e[axis];
-        g = all<V>(1);
-      }
-    }
-    g *= units.per_force;  // a power of two: the same as of the product
-    V largest = all<V>(0);
-    for (int axis = 0; axis < 3; ++axis) {
-      const V force = g * d[axis];
-      if constexpr (wide) {
-        const V upper = elementary::nearest_integer(force * 0x1p-40);
-        largest += elementary::abs(upper);
-        store(batch.high[axis] + k, integers(upper));
-        store(batch.low[axis] + k, integers(force - upper * 0x1p40));
+      if constexpr (wanted == Wanted::mean_forces) {
+        const V g = w * potential.quotient(rho, e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+        for (int axis = 0; axis < 3; ++axis) force[axis] = g * (d[axis] + e[axis]);
       } else {
-        largest += elementary::abs(force);
-        store(batch.low[axis] + k, integers(force));
+        const V along = 4.0 * w * potential.second_derivative(rho) * (d[0] * e[0] + d[1] * e[1] + d[2] * e[2]);
+        const V across = 2.0 * w * potential.derivative(rho);
+        for (int axis = 0; axis < 3; ++axis) force[axis] = along * d[axis] + across * e[axis];
       }
-    }
-    fits &= (I)(largest < limit);  // not where one is no number
-    if constexpr (wanted == Wanted::forces_and_sums) {
-      const V energy = weight * potential.value(rho) * units.per_energy, virial = g * rho * per_virial;
-      const V magnitude = elementary::abs(energy), terms[3] = {energy, magnitude, virial};
-      fits &= (I)(magnitude + elementary::abs(virial) < (wide ? 0x1p90 : 0x1p50));
-      for (int s = 0; s < 3; ++s) {
-        if constexpr (wide) {
-          const V upper = elementary::nearest_integer(terms[s] * 0x1p-40);
-          sum[s][1] += integers(upper);
-          sum[s][0] += integers(terms[s] - upper * 0x1p40);
-        } else {
-          sum[s][0] += integers(terms[s]);
+      squared = force[0] * force[0] + force[1] * force[1] + force[2] * force[2];
+    } else {
+      const V g = w * potential.derivative(rho), along = g * rho;
+      for (int axis = 0; axis < 3; ++axis) force[axis] = g * d[axis];
+      squared = g * along;
+      if constexpr (wanted == Wanted::forces_and_sums) {
+        const V energy = weight * units.per_energy * potential.value(rho), virial = along * per_virial;
+        const V magnitude = elementary::abs(energy), terms[3] = {energy, magnitude, virial};
+        fits &= below(magnitude + elementary::abs(virial), all<V>(wide ? 0x1p90 : 0x1p50));
+        for (int s = 0; s < 3; ++s) {
+          const V upper = wide ? elementary::nearest_integer(terms[s] * 0x1p-40) : V{};
+          sum[s][0] += (I)((wide ? terms[s] - upper * 0x1p40 : terms[s]) + kToInteger);
+          if constexpr (wide) sum[s][1] += integers(upper);
         }
       }
+    }
+    fits &= below(squared, all<V>(limit * limit));  // not where one is no number
+    for (int axis = 0; axis < 3; ++axis) {
+      if constexpr (wide) {
+        const V upper = elementary::nearest_integer(force[axis] * 0x1p-40);
+        store(batch.high[axis] + k, integers(upper));
+        force[axis] -= upper * 0x1p40;
+      }
+      store(batch.low[axis] + k, integers(force[axis]));
     }
   }
   if (bits(fits) != (1u << W) - 1) return false;
   if constexpr (wanted == Wanted::forces_and_sums) {
-    PairTotals::Whole whole[3] = {0, 0, 0};
-    for (int s = 0; s < 3; ++s)
+    PairTotals::Whole* const totals_of[3] = {&totals->energy, &totals->magnitude, &totals->virial};
+    for (int s = 0; s < 3; ++s) {
+      std::uint64_t low = 0;
       for (int l = 0; l < W; ++l) {
-        whole[s] += sum[s][0][l];
-        if constexpr (wide) whole[s] += static_cast<PairTotals::Whole>(sum[s][1][l]) << 40;
+        low += sum[s][0][l];
+        if constexpr (wide) *totals_of[s] += static_cast<PairTotals::Whole>(sum[s][1][l]) << 40;
       }
-    totals->energy += whole[0];
-    totals->magnitude += whole[1];
-    totals->virial += whole[2];
+      low -= (batch.n + W - 1) / W * W * __builtin_bit_cast(std::uint64_t, kToInteger);
+      *totals_of[s] += static_cast<std::int64_t>(low);
+    }
   }
   return true;
 }

@@ -12,6 +12,7 @@ template <int W>
 struct Width {
   typedef double Double __attribute__((vector_size(8 * W)));
   typedef long long Long __attribute__((vector_size(8 * W)));
+  typedef std::uint32_t Places __attribute__((vector_size(4 * W)));
 };
 using Two = Width<2>::Double;
 using Four = Width<4>::Double;
@@ -64,7 +65,7 @@ CAROM_INLINE Fields<V> transposed(const auto& at) {
   }
 }
 
-/// One bit a lane.
+/// The sign of each lane, one bit a lane.
 template <class M>
 CAROM_INLINE unsigned bits(M mask) {
 #if defined(__AVX512DQ__)
@@ -77,8 +78,25 @@ CAROM_INLINE unsigned bits(M mask) {
   if constexpr (sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
 #endif
   unsigned all = 0;
-  for (unsigned l = 0; l < sizeof mask / 8; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
+  for (unsigned l = 0; l < sizeof mask / 8; ++l) all |= (static_cast<long long>(mask[l]) < 0 ? 1u : 0u) << l;
   return all;
+}
+
+/// a < b, a mask: GCC for SSE2 takes the conjunction of two comparisons to pieces.
+template <class V>
+CAROM_INLINE IntegerOf<V> below(V a, V b) {
+#if defined(__SSE2__)
+  if constexpr (sizeof a == 16) return (IntegerOf<V>)_mm_cmplt_pd((__m128d)a, (__m128d)b);
+#endif
+  return (IntegerOf<V>)(a < b);
+}
+/// Where a < b, one bit a lane.
+template <class V>
+CAROM_INLINE unsigned less(V a, V b) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof a == 64) return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ);
+#endif
+  return bits(a < b);
 }
 
 /// For each mask of four lanes the halves of those that are in it, first things first.
@@ -116,38 +134,30 @@ CAROM_INLINE void compress(double* to, unsigned mask, V x) {
 #endif
   for (unsigned l = 0, n = 0; l < sizeof x / 8; n += mask >> l & 1, ++l) to[n] = x[l];
 }
-template <int W>
-CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, const std::uint32_t* from) {
-#if defined(__AVX512F__)
+template <int W, class Places>
+CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, Places places) {
+#if defined(__AVX512VL__)
   if constexpr (W == 8) {
-    const __m512i some = _mm512_castsi256_si512(load<__m256i>(from));
-    store(to, _mm512_castsi512_si256(_mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), some)));
+    store(to, _mm256_maskz_compress_epi32(static_cast<__mmask8>(mask), (__m256i)places));
     return;
   }
 #endif
 #if defined(__AVX2__)
   if constexpr (W == 4) {
     const __m128i which = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompression.lane[mask]));
-    store(to, _mm_permutevar_ps((__m128)load<__m128i>(from), which));
+    store(to, _mm_permutevar_ps((__m128)places, which));
     return;
   }
 #endif
-  std::uint32_t some[W];
-  __builtin_memcpy(some, from, sizeof some);
-  for (unsigned l = 0, n = 0; l < W; n += mask >> l & 1, ++l) to[n] = some[l];
+  for (unsigned l = 0, n = 0; l < W; n += mask >> l & 1, ++l) to[n] = places[l];
 }
 
 template <int W>
-CAROM_INLINE unsigned count(unsigned mask) {
+CAROM_INLINE unsigned bits_in(unsigned mask) {
   if constexpr (W == 2)
     return (mask & 1) + (mask >> 1);
   else
     return static_cast<unsigned>(__builtin_popcount(mask));  // all machines with so wide vectors have an instruction
-}
-
-template <int W>
-CAROM_INLINE unsigned first_lanes(std::uint32_t count) {
-  return count >= W ? (1u << W) - 1 : (1u << count) - 1;
 }
 
 /// What a batch has beside separations: nothing, new ones, or differences of vectors.
@@ -159,6 +169,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   batch.clear();
   unsigned n = 0;
   const V cutoff = all<V>(rows.cutoff_squared);
+  const PairRecord* const records = rows.x;
   for (; cursor.run < rows.runs; ++cursor.run, cursor.at = 0) {
     const PairRun& run = rows.run[cursor.run];
     const std::uint32_t* const partner = rows.partner + run.begin;
@@ -173,14 +184,18 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
     }
     batch.n = n;
     batch.begin_row(run.row);
-    for (; cursor.at < run.count; cursor.at += W) {
-      if (n + W > PairBatch::kCapacity) {
-        batch.n = n;
-        batch.pad();
-        return true;
+    const std::uint32_t count = run.count;
+    std::uint32_t at = cursor.at, end = at;  // there is room for the partners before `end`
+    unsigned mask = 0;
+    for (;; at += W) {
+      if (at >= end) {
+        n -= bits_in<W>(mask >> (W - (at - end)));  // partners of the next row
+        const std::uint32_t most = (PairBatch::kCapacity - n) / W * W;
+        if (at >= count || most == 0) break;
+        end = count - at < most ? count : at + most;
       }
-      const std::uint32_t* const j = partner + cursor.at;
-      const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x + j[l]; });
+      const std::uint32_t* const j = partner + at;
+      const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return records + j[l]; });
       if constexpr (moving) {
         const auto box = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.box + j[l]; });
         shift[0] = (image[0] + box.x) * rows.edges[0];
@@ -189,22 +204,21 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       }
       const V dx = (x - other.x) + shift[0], dy = (y - other.y) + shift[1], dz = (z - other.z) + shift[2];
       const V rho = dx * dx + dy * dy + dz * dz;
-      auto within = rho < cutoff;
+      mask = less(rho, cutoff);
       V ex, ey, ez;
       if constexpr (beside != Beside::nothing) {
         const auto after = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x_new + j[l]; });
         ex = x_new - after.x, ey = y_new - after.y, ez = z_new - after.z;
         if constexpr (beside == Beside::step) {
           ex += shift[0], ey += shift[1], ez += shift[2];
-          within |= ex * ex + ey * ey + ez * ez < cutoff;
+          mask |= less(ex * ex + ey * ey + ez * ez, cutoff);
         }
       }
       V product;
       if constexpr (weighted) {
         product = w * other.w;
-        within &= product != 0.0;
+        mask &= bits(product != 0.0);
       }
-      const unsigned mask = bits(within) & first_lanes<W>(run.count - cursor.at);
       compress(batch.d[0] + n, mask, dx);
       compress(batch.d[1] + n, mask, dy);
       compress(batch.d[2] + n, mask, dz);
@@ -214,8 +228,12 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         compress(batch.d_new[2] + n, mask, ez);
       }
       if constexpr (weighted) compress(batch.weight + n, mask, product);
-      compress<W>(batch.second + n, mask, j);
-      n += count<W>(mask);
+      compress<W>(batch.second + n, mask, load<typename Width<W>::Places>(j));
+      n += bits_in<W>(mask);
+    }
+    if (at < count) {
+      cursor.at = at;
+      break;
     }
   }
   batch.n = n;
@@ -238,37 +256,29 @@ bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
 
 /// Adds the words to the sums of both particles.
 template <int W>
-void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kCapacity], ForceWords* sums) {
-  constexpr int L = W < 4 ? W : 4;  // a record is no wider
-  using V = typename Width<L>::Double;
+void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums) {
+  constexpr unsigned L = W < 4 ? W : 4, kParts = 4 / L;  // a record is no wider
   using I = typename Width<L>::Long;
-  constexpr unsigned kParts = 4 / L;
   for (unsigned r = 0; r < batch.rows; ++r) {
     const unsigned end = batch.row[r + 1].begin;
-    unsigned k = batch.row[r].begin;
     I own[kParts] = {};
-    if constexpr (L == 4) {
-      for (; k + 4 <= end; k += 4) {
-        const V x = load<V>(words[0] + k), y = load<V>(words[1] + k), z = load<V>(words[2] + k), none = {};
-        const V xy02 = __builtin_shufflevector(x, y, 0, 4, 2, 6), xy13 = __builtin_shufflevector(x, y, 1, 5, 3, 7);
-        const V z02 = __builtin_shufflevector(z, none, 0, 4, 2, 6), z13 = __builtin_shufflevector(z, none, 1, 5, 3, 7);
+    for (unsigned k = batch.row[r].begin; k < end; k += L == 4 ? 4 : 1) {
+      if constexpr (L == 4) {  // pairs of the next row count as zero
+        static constexpr std::int64_t kLanes[8] = {-1, -1, -1, -1};
+        const I some = load<I>(kLanes + 4 - (end - k < 4 ? end - k : 4)), none = {};
+        const I x = load<I>(words[0] + k) & some, y = load<I>(words[1] + k) & some, z = load<I>(words[2] + k) & some;
+        const I xy02 = __builtin_shufflevector(x, y, 0, 4, 2, 6), xy13 = __builtin_shufflevector(x, y, 1, 5, 3, 7);
+        const I z02 = __builtin_shufflevector(z, none, 0, 4, 2, 6), z13 = __builtin_shufflevector(z, none, 1, 5, 3, 7);
         const I term[4] = {
-            (I)__builtin_shufflevector(xy02, z02, 0, 1, 4, 5), (I)__builtin_shufflevector(xy13, z13, 0, 1, 4, 5),
-            (I)__builtin_shufflevector(xy02, z02, 2, 3, 6, 7), (I)__builtin_shufflevector(xy13, z13, 2, 3, 6, 7)};
+            __builtin_shufflevector(xy02, z02, 0, 1, 4, 5), __builtin_shufflevector(xy13, z13, 0, 1, 4, 5),
+            __builtin_shufflevector(xy02, z02, 2, 3, 6, 7), __builtin_shufflevector(xy13, z13, 2, 3, 6, 7)};
         own[0] += (term[0] + term[1]) + (term[2] + term[3]);
         for (int l = 0; l < 4; ++l) {
           std::int64_t* const other = sums[batch.second[k + l]].of;
           store(other, load<I>(other) - term[l]);
         }
-      }
-    }
-    for (; k < end; ++k) {
-      std::int64_t* const other = sums[batch.second[k]].of;
-      if constexpr (L == 4) {
-        const I term = {words[0][k], words[1][k], words[2][k], 0};
-        own[0] += term;
-        store(other, load<I>(other) - term);
       } else {
+        std::int64_t* const other = sums[batch.second[k]].of;
         const I xy = {words[0][k], words[1][k]}, z = {words[2][k], 0};
         own[0] += xy;
         own[kParts - 1] += z;
@@ -285,24 +295,24 @@ template <int W>
 void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32_t end, PartnersFound& found) {
   using V = typename Width<W>::Double;
   using B = BitsOf<V>;
+  using Places = typename Width<W>::Places;
   const V x = all<V>(search.own[0]), y = all<V>(search.own[1]), z = all<V>(search.own[2]);
   const V reach = all<V>(search.reach_squared);
-  constexpr std::uint64_t kOdd = PartnerSearch::kMoving | PartnerSearch::kGhost;
-  for (std::uint32_t j = begin; j < end; j += W) {
+  const int to_sign = __builtin_clzll(search.wanted);
+  Places places;
+  for (unsigned l = 0; l < W; ++l) places[l] = begin + l;
+  for (std::uint32_t j = begin; j < end; j += W, places += W) {
     const V dx = x - load<V>(search.x[0] + j), dy = y - load<V>(search.x[1] + j), dz = z - load<V>(search.x[2] + j);
     const B code = load<B>(search.code + j);
-    const auto near = dx * dx + dy * dy + dz * dz <= reach;
-    const unsigned odd = bits((code & kOdd) != 0u), wanted = bits((code & search.wanted) != 0u);
-    unsigned mask = bits(near) & wanted & first_lanes<W>(end - j);
+    unsigned mask = ~less(reach, dx * dx + dy * dy + dz * dz) & bits(code << to_sign);
+    mask &= (1u << (end - j < W ? end - j : W)) - 1;
     if (!search.here && search.row - j < W) mask &= ~(1u << (search.row - j));
-    std::uint32_t index[W];
-    for (unsigned l = 0; l < W; ++l) index[l] = j + l;
-    const unsigned plain = search.plain ? mask & ~odd : 0;
-    compress<W>(found.plain, plain, index);
-    found.plain += count<W>(plain);
+    const unsigned plain = search.plain ? mask & ~bits(code) : 0;
+    compress<W>(found.plain, plain, places);
+    found.plain += bits_in<W>(plain);
     if (plain == mask) continue;
-    compress<W>(found.other, mask & ~plain, index);
-    found.other += count<W>(mask & ~plain);
+    compress<W>(found.other, mask & ~plain, places);
+    found.other += bits_in<W>(mask & ~plain);
   }
 }
 

@@ -13,7 +13,8 @@ bool available(const PairKernels& kernels) {
 #if defined(__x86_64__)
   if (&kernels == &kernels::pairs_avx2) return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("popcnt");
   if (&kernels == &kernels::pairs_avx512)
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512vl");
 #endif
   return true;
 }

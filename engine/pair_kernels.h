@@ -45,16 +45,16 @@ struct PairCursor {
 };
 
 struct PairBatch {
-  static constexpr unsigned kCapacity = 256;
+  static constexpr unsigned kCapacity = 256, kRoom = kCapacity + 8;  ///< pairs; numbers that can be read
   struct Row {
     std::uint32_t row, begin;  ///< pairs from `begin` to that of the next row have this first particle
   };
 
-  alignas(64) double d[3][kCapacity];      ///< separation, first minus second
-  alignas(64) double d_new[3][kCapacity];  ///< the new one, or the difference of vectors
-  alignas(64) double weight[kCapacity];
-  alignas(64) std::int64_t low[3][kCapacity];   ///< force on the first, in quanta
-  alignas(64) std::int64_t high[3][kCapacity];  ///< where it took two words
+  alignas(64) double d[3][kRoom];      ///< separation, first minus second
+  alignas(64) double d_new[3][kRoom];  ///< the new one, or the difference of vectors
+  alignas(64) double weight[kRoom];
+  alignas(64) std::int64_t low[3][kRoom];   ///< force on the first, in quanta
+  alignas(64) std::int64_t high[3][kRoom];  ///< where it took two words
   std::uint32_t second[kCapacity + 16];
   Row row[kCapacity + 1];
   unsigned n = 0, rows = 0;
@@ -79,6 +79,7 @@ struct PairBatch {
       for (int axis = 0; axis < 3; ++axis) d[axis][k] = d[axis][0], d_new[axis][k] = d_new[axis][0];
       weight[k] = 0;
     }
+    for (unsigned k = n; k < n + 4; ++k) second[k] = row[0].row;  // some place
   }
   std::uint32_t first_of(unsigned pair) const {
     unsigned r = 0;
@@ -108,15 +109,15 @@ struct PairFormula {
 
 /// A look at some particles for the partners of one, when a list is made.
 struct PartnerSearch {
-  // Codes of particles: may leave the box, a ghost, of the first and of the second species.
-  static constexpr std::uint64_t kMoving = 1, kGhost = 2, kFirst = 4, kSecond = 8;
+  // Codes of particles: may leave the box, a ghost, of the first and of the second species; one of the former two.
+  static constexpr std::uint64_t kMoving = 1, kGhost = 2, kFirst = 4, kSecond = 8, kOdd = 1ULL << 63;
   const double* x[3] = {};  ///< coordinates in the box
   const std::uint64_t* code = nullptr;
   std::uint32_t row = 0;
   double own[3];  ///< its position, with the image's shift
   double reach_squared = 0;
-  std::uint64_t wanted = 0;  ///< some of these bits of the partner's code
-  bool plain = false;        ///< neither moving nor a ghost
+  std::uint64_t wanted = 0;  ///< the highest of these bits of the partner's code
+  bool plain = false;        ///< not odd
   bool here = false;         ///< no other image
 };
 /// Where it goes: pairs that are plain, and others. Room for `count` more of each, and eight.
@@ -129,7 +130,7 @@ struct PairKernels {
   /// Fills a batch; false where the list is at its end and the batch empty.
   bool (*collect)(const PairRows&, PairCursor&, PairBatch&);
   /// Adds the words of a batch to the sums of both particles.
-  void (*scatter)(const PairBatch&, const std::int64_t (*words)[PairBatch::kCapacity], ForceWords* sums);
+  void (*scatter)(const PairBatch&, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums);
   void (*find)(const PartnerSearch&, std::uint32_t begin, std::uint32_t end, PartnersFound&);
   const PairFormula* formulas;  ///< of each of PairPotentials
 };

@@ -197,23 +197,33 @@ std::vector<Piece> pieces(std::int32_t low, std::int32_t high, std::int32_t coun
   return found;
 }
 
-/// Where the cells of the list begin, and how far a search goes along each axis.
+/// Where the cells of the list begin, and how far a search goes along each axis. Those of a grid are cut into kSlices
+/// along the last axis, along which partners stand one after the other.
 template <int D>
 struct Cells {
+  static constexpr std::int32_t kSlices = 8;
   CellGrid<D> grid;
   std::array<std::int32_t, D> range;
   std::vector<std::uint32_t> start;
   std::vector<std::vector<Piece>> around, ahead;  // of each cell of a row: the whole range, and its own half of it
 
-  Cells(const CellGrid<D>& cells, double reach) : grid(cells), start(cells.cells() + 1) {
-    for (int k = 0; k < D; ++k)
-      range[k] = std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid.edge(k) - 1e-9), 1e8)));
-    const std::int32_t count = grid.count(D - 1), far = range[D - 1];
+  Cells(const CellGrid<D>& cells, double reach) : grid(cells), start(kSlices * cells.cells() + 1) {
+    for (int k = 0; k < D; ++k) {
+      const double edges = reach / grid.edge(k);
+      range[k] = static_cast<std::int32_t>(std::clamp(std::ceil(k < D - 1 ? edges : kSlices * edges), 1.0, 1e8));
+    }
+    const std::int32_t count = kSlices * grid.count(D - 1), far = range[D - 1];
     const bool periodic = grid.box().periodic(D - 1);
     for (std::int32_t c = 0; c < count; ++c) {
       around.push_back(pieces(c - far, c + far, count, periodic));
       ahead.push_back(pieces(c, c + far, count, periodic));
     }
+  }
+
+  std::size_t index(const Vec<D>& x) const {
+    const Cell<D> cell = grid.cell(x);
+    const double part = (x[D - 1] - grid.face(D - 1, cell[D - 1])) * grid.inverse_edge(D - 1);
+    return kSlices * grid.index(cell) + static_cast<std::size_t>(std::clamp(kSlices * part, 0.0, kSlices - 1.0));
   }
 
   /// The ranges in which partners of those in a cell stand, each pair of cells once; by image. The first begins with
@@ -234,7 +244,7 @@ struct Cells {
     const auto last = static_cast<std::size_t>(centre[D - 1]);
     Cell<D> row = centre;
     row[D - 1] = 0;
-    add(grid.index(row), {}, ahead[last]);
+    add(kSlices * grid.index(row), {}, ahead[last]);
     const std::int32_t side = D == 3 ? range[1] : 0;
     for (std::int32_t a = 0; a <= range[0]; ++a) {
       typename CellGrid<D>::Step first, second{};
@@ -246,7 +256,7 @@ struct Cells {
           if (!grid.step(1, centre[1] + b, second)) continue;
           boxes[1] = second.boxes;
         }
-        add(first.offset + second.offset, boxes, around[last]);
+        add(kSlices * (first.offset + second.offset), boxes, around[last]);
       }
     }
     if (elsewhere)
@@ -269,12 +279,12 @@ void CutoffList<D>::build(const PairStep<D>& step) {
   for (Id i = 0; i < step.x.size(); ++i)
     if (filter_.species.code(i) != 0) members.push_back(i), extent.add(step.x[i]);
   const double reach = cutoff_ + skin_;
-  Cells<D> cells(CellGrid<D>(box_, 0.5 * reach, extent), reach);
+  Cells<D> cells(CellGrid<D>(box_, reach, extent), reach);
 
   // Counting sort by cell.
   std::vector<std::uint32_t> at(members.size());
   for (std::size_t m = 0; m < members.size(); ++m) {
-    at[m] = static_cast<std::uint32_t>(cells.grid.index(cells.grid.cell(step.x[members[m]])));
+    at[m] = static_cast<std::uint32_t>(cells.index(step.x[members[m]]));
     ++cells.start[at[m] + 1];
   }
   const std::size_t fullest = *std::ranges::max_element(cells.start);
@@ -295,12 +305,12 @@ void CutoffList<D>::build(const PairStep<D>& step) {
     boxes[r] = cells.grid.boxes(cells.grid.cell(step.x[i]));
     const Vec<D> home = step.x[i] - box_.shift(boxes[r]);
     std::uint64_t code = filter_.species.code(i);
-    if (!ghost_.empty() && ghost_[i] != 0) code |= PartnerSearch::kGhost;
+    if (!ghost_.empty() && ghost_[i] != 0) code |= PartnerSearch::kGhost | PartnerSearch::kOdd;
     bool moving = boxes[r] != Image<D>{};
     for (int k = 0; k < D; ++k)
       moving = moving ||
                (box_.periodic(k) && std::min(home[k], box_.edges[k] - home[k]) <= 0.5 * skin_ + 1e-9 * box_.edges[k]);
-    if (moving) code |= PartnerSearch::kMoving;
+    if (moving) code |= PartnerSearch::kMoving | PartnerSearch::kOdd;
     any_moving = any_moving || moving;
     for (int k = 0; k < D; ++k) built_at_[k][r] = home[k];
     code_[r] = code;
@@ -321,7 +331,7 @@ void CutoffList<D>::build(const PairStep<D>& step) {
     if (cells.start[c] < cells.start[c + 1]) {
       std::size_t rest = c;
       for (int k = D - 1; k >= 0; --k) {
-        const auto count = static_cast<std::size_t>(cells.grid.count(k));
+        const auto count = static_cast<std::size_t>(cells.grid.count(k) * (k < D - 1 ? 1 : Cells<D>::kSlices));
         centre[k] = static_cast<std::int32_t>(rest % count);
         rest /= count;
       }
@@ -353,7 +363,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
                        .own = {},
                        .reach_squared = reach * reach};
   search.wanted = filter_.species.partner_code(code);
-  search.plain = (code & (PartnerSearch::kMoving | PartnerSearch::kGhost)) == 0;
+  search.plain = (code & PartnerSearch::kOdd) == 0;
   for (std::size_t first = 0; first < ranges.size();) {
     const auto& image = ranges[first].image;
     std::size_t last = first, candidates = 16;

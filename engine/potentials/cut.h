@@ -39,6 +39,7 @@ class Cut {
   Cut(P potential, double cutoff, CutKind kind, double switch_from = 0)
       : potential_(potential),
         switched_(kind == CutKind::switched),
+        bent_(kind == CutKind::quadratic),
         cutoff_(cutoff),
         cutoff2_(cutoff * cutoff),
         at_cutoff_(potential_.value(cutoff2_)) {
@@ -47,7 +48,7 @@ class Cut {
       inverse_width_ = 1 / (cutoff2_ - from2_);
     }
     if (kind == CutKind::force_shifted) slope_in_r_ = 2 * cutoff * potential_.derivative(cutoff2_);
-    if (kind == CutKind::quadratic) {
+    if (bent_) {
       slope_ = potential_.derivative(cutoff2_);
       half_curvature_ = 0.5 * potential_.second_derivative(cutoff2_);
     }
@@ -63,8 +64,8 @@ class Cut {
   template <class T>
   T value(T rho) const {
     if (switched_) return potential_.value(rho) * factor(rho);
-    const T z = rho - cutoff2_;
-    T value = potential_.value(rho) - at_cutoff_ - z * (slope_ + half_curvature_ * z);
+    T value = potential_.value(rho) - at_cutoff_;
+    if (bent_) value -= (rho - cutoff2_) * (slope_ + half_curvature_ * (rho - cutoff2_));
     if (slope_in_r_ != 0) value -= slope_in_r_ * (elementary::sqrt(rho) - cutoff_);
     return rho < cutoff2_ ? value : all<T>(0);
   }
@@ -74,7 +75,8 @@ class Cut {
       const T t = rest(rho), u = share(rho);
       return potential_.derivative(rho) * factor(rho) - potential_.value(rho) * (30 * inverse_width_) * (t * t * u * u);
     }
-    T slope = potential_.derivative(rho) - slope_ - 2 * half_curvature_ * (rho - cutoff2_);
+    T slope = potential_.derivative(rho);
+    if (bent_) slope = slope - slope_ - 2 * half_curvature_ * (rho - cutoff2_);
     if (slope_in_r_ != 0) slope -= 0.5 * slope_in_r_ / elementary::sqrt(rho);
     return rho < cutoff2_ ? slope : all<T>(0);
   }
@@ -146,13 +148,14 @@ class Cut {
   }
   template <class T>
   T taken_off_quotient(T from, T to) const {
-    T quotient = potential_.quotient(from, to) - slope_ - half_curvature_ * ((from - cutoff2_) + (to - cutoff2_));
+    T quotient = potential_.quotient(from, to);
+    if (bent_) quotient = quotient - slope_ - half_curvature_ * ((from - cutoff2_) + (to - cutoff2_));
     if (slope_in_r_ != 0) quotient -= slope_in_r_ / (elementary::sqrt(from) + elementary::sqrt(to));
     return quotient;
   }
 
   P potential_;
-  bool switched_;
+  bool switched_, bent_;       ///< bent_: of the kind quadratic
   double cutoff_, cutoff2_;    ///< r_c [length], ρ_c [length²]
   double at_cutoff_;           ///< V(ρ_c)
   double from2_ = 0;           ///< ρ_s [length²]

@@ -15,7 +15,8 @@ namespace carom {
 /// Errors: a few ε of the sum of the magnitudes of the repulsive and the attractive part.
 class LennardJones {
  public:
-  LennardJones(double epsilon, double sigma) : epsilon_(epsilon), sigma2_(sigma * sigma) {}
+  LennardJones(double epsilon, double sigma)
+      : epsilon_(epsilon), sigma2_(sigma * sigma), slope_(-12 * epsilon / sigma2_), chord_(-4 * epsilon / sigma2_) {}
 
   ForceScale scale(double) const { return {24 * epsilon_ / std::sqrt(sigma2_), epsilon_}; }
 
@@ -27,7 +28,7 @@ class LennardJones {
   template <class T>
   T derivative(T rho) const {
     const T x = sigma2_ / rho, u = cube(x);
-    return -12 * epsilon_ / sigma2_ * (x * u) * (2 * u - 1);
+    return slope_ * (x * u) * (2 * u - 1);
   }
   template <class T>
   T second_derivative(T rho) const {
@@ -37,7 +38,7 @@ class LennardJones {
   template <class T>
   T quotient(T rho_old, T rho_new) const {
     const T x = sigma2_ / rho_old, y = sigma2_ / rho_new;
-    return -4 * epsilon_ / sigma2_ * (x * y) * (x * x + y * y + x * y) * (cube(x) + cube(y) - 1);
+    return chord_ * (x * y) * (x * x + y * y + x * y) * (cube(x) + cube(y) - 1);
   }
   /// ∫_r^∞ V r^(D−1) dr = 4ε r^D [u²/(12 − D) − u/(6 − D)]
   double tail(double r, int dimension) const {
@@ -51,8 +52,9 @@ class LennardJones {
     return x * x * x;
   }
 
-  double epsilon_;  ///< depth of the well [energy]
-  double sigma2_;   ///< [length²]
+  double epsilon_;        ///< depth of the well [energy]
+  double sigma2_;         ///< [length²]
+  double slope_, chord_;  ///< factors of V′ and of the quotient [energy/length²]
 };
 
 static_assert(Potential<LennardJones>);

@@ -38,6 +38,27 @@ TEST(ExactSum, IsTheCorrectlyRoundedSum) {
   }
 }
 
+TEST(ExactSeries, IsTheSameSum) {
+  for (int exponents : {0, 4, 10, 30, 60, 500, 1000}) {
+    std::vector<double> terms = terms_of_all_sizes(3000, exponents);
+    if (exponents == 1000) terms.insert(terms.begin(), {0.0, -0x1p-1074, 0.0, 0x1p1023, -0x1p1023, 0x1p-900});
+    ExactSeries series;
+    for (double t : terms) series.add(t);
+    EXPECT_EQ(series.sum().value(), sum_of(terms)) << "exponents up to " << exponents;
+  }
+}
+
+TEST(ExactSeries, HasRoomForTheLargestTerms) {  // each has all bits that the first of both sums holds
+  const double largest = 0x1.ffffffffffep12;
+  ExactSeries series;
+  std::vector<double> terms(2000, largest);
+  terms[0] = 1;
+  for (double t : terms) series.add(t);
+  EXPECT_EQ(series.sum().value(), sum_of(terms));
+  series.add(std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(std::isnan(series.sum().value()));
+}
+
 TEST(ExactSum, DoesNotDependOnTheOrder) {
   auto terms = terms_of_all_sizes(1000, 300);
   const double sum = sum_of(terms);

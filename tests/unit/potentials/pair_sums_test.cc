@@ -95,7 +95,7 @@ TEST(PairSums, AreOfTheKernelsThatAreToBeUsed) {
     };
     const auto expected = forces();
     PairKernels broken = pair_kernels();
-    broken.scatter = [](const PairBatch&, const std::int64_t(*)[PairBatch::kCapacity], ForceWords*) {};
+    broken.scatter = [](const PairBatch&, const std::int64_t(*)[PairBatch::kRoom], ForceWords*) {};
     term.use(broken);
     EXPECT_TRUE(forces() == (term.keeps_momentum() ? Quanta<3>(x.size()) : expected));  // fields have no kernels
     for (const PairKernels* kernels : available_pair_kernels()) {
@@ -200,6 +200,14 @@ TEST(PairSums, PassOverManyPairsThatAreOnlyInTheSkin) {
     const Cut potential(LennardJones(1.0, 0.8), 1.2, CutKind::shifted);
     expect_reference(scene, *scene.make("lennard-jones", cut_lennard_jones(0.8, 1.2)), potential, 1.44, nullptr, x, x);
   }
+}
+
+TEST(PairSums, PassOverManyPairsOfNoWeight) {
+  Scene<2> scene(600, 30, Boundary::wall, 0.2);
+  for (std::size_t i = 1; i < 599; ++i) scene.particles.charge[i] = 0;
+  const auto& x = scene.particles.x;
+  expect_reference(scene, *scene.make("yukawa", {{"amplitude", 2.0}, {"kappa", 0.1}, {"charges", true}}),
+                   Yukawa(2, 0.1), std::numeric_limits<double>::infinity(), &scene.particles.charge, x, x);
 }
 
 /// Moves particles about, wraps them now and then, and compares with plain loops all the time.
