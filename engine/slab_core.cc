@@ -93,7 +93,10 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   } else if (crowded_) {
     scan_.too_many(end.key);
   } else if (strayed_ > 0) {
-    throw Error(Failure::numerical, "a position or velocity is not finite; use a smaller integrator.step");
+    Id i = 0;
+    while (i + 1 < x_.size() && std::isfinite(reach_[i]) && x_[i].allFinite()) ++i;
+    throw Error(Failure::numerical, "the position or velocity of particle " + std::to_string(particles_.id_of(i)) +
+                                        " is not finite; use a smaller integrator.step");
   }
   for (const Flight& each : flights_) {
     const double rest = length_ - each.t;

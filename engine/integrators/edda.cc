@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "engine/error.h"
@@ -41,8 +42,10 @@ constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
 constexpr std::size_t kSmooth = 3;        // past slabs that the start is extrapolated from
 constexpr double kWild = 4;               // mean distances of ½ h² a: such a step is halved before it is flown
 constexpr double kStalled = 0.1;          // contraction of kPatience sweeps that is too little
-constexpr double kSettled = 0.5;          // of the tolerance: such a particle keeps its path
-constexpr double kRounding = 1e-13;       // of the speed scale: increments below it that do not shrink are rounding
+constexpr double kTooStiff = 0.5;  // contraction of kPatience sweeps that is expected: nothing is frozen for stiffness
+constexpr double kMostFolded = 0.1;  // of the kinetic energy, for frozen particles
+constexpr double kSettled = 0.5;     // of the tolerance: such a particle keeps its path
+constexpr double kRounding = 1e-13;  // of the speed scale: increments below it that do not shrink are rounding
 
 template <int D>
 class EventDrivenDiscreteGradient : public Integrator<D> {
@@ -127,7 +130,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       resolved_ = found_.touching;
       if (found_.touching) found_.touching = resolve(system, done);
       const double rest = slab.length - done, piece = std::min(longest, rest);
-      const Outcome outcome = solve(system, piece);
+      Outcome outcome = solve(system, piece);
+      if (outcome == Outcome::settled && any_freezes_ && !can_fold(system, piece)) outcome = Outcome::diverged;
       if (outcome == Outcome::settled) {
         core_->commit(done);
         finish(system, piece);
@@ -150,8 +154,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       longest = 0.5 * piece;
       if (longest * kMostPieces < slab.length)
         throw Error(Failure::numerical, "the sweeps do not settle even in " + std::to_string(kMostPieces) +
-                                            " pieces; the forces are not finite or far too stiff for step = " +
-                                            std::to_string(slab.length));
+                                            " pieces; the forces, strongest on particle " +
+                                            std::to_string(p.id_of(most_accelerated())) +
+                                            ", are not finite or far too stiff for step = " + short_text(slab.length) +
+                                            "; use a smaller integrator.step");
     }
   }
 
@@ -196,8 +202,11 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       std::array<double, 2> most{};  // |e|² and |a′|²
       for (Id i = 0; i < n; ++i) {
         if (frozen(i) || !p.owns(i)) continue;
-        most[0] = std::max(most[0], finite((mean_[i] - a_[i]).squaredNorm()));
-        most[1] = std::max(most[1], mean_[i].squaredNorm());
+        const Vec<D> e = mean_[i] - a_[i];
+        most[0] = std::max(most[0], finite(e.squaredNorm()));
+        // Of what is flown on next: Chebyshev's step may lead far beyond mean_.
+        most[1] = std::max(most[1], chebyshev.plain() ? mean_[i].squaredNorm()
+                                                      : std::pow(a_[i].norm() + move_[i].norm() + e.norm(), 2));
       }
       largest_of_all<D>(system, most);
       const double largest = h * std::sqrt(most[0]);
@@ -208,7 +217,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (sweep >= kPatience && any_rank(system, swaps_among_unfrozen())) freeze();
       if (sweep % kPatience == 0) {
         const double slow = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kPatience));
-        if (sweep > kPatience && largest > slow * earlier) freeze_stalled(largest / h);
+        if (sweep > kPatience && slow < kTooStiff && largest > slow * earlier) freeze_stalled(largest / h);
         earlier = largest;
       }
       if (sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * before) && measure(system)) {
@@ -276,6 +285,11 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       }
   }
 
+  Id most_accelerated() const {
+    const auto most = std::ranges::max_element(a_, {}, [](const Vec<D>& a) { return finite(a.squaredNorm()); });
+    return static_cast<Id>(most - a_.begin());
+  }
+
   bool frozen(Id i) const { return swaps_[i] > kSwaps; }
   static double finite(double value) { return std::isnan(value) ? kNever : value; }
   bool swaps_among_unfrozen() const {
@@ -317,6 +331,24 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         if (i == contact.key.lo || contact.key.kind == EventKind::pair) mean_[i] = 2 / h * (w[i] - p.v[i]);
   }
 
+  /// What the energy lacks for the kick of a particle.
+  double lack(const Particles<D>& p, Id i, double h) const {
+    const Vec<D> e = mean_[i] - a_[i];
+    return p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
+  }
+
+  /// Whether what frozen particles lack is little beside the kinetic energy.
+  bool can_fold(const System<D>& system, double h) const {
+    const auto& p = system.particles;
+    ExactSum lacks, kinetic;
+    for (Id i = 0; i < p.size(); ++i) {
+      if (!p.owns(i)) continue;
+      if (frozen(i)) lacks.add(std::min(std::abs(lack(p, i, h)), std::numeric_limits<double>::max()));
+      kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre_).squaredNorm());
+    }
+    return of_all_ranks(system, lacks).value() <= kMostFolded * of_all_ranks(system, kinetic).value();
+  }
+
   /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
@@ -324,8 +356,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     std::vector<Lack<D>> of_frozen;
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
-      const Vec<D> e = mean_[i] - a_[i];
-      const double r = p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
+      const double r = lack(p, i, h);
       if (frozen(i))
         of_frozen.push_back({p.id_of(i), core_->x()[i], r});
       else

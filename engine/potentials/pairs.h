@@ -66,7 +66,9 @@ class Bonds {
       else if ((i != kUnknown && some.owns(i)) || (j != kUnknown && some.owns(j)))
         return std::nullopt;
     }
-    return Bonds(box_, std::move(known));
+    Bonds bonds(box_, std::move(known));
+    bonds.id_ = &some.id;
+    return bonds;
   }
   double reach(Positions<D> x) const {
     double longest = 0;
@@ -136,7 +138,8 @@ class Bonds {
     const Vec<D> straight = x[i] - x[j], shift = box_.shift(box_.nearest_image(straight));
     for (int k = 0; k < D; ++k)
       if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > 0.48 * box_.edges[k])
-        throw Error(Failure::numerical, "the bond of particles " + std::to_string(i) + " and " + std::to_string(j) +
+        throw Error(Failure::numerical, "the bond of particles " + std::to_string(id_ ? (*id_)[i] : i) + " and " +
+                                            std::to_string(id_ ? (*id_)[j] : j) +
                                             " spans nearly half the periodic box along axis " + std::to_string(k) +
                                             ", where its image is ambiguous; use a larger box");
     return shift;
@@ -144,6 +147,7 @@ class Bonds {
 
   const Box<D>& box_;
   PairList pairs_;
+  const std::vector<Id>* id_ = nullptr;  // of particles, where they are some of all
   std::size_t most_partners_ = 0;
 };
 
@@ -241,7 +245,7 @@ class PairsWithinCutoff {
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
                Visit&& visit) const {
-    records_ = &list_.cover(step, particles.ghost);
+    records_ = &list_.cover(step, particles);
     collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit);
   }
   Id id(std::uint32_t place) const { return records_->order[place]; }
