@@ -140,9 +140,10 @@ class PairTerm final : public Interaction<D> {
       if (wide && !function[1](&potential_, *batch_, units, &totals[shared ? 1 : 0])) {
         if (given.x_new.empty() && given.vectors.empty()) refuse();
         forces->spoil();
+      } else if (forces) {
+        kernels_->scatter(*batch_, batch_->low, low);
+        if (wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
       }
-      if (forces) kernels_->scatter(*batch_, batch_->low, low);
-      if (forces && wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
       own += owned(shared);
     });
     if (low) pairs_.pass_on(*forces);
