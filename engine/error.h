@@ -1,6 +1,7 @@
 #pragma once
 // Errors that reach the user. Each knows which exit code the command ends with.
 
+#include <cstdio>
 #include <stdexcept>
 #include <string>
 
@@ -19,5 +20,12 @@ class Error : public std::runtime_error {
  private:
   Failure failure_;
 };
+
+/// A number as messages show it: six digits, whatever its size.
+inline std::string short_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
 
 }  // namespace carom

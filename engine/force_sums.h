@@ -38,8 +38,9 @@ class ForceSums {
   /// Makes room for adding at most so many forces to any particle, and says how large each may be.
   ForceLimits make_room(std::size_t forces) {
     const double count = static_cast<double>(forces < 1 ? 1 : forces);
-    const double share = std::exp2(std::floor(std::log2(kForceRoom / 2 / count)));
-    const ForceLimits limits{std::fmin(kMostInLow, share), std::fmin(kMostInHigh, share)};
+    const auto half = [&](double room) { return std::exp2(std::floor(std::log2(room / 2 / count))); };
+    const ForceLimits limits{std::fmin(kMostInLow, half(kForceRoom)),
+                             std::fmin(kMostInHigh, half(kForceRoom - used_high_))};
     const double low = count * std::fmax(limits.low, 0x1p39);
     if (used_low_ + low > kForceRoom) carry();
     used_low_ += low;

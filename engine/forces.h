@@ -65,7 +65,7 @@ Quanta quanta(const System<D>& system) {
     most[3] = std::max(most[3], scale.spread * scale.energy);
   }
   if (system.ranks && system.sizes) system.ranks->largest(most);
-  const auto power = [](double x) { return x < kNone ? std::exp2(std::floor(std::log2(x))) : 1; };
+  const auto power = [](double x) { return x < kNone ? std::exp2(std::floor(std::log2(std::max(x, 0x1p-900)))) : 1; };
   // Not so small that the largest do not fit.
   return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])),
           std::max(0x1p-46 * power(-most[1]), 0x1p-70 * power(most[3]))};

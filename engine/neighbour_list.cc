@@ -15,6 +15,7 @@ constexpr double kTooWide = 64;  // skins wider than this, in skins that would d
 constexpr double kCalls = 6;  // a skin that is half as wide as any particle comes in so many calls; so it lasts three,
 constexpr double kWidest = 1.6;  // where it need not be wider than this for it [mean reach]
 constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
+constexpr std::size_t kMostPairs = 10'000'000, kMostPartners = 200;  // a particle; more are a step gone wild
 }  // namespace
 
 /// Cells for particles of one size.
@@ -68,7 +69,14 @@ std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>
                     "a particle moves farther than " + std::to_string(kMostBoxes) +
                         " edges of the periodic box within one step; use a smaller integrator.step");
     skin_ = std::max(wanted, wasteful ? 0.0 : 0.5 * skin_);
-    build(x);
+    if (build(x)) return pairs_;
+    skin_ = 2 * step;  // no room for more
+    if (build(x)) return pairs_;
+    skin_ = least_skin_;
+    built_at_.clear();
+    throw Error(Failure::numerical, "a particle may come " + short_text(step) +
+                                        " far within one step, which gives far too many candidates for collisions; use "
+                                        "a smaller integrator.step");
   }
   return pairs_;
 }
@@ -92,8 +100,9 @@ void NeighbourList<D>::follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<
   built_at_[i] -= box_.shift(jump);
 }
 
+/// False where there are far too many pairs.
 template <int D>
-void NeighbourList<D>::build(std::span<const Vec<D>> x) {
+bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!x[i].allFinite())
       throw Error(Failure::numerical,
@@ -116,7 +125,9 @@ void NeighbourList<D>::build(std::span<const Vec<D>> x) {
         if (d.squaredNorm() <= reach * reach) pairs_.push_back({static_cast<Id>(i), j, image});
       });
     std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
+    if (pairs_.size() > kMostPairs + kMostPartners * x.size()) return false;
   }
+  return true;
 }
 
 /// Particles of similar reach, an octave each, in cells of their own: cells for the largest would hold thousands of

@@ -35,7 +35,7 @@ class NeighbourList {
 
   /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them
   /// (arcs that stray no farther from x than `margin` besides the straight displacement). Rebuilds where needed. Throws
-  /// Error(Failure::numerical) for steps of several edges of a periodic box.
+  /// Error(Failure::numerical) for steps of several edges of a periodic box, and with far too many pairs.
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new, double margin = 0);
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, double margin = 0) { return cover(x, x, margin); }
 
@@ -45,7 +45,7 @@ class NeighbourList {
   std::uint64_t rebuilds() const { return rebuilds_; }
 
  private:
-  void build(std::span<const Vec<D>> x);
+  bool build(std::span<const Vec<D>> x);
   std::vector<SizeClass<D>> group(std::span<const Vec<D>> x) const;
   void follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<Image<D>>& crossed);
 

@@ -97,12 +97,22 @@ constexpr double kTooWide = 64;  // skins wider than this, in skins that would d
 constexpr double kCalls = 16;    // a skin is as wide as particles come in so many calls: half of it lasts for eight,
 constexpr double kWidest = 0.8;  // where it need not be wider than this for it [cutoff]
 constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
+constexpr std::size_t kMostPairs = 100'000'000, kMostPartners = 5000;  // a particle; more are a step gone wild
 
 /// The larger of two squared distances; a step to where there is no number does not count, its force will tell.
 template <int D>
 double farther(double squared, const Vec<D>& way) {
   const double other = way.squaredNorm();
   return other > squared && other <= std::numeric_limits<double>::max() ? other : squared;
+}
+
+template <int D>
+Id farthest(const PairStep<D>& step) {
+  Id most = 0;
+  double squared = 0;
+  for (Id i = 0; i < step.x_new.size(); ++i)
+    if (const double other = farther<D>(squared, step.x_new[i] - step.x[i]); other > squared) squared = other, most = i;
+  return most;
 }
 
 }  // namespace
@@ -135,13 +145,14 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
     need_finite(particles, step.x);
     for (int k = 0; k < D; ++k)
       if (box_.periodic(k) && !(length <= kMostBoxes * box_.edges[k]))
-        throw Error(Failure::numerical,
-                    "a particle moves farther than " + std::to_string(kMostBoxes) +
-                        " edges of the periodic box within one step; use a smaller integrator.step");
+        throw Error(Failure::numerical, "particle " + std::to_string(particles.id_of(farthest(step))) +
+                                            " moves farther than " + std::to_string(kMostBoxes) +
+                                            " edges of the periodic box within one step; use a smaller "
+                                            "integrator.step");
     const double kept = rebuilds_ == 0 ? *learned_ : 0.5 * skin_;
     *learned_ = skin_ = std::max(wanted, wasteful ? 0.0 : kept);
     ghost_ = particles.ghost;
-    build(step);
+    build(step, particles);
   }
   records_.load(step);
   return records_;
@@ -268,7 +279,7 @@ struct Cells {
 }  // namespace
 
 template <int D>
-void CutoffList<D>::build(const PairStep<D>& step) {
+void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles) {
   ++rebuilds_;
   calls_ = 0;
   particles_ = step.x.size();
@@ -342,6 +353,14 @@ void CutoffList<D>::build(const PairStep<D>& step) {
       for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
         if (among) ranges[0].begin = r + 1;
         find_pairs(r, ranges);
+        if (plain_size_ + records_.partners[PairRecords<D>::kMoving].size() > kMostPairs + kMostPartners * particles_) {
+          rebuilds_ = 0;
+          throw Error(Failure::numerical, "far too many pairs are within " + short_text(reach) +
+                                              " of each other: the cutoff and " + short_text(skin_) +
+                                              " for steps as long as that of particle " +
+                                              std::to_string(particles.id_of(farthest(step))) +
+                                              "; use a smaller integrator.step or cutoff");
+        }
       }
     }
   }

@@ -73,8 +73,9 @@ class CutoffList {
     if (like) learned_ = like->learned_;
   }
 
-  /// The pairs that are within the cutoff at x or x_new. A pair keeps the image it has at x. Throws
-  /// Error(Failure::numerical) for positions that are not finite and for steps of several edges of a periodic box.
+  /// The pairs that are within the cutoff at x or x_new. A pair keeps the image it has at x. `particles` gives ghosts
+  /// and ids. Throws Error(Failure::numerical) for positions that are not finite, and for steps of several edges of a
+  /// periodic box or with far too many pairs.
   PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles);
 
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
@@ -83,7 +84,7 @@ class CutoffList {
   static constexpr double kLeastSkin = 0.1;  // [cutoff]
 
   bool follow(const PairStep<D>& step, double& squared_from_build, double& squared_step);
-  void build(const PairStep<D>& step);
+  void build(const PairStep<D>& step, const Particles<D>& particles);
   void find_pairs(std::uint32_t row, std::span<const struct PartnerRange> ranges);
 
   const Box<D>& box_;

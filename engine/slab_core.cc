@@ -110,10 +110,14 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     agree(!end.complete || crowded_ || strayed_ > 0);
   else if (crowded_)
     scan_.too_many(end.key);
-  else if (strayed_ > 0 && a_.empty())
-    throw Error(Failure::numerical, "a position or velocity is not finite; use a smaller integrator.step");
-  else if (strayed_ > 0)
+  else if (strayed_ > 0 && !a_.empty())
     return {.complete = false, .wild = true};
+  else if (strayed_ > 0) {
+    Id i = 0;
+    while (i + 1 < x_.size() && std::isfinite(reach_[i]) && x_[i].allFinite()) ++i;
+    throw Error(Failure::numerical, "the position or velocity of particle " + std::to_string(particles_.id_of(i)) +
+                                        " is not finite; use a smaller integrator.step");
+  }
   compare_sequences();
   return end;
 }

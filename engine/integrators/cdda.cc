@@ -53,7 +53,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
           throw Error(
               Failure::numerical,
               "the discrete-gradient step does not converge even in " + std::to_string(kMostPieces) +
-                  " pieces; the forces are not finite or far too stiff for step = " + std::to_string(slab.length));
+                  " pieces; the forces are not finite or far too stiff for step = " + short_text(slab.length));
         continue;
       }
       ended = tau == rest;

@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "engine/error.h"
@@ -31,18 +32,21 @@ namespace carom::integrator {
 namespace {
 
 constexpr int kMostSweeps = 60;
-constexpr int kMostPieces = 1 << 14;      // of a step
-constexpr std::uint64_t kFew = 5;         // one particle in so many has changed: only its pairs are evaluated
-constexpr int kPatience = 6;              // sweeps before particles may be frozen
-constexpr int kSwaps = 3;                 // of partners after that, until a particle is frozen
-constexpr int kStart = 4;                 // sweeps after which contraction tells of stiffness
-constexpr double kSlow = 0.04;            // contraction of two sweeps that tells of it
-constexpr double kRoom = 1.1;             // for frequencies above the one found
-constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
-constexpr std::size_t kSmooth = 3;        // past slabs that the start is extrapolated from
-constexpr double kStalled = 0.1;          // contraction of kPatience sweeps that is too little
-constexpr double kSettled = 0.5;          // of the tolerance: such a particle keeps its path
-constexpr double kRounding = 1e-13;       // of the speed scale: increments below it that do not shrink are rounding
+constexpr int kMostPieces = 1 << 14;          // of a step
+constexpr std::uint64_t kFew = 5;             // one particle in so many has changed: only its pairs are evaluated
+constexpr int kPatience = 6;                  // sweeps before particles may be frozen
+constexpr int kSwaps = 3;                     // of partners after that, until a particle is frozen
+constexpr int kStart = 4;                     // sweeps after which contraction tells of stiffness
+constexpr double kSlow = 0.04;                // contraction of two sweeps that tells of it
+constexpr double kRoom = 1.1;                 // for frequencies above the one found
+constexpr std::int64_t kMeasured = 1000;      // slabs for which it is good
+constexpr std::size_t kSmooth = 3;            // past slabs that the start is extrapolated from
+constexpr double kStalled = 0.1;              // contraction of kPatience sweeps that is too little
+constexpr double kTooStiff = 0.5;             // such a contraction expected: nothing is frozen for stiffness
+constexpr double kMostFolded = 0.1;           // of the kinetic energy, for frozen particles
+constexpr double kSettled = 0.5;              // of the tolerance: such a particle keeps its path
+constexpr double kSettledInCollision = 0.05;  // the same where it collides: its lack of energy is of first order in e
+constexpr double kRounding = 1e-13;           // of the speed scale: increments below it that do not shrink are rounding
 
 template <int D>
 class EventDrivenDiscreteGradient : public Integrator<D> {
@@ -121,7 +125,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         found_.touching = !scan.resting().empty();
       }
       const double rest = slab.length - done, piece = std::min(longest, rest);
-      if (solve(system, piece, resolved)) {
+      if (solve(system, piece, resolved) && (!any_freezes_ || can_fold(system, piece))) {
         core_->commit(done);
         finish(system, piece);
         if (found_.touching) scan.slide(p.x, p.v);
@@ -143,8 +147,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       longest = 0.5 * piece;
       if (longest * kMostPieces < slab.length)
         throw Error(Failure::numerical, "the sweeps do not settle even in " + std::to_string(kMostPieces) +
-                                            " pieces; the forces are not finite or far too stiff for step = " +
-                                            std::to_string(slab.length));
+                                            " pieces; the forces, strongest on particle " +
+                                            std::to_string(p.id_of(most_accelerated())) +
+                                            ", are not finite or far too stiff for step = " + short_text(slab.length) +
+                                            "; use a smaller integrator.step");
     }
   }
 
@@ -173,7 +179,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * residual[sweep - 1]) return true;
       if (sweep >= kPatience && swaps > 0) freeze();
       const double stalled = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kPatience));
-      if (sweep > kPatience && sweep % kPatience == 0 && largest > stalled * residual[sweep - kPatience])
+      if (sweep > kPatience && sweep % kPatience == 0 && stalled < kTooStiff &&
+          largest > stalled * residual[sweep - kPatience])
         freeze_stalled(largest / h);
       const bool slow =
           sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * residual[sweep - 2]);
@@ -185,12 +192,13 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       }
       chebyshev.next();
       const double settled = std::pow(kSettled * wanted / h, 2);
+      const double in_collision = std::pow(kSettledInCollision * wanted / h, 2);
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
         const Vec<D> e = mean_[i] - a_[i];
         if (!chebyshev.plain())
           a_[i] += move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
-        else if (e.squaredNorm() > settled)
+        else if (e.squaredNorm() > (core_->collides(i) ? in_collision : settled))
           a_[i] = mean_[i];
       }
     }
@@ -229,6 +237,11 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= kStalled * largest) swaps_[i] = kSwaps + 1;
   }
 
+  Id most_accelerated() const {
+    const auto most = std::ranges::max_element(a_, {}, [](const Vec<D>& a) { return finite(a.squaredNorm()); });
+    return static_cast<Id>(most - a_.begin());
+  }
+
   bool frozen(Id i) const { return swaps_[i] > kSwaps; }
   static double finite(double value) { return std::isnan(value) ? kNever : value; }
 
@@ -261,24 +274,41 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         if (i == contact.key.lo || contact.key.kind == EventKind::pair) mean_[i] = 2 / h * (w[i] - p.v[i]);
   }
 
+  /// What the energy lacks for the kick of a particle.
+  double lack(const Particles<D>& p, Id i, double h) const {
+    const Vec<D> e = mean_[i] - a_[i];
+    return p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
+  }
+
+  /// Whether what frozen particles lack is little beside the kinetic energy.
+  bool can_fold(const System<D>& system, double h) const {
+    const auto& p = system.particles;
+    ExactSum lacks, kinetic;
+    for (Id i = 0; i < p.size(); ++i) {
+      if (!p.owns(i)) continue;
+      if (frozen(i)) lacks.add(std::min(std::abs(lack(p, i, h)), std::numeric_limits<double>::max()));
+      kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre_).squaredNorm());
+    }
+    return of_all_ranks(system, lacks).value() <= kMostFolded * of_all_ranks(system, kinetic).value();
+  }
+
   /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
-    ExactSeries lack;
+    ExactSeries lacks;
     std::vector<Lack<D>> of_frozen;
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
-      const Vec<D> e = mean_[i] - a_[i];
-      const double r = p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
+      const double r = lack(p, i, h);
       if (frozen(i))
         of_frozen.push_back({p.id_of(i), core_->x()[i], r});
       else
-        lack.add(r);
+        lacks.add(r);
     }
     core_->finish(p);
     for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
     const double left = any_freezes_ ? fold_near(system, of_frozen, *counters_) : 0;
-    fold(system, centre_, lack.sum(), left, *counters_);
+    fold(system, centre_, lacks.sum(), left, *counters_);
     update_copies(system);
     past_.pass(h, mean_);
   }

@@ -140,9 +140,10 @@ class PairTerm final : public Interaction<D> {
       if (wide && !function[1](&potential_, *batch_, units, &totals[shared ? 1 : 0])) {
         if (given.x_new.empty() && given.vectors.empty()) refuse();
         forces->spoil();
+      } else if (forces) {
+        kernels_->scatter(*batch_, batch_->low, low);
+        if (wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
       }
-      if (forces) kernels_->scatter(*batch_, batch_->low, low);
-      if (forces && wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
       if (!given.x_new.empty()) own += owned(shared);
     });
     if (low) pairs_.pass_on(*forces);
@@ -160,22 +161,23 @@ class PairTerm final : public Interaction<D> {
   /// Names the pair of the batch with the largest force, or one that is no number.
   [[noreturn]] void refuse() const {
     unsigned worst = 0;
-    double largest = -1;
+    double largest = -1, apart = 0;
     for (unsigned k = 0; k < batch_->n; ++k) {
       const auto& d = batch_->d;
       const double rho = d[0][k] * d[0][k] + d[1][k] * d[1][k] + d[2][k] * d[2][k];
       const double size = std::abs(batch_->weight[k] * potential_.derivative(rho)) * std::sqrt(rho);
       if (size <= largest) continue;
       worst = k;
+      apart = std::sqrt(rho);
       if (!(size >= 0)) break;
       largest = size;
     }
     const Id i = pairs_.id(batch_->first_of(worst)), j = pairs_.id(batch_->second[worst]);
     const auto name = [&](Id k) { return std::to_string(particles_.id_of(k)); };
     throw Error(Failure::numerical, "the force between particles " + name(std::min(i, j)) + " and " +
-                                        name(std::max(i, j)) +
-                                        " is too large or no number; use a smaller integrator.step, or place them "
-                                        "farther apart");
+                                        name(std::max(i, j)) + ", " + short_text(apart) +
+                                        " apart, is too large or no number; use a smaller integrator.step, or place "
+                                        "them farther apart");
   }
 
   const Particles<D>& particles_;

@@ -23,8 +23,11 @@ class Yukawa {
       : amplitude_(amplitude), kappa_(kappa), contact_(contact) {}
 
   ForceScale scale(double distance) const {
+    const auto size = [&](double r) { return 0x1p-2 * std::abs(value(r * r)); };
     const double near = std::max(contact_, std::min(distance, 1 / kappa_));
-    const double energy = 0x1p-2 * std::abs(value(near * near));
+    double energy = size(near);
+    // Without cores that touch: where it is far weaker at the usual distances, pairs hardly come so near.
+    if (near > contact_) energy = std::clamp(0x1p4 * size(distance), 0x1p-16 * energy, energy);
     return {energy / near, energy};
   }
 

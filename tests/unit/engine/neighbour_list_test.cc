@@ -106,6 +106,19 @@ TEST(NeighbourList, LastsSomeCallsWhereEachMovesParticlesFar) {
   EXPECT_LT(list.rebuilds(), 15u);
 }
 
+TEST(NeighbourList, RefusesWildStepsBeforeTheyFillTheMemory) {
+  Box<2> box;
+  box.edges = {60, 60};
+  box.boundary.fill(Boundary::periodic);
+  std::vector<Vec<2>> x;
+  for (int k = 0; k < 3600; ++k) x.emplace_back(k % 60, k / 60);
+  NeighbourList<2> list(box, std::vector<double>(x.size(), 0.5));
+  const auto pairs = list.cover(x);
+  const std::vector before(pairs.begin(), pairs.end());
+  EXPECT_THROW(list.cover(x, 100.0), Error);  // 3600 particles and 35 images of them around each
+  EXPECT_TRUE(std::ranges::equal(list.cover(x), before));
+}
+
 TEST(NeighbourList, RecoversFromOneWildStep) {
   Box<2> box;
   box.edges = {2, 2};

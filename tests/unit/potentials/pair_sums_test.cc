@@ -340,6 +340,34 @@ TEST(PairSums, NameThePairWhoseForceIsNoNumber) {
   EXPECT_NE(lost.find("the position of particle 3 is not finite"), std::string::npos) << lost;
 }
 
+TEST(PairSums, NameBondsAndStraysByTheIdsOfTheParticles) {
+  Scene<2> scene(12, 8, Boundary::periodic, 0.5);
+  scene.particles.x[4] = Vec<2>(1, 1), scene.particles.x[9] = Vec<2>(4.9, 1);
+  Particles<2> some;
+  for (const Id i : {4, 7, 9}) {
+    some.x.push_back(scene.particles.x[i]);
+    some.mass.push_back(1);
+    some.species.push_back(0);
+    some.id.push_back(i);
+  }
+  const auto bond =
+      scene.make("harmonic-bond", {{"pairs", PairList{{4, 9}}}, {"stiffness", 1.0}, {"rest_length", 1.0}})
+          ->among(scene.particles, some);
+  EXPECT_NE(refusal(*bond, some.x).find("the bond of particles 4 and 9 "), std::string::npos);
+  const auto fluid = scene.make("lennard-jones", cut_lennard_jones(0.8, 2.0))->among(scene.particles, some);
+  auto x_new = some.x;
+  x_new[1][0] += 40;
+  ForceSums<2> mean(3, kQuantum);
+  try {
+    fluid->add_mean_forces(some.x, x_new, mean);
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("particle 7 moves farther than"), std::string::npos) << error.what();
+  }
+  some.x[1][0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(refusal(*fluid, some.x).find("position of particle 7 is"), std::string::npos);
+}
+
 TEST(PairSums, HoldForcesOfAllMagnitudesOrSaySo) {
   Scene<3> scene(24, 6, Boundary::wall, 0.5);
   std::uniform_real_distribution<double> exponent(-9, 0), part(-1, 1);
@@ -376,6 +404,20 @@ TEST(ForceSums, CarryWhereManyPassesAddUp) {
   EXPECT_TRUE(sums.quanta(1)[0] == static_cast<ForceSums<2>::Whole>(limits.low - 1) * 19999);
   EXPECT_TRUE(sums.quanta(1)[1] == static_cast<ForceSums<2>::Whole>(-3e15) * 19999);
   EXPECT_EQ(sums.value(0), Vec<2>(0, 0));
+}
+
+TEST(ForceSums, DoNotWrapWhereManyTermsHaveManyPartners) {
+  constexpr std::size_t kPartners = 1 << 16;
+  ForceSums<2> sums(1, 1.0);
+  ForceSums<2>::Whole expected = 0;
+  for (int term = 0; term < 12; ++term) {
+    const ForceLimits limits = sums.make_room(kPartners);
+    ASSERT_GE(limits.high, 0x1p30);
+    const double upper = std::nextafter(limits.high, 0) - 1, large = 0x1p40 * std::floor(upper);
+    for (std::size_t n = 0; n < kPartners; ++n) ASSERT_TRUE(sums.add(0, Vec<2>(large, 0), limits));
+    expected += static_cast<ForceSums<2>::Whole>(large) * kPartners;
+    ASSERT_TRUE(sums.quanta(0)[0] == expected) << term;
+  }
 }
 
 }  // namespace

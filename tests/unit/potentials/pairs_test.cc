@@ -338,6 +338,15 @@ TEST(Pairs, ScaleOfAShortRangedAttractionIsThatAtContact) {
   }
 }
 
+TEST(Pairs, ScaleOfAScreenedRepulsionWithoutCoresIsThatAtUsualDistances) {
+  Scene<3> scene(20, 8, Boundary::wall, 1);
+  for (double& radius : scene.particles.radius) radius = 1e-4;
+  const auto term =
+      scene.make("yukawa", {{"amplitude", std::exp(10.0)}, {"kappa", 10.0}, {"charges", false}});  // V(1) is 1
+  EXPECT_LT(term->scale(1).energy, 16);
+  EXPECT_GT(term->scale(1).energy, 0.1);
+}
+
 TEST(Pairs, ScaleKnowsTheLargestWeights) {
   Scene<2> scene(6, 8, Boundary::wall, 1);
   scene.particles.mass = {1, 1e-7, 1e-7, 0.5, 1e-7, 1e-7};

@@ -1,0 +1,499 @@
+// Random small systems over many orders of magnitude: sums of forces, energies and virials are those of plain loops, or
+// an error names a pair that is the reason. CAROM_FUZZ_SYSTEMS sets the number of systems of the slow test.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <random>
+#include <regex>
+
+#include "engine/error.h"
+#include "engine/forces.h"
+#include "engine/pair_kernels.h"
+#include "tests/support/experiments.h"
+
+namespace carom {
+namespace {
+
+using namespace std::string_literals;
+using Real = long double;
+
+/// A number, and the sum of the magnitudes of the terms that it was made from, times how much more than ε their own
+/// rounding may be: errors are relative to this.
+struct Sized {
+  Real v, size;
+  Sized(Real value) : v(value), size(std::abs(value)) {}
+  Sized(Real value, Real magnitude) : v(value), size(magnitude) {}
+  friend Sized operator+(Sized a, Sized b) { return {a.v + b.v, a.size + b.size}; }
+  friend Sized operator-(Sized a, Sized b) { return {a.v - b.v, a.size + b.size}; }
+  friend Sized operator*(Sized a, Sized b) { return {a.v * b.v, a.size * b.size}; }
+  friend Sized operator/(Sized a, Real b) { return {a.v / b, a.size / std::abs(b)}; }
+};
+
+using Function = std::function<Sized(Real)>;  // of ρ
+
+struct Dice {
+  std::mt19937_64 random;
+  double uniform(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random); }
+  double decades(double from, double to) { return std::pow(10, uniform(from, to)); }
+  std::size_t below(std::size_t n) { return random() % n; }
+  bool one_in(std::size_t n) { return below(n) == 0; }
+};
+
+/// One term of V.
+struct Law {
+  std::string type;
+  test::Given given = {};
+  Function value = {}, slope = {};  // V and dV/dρ
+  std::vector<double> breaks = {};  // of higher derivatives, ascending [ρ]
+  double cutoff2 = std::numeric_limits<double>::infinity();
+  enum { one, masses, charges } weight = one;
+  PairList bonds = {};
+
+  /// The divided difference: the mean of the slope, by three Gauss points in each smooth part where the step is short.
+  Sized quotient(Real a, Real b) const {
+    if (b < a) std::swap(a, b);
+    if (a == b) return slope(a);
+    const Sized ends = (value(b) - value(a)) / (b - a);
+    const Real steepest = std::max(slope(a).size, slope(b).size);
+    if (b - a > 1e-4L * b) return {ends.v, std::min(ends.size, steepest) + 0x1p-11L * ends.size};  // of 64 bits
+    Real from = a, sum = 0;
+    const auto add = [&](Real to) {
+      if (!(to > from)) return;
+      for (const int node : {-1, 0, 1})
+        sum += (node == 0 ? 8 : 5) * (to - from) / 18 * slope(from + (to - from) * (1 + node * std::sqrt(0.6L)) / 2).v;
+      from = to;
+    };
+    for (const double at : breaks) add(std::min<Real>(at, b));
+    add(b);
+    return {sum / (b - a), steepest};
+  }
+
+  /// Ends at the cutoff.
+  void cut(double cutoff, const std::string& kind, Real curvature = 0) {
+    const Function v = value, s = slope;
+    const Real end = cutoff2 = cutoff * cutoff, from = (0.9 * cutoff) * (0.9 * cutoff), width = end - from;
+    breaks.push_back(static_cast<double>(end));
+    if (kind == "switch") {
+      breaks = {static_cast<double>(from), static_cast<double>(end)};
+      const auto rest = [=](Real rho) { return Sized(std::clamp<Real>((end - rho) / width, 0, 1), 1); };
+      const auto factor = [=](Sized t) { return t * t * t * (10 - t * (15 - 6 * t)); };
+      value = [=](Real rho) { return v(rho) * factor(rest(rho)); };
+      slope = [=](Real rho) {
+        const Sized t = rest(rho), u(1 - t.v, 1);
+        return s(rho) * factor(t) - v(rho) * (30 / width) * t * t * u * u;
+      };
+      return;
+    }
+    const Sized at_end = v(end), in_r = kind == "force-shifted" ? 2 * Sized(cutoff) * s(end) : Sized(0);
+    const Sized in_rho = kind == "quadratic" ? s(end) : Sized(0);
+    value = [=](Real rho) {
+      if (rho >= end) return Sized(0);
+      const Sized z = Sized(rho) - end;
+      return v(rho) - at_end - z * (in_rho + z * curvature / 2) - in_r * (Sized(std::sqrt(rho)) - cutoff);
+    };
+    slope = [=](Real rho) {
+      if (rho >= end) return Sized(0);
+      const Sized rest = s(rho) - in_rho - (Sized(rho) - end) * curvature;
+      return in_r.v == 0 ? rest : rest - in_r / (2 * std::sqrt(rho));
+    };
+  }
+};
+
+Law bonds(Dice& dice, std::size_t particles, double strength, double length) {
+  const double rest = dice.one_in(4) ? 0 : length;
+  Law law{.type = "harmonic-bond"};
+  for (Id i = 0; i < particles; ++i)
+    for (Id j = i + 1; j < particles; ++j)
+      if (dice.one_in(3) || (i == 0 && j == 1)) law.bonds.push_back({i, j});
+  law.given = {{"pairs", law.bonds}, {"stiffness", strength}, {"rest_length", rest}};
+  law.value = [=](Real rho) {
+    const Sized stretch = Sized(std::sqrt(rho)) - rest;
+    return strength / 2 * stretch * stretch;
+  };
+  law.slope = [=](Real rho) {
+    return rest == 0 ? Sized(strength / 2) : strength / 2 * (1 - Sized(rest) / std::sqrt(rho));
+  };
+  return law;
+}
+
+Law lennard_jones(double strength, double length, bool wca) {
+  const Real sigma2 = length * length;
+  Law law{.type = wca ? "wca" : "lennard-jones", .given = {{"epsilon", strength}, {"sigma", length}}};
+  law.value = [=](Real rho) {
+    const Real x = sigma2 / rho, u = x * x * x;
+    return 4 * strength * Sized(u) * (Sized(u) - 1);
+  };
+  law.slope = [=](Real rho) {
+    const Real x = sigma2 / rho, u = x * x * x;
+    return -12 * strength / sigma2 * Sized(x * u) * (2 * Sized(u) - 1);
+  };
+  if (wca) law.cut(std::pow(2, 1.0 / 6) * length, "shifted");
+  return law;
+}
+
+Law inverse_power(double strength, double length, double exponent) {
+  const Real n = exponent / 2.0L, error = 4 + 4 * n;
+  Law law{.type = "inverse-power"};
+  law.given = {{"epsilon", strength}, {"sigma", length}, {"exponent", exponent}};
+  law.value = [=](Real rho) {
+    const Real v = strength * std::pow(length * length / rho, n);
+    return Sized(v, error * std::abs(v));
+  };
+  law.slope = [=, value = law.value](Real rho) { return -n * value(rho) / rho; };
+  return law;
+}
+
+Law yukawa(double strength, double kappa, bool charges) {
+  Law law{.type = "yukawa", .given = {{"amplitude", strength}, {"kappa", kappa}, {"charges", charges}}};
+  law.value = [=](Real rho) {
+    const Real r = std::sqrt(rho), v = strength * std::exp(-kappa * r) / r;
+    return Sized(v, (4 + kappa * r) * std::abs(v));
+  };
+  law.slope = [=, value = law.value](Real rho) { return -0.5L * value(rho) * (1 + kappa * std::sqrt(rho)) / rho; };
+  if (charges) law.weight = Law::charges;
+  return law;
+}
+
+Law damped_coulomb(double strength, double damping, double cutoff) {
+  Law law{.type = "coulomb", .weight = Law::charges};
+  law.given = {{"constant", strength}, {"form", "damped-shifted"s}, {"damping", damping}, {"cutoff", cutoff}};
+  const auto sized = [=](Real v, Real rho) { return Sized(v, (4 + 4 * damping * damping * rho) * std::abs(v)); };
+  law.value = [=](Real rho) {
+    const Real r = std::sqrt(rho);
+    return sized(strength * std::erfc(damping * r) / r, rho);
+  };
+  const auto gauss = [=](Real rho) {
+    return sized(strength * 2 / std::sqrt(std::acos(-1.0L)) * damping * std::exp(-damping * damping * rho), rho);
+  };
+  law.slope = [=, v = law.value](Real rho) { return -0.5L * (v(rho) + gauss(rho)) / rho; };
+  const Real end = cutoff * cutoff;
+  law.cut(cutoff, "quadratic", (0.5L * damping * damping * gauss(end).v - 1.5L * law.slope(end).v) / end);
+  return law;
+}
+
+Law inverse_distance(const char* type, double strength) {
+  Law law{.type = type, .given = {{"constant", strength}}, .weight = Law::charges};
+  if (type == "gravity"s)
+    law.weight = Law::masses, strength = -strength;
+  else
+    law.given.emplace_back("form", "plain"s);
+  law.value = [=](Real rho) { return Sized(strength / std::sqrt(rho)); };
+  law.slope = [=](Real rho) { return Sized(-strength / (2 * rho * std::sqrt(rho))); };
+  return law;
+}
+
+/// Points of a cubic in ρ, which are joined by it.
+Law table(Dice& dice, double strength, double last) {
+  std::array<Real, 4> c;
+  for (Real& each : c) each = dice.uniform(-strength, strength);
+  const double first = dice.uniform(0.2, 0.5) * last;
+  const Real start = Real(first) * first, unit = Real(last) * last;
+  const auto at = [=](Real rho, int derivative) {
+    const Real z = rho / unit;
+    return derivative == 0   ? c[0] + z * (c[1] + z * (c[2] + z * c[3]))
+           : derivative == 1 ? (c[1] + z * (2 * c[2] + z * 3 * c[3])) / unit
+                             : (2 * c[2] + z * 6 * c[3]) / (unit * unit);
+  };
+  Law law{.type = "table", .breaks = {static_cast<double>(start)}};
+  std::vector<double> r, values, slopes;
+  for (int k = 0; k <= 6; ++k) {
+    r.push_back(k == 6 ? last : first + (last - first) * k / 6);
+    values.push_back(static_cast<double>(at(Real(r[k]) * r[k], 0)));
+  }
+  for (const double end : {first, last}) slopes.push_back(static_cast<double>(2 * end * at(Real(end) * end, 1)));
+  law.given = {{"r", r}, {"value", values}, {"slope", slopes}};
+  law.value = [=](Real rho) {
+    const Real below = std::min<Real>(rho - start, 0), in = rho - below;
+    return Sized(at(in, 0) + below * (at(in, 1) + below / 2 * at(in, 2)), 400 * strength);
+  };
+  law.slope = [=](Real rho) {  // below the first point, too
+    const Real below = std::min<Real>(rho - start, 0), in = rho - below;
+    return Sized(at(in, 1) + below * at(in, 2), 400 * strength / unit);
+  };
+  return law;
+}
+
+Law random_law(Dice& dice, std::size_t particles, double edge, bool periodic) {
+  const double strength = dice.decades(-8, 8), either = dice.one_in(2) ? strength : -strength;
+  const double length = edge * dice.decades(-3, -0.3);
+  const std::size_t type = dice.below(periodic ? 7 : 9);
+  if (type == 0) return bonds(dice, particles, strength, length);
+  if (type == 1) return lennard_jones(strength, length, true);
+  if (type == 2) return damped_coulomb(strength, dice.decades(-1, 1) / edge, edge * dice.uniform(0.05, 0.7));
+  if (type == 7) return inverse_distance("gravity", strength);
+  if (type == 8) return inverse_distance("coulomb", either);
+  Law law = type == 3   ? lennard_jones(strength, length, false)
+            : type == 4 ? inverse_power(either, length, dice.uniform(0.5, 40))
+            : type == 5 ? yukawa(either, dice.decades(-1, 3) / edge, dice.one_in(2))
+                        : table(dice, strength, length);
+  if (!periodic && type != 6 && dice.one_in(2)) return law;
+  const std::string kind = std::array{"switch", "shifted", "force-shifted"}[dice.below(3)];
+  const double cutoff = type == 6 ? length : edge * dice.uniform(0.05, 1.2);
+  if (type != 6) law.given.emplace_back("cutoff", cutoff);
+  law.given.emplace_back("cut", kind);
+  law.cut(cutoff, kind);
+  return law;
+}
+
+/// Positions or their changes: some next to, or on top of, another; some far away.
+template <int D>
+std::vector<Vec<D>> random_positions(Dice& dice, std::size_t particles, double edge, bool periodic) {
+  std::vector<Vec<D>> x;
+  const auto direction = [&] {
+    Vec<D> u;
+    for (int k = 0; k < D; ++k) u[k] = dice.uniform(-1, 1);
+    return u;
+  };
+  while (x.size() < particles) {
+    Vec<D> at = 0.5 * edge * (Vec<D>::Ones() + direction());
+    if (!x.empty() && dice.one_in(3)) at = x[dice.below(x.size())] + edge * dice.decades(-15, -1) * direction();
+    if (!x.empty() && dice.one_in(100)) at = x[dice.below(x.size())];
+    if (!periodic && dice.one_in(30)) at += edge * dice.decades(0, 6) * direction();
+    for (int k = 0; periodic && k < D; ++k) at[k] = std::clamp(at[k], 0.0, std::nextafter(edge, 0.0));
+    x.push_back(at);
+  }
+  return x;
+}
+
+/// Sums of plain loops over pairs and images.
+template <int D>
+struct Expected {
+  struct Force {
+    std::array<Real, D> v{}, error{};
+  };
+  std::vector<Force> forces, mean_forces;
+  struct Sum {
+    Real v = 0, error = 0;
+  } energy, magnitude, virial;
+  struct Pair {
+    Id i, j;
+    Real share;  // of what can be summed, that its force takes, or its energy
+  };
+  std::vector<Pair> pairs;     // of forces and energies
+  Real largest = 0;            // of these shares
+  Real largest_mean = 0;       // the same of mean forces
+  bool bond_too_long = false;  // for its periodic box
+  static constexpr Real kUnit = 256 * std::numeric_limits<double>::epsilon();
+
+  explicit Expected(std::size_t particles) : forces(particles), mean_forces(particles) {}
+
+  void add(const Law& law, const System<D>& system, std::span<const Vec<D>> x_new) {
+    const auto& p = system.particles;
+    const Box<D>& box = system.box;
+    const int images = box.periodic(0) && std::isfinite(law.cutoff2)
+                           ? static_cast<int>(std::ceil(std::sqrt(law.cutoff2) / box.edges[0])) + 1
+                           : 0;
+    const auto visit = [&](Id i, Id j, const Image<D>& image) {
+      const Vec<D> shift = box.shift(image), d = p.x[i] - p.x[j] + shift, d_new = x_new[i] - x_new[j] + shift;
+      const double rho = squared(d), rho_new = squared(d_new);
+      const double w = law.weight == Law::one      ? 1
+                       : law.weight == Law::masses ? p.mass[i] * p.mass[j]
+                                                   : p.charge[i] * p.charge[j];
+      if (w == 0 || !(rho < law.cutoff2 || rho_new < law.cutoff2)) return;
+      const Quanta quanta = system.quanta;
+      if (rho < law.cutoff2) {
+        const Sized slope = Sized(-2 * Real(w)) * law.slope(rho), value = Sized(w) * law.value(rho);
+        const Real share = std::max({force(forces, i, j, slope, d, {}, quanta.force), sum(energy, value, quanta.energy),
+                                     sum(virial, slope * Sized(rho), 64 * quanta.energy)});
+        sum(magnitude, {std::abs(value.v), value.size}, quanta.energy);
+        pairs.push_back({i, j, share});
+        largest = std::max(largest, share);
+      }
+      const Real share = force(mean_forces, i, j, Sized(-w) * law.quotient(rho, rho_new), d, d_new, quanta.force);
+      largest_mean = std::max(largest_mean, share);
+    };
+    if (!law.bonds.empty()) {
+      for (const auto& [i, j] : law.bonds) {
+        const Vec<D> d = p.x[i] - p.x[j];
+        const Image<D> image = box.nearest_image(d);
+        for (int k = 0; k < D; ++k)
+          if (box.periodic(k) && std::abs(d[k] + box.shift(image)[k]) > 0.48 * box.edges[k]) bond_too_long = true;
+        visit(i, j, image);
+      }
+      return;
+    }
+    const int side = 2 * images + 1;
+    for (Id i = 0; i < p.size(); ++i)
+      for (Id j = i + 1; j < p.size(); ++j)
+        for (int n = 0; n < (D == 3 ? side * side * side : side * side); ++n) {
+          Image<D> image;
+          for (int k = 0, rest = n; k < D; ++k, rest /= side) image[k] = rest % side - images;
+          visit(i, j, image);
+        }
+  }
+
+ private:
+  static double squared(const Vec<D>& d) { return d[0] * d[0] + d[1] * d[1] + (D == 3 ? d[D - 1] * d[D - 1] : 0); }
+
+  static Real force(std::vector<Force>& to, Id i, Id j, const Sized& g, const Vec<D>& d, const std::optional<Vec<D>>& e,
+                    double quantum) {
+    Real size = 0;
+    for (int k = 0; k < D; ++k) {
+      const Real way = e ? d[k] + (*e)[k] : d[k], f = g.v * way;
+      const Real error = kUnit * g.size * std::abs(way) + quantum;
+      to[i].v[k] += f, to[j].v[k] -= f;
+      to[i].error[k] += error, to[j].error[k] += error;
+      size += std::abs(f);
+    }
+    return size >= 0 ? size / (0x1p86L * quantum) : std::numeric_limits<Real>::infinity();
+  }
+  static Real sum(Sum& to, const Sized& value, double quantum) {
+    to.v += value.v;
+    to.error += kUnit * value.size + quantum;
+    const Real share = std::abs(value.v) / (0x1p90L * quantum);
+    return share >= 0 ? share : std::numeric_limits<Real>::infinity();
+  }
+};
+
+struct Tally {
+  std::uint64_t held = 0, refused = 0, spoiled = 0, unmade = 0;
+  double worst = 0;
+};
+
+/// How many times the allowed error; infinite for no number.
+Real excess(double value, Real expected, Real error) {
+  if (value == expected) return 0;
+  const Real off = std::abs(value - expected) / error;
+  return off >= 0 ? off : std::numeric_limits<Real>::infinity();
+}
+
+template <int D>
+void expect_forces(const std::vector<Vec<D>>& f, const std::vector<typename Expected<D>::Force>& expected,
+                   Tally& tally) {
+  for (Id i = 0; i < f.size(); ++i)
+    for (int k = 0; k < D; ++k) {
+      const Real off = excess(f[i][k], expected[i].v[k], expected[i].error[k]);
+      tally.worst = std::max(tally.worst, static_cast<double>(off));
+      ASSERT_LE(off, 1) << "particle " << i << " error " << expected[i].error[k] << ": " << f[i][k] << ", not "
+                        << expected[i].v[k];
+    }
+}
+
+/// An error must name a pair, by ids, whose force or energy is too large, and say what to do.
+template <int D>
+void expect_reason(const Error& error, const Expected<D>& expected, const Particles<D>& p) {
+  EXPECT_EQ(error.failure(), Failure::numerical);
+  const std::string message = error.what();
+  std::smatch named;
+  if (expected.bond_too_long && message.find("spans nearly half the periodic box") != std::string::npos) {
+    EXPECT_TRUE(std::regex_search(message, named, std::regex("particles (\\d+) and (\\d+).*use a larger box")))
+        << message;
+    return;
+  }
+  ASSERT_TRUE(std::regex_search(
+      message, named, std::regex("between particles (\\d+) and (\\d+), .* apart, .*use a smaller integrator.step")))
+      << message;
+  Real share = 0;
+  for (const auto& pair : expected.pairs)
+    if (std::to_string(p.id_of(pair.i)) == named[1] && std::to_string(p.id_of(pair.j)) == named[2])
+      share = std::max(share, pair.share);
+  EXPECT_GT(share, 0.1) << message;
+}
+
+template <int D>
+void try_system(Dice& dice, Tally& tally) {
+  const bool periodic = dice.one_in(2);
+  const double edge = dice.decades(-3, 4);
+  const std::size_t n = 2 + dice.below(dice.one_in(10) ? 20 : 6);
+  auto system =
+      test::make_system<D>(Vec<D>::Constant(edge), periodic ? Boundary::periodic : Boundary::wall,
+                           random_positions<D>(dice, n, edge, periodic), std::vector<Vec<D>>(n, Vec<D>::Zero()));
+  Particles<D>& p = system->particles;
+  const double unit = dice.decades(-4, 4), spread = dice.one_in(2) ? 6 : 0.5;
+  for (Id i = 0; i < n; ++i) {
+    p.radius[i] = edge * dice.decades(-4, -1);
+    p.mass[i] = unit * dice.decades(-spread, 0);
+    p.charge[i] = dice.one_in(8) ? 0 : (dice.one_in(2) ? unit : -unit) * dice.decades(-spread, 0);
+  }
+  std::vector<Law> laws;
+  std::string description = std::to_string(D) + "-D, " + (periodic ? "periodic" : "walled");
+  const auto widths = available_pair_kernels();
+  do {
+    laws.push_back(random_law(dice, n, edge, periodic));
+    description += ", " + laws.back().type;
+    test::add_interaction(*system, laws.back().type, laws.back().given);
+    system->interactions.back()->use(*widths[dice.below(widths.size())]);
+  } while (dice.one_in(3));
+  SCOPED_TRACE(description);
+  for (Id i = 0; i < n; ++i) p.id.push_back(3 * i + 5);  // as ranks have them
+  system->quanta = quanta(*system);
+
+  auto x_new = p.x;
+  const double way = dice.one_in(5) ? 0 : edge * dice.decades(-15, -0.5);
+  for (auto& x : x_new)
+    if (!dice.one_in(4))
+      for (int k = 0; k < D; ++k) x[k] += way * dice.uniform(-1, 1);
+  Expected<D> expected(n);
+  for (const Law& law : laws) expected.add(law, *system, x_new);
+
+  std::vector<Vec<D>> f(n);
+  Counters counters;
+  PotentialSums sums;
+  try {
+    evaluate_forces<D>(*system, p.x, f, counters, &sums);
+    ++tally.held;
+    EXPECT_LT(expected.largest, 2);
+    expect_forces<D>(f, expected.forces, tally);
+    EXPECT_LE(excess(sums.energy.value(), expected.energy.v, expected.energy.error), 1);
+    EXPECT_LE(excess(sums.magnitude.value(), expected.magnitude.v, expected.magnitude.error), 1);
+    EXPECT_LE(excess(sums.virial.value(), expected.virial.v, expected.virial.error), 1)
+        << sums.virial.value() << " " << expected.virial.v << " " << expected.virial.error;
+    EXPECT_EQ(evaluate_energy<D>(*system, p.x).energy.value(), sums.energy.value());
+  } catch (const Error& error) {
+    ++tally.refused;
+    expect_reason<D>(error, expected, p);
+  }
+  if (expected.bond_too_long) return;
+  MeanForces<D> mean;
+  const auto values = [&] {
+    for (Id i = 0; i < n; ++i) f[i] = mean[i];
+  };
+  mean.evaluate(*system, p.x, x_new);
+  values();
+  if (std::isnan(f[0][0])) {
+    ++tally.spoiled;
+    EXPECT_GT(expected.largest_mean, 0.1);
+    return;
+  }
+  EXPECT_LT(expected.largest_mean, 2);
+  expect_forces<D>(f, expected.mean_forces, tally);
+  // Some of them come somewhere else, and back.
+  auto other = x_new;
+  std::vector<char> changed(n);
+  for (Id i = 0; i < n; ++i)
+    if (dice.one_in(3)) changed[i] = 1, other[i] += Vec<D>::Constant(way * dice.uniform(-1, 1));
+  const auto before = f;
+  mean.update(*system, p.x, x_new, other, changed.data());
+  mean.update(*system, p.x, other, x_new, changed.data());
+  values();
+  EXPECT_TRUE(f == before || std::isnan(f[0][0]));
+}
+
+void try_systems(std::uint64_t count, std::uint64_t seed) {
+  Tally tally;
+  for (std::uint64_t n = 0; n < count && !testing::Test::HasFailure(); ++n) {
+    SCOPED_TRACE("system " + std::to_string(n) + " of seed " + std::to_string(seed));
+    Dice dice{std::mt19937_64(seed * 1000000007 + n)};
+    dice.one_in(2) ? try_system<2>(dice, tally) : try_system<3>(dice, tally);
+  }
+  std::printf(
+      "    %g systems held, %g refused, %g with mean forces that do not fit; largest error %.3g of what is allowed\n",
+      static_cast<double>(tally.held), static_cast<double>(tally.refused), static_cast<double>(tally.spoiled),
+      tally.worst);
+  if (testing::Test::HasFailure()) return;
+  EXPECT_GT(tally.held, count / 4);
+  EXPECT_GT(tally.refused, count / 50);
+}
+
+TEST(PairFuzz, SumsAreThoseOfPlainLoopsOrTheErrorNamesThePair) { try_systems(4000, 1); }
+
+TEST(PairFuzzSlow, SumsAreThoseOfPlainLoopsOrTheErrorNamesThePair) {
+  const char* const given = std::getenv("CAROM_FUZZ_SYSTEMS");
+  try_systems(given ? static_cast<std::uint64_t>(std::stod(given)) : 1000000, 2);
+}
+
+}  // namespace
+}  // namespace carom
