@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <sstream>
 
 #include "engine/error.h"
 
@@ -125,24 +126,49 @@ double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bo
   return (D == 2 ? 2 * pi : 4 * pi) * volume;
 }
 
+/// Why there is no g(r) up to `range` in this system.
+template <int D>
+std::optional<ParameterError> error_of(const System<D>& system, double range) {
+  for (const Boundary boundary : system.box.boundary)
+    if (boundary == Boundary::open)
+      return ParameterError{"interval", "g(r) needs a density, and a box with an open boundary has none",
+                            "set rdf_interval = 0, or close the box"};
+  const double longest = RadialDistribution<D>::longest_range(system);
+  if (range > 0 && range <= longest * (1 + 1e-9)) return {};
+  std::ostringstream what, remedy;
+  what.precision(15);
+  remedy.precision(15);
+  what << "g(r) cannot be taken to " << range << " in this box";
+  remedy << "take at most " << longest << ": half the shortest periodic edge, or the way between two walls";
+  return ParameterError{"range", what.str(), remedy.str()};
+}
+
+/// The range where it is left open.
+template <int D>
+std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
+  if (!parameters.has("range")) parameters.set("range", RadialDistribution<D>::usual_range(system));
+  return error_of(system, parameters.real("range"));
+}
+
 }  // namespace
 
 template <int D>
 RadialDistribution<D>::RadialDistribution(const System<D>& system, const RadialDistributionOptions& options)
-    : system_(system), options_(options) {
-  for (const Boundary boundary : system.box.boundary)
-    if (boundary == Boundary::open)
-      throw Error(Failure::deck, "g(r) needs a density: there is none in a box with an open boundary");
-  if (!(options.range > 0) || options.range > longest_range(system) * (1 + 1e-9) || options.bins < 1)
-    throw Error(Failure::deck, "g(r) cannot be taken to r = " + std::to_string(options.range) +
-                                   ": half the shortest periodic edge, or the way between two walls, is " +
-                                   std::to_string(longest_range(system)));
+    : Observable<D>(options.sampling), system_(system), options_(options) {
+  if (const auto wrong = error_of(system, options.range))
+    throw Error(Failure::deck, wrong->what + "; " + wrong->remedy);
   const std::size_t species = system.species.size();
   number_.resize(species);
   smallest_.assign(species, std::numeric_limits<double>::infinity());
   largest_.resize(species);
   counts_.resize(species * (species + 1) / 2 * static_cast<std::size_t>(options.bins));
 }
+
+template <int D>
+RadialDistribution<D>::RadialDistribution(const System<D>& system, const Parameters& parameters, double start)
+    : RadialDistribution(system, {.sampling = {parameters.real("interval"), start},
+                                  .range = parameters.real("range"),
+                                  .bins = static_cast<int>(parameters.integer("bins"))}) {}
 
 /// Counts the particles of each species.
 template <int D>
@@ -178,8 +204,8 @@ std::size_t RadialDistribution<D>::pair_index(std::size_t a, std::size_t b) cons
 }
 
 template <int D>
-void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particles) {
-  if (samples_++ == 0) count(particles);
+void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& particles) {
+  if (this->samples() == 0) count(particles);
   const std::size_t n = particles.size(), bins = static_cast<std::size_t>(options_.bins);
   const Grid<D> grid(system_.box, options_.range, n);
 
@@ -282,7 +308,7 @@ std::vector<double> RadialDistribution<D>::normalised(const std::vector<std::uin
   for (std::size_t b = 0; b < g.size(); ++b) {
     const double inner = static_cast<double>(b) * width, outer = static_cast<double>(b + 1) * width;
     const double expected =
-        static_cast<double>(samples_) * pairs * shell_volume<D>(inner, outer, edges, walled) / edges.prod();
+        static_cast<double>(this->samples()) * pairs * shell_volume<D>(inner, outer, edges, walled) / edges.prod();
     g[b] = static_cast<double>(counts[b]) / expected;
   }
   return g;
@@ -305,7 +331,7 @@ std::vector<double> RadialDistribution<D>::g(std::size_t a, std::size_t b) const
 
 template <int D>
 std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::size_t b) const {
-  if (samples_ == 0 || smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
+  if (this->samples() == 0 || smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
   const double contact = smallest_[a] + smallest_[b], width = options_.range / options_.bins;
   const auto r = radii(), value = g(a, b);
   const std::uint64_t* counts = &counts_[pair_index(a, b) * static_cast<std::size_t>(options_.bins)];
@@ -326,7 +352,59 @@ std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::s
   return std::exp(normal.ldlt().solve(right)[0]);
 }
 
+template <int D>
+std::vector<TableColumn> RadialDistribution<D>::table() const {
+  std::vector<TableColumn> table = {{"r", radii()}, {"g", g()}};
+  const auto& names = system_.species;
+  for (std::size_t a = 0; names.size() > 1 && a < names.size(); ++a)
+    for (std::size_t b = a; b < names.size(); ++b) table.push_back({"g_" + names[a] + "_" + names[b], g(a, b)});
+  return table;
+}
+
+template <int D>
+std::vector<SpeciesValue> RadialDistribution<D>::species_values() const {
+  const auto& names = system_.species;
+  std::vector<SpeciesValue> values;
+  for (std::size_t a = 0; a < names.size(); ++a)
+    for (std::size_t b = a; b < names.size(); ++b)
+      if (const auto g = contact_value(a, b)) values.push_back({"contact_value", {names[a], names[b]}, "g", *g});
+  return values;
+}
+
 template class RadialDistribution<2>;
 template class RadialDistribution<3>;
+
+namespace observable {
+
+ObservableInfo rdf() {
+  using enum Parameter::Type;
+  using enum Parameter::Range;
+  return {.name = "rdf",
+          .title = "radial distribution function",
+          .parameters = {parameter::interval(
+                             "simulated time between samples of the radial distribution function, averaged into "
+                             "rdf.csv; 0: none. A sample costs O(count); configurations a hundred mean free times "
+                             "apart are about independent"),
+                         {"range", real, "none", "length",
+                          "the largest distance of rdf.csv, at most half the shortest periodic edge; three of the "
+                          "largest diameters, if there is room, where it is absent",
+                          positive},
+                         {.name = "bins",
+                          .type = integer,
+                          .fallback = "200",
+                          .unit = "-",
+                          .meaning = "shells of equal thickness from 0 to rdf_range",
+                          .range = positive,
+                          .most = 1e6}},
+          .documentation =
+              "Of all particles, and where there are several species between each two. Columns: r (middle of a shell), "
+              "g, g_A_B. The summary has g at contact, extrapolated, as contact_value. Along walls the ideal gas is "
+              "that of the region which the centres can reach.",
+          .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6",
+          .in_2d = maker<RadialDistribution, 2>(complete<2>),
+          .in_3d = maker<RadialDistribution, 3>(complete<3>)};
+}
+
+}  // namespace observable
 
 }  // namespace carom
