@@ -4,11 +4,11 @@
 namespace carom {
 
 namespace observable {  // declared at the end of their own files
-ObservableInfo rdf(), msd();
+ObservableInfo rdf(), msd(), profile();
 }
 
 const std::vector<ObservableInfo>& observables() {
-  static const std::vector<ObservableInfo> all = {observable::rdf(), observable::msd()};
+  static const std::vector<ObservableInfo> all = {observable::rdf(), observable::msd(), observable::profile()};
   return all;
 }
 
