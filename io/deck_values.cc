@@ -66,10 +66,10 @@ class NodeReader {
   bool in_range(const toml::node& node, Number value) {
     const bool positive = key_.range == Parameter::Range::positive;
     if (static_cast<double>(value) > key_.most) {
-      std::ostringstream is, most;
-      is << std::setprecision(15) << value;
-      most << std::setprecision(15) << key_.most;
-      complain(node, "is " + is.str(), "take at most " + most.str());
+      std::ostringstream is, remedy;
+      is << std::setprecision(15) << "is " << value;
+      remedy << std::setprecision(15) << "take at most " << key_.most;
+      complain(node, is.str(), remedy.str());
       return false;
     }
     if (key_.range == Parameter::Range::any || value > 0 || (!positive && value == 0)) return true;

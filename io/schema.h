@@ -55,8 +55,7 @@ struct TableSchema {
   std::string meaning;
   std::vector<Key> keys;
   std::vector<Variant> variants{};  ///< non-empty: `type` chooses one of them
-  std::vector<std::array<std::string_view, 2>>
-      former{};  ///< types and keys that are no more, and what to write instead
+  std::vector<std::array<std::string_view, 2>> former{};  ///< types and keys that are no more, and what to write instead
 
   const Variant* variant(std::string_view type) const;
 };

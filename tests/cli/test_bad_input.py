@@ -354,7 +354,7 @@ def test_potential_from_a_file(tmp_path):
     run = carom("run", "deck.toml", "-o", "one", "--quiet", cwd=tmp_path)
     assert run.returncode == 0, run.stderr
     resolved = (tmp_path / "one" / "deck.toml").read_text()
-    assert "r = [0.9, 1.2, 1.5]\nvalue = [1.0, 0.5, 0.0]" in resolved and "cutoff = 1.5" in resolved and "file" not in resolved
+    assert "r = [0.9, 1.2, 1.5]\nvalue = [1.0, 0.5, 0.0]" in resolved and "cutoff = 1.5" in resolved and "file = " not in resolved
 
 
 def test_unreadable_deck(tmp_path):
