@@ -17,6 +17,7 @@
 #include "engine/integrator.h"
 #include "engine/interaction.h"
 #include "engine/mean_squared_displacement.h"
+#include "engine/observable.h"
 #include "engine/placement.h"
 #include "engine/radial_distribution.h"
 #include "engine/simulation.h"

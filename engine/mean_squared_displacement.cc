@@ -7,15 +7,19 @@ namespace carom {
 
 template <int D>
 MeanSquaredDisplacement<D>::MeanSquaredDisplacement(const System<D>& system, const Sampling& sampling)
-    : system_(system), sampling_(sampling), number_(system.species.size()) {}
+    : Observable<D>(sampling), system_(system), number_(system.species.size()) {}
 
 template <int D>
-void MeanSquaredDisplacement<D>::sample(double time, const Particles<D>& particles) {
+MeanSquaredDisplacement<D>::MeanSquaredDisplacement(const System<D>& system, const Parameters& parameters, double start)
+    : MeanSquaredDisplacement(system, {parameters.real("interval"), start}) {}
+
+template <int D>
+void MeanSquaredDisplacement<D>::add_sample(double time, const Particles<D>& particles) {
   now_.resize(particles.size());
   for (std::size_t i = 0; i < particles.size(); ++i)
     for (int k = 0; k < D; ++k)
       now_[i][k] = particles.x[i][k] + static_cast<double>(particles.image[i][k]) * system_.box.edges[k];
-  const std::uint64_t index = samples_++;
+  const std::uint64_t index = this->samples();
   if (index == 0) {
     species_ = particles.species;
     for (const auto species : species_) number_[species] += 1;
@@ -64,7 +68,40 @@ auto MeanSquaredDisplacement<D>::rows() const -> std::vector<Row> {
   return rows;
 }
 
+template <int D>
+std::vector<TableColumn> MeanSquaredDisplacement<D>::table() const {
+  std::vector<TableColumn> table = {{"time", {}}, {"origins", {}}, {"msd", {}}};
+  const bool mixture = number_.size() > 1;
+  for (std::size_t s = 0; mixture && s < number_.size(); ++s) table.push_back({"msd_" + system_.species[s], {}});
+  for (const Row& row : rows()) {
+    table[0].values.push_back(row.time);
+    table[1].values.push_back(static_cast<double>(row.origins));
+    table[2].values.push_back(row.msd);
+    for (std::size_t s = 0; mixture && s < number_.size(); ++s) table[3 + s].values.push_back(row.of[s]);
+  }
+  return table;
+}
+
 template class MeanSquaredDisplacement<2>;
 template class MeanSquaredDisplacement<3>;
+
+namespace observable {
+
+ObservableInfo msd() {
+  return {.name = "msd",
+          .title = "mean squared displacement",
+          .parameters = {parameter::interval(
+              "the shortest lag of the mean squared displacement, averaged into msd.csv; 0: none. Lags are 1 … 9, 10, "
+              "20 … 90, 100 … times this, up to the length of the run")},
+          .documentation =
+              "Of all particles, and where there are several species of each, followed through periodic boundaries. "
+              "Columns: time (the lag), origins (of time, averaged over), msd, msd_A. A drift of the whole system is "
+              "not taken out.",
+          .source = "Frenkel, Smit, Understanding Molecular Simulation, 2nd ed., section 4.4.2",
+          .in_2d = maker<MeanSquaredDisplacement, 2>(),
+          .in_3d = maker<MeanSquaredDisplacement, 3>()};
+}
+
+}  // namespace observable
 
 }  // namespace carom

@@ -16,20 +16,16 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/simulation.h"
+#include "engine/observable.h"
 
 namespace carom {
 
 template <int D>
-class MeanSquaredDisplacement : public Observer<D> {
+class MeanSquaredDisplacement : public Observable<D> {
  public:
   /// Keeps a reference to the system, for its box.
   MeanSquaredDisplacement(const System<D>& system, const Sampling& sampling);
-
-  Sampling sampling() const override { return sampling_; }
-  void sample(double time, const Particles<D>& particles) override;
-
-  std::uint64_t samples() const { return samples_; }
+  MeanSquaredDisplacement(const System<D>& system, const Parameters& parameters, double start);
 
   struct Row {
     double time = 0;            ///< the lag; its mean, where steps do not meet the due times
@@ -39,6 +35,8 @@ class MeanSquaredDisplacement : public Observer<D> {
   };
   /// By lag, ascending.
   std::vector<Row> rows() const;
+  /// The rows; the species only where there are several.
+  std::vector<TableColumn> table() const override;
 
  private:
   static constexpr std::uint64_t kLags = 10;  // of a decade
@@ -52,15 +50,14 @@ class MeanSquaredDisplacement : public Observer<D> {
     std::vector<Vec<D>> origin;
     std::array<Lag, kLags> lag;  // 0 stays empty: that is the first lag of the next decade
   };
+  void add_sample(double time, const Particles<D>& particles) override;
   void add(Lag& lag, double time, const Decade& from);
 
   const System<D>& system_;
-  Sampling sampling_;
   std::vector<double> number_;  // of particles of each species
   std::vector<std::uint16_t> species_;
   std::vector<Vec<D>> now_;
   std::vector<Decade> decades_;
-  std::uint64_t samples_ = 0;
 };
 
 }  // namespace carom

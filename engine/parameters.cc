@@ -48,6 +48,8 @@ void check_number(std::string_view of, const Parameter& parameter, double value)
     refuse(of, name + " is " + std::to_string(value), "give a positive number");
   if (parameter.range == Parameter::Range::non_negative && value < 0)
     refuse(of, name + " is negative", "give zero or a positive number");
+  if (value > parameter.most)
+    refuse(of, name + " is " + std::to_string(value), "take at most " + std::to_string(parameter.most));
 }
 
 void check(std::string_view of, const Parameter& parameter, const ParameterValue& value) {

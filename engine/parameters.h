@@ -1,5 +1,5 @@
 #pragma once
-// Declared parameters: what an integrator or an interaction can be given in a deck, and the values it was given.
+// Declared parameters: what an integrator, an interaction or an observable can be given in a deck, and the values.
 //
 // A declaration is written once, beside the code that uses the value. The deck's schema, its validation, the
 // `carom schema` and `carom methods` pages and the resolved deck are all made from it.
@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <initializer_list>
+#include <limits>
 #include <map>
 #include <span>
 #include <stdexcept>
@@ -31,6 +32,7 @@ struct Parameter {
   Range range = Range::any;   ///< for integer and real (and each of real_list)
   std::vector<std::string_view> choices{};                ///< for text: what it may be; empty = anything
   std::vector<std::array<std::string_view, 2>> former{};  ///< for text: what it may no longer be, and the remedy
+  double most = std::numeric_limits<double>::infinity();  ///< for numbers: the largest allowed
 };
 
 /// Pairs of particle ids.

@@ -6,7 +6,9 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <sstream>
 
+#include "engine/cell_grid.h"
 #include "engine/error.h"
 
 namespace carom {
@@ -16,38 +18,6 @@ namespace {
 /// Cells of half the range: measured the fastest of 1/1 to 1/4 for ranges of three and four diameters.
 constexpr int kCellsInRange = 2;
 
-/// A grid of equal cells over the box. Cells are stored with the last axis running fastest, and particles in the order
-/// of their cells, so that a row of cells is a run of particles.
-template <int D>
-struct Grid {
-  std::array<std::int32_t, D> count, reach;  // cells of an axis; how many cells away a partner may be
-  Vec<D> edge;
-
-  Grid(const Box<D>& box, double range, std::size_t particles) {
-    const double most = std::max(1.0, std::floor(std::pow(static_cast<double>(particles), 1.0 / D)));
-    for (int k = 0; k < D; ++k) {
-      count[k] = static_cast<std::int32_t>(
-          std::clamp(std::floor(box.edges[k] * kCellsInRange / (range * (1 + 1e-9))), 1.0, most));
-      edge[k] = box.edges[k] / count[k];
-      reach[k] = static_cast<std::int32_t>(std::ceil(range / edge[k]));
-    }
-  }
-  std::size_t cells() const {
-    std::size_t n = 1;
-    for (const auto c : count) n *= static_cast<std::size_t>(c);
-    return n;
-  }
-  /// No two particles of cells within reach of each other are farther apart.
-  double farthest() const {
-    double squared = 0;
-    for (int k = 0; k < D; ++k) squared += (reach[k] + 1) * edge[k] * (reach[k] + 1) * edge[k];
-    return std::sqrt(squared);
-  }
-  std::int32_t cell(int axis, double x) const {
-    return std::clamp(static_cast<std::int32_t>(x / edge[axis]), 0, count[axis] - 1);
-  }
-};
-
 /// A run of particles in neighbouring cells of one row, and what to add to x_i − x_j for the image of the row.
 template <int D>
 struct Run {
@@ -55,56 +25,50 @@ struct Run {
   Vec<D> shift;
 };
 
-/// Floor division of a cell number that may lie outside the box: how many boxes away.
-std::int32_t boxes_away(std::int32_t cell, std::int32_t count) {
-  return cell >= 0 ? cell / count : -((count - 1 - cell) / count);
-}
-
 /// The runs of all cells that come after `centre` in the order of unwrapped cells and may hold partners: each pair of
 /// cells is met from one side only. What is left of the cell itself is its caller's.
 template <int D>
-void list_runs(const Grid<D>& grid, const Box<D>& box, const std::vector<std::uint32_t>& start,
-               const std::array<std::int32_t, D>& centre, double range, std::vector<Run<D>>& runs) {
+void list_runs(const CellGrid<D>& grid, const std::vector<std::uint32_t>& start, const Cell<D>& centre,
+               const Cell<D>& reach, double range, std::vector<Run<D>>& runs) {
   runs.clear();
   constexpr int last = D - 1;
-  const auto row = [&](const std::array<std::int32_t, D>& offset, std::int32_t from) {
+  const auto row = [&](const Cell<D>& offset, std::int32_t from) {
     Vec<D> shift = Vec<D>::Zero();
     std::size_t first = 0;  // cell of the row
     double squared_gap = 0;
+    typename CellGrid<D>::Step to;
     for (int k = 0; k < last; ++k) {
-      const std::int32_t at = centre[k] + offset[k], away = boxes_away(at, grid.count[k]);
-      if (away != 0 && !box.periodic(k)) return;
-      shift[k] = away == 0 ? 0.0 : -away * box.edges[k];
-      first = first * static_cast<std::size_t>(grid.count[k]) + static_cast<std::size_t>(at - away * grid.count[k]);
-      const double gap = std::max(std::abs(offset[k]) - 1, 0) * grid.edge[k];
+      if (!grid.step(k, centre[k] + offset[k], to)) return;
+      shift[k] = -to.boxes * grid.box().edges[k];
+      first += to.offset;
+      const double gap = std::max(std::abs(offset[k]) - 1, 0) * grid.edge(k);
       squared_gap += gap * gap;
     }
     if (squared_gap > range * range) return;
-    const std::int32_t n = grid.count[last];
-    first *= static_cast<std::size_t>(n);
-    const auto reach =
-        std::min(grid.reach[last],
-                 static_cast<std::int32_t>(std::ceil(std::sqrt(range * range - squared_gap) / grid.edge[last] + 1e-9)));
-    std::int32_t low = centre[last] + std::max(from, -reach), high = centre[last] + reach;
-    if (!box.periodic(last)) low = std::max(low, 0), high = std::min(high, n - 1);
-    while (low <= high) {
-      const std::int32_t away = boxes_away(low, n), stop = std::min(high, (away + 1) * n - 1);
-      shift[last] = away == 0 ? 0.0 : -away * box.edges[last];
-      const std::size_t begin = first + static_cast<std::size_t>(low - away * n);
+    const std::int32_t n = grid.count(last);
+    const auto along =
+        std::min(reach[last],
+                 static_cast<std::int32_t>(std::ceil(std::sqrt(range * range - squared_gap) / grid.edge(last) + 1e-9)));
+    std::int32_t low = centre[last] + std::max(from, -along), high = centre[last] + along;
+    if (!grid.box().periodic(last)) low = std::max(low, 0), high = std::min(high, n - 1);
+    while (low <= high && grid.step(last, low, to)) {
+      const std::int32_t stop = std::min(high, (to.boxes + 1) * n - 1);
+      shift[last] = -to.boxes * grid.box().edges[last];
+      const std::size_t begin = first + to.offset;
       const std::uint32_t a = start[begin], b = start[begin + static_cast<std::size_t>(stop - low) + 1];
       if (a < b) runs.push_back({a, b, shift});
       low = stop + 1;
     }
   };
-  std::array<std::int32_t, D> offset{};
+  Cell<D> offset{};
   row(offset, 1);
   if constexpr (D == 3)
-    for (offset[0] = 0, offset[1] = 1; offset[1] <= grid.reach[1]; ++offset[1]) row(offset, -grid.reach[last]);
-  for (offset[0] = 1; offset[0] <= grid.reach[0]; ++offset[0]) {
+    for (offset[0] = 0, offset[1] = 1; offset[1] <= reach[1]; ++offset[1]) row(offset, -reach[last]);
+  for (offset[0] = 1; offset[0] <= reach[0]; ++offset[0]) {
     if constexpr (D == 2)
-      row(offset, -grid.reach[last]);
+      row(offset, -reach[last]);
     else
-      for (offset[1] = -grid.reach[1]; offset[1] <= grid.reach[1]; ++offset[1]) row(offset, -grid.reach[last]);
+      for (offset[1] = -reach[1]; offset[1] <= reach[1]; ++offset[1]) row(offset, -reach[last]);
   }
 }
 
@@ -125,24 +89,49 @@ double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bo
   return (D == 2 ? 2 * pi : 4 * pi) * volume;
 }
 
+/// Why there is no g(r) up to `range` in this system.
+template <int D>
+std::optional<ParameterError> error_of(const System<D>& system, double range) {
+  for (const Boundary boundary : system.box.boundary)
+    if (boundary == Boundary::open)
+      return ParameterError{"interval", "g(r) needs a density, and a box with an open boundary has none",
+                            "set rdf_interval = 0, or close the box"};
+  const double longest = RadialDistribution<D>::longest_range(system);
+  if (range > 0 && range <= longest * (1 + 1e-9)) return {};
+  std::ostringstream what, remedy;
+  what.precision(15);
+  remedy.precision(15);
+  what << "g(r) cannot be taken to " << range << " in this box";
+  remedy << "take at most " << longest << ": half the shortest periodic edge, or the way between two walls";
+  return ParameterError{"range", what.str(), remedy.str()};
+}
+
+/// The range where it is left open.
+template <int D>
+std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
+  if (!parameters.has("range")) parameters.set("range", RadialDistribution<D>::usual_range(system));
+  return error_of(system, parameters.real("range"));
+}
+
 }  // namespace
 
 template <int D>
 RadialDistribution<D>::RadialDistribution(const System<D>& system, const RadialDistributionOptions& options)
-    : system_(system), options_(options) {
-  for (const Boundary boundary : system.box.boundary)
-    if (boundary == Boundary::open)
-      throw Error(Failure::deck, "g(r) needs a density: there is none in a box with an open boundary");
-  if (!(options.range > 0) || options.range > longest_range(system) * (1 + 1e-9) || options.bins < 1)
-    throw Error(Failure::deck, "g(r) cannot be taken to r = " + std::to_string(options.range) +
-                                   ": half the shortest periodic edge, or the way between two walls, is " +
-                                   std::to_string(longest_range(system)));
+    : Observable<D>(options.sampling), system_(system), options_(options) {
+  if (const auto wrong = error_of(system, options.range))
+    throw Error(Failure::deck, wrong->what + "; " + wrong->remedy);
   const std::size_t species = system.species.size();
   number_.resize(species);
   smallest_.assign(species, std::numeric_limits<double>::infinity());
   largest_.resize(species);
   counts_.resize(species * (species + 1) / 2 * static_cast<std::size_t>(options.bins));
 }
+
+template <int D>
+RadialDistribution<D>::RadialDistribution(const System<D>& system, const Parameters& parameters, double start)
+    : RadialDistribution(system, {.sampling = {parameters.real("interval"), start},
+                                  .range = parameters.real("range"),
+                                  .bins = static_cast<int>(parameters.integer("bins"))}) {}
 
 /// Counts the particles of each species.
 template <int D>
@@ -178,22 +167,27 @@ std::size_t RadialDistribution<D>::pair_index(std::size_t a, std::size_t b) cons
 }
 
 template <int D>
-void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particles) {
-  if (samples_++ == 0) count(particles);
+void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& particles) {
+  if (this->samples() == 0) count(particles);
   const std::size_t n = particles.size(), bins = static_cast<std::size_t>(options_.bins);
-  const Grid<D> grid(system_.box, options_.range, n);
+  const CellGrid<D> grid(system_.box, options_.range / kCellsInRange, {n, Vec<D>::Zero(), Vec<D>::Zero()}, 1);
+  Cell<D> reach;        // how many cells away a partner may be
+  double farthest = 0;  // squared distance of two particles in such cells
+  for (int k = 0; k < D; ++k) {
+    reach[k] = static_cast<std::int32_t>(std::ceil(options_.range / grid.edge(k)));
+    farthest += (reach[k] + 1) * grid.edge(k) * (reach[k] + 1) * grid.edge(k);
+  }
 
-  // Sorts the particles in the order of the cells.
+  // Sorts the particles in the order of the cells, so that a row of cells is a run of particles.
   start_.assign(grid.cells() + 1, 0);
   cell_.resize(n);
   species_.resize(n);
   for (auto& x : x_) x.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    std::uint32_t c = 0;
-    for (int k = 0; k < D; ++k)
-      c = c * static_cast<std::uint32_t>(grid.count[k]) + static_cast<std::uint32_t>(grid.cell(k, particles.x[i][k]));
-    cell_[i] = c;
-    ++start_[c + 1];
+    Cell<D> c = grid.cell(particles.x[i]);
+    for (int k = 0; k < D; ++k) c[k] = std::clamp(c[k], 0, grid.count(k) - 1);
+    cell_[i] = static_cast<std::uint32_t>(grid.index(c));
+    ++start_[cell_[i] + 1];
   }
   std::partial_sum(start_.begin(), start_.end(), start_.begin());
   auto next = start_;
@@ -205,7 +199,7 @@ void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particle
 
   // All partners that are looked at are counted, without a branch; those beyond the range are left out in the end.
   const double shells = static_cast<double>(bins) / options_.range;
-  const double last = std::floor(grid.farthest() * shells) + 1;
+  const double last = std::floor(std::sqrt(farthest) * shells) + 1;
   const std::size_t kinds = number_.size(), all = static_cast<std::size_t>(last) + 1;
   std::vector<std::uint64_t> counted(kinds * (kinds + 1) / 2 * all);
   std::vector<std::uint64_t*> histogram(kinds * kinds);
@@ -216,11 +210,11 @@ void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particle
   std::vector<std::uint16_t> kind;
   Eigen::ArrayXd squared;
   Eigen::ArrayXi shell;
-  std::array<std::int32_t, D> centre{};
+  Cell<D> centre{};
   for (std::size_t cell = 0; cell < grid.cells(); ++cell) {
     const std::uint32_t begin = start_[cell], own = start_[cell + 1] - begin;
     if (own > 0) {
-      list_runs<D>(grid, system_.box, start_, centre, options_.range, runs);
+      list_runs<D>(grid, start_, centre, reach, options_.range, runs);
       runs.insert(runs.begin(), {begin, begin + own, Vec<D>::Zero()});
       Eigen::Index size = 0;
       for (const Run<D>& run : runs) size += run.end - run.begin;
@@ -249,7 +243,7 @@ void RadialDistribution<D>::sample(double /*time*/, const Particles<D>& particle
           for (Eigen::Index j = 0; j < rest; ++j) ++of[kind[static_cast<std::size_t>(j) + i + 1]][shell[j]];
       }
     }
-    for (int k = D - 1; k >= 0 && ++centre[k] == grid.count[k]; --k) centre[k] = 0;
+    for (int k = D - 1; k >= 0 && ++centre[k] == grid.count(k); --k) centre[k] = 0;
   }
   for (std::size_t k = 0; k < counts_.size(); ++k) counts_[k] += counted[k / bins * all + k % bins];
 }
@@ -282,7 +276,7 @@ std::vector<double> RadialDistribution<D>::normalised(const std::vector<std::uin
   for (std::size_t b = 0; b < g.size(); ++b) {
     const double inner = static_cast<double>(b) * width, outer = static_cast<double>(b + 1) * width;
     const double expected =
-        static_cast<double>(samples_) * pairs * shell_volume<D>(inner, outer, edges, walled) / edges.prod();
+        static_cast<double>(this->samples()) * pairs * shell_volume<D>(inner, outer, edges, walled) / edges.prod();
     g[b] = static_cast<double>(counts[b]) / expected;
   }
   return g;
@@ -305,7 +299,7 @@ std::vector<double> RadialDistribution<D>::g(std::size_t a, std::size_t b) const
 
 template <int D>
 std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::size_t b) const {
-  if (samples_ == 0 || smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
+  if (this->samples() == 0 || smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
   const double contact = smallest_[a] + smallest_[b], width = options_.range / options_.bins;
   const auto r = radii(), value = g(a, b);
   const std::uint64_t* counts = &counts_[pair_index(a, b) * static_cast<std::size_t>(options_.bins)];
@@ -326,7 +320,59 @@ std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::s
   return std::exp(normal.ldlt().solve(right)[0]);
 }
 
+template <int D>
+std::vector<TableColumn> RadialDistribution<D>::table() const {
+  std::vector<TableColumn> table = {{"r", radii()}, {"g", g()}};
+  const auto& names = system_.species;
+  for (std::size_t a = 0; names.size() > 1 && a < names.size(); ++a)
+    for (std::size_t b = a; b < names.size(); ++b) table.push_back({"g_" + names[a] + "_" + names[b], g(a, b)});
+  return table;
+}
+
+template <int D>
+std::vector<SpeciesValue> RadialDistribution<D>::species_values() const {
+  const auto& names = system_.species;
+  std::vector<SpeciesValue> values;
+  for (std::size_t a = 0; a < names.size(); ++a)
+    for (std::size_t b = a; b < names.size(); ++b)
+      if (const auto g = contact_value(a, b)) values.push_back({"contact_value", {names[a], names[b]}, "g", *g});
+  return values;
+}
+
 template class RadialDistribution<2>;
 template class RadialDistribution<3>;
+
+namespace observable {
+
+ObservableInfo rdf() {
+  using enum Parameter::Type;
+  using enum Parameter::Range;
+  return {.name = "rdf",
+          .title = "radial distribution function",
+          .parameters = {parameter::interval(
+                             "simulated time between samples of the radial distribution function, averaged into "
+                             "rdf.csv; 0: none. A sample costs O(count); configurations a hundred mean free times "
+                             "apart are about independent"),
+                         {"range", real, "none", "length",
+                          "the largest distance of rdf.csv, at most half the shortest periodic edge; three of the "
+                          "largest diameters, if there is room, where it is absent",
+                          positive},
+                         {.name = "bins",
+                          .type = integer,
+                          .fallback = "200",
+                          .unit = "-",
+                          .meaning = "shells of equal thickness from 0 to rdf_range",
+                          .range = positive,
+                          .most = 1e6}},
+          .documentation =
+              "Of all particles, and where there are several species between each two. Columns: r (middle of a shell), "
+              "g, g_A_B. The summary has g at contact, extrapolated, as contact_value. Along walls the ideal gas is "
+              "that of the region which the centres can reach.",
+          .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6",
+          .in_2d = maker<RadialDistribution, 2>(complete<2>),
+          .in_3d = maker<RadialDistribution, 3>(complete<3>)};
+}
+
+}  // namespace observable
 
 }  // namespace carom

@@ -18,7 +18,7 @@
 #include <optional>
 #include <vector>
 
-#include "engine/simulation.h"
+#include "engine/observable.h"
 
 namespace carom {
 
@@ -29,21 +29,18 @@ struct RadialDistributionOptions {
 };
 
 template <int D>
-class RadialDistribution : public Observer<D> {
+class RadialDistribution : public Observable<D> {
  public:
   /// Keeps a reference to the system, for its box. Throws Error(deck) for a box that is open (it has no density) and a
   /// range beyond longest_range().
   RadialDistribution(const System<D>& system, const RadialDistributionOptions& options);
+  RadialDistribution(const System<D>& system, const Parameters& parameters, double start);
 
   /// Half the shortest periodic edge, or the shortest way between walls that centres can go, if that is less.
   static double longest_range(const System<D>& system);
   /// Three of the largest diameters, or longest_range() where that is less.
   static double usual_range(const System<D>& system);
 
-  Sampling sampling() const override { return options_.sampling; }
-  void sample(double time, const Particles<D>& particles) override;
-
-  std::uint64_t samples() const { return samples_; }
   /// The middles of the shells [length].
   std::vector<double> radii() const;
   /// g of all particles, whatever their species.
@@ -54,8 +51,13 @@ class RadialDistribution : public Observer<D> {
   /// distance and 1.15 times that, or the first six, with the counts as weights. Nothing where the species have several
   /// contact distances, or fewer than four shells hold pairs there.
   std::optional<double> contact_value(std::size_t a, std::size_t b) const;
+  /// r, g, and where there are several species g between each two.
+  std::vector<TableColumn> table() const override;
+  /// All contact values.
+  std::vector<SpeciesValue> species_values() const override;
 
  private:
+  void add_sample(double time, const Particles<D>& particles) override;
   void count(const Particles<D>& particles);
   std::size_t pair_index(std::size_t a, std::size_t b) const;
   std::vector<double> normalised(const std::vector<std::uint64_t>& counts, double pairs, double margin) const;
@@ -65,7 +67,6 @@ class RadialDistribution : public Observer<D> {
   RadialDistributionOptions options_;
   std::vector<double> number_, smallest_, largest_;  // of each species: particles; radii
   std::vector<std::uint64_t> counts_;                // [pair of species][shell]
-  std::uint64_t samples_ = 0;
 
   std::array<std::vector<double>, D> x_;  // positions in the order of the cells; kept for their memory
   std::vector<std::uint16_t> species_;

@@ -1,59 +1,32 @@
 #pragma once
-// rdf.csv and msd.csv: what is averaged while a run goes on instead of being written frame by frame.
+// rdf.csv and its like: what is averaged while a run goes on (engine/observable.h) instead of being written frame by
+// frame. Reduced units; numbers in the fewest digits that give them back exactly.
 //
-// rdf.csv: r (middle of a shell), g (of all particles), and where there are several species g_A_B for each pair of
-// their names, in the order of the deck. msd.csv: time (the lag), origins (averaged over, besides the particles), msd,
-// and where there are several species msd_A for each. Reduced units; numbers in the fewest digits that give them back
-// exactly. What is measured is defined in engine/radial_distribution.h and engine/mean_squared_displacement.h.
-//
-// The files are put in place anew as a whole, whenever the number of samples has doubled, and at the end: after a kill
-// at least half of the samples are there.
+// A file is put in place anew as a whole, whenever the number of samples has doubled, and at the end: after a kill at
+// least half of the samples are there.
 
 #include <filesystem>
-#include <string>
-#include <vector>
+#include <memory>
 
-#include "engine/mean_squared_displacement.h"
-#include "engine/radial_distribution.h"
+#include "engine/observable.h"
 
 namespace carom {
 
-/// g at contact between two species, extrapolated.
-struct ContactValue {
-  std::string first, second;
-  double g;
-};
-
 template <int D>
-class RdfWriter : public RadialDistribution<D> {
+class AverageWriter : public Observer<D> {
  public:
-  RdfWriter(std::filesystem::path path, const System<D>& system, const RadialDistributionOptions& options);
+  AverageWriter(std::filesystem::path path, std::unique_ptr<Observable<D>> average);
 
+  Sampling sampling() const override { return average_->sampling(); }
   /// Throws Error(Failure::file).
   void sample(double time, const Particles<D>& particles) override;
   /// The average up to now. Throws Error(Failure::file).
   void close() const;
-  /// Of all pairs of species that have one.
-  std::vector<ContactValue> contact_values() const;
+  const Observable<D>& average() const { return *average_; }
 
  private:
   std::filesystem::path path_;
-  std::vector<std::string> species_;
-};
-
-template <int D>
-class MsdWriter : public MeanSquaredDisplacement<D> {
- public:
-  MsdWriter(std::filesystem::path path, const System<D>& system, const Sampling& sampling);
-
-  /// Throws Error(Failure::file).
-  void sample(double time, const Particles<D>& particles) override;
-  /// The average up to now. Throws Error(Failure::file).
-  void close() const;
-
- private:
-  std::filesystem::path path_;
-  std::vector<std::string> species_;
+  std::unique_ptr<Observable<D>> average_;
 };
 
 }  // namespace carom

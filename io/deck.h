@@ -15,19 +15,22 @@
 
 #include "engine/error.h"
 #include "engine/integrator.h"
+#include "engine/observable.h"
 #include "engine/simulation.h"
 #include "engine/system.h"
 
 namespace carom {
 
+struct ObservableConfig {
+  const ObservableInfo* info;
+  Parameters parameters;  ///< complete after build_system()
+};
+
 struct OutputConfig {
   std::filesystem::path directory;
-  std::string checkpoint_wall;      ///< hh:mm:ss of wall time between checkpoints, or empty
-  double sample_start = 0;          ///< simulated time of the first sample of g(r) and displacements
-  double rdf_interval = 0;          ///< simulated time between samples of g(r); 0: none
-  std::optional<double> rdf_range;  ///< the largest r; set by build_system() where the deck leaves it open
-  int rdf_bins = 200;
-  double msd_interval = 0;  ///< the shortest lag of the mean squared displacement; 0: none
+  std::string checkpoint_wall;                ///< hh:mm:ss of wall time between checkpoints, or empty
+  double sample_start = 0;                    ///< simulated time of the first sample of the observables
+  std::vector<ObservableConfig> observables;  ///< those with an interval
 };
 
 /// The deck as a value; `toml_text` is the resolved deck, which gives the same run when it is run again.

@@ -4,7 +4,6 @@
 
 #include "engine/epoch.h"
 #include "engine/placement.h"
-#include "engine/radial_distribution.h"
 #include "engine/shares.h"
 #include "io/deck_interactions.h"
 #include "io/validate_state.h"
@@ -33,8 +32,9 @@ void give_velocities(const Deck::Source& source, System<D>& system) {
 }
 
 /// Writes what was left to the initial state into the values of the deck, so that they say it themselves from now on.
+/// What [output] requires must have a meaning in the box.
 template <int D>
-void complete_values(Deck& deck, const System<D>& system) {
+void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
   Deck::Source& source = *deck.source;
   if (source.edges.empty()) {
     source.edges.assign(system.box.edges.begin(), system.box.edges.end());
@@ -48,9 +48,12 @@ void complete_values(Deck& deck, const System<D>& system) {
     deck.integrator_parameters.set("step", deck.plan.step);
     source.values.find("integrator")->values.insert_or_assign("step", deck.plan.step);
   }
-  if (deck.output.rdf_interval > 0 && !deck.output.rdf_range) {
-    deck.output.rdf_range = RadialDistribution<D>::usual_range(system);
-    source.values.find("output")->values.insert_or_assign("rdf_range", *deck.output.rdf_range);
+  ValueTable& output = *source.values.find("output");
+  for (auto& [info, parameters] : deck.output.observables) {
+    if (const auto wrong = info->template in<D>().complete(parameters, system))
+      problems.error(output.place(output_key(*info, wrong->parameter)), wrong->what, wrong->remedy);
+    for (const auto& [name, value] : parameters.all())
+      std::visit([&, &key = name](const auto& v) { output.values.insert_or_assign(output_key(*info, key), v); }, value);
   }
   deck.toml_text = write_deck(source.values);
 }
@@ -123,8 +126,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
   Problems problems;
   make_interactions(source, {}, *system, true, problems);
   problems.throw_errors(Failure::deck);
-  complete_values(deck, *system);
-  check_output(deck, *system, problems);
+  complete_values(deck, *system, problems);
   problems.throw_errors(Failure::deck);
   check_state(deck, *system, problems);
   problems.throw_errors(Failure::initial_state);

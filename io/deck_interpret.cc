@@ -9,7 +9,17 @@
 namespace carom {
 namespace {
 
-constexpr std::int64_t kMostBins = 1'000'000;  // of g(r), for each pair of species
+/// Sets a parameter to the value of a key, if it has one.
+void copy_value(const ValueTable& table, std::string_view key, Parameters& parameters, std::string_view name) {
+  const auto at = table.values.find(key);
+  if (at == table.values.end()) return;
+  std::visit(
+      [&](const auto& value) {
+        if constexpr (std::is_constructible_v<ParameterValue, decltype(value)>)
+          parameters.set(std::string(name), value);
+      },
+      at->second);
+}
 
 /// The parts of a deck in the order in which they build on each other.
 class Interpreter {
@@ -177,15 +187,13 @@ class Interpreter {
     if (const auto* interval = table->find<double>("frame_interval")) deck_.plan.frame_interval = *interval;
     if (const auto* interval = table->find<double>("thermo_interval")) deck_.plan.thermo_interval = *interval;
     if (const auto* start = table->find<double>("sample_start")) deck_.output.sample_start = *start;
-    if (const auto* interval = table->find<double>("rdf_interval")) deck_.output.rdf_interval = *interval;
-    if (const auto* range = table->find<double>("rdf_range")) deck_.output.rdf_range = *range;
-    if (const auto* bins = table->find<std::int64_t>("rdf_bins")) {
-      deck_.output.rdf_bins = static_cast<int>(std::min(*bins, kMostBins));
-      if (*bins > kMostBins)
-        problems_.error(table->place("rdf_bins"), "'rdf_bins' is " + std::to_string(*bins),
-                        "take at most " + std::to_string(kMostBins));
+    for (const ObservableInfo& info : observables()) {
+      Parameters parameters;
+      for (const Parameter& each : info.parameters)
+        copy_value(*table, output_key(info, each.name), parameters, each.name);
+      if (parameters.has("interval") && parameters.real("interval") > 0)
+        deck_.output.observables.push_back({&info, std::move(parameters)});
     }
-    if (const auto* interval = table->find<double>("msd_interval")) deck_.output.msd_interval = *interval;
     if (const auto* events = table->find<bool>("events")) deck_.plan.events = *events;
     if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {
       deck_.output.checkpoint_wall = *wall;
@@ -208,15 +216,7 @@ class Interpreter {
 
 Parameters parameters_of(const ValueTable& table) {
   Parameters parameters;
-  for (const Key& key : table.variant->keys) {
-    const auto at = table.values.find(key.name);
-    if (at == table.values.end()) continue;
-    std::visit(
-        [&](const auto& value) {
-          if constexpr (std::is_constructible_v<ParameterValue, decltype(value)>) parameters.set(key.name, value);
-        },
-        at->second);
-  }
+  for (const Key& key : table.variant->keys) copy_value(table, key.name, parameters, key.name);
   return parameters;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <sstream>
 
 #include "io/deck_toml.h"
@@ -64,6 +65,13 @@ class NodeReader {
   template <class Number>
   bool in_range(const toml::node& node, Number value) {
     const bool positive = key_.range == Parameter::Range::positive;
+    if (static_cast<double>(value) > key_.most) {
+      std::ostringstream is, remedy;
+      is << std::setprecision(15) << "is " << value;
+      remedy << std::setprecision(15) << "take at most " << key_.most;
+      complain(node, is.str(), remedy.str());
+      return false;
+    }
     if (key_.range == Parameter::Range::any || value > 0 || (!positive && value == 0)) return true;
     std::ostringstream is;
     is << value;

@@ -116,7 +116,7 @@ int carom_main(int argc, char** argv) {
   CLI::App& schema = *app.add_subcommand("schema", "Every key of a deck: type, unit, default, meaning");
   schema.add_flag("--markdown", markdown, "As Markdown");
   CLI::App& methods =
-      *app.add_subcommand("methods", "Every integrator: order, conserved quantities, parameters, source");
+      *app.add_subcommand("methods", "Every integrator: order, conserved quantities, parameters, source; the averages");
   CLI::App& info = *app.add_subcommand("info", "What is in a trajectory");
   info.add_option("file", file, "The file")->required()->type_name("FILE");
 

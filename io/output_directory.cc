@@ -1,6 +1,7 @@
 #include "io/output_directory.h"
 
 #include <string>
+#include <vector>
 
 #include "engine/error.h"
 
@@ -11,7 +12,10 @@ namespace fs = std::filesystem;
 std::optional<fs::path> prepare_output_directory(const fs::path& directory) try {
   fs::create_directories(directory);
   std::optional<fs::path> backup;
-  for (const char* name : run_file::all) {
+  std::vector<std::string> names = {run_file::deck,   run_file::trajectory, run_file::thermo,
+                                    run_file::events, run_file::summary,    run_file::log};
+  for (const ObservableInfo& info : observables()) names.push_back(run_file::averages(info));
+  for (const std::string& name : names) {
     if (!fs::exists(fs::symlink_status(directory / name))) continue;
     for (int n = 1; !backup; ++n) {
       // create_directory returns whether the name was free, also if two runs start at once.

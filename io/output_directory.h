@@ -1,9 +1,11 @@
 #pragma once
 // The directory of a run: made where it is missing, and cleared of an earlier run without losing it.
 
-#include <array>
 #include <filesystem>
 #include <optional>
+#include <string>
+
+#include "engine/observable.h"
 
 namespace carom {
 
@@ -12,12 +14,10 @@ namespace run_file {
 inline constexpr const char* deck = "deck.toml";
 inline constexpr const char* trajectory = "trajectory.h5md";
 inline constexpr const char* thermo = "thermo.csv";
-inline constexpr const char* rdf = "rdf.csv";
-inline constexpr const char* msd = "msd.csv";
 inline constexpr const char* events = "events.h5";
 inline constexpr const char* summary = "summary.json";
 inline constexpr const char* log = "run.log";
-inline constexpr std::array all = {deck, trajectory, thermo, rdf, msd, events, summary, log};
+inline std::string averages(const ObservableInfo& info) { return std::string(info.name) + ".csv"; }
 }  // namespace run_file
 
 /// Creates the directory if need be. If files of these names are there, moves them into its subdirectory `backup.1`, or

@@ -111,7 +111,7 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
     progress.end_line();
     const auto accounts = accounts_of_all(at_work, statistics);
     files->close();
-    outcome.contact_values = files->contact_values();
+    outcome.species_values = files->species_values();
     outcome.peak_memory_bytes = peak_memory_bytes(accounts);
     if (statistics.stopped_early) outcome.status = "stopped";
     log.say(report_text(deck, statistics, accounts));
@@ -142,7 +142,8 @@ template <int D>
 int run_beside(Deck& deck, Exchange& at_work, const Deadline& deadline) {
   auto simulation = simulation_of<D>(deck, at_work);
   std::vector<Onlooker<D>> onlookers;
-  for (const Sampling& sampling : samplings(deck.output)) onlookers.emplace_back(sampling);
+  for (const auto& [info, parameters] : deck.output.observables)
+    onlookers.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
   for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
   ShareTeller<D> teller(at_work, simulation.system());
   simulation.add(teller);

@@ -1,30 +1,21 @@
 #include "io/run_files.h"
 
+#include <algorithm>
 #include <exception>
+#include <iterator>
 
 #include "io/output_directory.h"
 
 namespace carom {
-
-namespace {
-Sampling rdf_sampling(const OutputConfig& output) { return {output.rdf_interval, output.sample_start}; }
-Sampling msd_sampling(const OutputConfig& output) { return {output.msd_interval, output.sample_start}; }
-}  // namespace
-
-std::vector<Sampling> samplings(const OutputConfig& output) { return {rdf_sampling(output), msd_sampling(output)}; }
 
 template <int D>
 RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system)
     : trajectory_(deck.output.directory / run_file::trajectory, deck, system),
       thermo_(deck.output.directory / run_file::thermo) {
   if (deck.plan.events) events_ = std::make_unique<EventWriter<D>>(deck.output.directory / run_file::events, deck);
-  const OutputConfig& output = deck.output;
-  if (output.rdf_interval > 0)
-    rdf_ = std::make_unique<RdfWriter<D>>(
-        output.directory / run_file::rdf, system,
-        RadialDistributionOptions{rdf_sampling(output), output.rdf_range.value(), output.rdf_bins});
-  if (output.msd_interval > 0)
-    msd_ = std::make_unique<MsdWriter<D>>(output.directory / run_file::msd, system, msd_sampling(output));
+  for (const auto& [info, parameters] : deck.output.observables)
+    averages_.emplace_back(deck.output.directory / run_file::averages(*info),
+                           info->template in<D>().make(system, parameters, deck.output.sample_start));
 }
 
 template <int D>
@@ -32,8 +23,7 @@ void RunFiles<D>::add_to(Simulation<D>& simulation) {
   if (events_) simulation.add(*events_);
   simulation.add(trajectory_);
   simulation.add(thermo_);
-  if (rdf_) simulation.add(*rdf_);
-  if (msd_) simulation.add(*msd_);
+  for (auto& average : averages_) simulation.add(average);
 }
 
 template <int D>
@@ -41,8 +31,7 @@ void RunFiles<D>::close() {
   trajectory_.close();
   thermo_.close();
   if (events_) events_->close();
-  if (rdf_) rdf_->close();
-  if (msd_) msd_->close();
+  for (const auto& average : averages_) average.close();
 }
 
 template <int D>
@@ -56,13 +45,14 @@ void RunFiles<D>::close_after_failure() {
   try_to_close(trajectory_);
   try_to_close(thermo_);
   if (events_) try_to_close(*events_);
-  if (rdf_) try_to_close(*rdf_);
-  if (msd_) try_to_close(*msd_);
+  for (auto& average : averages_) try_to_close(average);
 }
 
 template <int D>
-std::vector<ContactValue> RunFiles<D>::contact_values() const {
-  return rdf_ ? rdf_->contact_values() : std::vector<ContactValue>{};
+std::vector<SpeciesValue> RunFiles<D>::species_values() const {
+  std::vector<SpeciesValue> all;
+  for (const auto& average : averages_) std::ranges::move(average.average().species_values(), std::back_inserter(all));
+  return all;
 }
 
 template class RunFiles<2>;

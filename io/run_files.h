@@ -14,9 +14,6 @@
 
 namespace carom {
 
-/// The times at which the files need the particles, besides frames and rows.
-std::vector<Sampling> samplings(const OutputConfig& output);
-
 /// Looks at the particles when the files of another rank do, so that all ranks stop at the same times.
 template <int D>
 class Onlooker : public Observer<D> {
@@ -43,16 +40,14 @@ class RunFiles {
   /// The same for a run that has failed: each file is closed as well as it can be.
   void close_after_failure();
 
-  /// g at contact as far as it was measured, for the summary.
-  std::vector<ContactValue> contact_values() const;
+  /// What the averages say of species, for the summary.
+  std::vector<SpeciesValue> species_values() const;
 
  private:
   TrajectoryWriter<D> trajectory_;
   ThermoWriter<D> thermo_;
-  // Null where the deck does not want them.
-  std::unique_ptr<EventWriter<D>> events_;
-  std::unique_ptr<RdfWriter<D>> rdf_;
-  std::unique_ptr<MsdWriter<D>> msd_;
+  std::unique_ptr<EventWriter<D>> events_;  // null where the deck does not want it
+  std::vector<AverageWriter<D>> averages_;
 };
 
 }  // namespace carom

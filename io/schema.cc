@@ -42,7 +42,8 @@ Variant variant(std::string_view name, const std::vector<Parameter>& parameters)
                       std::string(p.meaning),
                       p.range,
                       {p.choices.begin(), p.choices.end()},
-                      p.former});
+                      p.former,
+                      p.most});
   return v;
 }
 
@@ -56,6 +57,35 @@ std::vector<Variant> integrator_variants() {
   std::vector<Variant> all;
   for (const IntegratorInfo& info : integrators()) all.push_back(variant(info.name, info.parameters));
   return all;
+}
+
+std::string averages_of_all() {
+  std::string files;
+  for (const ObservableInfo& info : observables())
+    files += (files.empty() ? "" : &info == &observables().back() ? " and " : ", ") + std::string(info.name) + ".csv";
+  return files;
+}
+
+std::vector<Key> output_keys() {
+  std::vector<Key> keys = {
+      {"directory", text, "none", "-",
+       "where to; relative to the working directory; by default runs/ and the deck's name"},
+      {"frame_interval", real, "0.0", "time", "simulated time between frames of the trajectory; 0: first and last only",
+       Range::non_negative},
+      {"thermo_interval", real, "0.0", "time",
+       "simulated time between rows of the table of observables; 0: first and last only", Range::non_negative}};
+  for (const ObservableInfo& info : observables())
+    for (Key& key : variant(info.name, info.parameters).keys) {
+      key.name = output_key(info, key.name);
+      keys.push_back(std::move(key));
+    }
+  keys.push_back(
+      {"sample_start", real, "0.0", "time",
+       "simulated time of the first sample for " + averages_of_all() + ": what comes before is equilibration",
+       Range::non_negative});
+  keys.push_back({"checkpoint_wall", text, "\"\"", "-", "wall time between checkpoints, hh:mm:ss; empty: none"});
+  keys.push_back({"events", boolean, "false", "-", "write every collision to events.h5"});
+  return keys;
 }
 
 Key type_key(const std::string& meaning) { return {"type", text, "", "-", meaning}; }
@@ -147,35 +177,7 @@ std::vector<TableSchema> make_schema() {
        {{"steps", integer, "none", "-", "number of steps (free-flight: epochs)", Range::positive},
         {"end_time", real, "none", "time", "simulated time; the last step is shortened to meet it", Range::positive},
         {"collisions", integer, "none", "-", "number of pair collisions", Range::positive}}},
-      {"output",
-       false,
-       false,
-       "what the run leaves behind",
-       {{"directory", text, "none", "-",
-         "where to; relative to the working directory; by default runs/ and the deck's name"},
-        {"frame_interval", real, "0.0", "time",
-         "simulated time between frames of the trajectory; 0: first and last only", Range::non_negative},
-        {"thermo_interval", real, "0.0", "time",
-         "simulated time between rows of the table of observables; 0: first and last only", Range::non_negative},
-        {"rdf_interval", real, "0.0", "time",
-         "simulated time between samples of the radial distribution function, averaged into rdf.csv; 0: none. A sample "
-         "costs O(count); configurations a hundred mean free times apart are about independent",
-         Range::non_negative},
-        {"rdf_range", real, "none", "length",
-         "the largest distance of rdf.csv, at most half the shortest periodic edge; three of the largest diameters, if "
-         "there is room, where it is absent",
-         Range::positive},
-        {"rdf_bins", integer, "200", "-", "shells of equal thickness from 0 to rdf_range", Range::positive},
-        {"msd_interval", real, "0.0", "time",
-         "the shortest lag of the mean squared displacement, averaged into msd.csv; 0: none. Lags are 1 … 9, 10, 20 … "
-         "90, 100 … times this, up to the length of the run",
-         Range::non_negative},
-        {"sample_start", real, "0.0", "time",
-         "simulated time of the first sample for rdf.csv and msd.csv: what comes before is equilibration",
-         Range::non_negative},
-        {"checkpoint_wall", text, "\"\"", "-", "wall time between checkpoints, hh:mm:ss; empty: none"},
-        {"events", boolean, "false", "-", "write every collision to events.h5"}}},
-  };
+      {"output", false, false, "what the run leaves behind", output_keys()}};
 }
 
 }  // namespace
@@ -194,6 +196,10 @@ const TableSchema& table_schema(std::string_view name) {
   for (const TableSchema& table : deck_schema())
     if (table.name == name) return table;
   throw std::logic_error("no table '" + std::string(name) + "' in the schema");
+}
+
+std::string output_key(const ObservableInfo& info, std::string_view parameter) {
+  return std::string(info.name) + "_" + std::string(parameter);
 }
 
 std::string type_name(const Key& key) {

@@ -1,15 +1,16 @@
 #pragma once
 // The declared schema of a deck: every table and every key with type, unit, range, default and meaning, once.
 //
-// Reading and checking, `carom schema`, and the resolved deck are all made from it. The keys of integrators and
-// interactions come from their own declarations (engine/integrator.h, engine/interaction.h).
+// Reading and checking, `carom schema`, and the resolved deck are all made from it. The keys of integrators,
+// interactions and observables come from their own declarations (engine/integrator.h, interaction.h, observable.h).
 
 #include <array>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "engine/parameters.h"
+#include "engine/observable.h"
 
 namespace carom {
 
@@ -34,6 +35,7 @@ struct Key {
   Parameter::Range range = Parameter::Range::any;
   std::vector<std::string> choices{};
   std::vector<std::array<std::string_view, 2>> former{};  ///< as in Parameter
+  double most = std::numeric_limits<double>::infinity();  ///< as in Parameter
 
   bool required() const { return fallback.empty(); }
   bool has_default() const { return !required() && fallback != "none"; }
@@ -63,13 +65,16 @@ struct TableSchema {
 const std::vector<TableSchema>& deck_schema();
 const TableSchema& table_schema(std::string_view name);
 
+/// The key in [output] of a parameter of an observable.
+std::string output_key(const ObservableInfo& info, std::string_view parameter);
+
 /// "positive real" and the like, for messages and pages.
 std::string type_name(const Key& key);
 
 /// The schema as a page: plain text for a terminal, or Markdown for the manual.
 std::string schema_page(bool markdown);
 
-/// Every integrator with order, conserved quantities, parameters and source.
+/// Every integrator with order, conserved quantities, parameters and source, and every observable with its own.
 std::string methods_page();
 
 }  // namespace carom

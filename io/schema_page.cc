@@ -1,5 +1,7 @@
 // The schema and the methods as pages for people.
 
+#include <algorithm>
+#include <iterator>
 #include <sstream>
 
 #include "engine/integrator.h"
@@ -118,12 +120,22 @@ std::string schema_page(bool markdown) {
 
 std::string methods_page() {
   std::ostringstream out;
+  const auto about = [&](const auto& info, std::vector<Key> keys) {
+    out << "  " << wrapped(std::string(info.documentation), 2) << "\n  parameters:\n";
+    plain_keys(out, keys, 4);
+    out << "  source: " << wrapped(std::string(info.source), 10) << "\n\n";
+  };
   for (const IntegratorInfo& info : integrators()) {
     out << info.name << " – " << info.title << "\n  order:     " << info.order
         << "\n  conserves: " << wrapped(std::string(info.conserves), 13) << '\n';
-    out << "  " << wrapped(std::string(info.documentation), 2) << "\n  parameters:\n";
-    plain_keys(out, table_schema("integrator").variant(info.name)->keys, 4);
-    out << "  source: " << wrapped(std::string(info.source), 10) << "\n\n";
+    about(info, table_schema("integrator").variant(info.name)->keys);
+  }
+  for (const ObservableInfo& info : observables()) {
+    out << info.name << ".csv – " << info.title << '\n';
+    std::vector<Key> keys;
+    std::ranges::copy_if(table_schema("output").keys, std::back_inserter(keys),
+                         [&](const Key& key) { return key.name.starts_with(std::string(info.name) + "_"); });
+    about(info, keys);
   }
   return out.str();
 }

@@ -56,8 +56,8 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"collisions_per_second", rate},
       {"peak_memory_bytes", std::max(outcome.peak_memory_bytes, peak_memory_bytes())},
   };
-  for (const ContactValue& value : outcome.contact_values)
-    json["contact_value"].push_back({{"species", {value.first, value.second}}, {"g", value.g}});
+  for (const SpeciesValue& value : outcome.species_values)
+    json[value.name].push_back({{"species", value.species}, {value.symbol, value.value}});
   if (!outcome.error.empty()) json["error"] = outcome.error;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/simulation.h"
-#include "io/averages.h"
+#include "engine/observable.h"
 #include "io/deck.h"
 
 namespace carom {
@@ -18,7 +17,7 @@ struct RunOutcome {
   std::string error{};  ///< why it failed; empty otherwise
   std::size_t particles = 0;
   int ranks = 1;
-  std::vector<ContactValue> contact_values{};  ///< of g(r), where it was taken
+  std::vector<SpeciesValue> species_values{};  ///< of the averages
   std::uint64_t peak_memory_bytes = 0;         ///< of a rank, at most; 0: of this one
 };
 

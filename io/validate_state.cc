@@ -10,7 +10,6 @@
 #include "engine/forces.h"
 #include "engine/part.h"
 #include "engine/placement.h"
-#include "engine/radial_distribution.h"
 #include "engine/shares.h"
 #include "engine/stiffness.h"
 #include "engine/vicinity.h"
@@ -116,19 +115,6 @@ bool closed(const Box<D>& box) {
 }
 
 template <int D>
-void check_output(const Deck& deck, const System<D>& system, Problems& problems) {
-  if (!(deck.output.rdf_interval > 0)) return;
-  const ValueTable& output = *deck.source->values.find("output");
-  if (!closed(system.box))
-    problems.error(output.place("rdf_interval"), "g(r) needs a density, and a box with an open boundary has none",
-                   "set rdf_interval = 0, or close the box");
-  else if (const double longest = RadialDistribution<D>::longest_range(system);
-           !(*deck.output.rdf_range <= longest * (1 + 1e-9)))
-    problems.error(output.place("rdf_range"), say("g(r) cannot be taken to ", *deck.output.rdf_range, " in this box"),
-                   say("take at most ", longest, ": half the shortest periodic edge, or the way between two walls"));
-}
-
-template <int D>
 void check_state(const Deck& deck, const System<D>& system, Problems& problems) {
   const Deck::Source& source = *deck.source;
   if (!source.integrator->hard_cores) return;
@@ -183,13 +169,11 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
 }
 
 template bool closed(const Box<2>&);
-template void check_output(const Deck&, const System<2>&, Problems&);
 template void check_state(const Deck&, const System<2>&, Problems&);
 template double shortest_period(const System<2>&);
 template void warn_of_state(const Deck&, System<2>&, Problems&);
 
 template bool closed(const Box<3>&);
-template void check_output(const Deck&, const System<3>&, Problems&);
 template void check_state(const Deck&, const System<3>&, Problems&);
 template double shortest_period(const System<3>&);
 template void warn_of_state(const Deck&, System<3>&, Problems&);

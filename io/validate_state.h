@@ -10,10 +10,6 @@ namespace carom {
 template <int D>
 void check_state(const Deck& deck, const System<D>& system, Problems& problems);
 
-/// What [output] requires must have a meaning in this box: g(r) needs a density, and room.
-template <int D>
-void check_output(const Deck& deck, const System<D>& system, Problems& problems);
-
 /// A step too long for the forces, cutoffs beyond half the box, more than close packing, walls that do nothing.
 template <int D>
 void warn_of_state(const Deck& deck, System<D>& system, Problems& problems);

@@ -265,8 +265,20 @@ def test_g_of_r_without_a_density_or_room(tmp_path):
     assert validate(tmp_path, sampled).returncode == 0
     open_box = validate(tmp_path, changed('["wall", "wall"]', '["wall", "open"]', sampled))
     assert open_box.returncode == 2 and "error: g(r) needs a density" in open_box.stderr
+    many = validate(tmp_path, sampled.replace("rdf_interval = 1.0", "rdf_bins = 1000001"))
+    assert many.returncode == 2 and "error: 'rdf_bins' is 1000001; take at most 1000000" in many.stderr
     too_far = validate(tmp_path, sampled.replace("rdf_interval = 1.0", "rdf_interval = 1.0\nrdf_range = 9.1"))
     assert too_far.returncode == 2 and "error: g(r) cannot be taken to 9.1 in this box; take at most 9" in too_far.stderr
+
+
+def test_profile_without_its_axis_or_slabs(tmp_path):
+    sampled = GOOD + "\n[output]\nprofile_interval = 1.0\nprofile_axis = 1\n"
+    assert validate(tmp_path, sampled).returncode == 0
+    no_axis = validate(tmp_path, sampled.replace("profile_axis = 1", "profile_axis = 2"))
+    place = f"deck.toml:{len(sampled.splitlines())}:"
+    assert no_axis.returncode == 2 and no_axis.stderr.startswith(place) and "error: there is no such axis" in no_axis.stderr
+    open_box = validate(tmp_path, changed('["wall", "wall"]', '["wall", "open"]', sampled))
+    assert open_box.returncode == 2 and "error: a profile needs slabs" in open_box.stderr
 
 
 def test_every_problem_is_reported_in_the_order_of_the_deck(tmp_path):
@@ -342,7 +354,7 @@ def test_potential_from_a_file(tmp_path):
     run = carom("run", "deck.toml", "-o", "one", "--quiet", cwd=tmp_path)
     assert run.returncode == 0, run.stderr
     resolved = (tmp_path / "one" / "deck.toml").read_text()
-    assert "r = [0.9, 1.2, 1.5]\nvalue = [1.0, 0.5, 0.0]" in resolved and "cutoff = 1.5" in resolved and "file" not in resolved
+    assert "r = [0.9, 1.2, 1.5]\nvalue = [1.0, 0.5, 0.0]" in resolved and "cutoff = 1.5" in resolved and "file = " not in resolved
 
 
 def test_unreadable_deck(tmp_path):

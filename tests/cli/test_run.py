@@ -95,6 +95,18 @@ radius = 0.3
     assert (out / "backup.1" / "rdf.csv").exists() and not (out / "rdf.csv").exists()
 
 
+def test_profile(tmp_path):
+    out = tmp_path / "out"
+    run(write_deck(tmp_path, SPHERES), out, ["output.profile_interval=0.1", "output.profile_bins=6", "output.profile_axis=2"])
+    assert (out / "profile.csv").read_text().startswith("x,density,temperature\n")
+    profile = np.genfromtxt(out / "profile.csv", delimiter=",", names=True)
+    edges = [float(e) for e in re.search(r"box = \[(.*)\]", (out / "deck.toml").read_text())[1].split(",")]
+    assert profile["x"] == pytest.approx((np.arange(6) + 0.5) * edges[2] / 6)
+    assert profile["density"].mean() == pytest.approx(108 / np.prod(edges))
+    # 2K/(D N) of all, which free flight keeps
+    assert np.average(profile["temperature"], weights=profile["density"]) == pytest.approx(1)
+
+
 @pytest.mark.parametrize("text", [SPRINGS, SPHERES], ids=["springs", "spheres"])
 def test_resolved_deck_gives_the_same_run(text, tmp_path):
     run(write_deck(tmp_path, text), tmp_path / "a")

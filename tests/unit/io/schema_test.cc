@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "engine/integrator.h"
 #include "engine/interaction.h"
+#include "engine/observable.h"
 
 namespace carom {
 namespace {
@@ -20,6 +23,10 @@ TEST(Schema, KnowsEveryDeclaredParameter) {
     ASSERT_NE(variant, nullptr) << info.name;
     EXPECT_EQ(variant->keys.size(), info.parameters.size());
   }
+  const auto& output = table_schema("output").keys;
+  for (const ObservableInfo& info : observables())
+    for (const Parameter& parameter : info.parameters)
+      EXPECT_EQ(std::ranges::count(output, output_key(info, parameter.name), &Key::name), 1) << info.name;
 }
 
 TEST(Schema, PagesShowEveryKey) {
@@ -37,6 +44,11 @@ TEST(Schema, PagesShowEveryKey) {
   for (const IntegratorInfo& info : integrators()) {
     EXPECT_NE(methods.find(std::string(info.name) + " – " + std::string(info.title)), std::string::npos);
     EXPECT_NE(methods.find("order:     " + std::string(info.order)), std::string::npos);
+  }
+  for (const ObservableInfo& info : observables()) {
+    EXPECT_NE(methods.find(std::string(info.name) + ".csv – " + std::string(info.title)), std::string::npos);
+    for (const Parameter& parameter : info.parameters)
+      EXPECT_NE(methods.find("    " + output_key(info, parameter.name) + ": "), std::string::npos) << parameter.name;
   }
 }
 

@@ -179,7 +179,7 @@ Law inverse_distance(const char* type, double strength) {
   if (type == "gravity"s)
     law.weight = Law::masses, strength = -strength;
   else
-    law.given.emplace_back("form", "plain"s);
+    law.given.set("form", "plain"s);
   law.value = [=](Real rho) { return Sized(strength / std::sqrt(rho)); };
   law.slope = [=](Real rho) { return Sized(-strength / (2 * rho * std::sqrt(rho))); };
   return law;
@@ -232,8 +232,8 @@ Law random_law(Dice& dice, std::size_t particles, double edge, bool periodic) {
   if (!periodic && type != 6 && dice.one_in(2)) return law;
   const std::string kind = std::array{"switch", "shifted", "force-shifted"}[dice.below(3)];
   const double cutoff = type == 6 ? length : edge * dice.uniform(0.05, 1.2);
-  if (type != 6) law.given.emplace_back("cutoff", cutoff);
-  law.given.emplace_back("cut", kind);
+  if (type != 6) law.given.set("cutoff", cutoff);
+  law.given.set("cut", kind);
   law.cut(cutoff, kind);
   return law;
 }
