@@ -274,7 +274,7 @@ def too_many_collisions(deck):
 
 
 @pytest.mark.parametrize("spoil, words, of_one", [
-    (on_each_other, "the force between particles 796 and 797 is too large or no number", True),
+    (on_each_other, "the force between particles 796 and 797, 0 apart, is too large or no number", True),
     (far_apart, "the bond of particles 785 and 794 spans nearly half the periodic box", True),
     (too_many_collisions, "more than max_events_per_step = 1 collisions in one step, the last between", False),
 ])
