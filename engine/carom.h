@@ -12,6 +12,7 @@
 // Integrators, interactions and their parameters have the names that they have in decks (`carom methods`, `carom
 // schema`). Mistakes throw carom::Error, whose message says what to do.
 
+#include "engine/add_interaction.h"
 #include "engine/error.h"
 #include "engine/forces.h"
 #include "engine/integrator.h"

@@ -3,8 +3,6 @@
 #include <cmath>
 
 #include "engine/error.h"
-#include "engine/pair_filter.h"
-#include "engine/shares.h"
 
 namespace carom {
 namespace {
@@ -47,21 +45,7 @@ void System<D>::check() const {
   }
 }
 
-template <int D>
-void add_interaction(System<D>& system, std::string_view type, Parameters given) {
-  const InteractionInfo& info = find_interaction(type);
-  system.interactions.push_back(
-      info.make<D>(completed(info.name, info.parameters, std::move(given)), {.box = system.box,
-                                                                             .particles = system.particles,
-                                                                             .species = system.species,
-                                                                             .total = system.size(),
-                                                                             .ranks = shared_by(system),
-                                                                             .bonds = bonds_of(system.interactions)}));
-}
-
 template void System<2>::check() const;
 template void System<3>::check() const;
-template void add_interaction(System<2>&, std::string_view, Parameters);
-template void add_interaction(System<3>&, std::string_view, Parameters);
 
 }  // namespace carom

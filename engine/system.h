@@ -58,11 +58,6 @@ struct System {
   void check() const;
 };
 
-/// Adds a term to V by its name in the deck, with defaults for the parameters that are not given. Throws
-/// Error(Failure::deck). Particles must be there, and bonds before terms that exclude bonded pairs.
-template <int D>
-void add_interaction(System<D>& system, std::string_view type, Parameters given);
-
 template <int D>
 void System<D>::wrap() {
   for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i]);

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/add_interaction.h"
 #include "engine/simulation.h"
 
 namespace carom::test {
