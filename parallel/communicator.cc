@@ -5,7 +5,7 @@
 #include <exception>
 #include <new>
 
-#include "engine/error.h"
+#include "engine/base/error.h"
 
 namespace carom {
 

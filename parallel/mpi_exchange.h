@@ -5,7 +5,7 @@
 // that, so the object must outlive Communicator::on_all(). They may be of any length: MPI's limit of 2^31 bytes does
 // not show.
 
-#include "engine/exchange.h"
+#include "engine/ranks/exchange.h"
 #include "parallel/communicator.h"
 
 namespace carom {

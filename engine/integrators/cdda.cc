@@ -9,11 +9,11 @@
 #include <cmath>
 #include <optional>
 
-#include "engine/contact_scan.h"
-#include "engine/error.h"
+#include "engine/base/error.h"
 #include "engine/integrators/chord_contacts.h"
 #include "engine/integrators/discrete_gradient.h"
 #include "engine/integrators/registry.h"
+#include "engine/slabs/contact_scan.h"
 
 namespace carom::integrator {
 namespace {
@@ -50,10 +50,9 @@ class CollisionDiscreteDerivative : public Integrator<D> {
         longest = 0.5 * wanted;
         ++report.counters.slabs_halved;
         if (longest * kMostPieces < slab.length)
-          throw Error(
-              Failure::numerical,
-              "the discrete-gradient step does not converge even in " + std::to_string(kMostPieces) +
-                  " pieces; the forces are not finite or far too stiff for step = " + short_text(slab.length));
+          throw Error(Failure::numerical,
+                      "the discrete-gradient step does not converge even in " + std::to_string(kMostPieces) +
+                          " pieces; the forces are not finite or far too stiff for step = " + short_text(slab.length));
         continue;
       }
       ended = tau == rest;

@@ -8,8 +8,8 @@
 
 #include <cmath>
 
-#include "engine/contact_scan.h"
 #include "engine/integrators/discrete_gradient.h"
+#include "engine/slabs/contact_scan.h"
 
 namespace carom::integrator {
 

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "engine/contact_scan.h"
 #include "engine/integrators/kicks.h"
+#include "engine/slabs/contact_scan.h"
 
 namespace carom::integrator {
 

@@ -10,8 +10,8 @@
 
 #include <span>
 
-#include "engine/forces.h"
-#include "engine/resting.h"
+#include "engine/forces/forces.h"
+#include "engine/slabs/resting.h"
 
 namespace carom::integrator {
 

@@ -19,14 +19,14 @@
 #include <limits>
 #include <optional>
 
-#include "engine/error.h"
-#include "engine/forces.h"
+#include "engine/base/error.h"
+#include "engine/forces/forces.h"
+#include "engine/forces/stiffness.h"
 #include "engine/integrators/chebyshev.h"
 #include "engine/integrators/extrapolation.h"
 #include "engine/integrators/fold.h"
 #include "engine/integrators/registry.h"
-#include "engine/slab_core.h"
-#include "engine/stiffness.h"
+#include "engine/slabs/slab_core.h"
 
 namespace carom::integrator {
 namespace {

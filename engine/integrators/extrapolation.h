@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
-#include "engine/exchange.h"
-#include "engine/interaction.h"
+#include "engine/base/interaction.h"
+#include "engine/ranks/exchange.h"
 
 namespace carom::integrator {
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "engine/forces.h"
+#include "engine/forces/forces.h"
 
 namespace carom::integrator {
 

@@ -5,10 +5,10 @@
 
 #include <optional>
 
-#include "engine/domains.h"
-#include "engine/error.h"
-#include "engine/event_core.h"
+#include "engine/base/error.h"
+#include "engine/events/event_core.h"
 #include "engine/integrators/registry.h"
+#include "engine/ranks/domains.h"
 
 namespace carom::integrator {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 // What the kick methods share: accelerations a = −M⁻¹∇V at the present positions, and the kick v += s a.
 
-#include "engine/forces.h"
+#include "engine/forces/forces.h"
 
 namespace carom::integrator {
 

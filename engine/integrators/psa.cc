@@ -4,7 +4,7 @@
 
 #include "engine/integrators/kicks.h"
 #include "engine/integrators/registry.h"
-#include "engine/slab_core.h"
+#include "engine/slabs/slab_core.h"
 
 namespace carom::integrator {
 namespace {

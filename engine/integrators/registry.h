@@ -1,7 +1,7 @@
 #pragma once
 // One line an integrator: the declaration that its own file ends in.
 
-#include "engine/integrator.h"
+#include "engine/integrators/integrator.h"
 
 namespace carom::integrator {
 

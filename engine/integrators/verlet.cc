@@ -1,6 +1,6 @@
 // verlet: kick-drift-kick, K(h/2) D(h) K(h/2), for points without hard cores.
 
-#include "engine/forces.h"
+#include "engine/forces/forces.h"
 #include "engine/integrators/kicks.h"
 #include "engine/integrators/registry.h"
 

@@ -2,8 +2,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "engine/calendar.h"
-#include "engine/random.h"
+#include "engine/base/random.h"
+#include "engine/events/calendar.h"
 
 namespace carom {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "engine/cell_grid.h"
+#include "engine/search/cell_grid.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "engine/collision.h"
-#include "engine/contact.h"
-#include "engine/random.h"
+#include "engine/base/random.h"
+#include "engine/events/collision.h"
+#include "engine/events/contact.h"
 
 namespace carom {
 namespace {

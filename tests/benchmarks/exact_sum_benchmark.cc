@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "engine/exact_sum.h"
-#include "engine/random.h"
+#include "engine/base/exact_sum.h"
+#include "engine/base/random.h"
 
 namespace carom {
 namespace {

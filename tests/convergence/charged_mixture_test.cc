@@ -10,8 +10,8 @@
 #include <iostream>
 #include <numbers>
 
-#include "engine/placement.h"
-#include "engine/radial_distribution.h"
+#include "engine/run/radial_distribution.h"
+#include "engine/setup/placement.h"
 #include "tests/convergence/fluid.h"
 
 namespace carom {

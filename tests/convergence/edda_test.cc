@@ -7,7 +7,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "engine/placement.h"
+#include "engine/setup/placement.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

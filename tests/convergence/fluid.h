@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "engine/placement.h"
-#include "engine/random.h"
+#include "engine/base/random.h"
+#include "engine/setup/placement.h"
 #include "tests/convergence/literature.h"
 #include "tests/support/experiments.h"
 

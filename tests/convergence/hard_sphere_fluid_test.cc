@@ -14,7 +14,7 @@
 #include <cmath>
 #include <iostream>
 
-#include "engine/radial_distribution.h"
+#include "engine/run/radial_distribution.h"
 #include "tests/convergence/fluid.h"
 
 namespace carom {

@@ -9,7 +9,7 @@
 
 #include <iostream>
 
-#include "engine/placement.h"
+#include "engine/setup/placement.h"
 #include "tests/convergence/fluid.h"
 
 namespace carom {

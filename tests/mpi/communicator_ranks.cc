@@ -31,7 +31,7 @@
 #include <string>
 #include <thread>
 
-#include "engine/error.h"
+#include "engine/base/error.h"
 #include "parallel/mpi_exchange.h"
 
 namespace {

@@ -4,10 +4,10 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "engine/pair_filter.h"
-#include "engine/placement.h"
-#include "engine/random.h"
-#include "engine/shares.h"
+#include "engine/base/random.h"
+#include "engine/forces/pair_filter.h"
+#include "engine/ranks/shares.h"
+#include "engine/setup/placement.h"
 
 namespace carom::test {
 

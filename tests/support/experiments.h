@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/add_interaction.h"
-#include "engine/simulation.h"
+#include "engine/forces/add_interaction.h"
+#include "engine/run/simulation.h"
 
 namespace carom::test {
 

@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
-#include "engine/error.h"
-#include "engine/exchange.h"
+#include "engine/base/error.h"
+#include "engine/ranks/exchange.h"
 
 namespace carom::test {
 

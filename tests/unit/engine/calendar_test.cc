@@ -1,4 +1,4 @@
-#include "engine/calendar.h"
+#include "engine/events/calendar.h"
 
 #include <gtest/gtest.h>
 

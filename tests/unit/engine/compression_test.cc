@@ -1,11 +1,11 @@
-#include "engine/compression.h"
+#include "engine/setup/compression.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "engine/placement.h"
+#include "engine/setup/placement.h"
 
 namespace carom {
 namespace {

@@ -1,11 +1,11 @@
-#include "engine/contact_scan.h"
+#include "engine/slabs/contact_scan.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "engine/error.h"
+#include "engine/base/error.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

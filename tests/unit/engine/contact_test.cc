@@ -1,11 +1,11 @@
-#include "engine/contact.h"
+#include "engine/events/contact.h"
 
 #include <gtest/gtest.h>
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <random>
 
-#include "engine/collision.h"
+#include "engine/events/collision.h"
 
 namespace carom {
 namespace {

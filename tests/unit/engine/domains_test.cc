@@ -1,10 +1,10 @@
 // A system divided among ranks has the bits of one that is not, whatever the regions and the windows.
 
-#include "engine/domains.h"
+#include "engine/ranks/domains.h"
 
 #include <gtest/gtest.h>
 
-#include "engine/shares.h"
+#include "engine/ranks/shares.h"
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/event_cases.h"
 

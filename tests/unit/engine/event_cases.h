@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstring>
 
-#include "engine/event_core.h"
-#include "engine/placement.h"
-#include "engine/random.h"
+#include "engine/base/random.h"
+#include "engine/events/event_core.h"
+#include "engine/setup/placement.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

@@ -1,14 +1,14 @@
-#include "engine/event_core.h"
+#include "engine/events/event_core.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "engine/collision.h"
-#include "engine/contact.h"
-#include "engine/error.h"
-#include "engine/forces.h"
+#include "engine/base/error.h"
+#include "engine/events/collision.h"
+#include "engine/events/contact.h"
+#include "engine/forces/forces.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "engine/contact.h"
-#include "engine/error.h"
-#include "engine/placement.h"
+#include "engine/base/error.h"
+#include "engine/events/contact.h"
+#include "engine/setup/placement.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

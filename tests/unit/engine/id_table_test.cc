@@ -1,6 +1,6 @@
 // The table of slots by id does what a map does, however ids fall together.
 
-#include "engine/id_table.h"
+#include "engine/ranks/id_table.h"
 
 #include <gtest/gtest.h>
 

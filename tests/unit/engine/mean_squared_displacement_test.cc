@@ -1,11 +1,11 @@
-#include "engine/mean_squared_displacement.h"
+#include "engine/run/mean_squared_displacement.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <map>
 
-#include "engine/random.h"
+#include "engine/base/random.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

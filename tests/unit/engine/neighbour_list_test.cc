@@ -1,4 +1,4 @@
-#include "engine/neighbour_list.h"
+#include "engine/search/neighbour_list.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <set>
 
-#include "engine/error.h"
+#include "engine/base/error.h"
 
 namespace carom {
 namespace {

@@ -1,12 +1,12 @@
 // Observables by their names: all that are declared, and the profile.
 
-#include "engine/observable.h"
+#include "engine/run/observable.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "engine/error.h"
+#include "engine/base/error.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

@@ -1,12 +1,12 @@
 // Methods that share their work among ranks, against themselves on one: every bit.
 
-#include "engine/part.h"
+#include "engine/ranks/part.h"
 
 #include <gtest/gtest.h>
 
-#include "engine/forces.h"
-#include "engine/shares.h"
-#include "engine/simulation.h"
+#include "engine/forces/forces.h"
+#include "engine/ranks/shares.h"
+#include "engine/run/simulation.h"
 #include "tests/support/experiments.h"
 #include "tests/support/thread_ranks.h"
 

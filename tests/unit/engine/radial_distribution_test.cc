@@ -1,12 +1,12 @@
-#include "engine/radial_distribution.h"
+#include "engine/run/radial_distribution.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "engine/error.h"
-#include "engine/random.h"
+#include "engine/base/error.h"
+#include "engine/base/random.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

@@ -5,10 +5,10 @@
 
 #include <cstdlib>
 
-#include "engine/contact.h"
-#include "engine/error.h"
-#include "engine/event_core.h"
-#include "engine/scan_kernel.h"
+#include "engine/base/error.h"
+#include "engine/events/contact.h"
+#include "engine/events/event_core.h"
+#include "engine/search/simd/scan_kernel.h"
 #include "tests/unit/engine/event_cases.h"
 
 namespace carom {

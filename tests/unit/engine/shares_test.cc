@@ -1,11 +1,11 @@
 // Free flight on ranks that have shares of the particles, against one that has all.
 
-#include "engine/shares.h"
+#include "engine/ranks/shares.h"
 
 #include <gtest/gtest.h>
 
-#include "engine/division.h"
-#include "engine/simulation.h"
+#include "engine/ranks/division.h"
+#include "engine/run/simulation.h"
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/event_cases.h"
 

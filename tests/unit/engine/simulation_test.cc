@@ -1,13 +1,13 @@
-#include "engine/simulation.h"
+#include "engine/run/simulation.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "engine/error.h"
-#include "engine/mean_squared_displacement.h"
-#include "engine/radial_distribution.h"
+#include "engine/base/error.h"
+#include "engine/run/mean_squared_displacement.h"
+#include "engine/run/radial_distribution.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

@@ -1,4 +1,4 @@
-#include "io/deck_problems.h"
+#include "io/deck/deck_problems.h"
 
 #include <gtest/gtest.h>
 

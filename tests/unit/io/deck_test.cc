@@ -1,14 +1,14 @@
-#include "io/deck.h"
+#include "io/deck/deck.h"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <numbers>
 
-#include "engine/placement.h"
-#include "engine/shares.h"
-#include "io/deck_source.h"
-#include "io/validate_state.h"
+#include "engine/ranks/shares.h"
+#include "engine/setup/placement.h"
+#include "io/deck/deck_source.h"
+#include "io/deck/validate_state.h"
 #include "tests/support/thread_ranks.h"
 
 namespace carom {

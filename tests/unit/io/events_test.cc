@@ -1,6 +1,6 @@
-#include "io/events.h"
+#include "io/files/events.h"
 
-#include "io/hdf5.h"
+#include "io/files/hdf5.h"
 #include "sample_run.h"
 
 namespace carom {

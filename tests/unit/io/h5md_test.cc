@@ -1,9 +1,9 @@
-#include "io/h5md.h"
+#include "io/files/h5md.h"
 
 #include <cstdint>
 
-#include "engine/error.h"
-#include "io/hdf5.h"
+#include "engine/base/error.h"
+#include "io/files/hdf5.h"
 #include "sample_run.h"
 
 namespace carom {

@@ -1,4 +1,4 @@
-#include "io/options.h"
+#include "io/deck/options.h"
 
 #include <gtest/gtest.h>
 

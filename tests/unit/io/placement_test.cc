@@ -1,4 +1,4 @@
-#include "engine/placement.h"
+#include "engine/setup/placement.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "engine/random.h"
+#include "engine/base/random.h"
 
 namespace carom {
 namespace {

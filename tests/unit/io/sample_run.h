@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "io/deck.h"
+#include "io/deck/deck.h"
 
 namespace carom::test {
 

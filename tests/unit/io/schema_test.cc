@@ -1,12 +1,12 @@
-#include "io/schema.h"
+#include "io/deck/schema.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "engine/integrator.h"
-#include "engine/interaction.h"
-#include "engine/observable.h"
+#include "engine/base/interaction.h"
+#include "engine/integrators/integrator.h"
+#include "engine/run/observable.h"
 
 namespace carom {
 namespace {

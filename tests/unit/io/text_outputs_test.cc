@@ -7,12 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "io/log.h"
-#include "io/output_directory.h"
-#include "io/progress.h"
-#include "io/summary.h"
-#include "io/text_file.h"
-#include "io/thermo.h"
+#include "io/files/log.h"
+#include "io/files/output_directory.h"
+#include "io/files/progress.h"
+#include "io/files/summary.h"
+#include "io/files/text_file.h"
+#include "io/files/thermo.h"
 #include "sample_run.h"
 
 namespace carom {

@@ -13,7 +13,7 @@
 #include <cstdio>
 #include <random>
 
-#include "engine/potentials/potential.h"
+#include "engine/forces/potentials/potential.h"
 #include "tests/unit/potentials/precise.h"
 
 namespace carom::test {

@@ -1,15 +1,15 @@
 // Cut potentials: accuracy against 50 digits, also for pairs that cross the cutoff or the start of the switch, and
 // continuity there.
 
-#include "engine/potentials/cut.h"
+#include "engine/forces/potentials/cut.h"
 
 #include <boost/math/special_functions/erf.hpp>
 
-#include "engine/potentials/damped_coulomb.h"
-#include "engine/potentials/inverse_power.h"
-#include "engine/potentials/lennard_jones.h"
-#include "engine/potentials/tail.h"
-#include "engine/potentials/yukawa.h"
+#include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/inverse_power.h"
+#include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/tail.h"
+#include "engine/forces/potentials/yukawa.h"
 #include "tests/unit/potentials/accuracy.h"
 
 namespace carom {

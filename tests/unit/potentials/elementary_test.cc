@@ -1,6 +1,6 @@
 // The elementary functions against 50-digit arithmetic: errors in ulps over their whole range, and the special cases.
 
-#include "engine/elementary.h"
+#include "engine/base/elementary.h"
 
 #include <gtest/gtest.h>
 

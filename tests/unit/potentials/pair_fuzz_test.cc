@@ -9,9 +9,9 @@
 #include <random>
 #include <regex>
 
-#include "engine/error.h"
-#include "engine/forces.h"
-#include "engine/pair_kernels.h"
+#include "engine/base/error.h"
+#include "engine/forces/forces.h"
+#include "engine/forces/simd/pair_kernels.h"
 #include "tests/support/experiments.h"
 
 namespace carom {

@@ -2,13 +2,13 @@
 
 #include <cstdlib>
 
-#include "engine/error.h"
-#include "engine/forces.h"
-#include "engine/pair_kernels.h"
-#include "engine/potentials/cut.h"
-#include "engine/potentials/inverse_distance.h"
-#include "engine/potentials/lennard_jones.h"
-#include "engine/potentials/yukawa.h"
+#include "engine/base/error.h"
+#include "engine/forces/forces.h"
+#include "engine/forces/potentials/cut.h"
+#include "engine/forces/potentials/inverse_distance.h"
+#include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/yukawa.h"
+#include "engine/forces/simd/pair_kernels.h"
 #include "tests/unit/potentials/cases.h"
 
 namespace carom {

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "engine/error.h"
-#include "engine/potentials/lennard_jones.h"
+#include "engine/base/error.h"
+#include "engine/forces/potentials/lennard_jones.h"
 #include "tests/unit/potentials/scene.h"
 
 namespace carom {

@@ -2,13 +2,13 @@
 
 #include <boost/math/special_functions/erf.hpp>
 
-#include "engine/potentials/damped_coulomb.h"
-#include "engine/potentials/harmonic_bond.h"
-#include "engine/potentials/inverse_distance.h"
-#include "engine/potentials/inverse_power.h"
-#include "engine/potentials/lennard_jones.h"
-#include "engine/potentials/wca.h"
-#include "engine/potentials/yukawa.h"
+#include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/harmonic_bond.h"
+#include "engine/forces/potentials/inverse_distance.h"
+#include "engine/forces/potentials/inverse_power.h"
+#include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/wca.h"
+#include "engine/forces/potentials/yukawa.h"
 #include "tests/unit/potentials/accuracy.h"
 
 namespace carom {

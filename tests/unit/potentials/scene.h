@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/interaction.h"
-#include "engine/pair_filter.h"
+#include "engine/base/interaction.h"
+#include "engine/forces/pair_filter.h"
 
 namespace carom::test {
 

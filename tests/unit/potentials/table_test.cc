@@ -1,9 +1,9 @@
 // Potentials given by points: the spline against 50 digits, its continuity, pairs that cross knots, and both ends.
 
-#include "engine/potentials/table.h"
+#include "engine/forces/potentials/table.h"
 
-#include "engine/potentials/cut.h"
-#include "engine/potentials/lennard_jones.h"
+#include "engine/forces/potentials/cut.h"
+#include "engine/forces/potentials/lennard_jones.h"
 #include "tests/unit/potentials/accuracy.h"
 
 namespace carom {

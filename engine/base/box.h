@@ -1,0 +1,62 @@
+#pragma once
+// The simulation box: a rectangle or cuboid from the origin to `edges`, with a boundary rule for each axis.
+
+#include <array>
+#include <cmath>
+
+#include "engine/base/vec.h"
+
+namespace carom {
+
+enum class Boundary : std::uint8_t {
+  wall,      ///< hard, elastic: a sphere touches it when its centre is a radius away
+  periodic,  ///< what leaves on one side comes in on the other
+  open       ///< nothing there; the edge is only where the box is drawn
+};
+
+template <int D>
+struct Box {
+  Vec<D> edges = Vec<D>::Ones();  ///< [length]
+  std::array<Boundary, D> boundary{};
+
+  bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
+  bool walled(int axis) const { return boundary[axis] == Boundary::wall; }
+  double volume() const { return edges.prod(); }
+
+  /// The image of `d`, a difference of two positions, nearest to the origin: how many box edges to add on each axis.
+  Image<D> nearest_image(const Vec<D>& d) const {
+    Image<D> image{};
+    for (int k = 0; k < D; ++k)
+      if (periodic(k) && !(std::abs(d[k]) <= 0.5 * edges[k]))  // else the quotient rounds to zero
+        image[k] = -static_cast<std::int32_t>(std::nearbyint(d[k] / edges[k]));
+    return image;
+  }
+
+  /// The displacement that an image stands for.
+  Vec<D> shift(const Image<D>& image) const {
+    Vec<D> s;
+    for (int k = 0; k < D; ++k) s[k] = image[k] == 0 ? 0.0 : image[k] * edges[k];
+    return s;
+  }
+
+  /// Brings a position back into [0, edge) along the periodic axes and counts the crossings in `image`.
+  /// Returns whether anything changed.
+  bool wrap(Vec<D>& x, Image<D>& image) const {
+    bool moved = false;
+    for (int k = 0; k < D; ++k) {
+      if (!periodic(k) || (x[k] >= 0 && x[k] < edges[k])) continue;
+      const double crossings = std::floor(x[k] / edges[k]);
+      if (crossings == 0) continue;
+      x[k] -= crossings * edges[k];
+      image[k] += static_cast<std::int32_t>(crossings);
+      if (x[k] >= edges[k]) {  // a tiny negative x rounds up to the edge itself
+        x[k] = 0;
+        image[k] += 1;
+      }
+      moved = true;
+    }
+    return moved;
+  }
+};
+
+}  // namespace carom

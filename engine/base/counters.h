@@ -1,0 +1,59 @@
+#pragma once
+// What an integrator counts while it works, and where its time went. None of it reaches the physics.
+
+#include <chrono>
+#include <cstdint>
+#include <utility>
+
+#include "engine/base/event_counts.h"
+#include "engine/base/exact_sum.h"
+
+namespace carom {
+
+struct Counters {
+  std::uint64_t sphere_sphere = 0;  ///< executed pair collisions
+  std::uint64_t sphere_wall = 0;    ///< executed wall collisions
+  double force_passes = 0;   ///< pair evaluations of forces and their kin / interacting pairs; energies not counted
+  std::uint64_t sweeps = 0;  ///< iterations of implicit solves
+  std::uint64_t pieces = 0;  ///< edda: in which steps were solved; more than the steps where one was cut
+  std::uint64_t slabs_halved = 0;
+  std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; edda: searches for the highest frequency
+  std::uint64_t frozen = 0;        ///< edda: particles that kept an acceleration of an earlier sweep
+  double folded = 0;               ///< edda: Σ|r| of what was folded into velocities [energy]
+  std::uint64_t divisions = 0;     ///< of the particles among ranks under forces
+  std::uint64_t slabs_again = 0;   ///< done again, with more particles known
+  std::uint64_t slabs_by_all = 0;  ///< of these, with all particles known
+  double max_overlap = 0;          ///< deepest overlap met, relative to the contact distance
+  ExactSum collision_virial;       ///< Σ d·impulse over pair collisions [mass·length²/time]
+  EventCounts events;              ///< of the event core, at the end of the last slab; 0 where a method has none
+  DomainCounts domains;            ///< of the regions of this rank; 0 where there is one
+
+  struct Seconds {
+    double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;
+  } seconds;
+};
+
+/// Adds the time of its own life to a total, but for what others have measured meanwhile.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& total)
+      : total_(total), outer_(std::exchange(running_, this)), start_(std::chrono::steady_clock::now()) {}
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+  ~Stopwatch() {
+    const double life = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    total_ += life - within_;
+    if (outer_) outer_->within_ += life;
+    running_ = outer_;
+  }
+
+ private:
+  inline static thread_local Stopwatch* running_ = nullptr;
+
+  double& total_;
+  double within_ = 0;  // measured by others
+  Stopwatch* outer_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+}  // namespace carom

@@ -1,0 +1,12 @@
+#include "engine/base/elementary.h"
+
+namespace carom::elementary {
+
+double exp(double x) { return formula::exp(x); }
+double expm1(double x) { return formula::expm1(x); }
+double log(double x) { return formula::log(x); }
+double log1p(double x) { return formula::log1p(x); }
+double pow(double x, double y) { return formula::pow(x, y); }
+double erfc(double x) { return formula::erfc(x); }
+
+}  // namespace carom::elementary

@@ -1,0 +1,116 @@
+#pragma once
+// Sums of forces in fixed point: integers, so that the order of the terms does not matter.
+//
+// Each component of each force is rounded to a multiple of a quantum, a power of two that is constant in a run
+// (quanta() in forces.h). Forces of pairs then cancel exactly in the sum over all particles. A sum has a low word, and
+// a high one for forces that are too large for it: the value is (2^40 high + low) quanta whichever pair took which.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "engine/base/force_words.h"
+#include "engine/base/vec.h"
+
+namespace carom {
+
+template <int D>
+class ForceSums {
+ public:
+  __extension__ using Whole = __int128;
+
+  ForceSums() = default;
+  ForceSums(std::size_t particles, double quantum) { reset(particles, quantum); }
+
+  /// All zero. `quantum`: a power of two [force].
+  void reset(std::size_t particles, double quantum) {
+    low_.assign(particles, {});
+    high_.clear();
+    quantum_ = quantum;
+    used_low_ = used_high_ = 0;
+    spoiled_ = false;
+  }
+  std::size_t size() const { return low_.size(); }
+  double quantum() const { return quantum_; }
+
+  /// Makes room for adding at most so many forces to any particle, and says how large each may be.
+  ForceLimits make_room(std::size_t forces) {
+    const double count = static_cast<double>(forces < 1 ? 1 : forces);
+    const auto half = [&](double room) { return std::exp2(std::floor(std::log2(room / 2 / count))); };
+    const ForceLimits limits{std::fmin(kMostInLow, half(kForceRoom)),
+                             std::fmin(kMostInHigh, half(kForceRoom - used_high_))};
+    const double low = count * std::fmax(limits.low, 0x1p39);
+    if (used_low_ + low > kForceRoom) carry();
+    used_low_ += low;
+    used_high_ += count * limits.high;
+    return limits;
+  }
+  /// Whether more passes may add to them: not after some hundred without reset(), nor where they are spoiled.
+  bool has_room() const { return !spoiled_ && used_high_ < kForceRoom / 2; }
+
+  /// The words themselves, to add to after make_room(); high() makes them where there were none.
+  ForceWords* low() { return low_.data(); }
+  ForceWords* high() {
+    if (high_.empty()) high_.resize(low_.size());
+    return high_.data();
+  }
+
+  /// Adds a force on one particle, for which there is room. False where it is too large or no number.
+  bool add(Id i, const Vec<D>& force, const ForceLimits& limits) {
+    for (int k = 0; k < D; ++k) {
+      const double quanta = force[k] / quantum_;
+      if (std::abs(quanta) < limits.low) {
+        low_[i].of[k] += static_cast<std::int64_t>(std::nearbyint(quanta));
+        continue;
+      }
+      const double upper = std::nearbyint(quanta * 0x1p-40);
+      if (!(std::abs(upper) < limits.high)) return false;
+      high()[i].of[k] += static_cast<std::int64_t>(upper);
+      low_[i].of[k] += static_cast<std::int64_t>(std::nearbyint(quanta - upper * 0x1p40));
+    }
+    return true;
+  }
+  /// Some force could not be added: all values are no numbers until reset().
+  void spoil() { spoiled_ = true; }
+
+  /// The force on a particle, rounded once.
+  Vec<D> value(Id i) const {
+    Vec<D> force;
+    if (spoiled_) return Vec<D>::Constant(std::numeric_limits<double>::quiet_NaN());
+    for (int k = 0; k < D; ++k)
+      force[k] = quantum_ * (high_.empty() ? static_cast<double>(low_[i].of[k])
+                                           : static_cast<double>(whole(high_[i].of[k], low_[i].of[k])));
+    return force;
+  }
+  /// The same in quanta.
+  std::array<Whole, D> quanta(Id i) const {
+    std::array<Whole, D> sum;
+    for (int k = 0; k < D; ++k) sum[k] = whole(high_.empty() ? 0 : high_[i].of[k], low_[i].of[k]);
+    return sum;
+  }
+
+ private:
+  static Whole whole(std::int64_t high, std::int64_t low) { return (static_cast<Whole>(high) << kHighShift) + low; }
+
+  /// Empties the low words into the high ones.
+  void carry() {
+    high();
+    for (std::size_t i = 0; i < low_.size(); ++i)
+      for (int k = 0; k < 4; ++k) {
+        const std::int64_t upper = (low_[i].of[k] + (std::int64_t{1} << (kHighShift - 1))) >> kHighShift;
+        high_[i].of[k] += upper;
+        low_[i].of[k] -= upper << kHighShift;
+      }
+    used_low_ = 0x1p40;
+    used_high_ += 0x1p24;
+  }
+
+  std::vector<ForceWords> low_, high_;  // high_: empty while there are none
+  double quantum_ = 1;
+  bool spoiled_ = false;
+  double used_low_ = 0, used_high_ = 0;  // bounds of the sums [quanta]
+};
+
+}  // namespace carom

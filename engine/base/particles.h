@@ -1,0 +1,64 @@
+#pragma once
+// The particles of a run, in the order of their ids, as integrators and observers see them: all at the same time.
+//
+// Where several ranks share a system (engine/ranks/part.h) each has the particles it owns and copies of others, ghosts.
+// It may have only some of all then: their numbers here follow the order of their ids.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "engine/base/vec.h"
+
+namespace carom {
+
+/// What Particles::add() takes.
+template <int D>
+struct Particle {
+  Vec<D> x;                   ///< position of the centre [length]
+  Vec<D> v = Vec<D>::Zero();  ///< velocity [length/time]
+  double radius = 0.5;        ///< of the hard core [length]
+  double mass = 1;            ///< [mass]
+  double charge = 0;          ///< [charge]
+  std::uint16_t species = 0;  ///< index into System::species
+};
+
+template <int D>
+struct Particles {
+  std::vector<Vec<D>> x;               ///< position of the centre [length]
+  std::vector<Vec<D>> v;               ///< velocity [length/time]
+  std::vector<double> mass;            ///< [mass], positive
+  std::vector<double> radius;          ///< of the hard core [length], positive
+  std::vector<double> charge;          ///< [charge]
+  std::vector<std::uint16_t> species;  ///< index into System::species
+  std::vector<Image<D>> image;  ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
+  std::vector<char> ghost{};    ///< 1: another rank owns it; empty: there are no others
+  std::vector<Id> id{};         ///< ascending; empty: 0, 1, …
+
+  std::size_t size() const { return x.size(); }
+  /// Appends a particle; returns its id.
+  Id add(const Particle<D>& particle) {
+    x.push_back(particle.x);
+    v.push_back(particle.v);
+    mass.push_back(particle.mass);
+    radius.push_back(particle.radius);
+    charge.push_back(particle.charge);
+    species.push_back(particle.species);
+    image.push_back({});
+    return static_cast<Id>(x.size() - 1);
+  }
+  bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
+  Id id_of(Id i) const { return id.empty() ? i : id[i]; }
+};
+
+/// Throws Error(Failure::numerical) where one of these positions of the particles is not finite.
+template <int D>
+void need_finite(const Particles<D>& particles, std::span<const Vec<D>> x) {
+  for (Id i = 0; i < x.size(); ++i)
+    if (!x[i].allFinite())
+      throw Error(Failure::numerical, "the position of particle " + std::to_string(particles.id_of(i)) +
+                                          " is not finite; use a smaller integrator.step");
+}
+
+}  // namespace carom

@@ -1,0 +1,81 @@
+#pragma once
+// What the event core knows of one sphere, and how it writes down a neighbour.
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+
+#include "engine/base/error.h"
+#include "engine/base/vec.h"
+
+namespace carom {
+
+/// A particle's place in the core's arrays. Ids are for ever; slots change whenever the core sorts its particles.
+using Slot = std::uint32_t;
+
+/// The state of a sphere right after its last event. One cache line; the kernels of scan.h rely on the layout.
+template <int D>
+struct alignas(64) Record {
+  Vec<D> x;  ///< not wrapped within a slab
+  Vec<D> v;
+  double t;  ///< of the last event, since the start of the slab
+  Id id;
+  std::uint16_t generation;
+  std::uint16_t species;
+};
+static_assert(sizeof(Record<3>) == 64 && offsetof(Record<3>, v) == 24 && offsetof(Record<3>, t) == 48);
+static_assert(sizeof(Record<2>) == 64 && offsetof(Record<2>, v) == 16 && offsetof(Record<2>, t) == 32);
+
+/// The error where an image does not fit into the bits of a candidate.
+[[noreturn]] inline void throw_too_far() {
+  throw Error(Failure::numerical,
+              "spheres fly through too many periodic boxes in one epoch; give integrator.step a smaller value");
+}
+
+/// A candidate for a contact in 31 bits: the slot in the low bits, above it the image as a number of few bits an axis.
+/// The last bit is for lists of them. Images are also handled as one integer, `linear`: its sums and differences are
+/// those of the images.
+template <int D>
+class Packing {
+ public:
+  Packing() = default;
+  explicit Packing(std::size_t particles) {
+    slot_bits = std::max(1, static_cast<int>(std::bit_width(particles)));
+    field_bits = std::min(10, (31 - slot_bits) / D);
+    if (field_bits < 2) throw Error(Failure::deck, "too many particles for one event core");
+    slot_mask = (std::uint32_t{1} << slot_bits) - 1;
+    for (int k = 0; k < D; ++k) bias |= 1 << (field_bits * (k + 1) - 1);
+  }
+
+  std::int32_t largest() const { return (1 << (field_bits - 1)) - 1; }  ///< boxes along an axis
+  bool fits(const Image<D>& image) const {
+    return std::all_of(image.begin(), image.end(), [&](auto n) { return std::abs(n) <= largest(); });
+  }
+  std::int32_t linear(const Image<D>& image) const {
+    std::int32_t sum = 0;
+    for (int k = 0; k < D; ++k) sum += image[k] * (1 << (field_bits * k));
+    return sum;
+  }
+  std::uint32_t pack(Slot slot, std::int32_t linear_image) const {
+    return slot | static_cast<std::uint32_t>(linear_image + bias) << slot_bits;
+  }
+  Slot slot(std::uint32_t candidate) const { return candidate & slot_mask; }
+  std::int32_t linear(std::uint32_t candidate) const {
+    return static_cast<std::int32_t>(candidate >> slot_bits) - bias;
+  }
+  Image<D> image(std::uint32_t candidate) const {
+    Image<D> image;
+    const std::uint32_t code = candidate >> slot_bits;
+    for (int k = 0; k < D; ++k)
+      image[k] = static_cast<std::int32_t>(code >> (field_bits * k) & ((1u << field_bits) - 1)) - largest() - 1;
+    return image;
+  }
+  /// The same pair as its other partner `self` writes it down.
+  std::uint32_t reversed(Slot self, std::uint32_t candidate) const { return pack(self, -linear(candidate)); }
+
+  int slot_bits = 1, field_bits = 2;
+  std::uint32_t slot_mask = 1;
+  std::int32_t bias = 0;
+};
+
+}  // namespace carom

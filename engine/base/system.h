@@ -1,0 +1,66 @@
+#pragma once
+// The particles and what acts on them: the state that an integrator advances.
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/base/box.h"
+#include "engine/base/interaction.h"
+#include "engine/base/particles.h"
+#include "engine/base/sizes.h"
+
+namespace carom {
+
+class Exchange;
+template <int D>
+class Part;
+
+/// The units in which forces and energies of pairs are rounded: constants of a run, powers of two.
+struct Quanta {
+  double force = 0;   ///< 2^-44 of the smallest scale of the forces of all terms [force]; 0: not determined
+  double energy = 0;  ///< 2^-46 of the smallest scale of their energies [energy]
+};
+
+/// Lives on the heap and is never moved: interactions refer to its box and particles.
+template <int D>
+struct System {
+  System() = default;
+  System(const System&) = delete;
+  System& operator=(const System&) = delete;
+
+  Box<D> box;
+  Particles<D> particles;
+  std::vector<std::string> species;  ///< names; empty: a run gives them
+  std::vector<std::unique_ptr<Interaction<D>>> interactions;
+  Exchange* ranks = nullptr;   ///< that advance this system together; null: one
+  std::optional<Sizes> sizes;  ///< of all particles, where each rank has only its share of them (engine/ranks/shares.h)
+  Quanta quanta{};             ///< set before the first force pass
+  Part<D>* part = nullptr;     ///< what this rank does of it, where they share the work on forces
+
+  /// How many particles there are, on all ranks together, also while they are in the cores.
+  std::size_t size() const { return sizes ? sizes->spheres : particles.mass.size(); }
+
+  /// Whether nothing changes the total momentum: no wall, no field.
+  bool keeps_momentum() const {
+    for (int k = 0; k < D; ++k)
+      if (box.walled(k)) return false;
+    return std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
+  }
+
+  /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
+  void wrap();
+
+  /// Throws Error(Failure::initial_state) where arrays of the particles differ in length, or a value cannot be:
+  /// positions or velocities that are not finite, masses, radii or edges that are not positive, unknown species.
+  void check() const;
+};
+
+template <int D>
+void System<D>::wrap() {
+  for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i]);
+}
+
+}  // namespace carom

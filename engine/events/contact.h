@@ -1,0 +1,127 @@
+#pragma once
+// When do two spheres, or a sphere and a wall, touch? Pure functions of the relative motion.
+//
+// d = x_i − x_j is the separation of the centres (of the image that is meant), v and a its rates, sigma = r_i + r_j the
+// contact distance. Times count from now. A contact is the first instant at which the gap is not positive and falling:
+// spheres that overlap by rounding and part are left alone, spheres that overlap and approach touch at once.
+//
+//   const double s = contact_time(d, v, sigma, slack);            // straight flights
+//   const double s = contact_time(d, v, sigma, w, slack);         // straight flights of spheres that grow
+//   const double s = contact_time(d, v, a, sigma, rest, slack);   // parabolas, sought in [0, rest)
+//
+// Approach slower than `slack` (rounding of the velocities, see approach_slack) does not count for pairs that touch:
+// no impulse could change it, and a contact that changes nothing would come again for ever.
+
+#include <cmath>
+
+#include "engine/base/vec.h"
+#include "engine/events/polynomial.h"
+
+namespace carom {
+
+/// Rounding level of d·v for two touching spheres with velocities of the given sizes.
+inline double approach_slack(double sigma, double speed_i, double speed_j) {
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  return 8 * kEpsilon * sigma * (speed_i + speed_j);
+}
+
+/// Gaps smaller than this count as touching: max(1e-13 contact distances, 4 ulp of the box) [length].
+class GapTolerance {
+ public:
+  explicit GapTolerance(double largest_edge) : least_(4 * (std::nextafter(largest_edge, kNever) - largest_edge)) {}
+  double operator()(double sigma) const { return std::max(1e-13 * sigma, least_); }
+
+ private:
+  double least_;
+};
+
+/// |d × v|², the squared area that d and v span. Unlike d²v² − (d·v)² it has no cancellation.
+template <int D>
+double squared_cross(const Vec<D>& d, const Vec<D>& v) {
+  const double z = d[0] * v[1] - d[1] * v[0];
+  if constexpr (D == 2) return z * z;
+  if constexpr (D == 3) {
+    const double x = d[1] * v[2] - d[2] * v[1], y = d[2] * v[0] - d[0] * v[2];
+    return x * x + y * y + z * z;
+  }
+}
+
+/// Straight relative motion: the smaller root of |d + v s|² = sigma², in the form that does not cancel.
+template <int D>
+double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double slack) {
+  const double b = d.dot(v);
+  if (b >= 0) return kNever;
+  const double c = d.squaredNorm() - sigma * sigma;
+  if (c <= 0) return b < -slack ? 0.0 : kNever;
+  const double discriminant = v.squaredNorm() * sigma * sigma - squared_cross<D>(d, v);
+  if (discriminant <= 0) return kNever;
+  return c / (std::sqrt(discriminant) - b);
+}
+
+/// The same for spheres that grow: the first s ≥ 0 with |d + v s| = sigma + w s, where w ≥ 0 is the rate of the contact
+/// distance (Lubachevsky, Stillinger, J. Stat. Phys. 60 (1990) 561). With w = 0 the bits are those of the function
+/// above.
+///
+/// With A = v² − w², b = d·v − sigma w and c = d² − sigma² the squared gap is c + 2 b s + A s². Growth catches up even
+/// with spheres that part, where A < 0. Spheres that touch and part have A ≥ 0 and never meet again.
+template <int D>
+double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double w, double slack) {
+  const double dv = d.dot(v), b = dv - sigma * w;
+  const double outrun = v.squaredNorm() - w * w;
+  if (b >= 0 && outrun >= 0) return kNever;
+  const double c = d.squaredNorm() - sigma * sigma;
+  if (c <= 0) return b < -slack ? 0.0 : kNever;
+  const double discriminant =
+      v.squaredNorm() * sigma * sigma - squared_cross<D>(d, v) + w * (w * d.squaredNorm() - 2 * sigma * dv);
+  if (discriminant <= 0) return kNever;
+  const double root = std::sqrt(discriminant);
+  return b < 0 ? c / (root - b) : (b + root) / -outrun;  // of the two forms of one root the one that does not cancel
+}
+
+/// Parabolic relative motion d + v s + a s²/2, sought in [0, rest). `touching` divides out the root s = 0 of a pair in
+/// contact. The time is 0 for a pair that touches and approaches, and for one that touches, rests and is pressed
+/// together.
+template <int D>
+double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double rest, bool touching,
+                    double slack) {
+  const double c0 = d.squaredNorm() - sigma * sigma;
+  const double b = d.dot(v);
+  if (!touching) {  // most pairs are too far away to meet: distance against the length of the path
+    const double path = rest * (v.norm() + 0.5 * rest * a.norm());
+    if (c0 > 0 && path * (path + 2 * sigma) < c0) return kNever;
+  }
+  const Polynomial<4> gap{{c0, 2 * b, v.squaredNorm() + d.dot(a), v.dot(a), 0.25 * a.squaredNorm()}};
+  double s;
+  if (touching) {
+    if (b < -slack) return 0;
+    const double departing = b <= slack ? 0.0 : 2 * b;
+    s = first_fall(Polynomial<3>{{departing, gap.c[2], gap.c[3], gap.c[4]}}, rest);
+  } else {
+    s = first_fall(gap, rest);
+  }
+  if (s == 0 || s == kNever) return s;
+  const Vec<D> at = d + s * v + (0.5 * s * s) * a;  // polish on the vectors themselves
+  const double falling = at.dot(v + s * a);
+  if (falling < 0) {
+    const double correction = 0.5 * (at.squaredNorm() - sigma * sigma) / falling;
+    if (std::abs(correction) < 1e-6 * s) s -= correction;
+  }
+  return s < rest ? s : kNever;
+}
+
+/// A sphere and a wall: gap + v s + a s²/2, v and a along the wall's inward normal, sought in [0, rest).
+inline double wall_contact_time(double gap, double v, double a, double rest, bool touching, double slack) {
+  if (touching) {
+    if (v < -slack) return 0;
+    if (a >= 0) return kNever;
+    const double s = v <= slack ? 0.0 : -2 * v / a;
+    return s < rest ? s : kNever;
+  }
+  if (a == 0) {
+    const double s = v < 0 ? gap / -v : kNever;
+    return s < rest ? s : kNever;
+  }
+  return first_fall(Polynomial<2>{{gap, v, 0.5 * a}}, rest);
+}
+
+}  // namespace carom

@@ -1,0 +1,446 @@
+#include "engine/events/event_core.h"
+
+#include <bit>
+#include <string>
+
+#include "engine/base/error.h"
+#include "engine/events/contact.h"
+
+namespace carom {
+template <int D>
+EventCore<D>::EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options)
+    : box_(box), sizes_(sizes), flights_(box), options_(options), kernels_(scan_kernels()), tuning_(options) {
+  for (int k = 0; k < D; ++k) walled_ = walled_ || box.walled(k);
+}
+
+template <int D>
+EventCore<D>::~EventCore() = default;
+
+template <int D>
+bool EventCore<D>::stale(const Agenda<D>& a) const {
+  return a.kind == EventKind::pair && agenda_[packing_.slot(a.partner)].version != a.partner_version;
+}
+
+/// Of the contact that is planned.
+template <int D>
+std::uint32_t EventCore<D>::generation_of(Slot i) const {
+  const Agenda<D>& a = agenda_[i];
+  const std::uint32_t own = flights_.generation_at(i, a.contact);
+  if (a.kind == EventKind::wall) return own;
+  return std::max(own, flights_.generation_at(packing_.slot(a.partner), a.contact));
+}
+
+template <int D>
+EventKey<D> EventCore<D>::key_of(Slot i) const {
+  const Agenda<D>& a = agenda_[i];
+  const Record<D>& r = flights_[i];
+  if (a.kind == EventKind::wall)
+    return {.time = a.contact, .generation = generation_of(i), .kind = a.kind, .lo = r.id, .hi = a.partner};
+  const Id other = flights_[packing_.slot(a.partner)].id;
+  return pair_key<D>(a.contact, generation_of(i), r.id, other, packing_.image(a.partner));
+}
+
+template <int D>
+typename EventCore<D>::Tied EventCore<D>::tie(Slot i) const {
+  const Agenda<D>& a = agenda_[i];
+  if (a.update < a.contact) return {Tied::Rank::update, EventKey<D>{.lo = flights_[i].id}, i};
+  return {stale(a) ? Tied::Rank::stale : Tied::Rank::contact, key_of(i), i};
+}
+
+/// Whether two spheres plan the same contact, and it still holds.
+template <int D>
+bool EventCore<D>::mirrored(Slot i, Slot j) const {
+  const Agenda<D>&a = agenda_[i], &b = agenda_[j];
+  return a.kind == EventKind::pair && b.kind == EventKind::pair && b.contact == a.contact && a.contact <= a.update &&
+         b.contact <= b.update && packing_.slot(a.partner) == j && b.partner == packing_.reversed(i, a.partner) &&
+         !stale(a) && !stale(b);
+}
+
+/// The next event before `end`: the smallest time, and of equal times the smallest key.
+template <int D>
+bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
+  const auto holds = [&](const CalendarEntry& entry) { return agenda_[entry.slot].due() == entry.time; };
+  for (;;) {
+    if (tied_.empty()) {
+      const CalendarEntry* const top = calendar_.top(holds);
+      if (!top || top->time >= end) return false;
+      const CalendarEntry entry = *top;
+      calendar_.pop();
+      if (!holds(entry)) {
+        ++counts_.dropped;
+        continue;
+      }
+      slot = entry.slot;
+      time = entry.time;
+      if (!calendar_.more_at(time)) return true;
+      settle();  // from here on it matters which plans are stale
+      // Often it is the same contact, planned by both partners: the other's plan falls with this one.
+      Slot other = slot;
+      if (const CalendarEntry* const next = calendar_.top(holds); mirrored(slot, next->slot)) {
+        other = next->slot;
+        calendar_.pop();
+        if (!calendar_.more_at(time)) return true;
+      }
+      tied_.push(tie(slot));
+      if (other != slot) tied_.push(tie(other));
+      tied_time_ = time;
+    }
+    settle();
+    time = tied_time_;
+    while (calendar_.more_at(time)) {
+      const CalendarEntry* const top = calendar_.top(holds);
+      if (holds(*top)) tied_.push(tie(top->slot));
+      calendar_.pop();
+    }
+    const Tied first = tied_.top();
+    tied_.pop();
+    slot = first.slot;
+    if (agenda_[slot].due() != time) continue;  // its plans have changed, and its new ones are in the calendar
+    const Tied now = tie(slot);
+    if (now == first) return true;
+    tied_.push(now);  // what it plans has another place among these: its partner has collided
+  }
+}
+
+/// A contact holds while its partner's version is the one it was planned with. Versions are read an event after the
+/// plans were made, because they come from memory.
+template <int D>
+void EventCore<D>::settle() {
+  for (; planned_ > 0; --planned_) {
+    Agenda<D>& a = agenda_[just_planned_[planned_ - 1]];
+    if (a.kind == EventKind::pair) a.partner_version = agenda_[packing_.slot(a.partner)].version;
+  }
+}
+
+template <int D>
+double EventCore<D>::run(double end, const Report& report) {
+  Slot i;
+  double now;
+  while (next_event(end, i, now)) {
+    now_ = now;
+    if (!small_) prefetch_upcoming();
+    settle();
+    Agenda<D>& a = agenda_[i];
+    if (a.update < a.contact) {
+      update(i, now);
+      continue;
+    }
+    if (stale(a)) {
+      ++counts_.stale;
+      predict(i, now);
+      continue;
+    }
+    ++since_sort_;
+    const std::uint32_t generation = generation_of(i);
+    if (generation > std::numeric_limits<std::uint16_t>::max())
+      throw Error(Failure::numerical,
+                  partners(key_of(i)) + " collide without end at one instant; separate the spheres that touch there");
+    if (++events_ > report.max_events)
+      throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
+                                          " collisions in one step, the last between " + partners(key_of(i)) +
+                                          "; use a smaller step or raise integrator.max_events_per_step");
+    if (a.kind == EventKind::wall) {
+      collide_wall(i, now, generation, report);
+      predict(i, now);
+      continue;
+    }
+    const Slot j = packing_.slot(a.partner);
+    collide_pair(i, now, generation, report);
+    predict_two(i, j, now);
+    if (report.counters.sphere_sphere >= report.collision_limit) {
+      settle();
+      return now;
+    }
+  }
+  settle();
+  return end;
+}
+
+template <int D>
+void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
+  copies.x.resize(flights_.size());
+  copies.v.resize(flights_.size());
+  for (Slot i = 0; i < flights_.size(); ++i) {
+    const Record<D> r = flights_.at(i, time);
+    copies.x[r.id] = r.x;
+    copies.v[r.id] = r.v;
+  }
+}
+
+/// Finds the next contact of a sphere after a change of its record, or its partner's, and puts it into the calendar.
+template <int D>
+void EventCore<D>::predict(Slot i, double now) {
+  foresee(i, now);
+  schedule(i);
+}
+
+template <int D>
+void EventCore<D>::foresee(Slot i, double now) {
+  ++counts_.predictions;
+  Agenda<D>& a = agenda_[i];
+  a.contact = kNever;
+  if (lists_) {
+    predict_pairs({i, lists_->candidates(a), a.count, a.same}, flights_[i].t == now);
+  } else {
+    cells_->around(i, a.where.cell, found_);
+    predict_pairs({i, found_.packed.data(), found_.count, found_.same}, flights_[i].t == now);
+  }
+  if (walled_) predict_walls(i);
+  predict_update(i, now);
+}
+
+/// The same for two spheres that have just collided.
+template <int D>
+void EventCore<D>::predict_two(Slot i, Slot j, double now) {
+  counts_.predictions += 2;
+  Agenda<D>&a = agenda_[i], &b = agenda_[j];
+  ScanTask task[2];
+  if (lists_) {
+    task[0] = {i, lists_->candidates(a), a.count, a.same};
+    task[1] = {j, lists_->candidates(b), b.count, b.same};
+  } else {
+    cells_->around(i, a.where.cell, found_);
+    cells_->around(j, b.where.cell, others_);
+    task[0] = {i, found_.packed.data(), found_.count, found_.same};
+    task[1] = {j, others_.packed.data(), others_.count, others_.same};
+  }
+  counts_.candidates += task[0].n + task[1].n;
+  ScanResult first[2];
+  kernels_.scan_two[D - 2](setting_, task, first);
+  a.contact = b.contact = kNever;
+  for (const int k : {0, 1}) {
+    const Slot one = task[k].self;
+    take(task[k], first[k]);
+    if (walled_) predict_walls(one);
+    predict_update(one, now);
+    schedule(one);
+  }
+}
+
+/// Plans the first contact with the candidates where it comes before the one that is planned. `latest`: no record is of
+/// a later time than the sphere's own.
+template <int D>
+void EventCore<D>::predict_pairs(const ScanTask& task, bool latest) {
+  counts_.candidates += task.n;
+  take(task, kernels_.scan[D - 2](setting_, task, latest));
+}
+
+template <int D>
+void EventCore<D>::take(const ScanTask& task, const ScanResult& first) {
+  Agenda<D>& a = agenda_[task.self];
+  if (first.time > a.contact || first.time == kNever) return;
+  if (first.tied || first.time == a.contact || first.time == -kNever) return predict_pairs_one_by_one(task);
+  a.contact = first.time;
+  a.kind = EventKind::pair;
+  a.partner = task.candidates[first.which];
+  prefetch_line(&agenda_[packing_.slot(a.partner)]);
+  just_planned_[planned_++] = task.self;
+}
+
+template <int D>
+void EventCore<D>::predict_pairs_one_by_one(const ScanTask& task) {
+  const Slot i = task.self;
+  Agenda<D>& a = agenda_[i];
+  for (unsigned q = 0; q < task.n; ++q) {
+    const std::uint32_t candidate = task.candidates[q];
+    const Slot j = packing_.slot(candidate);
+    if (j == i) continue;
+    const double time = flights_.pair_contact(i, j, box_.shift(packing_.image(candidate)));
+    if (time > a.contact || time == kNever) continue;
+    const Agenda<D> before = a;
+    const bool first = before.contact == kNever;
+    const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
+    a.contact = time;
+    a.kind = EventKind::pair;
+    a.partner = candidate;
+    a.partner_version = agenda_[j].version;
+    if (!first && !(key_of(i) < rival)) a = before;
+  }
+}
+
+template <int D>
+void EventCore<D>::predict_walls(Slot i) {
+  Agenda<D>& a = agenda_[i];
+  for (int axis = 0; axis < D; ++axis)
+    for (int side = 0; side < 2 && box_.walled(axis); ++side) {
+      const double time = flights_.wall_contact(i, axis, side);
+      if (time > a.contact || time == kNever) continue;
+      const Agenda<D> before = a;
+      const bool first = before.contact == kNever;
+      const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
+      a.contact = time;
+      a.kind = EventKind::wall;
+      a.partner = static_cast<std::uint32_t>(2 * axis + side);
+      if (!first && !(key_of(i) < rival)) a = before;
+    }
+}
+
+template <int D>
+void EventCore<D>::predict_update(Slot i, double now) {
+  if (lists_)
+    predict_leaving(i, now);
+  else
+    predict_crossing(i, now);
+}
+
+/// How far a sphere may go from the centre of its region.
+template <int D>
+double EventCore<D>::room(Slot i) const {
+  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? astray_ : 0);
+}
+
+/// When does the sphere leave the region its list is good for? Its contact has been planned.
+template <int D>
+void EventCore<D>::predict_leaving(Slot i, double now) {
+  const Record<D>& r = flights_[i];
+  Agenda<D>& a = agenda_[i];
+  Vec<D> e;
+  for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
+  const double skin = room(i) * (1 - 1e-6);
+  if (!flights_.field()) {
+    if (a.contact < kNever && (e + (a.contact - r.t) * r.v).squaredNorm() < skin * skin) {
+      a.update = kNever;  // not before its contact: a straight way between two places of a ball stays in it
+      return;
+    }
+    // |e + v s| = skin; the form that cancels is good enough for a bound
+    const double b = e.dot(r.v), v_squared = r.v.squaredNorm(), room = skin * skin - e.squaredNorm();
+    const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
+    a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
+    return;
+  }
+  // At most |v| s + |g| s²/2 farther than at `now`.
+  const double s0 = now - r.t;
+  e += s0 * r.v + (0.5 * s0 * s0) * flights_.g();
+  const double speed = (r.v + s0 * flights_.g()).norm(), room = std::max(skin - e.norm(), 0.0);
+  a.update = std::max(now + 2 * room / (speed + std::sqrt(speed * speed + 2 * flights_.g().norm() * room)), now);
+}
+
+/// When does the sphere leave its cell, and through which face?
+template <int D>
+void EventCore<D>::predict_crossing(Slot i, double now) {
+  if (flights_.field()) return predict_crossing_in_field(i, now);
+  const Record<D>& r = flights_[i];
+  const CellGrid<D>& grid = cells_->grid();
+  Agenda<D>& a = agenda_[i];
+  // Without a branch, which could not be predicted: times that are not negative are in the order of their bits.
+  std::uint64_t first = std::bit_cast<std::uint64_t>(kNever);
+  unsigned face = 0;
+  for (int k = 0; k < D; ++k) {
+    const unsigned up = static_cast<unsigned>(std::bit_cast<std::uint64_t>(r.v[k]) >> 63) ^ 1;
+    const std::int32_t c = a.where.cell.unwrapped[k] + static_cast<std::int32_t>(up);
+    double s = std::abs(grid.face(k, c) - r.x[k]) / std::abs(r.v[k]);  // 0/0 comes after all
+    if (!box_.periodic(k) && (c <= 0 || c >= grid.count(k))) s = kNever;
+    const std::uint64_t bits = std::bit_cast<std::uint64_t>(s);
+    face = bits < first ? 2 * static_cast<unsigned>(k) + up : face;
+    first = bits < first ? bits : first;
+  }
+  a.update = std::max(r.t + std::bit_cast<double>(first), now);
+  a.face = static_cast<std::uint8_t>(face);
+}
+
+template <int D>
+void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
+  const Record<D> r = flights_.at(i, now);
+  const CellGrid<D>& grid = cells_->grid();
+  Agenda<D>& a = agenda_[i];
+  a.update = kNever;
+  for (int k = 0; k < D; ++k)
+    for (int side = 0; side < 2; ++side) {
+      const std::int32_t c = a.where.cell.unwrapped[k] + side;
+      if (!box_.periodic(k) && (c <= 0 || c >= grid.count(k))) continue;  // the outermost cells have no outer face
+      const double outward = side == 1 ? 1.0 : -1.0;
+      const double gap = outward * (grid.face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
+      const double s = wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * flights_.g()[k],
+                                         flights_.horizon() - now, false, 0.0);
+      // At least an ulp from now: at the top of its path a particle could cross back and forth in no time.
+      const double t = std::max(now + s, std::nextafter(now, kNever));
+      if (t < a.update) {
+        a.update = t;
+        a.face = static_cast<std::uint8_t>(2 * k + side);
+      }
+    }
+}
+
+template <int D>
+void EventCore<D>::schedule(Slot i) {
+  calendar_.push(agenda_[i].due(), i);
+  ++counts_.scheduled;
+}
+
+/// The surroundings of a sphere must be looked at again.
+template <int D>
+void EventCore<D>::update(Slot i, double now) {
+  if (!lists_) return cross(i, now);
+  const Record<D> r = flights_.at(i, now);
+  Agenda<D>& a = agenda_[i];
+  if (flights_.field()) {  // it may still be far from where its list ends
+    Vec<D> e;
+    for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
+    if (e.norm() < 0.7 * room(i)) {
+      predict_leaving(i, now);
+      schedule(i);
+      return;
+    }
+  }
+  ++counts_.rebuilds;
+  const std::span<const std::uint32_t> fresh = lists_->renew(i, r.x);
+  // The planned contact stands; only those that are new in the list are looked at.
+  if (!fresh.empty()) predict_pairs({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
+  predict_leaving(i, now);
+  schedule(i);
+}
+
+/// Moves a sphere into the next cell. Its contact stands; only the cells that have come into view are searched.
+template <int D>
+void EventCore<D>::cross(Slot i, double now) {
+  ++counts_.crossings;
+  Agenda<D>& a = agenda_[i];
+  const int axis = a.face / 2, step = a.face % 2 == 1 ? 1 : -1;
+  cells_->cross(i, a.where.cell, axis, step);
+  cells_->ahead(i, a.where.cell, axis, step, found_);
+  if (found_.count > 0) predict_pairs({i, found_.packed.data(), found_.count, found_.same}, false);
+  predict_crossing(i, now);
+  schedule(i);
+}
+
+template <int D>
+void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, const Report& report) {
+  Agenda<D>& agenda = agenda_[i];
+  const Slot j = packing_.slot(agenda.partner);
+  if (report.trace) {
+    if (flights_[i].id < flights_[j].id)
+      report.trace->begin(i, flights_[i], j, flights_[j], agenda.partner, generation);
+    else
+      report.trace->begin(j, flights_[j], i, flights_[i], packing_.reversed(i, agenda.partner), generation);
+  }
+  EventKey<D> key;
+  if (report.contacts) key = key_of(i);
+  Vec<D> shift = Vec<D>::Zero();
+  if (packing_.linear(agenda.partner) != 0) shift = box_.shift(packing_.image(agenda.partner));
+  const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
+  ++agenda.version;
+  ++agenda_[j].version;
+  if (report.trace) return report.trace->end(flights_[i], flights_[j], blow.d.dot(blow.impulse), blow.overlap);
+  ++report.counters.sphere_sphere;
+  report.counters.collision_virial.add(blow.d.dot(blow.impulse));
+  report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, blow));
+}
+
+template <int D>
+void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
+  const EventKey<D> key = key_of(i);
+  const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
+  if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
+  const Blow<D> blow = flights_.bounce(i, axis, side, time, generation);
+  ++agenda_[i].version;
+  if (report.trace) return report.trace->end(flights_[i], flights_[i], 0, blow.overlap);
+  ++report.counters.sphere_wall;
+  report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], blow));
+}
+
+template class EventCore<2>;
+template class EventCore<3>;
+
+}  // namespace carom

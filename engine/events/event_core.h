@@ -1,0 +1,191 @@
+#pragma once
+// The event core: runs flights through their contacts, in the order of their keys, to a given time.
+//
+// Every sphere is on a flight x + v s + g s²/2 (g the same for all: 0, or a uniform field) that is known from its
+// record; an event changes the records of the spheres that take part in it and no others. One pending event a particle
+// is kept, with the particle that was scanned last; it is stale when its partner has had an event since, and the
+// particle is scanned again when a stale event comes up (Lubachevsky, J. Comput. Phys. 94 (1991) 255). Neighbour lists
+// prune the candidates, or cells where the system is dilute; neither changes a record. Nothing that the search does can
+// therefore reach the physics.
+//
+// Spheres may grow meanwhile, all by a common factor (engine/setup/compression.h): their contact distances and their
+// distances from walls are then functions of time like their positions.
+//
+//   EventCore<3> core(box, particles);
+//   core.load(particles, g, horizon);             // all spheres at time 0
+//   core.run(end, report);                        // events with time < end
+//   core.fly_to(end, particles);                  // copies at `end`
+
+#include <limits>
+#include <memory>
+#include <queue>
+#include <vector>
+
+#include "engine/base/box.h"
+#include "engine/base/contact_log.h"
+#include "engine/base/counters.h"
+#include "engine/base/event_counts.h"
+#include "engine/base/particles.h"
+#include "engine/base/prefetch.h"
+#include "engine/events/calendar.h"
+#include "engine/events/flights.h"
+#include "engine/events/trace.h"
+#include "engine/search/agenda.h"
+#include "engine/search/linked_cells.h"
+#include "engine/search/search_tuning.h"
+#include "engine/search/skin_lists.h"
+
+namespace carom {
+
+template <int D>
+class EventCore {
+ public:
+  /// Limits of one run(), and where its results go.
+  struct Report {
+    Counters& counters;
+    std::vector<Contact<D>>* contacts = nullptr;
+    std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();  ///< of counters.sphere_sphere
+    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();       ///< contacts since load()
+    Trace<D>* trace = nullptr;  ///< where to write down paths; then contacts are not counted, they may be revoked
+  };
+
+  /// Masses and radii are read from `particles` at the start of each slab.
+  EventCore(const Box<D>& box, const Particles<D>& /*particles*/, const SearchOptions& options = {})
+      : EventCore(box, nullptr, options) {}
+  /// For a core that runs a part of a larger system; `sizes` has the masses and radii of all of it, and outlives the
+  /// core.
+  EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options);
+  ~EventCore();
+  EventCore(const EventCore&) = delete;
+  EventCore& operator=(const EventCore&) = delete;
+
+  /// Starts a slab: all spheres at time 0 at particles.x with particles.v, under the acceleration g. No event at or
+  /// after `horizon` will be required. All radii are those of the particles times 1 + growth·t, t since the start of
+  /// the slab; `growth` ≥ 0 [1/time].
+  void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth = 0);
+
+  /// The same for those that are too many to be kept twice: their positions and velocities are taken out of
+  /// `particles`, until give_back().
+  void take(Particles<D>& particles, const Vec<D>& g, double horizon, double growth = 0);
+
+  /// Ends a slab that began with take(): all spheres are flown to `time`, which no event precedes any more.
+  void give_back(double time, Particles<D>& particles);
+
+  /// Executes every event before `end`, or up to the collision limit; returns the time reached: `end`, or that of the
+  /// last collision. Throws Error(Failure::numerical) when more than max_events contacts are needed.
+  double run(double end, const Report& report);
+
+  /// The time of the event that is executed, or was last.
+  double now() const { return now_; }
+
+  /// Copies of all spheres flown to `time`, which no event precedes any more.
+  void fly_to(double time, Particles<D>& copies) const;
+
+  /// Since the core was made.
+  const EventCounts& counts() const { return counts_; }
+
+  // For a core that runs a part of a larger system (engine/ranks/region.h). All of this happens at a time `now` that no
+  // event precedes any more.
+
+  /// Starts with these spheres only; no record is of a later time than `now`. find_near() will use `astray`.
+  void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double astray);
+  const Flights<D>& flights() const { return flights_; }
+  const Packing<D>& packing() const { return packing_; }
+  /// Takes a sphere in; false: there is no room left, load anew.
+  bool admit(const Record<D>& r, double now, Slot& slot);
+  /// Removes a sphere; its slot will be given to another one.
+  void dismiss(Slot i);
+  /// Replaces the records of these spheres.
+  void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
+  /// Sets the spheres at the border of a region: their lists are good for each other wherever they come in a window,
+  /// and need not be searched for.
+  void set_border(std::span<const Slot> slots, double now);
+  /// Candidates for contacts of a sphere: all that may touch it where each of the two has come up to `astray` (load)
+  /// from where the core knows it to be. Good until the next call.
+  std::span<const std::uint32_t> find_near(Slot i);
+  /// The same for one at the border, where only others matter that are at the border and between two corners.
+  std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high);
+
+ private:
+  /// An event among several at one time, with what it was when it was found there.
+  struct Tied {
+    enum class Rank : std::uint8_t { stale, contact, update } rank;
+    EventKey<D> key;
+    Slot slot;
+    bool operator<(const Tied& other) const {  // std::priority_queue keeps the largest on top
+      return rank != other.rank ? rank > other.rank : other.key < key;
+    }
+    bool operator==(const Tied& other) const { return rank == other.rank && key == other.key; }
+  };
+
+  bool read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
+  void plan(bool anew, double now);
+  void choose_search(double now);
+  void prefetch_upcoming();
+  void prefetch_lists() const;
+  void prefetch_few_cells() const;
+  void prefetch_cells();
+  void prefetch(Slot i) const {
+    prefetch_line(&agenda_[i]);
+    prefetch_line(&flights_[i]);
+  }
+  static bool meets(const Agenda<D>& a) { return a.contact < a.update && a.kind == EventKind::pair; }
+  void settle();
+  bool mirrored(Slot i, Slot j) const;
+  bool next_event(double end, Slot& slot, double& time);
+  bool stale(const Agenda<D>& a) const;
+  std::uint32_t generation_of(Slot i) const;
+  EventKey<D> key_of(Slot i) const;
+  Tied tie(Slot i) const;
+
+  void predict(Slot i, double now);
+  void foresee(Slot i, double now);
+  void predict_two(Slot i, Slot j, double now);
+  void take(const ScanTask& task, const ScanResult& first);
+  void predict_pairs(const ScanTask& task, bool latest);
+  void predict_pairs_one_by_one(const ScanTask& task);
+  void predict_walls(Slot i);
+  double room(Slot i) const;
+  void predict_update(Slot i, double now);
+  void predict_leaving(Slot i, double now);
+  void predict_crossing(Slot i, double now);
+  void predict_crossing_in_field(Slot i, double now);
+  void schedule(Slot i);
+  void update(Slot i, double now);
+  void cross(Slot i, double now);
+
+  void collide_pair(Slot i, double time, std::uint32_t generation, const Report& report);
+  void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
+
+  const Box<D>& box_;
+  const Sizes* sizes_;  // of the larger system; null: there is none
+  Flights<D> flights_;
+  SearchOptions options_;
+  const ScanKernels& kernels_;
+  bool walled_ = false;
+  PageVector<Agenda<D>> agenda_;
+  std::vector<std::uint32_t> near_;
+  double astray_ = 0, largest_ = 0;      // how far spheres may be from where the core has them; largest radius
+  std::vector<std::uint8_t> at_border_;  // by slot; empty: no sphere is
+  std::vector<Slot> free_;               // slots of dismissed spheres
+  std::vector<double> radii_;            // that lists or cells are made for; one where all are equal
+  Packing<D> packing_;
+  ScanSetting setting_;
+  Calendar calendar_;
+  std::priority_queue<Tied> tied_;  // events at one and the same time, in the order of their keys
+  double tied_time_ = 0, now_ = 0;
+
+  std::unique_ptr<SkinLists<D>> lists_;  // one of the two
+  std::unique_ptr<LinkedCells<D>> cells_;
+  Candidates found_, others_;
+  bool small_ = true, large_ = false;  // few enough for a fast cache; too many for any
+  Slot just_planned_[2]{};             // in the last event: their partners' versions are still to be read
+  unsigned planned_ = 0;               // how many
+
+  SearchTuning tuning_;
+  EventCounts counts_;
+  std::uint64_t events_ = 0;      // contacts since load()
+  std::uint64_t since_sort_ = 0;  // contacts
+};
+
+}  // namespace carom

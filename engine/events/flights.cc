@@ -1,0 +1,204 @@
+#include "engine/events/flights.h"
+
+#include <algorithm>
+#include <string>
+
+#include "engine/base/error.h"
+#include "engine/events/collision.h"
+#include "engine/events/contact.h"
+
+namespace carom {
+namespace {
+
+/// The common value, or nothing where they differ.
+double common(const std::vector<double>& values) {
+  const bool equal = std::all_of(values.begin(), values.end(), [&](double v) { return v == values[0]; });
+  return equal && !values.empty() ? values[0] : 0;
+}
+
+}  // namespace
+
+template <int D>
+void Flights<D>::assign(std::span<const Id> order) {
+  records_.resize(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) records_[i].id = order[i];
+  room_ = order.size();
+}
+
+template <int D>
+void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  g_ = g;
+  field_ = g != Vec<D>::Zero();
+  growth_ = growth;
+  horizon_ = horizon;
+  common_radius_ = common(particles.radius);
+  common_mass_ = common(particles.mass);
+  radius_.clear();
+  mass_.clear();
+  for (Record<D>& r : records_) {
+    if (common_radius_ == 0) radius_.push_back(particles.radius[r.id]);
+    if (common_mass_ == 0) mass_.push_back(particles.mass[r.id]);
+    r = {particles.x[r.id], particles.v[r.id], 0.0, r.id, 0, particles.species[r.id]};
+  }
+}
+
+template <int D>
+std::vector<double> Flights<D>::radii(double t) const {
+  std::vector<double> all = radius_.empty() ? std::vector<double>{common_radius_} : radius_;
+  for (double& r : all) r = grown(r, t);
+  return all;
+}
+
+template <int D>
+Extent<D> Flights<D>::extent() const {
+  Extent<D> all;
+  for (const Record<D>& r : records_) all.add(r.x);
+  return all;
+}
+
+template <int D>
+ScanSetting Flights<D>::setting(const Packing<D>& packing) const {
+  ScanSetting setting{.records = reinterpret_cast<const double*>(records_.data()),
+                      .radius = radius_.empty() ? nullptr : radius_.data(),
+                      .diameter = common_radius_ + common_radius_,
+                      .growth = growth_,
+                      .slot_mask = packing.slot_mask,
+                      .slot_bits = packing.slot_bits,
+                      .field_bits = packing.field_bits,
+                      .plain = radius_.empty() && !field_ && growth_ == 0};
+  for (int k = 0; k < D; ++k) {
+    setting.edges[k] = box_.edges[k];
+    setting.g[k] = g_[k];
+  }
+  return setting;
+}
+
+template <int D>
+void Flights<D>::advance(Record<D>& r, double t) const {
+  const double s = t - r.t;
+  if (s != 0) {
+    r.x += s * r.v;
+    if (field_) {
+      r.x += (0.5 * s * s) * g_;
+      r.v += s * g_;
+    }
+  }
+  r.t = t;
+}
+
+template <int D>
+void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon) {
+  g_ = g;
+  field_ = g != Vec<D>::Zero();
+  growth_ = 0;
+  horizon_ = horizon;
+  common_radius_ = common(sizes.radius);
+  common_mass_ = common(sizes.mass);
+  room_ = records.size() + records.size() / 4 + 256;
+  records_.clear();
+  records_.reserve(room_);
+  radius_.clear();
+  mass_.clear();
+  for (const Record<D>& r : records) admit(static_cast<Slot>(records_.size()), r, sizes.radius_of(r), sizes.mass_of(r));
+}
+
+template <int D>
+void Flights<D>::admit(Slot i, const Record<D>& r, double radius, double mass) {
+  if (i == records_.size()) {
+    records_.push_back(r);
+    if (common_radius_ == 0) radius_.push_back(radius);
+    if (common_mass_ == 0) mass_.push_back(mass);
+    return;
+  }
+  records_[i] = r;
+  if (common_radius_ == 0) radius_[i] = radius;
+  if (common_mass_ == 0) mass_[i] = mass;
+}
+
+template <int D>
+double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const {
+  const double now = std::max(a.t, b.t);
+  const double s_a = now - a.t, s_b = now - b.t;
+  Vec<D> d = (a.x + s_a * a.v) - (b.x + s_b * b.v);
+  Vec<D> v = a.v - b.v;
+  if (field_) {
+    d += (0.5 * (s_a * s_a - s_b * s_b)) * g_;
+    v += (s_a - s_b) * g_;
+  }
+  d += shift;
+  const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
+  const bool apart = d.squaredNorm() > sigma * sigma;
+  const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
+  return now + contact_time<D>(d, v, sigma, rate, slack);
+}
+
+template <int D>
+double Flights<D>::wall_contact(Slot i, const Record<D>& r, int axis, int side) const {
+  const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
+  const double inward = side == 0 ? 1.0 : -1.0;
+  const double gap = side == 0 ? r.x[axis] - at_record : box_.edges[axis] - at_record - r.x[axis];
+  const double opening = inward * r.v[axis] - rate;
+  const double tolerance = GapTolerance(box_.edges[axis])(2 * at_record);
+  const double slack = approach_slack(1.0, r.v.norm(), rate);
+  const bool touching = gap <= tolerance;
+  const double s = wall_contact_time(gap, opening, inward * g_[axis], horizon_ - r.t, touching, slack);
+  if (s == 0 && !(opening < -slack))
+    throw Error(Failure::numerical,
+                "particle " + std::to_string(r.id) + " rests on the " + (side == 0 ? "lower" : "upper") +
+                    " wall of axis " + std::to_string(axis) +
+                    " under the uniform field and would bounce without end; give it a height or a velocity");
+  return r.t + s;
+}
+
+template <int D>
+Blow<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                            std::uint32_t generation) const {
+  advance(a, t);
+  advance(b, t);
+  const Vec<D> d = a.x - b.x + shift;
+  const double mass_a = mass(i), mass_b = mass(j);
+  const double radii = radius(i) + radius(j), sigma = grown(radii, t);
+  const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, sigma, radii * growth_, mass_a, mass_b) * d;
+  if (common_mass_ == 1) {  // the same bits without divisions
+    a.v += impulse;
+    b.v -= impulse;
+  } else {
+    a.v += impulse / mass_a;
+    b.v -= impulse / mass_b;
+  }
+  a.generation = b.generation = static_cast<std::uint16_t>(generation);
+  return {d, impulse, 1 - d.norm() / sigma};
+}
+
+template <int D>
+Blow<D> Flights<D>::bounce(Slot i, Record<D>& r, int axis, int side, double t, std::uint32_t generation) const {
+  advance(r, t);
+  const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
+  const double after = (side == 0 ? 2 * rate : -2 * rate) - r.v[axis];
+  const double gap = side == 0 ? r.x[axis] - at_contact : box_.edges[axis] - at_contact - r.x[axis];
+  Blow<D> blow{Vec<D>::Zero(), Vec<D>::Zero(), -gap / at_contact};
+  blow.d[axis] = r.x[axis] - (side == 0 ? 0.0 : box_.edges[axis]);
+  blow.impulse[axis] = mass(i) * (after - r.v[axis]);
+  r.v[axis] = after;
+  r.generation = static_cast<std::uint16_t>(generation);
+  return blow;
+}
+
+template <int D>
+Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
+                                  const Blow<D>& blow) const {
+  if (a.id < b.id) return {key, a.x, b.x - shift, blow.impulse, blow.d.dot(blow.impulse), blow.overlap};
+  return {key, b.x, a.x + shift, -blow.impulse, blow.d.dot(blow.impulse), blow.overlap};
+}
+
+template <int D>
+Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const {
+  Contact<D> contact{key, r.x, r.x, blow.impulse, 0, blow.overlap};
+  contact.x_hi[key.hi / 2] = key.hi % 2 == 0 ? 0.0 : box_.edges[key.hi / 2];
+  return contact;
+}
+
+template class Flights<2>;
+template class Flights<3>;
+
+}  // namespace carom

@@ -1,0 +1,123 @@
+#pragma once
+// The log of a window that the event core writes: enough to take any event back, and to read the path of any sphere.
+//
+// The log is in the order of keys and costs an event three cache lines, one after the other. Paths are read from it
+// where they are wanted, which is for the few spheres near the border of a region (engine/ranks/region.h).
+
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "engine/base/contact_log.h"
+#include "engine/base/pages.h"
+#include "engine/base/record.h"
+
+namespace carom {
+
+/// An event of one sphere, and the sphere after it.
+template <int D>
+struct Node {
+  Record<D> after;
+  EventKey<D> key;
+  double virial = 0;   ///< d·impulse of a pair collision [mass·length²/time]
+  double overlap = 0;  ///< at contact, relative to the contact distance
+
+  /// The other sphere's id; kNoPartner at a wall.
+  static constexpr Id kNoPartner = std::numeric_limits<Id>::max();
+  Id partner() const {
+    if (key.kind == EventKind::wall) return kNoPartner;
+    return key.lo == after.id ? key.hi : key.lo;
+  }
+};
+
+/// Whether two nodes are the same, bit for bit.
+template <int D>
+bool operator==(const Node<D>& a, const Node<D>& b) {
+  return a.key == b.key && a.after.x == b.after.x && a.after.v == b.after.v && a.after.t == b.after.t &&
+         a.after.id == b.after.id;
+}
+
+template <int D>
+class Trace {
+ public:
+  static constexpr std::uint32_t kNone = 0xffffffff;
+
+  /// What happened to one sphere, or to two: the one with the lower id first.
+  struct Event {
+    double time, virial, overlap;
+    std::uint32_t generation;
+    std::uint32_t partner;  ///< of the first, as the core has it (Agenda)
+    Id id[2];
+    Slot slot[2];           ///< kNone: a wall
+    std::uint32_t last[2];  ///< the share that the sphere had in an event before, or kNone
+  };
+  // A share in an event has the number 2·event + 0 or 1.
+
+  /// Removes all events, and makes room for so many slots.
+  void clear(std::size_t slots) {
+    base_ += 2 * static_cast<std::uint32_t>(events_.size());
+    if (base_ > kNone / 4) {
+      std::fill(latest_.begin(), latest_.end(), 0);
+      base_ = 1;
+    }
+    latest_.resize(slots, 0);
+    events_.clear();
+    before_.clear();
+    fastest_squared_ = 0;
+  }
+
+  /// An event is about to happen to the sphere `i`, and to `j` unless that is kNone.
+  void begin(Slot i, const Record<D>& a, Slot j, const Record<D>& b, std::uint32_t partner, std::uint32_t generation) {
+    Event& event = events_.emplace_back();
+    event.generation = generation;
+    event.partner = partner;
+    event.id[0] = a.id;
+    event.id[1] = b.id;
+    event.slot[0] = i;
+    event.slot[1] = j;
+    event.last[0] = take_share(i, 0);
+    event.last[1] = j == kNone ? kNone : take_share(j, 1);
+    before_.push_back(a);
+    before_.push_back(b);
+  }
+  /// It has happened.
+  void end(const Record<D>& a, const Record<D>& b, double virial, double overlap) {
+    Event& event = events_.back();
+    event.time = a.t;
+    event.virial = virial;
+    event.overlap = overlap;
+    fastest_squared_ = std::max({fastest_squared_, a.v.squaredNorm(), b.v.squaredNorm()});
+  }
+
+  std::span<const Event> events() const { return events_; }
+  const Event& event_of(std::uint32_t share) const { return events_[share / 2]; }
+  /// The sphere before its share in an event.
+  const Record<D>& before(std::uint32_t share) const { return before_[share]; }
+  bool has(Slot i) const { return latest_[i] >= base_; }
+  /// The shares of a sphere in the order of time; good until the next call.
+  std::span<const std::uint32_t> shares(Slot i) const {
+    shares_.clear();
+    for (std::uint32_t s = has(i) ? latest_[i] - base_ : kNone; s != kNone; s = event_of(s).last[s % 2])
+      shares_.push_back(s);
+    std::reverse(shares_.begin(), shares_.end());
+    return shares_;
+  }
+  double fastest_squared() const { return fastest_squared_; }  ///< of all spheres after events
+
+ private:
+  std::uint32_t take_share(Slot i, std::uint32_t which) {
+    const std::uint32_t last = has(i) ? latest_[i] - base_ : kNone;
+    latest_[i] = base_ + 2 * static_cast<std::uint32_t>(events_.size() - 1) + which;
+    return last;
+  }
+
+  std::vector<Event> events_;
+  PageVector<Record<D>> before_;       // by share
+  std::vector<std::uint32_t> latest_;  // by slot: base_ + share; what is less is of windows before
+  std::uint32_t base_ = 1;
+  double fastest_squared_ = 0;
+  mutable std::vector<std::uint32_t> shares_;
+};
+
+}  // namespace carom

@@ -1,0 +1,23 @@
+#include "engine/forces/add_interaction.h"
+
+#include "engine/forces/pair_filter.h"
+#include "engine/ranks/shares.h"
+
+namespace carom {
+
+template <int D>
+void add_interaction(System<D>& system, std::string_view type, Parameters given) {
+  const InteractionInfo& info = find_interaction(type);
+  system.interactions.push_back(
+      info.make<D>(completed(info.name, info.parameters, std::move(given)), {.box = system.box,
+                                                                             .particles = system.particles,
+                                                                             .species = system.species,
+                                                                             .total = system.size(),
+                                                                             .ranks = shared_by(system),
+                                                                             .bonds = bonds_of(system.interactions)}));
+}
+
+template void add_interaction(System<2>&, std::string_view, Parameters);
+template void add_interaction(System<3>&, std::string_view, Parameters);
+
+}  // namespace carom

@@ -1,0 +1,15 @@
+#pragma once
+// Terms of V by their names.
+
+#include <string_view>
+
+#include "engine/base/system.h"
+
+namespace carom {
+
+/// Adds a term to V by its name in the deck, with defaults for the parameters that are not given. Throws
+/// Error(Failure::deck). Particles must be there, and bonds before terms that exclude bonded pairs.
+template <int D>
+void add_interaction(System<D>& system, std::string_view type, Parameters given);
+
+}  // namespace carom

@@ -1,0 +1,206 @@
+#pragma once
+// Sums over all interactions of a system.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "engine/base/counters.h"
+#include "engine/base/system.h"
+#include "engine/ranks/part.h"
+
+namespace carom {
+
+/// The sum over all ranks of what each has summed up over what it owns.
+template <int D, class Sums>
+Sums of_all_ranks(const System<D>& system, const Sums& mine) {
+  if (system.part) return sum_of_all(system.part->ranks(), mine);
+  return system.sizes ? sum_of_all(*system.ranks, mine) : mine;
+}
+
+template <int D>
+bool any_rank(const System<D>& system, bool value) {
+  return system.part ? system.part->largest(value ? 1 : 0) > 0 : value;
+}
+
+/// Copies of particles that other ranks own get their positions and velocities from there.
+template <int D>
+void update_copies(System<D>& system) {
+  if (!system.part || system.part->knows_everybody()) return;
+  Particles<D>& p = system.particles;
+  system.part->tell([&](Id i, Bytes& to) { put(to, p.x[i]), put(to, p.v[i]); },
+                    [&](Id i, Reader& from) { p.x[i] = from.get<Vec<D>>(), p.v[i] = from.get<Vec<D>>(); });
+}
+
+/// For what only a rank that knows all particles can do.
+template <int D>
+void need_all(const System<D>& system) {
+  if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
+}
+
+/// How many particles all ranks have together.
+template <int D>
+std::size_t count_of_all(const System<D>& system) {
+  return system.part ? system.part->total() : system.size();
+}
+/// (V/N)^(1/D) [length].
+template <int D>
+double mean_distance(const System<D>& system) {
+  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, count_of_all(system))), 1.0 / D);
+}
+
+/// The quanta of a system; a function of its parameters, masses, charges and box. Collective where ranks have shares.
+template <int D>
+Quanta quanta(const System<D>& system) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const double distance = mean_distance(system);
+  std::array<double, 4> most = {-kNone, -kNone, 0, 0};  // the smallest force and energy, negative; the largest
+  for (const auto& term : system.interactions) {
+    const ForceScale scale = term->scale(distance);
+    if (scale.force > 0) most[0] = std::max(most[0], -scale.force);
+    if (scale.energy > 0) most[1] = std::max(most[1], -scale.energy);
+    most[2] = std::max(most[2], scale.spread * scale.force);
+    most[3] = std::max(most[3], scale.spread * scale.energy);
+  }
+  if (system.ranks && system.sizes) system.ranks->largest(most);
+  const auto power = [](double x) { return x < kNone ? std::exp2(std::floor(std::log2(std::max(x, 0x1p-900)))) : 1; };
+  // Not so small that the largest do not fit.
+  return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])),
+          std::max(0x1p-46 * power(-most[1]), 0x1p-70 * power(most[3]))};
+}
+
+/// Those that were determined at the start of the run.
+template <int D>
+Quanta quanta_of(const System<D>& system) {
+  return system.quanta.force > 0 ? system.quanta : quanta(system);
+}
+
+/// The forces of one pass: `add` adds each interaction's share, `out` gets the sums.
+template <int D, class Add>
+void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, Counters& counters, Add&& add) {
+  const Stopwatch watch(counters.seconds.force);
+  for (const auto& term : system.interactions) add(*term);
+  for (Id i = 0; i < out.size(); ++i) out[i] = forces.value(i);
+  if (system.part) system.part->refresh(out);
+  counters.force_passes += 1;
+}
+
+/// out[i] = force on particle i at positions x, and where `sums` is given V and its companions over what this rank
+/// owns. One force pass.
+template <int D>
+void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Counters& counters,
+                     PotentialSums* sums = nullptr) {
+  if (sums) *sums = {.quantum = quanta_of(system).energy};
+  ForceSums<D> forces(x.size(), quanta_of(system).force);
+  force_pass<D>(system, out, forces, counters, [&](const auto& term) { term.add_forces(x, forces, sums); });
+}
+
+/// out[i] = −∇̄_i V(x, x_new), the mean force of a discrete-gradient step. One force pass.
+template <int D>
+void evaluate_mean_forces(const System<D>& system, Positions<D> x, Positions<D> x_new, Vectors<D> out,
+                          Counters& counters) {
+  ForceSums<D> forces(x.size(), quanta_of(system).force);
+  force_pass<D>(system, out, forces, counters, [&](const auto& term) { term.add_mean_forces(x, x_new, forces); });
+}
+
+/// Mean forces over a step whose end is changed again and again, for some particles only.
+template <int D>
+class MeanForces {
+ public:
+  /// All pairs. Returns how many pairs of this rank are within reach.
+  std::uint64_t evaluate(const System<D>& system, Positions<D> x, Positions<D> x_new) {
+    forces_.reset(x.size(), quanta_of(system).force);
+    std::uint64_t pairs = 0;
+    for (const auto& term : system.interactions) pairs += term->add_mean_forces(x, x_new, forces_);
+    return pairs;
+  }
+  /// The same to the bit where only positions of `changed` particles are not those of the last call, `x_before`.
+  std::uint64_t update(const System<D>& system, Positions<D> x, Positions<D> x_before, Positions<D> x_new,
+                       const char* changed) {
+    if (!forces_.has_room()) return evaluate(system, x, x_new);
+    std::uint64_t pairs = 0;
+    for (const auto& term : system.interactions) {
+      pairs += term->add_mean_forces(x, x_before, forces_, changed, -1);
+      pairs += term->add_mean_forces(x, x_new, forces_, changed);
+    }
+    return pairs;
+  }
+  /// The force on an own particle.
+  Vec<D> operator[](Id i) const { return forces_.value(i); }
+
+ private:
+  ForceSums<D> forces_;
+};
+
+/// out = V″(x) w. One force pass.
+template <int D>
+void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions<D> w, Vectors<D> out,
+                              Counters& counters) {
+  double most = 0;
+  for (Id i = 0; i < w.size(); ++i)
+    if (system.particles.owns(i)) most = std::max(most, w[i].template lpNorm<Eigen::Infinity>());
+  if (system.part) most = system.part->largest(most);
+  // The quantum of forces where particles are displaced by a part of their distance.
+  const double share = most > 0 && std::isfinite(most) ? most / mean_distance(system) : 1;
+  ForceSums<D> sums(x.size(), quanta_of(system).force * std::exp2(std::floor(std::log2(share)) + 2));
+  force_pass<D>(system, out, sums, counters, [&](const auto& term) { term.add_hessian_product(x, w, sums); });
+}
+
+/// V, Σ|V| and the virial at x; exact sums, not counted as a pass.
+template <int D>
+PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
+  PotentialSums sums{.quantum = quanta_of(system).energy};
+  for (const auto& term : system.interactions) term->add_energy(x, sums);
+  return of_all_ranks(system, sums);
+}
+
+/// Exact sums over all particles.
+template <int D>
+struct MotionSums {
+  ExactSum kinetic;                  ///< ½ m v² [energy]
+  ExactSum speed;                    ///< |v| [length/time]
+  std::array<ExactSum, D> momentum;  ///< m v [mass·length/time]
+
+  void add(const MotionSums& other) {
+    kinetic.add(other.kinetic);
+    speed.add(other.speed);
+    for (int k = 0; k < D; ++k) momentum[k].add(other.momentum[k]);
+  }
+};
+
+/// Of all particles of a system: the momentum in one state, the rest in another.
+template <int D>
+MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
+  ExactSeries kinetic, speed;
+  std::array<ExactSeries, D> momentum;
+  for (Id i = 0; i < at.size(); ++i) {
+    if (!system.particles.owns(i)) continue;
+    const double squared = at.v[i].squaredNorm();
+    kinetic.add(0.5 * at.mass[i] * squared);
+    speed.add(std::sqrt(squared));
+    for (int k = 0; k < D; ++k) momentum[k].add(state.mass[i] * state.v[i][k]);
+  }
+  MotionSums<D> sums{kinetic.sum(), speed.sum(), {}};
+  for (int k = 0; k < D; ++k) sums.momentum[k] = momentum[k].sum();
+  return of_all_ranks(system, sums);
+}
+
+/// G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet follows to second order:
+/// G = (1/12) vᵀ V″ v − (1/24) ∇Vᵀ M⁻¹ ∇V (Hairer, Lubich, Wanner, Geometric Numerical Integration, IX.3).
+/// `a` = −M⁻¹∇V(x) is given; `scratch` is overwritten. One force pass.
+template <int D>
+double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D> a, Vectors<D> scratch,
+                   Counters& counters) {
+  evaluate_hessian_product<D>(system, at.x, at.v, scratch, counters);
+  ExactSeries sum;
+  for (Id i = 0; i < at.size(); ++i) {
+    if (!system.particles.owns(i)) continue;
+    sum.add(at.v[i].dot(scratch[i]) / 12);
+    sum.add(-at.mass[i] * a[i].squaredNorm() / 24);
+  }
+  return of_all_ranks(system, sum.sum()).value();
+}
+
+}  // namespace carom

@@ -1,0 +1,97 @@
+#pragma once
+// Which pairs a term of V leaves out: those of other species, and those joined by a bond.
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "engine/base/parameters.h"
+#include "engine/base/particles.h"
+#include "engine/forces/simd/pair_kernels.h"
+
+namespace carom {
+
+/// The bonds of a system, by ids.
+class BondTable {
+ public:
+  explicit BondTable(PairList bonds) {
+    for (auto& [i, j] : bonds)
+      if (i > j) std::swap(i, j);
+    std::ranges::sort(bonds);
+    for (const auto& [i, j] : bonds) {
+      first_.resize(i + 2, partners_.size());
+      partners_.push_back(j);
+      first_.back() = partners_.size();
+    }
+  }
+  bool joins(Id i, Id j) const {
+    if (i > j) std::swap(i, j);
+    if (i + 1 >= first_.size()) return false;
+    const auto partners = std::span(partners_).subspan(first_[i], first_[i + 1] - first_[i]);
+    return std::ranges::find(partners, j) != partners.end();
+  }
+
+ private:
+  std::vector<std::size_t> first_;  ///< where the higher partners of each particle begin
+  std::vector<Id> partners_;
+};
+
+/// The bonds that these terms stand for; null: none of them does.
+template <class Terms>
+std::shared_ptr<const BondTable> bonds_of(const Terms& terms) {
+  PairList all;
+  bool any = false;
+  for (const auto& term : terms)
+    if (const PairList* bonds = term ? term->bonds() : nullptr) {
+      all.insert(all.end(), bonds->begin(), bonds->end());
+      any = true;
+    }
+  return any ? std::make_shared<BondTable>(std::move(all)) : nullptr;
+}
+
+/// Two species, in either order; or no restriction.
+using SpeciesPair = std::optional<std::array<std::uint16_t, 2>>;
+
+/// Between which of two species a pair is wanted; both equal: within one.
+struct SpeciesRule {
+  const std::vector<std::uint16_t>* species_of = nullptr;  ///< null: all pairs
+  std::uint16_t a = 0, b = 0;
+
+  bool all() const { return species_of == nullptr; }
+  /// codes of PartnerSearch: those of a particle, and of which partners must have one.
+  std::uint64_t code(Id i) const {
+    if (all()) return PartnerSearch::kFirst;
+    const std::uint16_t s = (*species_of)[i];
+    return (s == a ? PartnerSearch::kFirst : 0u) | (s == b ? PartnerSearch::kSecond : 0u);
+  }
+  std::uint64_t partner_code(std::uint64_t code) const {
+    if (all()) return PartnerSearch::kFirst;
+    return ((code & PartnerSearch::kFirst) != 0 ? PartnerSearch::kSecond : 0u) |
+           ((code & PartnerSearch::kSecond) != 0 ? PartnerSearch::kFirst : 0u);
+  }
+};
+
+/// Which pairs a term acts between; the particles that it refers to outlive it.
+struct PairFilter {
+  SpeciesRule species;
+  std::shared_ptr<const BondTable> excluded;  ///< pairs that these join are left out; null: none
+  const std::vector<Id>* id = nullptr;        ///< where there are such
+
+  /// The same for other particles.
+  template <int D>
+  PairFilter among(const Particles<D>& some) const {
+    PairFilter other = *this;
+    if (!species.all()) other.species.species_of = &some.species;
+    other.id = &some.id;
+    return other;
+  }
+  bool excludes(Id i, Id j) const {
+    return excluded && excluded->joins(id->empty() ? i : (*id)[i], id->empty() ? j : (*id)[j]);
+  }
+};
+
+}  // namespace carom

@@ -1,0 +1,430 @@
+#include "engine/forces/pair_list.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/error.h"
+#include "engine/search/cell_grid.h"
+
+namespace carom {
+
+template <int D>
+void PairRecords<D>::clear() {
+  for (int kind = 0; kind < kKinds; ++kind) runs[kind].clear(), partners[kind].clear();
+  order.clear();
+  box.clear();
+}
+
+namespace {
+
+template <int D>
+PairRecord record(const Vec<D>& x, double w) {
+  return {x[0], x[1], D == 3 ? x[D - 1] : 0, w};
+}
+
+}  // namespace
+
+template <int D>
+void PairRecords<D>::load(const PairStep<D>& step) {
+  x_.resize(order.size());
+  for (std::size_t r = 0; r < order.size(); ++r)
+    x_[r] = record<D>(step.x[order[r]], step.weight ? (*step.weight)[order[r]] : 1);
+  const auto& other = step.vectors.empty() ? step.x_new : step.vectors;
+  if (other.empty()) return;
+  x_new_.resize(order.size());
+  for (std::size_t r = 0; r < order.size(); ++r) x_new_[r] = record<D>(other[order[r]], 1);
+}
+
+template <int D>
+PairRows PairRecords<D>::rows(Kind kind, const Box<D>& in, const PairStep<D>& step) {
+  PairRows rows{.x = x_.data()};
+  rows.vectors = !step.vectors.empty();
+  if (rows.vectors || !step.x_new.empty()) rows.x_new = x_new_.data();
+  if (kind != kPlain && !box.empty()) rows.box = box.data();
+  for (int k = 0; k < D; ++k) rows.edges[k] = in.edges[k];
+  rows.weighted = step.weight != nullptr;
+  rows.partner = partners[kind].data();
+  rows.run = runs[kind].data();
+  rows.runs = runs[kind].size();
+  if (!step.changed) return rows;
+  some_runs_.clear();
+  some_partners_.clear();
+  for (const PairRun& run : runs[kind]) {
+    PairRun some = run;
+    some.begin = static_cast<std::uint32_t>(some_partners_.size());
+    const std::uint32_t* const partner = partners[kind].data() + run.begin;
+    if (step.changed[order[run.row]] != 0) {
+      some_partners_.insert(some_partners_.end(), partner, partner + run.count);
+    } else {
+      for (std::uint32_t k = 0; k < run.count; ++k)
+        if (step.changed[order[partner[k]]] != 0) some_partners_.push_back(partner[k]);
+    }
+    some.count = static_cast<std::uint32_t>(some_partners_.size()) - some.begin;
+    if (some.count > 0) some_runs_.push_back(some);
+  }
+  some_partners_.resize(some_partners_.size() + 8);
+  rows.partner = some_partners_.data();
+  rows.run = some_runs_.data();
+  rows.runs = some_runs_.size();
+  return rows;
+}
+
+template <int D>
+ForceWords* PairRecords<D>::low() {
+  low_.assign(order.size(), {});
+  high_.clear();
+  return low_.data();
+}
+
+template <int D>
+ForceWords* PairRecords<D>::high() {
+  high_.resize(order.size());
+  return high_.data();
+}
+
+template <int D>
+void PairRecords<D>::pass_on(ForceSums<D>& sums) {
+  ForceWords* const low = sums.low();
+  for (std::size_t r = 0; r < low_.size(); ++r) low[order[r]].add(low_[r]);
+  if (high_.empty()) return;
+  ForceWords* const high = sums.high();
+  for (std::size_t r = 0; r < high_.size(); ++r) high[order[r]].add(high_[r]);
+}
+
+namespace {
+
+constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
+constexpr double kCalls = 16;    // a skin is as wide as particles come in so many calls: half of it lasts for eight,
+constexpr double kWidest = 0.8;  // where it need not be wider than this for it [cutoff]
+constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
+constexpr std::size_t kMostPairs = 100'000'000, kMostPartners = 5000;  // a particle; more are a step gone wild
+
+/// The larger of two squared distances; a step to where there is no number does not count, its force will tell.
+template <int D>
+double farther(double squared, const Vec<D>& way) {
+  const double other = way.squaredNorm();
+  return other > squared && other <= std::numeric_limits<double>::max() ? other : squared;
+}
+
+template <int D>
+Id farthest(const PairStep<D>& step) {
+  Id most = 0;
+  double squared = 0;
+  for (Id i = 0; i < step.x_new.size(); ++i)
+    if (const double other = farther<D>(squared, step.x_new[i] - step.x[i]); other > squared) squared = other, most = i;
+  return most;
+}
+
+}  // namespace
+
+/// Neighbouring places of the list, seen through one image.
+struct PartnerRange {
+  std::uint32_t begin, end;
+  std::array<std::int32_t, 3> image;
+
+  bool here() const { return (image[0] | image[1] | image[2]) == 0; }
+  bool as(const PartnerRange& other) const {
+    return ((image[0] ^ other.image[0]) | (image[1] ^ other.image[1]) | (image[2] ^ other.image[2])) == 0;
+  }
+};
+
+template <int D>
+PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>& particles) {
+  const bool still = step.x_new.empty();
+  double squared_from_build = 0, squared_step = 0;
+  bool known = rebuilds_ > 0 && particles_ == step.x.size() && ghost_ == particles.ghost;
+  known = known && follow(step, squared_from_build, squared_step);
+  if (!known && !still)
+    for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
+  const double length = std::sqrt(squared_step), from_build = std::sqrt(squared_from_build);
+  const double to_last = kCalls * from_build / static_cast<double>(++calls_);
+  const double room = known && to_last <= kWidest * cutoff_ ? to_last : 0;
+  const double wanted = std::max({kLeastSkin * cutoff_, 4 * length, room});
+  const bool wasteful = length > 0 && skin_ > kTooWide * wanted;  // made for one wild step
+  if (!(known && from_build <= 0.5 * skin_) || wasteful) {
+    need_finite(particles, step.x);
+    for (int k = 0; k < D; ++k)
+      if (box_.periodic(k) && !(length <= kMostBoxes * box_.edges[k]))
+        throw Error(Failure::numerical, "particle " + std::to_string(particles.id_of(farthest(step))) +
+                                            " moves farther than " + std::to_string(kMostBoxes) +
+                                            " edges of the periodic box within one step; use a smaller "
+                                            "integrator.step");
+    const double kept = rebuilds_ == 0 ? *learned_ : 0.5 * skin_;
+    *learned_ = skin_ = std::max(wanted, wasteful ? 0.0 : kept);
+    ghost_ = particles.ghost;
+    build(step, particles);
+  }
+  records_.load(step);
+  return records_;
+}
+
+/// The largest distances from the places at the last build. Notes which particles have been wrapped since the last
+/// time; false where one has that was not expected to, or where a position is not finite.
+template <int D>
+bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, double& squared_step) {
+  const double allowed = 0.25 * skin_ * skin_;
+  for (std::size_t r = 0; r < records_.order.size(); ++r) {
+    const Id i = records_.order[r];
+    Vec<D> home;
+    for (int k = 0; k < D; ++k) home[k] = built_at_[k][r];
+    const auto in_box = [&](const Vec<D>& x) {
+      Vec<D> y = x - home;
+      if (!records_.box.empty())
+        for (int k = 0; k < D; ++k) y[k] -= (&records_.box[r].x)[k] * box_.edges[k];
+      return y;
+    };
+    Vec<D> way = in_box(step.x[i]);
+    if (!(way.squaredNorm() <= allowed)) {
+      if (!way.allFinite()) return false;
+      const Image<D> jump = box_.nearest_image(way);
+      if (jump != Image<D>{}) {
+        if ((code_[r] & PartnerSearch::kMoving) == 0) return false;
+        for (int k = 0; k < D; ++k) (&records_.box[r].x)[k] -= jump[k];
+        way = in_box(step.x[i]);
+      }
+    }
+    squared_from_build = std::max(squared_from_build, way.squaredNorm());
+    if (step.x_new.empty()) continue;
+    squared_from_build = farther<D>(squared_from_build, in_box(step.x_new[i]));
+    squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
+  }
+  return true;
+}
+
+namespace {
+
+/// A part of a row of cells along the last axis, `boxes` boxes away.
+struct Piece {
+  std::int32_t begin, end, boxes;
+};
+
+/// The cells from `low` to `high`, which may reach around the box.
+std::vector<Piece> pieces(std::int32_t low, std::int32_t high, std::int32_t count, bool periodic) {
+  if (!periodic) return {{std::max(low, 0), std::min(high, count - 1) + 1, 0}};
+  std::vector<Piece> found;
+  const auto box = [&](std::int32_t c) { return c >= 0 ? c / count : -((count - 1 - c) / count); };
+  for (std::int32_t q = box(low); q <= box(high); ++q)
+    found.push_back({std::max(low - q * count, 0), std::min(high - q * count, count - 1) + 1, q});
+  return found;
+}
+
+/// Where the cells of the list begin, and how far a search goes along each axis. Those of a grid are cut into kSlices
+/// along the last axis, along which partners stand one after the other.
+template <int D>
+struct Cells {
+  static constexpr std::int32_t kSlices = 8;
+  CellGrid<D> grid;
+  std::array<std::int32_t, D> range;
+  std::vector<std::uint32_t> start;
+  std::vector<std::vector<Piece>> around, ahead;  // of each cell of a row: the whole range, and its own half of it
+
+  Cells(const CellGrid<D>& cells, double reach) : grid(cells), start(kSlices * cells.cells() + 1) {
+    for (int k = 0; k < D; ++k) {
+      const double edges = reach / grid.edge(k);
+      range[k] = static_cast<std::int32_t>(std::clamp(std::ceil(k < D - 1 ? edges : kSlices * edges), 1.0, 1e8));
+    }
+    const std::int32_t count = kSlices * grid.count(D - 1), far = range[D - 1];
+    const bool periodic = grid.box().periodic(D - 1);
+    for (std::int32_t c = 0; c < count; ++c) {
+      around.push_back(pieces(c - far, c + far, count, periodic));
+      ahead.push_back(pieces(c, c + far, count, periodic));
+    }
+  }
+
+  std::size_t index(const Vec<D>& x) const {
+    const Cell<D> cell = grid.cell(x);
+    const double part = (x[D - 1] - grid.face(D - 1, cell[D - 1])) * grid.inverse_edge(D - 1);
+    return kSlices * grid.index(cell) + static_cast<std::size_t>(std::clamp(kSlices * part, 0.0, kSlices - 1.0));
+  }
+
+  /// The ranges in which partners of those in a cell stand, each pair of cells once; by image. The first begins with
+  /// the cell itself.
+  void partners(const Cell<D>& centre, std::vector<PartnerRange>& found) const {
+    found.clear();
+    bool elsewhere = false;
+    const auto add = [&](std::size_t row, const Image<D>& boxes, const std::vector<Piece>& some) {
+      for (const Piece& piece : some) {
+        PartnerRange part{
+            start[row + static_cast<std::size_t>(piece.begin)], start[row + static_cast<std::size_t>(piece.end)], {}};
+        for (int k = 0; k < D - 1; ++k) part.image[k] = -boxes[k];
+        part.image[D - 1] = -piece.boxes;
+        elsewhere = elsewhere || !part.here();
+        if (part.begin < part.end) found.push_back(part);
+      }
+    };
+    const auto last = static_cast<std::size_t>(centre[D - 1]);
+    Cell<D> row = centre;
+    row[D - 1] = 0;
+    add(kSlices * grid.index(row), {}, ahead[last]);
+    const std::int32_t side = D == 3 ? range[1] : 0;
+    for (std::int32_t a = 0; a <= range[0]; ++a) {
+      typename CellGrid<D>::Step first, second{};
+      if (!grid.step(0, centre[0] + a, first)) continue;
+      for (std::int32_t b = a == 0 ? 1 : -side; b <= side; ++b) {
+        Image<D> boxes{};
+        boxes[0] = first.boxes;
+        if constexpr (D == 3) {
+          if (!grid.step(1, centre[1] + b, second)) continue;
+          boxes[1] = second.boxes;
+        }
+        add(kSlices * (first.offset + second.offset), boxes, around[last]);
+      }
+    }
+    if (elsewhere)
+      std::ranges::stable_sort(found.begin() + 1, found.end(), {},
+                               [](const PartnerRange& part) { return std::pair(!part.here(), part.image); });
+  }
+};
+
+}  // namespace
+
+template <int D>
+void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles) {
+  ++rebuilds_;
+  calls_ = 0;
+  particles_ = step.x.size();
+  records_.clear();
+  plain_size_ = 0;
+  std::vector<Id> members;
+  Extent<D> extent;
+  for (Id i = 0; i < step.x.size(); ++i)
+    if (filter_.species.code(i) != 0) members.push_back(i), extent.add(step.x[i]);
+  const double reach = cutoff_ + skin_;
+  Cells<D> cells(CellGrid<D>(box_, reach, extent), reach);
+
+  // Counting sort by cell.
+  std::vector<std::uint32_t> at(members.size());
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    at[m] = static_cast<std::uint32_t>(cells.index(step.x[members[m]]));
+    ++cells.start[at[m] + 1];
+  }
+  const std::size_t fullest = *std::ranges::max_element(cells.start);
+  for (std::size_t c = 1; c < cells.start.size(); ++c) cells.start[c] += cells.start[c - 1];
+  std::vector<std::uint32_t> next(cells.start.begin(), cells.start.end() - 1);
+  records_.order.resize(members.size());
+  for (std::size_t m = 0; m < members.size(); ++m) records_.order[next[at[m]]++] = members[m];
+  double around = 1;
+  for (int k = 0; k < D; ++k) around *= 2 * cells.range[k] + 1;
+  records_.most_partners = static_cast<std::size_t>(around * static_cast<double>(fullest));
+
+  for (auto& coordinate : built_at_) coordinate.assign(members.size() + 8, 0);
+  code_.assign(members.size() + 8, 0);
+  bool any_moving = false;
+  std::vector<Image<D>> boxes(members.size());
+  for (std::size_t r = 0; r < members.size(); ++r) {
+    const Id i = records_.order[r];
+    boxes[r] = cells.grid.boxes(cells.grid.cell(step.x[i]));
+    const Vec<D> home = step.x[i] - box_.shift(boxes[r]);
+    std::uint64_t code = filter_.species.code(i);
+    if (!ghost_.empty() && ghost_[i] != 0) code |= PartnerSearch::kGhost | PartnerSearch::kOdd;
+    bool moving = boxes[r] != Image<D>{};
+    for (int k = 0; k < D; ++k)
+      moving = moving ||
+               (box_.periodic(k) && std::min(home[k], box_.edges[k] - home[k]) <= 0.5 * skin_ + 1e-9 * box_.edges[k]);
+    if (moving) code |= PartnerSearch::kMoving | PartnerSearch::kOdd;
+    any_moving = any_moving || moving;
+    for (int k = 0; k < D; ++k) built_at_[k][r] = home[k];
+    code_[r] = code;
+  }
+  if (any_moving)
+    for (const Image<D>& box : boxes) {
+      records_.box.push_back({0, 0, 0, 0});
+      for (int k = 0; k < D; ++k) (&records_.box.back().x)[k] = box[k];
+    }
+
+  std::vector<std::uint32_t> owned(members.size() + 1);  // records of own particles before this one
+  for (std::size_t r = 0; r < members.size(); ++r)
+    owned[r + 1] = owned[r] + ((code_[r] & PartnerSearch::kGhost) == 0 ? 1 : 0);
+  const auto all_ghosts = [&](const PartnerRange& range) { return owned[range.begin] == owned[range.end]; };
+  std::vector<PartnerRange> ranges;
+  Cell<D> centre{};
+  for (std::size_t c = 0; c + 1 < cells.start.size(); ++c) {
+    if (cells.start[c] < cells.start[c + 1]) {
+      std::size_t rest = c;
+      for (int k = D - 1; k >= 0; --k) {
+        const auto count = static_cast<std::size_t>(cells.grid.count(k) * (k < D - 1 ? 1 : Cells<D>::kSlices));
+        centre[k] = static_cast<std::int32_t>(rest % count);
+        rest /= count;
+      }
+      cells.partners(centre, ranges);
+      const bool ghosts = owned[cells.start[c]] == owned[cells.start[c + 1]];
+      const bool among = !ghosts || !all_ghosts(ranges[0]);  // the first range begins with the cell itself
+      if (ghosts) std::erase_if(ranges, all_ghosts);
+      for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
+        if (among) ranges[0].begin = r + 1;
+        find_pairs(r, ranges);
+        if (plain_size_ + records_.partners[PairRecords<D>::kMoving].size() > kMostPairs + kMostPartners * particles_) {
+          rebuilds_ = 0;
+          throw Error(Failure::numerical, "far too many pairs are within " + short_text(reach) +
+                                              " of each other: the cutoff and " + short_text(skin_) +
+                                              " for steps as long as that of particle " +
+                                              std::to_string(particles.id_of(farthest(step))) +
+                                              "; use a smaller integrator.step or cutoff");
+        }
+      }
+    }
+  }
+  records_.partners[0].swap(plain_);
+  records_.partners[0].resize(std::max(records_.partners[0].size(), plain_size_ + 8));
+  for (int kind = 1; kind < PairRecords<D>::kKinds; ++kind)
+    records_.partners[kind].resize(records_.partners[kind].size() + 8);
+}
+
+/// Lists the pairs of one particle with those in these ranges.
+template <int D>
+void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> ranges) {
+  const std::uint64_t code = code_[row];
+  const double reach = (cutoff_ + skin_) * (1 + 1e-12);
+  const bool is_ghost = (code & PartnerSearch::kGhost) != 0;
+  PartnerSearch search{.x = {built_at_[0].data(), built_at_[1].data(), built_at_[2].data()},
+                       .code = code_.data(),
+                       .row = row,
+                       .own = {},
+                       .reach_squared = reach * reach};
+  search.wanted = filter_.species.partner_code(code);
+  search.plain = (code & PartnerSearch::kOdd) == 0;
+  for (std::size_t first = 0; first < ranges.size();) {
+    const auto& image = ranges[first].image;
+    std::size_t last = first, candidates = 16;
+    for (; last < ranges.size() && ranges[last].as(ranges[first]); ++last)
+      candidates += ranges[last].end - ranges[last].begin;
+    if (plain_.size() < plain_size_ + candidates) plain_.resize(2 * (plain_size_ + candidates));
+    if (other_.size() < candidates) other_.resize(candidates);
+    search.here = ranges[first].here();
+    for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
+    PartnersFound found{plain_.data() + plain_size_, other_.data()};
+    for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
+    if (filter_.excluded) {
+      const auto excluded = [&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); };
+      found.plain = std::remove_if(plain_.data() + plain_size_, found.plain, excluded);
+      found.other = std::remove_if(other_.data(), found.other, excluded);
+    }
+    const auto add = [&](int kind, std::size_t begin, std::size_t end) {
+      if (begin == end) return;
+      records_.runs[kind].push_back({row,
+                                     static_cast<std::uint32_t>(begin),
+                                     static_cast<std::uint32_t>(end - begin),
+                                     {image[0], image[1], image[2]}});
+    };
+    const auto plain_end = static_cast<std::size_t>(found.plain - plain_.data());
+    add(PairRecords<D>::kPlain, plain_size_, plain_end);
+    plain_size_ = plain_end;
+    for (const int kind : {PairRecords<D>::kMoving, PairRecords<D>::kShared}) {
+      auto& partners = records_.partners[kind];
+      const std::size_t begin = partners.size();
+      for (const std::uint32_t* other = other_.data(); other < found.other; ++other) {
+        const bool other_is_ghost = (code_[*other] & PartnerSearch::kGhost) != 0;
+        if (is_ghost && other_is_ghost) continue;
+        if ((kind == PairRecords<D>::kShared) == (is_ghost || other_is_ghost)) partners.push_back(*other);
+      }
+      add(kind, begin, partners.size());
+    }
+  }
+}
+
+template class PairRecords<2>;
+template class PairRecords<3>;
+template class CutoffList<2>;
+template class CutoffList<3>;
+
+}  // namespace carom

@@ -1,0 +1,57 @@
+#include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/inverse_distance.h"
+#include "engine/forces/potentials/options.h"
+#include "engine/forces/potentials/types.h"
+
+namespace carom::types {
+namespace {
+
+using Type = Parameter::Type;
+using Range = Parameter::Range;
+
+template <int D>
+std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
+  constexpr std::string_view type = "coulomb";
+  constexpr PairWeight charges = PairWeight::charges;
+  if (p.text("form") == "plain") {
+    if (p.has("cutoff") || p.has("damping"))
+      options::refuse(type,
+                      "'cutoff' and 'damping' belong to form = \"damped-shifted\"; leave them out or change 'form'");
+    return options::all_pairs<D>(type, InverseDistance(p.real("constant")), charges, p, context,
+                                 "use form = \"damped-shifted\" with 'damping' and 'cutoff'");
+  }
+  if (!p.has("cutoff") || !p.has("damping"))
+    options::refuse(type, "form = \"damped-shifted\" needs 'damping' and 'cutoff'; give both (damping = 0 only cuts)");
+  const DampedCoulomb whole(p.real("constant"), p.real("damping"));
+  return options::within_reach<D>(type, Cut<DampedCoulomb>(whole, p.real("cutoff"), CutKind::quadratic), charges, p,
+                                  context, whole);
+}
+
+}  // namespace
+
+InteractionInfo coulomb() {
+  return {
+      .name = "coulomb",
+      .kind = InteractionInfo::Kind::pair,
+      .parameters = options::with_filter(
+          {{"constant", Type::real, "1.0", "energy*length/charge^2", "C, or 1/(4 pi epsilon)"},
+           {"form",
+            Type::text,
+            "\"plain\"",
+            "-",
+            "plain: C q q'/r between all pairs; damped-shifted: damped and cut, for periodic boxes",
+            Range::any,
+            {"plain", "damped-shifted"}},
+           {"damping", Type::real, "none", "1/length", "alpha of the form damped-shifted", Range::non_negative},
+           {"cutoff", Type::real, "none", "length", "where the form damped-shifted ends", Range::positive}}),
+      .formula = "sum over pairs of C q q'/r, or of C q q' [erfc(alpha r)/r - polynomial in r^2] up to the cutoff",
+      .documentation =
+          "Charges in vacuum (plain, all pairs summed directly, not in periodic boxes), or the damped-shifted sum that "
+          "stands for the long-ranged potential in neutral periodic systems: the real-space part of an Ewald sum, cut "
+          "so that V, V' and V'' go to zero at the cutoff. Usual values: alpha times cutoff between 2 and 3.",
+      .source = "Wolf et al., J. Chem. Phys. 110 (1999) 8254; Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104",
+      .in_2d = make<2>,
+      .in_3d = make<3>};
+}
+
+}  // namespace carom::types

@@ -1,0 +1,30 @@
+#include "engine/forces/potentials/inverse_distance.h"
+#include "engine/forces/potentials/options.h"
+#include "engine/forces/potentials/types.h"
+
+namespace carom::types {
+namespace {
+
+using Type = Parameter::Type;
+using Range = Parameter::Range;
+
+template <int D>
+std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
+  return options::all_pairs<D>("gravity", InverseDistance(-p.real("constant")), PairWeight::masses, p, context,
+                               "make the boundaries 'wall' or 'open'");
+}
+
+}  // namespace
+
+InteractionInfo gravity() {
+  return {.name = "gravity",
+          .kind = InteractionInfo::Kind::pair,
+          .parameters = options::with_filter({{"constant", Type::real, "1.0", "energy*length/mass^2", "G"}}),
+          .formula = "sum over pairs of -G m m'/r",
+          .documentation = "Newton's gravitation between all pairs, summed directly. Not in periodic boxes.",
+          .source = "Enomoto, thesis, 2011, experiment 2",
+          .in_2d = make<2>,
+          .in_3d = make<3>};
+}
+
+}  // namespace carom::types

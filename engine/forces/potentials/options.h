@@ -1,0 +1,202 @@
+#pragma once
+// What the types of interaction have in common in a deck: shared parameters, and how they are read.
+//
+// All functions throw Error(Failure::deck); its message begins with the type's name and says what to do.
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/base/interaction.h"
+#include "engine/forces/potentials/cut.h"
+#include "engine/forces/potentials/pair_term.h"
+#include "engine/forces/potentials/tail.h"
+#include "engine/ranks/vicinity.h"
+#include "engine/search/neighbour_list.h"
+
+namespace carom::options {
+
+/// `own` followed by those that say between which particles a term acts.
+std::vector<Parameter> with_filter(std::vector<Parameter> own);
+
+/// The same, followed by cutoff, cut and switch_from.
+std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view absent_cutoff);
+
+/// The same, followed by tail: what a potential without an end of its own can be given.
+std::vector<Parameter> with_pair_options(std::vector<Parameter> own);
+
+[[noreturn]] void refuse(std::string_view type, const std::string& problem);
+
+/// The two species `species` names, as indices into `known`.
+SpeciesPair species_pair(std::string_view type, const Parameters& parameters, const std::vector<std::string>& known);
+
+/// What `cutoff`, `cut` and `switch_from` say; it ends at `end` where there is no `cutoff`.
+struct CutOptions {
+  double cutoff;
+  CutKind kind;
+  double switch_from;
+};
+CutOptions cut_options(std::string_view type, const Parameters& parameters, double end = 0);
+
+/// Refuses what is said of the end of a potential without `cutoff`.
+void refuse_cut_options(std::string_view type, const Parameters& parameters);
+
+/// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending; none for `within`.
+PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
+
+/// What ranks have found together, ascending. Collective.
+PairList union_of_all(Exchange& ranks, const PairList& mine);
+
+/// The bonds that `pairs`, `chain` or `within` describe, by ids, i < j, ascending: all there are, on each rank.
+template <int D>
+PairList bonds(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
+  PairList list = bonds(type, parameters, context.total);
+  if (!parameters.has("within") || !context.placed) return list;
+  const double distance = parameters.real("within");
+  const auto add = [&](const auto& p, auto&& counts) {
+    NeighbourList<D> near(context.box, std::vector<double>(p.x.size(), 0.5 * distance));
+    for (const auto& [i, j, image] : near.cover(p.x)) {
+      if (!counts(i) || !((p.x[i] - p.x[j] + context.box.shift(image)).norm() <= distance)) continue;
+      const PairList::value_type bond{p.id.empty() ? i : p.id[i], p.id.empty() ? j : p.id[j]};
+      if (list.empty() || list.back() != bond) list.push_back(bond);  // not through another image
+    }
+  };
+  if (context.ranks) {
+    const Vicinity<D> near = vicinity(context.box, distance, *context.ranks, context.particles);
+    add(near, [&](Id i) { return near.beyond[i] == 0; });
+    list = union_of_all(*context.ranks, list);
+  } else {
+    add(context.particles, [](Id) { return true; });
+  }
+  if (list.empty()) refuse(type, "no particles stand within " + std::to_string(distance) + "; give a larger 'within'");
+  return list;
+}
+
+/// A vector given as a list of D numbers.
+template <int D>
+Vec<D> vector(std::string_view type, const Parameters& parameters, std::string_view key) {
+  const auto& given = parameters.get<std::vector<double>>(key);
+  if (given.size() != D)
+    refuse(type, "'" + std::string(key) + "' has " + std::to_string(given.size()) + " components; give " +
+                     std::to_string(D) + ", as the system has " + std::to_string(D) + " dimensions");
+  return Eigen::Map<const Vec<D>>(given.data());
+}
+
+/// What `species` and `exclude` say.
+template <int D>
+PairFilter filter(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
+  const SpeciesPair species = species_pair(type, parameters, context.species);
+  const bool exclude = parameters.has("exclude") && parameters.text("exclude") == "bonded";
+  if (exclude && !context.bonds)
+    refuse(type,
+           "exclude = \"bonded\" leaves out bonded pairs, but there are no bonds; leave it out or add a harmonic-bond");
+  PairFilter filter;
+  if (species) filter.species = {&context.particles.species, (*species)[0], (*species)[1]};
+  if (exclude) filter.excluded = context.bonds, filter.id = &context.particles.id;
+  return filter;
+}
+
+/// The least contact distance of the pairs between which a term acts [length]; 0 where there are none. Collective.
+template <int D>
+double least_contact(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const SpeciesPair species = species_pair(type, parameters, context.species);
+  const auto& radius = context.particles.radius;
+  std::array<double, 2> least = {-kNone, -kNone};  // radius of either species, negative
+  for (Id i = 0; i < radius.size(); ++i)
+    for (std::size_t k = 0; k < 2; ++k)
+      if (!species || context.particles.species[i] == (*species)[k]) least[k] = std::max(least[k], -radius[i]);
+  if (context.ranks) context.ranks->largest(least);
+  const double contact = -least[0] - least[1];
+  return contact < kNone ? contact : 0;
+}
+
+template <int D>
+bool any_periodic(const Box<D>& box) {
+  for (int k = 0; k < D; ++k)
+    if (box.periodic(k)) return true;
+  return false;
+}
+
+/// A term over the pairs of a source, with the scale of the potential before it was cut.
+template <int D, Potential P, class Pairs>
+std::unique_ptr<Interaction<D>> term(P potential, PairWeight weight, const InteractionContext<D>& context, Pairs pairs,
+                                     const auto& whole, Tail tail = {}) {
+  const auto scale = [whole](double distance) { return whole.scale(distance); };
+  return std::make_unique<PairTerm<D, P, Pairs>>(context.particles, potential, weight, std::move(pairs), scale, tail);
+}
+
+/// A term over all pairs; `remedy` says what to write instead in a periodic box, where there is no such sum.
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, PairWeight weight,
+                                          const Parameters& parameters, const InteractionContext<D>& context,
+                                          const std::string& remedy) {
+  PairFilter pairs_of = filter(type, parameters, context);
+  if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
+  return term<D>(potential, weight, context, AllPairs<D>(context.box, context.total, std::move(pairs_of)), potential);
+}
+
+/// A term over the pairs within the reach of a potential that ends by itself, or of `whole` that was cut.
+template <int D, ShortRanged P>
+std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, PairWeight weight,
+                                             const Parameters& parameters, const InteractionContext<D>& context,
+                                             const auto& whole, Tail tail = {}) {
+  const double reach = std::sqrt(potential.cutoff_squared()) * (1 + 1e-15);
+  PairsWithinCutoff<D> pairs(context.box, reach, filter(type, parameters, context));
+  return term<D>(potential, weight, context, std::move(pairs), whole, tail);
+}
+
+/// The long-range correction of a term over all particles on all ranks.
+template <int D, KnowsTail P>
+Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, PairWeight weight, const Parameters& parameters,
+          const InteractionContext<D>& context) {
+  if (kind == CutKind::force_shifted)
+    refuse(type, "'tail' does not go with cut = \"force-shifted\", which changes V at all distances; take \"switch\"");
+  for (int k = 0; k < D; ++k)
+    if (!context.box.periodic(k))
+      refuse(type, "'tail' is for a fluid without borders; make the box periodic or leave it out");
+  if (!std::isfinite(cut.whole().tail(1, D)))
+    refuse(type, "the long-range correction diverges: V falls off too slowly; leave 'tail' out");
+  const SpeciesPair species = species_pair(type, parameters, context.species);
+  struct Sums {
+    std::array<ExactSum, 2> weight;  // of either species
+    void add(const Sums& other) {
+      for (int k = 0; k < 2; ++k) weight[k].add(other.weight[k]);
+    }
+  } sums;
+  const auto* factor = pair_factors(weight, context.particles);
+  for (Id i = 0; i < context.particles.mass.size(); ++i)
+    for (int k = 0; k < 2; ++k)
+      if (!species || context.particles.species[i] == (*species)[k]) sums.weight[k].add(factor ? (*factor)[i] : 1.0);
+  if (context.ranks) sums = sum_of_all(*context.ranks, sums);
+  const double pairs = sums.weight[0].value() * sums.weight[1].value();
+  const bool alike = !species || (*species)[0] == (*species)[1];
+  return tail_of<D>(cut, alike ? pairs / 2 : pairs, context.box.volume());
+}
+
+/// A term cut as said, with its long-range correction if the deck wants it.
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> cut_term(std::string_view type, P potential, PairWeight weight,
+                                         const CutOptions& options, const Parameters& parameters,
+                                         const InteractionContext<D>& context) {
+  const Cut<P> cut(potential, options.cutoff, options.kind, options.switch_from);
+  Tail correction;
+  if constexpr (KnowsTail<P>)
+    if (parameters.has("tail") && parameters.flag("tail"))
+      correction = tail<D>(type, cut, options.kind, weight, parameters, context);
+  return within_reach<D>(type, cut, weight, parameters, context, potential, correction);
+}
+
+/// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.
+template <int D, Potential P>
+std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, PairWeight weight,
+                                          const Parameters& parameters, const InteractionContext<D>& context) {
+  if (!parameters.has("cutoff")) {
+    refuse_cut_options(type, parameters);
+    return all_pairs<D>(type, potential, weight, parameters, context, "give 'cutoff', at most half the shortest edge");
+  }
+  return cut_term<D>(type, potential, weight, cut_options(type, parameters), parameters, context);
+}
+
+}  // namespace carom::options

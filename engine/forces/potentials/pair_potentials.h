@@ -1,0 +1,40 @@
+#pragma once
+// The potentials that pair kernels are made for: a new one takes a line here.
+
+#include <cstddef>
+#include <type_traits>
+
+#include "engine/forces/potentials/cut.h"
+#include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/harmonic_bond.h"
+#include "engine/forces/potentials/inverse_distance.h"
+#include "engine/forces/potentials/inverse_power.h"
+#include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/table.h"
+#include "engine/forces/potentials/wca.h"
+#include "engine/forces/potentials/yukawa.h"
+
+namespace carom {
+
+template <class... P>
+struct PotentialList {};
+
+using PairPotentials = PotentialList<HarmonicBond,                     // bonds
+                                     InverseDistance,                  // gravity, Coulomb
+                                     Cut<DampedCoulomb>,               //
+                                     Yukawa, Cut<Yukawa>,              //
+                                     LennardJones, Cut<LennardJones>,  //
+                                     Wca,                              //
+                                     InversePower, Cut<InversePower>,  //
+                                     Cut<Table>>;
+
+/// Where in the list a potential stands.
+template <class P, class First, class... Rest>
+constexpr std::size_t place_of(PotentialList<First, Rest...>) {
+  if constexpr (std::is_same_v<P, First>)
+    return 0;
+  else
+    return 1 + place_of<P>(PotentialList<Rest...>{});
+}
+
+}  // namespace carom

@@ -1,0 +1,193 @@
+#pragma once
+// The loop over pairs, written once for all pair potentials.
+//
+//   V = Σ_{i<j} w_ij U(ρ_ij),   ρ_ij = d·d,   d = x_i − x_j (+ the image's shift)
+//   force on i, minus that on j:   −2 w U′ d;    mean force: −w Q(ρ, ρ′) (d + d′)
+//   Hessian product, on i, minus that on j:   w [2 U′ u + 4 U″ (d·u) d],   u = w_i − w_j
+//
+// Q is the divided difference of U; since ρ′ − ρ = (d + d′)·(d′ − d), the mean forces are a discrete gradient.
+
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include "engine/forces/potentials/pair_potentials.h"
+#include "engine/forces/potentials/pairs.h"
+
+namespace carom {
+
+/// w_ij = 1, m_i m_j or q_i q_j.
+enum class PairWeight { one, masses, charges };
+
+/// The factors of w_ij; null: all 1.
+template <int D>
+const std::vector<double>* pair_factors(PairWeight weight, const Particles<D>& particles) {
+  if (weight == PairWeight::one) return nullptr;
+  return weight == PairWeight::masses ? &particles.mass : &particles.charge;
+}
+
+template <int D, Potential P, class Pairs>
+class PairTerm final : public Interaction<D> {
+ public:
+  /// `particles` tells which are ghosts, and outlives the term. `scale`: of pairs of weight 1, at a given distance.
+  PairTerm(const Particles<D>& particles, P potential, PairWeight weight, Pairs pairs,
+           std::function<ForceScale(double)> scale, Tail tail = {})
+      : particles_(particles),
+        potential_(std::move(potential)),
+        weight_(weight),
+        pairs_(std::move(pairs)),
+        scale_(std::move(scale)),
+        tail_(tail),
+        batch_(std::make_unique<PairBatch>()) {}
+
+  void add_energy(Positions<D> x, PotentialSums& sums) const override { evaluate({.x = x}, nullptr, &sums); }
+  void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
+    evaluate({.x = x}, &forces, sums);
+  }
+  std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
+                                int sign) const override {
+    return evaluate({.x = x, .x_new = x_new, .changed = changed}, &forces, nullptr, sign);
+  }
+
+  void add_hessian_product(Positions<D> x, Positions<D> w, ForceSums<D>& out) const override {
+    evaluate({.x = x, .vectors = w}, &out, nullptr);
+  }
+
+  std::unique_ptr<Interaction<D>> among(const Particles<D>& /*made_for*/, const Particles<D>& some) const override {
+    auto pairs = pairs_.among(some);
+    if (!pairs) return nullptr;
+    auto term = std::make_unique<PairTerm>(some, potential_, weight_, std::move(*pairs), scale_, tail_);
+    term->use(*kernels_);
+    return term;
+  }
+  void use(const PairKernels& kernels) override {
+    kernels_ = &kernels;
+    pairs_.use(kernels);
+  }
+  Tail tail() const override { return tail_; }
+  const PairList* bonds() const override {
+    if constexpr (requires { pairs_.list(); })
+      return &pairs_.list();
+    else
+      return nullptr;
+  }
+  double reach(Positions<D> x) const override { return pairs_.reach(x); }
+  double reach(const Particles<D>& share, Exchange& ranks) const override { return pairs_.reach(share, ranks); }
+
+  std::uint64_t interacting_pairs(Positions<D> x) const override {
+    std::uint64_t own = 0;
+    pairs_.batches(step({x}), particles_, cutoff_squared(), *batch_, [&](bool shared) { own += owned(shared); });
+    return own;
+  }
+
+  ForceScale scale(double distance) const override {
+    ForceScale scale = scale_(distance);
+    if (const auto* factor = factors()) {
+      double least = std::numeric_limits<double>::infinity(), largest = 0;
+      for (const double w : *factor)
+        if (w != 0) least = std::min(least, w * w), largest = std::max(largest, w * w);
+      if (largest == 0) return {};
+      scale.spread = largest / least;
+      scale.force *= least;
+      scale.energy *= least;
+    }
+    return scale;
+  }
+
+ private:
+  double cutoff_squared() const {
+    if constexpr (ShortRanged<P>)
+      return potential_.cutoff_squared();
+    else
+      return std::numeric_limits<double>::infinity();
+  }
+  const std::vector<double>* factors() const { return pair_factors(weight_, particles_); }
+  PairStep<D> step(PairStep<D> given) const {
+    given.weight = factors();
+    return given;
+  }
+
+  /// How many pairs of the batch are this rank's: each pair is that of the rank that owns its lower particle.
+  std::uint64_t owned(bool shared) const {
+    if (!shared) return batch_->n;
+    std::uint64_t own = 0;
+    for (unsigned r = 0; r < batch_->rows; ++r)
+      for (unsigned k = batch_->row[r].begin; k < batch_->row[r + 1].begin; ++k)
+        own += particles_.owns(std::min(pairs_.id(batch_->row[r].row), pairs_.id(batch_->second[k]))) ? 1 : 0;
+    return own;
+  }
+
+  /// The loop over pairs. Returns how many are this rank's, for mean forces.
+  std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1) const {
+    const PairFormula& formula = kernels_->formulas[place_of<P>(PairPotentials{})];
+    const auto& function = sums                     ? formula.forces_and_sums
+                           : !given.vectors.empty() ? formula.hessian_product
+                           : given.x_new.empty()    ? formula.forces
+                                                    : formula.mean_forces;
+    constexpr double kNoLimit = std::numeric_limits<double>::infinity();  // of forces that are not asked for
+    PairUnits units{.limits = {kNoLimit, kNoLimit}};
+    if (sums) units.per_energy = 1 / sums->quantum;
+    PairTotals totals[2];  // of own pairs, and of those shared with another rank
+    std::uint64_t own = 0;
+    ForceWords* low = nullptr;
+    pairs_.batches(step(given), particles_, cutoff_squared(), *batch_, [&](bool shared) {
+      if (forces && !low) {
+        units.limits = forces->make_room(pairs_.most_partners());
+        units.per_force = sign / forces->quantum();
+        low = pairs_.low(*forces);
+      }
+      const bool wide = !function[0](&potential_, *batch_, units, &totals[shared ? 1 : 0]);
+      if (wide && !function[1](&potential_, *batch_, units, &totals[shared ? 1 : 0])) {
+        if (given.x_new.empty() && given.vectors.empty()) refuse();
+        forces->spoil();
+      } else if (forces) {
+        kernels_->scatter(*batch_, batch_->low, low);
+        if (wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
+      }
+      if (!given.x_new.empty()) own += owned(shared);
+    });
+    if (low) pairs_.pass_on(*forces);
+    if (!sums) return own;
+    // A shared pair counts half here and half there.
+    const auto add = [&](ExactSum& sum, PairTotals::Whole PairTotals::*part, double quanta) {
+      sum.add(2 * totals[0].*part + totals[1].*part, 0.5 * quanta * sums->quantum);
+    };
+    add(sums->energy, &PairTotals::energy, 1);
+    add(sums->magnitude, &PairTotals::magnitude, 1);
+    add(sums->virial, &PairTotals::virial, 64);
+    return own;
+  }
+
+  /// Names the pair of the batch with the largest force, or one that is no number.
+  [[noreturn]] void refuse() const {
+    unsigned worst = 0;
+    double largest = -1, apart = 0;
+    for (unsigned k = 0; k < batch_->n; ++k) {
+      const auto& d = batch_->d;
+      const double rho = d[0][k] * d[0][k] + d[1][k] * d[1][k] + d[2][k] * d[2][k];
+      const double size = std::abs(batch_->weight[k] * potential_.derivative(rho)) * std::sqrt(rho);
+      if (size <= largest) continue;
+      worst = k;
+      apart = std::sqrt(rho);
+      if (!(size >= 0)) break;
+      largest = size;
+    }
+    const Id i = pairs_.id(batch_->first_of(worst)), j = pairs_.id(batch_->second[worst]);
+    const auto name = [&](Id k) { return std::to_string(particles_.id_of(k)); };
+    throw Error(Failure::numerical, "the force between particles " + name(std::min(i, j)) + " and " +
+                                        name(std::max(i, j)) + ", " + short_text(apart) +
+                                        " apart, is too large or no number; use a smaller integrator.step, or place "
+                                        "them farther apart");
+  }
+
+  const Particles<D>& particles_;
+  P potential_;
+  PairWeight weight_;
+  Pairs pairs_;
+  std::function<ForceScale(double)> scale_;
+  Tail tail_;
+  const PairKernels* kernels_ = &pair_kernels();
+  std::unique_ptr<PairBatch> batch_;
+};
+
+}  // namespace carom

@@ -1,0 +1,274 @@
+#pragma once
+// Which pairs a term of V is summed over: a list of bonds, all pairs, or the pairs within a cutoff.
+//
+// Each source offers
+//   batches(step, particles, cutoff², batch, visit)   fills the batch again and again and calls visit(shared), shared:
+//                               of each pair another rank owns one particle; pairs of two ghosts are left out
+//   id(place)                   the particle that a batch means
+//   low(sums), high(sums)       words to which the forces of a batch are added; pass_on(sums) comes last
+//   most_partners()             of any particle in these batches, or more
+//   use(kernels)                instead of pair_kernels()
+// and
+//   reach(x), reach(share, ranks)           how far apart partners are at most; infinite: no end
+//   among(some)                             itself for some of the particles, if they are enough
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "engine/base/interaction.h"
+#include "engine/forces/pair_list.h"
+#include "engine/ranks/exchange.h"
+
+namespace carom {
+
+/// Fills the batch from a list, for each of the parts of the list.
+template <int D, class Visit>
+void collect_batches(PairRecords<D>& records, const Box<D>& box, const PairStep<D>& step, double cutoff_squared,
+                     const PairKernels& kernels, PairBatch& batch, Visit&& visit) {
+  for (const auto kind : {PairRecords<D>::kPlain, PairRecords<D>::kMoving, PairRecords<D>::kShared}) {
+    PairRows rows = records.rows(kind, box, step);
+    rows.cutoff_squared = cutoff_squared;
+    for (PairCursor cursor; kernels.collect(rows, cursor, batch);) visit(kind == PairRecords<D>::kShared);
+  }
+}
+
+/// Bonds, given with i < j in ascending order. A bond spans the image that is nearest at x; one that grows to nearly
+/// half an edge of a periodic box, where another image becomes the nearest, throws Error(Failure::numerical).
+template <int D>
+class Bonds {
+ public:
+  Bonds(const Box<D>& box, PairList pairs) : box_(box), pairs_(std::move(pairs)) {
+    std::unordered_map<Id, std::size_t> partners;
+    for (const auto& pair : pairs_)
+      for (const Id i : pair) most_partners_ = std::max(most_partners_, ++partners[i]);
+  }
+
+  const PairList& list() const { return pairs_; }
+
+  std::optional<Bonds> among(const Particles<D>& some) const {
+    if (some.id.empty()) return *this;
+    constexpr Id kUnknown = std::numeric_limits<Id>::max();
+    std::vector<Id> number(some.id.back() + 1, kUnknown);
+    for (Id i = 0; i < some.id.size(); ++i) number[some.id[i]] = i;
+    const auto of = [&](Id id) { return id < number.size() ? number[id] : kUnknown; };
+    PairList known;
+    for (const auto& [a, b] : pairs_) {
+      const Id i = of(a), j = of(b);
+      if (!(i != kUnknown && some.owns(i)) && !(j != kUnknown && some.owns(j))) continue;
+      if (i == kUnknown || j == kUnknown) return std::nullopt;
+      known.push_back({i, j});
+    }
+    Bonds bonds(box_, std::move(known));
+    bonds.ids_ = some.id;
+    return bonds;
+  }
+  double reach(Positions<D> x) const {
+    double longest = 0;
+    for (const auto& [i, j] : pairs_) longest = std::max(longest, (x[i] - x[j] + shift_of(i, j, x)).norm());
+    return longest;
+  }
+  double reach(const Particles<D>& share, Exchange& ranks) const {
+    const Id first = share.size() > 0 ? share.id_of(0) : 0;
+    const auto here = [&](Id id) { return id >= first && id - first < share.size(); };
+    Bytes told;  // the higher partners of bonds, where another rank has the lower one
+    for (const auto& [i, j] : pairs_)
+      if (!here(i) && here(j)) put(told, j), put(told, share.x[j - first]);
+    std::unordered_map<Id, Vec<D>> elsewhere;
+    for (const Bytes& each : ranks.gather(told))
+      for (Reader reader(each); reader.more();) {
+        const auto id = reader.get<Id>();
+        elsewhere[id] = reader.get<Vec<D>>();
+      }
+    double longest = 0;
+    for (const auto& [i, j] : pairs_) {
+      if (!here(i)) continue;
+      const Vec<D> d = share.x[i - first] - (here(j) ? share.x[j - first] : elsewhere.at(j));
+      longest = std::max(longest, (d + box_.shift(box_.nearest_image(d))).norm());
+    }
+    return longest;
+  }
+
+  template <class Visit>
+  void batches(const PairStep<D>& step, const Particles<D>& particles, double /*cutoff_squared*/, PairBatch& batch,
+               Visit&& visit) const {
+    shared_.clear();
+    for (const bool shared : {false, true}) {
+      batch.clear();
+      const auto flush = [&] {
+        batch.pad();
+        if (batch.n > 0) visit(shared);
+        batch.clear();
+      };
+      for (const auto& [i, j] : shared ? shared_ : pairs_) {
+        if (step.changed && step.changed[i] == 0 && step.changed[j] == 0) continue;
+        if (!shared && !(particles.owns(i) && particles.owns(j))) {
+          if (particles.owns(i) || particles.owns(j)) shared_.push_back({i, j});
+          continue;
+        }
+        const Vec<D> shift = shift_of(i, j, step.x), d = step.x[i] - step.x[j] + shift;
+        batch.begin_row(i);
+        for (int k = 0; k < 3; ++k) batch.d[k][batch.n] = k < D ? d[k] : 0;
+        if (!step.x_new.empty() || !step.vectors.empty()) {
+          const Vec<D> d_new = step.vectors.empty() ? Vec<D>(step.x_new[i] - step.x_new[j] + shift)
+                                                    : Vec<D>(step.vectors[i] - step.vectors[j]);
+          for (int k = 0; k < 3; ++k) batch.d_new[k][batch.n] = k < D ? d_new[k] : 0;
+        }
+        batch.second[batch.n++] = j;
+        if (batch.n == PairBatch::kCapacity) flush();
+      }
+      flush();
+    }
+  }
+  Id id(std::uint32_t place) const { return place; }
+  ForceWords* low(ForceSums<D>& sums) const { return sums.low(); }
+  ForceWords* high(ForceSums<D>& sums) const { return sums.high(); }
+  void pass_on(ForceSums<D>&) const {}
+  std::size_t most_partners() const { return most_partners_; }
+  void use(const PairKernels&) {}
+
+ private:
+  /// Of the image in which the bond is at x.
+  Vec<D> shift_of(Id i, Id j, Positions<D> x) const {
+    const Vec<D> straight = x[i] - x[j];
+    if ((straight.array().abs() <= kLongest * box_.edges.array()).all()) return Vec<D>::Zero();
+    const Vec<D> shift = box_.shift(box_.nearest_image(straight));
+    for (int k = 0; k < D; ++k)
+      if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > kLongest * box_.edges[k])
+        throw Error(Failure::numerical, "the bond of particles " + std::to_string(ids_.empty() ? i : ids_[i]) +
+                                            " and " + std::to_string(ids_.empty() ? j : ids_[j]) +
+                                            " spans nearly half the periodic box along axis " + std::to_string(k) +
+                                            ", where its image is ambiguous; use a larger box");
+    return shift;
+  }
+
+  static constexpr double kLongest = 0.48;  // of a bond along a periodic axis [edge]
+
+  const Box<D>& box_;
+  PairList pairs_;
+  mutable PairList shared_;  // with other ranks, in batches()
+  std::span<const Id> ids_;  // that all ranks know; empty: those of pairs_
+  std::size_t most_partners_ = 0;
+};
+
+/// All pairs of `particles` particles, in a box without periodic axes. They are not stored: partners of one stand one
+/// after the other, sorted by species where these matter and by whether they are owned.
+template <int D>
+class AllPairs {
+ public:
+  AllPairs(const Box<D>& box, std::size_t particles, PairFilter filter)
+      : box_(box), particles_(particles), filter_(std::move(filter)) {}
+
+  std::optional<AllPairs> among(const Particles<D>& some) const {
+    if (some.size() < particles_) return std::nullopt;
+    return AllPairs(box_, particles_, filter_.among(some));
+  }
+  double reach(Positions<D>) const { return std::numeric_limits<double>::infinity(); }
+  double reach(const Particles<D>&, Exchange&) const { return std::numeric_limits<double>::infinity(); }
+
+  template <class Visit>
+  void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
+               Visit&& visit) const {
+    if (records_.order.empty() || ghost_ != particles.ghost) arrange(particles);
+    need_finite(particles, step.x);
+    records_.load(step);
+    collect_batches(records_, box_, step, cutoff_squared, *kernels_, batch, visit);
+  }
+  Id id(std::uint32_t place) const { return records_.order[place]; }
+  ForceWords* low(ForceSums<D>&) const { return records_.low(); }
+  ForceWords* high(ForceSums<D>&) const { return records_.high(); }
+  void pass_on(ForceSums<D>& sums) const { records_.pass_on(sums); }
+  std::size_t most_partners() const { return particles_; }
+  void use(const PairKernels& kernels) { kernels_ = &kernels; }
+
+ private:
+  void arrange(const Particles<D>& particles) const {
+    ghost_ = particles.ghost;
+    records_.clear();
+    std::vector<std::uint32_t> end;  // of each group: by species and, within that, owned and not
+    const bool apart = !filter_.species.all() && filter_.species.a != filter_.species.b;
+    for (const std::uint64_t code : {PartnerSearch::kFirst, PartnerSearch::kSecond})
+      for (const bool owned : {true, false}) {
+        for (Id i = 0; i < particles_; ++i)
+          if (particles.owns(i) == owned && (filter_.species.code(i) & code) != 0 &&
+              (apart || code == PartnerSearch::kFirst))
+            records_.order.push_back(i);
+        end.push_back(static_cast<std::uint32_t>(records_.order.size()));
+      }
+    const auto add = [&](auto kind, std::uint32_t row, std::uint32_t first, std::uint32_t last) {
+      const auto run = [&](std::uint32_t stop) {
+        if (first < stop) records_.runs[kind].push_back({row, first, stop - first, {0, 0, 0}});
+      };
+      for (std::uint32_t r = first; filter_.excluded && r < last; ++r)
+        if (filter_.excludes(records_.order[row], records_.order[r])) run(r), first = r + 1;
+      run(last);
+    };
+    for (std::uint32_t row = 0; row < end[1]; ++row) {
+      const bool owned = row < end[0];
+      const std::uint32_t own = apart ? end[1] : owned ? row + 1 : end[1], owned_end = apart ? end[2] : end[0];
+      add(owned ? PairRecords<D>::kPlain : PairRecords<D>::kShared, row, own, owned_end);
+      if (owned) add(PairRecords<D>::kShared, row, owned_end, apart ? end[3] : end[1]);
+    }
+    for (const auto kind : {PairRecords<D>::kPlain, PairRecords<D>::kShared}) {
+      auto& partners = records_.partners[kind];
+      partners.resize(records_.order.size());
+      std::iota(partners.begin(), partners.end(), 0u);
+      partners.resize(partners.size() + 8);
+    }
+  }
+
+  const Box<D>& box_;
+  std::size_t particles_;
+  PairFilter filter_;
+  const PairKernels* kernels_ = &pair_kernels();
+  // Caches: their state never shows in the sums.
+  mutable PairRecords<D> records_;
+  mutable std::vector<char> ghost_;
+};
+
+/// The pairs within a cutoff.
+template <int D>
+class PairsWithinCutoff {
+ public:
+  PairsWithinCutoff(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList<D>* like = nullptr)
+      : box_(box), cutoff_(cutoff), filter_(filter), list_(box, cutoff, std::move(filter), like) {}
+
+  std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
+    return PairsWithinCutoff(box_, cutoff_, filter_.among(some), &list_);
+  }
+  double reach(Positions<D>) const { return cutoff_; }
+  double reach(const Particles<D>&, Exchange&) const { return cutoff_; }
+
+  template <class Visit>
+  void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
+               Visit&& visit) const {
+    records_ = &list_.cover(step, particles);
+    collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit);
+  }
+  Id id(std::uint32_t place) const { return records_->order[place]; }
+  ForceWords* low(ForceSums<D>&) const { return records_->low(); }
+  ForceWords* high(ForceSums<D>&) const { return records_->high(); }
+  void pass_on(ForceSums<D>& sums) const { records_->pass_on(sums); }
+  std::size_t most_partners() const { return records_->most_partners; }
+  void use(const PairKernels& kernels) {
+    kernels_ = &kernels;
+    list_.use(kernels);
+  }
+
+ private:
+  const Box<D>& box_;
+  double cutoff_;
+  PairFilter filter_;
+  const PairKernels* kernels_ = &pair_kernels();
+  // Caches: their state never shows in the sums.
+  mutable CutoffList<D> list_;
+  mutable PairRecords<D>* records_ = nullptr;
+};
+
+}  // namespace carom

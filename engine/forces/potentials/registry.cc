@@ -1,0 +1,28 @@
+// Every type of interaction there is, in the order of the manual: one line each.
+
+#include "engine/base/interaction.h"
+#include "engine/forces/potentials/types.h"
+
+namespace carom {
+
+const std::vector<InteractionInfo>& interactions() {
+  static const std::vector<InteractionInfo> all = {
+      types::harmonic_bond(),  // springs between given pairs
+      types::gravity(),        // all pairs
+      types::coulomb(),        // all pairs, or damped and cut
+      types::yukawa(),         // screened charges
+      types::lennard_jones(),  // van der Waals
+      types::wca(),            // its repulsive part
+      types::inverse_power(),  // soft spheres
+      types::table(),          // any pair potential, from points
+      types::uniform_field(),  // weight
+      types::harmonic_trap(),  // a spring to one point
+  };
+  return all;
+}
+
+const InteractionInfo& find_interaction(std::string_view name) {
+  return find_named(interactions(), "interaction", name);
+}
+
+}  // namespace carom

@@ -1,0 +1,19 @@
+#pragma once
+// The declarations of all types of interaction. Each is defined in the file of its name; registry.cc lists them.
+
+#include "engine/base/interaction.h"
+
+namespace carom::types {
+
+InteractionInfo harmonic_bond();
+InteractionInfo gravity();
+InteractionInfo coulomb();
+InteractionInfo yukawa();
+InteractionInfo lennard_jones();
+InteractionInfo wca();
+InteractionInfo inverse_power();
+InteractionInfo table();
+InteractionInfo uniform_field();
+InteractionInfo harmonic_trap();
+
+}  // namespace carom::types

@@ -1,0 +1,320 @@
+// The kernels of pair_kernels.h, written once for any number of lanes. Included by pair_kernels_*.cc only, which are
+// compiled for different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so
+// that no function compiled for one machine can end up in another's binary.
+
+#include "engine/base/lanes.h"
+#include "engine/forces/simd/pair_kernels.h"
+
+namespace carom {
+namespace {
+
+template <int W>
+struct Width {
+  typedef double Double __attribute__((vector_size(8 * W)));
+  typedef long long Long __attribute__((vector_size(8 * W)));
+  typedef std::uint32_t Places __attribute__((vector_size(4 * W)));
+};
+using Two = Width<2>::Double;
+using Four = Width<4>::Double;
+using Eight = Width<8>::Double;
+
+#define CAROM_INLINE [[gnu::always_inline]] inline
+
+template <class V>
+CAROM_INLINE V load(const void* at) {
+  V lanes;
+  __builtin_memcpy(&lanes, at, sizeof lanes);
+  return lanes;
+}
+template <class V>
+CAROM_INLINE void store(void* at, V lanes) {
+  __builtin_memcpy(at, &lanes, sizeof lanes);
+}
+
+template <class V>
+struct Fields {
+  V x, y, z, w;
+};
+
+/// The fields of W records that stand at `at(lane)`.
+template <class V>
+CAROM_INLINE Fields<V> transposed(const auto& at) {
+  if constexpr (sizeof(V) == 16) {
+    const V a = load<V>(&at(0)->x), b = load<V>(&at(1)->x), c = load<V>(&at(0)->z), d = load<V>(&at(1)->z);
+    return {__builtin_shufflevector(a, b, 0, 2), __builtin_shufflevector(a, b, 1, 3),
+            __builtin_shufflevector(c, d, 0, 2), __builtin_shufflevector(c, d, 1, 3)};
+  } else if constexpr (sizeof(V) == 32) {
+    const V a = load<V>(at(0)), b = load<V>(at(1)), c = load<V>(at(2)), d = load<V>(at(3));
+    const V xz01 = __builtin_shufflevector(a, b, 0, 4, 2, 6), yw01 = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    const V xz23 = __builtin_shufflevector(c, d, 0, 4, 2, 6), yw23 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    return {__builtin_shufflevector(xz01, xz23, 0, 1, 4, 5), __builtin_shufflevector(yw01, yw23, 0, 1, 4, 5),
+            __builtin_shufflevector(xz01, xz23, 2, 3, 6, 7), __builtin_shufflevector(yw01, yw23, 2, 3, 6, 7)};
+  } else {
+    const auto both = [&](int lane) __attribute__((always_inline)) {
+      return __builtin_shufflevector(load<Four>(at(lane)), load<Four>(at(lane + 4)), 0, 1, 2, 3, 4, 5, 6, 7);
+    };
+    const V a = both(0), b = both(1), c = both(2), d = both(3);
+    const V xz01 = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
+    const V yw01 = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+    const V xz23 = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14);
+    const V yw23 = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+    return {__builtin_shufflevector(xz01, xz23, 0, 1, 8, 9, 4, 5, 12, 13),
+            __builtin_shufflevector(yw01, yw23, 0, 1, 8, 9, 4, 5, 12, 13),
+            __builtin_shufflevector(xz01, xz23, 2, 3, 10, 11, 6, 7, 14, 15),
+            __builtin_shufflevector(yw01, yw23, 2, 3, 10, 11, 6, 7, 14, 15)};
+  }
+}
+
+/// The sign of each lane, one bit a lane.
+template <class M>
+CAROM_INLINE unsigned bits(M mask) {
+#if defined(__AVX512DQ__)
+  if constexpr (sizeof mask == 64) return _mm512_movepi64_mask((__m512i)mask);
+#endif
+#if defined(__AVX__)
+  if constexpr (sizeof mask == 32) return static_cast<unsigned>(_mm256_movemask_pd((__m256d)mask));
+#endif
+#if defined(__SSE2__)
+  if constexpr (sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
+#endif
+  unsigned all = 0;
+  for (unsigned l = 0; l < sizeof mask / 8; ++l) all |= (static_cast<long long>(mask[l]) < 0 ? 1u : 0u) << l;
+  return all;
+}
+
+/// a < b, a mask: GCC for SSE2 takes the conjunction of two comparisons to pieces.
+template <class V>
+CAROM_INLINE IntegerOf<V> below(V a, V b) {
+#if defined(__SSE2__)
+  if constexpr (sizeof a == 16) return (IntegerOf<V>)_mm_cmplt_pd((__m128d)a, (__m128d)b);
+#endif
+  return (IntegerOf<V>)(a < b);
+}
+/// Where a < b, one bit a lane.
+template <class V>
+CAROM_INLINE unsigned less(V a, V b) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof a == 64) return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ);
+#endif
+  return bits(a < b);
+}
+
+/// For each mask of four lanes the halves of those that are in it, first things first.
+struct Compression {
+  alignas(32) std::uint32_t half[16][8];
+  alignas(16) std::uint32_t lane[16][4];
+  constexpr Compression() : half{}, lane{} {
+    for (unsigned mask = 0; mask < 16; ++mask) {
+      unsigned n = 0;
+      for (unsigned l = 0; l < 4; ++l)
+        if ((mask >> l & 1) != 0) {
+          half[mask][2 * n] = 2 * l, half[mask][2 * n + 1] = 2 * l + 1;
+          lane[mask][n++] = l;
+        }
+    }
+  }
+};
+constexpr Compression kCompression;
+
+/// Stores the lanes in a mask one after another; may write up to W numbers.
+template <class V>
+CAROM_INLINE void compress(double* to, unsigned mask, V x) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof x == 64) {
+    store(to, _mm512_maskz_compress_pd(static_cast<__mmask8>(mask), (__m512d)x));
+    return;
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (sizeof x == 32) {
+    const __m256i which = _mm256_load_si256(reinterpret_cast<const __m256i*>(kCompression.half[mask]));
+    store(to, _mm256_permutevar8x32_ps((__m256)x, which));
+    return;
+  }
+#endif
+  for (unsigned l = 0, n = 0; l < sizeof x / 8; n += mask >> l & 1, ++l) to[n] = x[l];
+}
+template <int W, class Places>
+CAROM_INLINE void compress(std::uint32_t* to, unsigned mask, Places places) {
+#if defined(__AVX512VL__)
+  if constexpr (W == 8) {
+    store(to, _mm256_maskz_compress_epi32(static_cast<__mmask8>(mask), (__m256i)places));
+    return;
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (W == 4) {
+    const __m128i which = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompression.lane[mask]));
+    store(to, _mm_permutevar_ps((__m128)places, which));
+    return;
+  }
+#endif
+  for (unsigned l = 0, n = 0; l < W; n += mask >> l & 1, ++l) to[n] = places[l];
+}
+
+template <int W>
+CAROM_INLINE unsigned bits_in(unsigned mask) {
+  if constexpr (W == 2)
+    return (mask & 1) + (mask >> 1);
+  else
+    return static_cast<unsigned>(__builtin_popcount(mask));  // all machines with so wide vectors have an instruction
+}
+
+/// What a batch has beside separations: nothing, new ones, or differences of vectors.
+enum class Beside { nothing, step, vectors };
+
+template <int W, Beside beside, bool moving, bool weighted>
+bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
+  using V = typename Width<W>::Double;
+  batch.clear();
+  unsigned n = 0;
+  const V cutoff = all<V>(rows.cutoff_squared);
+  const PairRecord* const records = rows.x;
+  for (; cursor.run < rows.runs; ++cursor.run, cursor.at = 0) {
+    const PairRun& run = rows.run[cursor.run];
+    const std::uint32_t* const partner = rows.partner + run.begin;
+    const PairRecord &own = rows.x[run.row], &own_new = beside == Beside::nothing ? own : rows.x_new[run.row];
+    const V x = all<V>(own.x), y = all<V>(own.y), z = all<V>(own.z), w = all<V>(own.w);
+    const V x_new = all<V>(own_new.x), y_new = all<V>(own_new.y), z_new = all<V>(own_new.z);
+    V image[3], shift[3];
+    for (int k = 0; k < 3; ++k) {
+      const double* const box = moving ? &rows.box[run.row].x : nullptr;
+      image[k] = all<V>(run.image[k] - (moving ? box[k] : 0));
+      shift[k] = image[k] * rows.edges[k];
+    }
+    batch.n = n;
+    batch.begin_row(run.row);
+    const std::uint32_t count = run.count;
+    std::uint32_t at = cursor.at, end = at;  // there is room for the partners before `end`
+    unsigned mask = 0;
+    for (;; at += W) {
+      if (at >= end) {
+        n -= bits_in<W>(mask >> (W - (at - end)));  // partners of the next row
+        const std::uint32_t most = (PairBatch::kCapacity - n) / W * W;
+        if (at >= count || most == 0) break;
+        end = count - at < most ? count : at + most;
+      }
+      const std::uint32_t* const j = partner + at;
+      const auto other = transposed<V>([&](int l) __attribute__((always_inline)) { return records + j[l]; });
+      if constexpr (moving) {
+        const auto box = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.box + j[l]; });
+        shift[0] = (image[0] + box.x) * rows.edges[0];
+        shift[1] = (image[1] + box.y) * rows.edges[1];
+        shift[2] = (image[2] + box.z) * rows.edges[2];
+      }
+      const V dx = (x - other.x) + shift[0], dy = (y - other.y) + shift[1], dz = (z - other.z) + shift[2];
+      const V rho = dx * dx + dy * dy + dz * dz;
+      mask = less(rho, cutoff);
+      V ex, ey, ez;
+      if constexpr (beside != Beside::nothing) {
+        const auto after = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x_new + j[l]; });
+        ex = x_new - after.x, ey = y_new - after.y, ez = z_new - after.z;
+        if constexpr (beside == Beside::step) {
+          ex += shift[0], ey += shift[1], ez += shift[2];
+          mask |= less(ex * ex + ey * ey + ez * ez, cutoff);
+        }
+      }
+      V product;
+      if constexpr (weighted) {
+        product = w * other.w;
+        mask &= bits(product != 0.0);
+      }
+      compress(batch.d[0] + n, mask, dx);
+      compress(batch.d[1] + n, mask, dy);
+      compress(batch.d[2] + n, mask, dz);
+      if constexpr (beside != Beside::nothing) {
+        compress(batch.d_new[0] + n, mask, ex);
+        compress(batch.d_new[1] + n, mask, ey);
+        compress(batch.d_new[2] + n, mask, ez);
+      }
+      if constexpr (weighted) compress(batch.weight + n, mask, product);
+      compress<W>(batch.second + n, mask, load<typename Width<W>::Places>(j));
+      n += bits_in<W>(mask);
+    }
+    if (at < count) {
+      cursor.at = at;
+      break;
+    }
+  }
+  batch.n = n;
+  batch.pad();
+  return n > 0;
+}
+
+template <int W, Beside beside>
+constexpr decltype(&collect_pairs<W, beside, false, false>) kCollect[4] = {
+    collect_pairs<W, beside, false, false>, collect_pairs<W, beside, false, true>,
+    collect_pairs<W, beside, true, false>, collect_pairs<W, beside, true, true>};
+
+template <int W>
+bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
+  const unsigned which = (rows.box ? 2 : 0) + (rows.weighted ? 1 : 0);
+  if (!rows.x_new) return kCollect<W, Beside::nothing>[which](rows, cursor, batch);
+  if (rows.vectors) return kCollect<W, Beside::vectors>[which](rows, cursor, batch);
+  return kCollect<W, Beside::step>[which](rows, cursor, batch);
+}
+
+/// Adds the words to the sums of both particles.
+template <int W>
+void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums) {
+  constexpr unsigned L = W < 4 ? W : 4, kParts = 4 / L;  // a record is no wider
+  using I = typename Width<L>::Long;
+  for (unsigned r = 0; r < batch.rows; ++r) {
+    const unsigned end = batch.row[r + 1].begin;
+    I own[kParts] = {};
+    for (unsigned k = batch.row[r].begin; k < end; k += L == 4 ? 4 : 1) {
+      if constexpr (L == 4) {  // pairs of the next row count as zero
+        static constexpr std::int64_t kLanes[8] = {-1, -1, -1, -1};
+        const I some = load<I>(kLanes + 4 - (end - k < 4 ? end - k : 4)), none = {};
+        const I x = load<I>(words[0] + k) & some, y = load<I>(words[1] + k) & some, z = load<I>(words[2] + k) & some;
+        const I xy02 = __builtin_shufflevector(x, y, 0, 4, 2, 6), xy13 = __builtin_shufflevector(x, y, 1, 5, 3, 7);
+        const I z02 = __builtin_shufflevector(z, none, 0, 4, 2, 6), z13 = __builtin_shufflevector(z, none, 1, 5, 3, 7);
+        const I term[4] = {
+            __builtin_shufflevector(xy02, z02, 0, 1, 4, 5), __builtin_shufflevector(xy13, z13, 0, 1, 4, 5),
+            __builtin_shufflevector(xy02, z02, 2, 3, 6, 7), __builtin_shufflevector(xy13, z13, 2, 3, 6, 7)};
+        own[0] += (term[0] + term[1]) + (term[2] + term[3]);
+        for (int l = 0; l < 4; ++l) {
+          std::int64_t* const other = sums[batch.second[k + l]].of;
+          store(other, load<I>(other) - term[l]);
+        }
+      } else {
+        std::int64_t* const other = sums[batch.second[k]].of;
+        const I xy = {words[0][k], words[1][k]}, z = {words[2][k], 0};
+        own[0] += xy;
+        own[kParts - 1] += z;
+        store(other, load<I>(other) - xy);
+        store(other + 2, load<I>(other + 2) - z);
+      }
+    }
+    std::int64_t* const first = sums[batch.row[r].row].of;
+    for (unsigned part = 0; part < kParts; ++part) store(first + L * part, load<I>(first + L * part) + own[part]);
+  }
+}
+
+template <int W>
+void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32_t end, PartnersFound& found) {
+  using V = typename Width<W>::Double;
+  using B = BitsOf<V>;
+  using Places = typename Width<W>::Places;
+  const V x = all<V>(search.own[0]), y = all<V>(search.own[1]), z = all<V>(search.own[2]);
+  const V reach = all<V>(search.reach_squared);
+  const int to_sign = __builtin_clzll(search.wanted);
+  Places places;
+  for (unsigned l = 0; l < W; ++l) places[l] = begin + l;
+  for (std::uint32_t j = begin; j < end; j += W, places += W) {
+    const V dx = x - load<V>(search.x[0] + j), dy = y - load<V>(search.x[1] + j), dz = z - load<V>(search.x[2] + j);
+    const B code = load<B>(search.code + j);
+    unsigned mask = ~less(reach, dx * dx + dy * dy + dz * dz) & bits(code << to_sign);
+    mask &= (1u << (end - j < W ? end - j : W)) - 1;
+    if (!search.here && search.row - j < W) mask &= ~(1u << (search.row - j));
+    const unsigned plain = search.plain ? mask & ~bits(code) : 0;
+    compress<W>(found.plain, plain, places);
+    found.plain += bits_in<W>(plain);
+    if (plain == mask) continue;
+    compress<W>(found.other, mask & ~plain, places);
+    found.other += bits_in<W>(mask & ~plain);
+  }
+}
+
+}  // namespace
+}  // namespace carom

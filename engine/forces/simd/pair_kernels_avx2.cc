@@ -1,0 +1,5 @@
+#include "engine/forces/pair_formulas.h"
+
+namespace carom::kernels {
+constinit const PairKernels pairs_avx2 = kernels_of<4>("avx2", PairPotentials{});
+}  // namespace carom::kernels

@@ -1,0 +1,5 @@
+#include "engine/forces/pair_formulas.h"
+
+namespace carom::kernels {
+constinit const PairKernels pairs_sse2 = kernels_of<2>("sse2", PairPotentials{});
+}  // namespace carom::kernels

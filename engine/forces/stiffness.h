@@ -1,0 +1,38 @@
+#pragma once
+// The highest frequency of small vibrations: it limits how long a step may be.
+
+#include "engine/base/random.h"
+#include "engine/forces/forces.h"
+
+namespace carom {
+
+/// The largest |ω²| [1/time²] of small vibrations about the present positions: of the eigenvalues of M⁻¹V″, by power
+/// iteration from random directions. 0 where nothing acts. The same on any number of ranks; collective.
+template <int D>
+double largest_squared_frequency(const System<D>& system) {
+  constexpr int kRounds = 40;
+  const Particles<D>& p = system.particles;
+  const auto n = static_cast<Id>(p.size());
+  std::vector<Vec<D>> u(n), w(n), force(n);
+  for (Id i = 0; i < n; ++i) {
+    RandomStream random(0, RandomPurpose::probe, p.id_of(i));
+    for (int k = 0; k < D; ++k) u[i][k] = random.uniform() - 0.5;
+  }
+  const auto norm = [&] {
+    ExactSum sum;
+    for (Id i = 0; i < n; ++i)
+      if (p.owns(i)) sum.add(u[i].squaredNorm());
+    return std::sqrt(of_all_ranks(system, sum).value());
+  };
+  Counters uncounted;
+  double curvature = norm();
+  for (int round = 0; round < kRounds && curvature > 0; ++round) {
+    for (std::size_t i = 0; i < n; ++i) w[i] = u[i] / (curvature * std::sqrt(p.mass[i]));
+    evaluate_hessian_product<D>(system, p.x, w, force, uncounted);
+    for (std::size_t i = 0; i < n; ++i) u[i] = force[i] / std::sqrt(p.mass[i]);
+    curvature = norm();
+  }
+  return curvature;
+}
+
+}  // namespace carom

@@ -1,5 +1,0 @@
-#include "engine/pair_formulas.h"
-
-namespace carom::kernels {
-constinit const PairKernels pairs_avx2 = kernels_of<4>("avx2", PairPotentials{});
-}  // namespace carom::kernels

@@ -1,5 +1,0 @@
-#include "engine/pair_formulas.h"
-
-namespace carom::kernels {
-constinit const PairKernels pairs_avx512 = kernels_of<8>("avx512", PairPotentials{});
-}  // namespace carom::kernels

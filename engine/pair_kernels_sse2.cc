@@ -1,5 +1,0 @@
-#include "engine/pair_formulas.h"
-
-namespace carom::kernels {
-constinit const PairKernels pairs_sse2 = kernels_of<2>("sse2", PairPotentials{});
-}  // namespace carom::kernels

@@ -1,0 +1,243 @@
+#include "engine/ranks/division.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace carom {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+/// Doubles as whole numbers in the same order.
+std::uint64_t ordered(double value) {
+  const auto bits = std::bit_cast<std::uint64_t>(value + 0.0);  // one zero only
+  constexpr std::uint64_t kSign = std::uint64_t{1} << 63;
+  return (bits & kSign) != 0 ? ~bits : bits | kSign;
+}
+double from_ordered(std::uint64_t key) {
+  constexpr std::uint64_t kSign = std::uint64_t{1} << 63;
+  return std::bit_cast<double>((key & kSign) != 0 ? key & ~kSign : ~key);
+}
+
+/// The position of the wanted element in a sorted sequence that all ranks have parts of.
+struct OrderStatistic {
+  struct Element {
+    std::uint64_t key;
+    std::uint32_t weight;  // it stands there so many times
+  };
+  std::vector<Element> elements;  // of this rank; in the end those that are left
+  std::uint64_t number;           // from 0, less than there are; unused where there are no elements
+  std::uint64_t found = 0;        // the bits known so far
+};
+
+/// Finds the wanted elements, digit by digit from the highest, by counting: all ranks find the same.
+void select(std::span<OrderStatistic> wanted, Exchange& ranks) {
+  constexpr int kBits = 8;
+  constexpr std::size_t kDigits = std::size_t{1} << kBits;
+  std::vector<std::uint64_t> counts(wanted.size() * kDigits);
+  for (int shift = 64 - kBits; shift >= 0; shift -= kBits) {
+    std::ranges::fill(counts, 0);
+    for (std::size_t w = 0; w < wanted.size(); ++w)
+      for (const auto& [key, weight] : wanted[w].elements) counts[w * kDigits + (key >> shift) % kDigits] += weight;
+    ranks.sum(counts);
+    for (std::size_t w = 0; w < wanted.size(); ++w) {
+      std::uint64_t digit = 0;
+      for (const std::uint64_t* count = &counts[w * kDigits]; digit + 1 < kDigits && wanted[w].number >= count[digit];)
+        wanted[w].number -= count[digit++];
+      wanted[w].found |= digit << shift;
+      std::erase_if(wanted[w].elements, [&](const auto& element) { return (element.key >> shift) % kDigits != digit; });
+    }
+  }
+}
+
+}  // namespace
+
+template <int D>
+struct Division<D>::Sphere {
+  Vec<D> x;
+  std::uint32_t work;
+};
+
+/// What is still to be cut, into so many regions from `first` on.
+template <int D>
+struct Division<D>::Piece {
+  Part part;
+  std::uint32_t first;
+  std::size_t regions;
+  std::span<Sphere> spheres;        // of this rank
+  std::int32_t above_cut = kNoCut;  // that it is a side of
+  bool upper = false;
+};
+
+template <int D>
+Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks,
+                      std::span<const std::uint32_t> work)
+    : box_(box), reach_(reach), parts_(std::max<std::size_t>(regions, 1)) {
+  std::vector<Sphere> spheres(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) spheres[i] = {wrapped(x[i]), work.empty() ? 1 : work[i]};
+  Piece all{.part = {}, .first = 0, .regions = parts_.size(), .spheres = spheres};
+  for (int k = 0; k < D; ++k) {
+    all.part.low[k] = box.periodic(k) ? 0 : -kInfinite;
+    all.part.high[k] = box.periodic(k) ? box.edges[k] : kInfinite;
+  }
+  std::vector<Piece> pieces;
+  settle(all, pieces);
+  while (!pieces.empty()) pieces = cut(pieces, ranks);
+  for (std::uint32_t r = 0; r < parts_.size(); ++r) neighbours_.push_back(neighbours_of(r));
+}
+
+/// Makes a piece known to the cut that it is a side of, and a region where that is all; else it is cut further.
+template <int D>
+void Division<D>::settle(Piece piece, std::vector<Piece>& pieces) {
+  const bool region = piece.regions == 1;
+  // Pieces that are cut further are cut in their order.
+  const auto node =
+      region ? ~static_cast<std::int32_t>(piece.first) : static_cast<std::int32_t>(cuts_.size() + pieces.size());
+  if (piece.above_cut == kNoCut)
+    root_ = node;
+  else
+    (piece.upper ? cuts_[static_cast<std::size_t>(piece.above_cut)].above
+                 : cuts_[static_cast<std::size_t>(piece.above_cut)].below) = node;
+  if (!region) {
+    pieces.push_back(std::move(piece));
+    return;
+  }
+  Part& part = parts_[piece.first] = piece.part;
+  part.centre = 0.5 * (part.low + part.high);
+  part.half = 0.5 * (part.high - part.low);
+  for (int k = 0; k < D; ++k)
+    part.whole[k] = box_.periodic(k) ? part.low[k] == 0 && part.high[k] == box_.edges[k]
+                                     : !std::isfinite(part.low[k]) && !std::isfinite(part.high[k]);
+}
+
+/// Cuts pieces across their longest edges, all at once; returns what is to be cut further.
+template <int D>
+auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::vector<Piece> {
+  // Where the spheres of each are, for edges that are not those of the box; and their work.
+  std::vector<double> bounds;  // largest of −x, and of x
+  std::vector<std::uint64_t> work;
+  for (const Piece& piece : pieces) {
+    Vec<D> low = box_.edges, high = Vec<D>::Zero();
+    std::uint64_t& sum = work.emplace_back(0);
+    for (const Sphere& sphere : piece.spheres) {
+      low = low.cwiseMin(sphere.x).eval(), high = high.cwiseMax(sphere.x).eval();
+      sum += sphere.work;
+    }
+    for (int k = 0; k < D; ++k) bounds.push_back(-low[k]), bounds.push_back(high[k]);
+  }
+  ranks.largest(bounds);
+  ranks.sum(work);
+
+  std::vector<OrderStatistic> wanted;
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    const Piece& piece = pieces[p];
+    Vec<D> low, high;
+    int axis = 0;
+    for (int k = 0; k < D; ++k) {
+      low[k] = std::isfinite(piece.part.low[k]) ? piece.part.low[k] : -bounds[2 * (p * D + k)];
+      high[k] = std::isfinite(piece.part.high[k]) ? piece.part.high[k] : bounds[2 * (p * D + k) + 1];
+      if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+    }
+    const std::size_t below = piece.regions / 2;
+    const double share = static_cast<double>(below) / static_cast<double>(piece.regions);
+    cuts_.push_back({axis, low[axis] + (high[axis] - low[axis]) * share, 0, 0});
+    OrderStatistic& split = wanted.emplace_back();
+    split.number = work[p] / piece.regions * below + work[p] % piece.regions * below / piece.regions;
+    for (const Sphere& sphere : piece.spheres) split.elements.push_back({ordered(sphere.x[axis]), sphere.work});
+  }
+  select(wanted, ranks);
+
+  // Between two layers, where there are layers: spheres of one that is cut would soon stand on one side of it.
+  const std::size_t first = cuts_.size() - pieces.size();
+  std::vector<double> layer_below(pieces.size(), -kInfinite);
+  for (std::size_t p = 0; p < pieces.size(); ++p)
+    for (const Sphere& sphere : pieces[p].spheres)
+      if (const double at = sphere.x[cuts_[first + p].axis]; at < from_ordered(wanted[p].found))
+        layer_below[p] = std::max(layer_below[p], at);
+  ranks.largest(layer_below);
+
+  std::vector<Piece> further;
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    const Piece& piece = pieces[p];
+    Cut& cut = cuts_[first + p];
+    const double layer = from_ordered(wanted[p].found);
+    if (work[p] > 0) cut.at = std::isfinite(layer_below[p]) ? 0.5 * (layer_below[p] + layer) : layer;
+    const auto middle = std::partition(piece.spheres.begin(), piece.spheres.end(),
+                                       [&](const Sphere& sphere) { return sphere.x[cut.axis] < cut.at; });
+    const auto number = static_cast<std::int32_t>(first + p);
+    const std::size_t below = piece.regions / 2;
+    Piece lower{piece.part, piece.first, below, {piece.spheres.begin(), middle}, number, false};
+    Piece upper{piece.part,
+                piece.first + static_cast<std::uint32_t>(below),
+                piece.regions - below,
+                {middle, piece.spheres.end()},
+                number,
+                true};
+    lower.part.high[cut.axis] = upper.part.low[cut.axis] = cut.at;
+    settle(lower, further);
+    settle(upper, further);
+  }
+  return further;
+}
+
+template <int D>
+std::uint32_t Division<D>::owner(const Vec<D>& at) const {
+  std::int32_t node = root_;
+  while (node >= 0) {
+    const Cut& cut = cuts_[static_cast<std::size_t>(node)];
+    node = at[cut.axis] < cut.at ? cut.below : cut.above;
+  }
+  return static_cast<std::uint32_t>(~node);
+}
+
+template <int D>
+bool Division<D>::clip(std::uint32_t region, double margin, Vec<D>& low, Vec<D>& high) const {
+  const Part& part = parts_[region];
+  for (int k = 0; k < D; ++k) {
+    const double edge = box_.edges[k];
+    const bool images = box_.periodic(k);
+    if (part.whole[k] || (images && high[k] - low[k] > edge)) continue;
+    double least = kInfinite, most = -kInfinite;
+    for (int box = images ? -1 : 0; box <= (images ? 1 : 0); ++box) {
+      const double from = std::max(low[k], part.low[k] - margin + box * edge);
+      const double to = std::min(high[k], part.high[k] + margin + box * edge);
+      if (from <= to) least = std::min(least, from), most = std::max(most, to);
+    }
+    if (!(least <= most)) return false;
+    low[k] = least;
+    high[k] = most;
+  }
+  return true;
+}
+
+/// Between two stretches of an axis.
+template <int D>
+double Division<D>::gap(int axis, double low, double high, double other_low, double other_high) const {
+  const double edge = box_.edges[axis];
+  double least = std::max({low - other_high, other_low - high, 0.0});
+  if (box_.periodic(axis)) {
+    least = std::min(least, std::max({low - (other_high - edge), (other_low - edge) - high, 0.0}));
+    least = std::min(least, std::max({low - (other_high + edge), (other_low + edge) - high, 0.0}));
+  }
+  return least;
+}
+
+template <int D>
+std::vector<std::uint32_t> Division<D>::neighbours_of(std::uint32_t region) const {
+  std::vector<std::uint32_t> near;
+  for (std::uint32_t r = 0; r < parts_.size(); ++r) {
+    const Part &a = parts_[std::min(r, region)], &b = parts_[std::max(r, region)];  // the same for both
+    double sum = 0;
+    for (int k = 0; k < D; ++k) {
+      const double d = gap(k, a.low[k], a.high[k], b.low[k], b.high[k]);
+      sum += d * d;
+    }
+    if (r != region && sum <= reach_ * reach_) near.push_back(r);
+  }
+  return near;
+}
+
+template class Division<2>;
+template class Division<3>;
+
+}  // namespace carom

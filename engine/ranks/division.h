@@ -1,0 +1,111 @@
+#pragma once
+// How the box is divided among regions: by recursive bisection, so that each has about as much work.
+//
+// Which region owns a sphere never reaches the physics; all that matters is that all ranks compute the same cuts: they
+// come from sums of whole numbers, whichever rank has which spheres.
+
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "engine/base/box.h"
+#include "engine/ranks/exchange.h"
+
+namespace carom {
+
+template <int D>
+class Division {
+ public:
+  /// Regions for the spheres of all ranks, of which this one has those at x; so that each has about as much `work`, of
+  /// each sphere (empty: the same). Places that are nearer to a region than `reach` concern it. Collective; the cuts do
+  /// not depend on which rank has which spheres.
+  Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks,
+           std::span<const std::uint32_t> work = {});
+
+  std::size_t regions() const { return parts_.size(); }
+  double reach() const { return reach_; }
+  /// The regions that are nearer than the reach to a region, without itself.
+  std::span<const std::uint32_t> neighbours(std::uint32_t region) const { return neighbours_[region]; }
+
+  /// A place as it is in the box. The others take such.
+  Vec<D> wrapped(Vec<D> x) const {
+    for (int k = 0; k < D; ++k) {
+      if (!box_.periodic(k) || (x[k] >= 0 && x[k] < box_.edges[k])) continue;
+      x[k] -= std::floor(x[k] / box_.edges[k]) * box_.edges[k];
+      if (!(x[k] >= 0 && x[k] < box_.edges[k])) x[k] = 0;
+    }
+    return x;
+  }
+  /// The region that a place belongs to.
+  std::uint32_t owner(const Vec<D>& at) const;
+  /// Calls visit(region) for all regions that a place concerns, its own first.
+  template <class Visit>
+  void for_each_near(const Vec<D>& at, Visit&& visit) const {
+    const std::uint32_t own = owner(at);
+    visit(own);
+    if (deep(depth(own, at))) return;
+    for (const std::uint32_t r : neighbours_[own])
+      if (near(r, at)) visit(r);
+  }
+  /// Whether a place concerns a region.
+  bool near(std::uint32_t region, const Vec<D>& at) const { return squared_distance(region, at) <= reach_ * reach_; }
+  /// Whether a place is so deep in a region that it concerns no other, however distances are rounded.
+  bool deep(double depth) const { return depth > (1 + 1e-6) * reach_; }
+  /// Of a place from a region.
+  double squared_distance(std::uint32_t region, const Vec<D>& at) const {
+    const Part& part = parts_[region];
+    double sum = 0;
+    for (int k = 0; k < D; ++k) {
+      double d = 0;
+      if (box_.periodic(k)) {
+        const double away = std::abs(at[k] - part.centre[k]);
+        d = std::max(std::min(away, box_.edges[k] - away) - part.half[k], 0.0);
+      } else {
+        d = std::max({part.low[k] - at[k], at[k] - part.high[k], 0.0});
+      }
+      sum += d * d;
+    }
+    return sum;
+  }
+  /// Cuts what lies between two corners down to places up to `margin` from a region; false: nothing is left.
+  bool clip(std::uint32_t region, double margin, Vec<D>& low, Vec<D>& high) const;
+  /// How far a place in a region is from its faces; infinite where it has none. Negative: it is not in it.
+  double depth(std::uint32_t region, const Vec<D>& at) const {
+    const Part& part = parts_[region];
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < D; ++k)
+      if (!part.whole[k]) least = std::min({least, at[k] - part.low[k], part.high[k] - at[k]});
+    return least;
+  }
+
+ private:
+  struct Part {
+    Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();     // infinite where the box has a wall or an open end
+    Vec<D> centre = Vec<D>::Zero(), half = Vec<D>::Zero();  // along periodic axes
+    std::array<bool, D> whole{};                            // has no faces along the axis
+  };
+  struct Cut {
+    int axis;
+    double at;
+    std::int32_t below, above;  // a further cut, or ~region
+  };
+
+  struct Sphere;
+  struct Piece;
+  static constexpr std::int32_t kNoCut = -1;
+
+  void settle(Piece piece, std::vector<Piece>& pieces);
+  std::vector<Piece> cut(std::span<const Piece> pieces, Exchange& ranks);
+  double gap(int axis, double low, double high, double other_low, double other_high) const;
+  std::vector<std::uint32_t> neighbours_of(std::uint32_t region) const;
+
+  Box<D> box_;
+  double reach_;
+  std::vector<Part> parts_;
+  std::vector<Cut> cuts_;
+  std::vector<std::vector<std::uint32_t>> neighbours_;
+  std::int32_t root_ = 0;
+};
+
+}  // namespace carom

@@ -1,0 +1,133 @@
+// What a window has brought, once all regions agree about it.
+
+#include <algorithm>
+
+#include "engine/ranks/domains.h"
+#include "engine/ranks/shared_contacts.h"
+
+namespace carom {
+
+template <int D>
+typename Region<D>::Tally Domains<D>::tally() const {
+  return region_ ? region_->tally() : typename Region<D>::Tally{};
+}
+
+/// When a sphere may first have come farther than the stray in the window; infinite: never.
+template <int D>
+double Domains<D>::first_astray(double end) {
+  double speed = 0, first = std::numeric_limits<double>::infinity();
+  if (region_) speed = region_->fastest() + g_.norm() * horizon_;
+  if (speed > fastest_) region_->for_each_touched([&](Slot i) { first = std::min(first, astray_at(i, end)); });
+  std::array<double, 2> worst{speed, -first};
+  exchange_.largest(worst);
+  if (worst[0] > fastest_) fastest_ = kFaster * worst[0];
+  return -worst[1];
+}
+
+/// When a sphere may have come farther than the stray in the window, by the length of its path; infinite: never.
+template <int D>
+double Domains<D>::astray_at(Slot i, double end) const {
+  const auto path = region_->path(i);
+  double now = now_, left = stray_;
+  for (std::size_t k = 0; k <= path.size(); ++k) {
+    const double speed = region_->before(i, k).v.norm() + g_.norm() * horizon_;
+    const double until = k < path.size() ? path[k].key.time : end;
+    if (speed * (until - now) > left) return now + left / speed;
+    left -= speed * (until - now);
+    now = until;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+/// Removes the events from a time on, and returns it.
+template <int D>
+double Domains<D>::cut_at(double time) {
+  ++counts_.cut;
+  cut_ = true;
+  EventKey<D> last{.time = time};
+  for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
+  if (region_) region_->cut(last);
+  return time;
+}
+
+/// The contacts of the window.
+template <int D>
+void Domains<D>::add_contacts(std::vector<Contact<D>>& contacts) const {
+  if (!region_) return;
+  region_->for_each_touched([&](Slot i) {
+    const auto path = region_->path(i);
+    for (std::size_t k = 0; k < path.size(); ++k)
+      if (path[k].key.lo == path[k].after.id) contacts.push_back(contact_of(i, k));
+  });
+}
+
+/// Adds up what all ranks have to report of a run.
+template <int D>
+void Domains<D>::report_all(const typename Region<D>::Tally& sum, const std::vector<Contact<D>>& contacts,
+                            const Report& report) {
+  std::array<std::uint64_t, 2> totals{sum.collisions, sum.bounces};
+  exchange_.sum(totals);
+  report.counters.sphere_sphere += totals[0];
+  report.counters.sphere_wall += totals[1];
+  double overlap = sum.overlap;
+  exchange_.largest({&overlap, 1});
+  report.counters.max_overlap = std::max(report.counters.max_overlap, overlap);
+  report.counters.collision_virial.add(sum_of_all(exchange_, sum.virial));
+  if (report.contacts) merge_contacts<D>(gather_on_first(exchange_, packed<D>(contacts)), *report.contacts);
+  if (events_ += totals[0] + totals[1]; events_ > report.max_events)
+    throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
+                                        " collisions in one step; use a smaller step or raise "
+                                        "integrator.max_events_per_step");
+}
+
+/// The contact that node k of a path stands for.
+template <int D>
+Contact<D> Domains<D>::contact_of(Slot lo, std::size_t k) const {
+  const EventKey<D> key = region_->path(lo)[k].key;
+  const Flights<D>& flights = region_->flights();
+  Record<D> a = region_->before(lo, k);
+  if (key.kind == EventKind::wall) {
+    const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
+    const Blow<D> blow = flights.bounce(lo, a, axis, side, key.time, key.generation);
+    return flights.contact_of(key, a, blow);
+  }
+  const Slot hi = region_->slot_of(key.hi);
+  const auto path = region_->path(hi);
+  const auto met = std::ranges::find(path, key, &Node<D>::key) - path.begin();
+  Record<D> b = region_->before(hi, static_cast<std::size_t>(met));
+  const Vec<D> shift = box_.shift(key.image);
+  const Blow<D> blow = flights.collide(lo, a, hi, b, shift, key.time, key.generation);
+  return flights.contact_of(key, a, b, shift, blow);
+}
+
+/// The key of the n-th pair collision of the window.
+template <int D>
+std::optional<EventKey<D>> Domains<D>::key_of_collision(std::uint64_t number) const {
+  Bytes mine;
+  if (region_)
+    region_->for_each_touched([&](Slot i) {
+      for (const Node<D>& node : region_->path(i))
+        if (node.key.kind == EventKind::pair && node.key.lo == node.after.id) put(mine, node.key);
+    });
+  std::vector<EventKey<D>> keys;
+  for (const Bytes& bytes : exchange_.gather(mine))
+    for (Reader reader(bytes); reader.more();) keys.push_back(reader.get<EventKey<D>>());
+  if (number == 0 || number > keys.size()) return std::nullopt;
+  std::nth_element(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(number - 1), keys.end());
+  return keys[number - 1];
+}
+
+template typename Region<2>::Tally Domains<2>::tally() const;
+template double Domains<2>::first_astray(double);
+template double Domains<2>::cut_at(double);
+template void Domains<2>::add_contacts(std::vector<Contact<2>>&) const;
+template void Domains<2>::report_all(const Region<2>::Tally&, const std::vector<Contact<2>>&, const Report&);
+template std::optional<EventKey<2>> Domains<2>::key_of_collision(std::uint64_t) const;
+template typename Region<3>::Tally Domains<3>::tally() const;
+template double Domains<3>::first_astray(double);
+template double Domains<3>::cut_at(double);
+template void Domains<3>::add_contacts(std::vector<Contact<3>>&) const;
+template void Domains<3>::report_all(const Region<3>::Tally&, const std::vector<Contact<3>>&, const Report&);
+template std::optional<EventKey<3>> Domains<3>::key_of_collision(std::uint64_t) const;
+
+}  // namespace carom

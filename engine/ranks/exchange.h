@@ -1,0 +1,128 @@
+#pragma once
+// Communication among the ranks of a run, as far as the engine knows: bytes, sums and maxima.
+//
+// By default there is one rank. parallel/ has the class for MPI. Every call is collective: all ranks make the same
+// calls in the same order.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "engine/base/counters.h"
+
+namespace carom {
+
+using Bytes = std::vector<std::byte>;
+
+/// Appends a value, byte by byte: all ranks are the same program.
+template <class T>
+void put(Bytes& to, const T& value) {
+  const std::size_t at = to.size();
+  to.resize(at + sizeof(T));
+  std::memcpy(to.data() + at, &value, sizeof(T));
+}
+
+/// Reads what put() wrote, in its order.
+class Reader {
+ public:
+  explicit Reader(const Bytes& bytes) : at_(bytes.data()), end_(bytes.data() + bytes.size()) {}
+  bool more() const { return at_ < end_; }
+  std::size_t left() const { return static_cast<std::size_t>(end_ - at_); }
+  template <class T>
+  T get() {
+    T value;
+    std::memcpy(static_cast<void*>(&value), at_, sizeof(T));
+    at_ += sizeof(T);
+    return value;
+  }
+  /// Where the next so many bytes stand, and goes on behind them.
+  const std::byte* skip(std::size_t bytes) { return std::exchange(at_, at_ + bytes); }
+
+ private:
+  const std::byte *at_, *end_;
+};
+
+class Exchange {
+ public:
+  virtual ~Exchange() = default;
+  virtual int rank() const { return 0; }
+  virtual int size() const { return 1; }
+
+  /// Sends outgoing[r] to rank r and returns what each rank has sent here, by rank. Empty messages are not sent.
+  virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing) { return outgoing; }
+  /// The same among neighbours: outgoing[k] goes to partners[k], and this rank is among the partners of that one;
+  /// returns what they have sent, in their order. Others are not waited for.
+  virtual std::vector<Bytes> swap(std::vector<Bytes> /*outgoing*/, std::span<const int> /*partners*/) { return {}; }
+  /// The messages of all ranks, by rank.
+  virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
+  /// Makes each of `most` the largest among all ranks and each of `sums` the sum over them.
+  virtual void combine(std::span<double> /*most*/, std::span<std::uint64_t> /*sums*/) {}
+  void largest(std::span<double> values) { combine(values, {}); }
+  void sum(std::span<std::uint64_t> values) { combine({}, values); }
+};
+
+/// The messages of all ranks, by rank, on rank 0; empty ones elsewhere. Collective.
+inline std::vector<Bytes> gather_on_first(Exchange& ranks, Bytes mine) {
+  std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
+  outgoing[0] = std::move(mine);
+  return ranks.swap(std::move(outgoing));
+}
+
+/// Hands a value from rank to rank, each of which does add(value): the result is that of one rank that does it all.
+template <class Value, class Add>
+Value handed_on(Exchange& ranks, Value value, Add&& add) {
+  for (int rank = 0; rank < ranks.size(); ++rank) {
+    Bytes mine;
+    if (rank == ranks.rank()) {
+      add(value);
+      put(mine, value);
+    }
+    const auto received = ranks.gather(mine);
+    value = Reader(received[static_cast<std::size_t>(rank)]).template get<Value>();
+  }
+  return value;
+}
+
+/// The sum over all ranks of what has a function add().
+template <class Sums>
+Sums sum_of_all(Exchange& ranks, const Sums& mine) {
+  Bytes bytes;
+  put(bytes, mine);
+  Sums all;
+  for (const Bytes& each : ranks.gather(bytes)) all.add(Reader(each).get<Sums>());
+  return all;
+}
+
+/// Another one, and the time that is spent in it.
+class TimedExchange final : public Exchange {
+ public:
+  explicit TimedExchange(Exchange& ranks) : ranks_(ranks) {}
+  int rank() const override { return ranks_.rank(); }
+  int size() const override { return ranks_.size(); }
+  std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
+    const Stopwatch watch(seconds_);
+    return ranks_.swap(std::move(outgoing));
+  }
+  std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override {
+    const Stopwatch watch(seconds_);
+    return ranks_.swap(std::move(outgoing), partners);
+  }
+  std::vector<Bytes> gather(const Bytes& mine) override {
+    const Stopwatch watch(seconds_);
+    return ranks_.gather(mine);
+  }
+  void combine(std::span<double> most, std::span<std::uint64_t> sums) override {
+    const Stopwatch watch(seconds_);
+    ranks_.combine(most, sums);
+  }
+  double seconds() const { return seconds_; }
+
+ private:
+  Exchange& ranks_;
+  double seconds_ = 0;
+};
+
+}  // namespace carom

@@ -1,0 +1,107 @@
+#include "engine/run/mean_squared_displacement.h"
+
+#include <numeric>
+#include <utility>
+
+namespace carom {
+
+template <int D>
+MeanSquaredDisplacement<D>::MeanSquaredDisplacement(const System<D>& system, const Sampling& sampling)
+    : Observable<D>(sampling), system_(system), number_(system.species.size()) {}
+
+template <int D>
+MeanSquaredDisplacement<D>::MeanSquaredDisplacement(const System<D>& system, const Parameters& parameters, double start)
+    : MeanSquaredDisplacement(system, {parameters.real("interval"), start}) {}
+
+template <int D>
+void MeanSquaredDisplacement<D>::add_sample(double time, const Particles<D>& particles) {
+  now_.resize(particles.size());
+  for (std::size_t i = 0; i < particles.size(); ++i)
+    for (int k = 0; k < D; ++k)
+      now_[i][k] = particles.x[i][k] + static_cast<double>(particles.image[i][k]) * system_.box.edges[k];
+  const std::uint64_t index = this->samples();
+  if (index == 0) {
+    species_ = particles.species;
+    for (const auto species : species_) number_[species] += 1;
+    decades_.push_back({time, now_, {}});
+    return;
+  }
+  std::uint64_t spacing = 1;  // of the lags of a decade, in samples
+  for (std::size_t n = 0; index % spacing == 0; ++n, spacing *= kLags) {
+    const std::uint64_t lag = index / spacing % kLags;
+    if (lag != 0) {
+      add(decades_[n].lag[lag], time, decades_[n]);
+      return;
+    }
+    // The window is over. It is one lag of the next decade: the first windows of both began at the same time.
+    if (n + 1 == decades_.size()) decades_.push_back({decades_[n].origin_time, std::move(decades_[n].origin), {}});
+    decades_[n].origin_time = time;
+    decades_[n].origin = now_;
+  }
+}
+
+template <int D>
+void MeanSquaredDisplacement<D>::add(Lag& lag, double time, const Decade& from) {
+  lag.squares.resize(number_.size());
+  ++lag.origins;
+  lag.time.add(time - from.origin_time);
+  for (std::size_t i = 0; i < now_.size(); ++i) lag.squares[species_[i]].add((now_[i] - from.origin[i]).squaredNorm());
+}
+
+template <int D>
+auto MeanSquaredDisplacement<D>::rows() const -> std::vector<Row> {
+  const double particles = std::accumulate(number_.begin(), number_.end(), 0.0);
+  std::vector<Row> rows;
+  for (const Decade& decade : decades_)
+    for (const Lag& lag : decade.lag) {
+      if (lag.origins == 0) continue;
+      const auto origins = static_cast<double>(lag.origins);
+      Row row{lag.time.value() / origins, lag.origins, 0, {}};
+      ExactSum all;
+      for (std::size_t s = 0; s < number_.size(); ++s) {
+        all.add(lag.squares[s]);
+        row.of.push_back(lag.squares[s].value() / (origins * number_[s]));
+      }
+      row.msd = all.value() / (origins * particles);
+      rows.push_back(std::move(row));
+    }
+  return rows;
+}
+
+template <int D>
+std::vector<TableColumn> MeanSquaredDisplacement<D>::table() const {
+  std::vector<TableColumn> table = {{"time", {}}, {"origins", {}}, {"msd", {}}};
+  const bool mixture = number_.size() > 1;
+  for (std::size_t s = 0; mixture && s < number_.size(); ++s) table.push_back({"msd_" + system_.species[s], {}});
+  for (const Row& row : rows()) {
+    table[0].values.push_back(row.time);
+    table[1].values.push_back(static_cast<double>(row.origins));
+    table[2].values.push_back(row.msd);
+    for (std::size_t s = 0; mixture && s < number_.size(); ++s) table[3 + s].values.push_back(row.of[s]);
+  }
+  return table;
+}
+
+template class MeanSquaredDisplacement<2>;
+template class MeanSquaredDisplacement<3>;
+
+namespace observable {
+
+ObservableInfo msd() {
+  return {.name = "msd",
+          .title = "mean squared displacement",
+          .parameters = {parameter::interval(
+              "the shortest lag of the mean squared displacement, averaged into msd.csv; 0: none. Lags are 1 … 9, 10, "
+              "20 … 90, 100 … times this, up to the length of the run")},
+          .documentation =
+              "Of all particles, and where there are several species of each, followed through periodic boundaries. "
+              "Columns: time (the lag), origins (of time, averaged over), msd, msd_A. A drift of the whole system is "
+              "not taken out.",
+          .source = "Frenkel, Smit, Understanding Molecular Simulation, 2nd ed., section 4.4.2",
+          .in_2d = maker<MeanSquaredDisplacement, 2>(),
+          .in_3d = maker<MeanSquaredDisplacement, 3>()};
+}
+
+}  // namespace observable
+
+}  // namespace carom

@@ -1,0 +1,237 @@
+#include "engine/run/monitor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/forces/forces.h"
+#include "engine/ranks/shares.h"
+#include "engine/ranks/vicinity.h"
+
+namespace carom {
+
+namespace {
+/// S_h costs two passes over all pairs. Systems larger than this are measured at thermo rows and frames only.
+constexpr std::size_t kShadowAtEveryStep = 100;
+
+}  // namespace
+
+template <int D>
+Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const Plan& plan,
+                    const std::vector<Observer<D>*>& observers, Statistics& statistics)
+    : system_(system),
+      info_(info),
+      plan_(plan),
+      observers_(observers),
+      statistics_(statistics),
+      frames_(plan.frame_interval),
+      rows_(plan.thermo_interval) {
+  for (const auto& term : system.interactions) {
+    tail_.energy += term->tail().energy;
+    tail_.virial += term->tail().virial;
+  }
+  statistics.tail_energy = tail_.energy;
+  statistics.tail_pressure = tail_.virial / (D * system.box.volume());
+  if (system.keeps_momentum()) statistics.max_momentum_error = 0;
+  for (auto* observer : observers)
+    if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
+  if (info.shadow) statistics.max_shadow_energy_error = 0;
+  regroup();
+}
+
+template <int D>
+void Monitor<D>::regroup() {
+  const Particles<D>& p = known().particles;
+  if (info_.hard_cores && !in_free_flight()) touching_.emplace(system_.box, p.radius, p.ghost);
+  if (!info_.shadow) return;
+  scratch_.resize(p.size());
+}
+
+template <int D>
+void Monitor<D>::start(const Integrator<D>& integrator) {
+  shot_ = measure(0, known().particles, &integrator, info_.shadow);
+  statistics_.energy_initial = statistics_.energy_final = shot_.total();
+  first_momentum_ = shot_.momentum;
+  count_from(shot_);
+  sample(0, known().particles);
+  show(shot_, true);
+}
+
+/// Energy errors count from this state on.
+template <int D>
+void Monitor<D>::count_from(const Snapshot<D>& shot) {
+  statistics_.energy_after_first_step = shot.total();
+  first_energy_ = energy_;
+  first_shadow_ = shot.shadow;
+  statistics_.energy_reference = std::max(std::abs(energy_), magnitude_);
+}
+
+template <int D>
+std::vector<double> Monitor<D>::due_within(const Slab& slab) const {
+  std::vector<double> times;
+  std::vector<Schedule> all = {frames_, rows_};
+  for (const Sampler& sampler : samplers_) all.push_back(sampler.due);
+  for (;;) {
+    double due = std::numeric_limits<double>::infinity();
+    for (const Schedule& schedule : all) due = std::min(due, schedule.due());
+    if (!(due < slab.start + slab.length - time_slack())) break;
+    times.push_back(due - slab.start);
+    for (Schedule& schedule : all) schedule.pass(due + time_slack());
+  }
+  return times;
+}
+
+template <int D>
+void Monitor<D>::observe(double time, const Particles<D>& copies) {
+  sample(time, copies);
+  if (std::min(frames_.due(), rows_.due()) <= time + time_slack()) show(measure(time, copies, nullptr, false), false);
+}
+
+/// Shows the particles to observers that look at times of their own.
+template <int D>
+void Monitor<D>::sample(double time, const Particles<D>& state) {
+  for (Sampler& sampler : samplers_) {
+    if (sampler.due.due() > time + time_slack()) continue;
+    const Stopwatch watch(statistics_.counters.seconds.output);
+    sampler.observer->sample(time, all_particles(state));
+    sampler.due.pass(time + time_slack());
+  }
+}
+
+template <int D>
+void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bool last) {
+  Statistics& s = statistics_;
+  const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
+  const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.size() <= kShadowAtEveryStep);
+  const double speed = speed_;
+  shot_ = measure(s.end_time, known().particles, &integrator, with_shadow);
+  s.energy_final = shot_.total();
+  if (s.steps == 1 && info_.stepping) count_from(shot_);
+  s.max_energy_error = std::max(s.max_energy_error, std::abs(energy_ - first_energy_));
+  if (with_shadow)
+    s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - first_shadow_));
+  if (s.max_momentum_error)
+    s.max_momentum_error = std::max(*s.max_momentum_error, (shot_.momentum - first_momentum_).norm());
+  if (info_.hard_cores) {
+    s.counters.max_overlap = std::max(s.counters.max_overlap, deepest_overlap());
+    if (system_.ranks) system_.ranks->largest({&s.counters.max_overlap, 1});
+  }
+  virial_time_ += elapsed * virial_;
+  if (s.end_time > 0) {
+    s.mean_pressure = (virial_time_ + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
+    s.collision_rate =
+        2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * s.end_time);
+  }
+  path_ += elapsed * 0.5 * (speed + speed_);
+  if (s.collision_rate > 0) {
+    s.mean_free_time = 1 / s.collision_rate;
+    s.mean_free_path = path_ / s.end_time / s.collision_rate;
+  }
+  sample(s.end_time, known().particles);
+  show(shot_, last);
+}
+
+/// `integrator`: null where the particles are not its own.
+template <int D>
+Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Integrator<D>* integrator,
+                                bool with_shadow) {
+  const Stopwatch watch(statistics_.counters.seconds.output);
+  Snapshot<D> shot;
+  shot.time = time;
+  shot.step = statistics_.steps;
+  shot.collisions = statistics_.counters.sphere_sphere;
+  shot.particles = &state;
+  const Particles<D>* elsewhere = integrator ? integrator->energy_state() : nullptr;
+  const Particles<D>& nodes = elsewhere ? *elsewhere : state;
+  const PotentialSums* potential = integrator ? integrator->potential() : nullptr;
+  const PotentialSums sums = potential ? of_all_ranks(known(), *potential) : evaluate_energy<D>(known(), nodes.x);
+  const auto total = static_cast<double>(system_.size());
+  const MotionSums<D> motion = evaluate_motion(known(), state, nodes);
+  shot.kinetic = motion.kinetic.value();
+  energy_ = shot.kinetic + sums.energy.value();
+  shot.potential = sums.energy.value() + tail_.energy;
+  magnitude_ = shot.kinetic + sums.magnitude.value();
+  virial_ = 2 * shot.kinetic + sums.virial.value() + tail_.virial;
+  if (with_shadow) {
+    Counters uncounted;
+    const double g = shadow_term<D>(known(), nodes, integrator->accelerations(), scratch_, uncounted);
+    shot.shadow = shot.total() + plan_.step * plan_.step * g;
+  }
+  for (int k = 0; k < D; ++k) shot.momentum[k] = motion.momentum[k].value();
+  if (total > 0) {
+    shot.temperature = 2 * shot.kinetic / (D * total);
+    speed_ = motion.speed.value() / total;
+  }
+  if (!std::isfinite(shot.total()))
+    throw Error(Failure::numerical, "the energy is not finite at step " + std::to_string(shot.step) + ", time " +
+                                        std::to_string(time) + "; use a smaller integrator.step");
+  return shot;
+}
+
+template <int D>
+void Monitor<D>::show(Snapshot<D> shot, bool last) {
+  const double now = shot.time + time_slack();
+  const bool frame = frames_.due() <= now || (last && shot.time > last_frame_);
+  const bool row = rows_.due() <= now || (last && shot.time > last_row_);
+  if (!frame && !row) return;
+  const Stopwatch watch(statistics_.counters.seconds.output);
+  const double collision_virial = statistics_.counters.collision_virial.value();
+  const double collisions = last_row_ >= 0 && shot.time > last_row_
+                                ? (collision_virial - last_row_virial_) / (shot.time - last_row_)
+                                : 0;  // nothing has collided before the start
+  shot.pressure = (virial_ + collisions) / (D * system_.box.volume());
+  shot.max_energy_error = statistics_.max_energy_error;
+  if (row) {
+    for (auto* observer : observers_) observer->thermo(shot);
+    rows_.pass(now);
+    last_row_ = shot.time;
+    last_row_virial_ = collision_virial;
+  }
+  if (frame) {
+    if (system_.part) {
+      system_.part->collect();
+      shot.particles = &system_.particles;
+    }
+    for (auto* observer : observers_) observer->frame(shot);
+    frames_.pass(now);
+    last_frame_ = shot.time;
+  }
+}
+
+/// The deepest overlap of any two spheres, relative to their contact distance: an independent check that no contact was
+/// missed. 0 where none overlap.
+template <int D>
+double Monitor<D>::deepest_overlap() {
+  double deepest = 0;
+  const auto look = [&](NeighbourList<D>& list, const auto& p) {
+    for (const auto& pair : list.cover(p.x)) {
+      const double sigma = p.radius[pair.i] + p.radius[pair.j];
+      const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
+      if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
+    }
+  };
+  const Particles<D>& p = known().particles;
+  if (in_free_flight()) {
+    const Vicinity<D> near = vicinity(system_.box, 2 * system_.sizes->largest_radius(), *system_.ranks, p);
+    NeighbourList<D> touching(system_.box, near.radius, near.beyond);
+    look(touching, near);
+  } else {
+    look(*touching_, p);
+  }
+  return deepest;
+}
+
+/// All particles, in a state of this rank's particles; where there are several ranks, on rank 0 only.
+template <int D>
+const Particles<D>& Monitor<D>::all_particles(const Particles<D>& state) {
+  if (!system_.sizes) return state;
+  if (system_.part) system_.part->collect();
+  return gathered_ = gathered(*system_.ranks, system_.part ? system_.particles : state);
+}
+
+template class Monitor<2>;
+template class Monitor<3>;
+
+}  // namespace carom

@@ -1,0 +1,378 @@
+#include "engine/run/radial_distribution.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <sstream>
+
+#include "engine/base/error.h"
+#include "engine/search/cell_grid.h"
+
+namespace carom {
+
+namespace {
+
+/// Cells of half the range: measured the fastest of 1/1 to 1/4 for ranges of three and four diameters.
+constexpr int kCellsInRange = 2;
+
+/// A run of particles in neighbouring cells of one row, and what to add to x_i − x_j for the image of the row.
+template <int D>
+struct Run {
+  std::uint32_t begin, end;
+  Vec<D> shift;
+};
+
+/// The runs of all cells that come after `centre` in the order of unwrapped cells and may hold partners: each pair of
+/// cells is met from one side only. What is left of the cell itself is its caller's.
+template <int D>
+void list_runs(const CellGrid<D>& grid, const std::vector<std::uint32_t>& start, const Cell<D>& centre,
+               const Cell<D>& reach, double range, std::vector<Run<D>>& runs) {
+  runs.clear();
+  constexpr int last = D - 1;
+  const auto row = [&](const Cell<D>& offset, std::int32_t from) {
+    Vec<D> shift = Vec<D>::Zero();
+    std::size_t first = 0;  // cell of the row
+    double squared_gap = 0;
+    typename CellGrid<D>::Step to;
+    for (int k = 0; k < last; ++k) {
+      if (!grid.step(k, centre[k] + offset[k], to)) return;
+      shift[k] = -to.boxes * grid.box().edges[k];
+      first += to.offset;
+      const double gap = std::max(std::abs(offset[k]) - 1, 0) * grid.edge(k);
+      squared_gap += gap * gap;
+    }
+    if (squared_gap > range * range) return;
+    const std::int32_t n = grid.count(last);
+    const auto along =
+        std::min(reach[last],
+                 static_cast<std::int32_t>(std::ceil(std::sqrt(range * range - squared_gap) / grid.edge(last) + 1e-9)));
+    std::int32_t low = centre[last] + std::max(from, -along), high = centre[last] + along;
+    if (!grid.box().periodic(last)) low = std::max(low, 0), high = std::min(high, n - 1);
+    while (low <= high && grid.step(last, low, to)) {
+      const std::int32_t stop = std::min(high, (to.boxes + 1) * n - 1);
+      shift[last] = -to.boxes * grid.box().edges[last];
+      const std::size_t begin = first + to.offset;
+      const std::uint32_t a = start[begin], b = start[begin + static_cast<std::size_t>(stop - low) + 1];
+      if (a < b) runs.push_back({a, b, shift});
+      low = stop + 1;
+    }
+  };
+  Cell<D> offset{};
+  row(offset, 1);
+  if constexpr (D == 3)
+    for (offset[0] = 0, offset[1] = 1; offset[1] <= reach[1]; ++offset[1]) row(offset, -reach[last]);
+  for (offset[0] = 1; offset[0] <= reach[0]; ++offset[0]) {
+    if constexpr (D == 2)
+      row(offset, -reach[last]);
+    else
+      for (offset[1] = -reach[1]; offset[1] <= reach[1]; ++offset[1]) row(offset, -reach[last]);
+  }
+}
+
+/// The volume in which an ideal gas finds a partner at distances from a to b, on average over the region of these
+/// edges; along the axes that are walled there is none beyond the edge.
+template <int D>
+double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bool, D>& walled) {
+  // Averages of |u_x|, |u_x u_y|, |u_x u_y u_z| over directions u.
+  constexpr double pi = std::numbers::pi;
+  constexpr std::array<double, 3> mean = {D == 2 ? 2 / pi : 0.5, D == 2 ? 1 / pi : 2 / (3 * pi), 1 / (4 * pi)};
+  std::array<double, D + 1> c{1};  // of the average of Π (1 − r|u_k|/L_k) as a polynomial in r
+  for (int k = 0; k < D; ++k)
+    if (walled[k])
+      for (int p = D; p > 0; --p) c[p] -= c[p - 1] / edges[k];
+  double volume = 0;
+  for (int p = 0; p <= D; ++p)
+    volume += c[p] * (p == 0 ? 1.0 : mean[p - 1]) * (std::pow(b, D + p) - std::pow(a, D + p)) / (D + p);
+  return (D == 2 ? 2 * pi : 4 * pi) * volume;
+}
+
+/// Why there is no g(r) up to `range` in this system.
+template <int D>
+std::optional<ParameterError> error_of(const System<D>& system, double range) {
+  for (const Boundary boundary : system.box.boundary)
+    if (boundary == Boundary::open)
+      return ParameterError{"interval", "g(r) needs a density, and a box with an open boundary has none",
+                            "set rdf_interval = 0, or close the box"};
+  const double longest = RadialDistribution<D>::longest_range(system);
+  if (range > 0 && range <= longest * (1 + 1e-9)) return {};
+  std::ostringstream what, remedy;
+  what.precision(15);
+  remedy.precision(15);
+  what << "g(r) cannot be taken to " << range << " in this box";
+  remedy << "take at most " << longest << ": half the shortest periodic edge, or the way between two walls";
+  return ParameterError{"range", what.str(), remedy.str()};
+}
+
+/// The range where it is left open.
+template <int D>
+std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
+  if (!parameters.has("range")) parameters.set("range", RadialDistribution<D>::usual_range(system));
+  return error_of(system, parameters.real("range"));
+}
+
+}  // namespace
+
+template <int D>
+RadialDistribution<D>::RadialDistribution(const System<D>& system, const RadialDistributionOptions& options)
+    : Observable<D>(options.sampling), system_(system), options_(options) {
+  if (const auto wrong = error_of(system, options.range))
+    throw Error(Failure::deck, wrong->what + "; " + wrong->remedy);
+  const std::size_t species = system.species.size();
+  number_.resize(species);
+  smallest_.assign(species, std::numeric_limits<double>::infinity());
+  largest_.resize(species);
+  counts_.resize(species * (species + 1) / 2 * static_cast<std::size_t>(options.bins));
+}
+
+template <int D>
+RadialDistribution<D>::RadialDistribution(const System<D>& system, const Parameters& parameters, double start)
+    : RadialDistribution(system, {.sampling = {parameters.real("interval"), start},
+                                  .range = parameters.real("range"),
+                                  .bins = static_cast<int>(parameters.integer("bins"))}) {}
+
+/// Counts the particles of each species.
+template <int D>
+void RadialDistribution<D>::count(const Particles<D>& p) {
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const std::size_t s = p.species[i];
+    number_[s] += 1;
+    smallest_[s] = std::min(smallest_[s], p.radius[i]);
+    largest_[s] = std::max(largest_[s], p.radius[i]);
+  }
+}
+
+template <int D>
+double RadialDistribution<D>::longest_range(const System<D>& system) {
+  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
+  const double margin = radius.empty() ? 0 : 2 * *std::ranges::min_element(radius);
+  double longest = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < D; ++k)
+    longest = std::min(longest, system.box.periodic(k) ? system.box.edges[k] / 2 : system.box.edges[k] - margin);
+  return longest;
+}
+
+template <int D>
+double RadialDistribution<D>::usual_range(const System<D>& system) {
+  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
+  return std::min(longest_range(system), radius.empty() ? 1.0 : 6 * *std::ranges::max_element(radius));
+}
+
+template <int D>
+std::size_t RadialDistribution<D>::pair_index(std::size_t a, std::size_t b) const {
+  const std::size_t lo = std::min(a, b), hi = std::max(a, b);
+  return hi * (hi + 1) / 2 + lo;
+}
+
+template <int D>
+void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& particles) {
+  if (this->samples() == 0) count(particles);
+  const std::size_t n = particles.size(), bins = static_cast<std::size_t>(options_.bins);
+  const CellGrid<D> grid(system_.box, options_.range / kCellsInRange, {n, Vec<D>::Zero(), Vec<D>::Zero()}, 1);
+  Cell<D> reach;        // how many cells away a partner may be
+  double farthest = 0;  // squared distance of two particles in such cells
+  for (int k = 0; k < D; ++k) {
+    reach[k] = static_cast<std::int32_t>(std::ceil(options_.range / grid.edge(k)));
+    farthest += (reach[k] + 1) * grid.edge(k) * (reach[k] + 1) * grid.edge(k);
+  }
+
+  // Sorts the particles in the order of the cells, so that a row of cells is a run of particles.
+  start_.assign(grid.cells() + 1, 0);
+  cell_.resize(n);
+  species_.resize(n);
+  for (auto& x : x_) x.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    Cell<D> c = grid.cell(particles.x[i]);
+    for (int k = 0; k < D; ++k) c[k] = std::clamp(c[k], 0, grid.count(k) - 1);
+    cell_[i] = static_cast<std::uint32_t>(grid.index(c));
+    ++start_[cell_[i] + 1];
+  }
+  std::partial_sum(start_.begin(), start_.end(), start_.begin());
+  auto next = start_;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t at = next[cell_[i]]++;
+    for (int k = 0; k < D; ++k) x_[k][at] = particles.x[i][k];
+    species_[at] = particles.species[i];
+  }
+
+  // All partners that are looked at are counted, without a branch; those beyond the range are left out in the end.
+  const double shells = static_cast<double>(bins) / options_.range;
+  const double last = std::floor(std::sqrt(farthest) * shells) + 1;
+  const std::size_t kinds = number_.size(), all = static_cast<std::size_t>(last) + 1;
+  std::vector<std::uint64_t> counted(kinds * (kinds + 1) / 2 * all);
+  std::vector<std::uint64_t*> histogram(kinds * kinds);
+  for (std::size_t a = 0; a < kinds; ++a)
+    for (std::size_t b = 0; b < kinds; ++b) histogram[a * kinds + b] = &counted[pair_index(a, b) * all];
+  std::vector<Run<D>> runs;
+  std::array<Eigen::ArrayXd, D> partner;  // those that may be near the particles of a cell: themselves first
+  std::vector<std::uint16_t> kind;
+  Eigen::ArrayXd squared;
+  Eigen::ArrayXi shell;
+  Cell<D> centre{};
+  for (std::size_t cell = 0; cell < grid.cells(); ++cell) {
+    const std::uint32_t begin = start_[cell], own = start_[cell + 1] - begin;
+    if (own > 0) {
+      list_runs<D>(grid, start_, centre, reach, options_.range, runs);
+      runs.insert(runs.begin(), {begin, begin + own, Vec<D>::Zero()});
+      Eigen::Index size = 0;
+      for (const Run<D>& run : runs) size += run.end - run.begin;
+      for (int k = 0; k < D; ++k) {
+        if (partner[k].size() < size) partner[k].resize(2 * size);
+        double* to = partner[k].data();
+        for (const Run<D>& run : runs)
+          for (std::uint32_t j = run.begin; j < run.end; ++j) *to++ = x_[k][j] - run.shift[k];
+      }
+      kind.clear();
+      if (kinds > 1)
+        for (const Run<D>& run : runs)
+          kind.insert(kind.end(), species_.begin() + run.begin, species_.begin() + run.end);
+      squared.resize(size);
+      shell.resize(size);
+      for (std::uint32_t i = 0; i < own; ++i) {
+        const Eigen::Index rest = size - (i + 1);
+        squared.head(rest).setZero();
+        for (int k = 0; k < D; ++k) squared.head(rest) += (partner[k].segment(i + 1, rest) - partner[k][i]).square();
+        // (std::sqrt sets errno, which keeps compilers from doing two at once.)
+        shell.head(rest) = (squared.head(rest).sqrt() * shells).min(last).template cast<std::int32_t>();
+        std::uint64_t* const* const of = &histogram[species_[begin + i] * kinds];
+        if (kinds == 1)
+          for (Eigen::Index j = 0; j < rest; ++j) ++of[0][shell[j]];
+        else
+          for (Eigen::Index j = 0; j < rest; ++j) ++of[kind[static_cast<std::size_t>(j) + i + 1]][shell[j]];
+      }
+    }
+    for (int k = D - 1; k >= 0 && ++centre[k] == grid.count(k); --k) centre[k] = 0;
+  }
+  for (std::size_t k = 0; k < counts_.size(); ++k) counts_[k] += counted[k / bins * all + k % bins];
+}
+
+template <int D>
+std::vector<double> RadialDistribution<D>::radii() const {
+  std::vector<double> r(static_cast<std::size_t>(options_.bins));
+  for (std::size_t b = 0; b < r.size(); ++b)
+    r[b] = (static_cast<double>(b) + 0.5) * options_.range / static_cast<double>(options_.bins);
+  return r;
+}
+
+template <int D>
+double RadialDistribution<D>::pairs_between(std::size_t a, std::size_t b) const {
+  return a == b ? number_[a] * (number_[a] - 1) / 2 : number_[a] * number_[b];
+}
+
+/// Counts over those of an ideal gas of so many pairs. `margin`: the radius that centres keep from walls.
+template <int D>
+std::vector<double> RadialDistribution<D>::normalised(const std::vector<std::uint64_t>& counts, double pairs,
+                                                      double margin) const {
+  Vec<D> edges = system_.box.edges;
+  std::array<bool, D> walled;
+  for (int k = 0; k < D; ++k) {
+    walled[k] = system_.box.walled(k);
+    if (walled[k]) edges[k] -= 2 * margin;
+  }
+  const double width = options_.range / static_cast<double>(options_.bins);
+  std::vector<double> g(counts.size());
+  for (std::size_t b = 0; b < g.size(); ++b) {
+    const double inner = static_cast<double>(b) * width, outer = static_cast<double>(b + 1) * width;
+    const double expected =
+        static_cast<double>(this->samples()) * pairs * shell_volume<D>(inner, outer, edges, walled) / edges.prod();
+    g[b] = static_cast<double>(counts[b]) / expected;
+  }
+  return g;
+}
+
+template <int D>
+std::vector<double> RadialDistribution<D>::g() const {
+  const std::size_t bins = static_cast<std::size_t>(options_.bins);
+  std::vector<std::uint64_t> all(bins);
+  for (std::size_t k = 0; k < counts_.size(); ++k) all[k % bins] += counts_[k];
+  const double n = std::accumulate(number_.begin(), number_.end(), 0.0);
+  return normalised(all, n * (n - 1) / 2, *std::ranges::min_element(smallest_));
+}
+
+template <int D>
+std::vector<double> RadialDistribution<D>::g(std::size_t a, std::size_t b) const {
+  const auto first = counts_.begin() + static_cast<std::ptrdiff_t>(pair_index(a, b)) * options_.bins;
+  return normalised({first, first + options_.bins}, pairs_between(a, b), std::min(smallest_[a], smallest_[b]));
+}
+
+template <int D>
+std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::size_t b) const {
+  if (this->samples() == 0 || smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
+  const double contact = smallest_[a] + smallest_[b], width = options_.range / options_.bins;
+  const auto r = radii(), value = g(a, b);
+  const std::uint64_t* counts = &counts_[pair_index(a, b) * static_cast<std::size_t>(options_.bins)];
+  // Shells from the contact distance on, and rounding must not lose the first.
+  const auto first = static_cast<std::size_t>(std::ceil(contact / width * (1 - 1e-9)));
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  int used = 0;
+  for (std::size_t k = first; k < r.size() && (k < first + 6 || r[k] + width / 2 <= 1.15 * contact); ++k) {
+    if (counts[k] == 0) continue;
+    const double s = (r[k] - contact) / contact, weight = static_cast<double>(counts[k]);
+    const Eigen::Vector3d powers(1, s, s * s);
+    normal += weight * powers * powers.transpose();
+    right += weight * std::log(value[k]) * powers;
+    ++used;
+  }
+  if (used < 4) return {};
+  return std::exp(normal.ldlt().solve(right)[0]);
+}
+
+template <int D>
+std::vector<TableColumn> RadialDistribution<D>::table() const {
+  std::vector<TableColumn> table = {{"r", radii()}, {"g", g()}};
+  const auto& names = system_.species;
+  for (std::size_t a = 0; names.size() > 1 && a < names.size(); ++a)
+    for (std::size_t b = a; b < names.size(); ++b) table.push_back({"g_" + names[a] + "_" + names[b], g(a, b)});
+  return table;
+}
+
+template <int D>
+std::vector<SpeciesValue> RadialDistribution<D>::species_values() const {
+  const auto& names = system_.species;
+  std::vector<SpeciesValue> values;
+  for (std::size_t a = 0; a < names.size(); ++a)
+    for (std::size_t b = a; b < names.size(); ++b)
+      if (const auto g = contact_value(a, b)) values.push_back({"contact_value", {names[a], names[b]}, "g", *g});
+  return values;
+}
+
+template class RadialDistribution<2>;
+template class RadialDistribution<3>;
+
+namespace observable {
+
+ObservableInfo rdf() {
+  using enum Parameter::Type;
+  using enum Parameter::Range;
+  return {.name = "rdf",
+          .title = "radial distribution function",
+          .parameters = {parameter::interval(
+                             "simulated time between samples of the radial distribution function, averaged into "
+                             "rdf.csv; 0: none. A sample costs O(count); configurations a hundred mean free times "
+                             "apart are about independent"),
+                         {"range", real, "none", "length",
+                          "the largest distance of rdf.csv, at most half the shortest periodic edge; three of the "
+                          "largest diameters, if there is room, where it is absent",
+                          positive},
+                         {.name = "bins",
+                          .type = integer,
+                          .fallback = "200",
+                          .unit = "-",
+                          .meaning = "shells of equal thickness from 0 to rdf_range",
+                          .range = positive,
+                          .most = 1e6}},
+          .documentation =
+              "Of all particles, and where there are several species between each two. Columns: r (middle of a shell), "
+              "g, g_A_B. The summary has g at contact, extrapolated, as contact_value. Along walls the ideal gas is "
+              "that of the region which the centres can reach.",
+          .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6",
+          .in_2d = maker<RadialDistribution, 2>(complete<2>),
+          .in_3d = maker<RadialDistribution, 3>(complete<3>)};
+}
+
+}  // namespace observable
+
+}  // namespace carom

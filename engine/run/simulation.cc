@@ -1,0 +1,179 @@
+#include "engine/run/simulation.h"
+
+#include <algorithm>
+
+#include "engine/base/error.h"
+#include "engine/forces/forces.h"
+#include "engine/ranks/shares.h"
+#include "engine/run/monitor.h"
+#include "engine/setup/epoch.h"
+#include "engine/setup/placement.h"
+
+namespace carom {
+
+namespace {
+/// Output intervals shorter than this share of a step are refused: there would be no end to counting them.
+constexpr double kLeastInterval = 1e-6;
+
+template <int D>
+void check_spheres(const System<D>& system) {
+  const Particles<D>& p = system.particles;
+  if (const Outsiders out = find_outsiders<D>(system.box, p.x, p.radius); out.spheres > 0)
+    throw Error(Failure::initial_state, "particle " + std::to_string(out.worst) + " is not inside the walls of axis " +
+                                            std::to_string(out.axis) +
+                                            "; keep it a radius from every wall, or enlarge the box");
+  if (const Overlaps overlaps = find_overlaps<D>(system.box, p.x, p.radius); overlaps.pairs > 0)
+    throw Error(Failure::initial_state, "particles " + std::to_string(overlaps.lo) + " and " +
+                                            std::to_string(overlaps.hi) + " overlap, at distance " +
+                                            std::to_string(overlaps.distance) + "; move them apart");
+}
+
+void check_interval(double interval, double step) {
+  if (interval > 0 && interval < kLeastInterval * step)
+    throw Error(Failure::deck,
+                "an output interval is shorter than a millionth of the step; give 0, the step or something longer");
+}
+}  // namespace
+
+template <int D>
+Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info,
+                          std::unique_ptr<Integrator<D>> integrator, Plan plan)
+    : system_(std::move(system)), info_(info), integrator_(std::move(integrator)), plan_(plan) {
+  if (!(plan_.step > 0)) throw Error(Failure::deck, "the step must be positive");
+  if (!plan_.steps && !plan_.end_time && !plan_.collisions)
+    throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
+  for (const double interval : {plan_.frame_interval, plan_.thermo_interval}) check_interval(interval, plan_.step);
+}
+
+template <int D>
+Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan)
+    : Simulation(prepare(std::move(system), info, std::move(given), plan)) {}
+
+template <int D>
+typename Simulation<D>::Prepared Simulation<D>::prepare(std::unique_ptr<System<D>> system, const IntegratorInfo& info,
+                                                        Parameters given, Plan plan) {
+  const std::string name(info.name);
+  system->check();
+  for (const std::uint16_t s : system->particles.species)
+    while (system->species.size() <= s) system->species.push_back("species " + std::to_string(system->species.size()));
+  for (const auto& term : system->interactions)
+    if (!info.smooth_forces && !term->common_acceleration())
+      throw Error(Failure::deck, name + " knows no forces but a uniform-field; take psa, edda or their relatives");
+  if (info.hard_cores) check_spheres(*system);
+  if (plan.step != 0 && given.has("step"))
+    throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
+  if (plan.step != 0) given.set("step", plan.step);
+  if (!given.has("step") && !info.stepping) given.set("step", default_epoch(*system));
+  given = completed(info.name, info.parameters, std::move(given));
+  plan.step = given.real("step");
+  auto integrator = info.make<D>(given);
+  return {std::move(system), info, std::move(integrator), plan};
+}
+
+template <int D>
+Simulation<D>::~Simulation() = default;
+
+template <int D>
+void Simulation<D>::add(Observer<D>& observer) {
+  check_interval(observer.sampling().interval, plan_.step);
+  observers_.push_back(&observer);
+}
+
+template <int D>
+void Simulation<D>::run(const std::function<bool()>& should_stop) {
+  const auto clock_start = std::chrono::steady_clock::now();
+  Statistics& s = statistics_;
+  if (system_->ranks && !system_->sizes) keep_share(*system_);
+  if (info_.smooth_forces) system_->quanta = quanta(*system_);
+  std::optional<Part<D>> part;
+  if (system_->ranks && info_.smooth_forces) {
+    part.emplace(*system_, integrator_->local(), plan_.step, info_.hard_cores);
+    ++s.counters.divisions;
+  }
+  Monitor<D> monitor(*system_, info_, plan_, observers_, s);
+  const auto known = [&]() -> System<D>& { return part ? part->known() : *system_; };
+  integrator_->start(known(), s.counters);
+  monitor.start(*integrator_);
+
+  std::vector<Contact<D>> contacts;
+  while (!finished(monitor.time_slack())) {
+    if (should_stop && should_stop()) {
+      s.stopped_early = true;
+      break;
+    }
+    const Slab slab = next_slab(monitor.time_slack());
+    if (part && part->divide_if_due(*integrator_, integrator_->local(), slab.index, slab.length)) {
+      ++s.counters.divisions;
+      monitor.regroup();
+    }
+    const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor.due_within(slab);
+    contacts.clear();
+    SlabReport<D> report{.counters = s.counters, .contacts = plan_.events ? &contacts : nullptr, .observe = due};
+    report.observer = [&](double offset, const Particles<D>& copies) { monitor.observe(slab.start + offset, copies); };
+    Counters before = s.counters;
+    for (bool done = false; !done;) try {
+        integrator_->slab(known(), slab, report);
+        done = true;
+      } catch (HaloTooSmall) {
+        part->know_more(*integrator_, slab.index, slab.length);
+        monitor.regroup();
+        ++before.slabs_again;
+        before.slabs_by_all += part->knows_everybody() ? 1 : 0;
+        s.counters = before;
+        contacts.clear();
+      }
+
+    ++s.steps;
+    // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
+    s.end_time = report.reached < slab.length ? slab.start + report.reached
+                 : slab.length == plan_.step  ? static_cast<double>(s.steps) * plan_.step
+                                              : *plan_.end_time;
+    if (part) s.counters.seconds.communicate = part->seconds_waited();
+    s.force_passes = s.counters.force_passes;
+    s.fraction_done = fraction_done();
+    s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
+    if (plan_.events) {
+      const Stopwatch watch(s.counters.seconds.output);
+      for (auto* observer : observers_) observer->contacts(slab.start, contacts);
+    }
+    monitor.end_of_slab(report.reached, *integrator_, finished(monitor.time_slack()));
+    for (auto* observer : observers_) observer->progress(s);
+  }
+  if (s.stopped_early) monitor.finish();
+  if (part) part->collect();
+  s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
+}
+
+template <int D>
+Slab Simulation<D>::next_slab(double slack) const {
+  Slab slab;
+  slab.index = statistics_.steps;
+  slab.start = static_cast<double>(slab.index) * plan_.step;
+  const bool shortened = plan_.end_time && slab.start + plan_.step > *plan_.end_time - slack;
+  slab.length = shortened ? *plan_.end_time - slab.start : plan_.step;
+  if (plan_.collisions && !info_.stepping) slab.collision_limit = *plan_.collisions;
+  return slab;
+}
+
+template <int D>
+bool Simulation<D>::finished(double slack) const {
+  const Statistics& s = statistics_;
+  return (plan_.steps && s.steps >= *plan_.steps) || (plan_.end_time && s.end_time >= *plan_.end_time - slack) ||
+         (plan_.collisions && s.counters.sphere_sphere >= *plan_.collisions);
+}
+
+template <int D>
+double Simulation<D>::fraction_done() const {
+  const Statistics& s = statistics_;
+  double done = 0;
+  if (plan_.steps) done = std::max(done, static_cast<double>(s.steps) / static_cast<double>(*plan_.steps));
+  if (plan_.end_time) done = std::max(done, s.end_time / *plan_.end_time);
+  if (plan_.collisions)
+    done = std::max(done, static_cast<double>(s.counters.sphere_sphere) / static_cast<double>(*plan_.collisions));
+  return done;
+}
+
+template class Simulation<2>;
+template class Simulation<3>;
+
+}  // namespace carom

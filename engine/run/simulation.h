@@ -1,0 +1,149 @@
+#pragma once
+// A run: slab after slab, with energies measured and observers called at their due times.
+//
+//   Simulation<2> run(std::move(system), "edda", {{"step", 0.01}}, {.end_time = 6});
+//   run.add(writer);
+//   run.run();
+//
+// Observing changes nothing: observers get copies, and no due time cuts a slab.
+
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/base/system.h"
+#include "engine/integrators/integrator.h"
+
+namespace carom {
+
+/// When a run ends and what it shows on the way. Of several ends the first reached counts; at least one is given.
+struct Plan {
+  double step = 0;                      ///< length of a slab [time], > 0
+  std::optional<std::int64_t> steps{};  ///< number of slabs
+  std::optional<double> end_time{};     ///< the last slab is shortened to meet it
+  std::optional<std::uint64_t>
+      collisions{};            ///< pair collisions; free flight stops exactly there, the others at the slab's end
+  double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
+  double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
+  bool events = false;         ///< pass every contact on to the observers
+};
+
+/// What an observer is shown: a state and its observables, all at `time`.
+template <int D>
+struct Snapshot {
+  double time = 0;
+  std::int64_t step = 0;                    ///< slabs completed (free flight: epochs begun or completed)
+  std::uint64_t collisions = 0;             ///< pair collisions so far
+  const Particles<D>* particles = nullptr;  ///< all of them; where ranks have shares, this rank's (with ids)
+  double kinetic = 0, potential = 0;        ///< [energy]; V with its long-range corrections
+  double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN where the method has none
+  double max_energy_error = 0;                               ///< largest |H − H₁| so far [energy]
+  Vec<D> momentum = Vec<D>::Zero();
+  double temperature = 0;  ///< 2K/(D N), in units of energy (k_B = 1); total momentum is not subtracted
+  double pressure = 0;     ///< virial: (2K + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
+  double total() const { return kinetic + potential; }
+};
+
+/// The times at which an observer needs the particles: start, start + interval, …
+struct Sampling {
+  double interval = 0;  ///< simulated time; 0: never
+  double start = 0;     ///< ≥ 0
+};
+
+template <int D>
+class Observer {
+ public:
+  virtual ~Observer() = default;
+  /// Called once, before the run begins.
+  virtual Sampling sampling() const { return {}; }
+  /// Copies of all particles at a time of sampling(): exactly then with free flight, else at the first step end at or
+  /// after it. Costs no measurement: this is the way to look often. Where ranks have shares rank 0 alone has the
+  /// particles.
+  virtual void sample(double /*time*/, const Particles<D>&) {}
+  virtual void frame(const Snapshot<D>&) {}
+  virtual void thermo(const Snapshot<D>&) {}
+  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`. Where ranks have shares on rank
+  /// 0 only.
+  virtual void contacts(double /*slab_start*/, std::span<const Contact<D>>) {}
+  /// After every slab: how far the run has come. Cheap; called often.
+  virtual void progress(const struct Statistics&) {}
+};
+
+/// The run's account of itself; final once run() has returned, current while it runs.
+struct Statistics {
+  std::int64_t steps = 0;
+  double end_time = 0;       ///< simulated time reached
+  double fraction_done = 0;  ///< of the plan, 0…1
+  Counters counters;
+  double force_passes = 0;  ///< pair evaluations / interacting pairs
+
+  double energy_initial = 0, energy_after_first_step = 0, energy_final = 0;
+  double energy_reference = 0;  ///< max(|H₁|, K₁ + Σ|V|): what to divide energy errors by
+  /// The long-range corrections in the energies above and in pressures (engine/forces/potentials/tail.h). They are
+  /// constants; energy_reference and the errors of H are without them.
+  double tail_energy = 0, tail_pressure = 0;
+  double max_energy_error = 0;  ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the start)
+  std::optional<double>
+      max_shadow_energy_error;  ///< Verlet types; of more than 100 particles at thermo rows and frames only
+  std::optional<double> max_momentum_error;  ///< where nothing takes momentum (no walls, no fields): max |P − P₀|
+  double mean_pressure = 0;                  ///< over the whole run
+  double collision_rate = 0;  ///< pair collisions a unit time and particle, times two: what one sphere suffers
+  /// Of the flight of one sphere from one pair collision to the next: its mean time N t/(2 collisions), and its mean
+  /// length, that time × the mean speed. The mean of |v| over all particles is taken at slab ends and averaged over
+  /// time by the trapezoidal rule. Absent while nothing has collided.
+  std::optional<double> mean_free_time, mean_free_path;
+  double wall_seconds = 0;     ///< of the run's loop
+  bool stopped_early = false;  ///< by should_stop
+};
+
+template <int D>
+class Simulation {
+ public:
+  /// The integrator and its info must belong together.
+  Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator,
+             Plan plan);
+  /// An integrator by its name in the deck, with defaults for the parameters that are not given. The step is given
+  /// once, there or in the plan; free flight chooses one by itself. Throws Error(Failure::deck) about parameters,
+  /// forces that the integrator does not know and plans, and Error(Failure::initial_state) about the system
+  /// (System::check(), spheres that overlap or are not inside the walls).
+  Simulation(std::unique_ptr<System<D>> system, std::string_view integrator, Parameters given, Plan plan)
+      : Simulation(std::move(system), find_integrator(integrator), std::move(given), plan) {}
+  /// The same by a declaration, which outlives the run.
+  Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan);
+  ~Simulation();
+
+  /// Observers outlive the run. Throws Error(deck) where one wants samples at intervals that cannot be counted.
+  void add(Observer<D>& observer);
+
+  /// Runs to the end of the plan, or until should_stop() returns true at the end of a slab. Throws Error.
+  void run(const std::function<bool()>& should_stop = {});
+
+  const Statistics& statistics() const { return statistics_; }
+  const System<D>& system() const { return *system_; }
+
+ private:
+  struct Prepared {
+    std::unique_ptr<System<D>> system;
+    const IntegratorInfo& info;
+    std::unique_ptr<Integrator<D>> integrator;
+    Plan plan;
+  };
+  static Prepared prepare(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan);
+  explicit Simulation(Prepared p) : Simulation(std::move(p.system), p.info, std::move(p.integrator), p.plan) {}
+
+  Slab next_slab(double slack) const;
+  bool finished(double slack) const;
+  double fraction_done() const;
+
+  std::unique_ptr<System<D>> system_;
+  const IntegratorInfo& info_;
+  std::unique_ptr<Integrator<D>> integrator_;
+  Plan plan_;
+  std::vector<Observer<D>*> observers_;
+  Statistics statistics_;
+};
+
+}  // namespace carom

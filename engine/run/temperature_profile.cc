@@ -1,0 +1,92 @@
+// Density and temperature in slabs across one axis.
+//
+// A sample finds n particles (their centres) with the kinetic energy K in a slab of volume V: the density is ⟨n⟩/V, the
+// temperature 2⟨K⟩/(D⟨n⟩), of which no mean velocity is taken out. Sums are exact, so that no order of summation
+// matters.
+
+#include <algorithm>
+#include <limits>
+
+#include "engine/run/observable.h"
+
+namespace carom::observable {
+namespace {
+
+template <int D>
+class TemperatureProfile : public Observable<D> {
+ public:
+  TemperatureProfile(const System<D>& system, const Parameters& parameters, double start)
+      : Observable<D>({parameters.real("interval"), start}),
+        box_(system.box),
+        axis_(parameters.integer("axis")),
+        number_(static_cast<std::size_t>(parameters.integer("bins"))),
+        twice_kinetic_(number_.size()) {}
+
+  std::vector<TableColumn> table() const override {
+    const auto bins = static_cast<double>(number_.size()), samples = static_cast<double>(this->samples());
+    std::vector<TableColumn> table = {{"x", {}}, {"density", {}}, {"temperature", {}}};
+    for (std::size_t b = 0; b < number_.size(); ++b) {
+      table[0].values.push_back((static_cast<double>(b) + 0.5) * box_.edges[axis_] / bins);
+      table[1].values.push_back(number_[b] / (samples * box_.volume() / bins));
+      table[2].values.push_back(number_[b] > 0 ? twice_kinetic_[b].value() / (D * number_[b])
+                                               : std::numeric_limits<double>::quiet_NaN());
+    }
+    return table;
+  }
+
+ private:
+  void add_sample(double /*time*/, const Particles<D>& p) override {
+    const auto bins = static_cast<double>(number_.size());
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      const double slab = std::clamp(p.x[i][axis_] / box_.edges[axis_] * bins, 0.0, bins - 1);
+      number_[static_cast<std::size_t>(slab)] += 1;
+      twice_kinetic_[static_cast<std::size_t>(slab)].add(p.mass[i] * p.v[i].squaredNorm());
+    }
+  }
+
+  const Box<D>& box_;
+  Eigen::Index axis_;
+  std::vector<double> number_;  // of particles in each slab, all samples together
+  std::vector<ExactSum> twice_kinetic_;
+};
+
+template <int D>
+std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
+  if (parameters.integer("axis") >= D)
+    return ParameterError{"axis", "there is no such axis", "the axes are numbered from 0"};
+  if (std::ranges::find(system.box.boundary, Boundary::open) == system.box.boundary.end()) return {};
+  return ParameterError{"interval", "a profile needs slabs, and a box with an open boundary has none",
+                        "set profile_interval = 0, or close the box"};
+}
+
+}  // namespace
+
+ObservableInfo profile() {
+  using enum Parameter::Type;
+  return {
+      .name = "profile",
+      .title = "density and temperature across the box",
+      .parameters = {parameter::interval("simulated time between samples of the profile of density and temperature, "
+                                         "averaged into profile.csv; 0: none"),
+                     {.name = "bins",
+                      .type = integer,
+                      .fallback = "50",
+                      .unit = "-",
+                      .meaning = "slabs of equal thickness",
+                      .range = Parameter::Range::positive,
+                      .most = 1e5},
+                     {.name = "axis",
+                      .type = integer,
+                      .fallback = "0",
+                      .unit = "-",
+                      .meaning = "across which the slabs lie, counted from 0",
+                      .range = Parameter::Range::non_negative}},
+      .documentation =
+          "Columns: x (middle of a slab), density (of centres), temperature 2K/(D n) of the n particles there, with "
+          "the mean velocity in it.",
+      .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.12",
+      .in_2d = maker<TemperatureProfile, 2>(complete<2>),
+      .in_3d = maker<TemperatureProfile, 3>(complete<3>)};
+}
+
+}  // namespace carom::observable

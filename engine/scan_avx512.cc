@@ -1,6 +1,0 @@
-// See scan_kernel.h.
-#include "engine/scan_kernel.h"
-
-namespace carom::kernels {
-const ScanKernels avx512{"avx512", 8, {scan<2, 8>, scan<3, 8>}, {scan_two<2, 8>, scan_two<3, 8>}, near, compare, heads};
-}

@@ -1,0 +1,268 @@
+#pragma once
+// A regular grid of search cells over the box, and a table of the particles in each.
+//
+// Positions are mapped to *unwrapped* integer cells: a particle outside a periodic box, or an image of one, has its own
+// cell numbers there, and the difference of two unwrapped cells gives the image of a neighbour that is meant. (The
+// nearest image of two positions is wrong where the box is dilute or small.) Along open and walled axes the outermost
+// cells reach to infinity. Only the search uses the cells: results never depend on them.
+
+#include <algorithm>
+#include <boost/container/small_vector.hpp>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "engine/base/box.h"
+
+namespace carom {
+
+template <int D>
+using Cell = std::array<std::int32_t, D>;
+
+/// What a grid must know of the particles that it is for.
+template <int D>
+struct Extent {
+  std::size_t particles = 0;
+  Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();  ///< of their positions
+
+  void add(const Vec<D>& x) {
+    low = particles == 0 ? x : low.cwiseMin(x).eval();
+    high = particles == 0 ? x : high.cwiseMax(x).eval();
+    ++particles;
+  }
+};
+
+template <int D>
+class CellGrid {
+ public:
+  /// A grid with cells of edge at least `smallest` over the box (open axes: over the positions), with no more than
+  /// about so many cells a particle.
+  CellGrid(const Box<D>& box, double smallest, const Extent<D>& extent, double cells_a_particle = 2) : box_(box) {
+    const double most =
+        std::max(1.0, std::floor(std::pow(cells_a_particle * static_cast<double>(extent.particles), 1.0 / D)));
+    for (int k = 0; k < D; ++k) {
+      const bool open = box.boundary[k] == Boundary::open;
+      const double low = open ? extent.low[k] : 0, high = open ? extent.high[k] : box.edges[k];
+      const double length = box.periodic(k) ? high - low : std::max(high - low, smallest);
+      // Not quite full: rounding must never make a cell smaller than what it is to hold.
+      count_[k] = static_cast<std::int32_t>(std::clamp(std::floor(length / (smallest * (1 + 1e-9))), 1.0, most));
+      origin_[k] = low;
+      edge_[k] = length / count_[k];
+      inverse_[k] = 1 / edge_[k];
+    }
+    lay_out();
+  }
+
+  CellGrid(const Box<D>& box, double smallest, std::span<const Vec<D>> x)
+      : CellGrid(box, smallest, std::accumulate(x.begin(), x.end(), Extent<D>{}, [](Extent<D> all, const Vec<D>& p) {
+                   all.add(p);
+                   return all;
+                 })) {}
+
+  /// Of which something can be stored.
+  std::size_t cells() const {
+    std::size_t n = 1;
+    for (int k = 0; k < D; ++k) n *= static_cast<std::size_t>(rows(k));
+    return n;
+  }
+  int count(int axis) const { return count_[axis]; }
+  double edge(int axis) const { return edge_[axis]; }
+  double inverse_edge(int axis) const { return inverse_[axis]; }
+  const Box<D>& box() const { return box_; }
+
+  /// The unwrapped cell of a position.
+  Cell<D> cell(const Vec<D>& x) const {
+    Cell<D> c;
+    for (int k = 0; k < D; ++k) {
+      double at = std::floor((x[k] - origin_[k]) * inverse_[k]);
+      if (!box_.periodic(k)) at = std::clamp(at, 0.0, count_[k] - 1.0);
+      c[k] = static_cast<std::int32_t>(at);
+    }
+    return c;
+  }
+
+  /// The coordinate of the lower face of unwrapped cell number c on an axis.
+  double face(int axis, std::int32_t c) const { return origin_[axis] + c * edge_[axis]; }
+
+  /// Where an unwrapped cell is stored.
+  std::size_t index(const Cell<D>& c) const {
+    std::size_t at = 0;
+    for (int k = 0; k < D; ++k) at += stride_[k] * static_cast<std::size_t>(row(k, wrapped(k, c[k])));
+    return at;
+  }
+
+  /// Only cells that are, along each of the first `axes` axes, at most `margin` cells from one of these places are
+  /// stored each for itself. All others share places that must stay empty: see holds().
+  void confine(std::span<const Vec<D>> places, std::int32_t margin, int axes = D) {
+    for (int k = 0; k < axes; ++k) {
+      std::vector<std::int32_t>& row = row_[k];
+      row.assign(static_cast<std::size_t>(count_[k]), 0);
+      for (const Vec<D>& x : places) row[static_cast<std::size_t>(wrapped(k, cell(x)[k]))] = 1;
+      const std::vector<std::int32_t> inside = row;
+      for (std::int32_t c = 0; c < count_[k]; ++c)
+        for (std::int32_t m = -margin; m <= margin && inside[static_cast<std::size_t>(c)] != 0; ++m)
+          if (Step to; step(k, c + m, to)) row[static_cast<std::size_t>(wrapped(k, c + m))] = 1;
+      rows_[k] = 0;
+      for (std::int32_t& r : row) r = r != 0 ? rows_[k]++ : -1;
+      if (rows_[k] == count_[k]) row.clear();
+      if (!row.empty()) std::replace(row.begin(), row.end(), -1, rows_[k]);
+    }
+    lay_out();
+  }
+  /// Whether something may be stored in an unwrapped cell.
+  bool holds(const Cell<D>& c) const {
+    for (int k = 0; k < D; ++k)
+      if (!row_[k].empty() && row(k, wrapped(k, c[k])) == rows_[k]) return false;
+    return true;
+  }
+  /// Takes confine() back.
+  void spread() {
+    for (auto& row : row_) row.clear();
+    lay_out();
+  }
+  /// Where a cell of an axis, 0 … count - 1, is stored along it, and how many such rows there are.
+  std::int32_t row(int axis, std::int32_t c) const {
+    return row_[axis].empty() ? c : row_[axis][static_cast<std::size_t>(c)];
+  }
+  std::int32_t rows(int axis) const { return row_[axis].empty() ? count_[axis] : rows_[axis] + 1; }
+
+  /// How many boxes an unwrapped cell number lies away.
+  std::int32_t boxes(int axis, std::int32_t c) const {
+    return c >= 0 && c < count_[axis] ? 0 : (c - wrapped(axis, c)) / count_[axis];
+  }
+  Image<D> boxes(const Cell<D>& c) const {
+    Image<D> image;
+    for (int k = 0; k < D; ++k) image[k] = boxes(k, c[k]);
+    return image;
+  }
+
+  /// A cell number of one axis as index() sums them up, and how many boxes away it lies.
+  struct Step {
+    std::size_t offset;
+    std::int32_t boxes;
+  };
+  /// The step to unwrapped cell number c; false where there is no such cell, beyond a wall or an open end.
+  bool step(int axis, std::int32_t c, Step& to) const {
+    const bool inside = c >= 0 && c < count_[axis];
+    if (!inside && !box_.periodic(axis)) return false;
+    const std::int32_t w = wrapped(axis, c);
+    to = {stride_[axis] * static_cast<std::size_t>(row(axis, w)), inside ? 0 : (c - w) / count_[axis]};
+    return true;
+  }
+
+  /// Calls visit(index, boxes) for every stored cell from `low` to `high` (inclusive, by axis), each image for itself;
+  /// `boxes` is how many boxes away the visited cell lies. Cells beyond walls and open ends do not exist.
+  template <class Visit>
+  void for_each_between(Cell<D> low, Cell<D> high, Visit&& visit) const {
+    std::array<boost::container::small_vector<Step, 4>, D> places;  // of each axis
+    for (int k = 0; k < D; ++k) {
+      if (!box_.periodic(k)) low[k] = std::max(low[k], 0), high[k] = std::min(high[k], count_[k] - 1);
+      for (std::int32_t c = low[k]; c <= high[k]; ++c) {
+        Step to;
+        if (step(k, c, to)) places[k].push_back(to);
+      }
+    }
+    for (const Step& p : places[0])
+      for (const Step& q : places[1])
+        if constexpr (D == 2)
+          visit(p.offset + q.offset, Image<D>{p.boxes, q.boxes});
+        else
+          for (const Step& r : places[2]) visit(p.offset + q.offset + r.offset, Image<D>{p.boxes, q.boxes, r.boxes});
+  }
+
+  /// The same for every stored cell within `range` cells of `centre`.
+  template <class Visit>
+  void for_each_around(const Cell<D>& centre, const Cell<D>& range, Visit&& visit) const {
+    Cell<D> low, high;
+    for (int k = 0; k < D; ++k) low[k] = centre[k] - range[k], high[k] = centre[k] + range[k];
+    for_each_between(low, high, visit);
+  }
+
+ private:
+  std::int32_t wrapped(int axis, std::int32_t c) const {
+    if (!box_.periodic(axis) || (c >= 0 && c < count_[axis])) return c;
+    const std::int32_t r = c % count_[axis];
+    return r < 0 ? r + count_[axis] : r;
+  }
+
+  void lay_out() {
+    stride_[D - 1] = 1;
+    for (int k = D - 1; k > 0; --k) stride_[k - 1] = stride_[k] * static_cast<std::size_t>(rows(k));
+  }
+
+  Box<D> box_;
+  Cell<D> count_;
+  std::array<std::vector<std::int32_t>, D> row_;  // by axis and cell, where confined: else the cell's own number
+  Cell<D> rows_{};                                // so many hold something there; one more is empty
+  std::array<std::size_t, D> stride_;
+  Vec<D> origin_, edge_, inverse_;
+};
+
+/// The particles of each cell, for one set of positions: built once, by counting, and read.
+template <int D>
+class CellTable {
+ public:
+  CellTable(const CellGrid<D>& grid, std::span<const Vec<D>> x)
+      : grid_(grid), start_(grid.cells() + 2), ids_(x.size()), boxes_(x.size()) {
+    std::vector<std::uint32_t> at(x.size());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const Cell<D> c = grid.cell(x[i]);
+      at[i] = static_cast<std::uint32_t>(grid.index(c));
+      for (int k = 0; k < D; ++k) boxes_[i][k] = grid.boxes(k, c[k]);
+      ++start_[at[i] + 2];
+    }
+    // While filling, start_[c + 1] is where the next one in cell c goes.
+    for (std::size_t c = 0; c + 1 < start_.size(); ++c) start_[c + 1] += start_[c];
+    for (std::size_t i = 0; i < x.size(); ++i) ids_[start_[at[i] + 1]++] = static_cast<Id>(i);
+  }
+
+  /// Calls visit(j, image) for every particle j (the one at `x` among them) with an image that may lie within `reach`
+  /// of x: that image stands at x_j − shift(image).
+  template <class Visit>
+  void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
+    Cell<D> range;
+    for (int k = 0; k < D; ++k)
+      range[k] = std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid_.edge(k) - 1e-9), kFarthest)));
+    const Cell<D> centre = grid_.cell(x);
+    bool inside = true;
+    for (int k = 0; k < D; ++k) inside = inside && centre[k] >= range[k] && centre[k] < grid_.count(k) - range[k];
+    if (inside) {  // no images, and the cells of a row stand together
+      Cell<D> row;
+      for (int k = 0; k < D; ++k) row[k] = centre[k] - range[k];
+      const auto length = static_cast<std::size_t>(2 * range[D - 1] + 1);
+      do {
+        const std::size_t first = grid_.index(row);
+        for (std::uint32_t q = start_[first]; q < start_[first + length]; ++q) visit(ids_[q], boxes_[ids_[q]]);
+      } while (next_row(row, centre, range));
+      return;
+    }
+    grid_.for_each_around(centre, range, [&](std::size_t cell, const Image<D>& away) {
+      for (std::uint32_t q = start_[cell]; q < start_[cell + 1]; ++q) {
+        const Id j = ids_[q];
+        Image<D> image;
+        for (int k = 0; k < D; ++k) image[k] = boxes_[j][k] - away[k];
+        visit(j, image);
+      }
+    });
+  }
+
+ private:
+  static constexpr double kFarthest = 1 << 28;  // cells: what an integer holds
+
+  /// Moves on to the next row within `range` of the centre; false after the last.
+  static bool next_row(Cell<D>& row, const Cell<D>& centre, const Cell<D>& range) {
+    for (int k = D - 2; k >= 0; --k) {
+      if (++row[k] <= centre[k] + range[k]) return true;
+      row[k] = centre[k] - range[k];
+    }
+    return false;
+  }
+
+  CellGrid<D> grid_;
+  std::vector<std::uint32_t> start_;
+  std::vector<Id> ids_;
+  std::vector<Image<D>> boxes_;
+};
+
+}  // namespace carom

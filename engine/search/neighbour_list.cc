@@ -1,0 +1,159 @@
+#include "engine/search/neighbour_list.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "engine/base/error.h"
+#include "engine/search/cell_grid.h"
+
+namespace carom {
+
+namespace {
+constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
+constexpr double kCalls = 6;  // a skin that is half as wide as any particle comes in so many calls; so it lasts three,
+constexpr double kWidest = 1.6;  // where it need not be wider than this for it [mean reach]
+constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
+constexpr std::size_t kMostPairs = 10'000'000, kMostPartners = 200;  // a particle; more are a step gone wild
+}  // namespace
+
+/// Cells for particles of one size.
+template <int D>
+struct SizeClass {
+  SizeClass(const Box<D>& box, double largest_reach, double skin, std::span<const Vec<D>> x, std::vector<Id> members)
+      : largest(largest_reach), table(CellGrid<D>(box, 2 * largest_reach + skin, x), x), ids(std::move(members)) {}
+  Id id(Id member) const { return ids.empty() ? member : ids[member]; }
+  double largest;  ///< reach
+  CellTable<D> table;
+  std::vector<Id> ids;  ///< of the members; empty: all particles
+};
+
+template <int D>
+NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without)
+    : box_(box), reach_(std::move(reach)), without_(without) {
+  const double mean =
+      std::accumulate(reach_.begin(), reach_.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, reach_.size()));
+  least_skin_ = skin_ = 0.3 * mean;  // 15 % of a mean pair reach
+  widest_ = kWidest * mean;
+}
+
+template <int D>
+std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new,
+                                                          double margin) {
+  const bool known = built_at_.size() == x.size(), still = x.data() == x_new.data();
+  std::vector<Image<D>> crossed;
+  double squared_from_build = 0, squared_step = 0;  // the largest distances: two bounds for all
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (known) {
+      follow_wrap(static_cast<Id>(i), x, crossed);
+      squared_from_build = std::max(squared_from_build, (x[i] - built_at_[i]).squaredNorm());
+    }
+    if (still) continue;
+    if (known) squared_from_build = std::max(squared_from_build, (x_new[i] - built_at_[i]).squaredNorm());
+    squared_step = std::max(squared_step, (x_new[i] - x[i]).squaredNorm());
+  }
+  if (!crossed.empty())
+    for (auto& pair : pairs_)  // the images of two particles all change by as much: their order stays
+      for (int k = 0; k < D; ++k) pair.image[k] += crossed[pair.i][k] - crossed[pair.j][k];
+  const double step = std::sqrt(squared_step) + margin, from_build = std::sqrt(squared_from_build);
+  const bool covers = known && from_build + margin <= 0.5 * skin_;
+  const double to_last = kCalls * from_build / static_cast<double>(++calls_);
+  const double room = known && to_last <= widest_ ? to_last : 0;  // for some calls more
+  const double wanted = std::max({least_skin_, 4 * step, room});  // room for the step and for some more of its size
+  const bool wasteful = step > 0 && skin_ > kTooWide * wanted;    // made for one wild step
+  if (!covers || wasteful) {
+    for (int k = 0; k < D; ++k)
+      if (box_.periodic(k) && !(step <= kMostBoxes * box_.edges[k]))
+        throw Error(Failure::numerical,
+                    "a particle moves farther than " + std::to_string(kMostBoxes) +
+                        " edges of the periodic box within one step; use a smaller integrator.step");
+    skin_ = std::max(wanted, wasteful ? 0.0 : 0.5 * skin_);
+    if (build(x)) return pairs_;
+    skin_ = 2 * step;  // no room for more
+    if (build(x)) return pairs_;
+    skin_ = least_skin_;
+    built_at_.clear();
+    throw Error(Failure::numerical, "a particle may come " + short_text(step) +
+                                        " far within one step, which gives far too many candidates for collisions; use "
+                                        "a smaller integrator.step");
+  }
+  return pairs_;
+}
+
+template <int D>
+const Partners& NeighbourList<D>::partners() {
+  if (partners_.empty())
+    partners_.build(reach_.size(), pairs_.size(), [&](std::size_t k) {
+      return std::array<Id, 2>{pairs_[k].i, pairs_[k].j};
+    });
+  return partners_;
+}
+
+/// Where particle i has been wrapped since the last time: notes it and moves its position at the build along.
+template <int D>
+void NeighbourList<D>::follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<Image<D>>& crossed) {
+  const Image<D> jump = box_.nearest_image(x[i] - built_at_[i]);
+  if (jump == Image<D>{}) return;
+  if (crossed.empty()) crossed.resize(x.size());
+  crossed[i] = jump;
+  built_at_[i] -= box_.shift(jump);
+}
+
+/// False where there are far too many pairs.
+template <int D>
+bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (!x[i].allFinite())
+      throw Error(Failure::numerical,
+                  "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
+  ++rebuilds_;
+  calls_ = 0;
+  built_at_.assign(x.begin(), x.end());
+  pairs_.clear();
+  partners_.clear();
+  const std::vector<SizeClass<D>> sizes = group(x);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (!without_.empty() && without_[i] != 0) continue;
+    const std::size_t first = pairs_.size();
+    for (const SizeClass<D>& size : sizes)
+      size.table.for_each_near(x[i], reach_[i] + size.largest + skin_, [&](Id member, const Image<D>& image) {
+        const Id j = size.id(member);
+        if (j <= i) return;
+        const Vec<D> d = x[i] - x[j] + box_.shift(image);
+        const double reach = reach_[i] + reach_[j] + skin_;
+        if (d.squaredNorm() <= reach * reach) pairs_.push_back({static_cast<Id>(i), j, image});
+      });
+    std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
+    if (pairs_.size() > kMostPairs + kMostPartners * x.size()) return false;
+  }
+  return true;
+}
+
+/// Particles of similar reach, an octave each, in cells of their own: cells for the largest would hold thousands of
+/// small ones.
+template <int D>
+std::vector<SizeClass<D>> NeighbourList<D>::group(std::span<const Vec<D>> x) const {
+  std::vector<SizeClass<D>> sizes;
+  if (x.empty()) return sizes;
+  const auto [least, most] = std::ranges::minmax_element(reach_);
+  if (!(*least > 0) || *most < 2 * *least) {
+    sizes.emplace_back(box_, *most, skin_, x, std::vector<Id>{});
+    return sizes;
+  }
+  std::map<int, std::vector<Id>> octaves;
+  for (Id i = 0; i < x.size(); ++i) octaves[std::ilogb(*most / reach_[i])].push_back(i);
+  std::vector<Vec<D>> at;
+  for (auto& [octave, ids] : octaves) {
+    at.clear();
+    double largest = 0;
+    for (const Id i : ids) at.push_back(x[i]), largest = std::max(largest, reach_[i]);
+    sizes.emplace_back(box_, largest, skin_, at, std::move(ids));
+  }
+  return sizes;
+}
+
+template class NeighbourList<2>;
+template class NeighbourList<3>;
+
+}  // namespace carom

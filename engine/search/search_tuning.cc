@@ -1,0 +1,115 @@
+#include "engine/search/search_tuning.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace carom {
+namespace {
+
+// Instructions, as callgrind counts them.
+constexpr double kPrediction = 400, kCandidate = 32;        // on a list
+constexpr double kRenewal = 4500;                           // of a list
+constexpr double kCellHead = 9, kCellCandidate = 60;        // a prediction on cells: for each cell and each candidate
+constexpr double kCrossing = 550;                           // into another cell, beside the cells and candidates ahead
+constexpr double kFewestPredictions = 20000;                // before counts are trusted
+constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02;  // in mean diameters
+
+/// Packing fraction from which on lists are faster, as measured for equal spheres and discs.
+double dense(int dimension) { return dimension == 2 ? 0.55 : 0.32; }
+
+/// The edge of cells that costs least: small ones are crossed often, large ones hold many candidates.
+double best_cell(const SearchSituation& s) {
+  const double around = s.dimension == 2 ? 9 : 27, ahead = around / 3;
+  double best = s.largest, least = std::numeric_limits<double>::infinity();
+  for (double edge = s.largest; s.density * std::pow(edge, s.dimension) < 3; edge *= 1.1) {
+    const double inside = s.density * std::pow(edge, s.dimension);
+    const double predictions = 1.1 * contacts_a_length(s),
+                 crossings = s.dimension * std::sqrt(2 / std::numbers::pi) / edge;
+    const double cost = predictions * (kPrediction + around * (kCellHead + kCellCandidate * inside)) +
+                        crossings * (kCrossing + ahead * (kCellHead + kCellCandidate * inside));
+    if (cost < least) least = cost, best = edge;
+  }
+  return best;
+}
+
+}  // namespace
+
+// With the contact values of Henderson and of Carnahan and Starling.
+double contacts_a_length(const SearchSituation& s) {
+  const double filled = std::min(s.filled, 0.8), empty = 1 - filled;
+  const double contact_value =
+      s.dimension == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
+  const double cross_section = s.dimension == 2 ? 2 * s.largest : 4 * s.largest * s.largest;
+  return std::sqrt(std::numbers::pi) * s.density * cross_section * contact_value;
+}
+
+template <int D>
+SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, const Extent<D>& extent,
+                             std::span<const double> numbers) {
+  const auto n = static_cast<double>(extent.particles), each = n / static_cast<double>(radii.size());
+  double largest = 0, sum = 0, sum_of_powers = 0;
+  for (std::size_t k = 0; k < radii.size(); ++k) {
+    const double r = radii[k], number = numbers.empty() ? each : numbers[k];
+    largest = std::max(largest, r);
+    sum += number * r;
+    sum_of_powers += number * std::pow(r, D);
+  }
+  double volume = 1;
+  for (int k = 0; k < D; ++k) {
+    const bool open = box.boundary[k] == Boundary::open;  // as far as there are spheres
+    volume *= open ? extent.high[k] - extent.low[k] + 2 * largest : box.edges[k];
+  }
+  const double filled = (D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * sum_of_powers / volume;
+  return {D, n / volume, filled, 2 * sum / n, 2 * largest};
+}
+template SearchSituation situation_of<2>(const Box<2>&, std::span<const double>, const Extent<2>&,
+                                         std::span<const double>);
+template SearchSituation situation_of<3>(const Box<3>&, std::span<const double>, const Extent<3>&,
+                                         std::span<const double>);
+
+void SearchTuning::choose(const SearchSituation& situation, const EventCounts& counts) {
+  if (!chosen_) {
+    choose_first(situation);
+    before_ = counts;
+  }
+  const auto predictions = static_cast<double>(counts.predictions - before_.predictions);
+  if (predictions > kFewestPredictions) {
+    const auto candidates = static_cast<double>(counts.candidates - before_.candidates);
+    const auto rebuilds = static_cast<double>(counts.rebuilds - before_.rebuilds);
+    if (lists_ && options_.skin == 0) adapt_skin(situation, predictions, candidates, rebuilds);
+    if (options_.method == SearchOptions::Method::automatic && !lists_ && candidates > 40 * predictions)
+      lists_ = true;  // crowded somewhere: cells hold too many
+    before_ = counts;
+  }
+  // What cells and regions must be able to hold, whatever was chosen.
+  cell_ = std::max(cell_, situation.largest);
+}
+
+void SearchTuning::choose_first(const SearchSituation& s) {
+  chosen_ = true;
+  lists_ = options_.method == SearchOptions::Method::automatic
+               ? s.filled > dense(s.dimension) || s.largest > 1.0001 * s.mean
+               : options_.method == SearchOptions::Method::lists;
+  // The room that spheres have beside a close packing of theirs, about.
+  const double room = s.mean * (std::pow(0.74 / std::clamp(s.filled, 0.01, 0.73), 1.0 / s.dimension) - 1);
+  skin_ = options_.skin > 0 ? options_.skin : std::clamp(2 * room, 0.1 * s.mean, 0.4 * s.mean);
+  cell_ = options_.cell > 0 ? options_.cell : best_cell(s);
+}
+
+/// Scales the skin to where predictions, which grow with the candidates, and renewals cost least together. Regions are
+/// left at a rate between that of free flight (1/skin) and that of diffusion (1/skin²).
+void SearchTuning::adapt_skin(const SearchSituation& s, double predictions, double candidates, double rebuilds) {
+  const double now = s.largest + 2 * skin_;
+  double best = skin_, least = std::numeric_limits<double>::infinity();
+  for (const double factor : {0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4}) {
+    const double skin = skin_ * factor, reach = s.largest + 2 * skin;
+    if (skin > kLargestSkin * s.mean || skin < kSmallestSkin * s.mean) continue;
+    const double cost = predictions * kPrediction + candidates * std::pow(reach / now, s.dimension) * kCandidate +
+                        rebuilds * std::pow(factor, -1.7) * kRenewal;
+    if (cost < 0.99 * least) least = cost, best = skin;
+  }
+  skin_ = best;
+}
+
+}  // namespace carom

@@ -1,0 +1,435 @@
+// The kernels of scan.h, written once for any number of lanes. Included by scan_*.cc only, which are compiled for
+// different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so that no
+// function compiled for one machine can end up in another's binary.
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+#include "engine/search/simd/scan.h"
+
+namespace carom {
+namespace {
+
+template <int W>
+struct Lanes {
+  typedef double Double __attribute__((vector_size(8 * W)));
+  typedef long long Long __attribute__((vector_size(8 * W)));
+  typedef int Int __attribute__((vector_size(4 * W)));
+  typedef unsigned Bits __attribute__((vector_size(4 * W)));
+};
+using Two = Lanes<2>::Double;
+using Four = Lanes<4>::Double;
+using Eight = Lanes<8>::Double;
+
+template <int W>
+using Double = typename Lanes<W>::Double;
+template <int W>
+using Long = typename Lanes<W>::Long;
+
+inline Two load(const double* at) {
+  Two pair;
+  __builtin_memcpy(&pair, at, sizeof pair);
+  return pair;
+}
+inline Four load(const double* low, const double* high) {
+#if defined(__AVX__)
+  return (Four)_mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(low)), _mm_loadu_pd(high), 1);
+#else
+  return __builtin_shufflevector(load(low), load(high), 0, 1, 2, 3);
+#endif
+}
+inline Eight join(Four a, Four b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7); }
+
+/// Two neighbouring doubles of W records: `first` and `second` hold one each of all records.
+inline void load_pairs(const double* const* record, int at, Two& first, Two& second) {
+  const Two even = load(record[0] + at), odd = load(record[1] + at);
+  first = __builtin_shufflevector(even, odd, 0, 2);
+  second = __builtin_shufflevector(even, odd, 1, 3);
+}
+inline void load_pairs(const double* const* record, int at, Four& first, Four& second) {
+  const Four even = load(record[0] + at, record[2] + at);
+  const Four odd = load(record[1] + at, record[3] + at);
+  first = __builtin_shufflevector(even, odd, 0, 4, 2, 6);
+  second = __builtin_shufflevector(even, odd, 1, 5, 3, 7);
+}
+inline void load_pairs(const double* const* record, int at, Eight& first, Eight& second) {
+  const Eight even = join(load(record[0] + at, record[2] + at), load(record[4] + at, record[6] + at));
+  const Eight odd = join(load(record[1] + at, record[3] + at), load(record[5] + at, record[7] + at));
+  first = __builtin_shufflevector(even, odd, 0, 8, 2, 10, 4, 12, 6, 14);
+  second = __builtin_shufflevector(even, odd, 1, 9, 3, 11, 5, 13, 7, 15);
+}
+
+template <int W>
+inline Double<W> square_root(Double<W> x) {
+#if defined(__AVX512F__)
+  if constexpr (W == 8) return (Eight)_mm512_sqrt_pd((__m512d)x);
+#endif
+#if defined(__AVX__)
+  if constexpr (W == 4) return (Four)_mm256_sqrt_pd((__m256d)x);
+#endif
+#if defined(__SSE2__)
+  if constexpr (W == 2) return (Two)_mm_sqrt_pd((__m128d)x);
+#endif
+  for (int l = 0; l < W; ++l) x[l] = __builtin_sqrt(x[l]);
+  return x;
+}
+
+/// One bit a lane.
+template <int W>
+inline unsigned bits(Long<W> mask) {
+#if defined(__AVX512DQ__)
+  if constexpr (W == 8) return _mm512_movepi64_mask((__m512i)mask);
+#endif
+#if defined(__AVX__)
+  if constexpr (W == 4) return static_cast<unsigned>(_mm256_movemask_pd((__m256d)mask));
+#endif
+#if defined(__SSE2__)
+  if constexpr (W == 2) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
+#endif
+  unsigned all = 0;
+  for (int l = 0; l < W; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
+  return all;
+}
+
+template <int W>
+inline double smallest(Double<W> x) {
+  if constexpr (W == 8) {
+    const Four a = __builtin_shufflevector(x, x, 0, 1, 2, 3), b = __builtin_shufflevector(x, x, 4, 5, 6, 7);
+    return smallest<4>(a < b ? a : b);
+  } else if constexpr (W == 4) {
+    const Two a = __builtin_shufflevector(x, x, 0, 1), b = __builtin_shufflevector(x, x, 2, 3);
+    return smallest<2>(a < b ? a : b);
+  } else {
+    return x[0] < x[1] ? x[0] : x[1];
+  }
+}
+
+template <int W>
+inline Double<W> all(double x) {
+  Double<W> lanes;
+  for (int l = 0; l < W; ++l) lanes[l] = x;
+  return lanes;
+}
+
+/// The lesser of two in every lane; the second where one is no number.
+template <int W>
+inline Double<W> least(Double<W> a, Double<W> b) {
+#if defined(__AVX512F__)
+  if constexpr (W == 8) return (Eight)_mm512_min_pd((__m512d)a, (__m512d)b);
+#endif
+#if defined(__AVX__)
+  if constexpr (W == 4) return (Four)_mm256_min_pd((__m256d)a, (__m256d)b);
+#endif
+#if defined(__SSE2__)
+  if constexpr (W == 2) return (Two)_mm_min_pd((__m128d)a, (__m128d)b);
+#endif
+  return a < b ? a : b;
+}
+
+constexpr unsigned kBlock = 64;  // candidates per block: their times are kept until the first is known
+
+/// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: never, if it
+/// is infinite or no number; −infinite where the two overlap and approach. Returns the least in each lane.
+template <int D, int W, bool latest, bool plain>
+inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting& s, std::uint32_t self,
+                                                              const std::uint32_t* candidates, unsigned n,
+                                                              unsigned same, double* times) {
+  using V = Double<W>;
+  constexpr double kNever = __builtin_inf();
+  const double* const records = s.records;
+  const double* const own = records + std::size_t{8} * self;
+  const std::uint32_t slot_mask = s.slot_mask;
+  const V none = all<W>(kNever), t_i = all<W>(own[2 * D]);
+  V x_i[D], v_i[D];
+  for (int k = 0; k < D; ++k) x_i[k] = all<W>(own[k]), v_i[k] = all<W>(own[D + k]);
+  V sigma = all<W>(s.diameter), best = none;
+  const auto look = [&]<bool shifted>(const std::uint32_t* some, double* to) __attribute__((always_inline)) {
+    const double* record[W];
+    for (int l = 0; l < W; ++l) record[l] = records + std::size_t{8} * (some[l] & slot_mask);
+    V field[2 * D + 2];  // x, v, t of the candidates, and what comes after
+    for (int k = 0; k < 2 * D + 2; k += 2) load_pairs(record, k, field[k], field[k + 1]);
+    // Separation and its rate as the candidate sees them: all that follows is even in the sign.
+    const V t_j = field[2 * D];
+    const V now = latest ? t_i : t_i > t_j ? t_i : t_j, s_i = now - t_i, s_j = now - t_j;
+    V d[D], v[D];
+    for (int k = 0; k < D; ++k) {
+      d[k] = (field[k] + s_j * field[D + k]) - (latest ? x_i[k] : x_i[k] + s_i * v_i[k]);
+      v[k] = field[D + k] - v_i[k];
+    }
+    if constexpr (!plain) {
+      const V half = 0.5 * (s_i * s_i - s_j * s_j), difference = s_i - s_j;
+      for (int k = 0; k < D; ++k) {
+        d[k] -= half * s.g[k];
+        v[k] -= difference * s.g[k];
+      }
+    }
+    if constexpr (shifted) {
+      typename Lanes<W>::Bits code;
+      __builtin_memcpy(&code, some, sizeof code);
+      const unsigned mask = (1u << s.field_bits) - 1, zero = 1u << (s.field_bits - 1);
+      for (int k = 0; k < D; ++k) {
+        const auto image = (typename Lanes<W>::Int)((code >> (s.slot_bits + k * s.field_bits) & mask) - zero);
+        d[k] -= __builtin_convertvector(image, V) * s.edges[k];
+      }
+    }
+    V b, d_squared, v_squared, cross;
+    if constexpr (D == 3) {
+      b = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
+      d_squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+      v_squared = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+      const V z = d[0] * v[1] - d[1] * v[0], x = d[1] * v[2] - d[2] * v[1], y = d[2] * v[0] - d[0] * v[2];
+      cross = x * x + y * y + z * z;
+    } else {
+      b = d[0] * v[0] + d[1] * v[1];
+      d_squared = d[0] * d[0] + d[1] * d[1];
+      v_squared = v[0] * v[0] + v[1] * v[1];
+      const V z = d[0] * v[1] - d[1] * v[0];
+      cross = z * z;
+    }
+    V time;
+    if constexpr (plain) {
+      const V c = d_squared - sigma * sigma;
+      const V discriminant = v_squared * sigma * sigma - cross;
+      time = now + c / (square_root<W>(discriminant) - b);
+      const Long<W> parting = b >= 0.0;
+      time = (V)((Long<W>)time | parting | (discriminant <= 0.0));  // all bits set: no number
+      time = (c <= 0.0) & ~parting ? all<W>(-kNever) : time;
+    } else {
+      if (s.radius)
+        for (int l = 0; l < W; ++l) sigma[l] = s.radius[self] + s.radius[some[l] & slot_mask];
+      // As contact_time() for growing spheres, contact.h.
+      const V rate = sigma * s.growth, reach = sigma * (1.0 + s.growth * now);
+      const V c = d_squared - reach * reach, falling = b - reach * rate, outrun = v_squared - rate * rate;
+      const V discriminant = v_squared * reach * reach - cross + rate * (rate * d_squared - 2.0 * reach * b);
+      const V root = square_root<W>(discriminant);
+      time = now + (falling < 0.0 ? c / (root - falling) : (falling + root) / -outrun);
+      time = (discriminant > 0.0) & ((falling < 0.0) | (outrun < 0.0)) ? time : none;
+      time = (c <= 0.0) ? ((falling < 0.0) & (d_squared > 0.0) ? all<W>(-kNever) : none) : time;  // but for the padding
+    }
+    __builtin_memcpy(to, &time, sizeof time);
+    best = least<W>(time, best);
+  };
+  const unsigned surely = same == n ? n : same / W * W;  // the padding is in the same box
+  unsigned q = 0;
+  for (; q < surely; q += W) look.template operator()<false>(candidates + q, times + q);
+  for (; q < n; q += W) look.template operator()<true>(candidates + q, times + q);
+  return best;
+}
+
+/// The first of n times, given the least in each lane.
+template <int W>
+inline ScanResult first_of(const double* times, unsigned n, Double<W> best) {
+  const double first = smallest<W>(best);
+  std::uint64_t at = 0;
+  for (unsigned q = 0; q < n; q += W) {
+    Double<W> some;
+    __builtin_memcpy(&some, times + q, sizeof some);
+    at |= static_cast<std::uint64_t>(bits<W>(some == first)) << q;
+  }
+  return {first, static_cast<std::uint32_t>(__builtin_ctzll(at | std::uint64_t{1} << 63)), (at & (at - 1)) != 0};
+}
+
+template <int D, int W, bool latest, bool plain>
+__attribute__((noinline)) ScanResult scan_blocks(const ScanSetting& s, const ScanTask& task) {
+  alignas(64) double times[kBlock];
+  ScanResult result{__builtin_inf(), 0, false};
+  for (unsigned start = 0; start < task.n; start += kBlock) {
+    const unsigned n = task.n - start < kBlock ? task.n - start : kBlock;
+    const unsigned same = task.same > start ? (task.same - start < n ? task.same - start : n) : 0;
+    const auto best = contact_times<D, W, latest, plain>(s, task.self, task.candidates + start, n, same, times);
+    const ScanResult some = first_of<W>(times, n, best);
+    if (some.time < result.time)
+      result = {some.time, start + some.which, some.tied};
+    else if (some.time == result.time)
+      result.tied = true;
+  }
+  return result;
+}
+
+template <int D, int W, bool latest>
+ScanResult scan_plain(const ScanSetting& s, const ScanTask& task) {
+  if (task.n > kBlock) return scan_blocks<D, W, latest, true>(s, task);
+  alignas(64) double times[kBlock];
+  const auto best = contact_times<D, W, latest, true>(s, task.self, task.candidates, task.n, task.same, times);
+  return first_of<W>(times, task.n, best);
+}
+
+template <int D, int W>
+ScanResult scan(const ScanSetting& s, const ScanTask& task, bool latest) {
+  if (!s.plain) return scan_blocks<D, W, false, false>(s, task);
+  return latest ? scan_plain<D, W, true>(s, task) : scan_plain<D, W, false>(s, task);
+}
+
+/// Two at once: the end of one and the start of the other overlap in the processor.
+template <int D, int W>
+void scan_two(const ScanSetting& s, const ScanTask* task, ScanResult* result) {
+  if (!s.plain || task[0].n > kBlock || task[1].n > kBlock) {
+    for (int k = 0; k < 2; ++k) result[k] = scan<D, W>(s, task[k], true);
+    return;
+  }
+  alignas(64) double times[2][kBlock];
+  Double<W> best[2];
+  for (int k = 0; k < 2; ++k)
+    best[k] = contact_times<D, W, true, true>(s, task[k].self, task[k].candidates, task[k].n, task[k].same, times[k]);
+  for (int k = 0; k < 2; ++k) result[k] = first_of<W>(times[k], task[k].n, best[k]);
+}
+
+typedef int Ints __attribute__((vector_size(32)));
+typedef float Floats __attribute__((vector_size(32)));
+
+/// One bit a lane.
+inline unsigned bits(Ints mask) {
+#if defined(__AVX2__)
+  return static_cast<unsigned>(_mm256_movemask_ps((__m256)mask));
+#elif defined(__SSE2__)
+  typedef int Half __attribute__((vector_size(16)));
+  const Half low = __builtin_shufflevector(mask, mask, 0, 1, 2, 3),
+             high = __builtin_shufflevector(mask, mask, 4, 5, 6, 7);
+  return static_cast<unsigned>(_mm_movemask_ps((__m128)low) | _mm_movemask_ps((__m128)high) << 4);
+#else
+  unsigned all = 0;
+  for (int l = 0; l < 8; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
+  return all;
+#endif
+}
+
+[[maybe_unused]] unsigned near(const NearTask& task, std::uint32_t* slots, std::int32_t* away) {
+  const Floats scale_x = Floats{} + task.scale[0], scale_y = Floats{} + task.scale[1],
+               scale_z = Floats{} + task.scale[2], limit = Floats{} + task.limit_squared;
+  const float limit_squared = task.limit_squared;
+  unsigned found = 0;
+  struct Place {  // a line, and the corner of its cell seen from the sphere
+    std::uint32_t line;
+    std::int32_t boxes;
+    float x, y, z;
+  } places[8];
+  unsigned lines = 0;
+  const auto within = [&](const Place& at, const CellLine& line) {
+    Ints place, slot;
+    __builtin_memcpy(&place, line.place, sizeof place);
+    __builtin_memcpy(&slot, line.slot, sizeof slot);
+    const Floats x = __builtin_convertvector(place & 1023, Floats) * scale_x + at.x;
+    const Floats y = __builtin_convertvector(place >> 10 & 1023, Floats) * scale_y + at.y;
+    const Floats z = __builtin_convertvector(place >> 20, Floats) * scale_z + at.z;
+    return bits((x * x + y * y + z * z < limit) & (slot != -1));
+  };
+  const auto take = [&](std::uint32_t slot, std::int32_t boxes) {
+    slots[found] = slot;
+    away[found++] = boxes;
+  };
+  const auto flush = [&] {
+    std::uint64_t hits = 0;  // of eight lines, one bit for each of their spheres
+    for (unsigned l = 0; l < lines; ++l) {
+      const Place& at = places[l];
+      hits |= static_cast<std::uint64_t>(within(at, task.lines[at.line])) << (8 * l);
+      for (std::uint32_t more = task.next[at.line]; more != kEmpty; more = task.next[more])  // crowded cells
+        for (unsigned m = within(at, task.lines[more]); m != 0; m &= m - 1)
+          take(task.lines[more].slot[__builtin_ctz(m)], at.boxes);
+    }
+    for (; hits != 0; hits &= hits - 1) {
+      const int bit = __builtin_ctzll(hits);
+      take(task.lines[places[bit / 8].line].slot[bit % 8], places[bit / 8].boxes);
+    }
+    lines = 0;
+  };
+  const CellView* const view = task.view[2];
+  const unsigned views = task.views[2];
+  for (unsigned a = 0; a < task.views[0]; ++a) {
+    const CellView p = task.view[0][a];
+    for (unsigned b = 0; b < task.views[1]; ++b) {
+      const CellView q = task.view[1][b];
+      const std::uint32_t line = p.line + q.line;
+      const std::int32_t boxes = p.away + q.away;
+      const float left = limit_squared - p.squared - q.squared;
+      for (unsigned c = 0; c < views; ++c) {
+        const CellView& r = view[c];
+        places[lines] = {line + r.line, boxes + r.away, p.corner, q.corner, r.corner};
+        lines += r.squared < left ? 1 : 0;
+        if (lines == 8) flush();
+      }
+    }
+  }
+  flush();
+  return found;
+}
+
+[[maybe_unused]] unsigned compare(const std::uint32_t* list, unsigned length, const std::uint32_t* candidates,
+                                  unsigned n, std::uint32_t* fresh, std::uint64_t* kept) {
+  unsigned count = 0;
+  for (unsigned q = 0; q < n; ++q) {
+    const Ints one = Ints{} + static_cast<int>(candidates[q]);
+    unsigned hit = 0;
+    for (unsigned p = 0; p < length; p += 8) {
+      Ints eight;
+      __builtin_memcpy(&eight, list + p, sizeof eight);
+      const unsigned inside = length - p < 8 ? (1u << (length - p)) - 1 : 0xff, same = bits(eight == one) & inside;
+      hit |= same;
+      kept[p / 64] |= static_cast<std::uint64_t>(same) << (p % 64);
+    }
+    fresh[count] = candidates[q];
+    count += hit == 0 ? 1 : 0;
+  }
+  return count;
+}
+
+typedef unsigned Quad __attribute__((vector_size(16)));
+
+/// Those of four that a mask names, moved to the front.
+inline Quad pack(Quad four, unsigned mask) {
+#if defined(__SSSE3__)
+  alignas(16) static const unsigned char order[8][16] = {{},
+                                                         {0, 1, 2, 3},
+                                                         {4, 5, 6, 7},
+                                                         {0, 1, 2, 3, 4, 5, 6, 7},
+                                                         {8, 9, 10, 11},
+                                                         {0, 1, 2, 3, 8, 9, 10, 11},
+                                                         {4, 5, 6, 7, 8, 9, 10, 11},
+                                                         {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}};
+  return (Quad)_mm_shuffle_epi8((__m128i)four, _mm_load_si128((const __m128i*)order[mask]));
+#else
+  Quad packed{};
+  for (unsigned l = 0, to = 0; l < 3; ++l)
+    if ((mask >> l & 1) != 0) packed[to++] = four[l];
+  return packed;
+#endif
+}
+
+inline unsigned bits(Quad mask) {
+#if defined(__SSE2__)
+  return static_cast<unsigned>(_mm_movemask_ps((__m128)mask));
+#else
+  unsigned all = 0;
+  for (unsigned l = 0; l < 4; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
+  return all;
+#endif
+}
+
+[[maybe_unused]] Heads heads(const HeadsTask& task, std::uint32_t* candidates) {
+  const std::uint32_t* const first = task.first;
+  const HeadStep* const inner = task.step[1];
+  const unsigned steps = task.steps[1];
+  const Quad here = Quad{} + task.here;
+  Quad wanted{}, any{};
+  for (unsigned l = 0; l < 3; ++l) wanted[l] = (task.wanted >> l & 1) != 0 ? ~0u : 0u;
+  std::uint32_t* end = candidates;
+  for (const HeadStep *outer = task.step[0], *const last = outer + task.steps[0]; outer < last; ++outer) {
+    const std::uint32_t* const row = first + outer->offset;
+    const std::uint32_t box = task.away + outer->away;
+    for (unsigned b = 0; b < steps; ++b) {
+      Quad four;
+      __builtin_memcpy(&four, row + inner[b].offset, sizeof four);
+      const Quad filled = ~(Quad)(four == kEmpty) & wanted;
+      const unsigned mask = bits(filled);
+      const Quad seen = four - (box + inner[b].away);
+      any |= (seen ^ here) & filled;
+      const Quad front = pack(seen, mask);
+      __builtin_memcpy(end, &front, sizeof front);
+      end += __builtin_popcount(mask);
+    }
+  }
+  return {static_cast<unsigned>(end - candidates), any[0] | any[1] | any[2] | any[3]};
+}
+
+}  // namespace
+}  // namespace carom

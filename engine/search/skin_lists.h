@@ -1,0 +1,115 @@
+#pragma once
+// Neighbour lists with a skin: for each sphere all others that it could touch while both stay within `skin` of where
+// they were when their lists were made. A sphere that leaves that region gets a new list, and those of its neighbours
+// are updated.
+//
+// The centres of the regions stand in cells, eight to a cache line with their places in ten bits an axis; spheres of
+// very different sizes have cells of their own, a factor of two in radius each, so that a small sphere does not look
+// through cells as large as the largest one. Lists are symmetric. (Verlet, Phys. Rev. 159 (1967) 98; event-driven:
+// Donev, Torquato, Stillinger, J. Comput. Phys. 202 (2005) 737.)
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "engine/base/pages.h"
+#include "engine/base/prefetch.h"
+#include "engine/search/agenda.h"
+#include "engine/search/cell_grid.h"
+#include "engine/search/simd/scan.h"
+
+namespace carom {
+
+template <int D>
+class SkinLists {
+ public:
+  /// `radius` by slot, the largest one they will have; where all are `equal`, for ever, of the first one alone. Spheres
+  /// admitted later are not larger than `largest`.
+  SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> radius,
+            bool equal, double largest, double skin, PageVector<Agenda<D>>& agenda);
+
+  double skin() const { return skin_; }
+  const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
+
+  /// Makes all lists for n spheres, with centres place(slot). find_near() will be called with `astray`.
+  void build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent, double astray = 0);
+
+  /// The sphere is now at x: makes its list anew and mends those of its neighbours. Returns what is new in it, padded
+  /// like a list; good until the next call.
+  std::span<const std::uint32_t> renew(Slot i, const Vec<D>& x);
+
+  /// The spheres have moved since, and been wrapped into the box: mends images and renews the lists of those that have
+  /// left their regions.
+  void follow(std::span<const Record<D>> records);
+
+  /// Takes in a sphere at x, in an empty slot; `radius` as in the constructor.
+  void admit(Slot i, const Vec<D>& x, std::span<const double> radius);
+  /// Removes a sphere.
+  void dismiss(Slot i);
+  /// The sphere is now at x: renews its list where that is farther than `room` from the centre of its region; whether
+  /// it was.
+  bool move(Slot i, const Vec<D>& x, double room);
+  /// Starts to fetch the list of a sphere; of a long one what a list of equal spheres would be.
+  void prefetch(const Agenda<D>& a) const {
+    for (const unsigned q : {0u, 16u, 32u}) prefetch_line(candidates(a) + q);
+  }
+  /// All spheres that a sphere may touch where both have come up to `astray` from their regions.
+  std::span<const std::uint32_t> find_near(Slot i, double astray);
+
+ private:
+  struct Level {  // spheres of similar size
+    CellGrid<D> grid;
+    double largest_radius;
+    PageVector<CellLine> lines;
+    std::vector<std::uint32_t> next;  // by line
+    std::uint32_t free = kEmpty;
+    std::int32_t margin = 1;                     // cells that the largest reach extends beyond one's own
+    std::array<std::vector<CellStep>, D> steps;  // by axis: to the cells −margin … count + margin
+  };
+  using Place = std::array<std::int32_t, D>;  // in 1024ths of a cell
+
+  static std::uint8_t octave(double largest, double radius);
+  std::size_t level_of(Slot i) const { return equal_ ? 0 : level_[i]; }
+  double radius(Slot i) const { return radius_[equal_ ? 0 : i]; }
+  void lay_out(Level& level, double astray);
+  void spread(Level& level);
+  double most_places(double radius, const Level& level, double astray) const;
+  Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
+  void insert(Slot i, const Vec<D>& x);
+  void remove(Slot i, const Vec<D>& x);
+  unsigned surround(Slot i, const Vec<D>& x, double astray = 0);
+  void look_into(const Level& level, Slot i, const Vec<D>& x, double astray, unsigned& found);
+  void assign(Slot i, unsigned n);
+  std::uint32_t* start_of(const Agenda<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
+  bool same_box(std::uint32_t candidate) const { return packing_.linear(candidate) == 0; }
+  void divide(Agenda<D>& a);
+  void add(Slot i, std::uint32_t candidate);
+  void drop(Slot i, std::uint32_t candidate);
+  void remove_from_list(Slot i, unsigned q);
+  void shift(Slot i, const Image<D>& boxes);
+  std::uint32_t take(unsigned units);
+
+  Box<D> box_;
+  Packing<D> packing_;
+  const ScanKernels& kernels_;
+  const unsigned lanes_;  // lists start and end at multiples of so many candidates
+  std::span<const double> radius_;
+  bool equal_;
+  double largest_, skin_, astray_ = 0;
+  PageVector<Agenda<D>>& agenda_;
+  std::vector<Level> levels_;
+  std::vector<std::uint8_t> level_;                 // by slot; empty where all are equal
+  PageVector<std::int32_t> boxes_;                  // by slot: the box of the region's centre, as a linear image
+  PageVector<std::uint32_t> pool_;                  // the lists
+  std::size_t used_ = 0;                            // of the pool
+  std::vector<std::vector<std::uint32_t>> unused_;  // lists given back, by capacity
+
+  std::array<std::vector<CellView>, D> views_;
+  std::vector<std::uint32_t> slots_, found_, fresh_;
+  std::vector<std::int32_t> away_;
+  std::vector<std::uint64_t> kept_;
+  std::int32_t widest_ = 0;  // boxes: the farthest that a sphere has come, or can see
+  bool exact_ = false;       // rounded places do not suffice: distances are computed
+};
+
+}  // namespace carom

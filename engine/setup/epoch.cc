@@ -1,0 +1,50 @@
+#include "engine/setup/epoch.h"
+
+#include <array>
+#include <charconv>
+#include <numbers>
+
+#include "engine/ranks/shares.h"
+#include "engine/setup/placement.h"
+
+namespace carom {
+
+template <int D>
+double default_epoch(const System<D>& system) {
+  const auto& p = system.particles;
+  const auto n = static_cast<double>(system.size());
+  struct Sums {
+    double twice_kinetic = 0, mass = 0, diameter = 0;
+  };
+  Exchange alone;
+  const auto [twice_kinetic, mass, diameter] =
+      handed_on(shared_by(system) ? *shared_by(system) : alone, Sums{}, [&](Sums& sums) {
+        for (std::size_t i = 0; i < p.size(); ++i) {
+          sums.twice_kinetic += p.mass[i] * p.v[i].squaredNorm();
+          sums.mass += p.mass[i] / n;
+          sums.diameter += 2 * p.radius[i] / n;
+        }
+      });
+  const double filled = packing_fraction<D>(system.box.volume(), p.radius, shared_by(system));
+  if (twice_kinetic == 0) return 1;
+  // Collision rate of one particle by Enskog's theory, contact value by Carnahan–Starling (3-D), Henderson (2-D).
+  const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));
+  const double density = n / system.box.volume();
+  const double empty = std::max(1 - filled, 0.01);
+  const double contact_value =
+      D == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
+  const double cross_section = D == 2 ? 2 * diameter : 4 * diameter * diameter;
+  const double rate = density * cross_section * contact_value * std::sqrt(std::numbers::pi) * thermal_speed;
+  const double farthest = std::min(300 * diameter, 4 * system.box.edges.minCoeff());
+  const double epoch = std::min(40 / rate, farthest / thermal_speed);
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), epoch, std::chars_format::scientific, 1).ptr;
+  double rounded = epoch;
+  std::from_chars(text.data(), end, rounded);
+  return rounded;
+}
+
+template double default_epoch(const System<2>&);
+template double default_epoch(const System<3>&);
+
+}  // namespace carom

@@ -1,0 +1,308 @@
+#include "engine/setup/placement.h"
+
+#include <algorithm>
+#include <numbers>
+#include <numeric>
+
+#include "engine/base/random.h"
+#include "engine/events/contact.h"
+#include "engine/setup/placement_grid.h"
+
+namespace carom {
+namespace {
+
+/// Equally spaced planes of sites along one axis.
+struct Planes {
+  int number = 1;
+  double first = 0, spacing = 0;
+  bool periodic = false;
+
+  double at(int plane) const { return first + plane * spacing; }
+  /// Distance to a like site `planes` planes on; infinite where there is none.
+  double step(int planes) const {
+    return periodic || number > planes ? planes * spacing : std::numeric_limits<double>::infinity();
+  }
+};
+
+template <int D>
+Planes planes(Lattice lattice, const Box<D>& box, int axis, int cells, double margin) {
+  const double edge = box.edges[axis];
+  Planes p;
+  p.number = lattice == Lattice::centred ? 2 * cells : cells;
+  p.periodic = box.periodic(axis);
+  p.spacing = edge / p.number;
+  p.first = p.spacing / 2;
+  if (box.walled(axis) && margin > p.first && p.number > 1) {
+    p.first = margin;
+    p.spacing = std::max(0.0, (edge - 2 * margin) / (p.number - 1));
+  }
+  return p;
+}
+
+/// The smallest distance between two sites. In centred lattices those with an even sum of plane numbers are sites.
+template <int D>
+double site_distance(Lattice lattice, const std::array<Planes, D>& p) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < D; ++k) {
+    nearest = std::min(nearest, p[k].step(lattice == Lattice::centred ? 2 : 1));
+    for (int l = 0; l < k && lattice == Lattice::centred; ++l)
+      nearest = std::min(nearest, std::hypot(p[k].step(1), p[l].step(1)));
+  }
+  return nearest;
+}
+
+template <int D>
+std::size_t sites_a_cell(Lattice lattice) {
+  return lattice == Lattice::simple ? 1 : D == 2 ? 2 : 4;
+}
+
+}  // namespace
+
+template <int D>
+LatticeCells<D> fit_lattice(Lattice lattice, const Box<D>& box, std::size_t count, double margin) {
+  const std::size_t basis = sites_a_cell<D>(lattice);
+  const double cell_edge = std::pow(box.volume() * static_cast<double>(basis) / static_cast<double>(count), 1.0 / D);
+  std::array<int, D> most{};
+  for (int k = 0; k < D; ++k)
+    most[k] = static_cast<int>(std::min(2 * box.edges[k] / cell_edge, static_cast<double>(count))) + 2;
+
+  LatticeCells<D> best;
+  double best_distance = -1;
+  std::array<int, D> n{};
+  n.fill(1);
+  while (n[0] <= most[0]) {  // every choice of all but the last axis; that one takes as few cells as will do
+    std::size_t others = basis;
+    for (int k = 0; k + 1 < D; ++k) others *= static_cast<std::size_t>(n[k]);
+    n[D - 1] = static_cast<int>((count + others - 1) / others);
+    std::array<Planes, D> p;
+    for (int k = 0; k < D; ++k) p[k] = planes(lattice, box, k, n[k], margin);
+    const double distance = site_distance<D>(lattice, p);
+    const std::size_t sites = others * static_cast<std::size_t>(n[D - 1]);
+    constexpr double same = 1 + 1e-12;
+    if (distance > best_distance * same || (distance * same > best_distance && sites < best.sites)) {
+      best = {n, sites};
+      best_distance = distance;
+    }
+    int axis = D - 2;
+    while (axis > 0 && n[axis] == most[axis]) n[axis--] = 1;
+    ++n[axis];
+  }
+  return best;
+}
+
+template <int D>
+std::size_t for_each_site(Lattice lattice, const Box<D>& box, std::size_t count, double margin,
+                          const std::function<void(const Vec<D>&)>& visit) {
+  const auto fit = fit_lattice(lattice, box, count, margin);
+  std::array<Planes, D> p;
+  for (int k = 0; k < D; ++k) p[k] = planes(lattice, box, k, fit.cells[k], margin);
+  std::array<int, D> at{};
+  while (at[0] < p[0].number) {
+    if (lattice == Lattice::simple || std::accumulate(at.begin(), at.end(), 0) % 2 == 0) {
+      Vec<D> x;
+      for (int k = 0; k < D; ++k) x[k] = p[k].at(at[k]);
+      visit(x);
+    }
+    int axis = D - 1;
+    while (axis > 0 && at[axis] + 1 == p[axis].number) at[axis--] = 0;
+    ++at[axis];
+  }
+  return fit.sites;
+}
+
+template <int D>
+std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_t count, double margin) {
+  std::vector<Vec<D>> sites;
+  for_each_site<D>(lattice, box, count, margin, [&](const Vec<D>& x) { sites.push_back(x); });
+  return sites;
+}
+
+template <int D>
+Vec<D> commensurate_edges(Lattice lattice, std::size_t count, double volume) {
+  if (lattice == Lattice::simple || D == 3) return Vec<D>::Constant(D == 2 ? std::sqrt(volume) : std::cbrt(volume));
+  // Hexagonal: nx by ny cells of a by a√3. Few vacancies come first, a box near the square second.
+  const double square = std::sqrt(static_cast<double>(count) * std::numbers::sqrt3 / 2);
+  const int least = std::max(1, static_cast<int>(square / 1.5)), most = static_cast<int>(square * 1.5) + 1;
+  double best_cost = std::numeric_limits<double>::infinity(), best_aspect = 1;
+  for (int nx = least; nx <= most; ++nx) {
+    const std::size_t row = 2 * static_cast<std::size_t>(nx), ny = (count + row - 1) / row;
+    const double vacancies = static_cast<double>(row * ny) / static_cast<double>(count) - 1;
+    const double aspect = static_cast<double>(nx) / (static_cast<double>(ny) * std::numbers::sqrt3);
+    const double cost = vacancies + 0.2 * std::abs(std::log(aspect));
+    if (cost >= best_cost) continue;
+    best_cost = cost;
+    best_aspect = aspect;
+  }
+  Vec<D> edges = Vec<D>::Constant(std::sqrt(volume / best_aspect));
+  edges[0] = std::sqrt(volume * best_aspect);
+  return edges;
+}
+
+std::vector<int> distribute(std::size_t sites, std::span<const std::size_t> counts, std::uint64_t seed) {
+  std::vector<int> group;
+  group.reserve(sites);
+  for (std::size_t g = 0; g < counts.size(); ++g) group.insert(group.end(), counts[g], static_cast<int>(g));
+  group.resize(sites, -1);
+  RandomStream random(seed, RandomPurpose::species, 0);
+  for (std::size_t i = sites; i > 1; --i) std::swap(group[i - 1], group[random.below(static_cast<std::uint32_t>(i))]);
+  return group;
+}
+
+template <int D>
+std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<const double> radius,
+                             std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries) {
+  std::vector<bool> waiting(x.size(), false);
+  for (const Id i : ids) waiting[i] = true;
+  PlacementGrid<D> grid(box, radius);
+  for (Id i = 0; i < x.size(); ++i)
+    if (!waiting[i]) grid.insert(i, x[i]);
+
+  std::vector<Id> order(ids.begin(), ids.end());
+  std::stable_sort(order.begin(), order.end(), [&](Id a, Id b) { return radius[a] > radius[b]; });
+  std::size_t placed = 0;
+  for (const Id i : order) {
+    RandomStream random(seed, RandomPurpose::position, i);
+    bool free = false;
+    for (std::uint64_t trial = 0; trial < tries && !free; ++trial) {
+      for (int k = 0; k < D; ++k) {
+        const double margin = box.walled(k) ? radius[i] : 0;
+        x[i][k] = margin + random.uniform() * (box.edges[k] - 2 * margin);
+      }
+      free = true;
+      grid.near(x[i], radius[i], [&](Id j, const Vec<D>& shift) {
+        const double contact = radius[i] + radius[j];
+        if ((x[i] - x[j] - shift).squaredNorm() < contact * contact) free = false;
+      });
+    }
+    if (!free) break;
+    grid.insert(i, x[i]);
+    ++placed;
+  }
+  return placed;
+}
+
+template <int D>
+Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
+                       std::span<const char> beyond) {
+  Overlaps found;
+  if (x.empty()) return found;
+  PlacementGrid<D> grid(box, radius);
+  const GapTolerance tolerance(box.edges.maxCoeff());
+  double worst = 1;
+  for (Id i = 0; i < x.size(); ++i) {
+    Vec<D> inside = x[i];
+    Image<D> image{};
+    box.wrap(inside, image);
+    const auto look = [&](Id j, const Vec<D>& shift) {
+      Vec<D> other = x[j];
+      Image<D> ignored{};
+      box.wrap(other, ignored);
+      const double distance = (inside - other - shift).norm(), contact = radius[i] + radius[j];
+      if (distance >= contact - tolerance(contact)) return;
+      ++found.pairs;
+      const bool tie = distance / contact == worst && found.hi == i && j < found.lo;
+      if (distance / contact >= worst && !tie) return;
+      worst = distance / contact;
+      found.lo = j;
+      found.hi = i;
+      found.distance = distance;
+      found.contact = contact;
+    };
+    if (beyond.empty() || beyond[i] == 0) grid.near(inside, radius[i], look);
+    grid.insert(i, inside);
+  }
+  return found;
+}
+
+template <int D>
+Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius) {
+  Outsiders found;
+  const GapTolerance tolerance(box.edges.maxCoeff());
+  for (Id i = 0; i < x.size(); ++i) {
+    bool outside = false;
+    for (int k = 0; k < D; ++k) {
+      if (!box.walled(k)) continue;
+      const double depth = std::max(radius[i] - x[i][k], x[i][k] + radius[i] - box.edges[k]);
+      if (depth <= tolerance(radius[i])) continue;
+      outside = true;
+      if (depth <= found.depth) continue;
+      found.worst = i;
+      found.axis = k;
+      found.depth = depth;
+    }
+    if (outside) ++found.spheres;
+  }
+  return found;
+}
+
+template <int D>
+void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::span<const double> temperature,
+                     std::uint64_t seed, RandomPurpose purpose, Exchange* ranks) {
+  Exchange alone;
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    const Id i = chosen[n];
+    RandomStream random(seed, purpose, particles.id_of(i));
+    const auto first = random.normal_pair(), second = random.normal_pair();
+    const std::array<double, 4> normal{first[0], first[1], second[0], second[1]};
+    for (int k = 0; k < D; ++k) particles.v[i][k] = std::sqrt(temperature[n] / particles.mass[i]) * normal[k];
+  }
+  struct Sums {
+    std::size_t particles = 0;
+    double mass = 0, twice_kinetic_wanted = 0, twice_kinetic = 0;
+    Vec<D> momentum = Vec<D>::Zero();
+  };
+  const Sums drawn = handed_on(ranks ? *ranks : alone, Sums{}, [&](Sums& sums) {
+    sums.particles += chosen.size();
+    for (std::size_t n = 0; n < chosen.size(); ++n) {
+      const Id i = chosen[n];
+      sums.mass += particles.mass[i];
+      sums.momentum += particles.mass[i] * particles.v[i];
+      sums.twice_kinetic_wanted += D * temperature[n];
+    }
+  });
+  const Sums centred = handed_on(ranks ? *ranks : alone, drawn, [&](Sums& sums) {
+    for (const Id i : chosen) {
+      if (sums.particles > 1) particles.v[i] -= sums.momentum / sums.mass;
+      sums.twice_kinetic += particles.mass[i] * particles.v[i].squaredNorm();
+    }
+  });
+  const double scale = centred.twice_kinetic > 0 ? std::sqrt(centred.twice_kinetic_wanted / centred.twice_kinetic) : 0;
+  for (const Id i : chosen) particles.v[i] *= scale;
+}
+
+template <int D>
+double packing_fraction(double volume, std::span<const double> radius, Exchange* ranks) {
+  Exchange alone;
+  const double filled = handed_on(ranks ? *ranks : alone, 0.0, [&](double& sum) {
+    for (const double r : radius) sum += D == 2 ? std::numbers::pi * r * r : 4 * std::numbers::pi / 3 * r * r * r;
+  });
+  return filled / volume;
+}
+
+template LatticeCells<2> fit_lattice(Lattice, const Box<2>&, std::size_t, double);
+template std::size_t for_each_site(Lattice, const Box<2>&, std::size_t, double,
+                                   const std::function<void(const Vec<2>&)>&);
+template std::vector<Vec<2>> lattice_sites(Lattice, const Box<2>&, std::size_t, double);
+template Vec<2> commensurate_edges<2>(Lattice, std::size_t, double);
+template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::span<const double>, std::span<const Id>,
+                                      std::uint64_t, std::uint64_t);
+template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>, std::span<const char>);
+template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
+template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
+                              Exchange*);
+template double packing_fraction<2>(double, std::span<const double>, Exchange*);
+
+template LatticeCells<3> fit_lattice(Lattice, const Box<3>&, std::size_t, double);
+template std::size_t for_each_site(Lattice, const Box<3>&, std::size_t, double,
+                                   const std::function<void(const Vec<3>&)>&);
+template std::vector<Vec<3>> lattice_sites(Lattice, const Box<3>&, std::size_t, double);
+template Vec<3> commensurate_edges<3>(Lattice, std::size_t, double);
+template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::span<const double>, std::span<const Id>,
+                                      std::uint64_t, std::uint64_t);
+template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>, std::span<const char>);
+template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
+template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
+                              Exchange*);
+template double packing_fraction<3>(double, std::span<const double>, Exchange*);
+
+}  // namespace carom

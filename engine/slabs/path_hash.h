@@ -1,0 +1,44 @@
+#pragma once
+// What happened to each particle in a slab, in a word: two ranks that have it from the same start agree on all of it.
+
+#include <bit>
+#include <vector>
+
+#include "engine/base/contact_log.h"
+#include "engine/base/particles.h"
+
+namespace carom {
+
+/// Takes a word into a hash.
+inline void add_to_hash(std::uint64_t& hash, std::uint64_t word) {
+  hash = (hash ^ word) * 0x9e3779b97f4a7c15;
+  hash ^= hash >> 32;
+}
+
+/// Takes an event into a hash, with the ids that all ranks know.
+template <int D>
+void add_to_hash(std::uint64_t& hash, const EventKey<D>& key, const Particles<D>& particles) {
+  const bool pair = key.kind == EventKind::pair;
+  add_to_hash(hash, std::bit_cast<std::uint64_t>(key.time));
+  add_to_hash(hash, std::uint64_t{key.generation} << 1 | (pair ? 1 : 0));
+  add_to_hash(hash, std::uint64_t{particles.id_of(key.lo)} << 32 | (pair ? particles.id_of(key.hi) : key.hi));
+  for (int k = 0; k < D; ++k) add_to_hash(hash, static_cast<std::uint64_t>(key.image[k]));
+}
+
+/// Of the events of each particle, given in their order.
+template <int D>
+class PathHashes {
+ public:
+  explicit PathHashes(const Particles<D>& particles) : particles_(particles), words_(particles.size()) {}
+  void add(const EventKey<D>& key) {
+    add_to_hash(words_[key.lo], key, particles_);
+    if (key.kind == EventKind::pair) add_to_hash(words_[key.hi], key, particles_);
+  }
+  std::uint64_t operator[](Id i) const { return words_[i]; }
+
+ private:
+  const Particles<D>& particles_;
+  std::vector<std::uint64_t> words_;
+};
+
+}  // namespace carom

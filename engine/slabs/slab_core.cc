@@ -1,0 +1,363 @@
+#include "engine/slabs/slab_core.h"
+
+#include <array>
+#include <cmath>
+
+#include "engine/base/error.h"
+#include "engine/events/collision.h"
+#include "engine/forces/forces.h"
+#include "engine/ranks/shared_contacts.h"
+#include "engine/slabs/path_hash.h"
+
+namespace carom {
+
+namespace {
+constexpr double kRoom = 1.25;  // for paths under other accelerations, in parts of the first ones
+constexpr double kWild = 4;     // mean distances of ½ h² a
+}  // namespace
+
+template <int D>
+SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
+    : system_(system),
+      box_(system.box),
+      particles_(system.particles),
+      scan_(system, max_events),
+      max_events_(max_events),
+      wild_(kWild * mean_distance(system)),
+      slot_(system.particles.size()) {
+  for (int axis = 0; axis < D; ++axis) walls_ = walls_ || box_.walled(axis);
+}
+
+template <int D>
+void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool resolved) {
+  const Stopwatch watch(counters_->seconds.predict);
+  start_v_ = v;
+  a_ = a;
+  length_ = length;
+  resolved_ = resolved;
+  last_sequences_.clear();
+  sequences_.clear();
+  const std::size_t n = particles_.size();
+  for (auto* each : {&room_, &reach_}) each->resize(n);
+  for (auto* each : {&x_, &last_x_, &v_}) each->resize(n);
+  moved_.resize(n);
+  held_.assign(scan_.resting().empty() ? 0 : n, 0);
+  for (const auto& contact : scan_.resting()) {
+    held_[contact.key.lo] = 1;
+    if (contact.key.kind == EventKind::pair) held_[contact.key.hi] = 1;
+  }
+  margin_ = own_reach_ = 0;
+  for (Id i = 0; i < n; ++i) {
+    const double straight = length * v[i].norm(), bent = 0.5 * length * length * acceleration(i).norm();
+    reach_[i] = kRoom * (straight + bent);
+    margin_ = bent <= wild_ ? std::max(margin_, reach_[i]) : kNever;
+    if (particles_.owns(i)) own_reach_ = std::max(own_reach_, reach_[i]);
+    room_[i] = (kRoom - 1) * straight + kRoom * bent;
+  }
+  near_.clear();
+  if (std::isfinite(margin_)) find_near();
+}
+
+/// The candidates within margin_, and those of them that first flights may bring together.
+template <int D>
+void SlabCore<D>::find_near() {
+  const auto& x = particles_.x;
+  pairs_ = scan_.candidates(x, margin_);
+  near_.clear();
+  for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
+    const auto& [i, j, image] = pairs_[k];
+    const double sigma = scan_.contact_distance(i, j), near = sigma + scan_.tolerance(sigma) + reach_[i] + reach_[j];
+    if ((x[i] - x[j] + box_.shift(image)).squaredNorm() <= near * near) near_.push_back(k);
+  }
+}
+
+template <int D>
+FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
+  a_ = a;
+  x_.swap(last_x_);
+  FlightEnd<D> end;
+  do {
+    for (const Flight& each : flights_) slot_[each.id] = 0;
+    flights_.clear();
+    queue_.clear();
+    contacts_.clear();
+    strayed_ = std::isfinite(margin_) ? 0 : kNever;
+    crowded_ = false;
+    plain_ends();
+    if (strayed_ == 0) {
+      const Stopwatch watch(counters_->seconds.queue);
+      predict_first();
+      end = serve();
+    }
+    if (strayed_ > 0 && std::isfinite(strayed_)) {
+      margin_ = kRoom * strayed_;
+      find_near();
+    }
+  } while (strayed_ > 0 && std::isfinite(strayed_));
+  for (const Flight& each : flights_) {
+    const double rest = length_ - each.t;
+    const Vec<D> a_i = acceleration(each.id);
+    x_[each.id] = each.x + rest * each.v + (0.5 * rest * rest) * a_i;
+    v_[each.id] = each.v + rest * a_i;
+  }
+  const bool shared = system_.part && !system_.part->knows_everybody();
+  all_moved_ = 0;
+  for (Id i = 0; i < x_.size(); ++i) {
+    moved_[i] = x_[i] != last_x_[i];
+    if (!shared || particles_.owns(i)) all_moved_ += moved_[i];
+  }
+  if (shared)
+    agree(!end.complete || crowded_ || strayed_ > 0);
+  else if (crowded_)
+    scan_.too_many(end.key);
+  else if (strayed_ > 0 && !a_.empty())
+    return {.complete = false, .wild = true};
+  else if (strayed_ > 0) {
+    Id i = 0;
+    while (i + 1 < x_.size() && std::isfinite(reach_[i]) && x_[i].allFinite()) ++i;
+    throw Error(Failure::numerical, "the position or velocity of particle " + std::to_string(particles_.id_of(i)) +
+                                        " is not finite; use a smaller integrator.step");
+  }
+  compare_sequences();
+  return end;
+}
+
+/// The contacts of first flights.
+template <int D>
+void SlabCore<D>::predict_first() {
+  for (const std::uint32_t k : near_) predict_pair(pairs_[k].i, pairs_[k].j, pairs_[k].image);
+  for (const Id i : beyond_)
+    for (const auto& [j, pair] : scan_.candidate_partners().of(i))
+      predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
+  if (walls_)
+    for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
+  std::make_heap(queue_.begin(), queue_.end());
+}
+
+/// Where all particles come without contacts, and which of them may come farther than near_ knows.
+template <int D>
+void SlabCore<D>::plain_ends() {
+  const Stopwatch watch(counters_->seconds.predict);
+  beyond_.clear();
+  const double h = length_, half = 0.5 * h * h;
+  const auto& x = particles_.x;
+  if (a_.empty()) {
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      x_[i] = x[i] + h * start_v_[i];
+      v_[i] = start_v_[i];
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const Vec<D> bent = half * a_[i];
+    x_[i] = x[i] + h * start_v_[i] + bent;
+    v_[i] = start_v_[i] + h * a_[i];
+    if (!(bent.squaredNorm() <= room_[i] * room_[i])) beyond_.push_back(static_cast<Id>(i));
+  }
+  for (const Id i : beyond_)
+    if (const double far = path(start_v_[i], a_[i], h); !(far <= margin_))
+      stray(half * a_[i].norm() <= wild_ ? far : kNever);
+}
+
+/// Serves the queue until it is empty.
+template <int D>
+FlightEnd<D> SlabCore<D>::serve() {
+  while (!queue_.empty() && strayed_ == 0) {
+    std::pop_heap(queue_.begin(), queue_.end());
+    const Planned event = queue_.back();
+    queue_.pop_back();
+    const EventKey<D>& key = event.key;
+    const bool pair = key.kind == EventKind::pair;
+    if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
+    if (resolved_ && !(key.time > 0)) continue;  // rounding
+    const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
+    // A straight flight presses nothing together: what does not approach needs no impulse.
+    if (held || (approach(key) >= -scan_.resting_speed() && !a_.empty()))
+      return {.complete = false, .time = key.time, .key = key};
+    if (contacts_.size() >= max_events_) {
+      crowded_ = true;
+      return {.complete = false, .time = key.time, .key = key};
+    }
+    collide(key);
+    predict_all(key.lo);
+    if (pair) predict_all(key.hi);
+  }
+  return {};
+}
+
+template <int D>
+Vec<D> SlabCore<D>::position(Id i, double t) const {
+  const Vec<D> a = acceleration(i);
+  if (slot_[i] == 0) return particles_.x[i] + t * start_v_[i] + (0.5 * t * t) * a;
+  const Flight& f = flights_[slot_[i] - 1];
+  const double s = t - f.t;
+  return f.x + s * f.v + (0.5 * s * s) * a;
+}
+
+template <int D>
+Vec<D> SlabCore<D>::velocity(Id i, double t) const {
+  const Vec<D> a = acceleration(i);
+  if (slot_[i] == 0) return start_v_[i] + t * a;
+  const Flight& f = flights_[slot_[i] - 1];
+  return f.v + (t - f.t) * a;
+}
+
+template <int D>
+void SlabCore<D>::predict_all(Id i) {
+  for (const auto& [j, pair] : scan_.candidate_partners().of(i))
+    predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
+  if (walls_) predict_walls(i);
+}
+
+/// The next contact of the present flights, looked at from the later of their starts.
+template <int D>
+void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
+  const double t = std::max(start(i), start(j)), sigma = scan_.contact_distance(i, j), rest = length_ - t;
+  const Vec<D> d = position(i, t) - position(j, t) + box_.shift(image), v = velocity(i, t) - velocity(j, t);
+  const double slack = sigma * scan_.resting_speed();
+  const double s = a_.empty() ? contact_time<D>(d, v, sigma, slack)
+                              : contact_time<D>(d, v, a_[i] - a_[j], sigma, rest, scan_.touches(d, sigma), slack);
+  if (!(t + s < length_)) return;
+  EventKey<D> key{.time = t + s, .kind = EventKind::pair, .lo = i, .hi = j, .image = image};
+  if (!held_.empty() && scan_.rests(key)) return;
+  key.generation = std::max(generation(i, key.time), generation(j, key.time));
+  queue_.push_back({key, version(i), version(j)});
+  if (!flights_.empty()) std::push_heap(queue_.begin(), queue_.end());
+}
+
+template <int D>
+void SlabCore<D>::predict_walls(Id i) {
+  const double t = start(i);
+  const Vec<D> x = position(i, t), v = velocity(i, t), a = acceleration(i);
+  for (int wall = 0; wall < 2 * D; ++wall) {
+    const int axis = wall / 2;
+    if (!box_.walled(axis)) continue;
+    const double gap = scan_.wall_gap(x, i, wall), inward = ContactScan<D>::inward(wall);
+    const double s = wall_contact_time(gap, inward * v[axis], inward * a[axis], length_ - t,
+                                       gap <= scan_.tolerance(particles_.radius[i]), scan_.resting_speed());
+    if (!(t + s < length_)) continue;
+    EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = static_cast<Id>(wall)};
+    if (!held_.empty() && scan_.rests(key)) continue;
+    key.generation = generation(i, key.time);
+    queue_.push_back({key, version(i)});
+    if (!flights_.empty()) std::push_heap(queue_.begin(), queue_.end());
+  }
+}
+
+/// The normal speed with which the flights meet, negative where they approach.
+template <int D>
+double SlabCore<D>::approach(const EventKey<D>& key) const {
+  const Vec<D> v = velocity(key.lo, key.time);
+  if (key.kind == EventKind::wall) {
+    const int wall = static_cast<int>(key.hi);
+    return ContactScan<D>::inward(wall) * v[wall / 2];
+  }
+  const Vec<D> normal = position(key.lo, key.time) - position(key.hi, key.time) + box_.shift(key.image);
+  return normal.dot(v - velocity(key.hi, key.time)) / normal.norm();
+}
+
+/// The flight of particle i from this event on, before its impulse.
+template <int D>
+typename SlabCore<D>::Flight& SlabCore<D>::flight(Id i, const EventKey<D>& key) {
+  const Vec<D> x = position(i, key.time), v = velocity(i, key.time);
+  if (slot_[i] == 0) {
+    flights_.push_back({x, v, key.time, i, 0, 0, 0});
+    slot_[i] = static_cast<std::uint32_t>(flights_.size());
+  }
+  Flight& f = flights_[slot_[i] - 1];
+  f.x = x;
+  f.v = v;
+  f.t = key.time;
+  f.generation = key.generation;
+  ++f.version;
+  EventKey<D> partners = key;
+  partners.time = 0;
+  partners.generation = 0;
+  add_to_hash(f.hash, partners, particles_);
+  return f;
+}
+
+/// The elastic impulse, where the velocities of arrival still approach.
+template <int D>
+void SlabCore<D>::collide(const EventKey<D>& key) {
+  flight(key.lo, key);
+  if (key.kind == EventKind::pair) flight(key.hi, key);  // flights_ may have moved
+  Flight& lo = flights_[slot_[key.lo] - 1];
+  const double mass = particles_.mass[key.lo];
+  Contact<D> contact{key, lo.x, lo.x, Vec<D>::Zero()};
+  const auto stays_near = [&](const Flight& f) {
+    const double strays = (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t);
+    if (!(strays <= margin_)) stray(strays);
+  };
+  if (key.kind == EventKind::wall) {
+    const int axis = static_cast<int>(key.hi / 2), wall = static_cast<int>(key.hi);
+    double& v = lo.v[axis];
+    if (!(ContactScan<D>::inward(wall) * v < 0)) return;
+    contact.impulse[axis] = -2 * mass * v;
+    contact.x_hi[axis] = wall % 2 == 0 ? 0.0 : box_.edges[axis];
+    v = -v;
+  } else {
+    Flight& hi = flights_[slot_[key.hi] - 1];
+    const double mass_hi = particles_.mass[key.hi];
+    const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
+    if (!(d.dot(v) < 0)) return;
+    const double g = collision_factor<D>(d, v, mass, mass_hi);
+    contact.impulse = g * d;
+    contact.x_hi = hi.x - box_.shift(key.image);
+    contact.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse);
+    lo.v += (g / mass) * d;
+    hi.v -= (g / mass_hi) * d;
+    stays_near(hi);
+  }
+  stays_near(lo);
+  contacts_.push_back(contact);
+}
+
+template <int D>
+void SlabCore<D>::compare_sequences() {
+  last_sequences_.swap(sequences_);
+  sequences_.clear();
+  for (const Flight& each : flights_) sequences_.push_back({each.id, each.hash});
+  std::ranges::sort(sequences_);
+  std::vector<Sequence> differ;
+  std::ranges::set_symmetric_difference(sequences_, last_sequences_, std::back_inserter(differ));
+  swapped_.clear();
+  for (const Sequence& each : differ)
+    if (swapped_.empty() || swapped_.back() != each.id) swapped_.push_back(each.id);
+}
+
+/// Throws HaloTooSmall on all ranks where a flight failed on one of them, a copy that matters went another way than the
+/// particle at its owner, or a path was longer than what is known allows. Collective.
+template <int D>
+void SlabCore<D>::agree(bool failed) {
+  Part<D>& part = *system_.part;
+  PathHashes<D> events(particles_);
+  for (const Contact<D>& contact : contacts_) events.add(contact.key);
+  bool agreed = true;
+  part.tell(
+      [&](Id i, Bytes& to) { put(to, events[i]); },
+      [&](Id i, Reader& from) { agreed = (from.get<std::uint64_t>() == events[i] || !part.matters(i)) && agreed; });
+  std::array<double, 3> most = {failed ? 1.0 : 0.0, agreed ? 0.0 : 1.0, own_reach_};
+  auto& [any_failed, any_wrong, farthest] = most;
+  for (const Id i : beyond_)
+    if (particles_.owns(i)) farthest = std::max(farthest, path(start_v_[i], a_[i], length_));
+  for (const Flight& f : flights_)
+    if (particles_.owns(f.id))
+      farthest = std::max(farthest, (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t));
+  part.ranks().combine(most, {&all_moved_, 1});
+  if (any_wrong > 0 && any_failed == 0) part.deepen();
+  if (any_failed > 0 || any_wrong > 0 || !part.covers(farthest)) throw HaloTooSmall{};
+}
+
+template <int D>
+void SlabCore<D>::commit(double time) {
+  if (!system_.part || system_.part->knows_everybody())
+    scan_.commit(time, contacts_);
+  else if (!commit_contacts<D>(system_, contacts_, max_events_, *counters_, log_))
+    throw HaloTooSmall{};  // with all particles known the error can name them
+}
+
+template class SlabCore<2>;
+template class SlabCore<3>;
+
+}  // namespace carom

@@ -1,0 +1,155 @@
+#pragma once
+// Flies all particles through one slab, each on parabolas under a constant acceleration of its own, event by event.
+//
+//   core.begin(v, a, length);                  // candidate pairs of a slab from the system's positions, once
+//   core.fly(a);                               // to its end: x(), v(), contacts(); again with other accelerations
+//   core.commit(start);                        // the contacts of the last flight count
+//
+// A collision changes velocities, never an acceleration. Most particles have no contact in a slab: only pairs which
+// their paths can bring together are predicted, and only particles in a collision are flown in pieces. A contact is a
+// function of two flights alone, so neither list, nor order, nor rank shows in the bits.
+//
+// Where each rank knows only some of the particles (engine/ranks/part.h), a flight is compared: owners send a hash of
+// the events of each particle that others have a copy of. Where a copy that matters went another way, or a path was
+// longer than what is known allows, fly() throws HaloTooSmall on all ranks. Nothing of the system has changed then.
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/ranks/part.h"
+#include "engine/slabs/contact_scan.h"
+
+namespace carom {
+
+/// How a flight ended.
+template <int D>
+struct FlightEnd {
+  bool complete = true;
+  bool wild = false;  ///< where it is not: an acceleration is far too strong for the slab, or no number
+  double time = 0;    ///< else the slab must end here, because a contact came to rest or a resting one was hit
+  EventKey<D> key{};  ///< by this event
+};
+
+template <int D>
+class SlabCore {
+ public:
+  /// `max_events` limits the contacts of one step.
+  SlabCore(System<D>& system, std::uint64_t max_events);
+
+  /// Starts a step; see ContactScan::begin_slab.
+  void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length) {
+    counters_ = &counters;
+    log_ = contacts;
+    scan_.begin_slab(counters, contacts, a, length);
+  }
+
+  /// Finds the pairs that may meet in a slab of this length [time] from the system's positions with velocities v, under
+  /// accelerations a or others not much larger. `resolved`: ContactScan::resolve() has seen to what touches now.
+  void begin(Positions<D> v, Positions<D> a, double length, bool resolved = false);
+
+  /// Flies from the start of the slab to its end. Empty `a`: straight.
+  FlightEnd<D> fly(Positions<D> a);
+
+  const std::vector<Vec<D>>& x() const { return x_; }            ///< positions at the slab's end, not wrapped [length]
+  const std::vector<Vec<D>>& last_x() const { return last_x_; }  ///< the same of the flight before
+  const std::vector<Vec<D>>& v() const { return v_; }            ///< velocities there [length/time]
+  /// By particle, whether the flight before ended elsewhere; and how many these are on all ranks.
+  const std::vector<char>& moved() const { return moved_; }
+  std::uint64_t all_moved() const { return all_moved_; }
+  /// Of the last flight, in the order of their keys.
+  std::span<const Contact<D>> contacts() const { return contacts_; }
+
+  /// Whether particle i has a contact in the last flight.
+  bool collides(Id i) const { return slot_[i] != 0; }
+
+  /// The particles of which the sequence of partners is another than in the flight before, ascending.
+  std::span<const Id> swapped() const { return swapped_; }
+
+  /// Counts and logs the contacts of the last flight; `time`: of the slab's start within the step.
+  void commit(double time);
+
+  /// Moves the particles to the slab's end.
+  void finish(Particles<D>& particles) {
+    particles.x.swap(x_);
+    particles.v.swap(v_);
+  }
+
+  /// Contacts at the slab's start, and those that rest.
+  ContactScan<D>& scan() { return scan_; }
+
+ private:
+  /// A particle after its first collision in this slab.
+  struct Flight {
+    Vec<D> x, v;
+    double t;
+    Id id;
+    std::uint32_t version, generation;
+    std::uint64_t hash;  ///< of its sequence of partners
+  };
+  struct Planned {
+    EventKey<D> key;
+    std::uint32_t version_lo = 0, version_hi = 0;                           ///< of the flights that it is planned for
+    bool operator<(const Planned& other) const { return other.key < key; }  // the standard heap serves the largest
+  };
+  struct Sequence {
+    Id id;
+    std::uint64_t hash;
+    auto operator<=>(const Sequence&) const = default;
+  };
+
+  void find_near();
+  void plain_ends();
+  void predict_first();
+  FlightEnd<D> serve();
+  void predict_pair(Id i, Id j, const Image<D>& image);
+  void predict_walls(Id i);
+  void predict_all(Id i);
+  double approach(const EventKey<D>& key) const;
+  void collide(const EventKey<D>& key);
+  Flight& flight(Id i, const EventKey<D>& key);
+  double path(const Vec<D>& v, const Vec<D>& a, double time) const { return time * (v.norm() + 0.5 * time * a.norm()); }
+  /// A particle comes so far.
+  void stray(double path) { strayed_ = std::isnan(path) ? kNever : std::max(strayed_, path); }
+  void compare_sequences();
+  void agree(bool failed);
+
+  Vec<D> acceleration(Id i) const { return a_.empty() ? Vec<D>(Vec<D>::Zero()) : a_[i]; }
+  double start(Id i) const { return slot_[i] == 0 ? 0.0 : flights_[slot_[i] - 1].t; }
+  std::uint32_t version(Id i) const { return slot_[i] == 0 ? 0 : flights_[slot_[i] - 1].version; }
+  std::uint32_t generation(Id i, double t) const {
+    return slot_[i] != 0 && flights_[slot_[i] - 1].t == t ? flights_[slot_[i] - 1].generation + 1 : 0;
+  }
+  Vec<D> position(Id i, double t) const;
+  Vec<D> velocity(Id i, double t) const;
+
+  System<D>& system_;
+  const Box<D>& box_;
+  const Particles<D>& particles_;
+  ContactScan<D> scan_;
+  std::uint64_t max_events_;
+  double wild_;  // path that an acceleration may bend in a slab [length]
+  bool walls_ = false;
+  Counters* counters_ = nullptr;
+  std::vector<Contact<D>>* log_ = nullptr;
+  double length_ = 0, margin_ = 0, own_reach_ = 0;
+  double strayed_ = 0;  // > 0: how far a particle came, beyond margin_, in this flight
+  bool crowded_ = false, resolved_ = false;
+  Positions<D> start_v_, a_;  // of the slab
+  std::span<const NeighbourPair<D>> pairs_;
+  std::vector<std::uint32_t> near_;  // among the pairs: those that first flights may bring together
+  std::vector<double> reach_;        // by particle: how far first flights may lead for which `near_` holds
+  std::vector<double> room_;         // by particle: the largest |½ a h²| for which `near_` holds
+  std::vector<Id> beyond_;           // particles with larger ones
+  std::vector<char> held_;           // resting in contact; empty: none are
+  std::vector<Vec<D>> x_, last_x_, v_;
+  std::vector<char> moved_;
+  std::uint64_t all_moved_ = 0;
+  std::vector<std::uint32_t> slot_;  // by particle: 1 + its place in flights_, or 0
+  std::vector<Flight> flights_;
+  std::vector<Planned> queue_;  // a heap
+  std::vector<Contact<D>> contacts_;
+  std::vector<Sequence> sequences_, last_sequences_;
+  std::vector<Id> swapped_;
+};
+
+}  // namespace carom

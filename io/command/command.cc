@@ -1,0 +1,96 @@
+#include "io/command/command.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <sstream>
+
+#include "engine/setup/placement.h"
+#include "io/deck/deck.h"
+#include "io/deck/schema.h"
+#include "io/deck/validate_state.h"
+#include "io/files/version.h"
+
+namespace carom {
+namespace {
+
+template <int D>
+std::string box_text(const Box<D>& box) {
+  std::ostringstream out;
+  for (int k = 0; k < D; ++k) {
+    const char* boundary = box.periodic(k) ? "periodic" : box.walled(k) ? "wall" : "open";
+    out << (k > 0 ? " x " : "") << box.edges[k] << " (" << boundary << ")";
+  }
+  return out.str();
+}
+
+std::string end_text(const Plan& plan) {
+  std::ostringstream out;
+  const auto part = [&](const std::string& text) { out << (out.tellp() > 0 ? " or " : "") << text; };
+  if (plan.steps) part(std::to_string(*plan.steps) + " steps");
+  if (plan.end_time) {
+    std::ostringstream time;
+    time << "time " << *plan.end_time << " (" << std::ceil(*plan.end_time / plan.step * (1 - 1e-12)) << " steps)";
+    part(time.str());
+  }
+  if (plan.collisions) part(std::to_string(*plan.collisions) + " collisions");
+  return out.str();
+}
+
+/// Bytes a run of this size takes, roughly, as measured with the decks in inputs/.
+template <int D>
+double estimated_memory(std::size_t particles, bool neighbour_lists) {
+  constexpr double program = 30e6;  // libraries and MPI
+  constexpr double state = (2 * D + 3) * sizeof(double) + D * sizeof(std::int32_t) + sizeof(std::uint16_t);
+  constexpr double events = 300, neighbours = 900;
+  return program + static_cast<double>(particles) * (2 * state + events + (neighbour_lists ? neighbours : 0));
+}
+
+template <int D>
+int describe(Deck& deck) {
+  const auto system = build_system<D>(deck);
+  for (const std::string& warning : deck.warnings) std::cerr << warning << '\n';
+  const Particles<D>& p = system->particles;
+  std::cout << deck.file.string() << ": valid\n";
+  if (!deck.title.empty()) std::cout << "title             " << deck.title << '\n';
+  std::cout << "particles         " << p.size() << " in " << D << " dimensions";
+  for (std::size_t s = 0; s < system->species.size(); ++s)
+    std::cout << (s == 0 ? ": " : ", ") << std::count(p.species.begin(), p.species.end(), s) << " "
+              << system->species[s];
+  std::cout << "\nbox               " << box_text(system->box) << '\n';
+  if (closed(system->box))
+    std::cout << "packing fraction  " << packing_fraction<D>(system->box.volume(), p.radius) << '\n';
+  std::cout << "interactions      " << system->interactions.size() << '\n';
+  std::cout << "integrator        " << deck.integrator << ", step " << deck.plan.step << '\n';
+  std::cout << "ends at           " << end_text(deck.plan) << '\n';
+  std::cout << "output            " << deck.output.directory.string() << '\n';
+  const auto& terms = deck.source->interactions;
+  const bool lists = std::any_of(terms.begin(), terms.end(), [](const InteractionConfig& term) {
+    return term.info->kind == InteractionInfo::Kind::pair;
+  });
+  std::cout << "memory            about " << std::ceil(estimated_memory<D>(p.size(), lists) / 1e6) << " MB\n";
+  return 0;
+}
+
+}  // namespace
+
+int validate_command(const std::filesystem::path& file, const std::vector<std::string>& set) {
+  Deck deck = read_deck(file, set);
+  return deck.dimension == 2 ? describe<2>(deck) : describe<3>(deck);
+}
+
+int schema_command(bool markdown) {
+  std::cout << schema_page(markdown);
+  return 0;
+}
+
+int methods_command() {
+  std::cout << methods_page();
+  return 0;
+}
+
+std::string version_page() {
+  return "carom " + version_string() + "\ncompiler: " + compiler_string() + "\nlibraries: " + library_versions();
+}
+
+}  // namespace carom

@@ -1,0 +1,156 @@
+// The `carom` command.
+//
+//   carom run inputs/five-springs.toml --set integrator.step=0.02 -o runs/trial
+//   carom validate DECK     carom schema --markdown     carom methods     carom info FILE     carom --version
+//   carom bench --n 10000 --packing-fraction 0.49
+//
+// Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75 stopped
+// early.
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <iostream>
+
+#include "engine/base/error.h"
+#include "io/command/bench.h"
+#include "io/command/bench_forces.h"
+#include "io/command/command.h"
+#include "io/command/run.h"
+#include "io/deck/options.h"
+#include "io/files/info.h"
+#include "parallel/communicator.h"
+
+namespace {
+
+constexpr int usage_error = 2;
+
+/// Each --set takes one value; what has commas or brackets in it is not split.
+void add_set(CLI::App& command, std::vector<std::string>& set) {
+  command.add_option("--set", set, "Change a value of the deck: table.key=value, list.0.key=value; may be repeated")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+}
+
+void add_bench(CLI::App& app, carom::BenchOptions& options) {
+  CLI::App& bench = *app.add_subcommand("bench", "The speed of the event core on this machine, or of forces");
+  auto* forces = bench.add_flag("--forces", options.forces, "Measure the loops over pairs instead of the event core");
+  auto* n = bench.add_option("--n", options.n, "Numbers of particles; 1000 10000 100000 1000000, of --forces 32000");
+  n->type_name("N")->check(CLI::Range(std::uint64_t{10}, std::uint64_t{4000000000}));
+  auto* filled = bench.add_option("--packing-fraction", options.packing_fraction, "Packing fractions");
+  filled->capture_default_str()->type_name("PHI")->check(CLI::Range(1e-6, 0.91));
+  auto* dimension = bench.add_option("--dimension", options.dimension, "2 or 3")->capture_default_str();
+  dimension->check(CLI::IsMember({2, 3}));
+  auto* equilibrate = bench.add_option("--equilibrate", options.equilibrate,
+                                       "Epochs of forty mean free times before measuring; 3, of a state 0");
+  equilibrate->type_name("NUMBER")->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
+  auto* collisions = bench.add_option("--collisions", options.collisions,
+                                      "Collisions of a measurement, at least; whole epochs are measured");
+  collisions->capture_default_str()->type_name("NUMBER")->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 50));
+  bench.add_option("--repeat", options.repeat, "Measurements of each state")
+      ->capture_default_str()
+      ->type_name("NUMBER")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1000000}));
+  bench.add_option("--json", options.json, "Also write all results to this file")->type_name("FILE");
+  auto* save = bench.add_option("--save-state", options.save_state, "Write the equilibrated state, as text");
+  save->type_name("FILE");
+  auto* state = bench.add_option("--state", options.state, "Measure this state instead of a table");
+  state->type_name("FILE")->excludes(n)->excludes(filled)->excludes(dimension);
+  for (auto* other : {filled, dimension, equilibrate, collisions, save, state}) forces->excludes(other);
+
+  bench.add_option("--potential", options.potential, "Of --forces: these potentials; all")
+      ->needs(forces)
+      ->check(CLI::IsMember(carom::bench_potentials()));
+  bench.add_option("--kind", options.kind, "Of --forces: forces or 'mean forces'; both")
+      ->needs(forces)
+      ->check(CLI::IsMember({"forces", "mean forces"}));
+  bench
+      .add_option("--pairs", options.pairs, "Of --forces: pairs of a measurement, at least; whole passes are measured")
+      ->needs(forces)
+      ->capture_default_str()
+      ->type_name("NUMBER")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 50));
+  bench.add_option("--steps", options.steps, "Of --forces: steps of a measurement of the melt; 0: none")
+      ->needs(forces)
+      ->capture_default_str()
+      ->type_name("NUMBER")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
+}
+
+/// One process does it, however many a launcher has started.
+int once(const std::function<int()>& work) {
+  if (!carom::Communicator::launched()) return work();
+  return carom::Communicator().on_first(work);
+}
+
+int carom_main(int argc, char** argv) {
+  // 1. The options.
+  CLI::App app{"Carom: event-driven molecular dynamics with smooth forces"};
+  app.set_version_flag("--version", carom::version_page, "Version, git hash, compiler, flags, library versions");
+  app.require_subcommand(1);
+
+  carom::RunOptions options;
+  CLI::App& run = *app.add_subcommand("run", "Run a deck");
+  run.add_option("deck", options.deck, "The deck (TOML)")->required()->type_name("DECK");
+  add_set(run, options.set);
+  run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")->type_name("DIR");
+  const auto wall_time = [&](const std::string& text) {
+    options.max_wall_seconds = carom::wall_seconds(text);
+    if (!options.max_wall_seconds) throw CLI::ValidationError("--max-wall", "'" + text + "' is not hh:mm:ss");
+  };
+  run.add_option_function<std::string>("--max-wall", wall_time, "Stop after this wall time with exit code 75")
+      ->type_name("HH:MM:SS");
+  run.add_option("--silence", options.silence,
+                 "Of several ranks: give up after so many seconds without a word from one; 0: never")
+      ->capture_default_str()
+      ->type_name("SECONDS")
+      ->check(CLI::NonNegativeNumber);
+  run.add_flag("--quiet", options.quiet, "No banner and no progress line");
+
+  std::filesystem::path deck, file;
+  std::vector<std::string> set;
+  CLI::App& validate = *app.add_subcommand("validate", "Parse, check, build the initial state, say what would run");
+  validate.add_option("deck", deck, "The deck (TOML)")->required()->type_name("DECK");
+  add_set(validate, set);
+
+  bool markdown = false;
+  CLI::App& schema = *app.add_subcommand("schema", "Every key of a deck: type, unit, default, meaning");
+  schema.add_flag("--markdown", markdown, "As Markdown");
+  CLI::App& methods =
+      *app.add_subcommand("methods", "Every integrator: order, conserved quantities, parameters, source; the averages");
+  CLI::App& info = *app.add_subcommand("info", "What is in a trajectory");
+  info.add_option("file", file, "The file")->required()->type_name("FILE");
+
+  carom::BenchOptions bench;
+  add_bench(app, bench);
+
+  // 2. The command.
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return once([&] { return app.exit(e) == 0 ? 0 : usage_error; });
+  }
+
+  // 3. Do it.
+  if (run.parsed()) return carom::run_command(options);
+  return once([&] {
+    if (validate.parsed()) return carom::validate_command(deck, set);
+    if (schema.parsed()) return carom::schema_command(markdown);
+    if (methods.parsed()) return carom::methods_command();
+    if (info.parsed()) return carom::info_command(file);
+    return carom::bench_command(bench);
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return carom_main(argc, argv);
+  } catch (const carom::Error& e) {
+    std::cerr << e.what() << '\n';
+    return e.exit_code();
+  } catch (const std::exception& e) {
+    std::cerr << "internal error: " << e.what() << '\n';
+    return carom::kFault;
+  }
+}

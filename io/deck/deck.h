@@ -1,0 +1,80 @@
+#pragma once
+// A deck, read, checked and resolved: everything a run needs, with defaults filled in.
+//
+//   Deck deck = read_deck("inputs/five-springs.toml", {"integrator.step=0.02"});   // throws DeckError with all
+//   problems auto system = build_system<2>(deck);                                            // throws
+//   Error(initial_state)
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "engine/base/system.h"
+#include "engine/integrators/integrator.h"
+#include "engine/run/observable.h"
+#include "engine/run/simulation.h"
+
+namespace carom {
+
+struct ObservableConfig {
+  const ObservableInfo* info;
+  Parameters parameters;  ///< complete after build_system()
+};
+
+struct OutputConfig {
+  std::filesystem::path directory;
+  std::string checkpoint_wall;                ///< hh:mm:ss of wall time between checkpoints, or empty
+  double sample_start = 0;                    ///< simulated time of the first sample of the observables
+  std::vector<ObservableConfig> observables;  ///< those with an interval
+};
+
+/// The deck as a value; `toml_text` is the resolved deck, which gives the same run when it is run again.
+struct Deck {
+  std::filesystem::path file;
+  std::string title, description;
+  int dimension = 2;
+  std::string integrator;
+  Parameters integrator_parameters;
+  Plan plan;  ///< plan.step: the slab length (free flight: the epoch)
+  OutputConfig output;
+  std::vector<std::string> warnings;  ///< printed before the run
+  std::string toml_text;
+
+  struct Source;  ///< the parsed tables, known to io/deck*.cc only
+  std::shared_ptr<Source> source;
+};
+
+/// All problems of a deck, one a line: `file:line:column: error: what; what to do`.
+class DeckError : public Error {
+ public:
+  explicit DeckError(const std::string& all) : Error(Failure::deck, all) {}
+};
+
+/// How the texts are read of which a run is made: the deck, and the positions it may name. Nothing: it cannot be read.
+using TextReader = std::function<std::optional<std::string>(const std::filesystem::path&)>;
+
+/// Reads a whole file.
+std::optional<std::string> read_text(const std::filesystem::path& file);
+
+/// Reads, applies `table.key=value` overrides, validates against the schema, resolves defaults. The reader is called
+/// for the deck, then for the positions.
+Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides,
+               const TextReader& reader = read_text);
+
+/// Puts the results elsewhere than the deck says; the resolved deck says so too.
+void set_output_directory(Deck& deck, const std::filesystem::path& directory);
+
+/// How many particles it has.
+std::size_t particle_count(const Deck& deck);
+
+/// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
+/// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards.
+template <int D>
+std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks = nullptr);
+
+}  // namespace carom

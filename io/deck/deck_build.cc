@@ -1,0 +1,147 @@
+#include "io/deck/deck_build.h"
+
+#include <algorithm>
+
+#include "engine/ranks/shares.h"
+#include "engine/setup/epoch.h"
+#include "engine/setup/placement.h"
+#include "io/deck/deck_interactions.h"
+#include "io/deck/validate_state.h"
+
+namespace carom {
+namespace {
+
+/// Velocities as given, or drawn for the species that have a temperature.
+template <int D>
+void give_velocities(const Deck::Source& source, System<D>& system) {
+  std::vector<Id> drawn;
+  std::vector<double> temperature;
+  Particles<D>& p = system.particles;
+  std::size_t first = 0;  // id of the species
+  Id i = 0;
+  for (const SpeciesConfig& species : source.species) {
+    for (; i < p.size() && p.id_of(i) < first + species.count; ++i) {
+      if (!species.velocity.empty()) p.v[i] = Eigen::Map<const Vec<D>>(species.velocity[p.id_of(i) - first].data());
+      if (!species.temperature) continue;
+      drawn.push_back(i);
+      temperature.push_back(*species.temperature);
+    }
+    first += species.count;
+  }
+  draw_velocities<D>(p, drawn, temperature, source.placement.seed, RandomPurpose::velocity, shared_by(system));
+}
+
+/// Writes what was left to the initial state into the values of the deck, so that they say it themselves from now on.
+/// What [output] requires must have a meaning in the box.
+template <int D>
+void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
+  Deck::Source& source = *deck.source;
+  if (source.edges.empty()) {
+    source.edges.assign(system.box.edges.begin(), system.box.edges.end());
+    source.values.find("system")->values.insert_or_assign("box", source.edges);
+    source.values.find("placement")->values.erase("packing_fraction");
+  }
+  if (ValueTable* placement = source.values.find("placement"); placement != nullptr && !source.placement.file.empty())
+    placement->values.insert_or_assign("file", source.placement.file.string());
+  if (deck.plan.step == 0) {
+    deck.plan.step = default_epoch(system);
+    deck.integrator_parameters.set("step", deck.plan.step);
+    source.values.find("integrator")->values.insert_or_assign("step", deck.plan.step);
+  }
+  ValueTable& output = *source.values.find("output");
+  for (auto& [info, parameters] : deck.output.observables) {
+    if (const auto wrong = info->template in<D>().complete(parameters, system))
+      problems.error(output.place(output_key(*info, wrong->parameter)), wrong->what, wrong->remedy);
+    for (const auto& [name, value] : parameters.all())
+      std::visit([&, &key = name](const auto& v) { output.values.insert_or_assign(output_key(*info, key), v); }, value);
+  }
+  deck.toml_text = write_deck(source.values);
+}
+
+}  // namespace
+
+bool built_in_shares(const Deck::Source& source) {
+  const std::string& type = source.placement.type;
+  const bool lattice = !type.empty() && type != "file" && type != "random" && type != "compressed";
+  return lattice && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
+           return species.placed && species.radius.size() == 1 && species.mass.size() == 1;
+         });
+}
+
+template <int D>
+void fill_box(const Deck::Source& source, System<D>& system) {
+  std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
+  if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
+  for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
+}
+
+template <int D>
+void fill_particles(const Deck::Source& source, System<D>& system) {
+  Particles<D>& all = system.particles;
+  std::size_t begin = 0, end = source.particles();  // ids of this rank
+  if (system.ranks && built_in_shares(source)) {
+    Sizes& sizes = system.sizes.emplace();
+    sizes.spheres = end;
+    sizes.by_species = true;
+    for (const SpeciesConfig& species : source.species) {
+      sizes.radius.push_back(species.radius[0]);
+      sizes.mass.push_back(species.mass[0]);
+      sizes.number.push_back(static_cast<double>(species.count));
+    }
+    const Shares shares{end, static_cast<std::size_t>(system.ranks->size())};
+    begin = shares.first(system.ranks->rank());
+    end = shares.first(system.ranks->rank() + 1);
+    for (std::size_t id = begin; id < end; ++id) all.id.push_back(static_cast<Id>(id));
+  }
+  std::size_t first = 0;  // id of the species
+  std::uint16_t index = 0;
+  for (const SpeciesConfig& species : source.species) {
+    for (std::size_t id = std::max(begin, first); id < std::min(end, first + species.count); ++id) {
+      all.mass.push_back(SpeciesConfig::of(species.mass, id - first));
+      all.radius.push_back(SpeciesConfig::of(species.radius, id - first));
+      all.charge.push_back(SpeciesConfig::of(species.charge, id - first));
+      all.species.push_back(index);
+    }
+    first += species.count;
+    ++index;
+  }
+  const std::size_t n = all.mass.size();
+  all.x.assign(n, Vec<D>::Zero());
+  all.v.assign(n, Vec<D>::Zero());
+  all.image.assign(n, Image<D>{});
+}
+
+template <int D>
+std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
+  const Deck::Source& source = *deck.source;
+  if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
+  auto system = std::make_unique<System<D>>();
+  system->ranks = ranks;
+  fill_box(source, *system);
+  fill_particles(source, *system);
+  place_particles(source, *system);
+  system->wrap();
+  give_velocities(source, *system);
+
+  Problems problems;
+  make_interactions(source, {}, *system, true, problems);
+  problems.throw_errors(Failure::deck);
+  complete_values(deck, *system, problems);
+  problems.throw_errors(Failure::deck);
+  check_state(deck, *system, problems);
+  problems.throw_errors(Failure::initial_state);
+  if (ranks && !system->sizes) keep_share(*system);
+  warn_of_state(deck, *system, problems);
+  for (const std::string& warning : problems.warnings()) deck.warnings.push_back(warning);
+  return system;
+}
+
+template void fill_box(const Deck::Source&, System<2>&);
+template void fill_particles(const Deck::Source&, System<2>&);
+template std::unique_ptr<System<2>> build_system<2>(Deck&, Exchange*);
+
+template void fill_box(const Deck::Source&, System<3>&);
+template void fill_particles(const Deck::Source&, System<3>&);
+template std::unique_ptr<System<3>> build_system<3>(Deck&, Exchange*);
+
+}  // namespace carom

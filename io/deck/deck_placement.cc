@@ -1,0 +1,189 @@
+// Where the particles stand at the start.
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "engine/ranks/shares.h"
+#include "engine/setup/compression.h"
+#include "engine/setup/placement.h"
+#include "io/deck/deck_build.h"
+
+namespace carom {
+namespace {
+
+/// The numbers of one line; nothing if there is anything else in it.
+std::optional<std::vector<double>> numbers(std::string line) {
+  line = line.substr(0, line.find('#'));
+  std::vector<double> found;
+  std::size_t at = 0;
+  constexpr const char* separators = ",; \t\r";
+  while ((at = line.find_first_not_of(separators, at)) != std::string::npos) {
+    const std::size_t end = std::min(line.find_first_of(separators, at), line.size());
+    const char* first = line.data() + at + (line[at] == '+' ? 1 : 0);
+    double value = 0;
+    const auto [stop, failed] = std::from_chars(first, line.data() + end, value);
+    if (failed != std::errc{} || stop != line.data() + end) return {};
+    found.push_back(value);
+    at = end;
+  }
+  return found;
+}
+
+template <int D>
+void place_from_file(const Deck::Source& source, const std::vector<Id>& placed, System<D>& system) {
+  const auto& positions = source.placement.positions;
+  if (positions.size() != placed.size()) {
+    Problems problems;
+    problems.error({source.placement.file.string()},
+                   "this file has " + std::to_string(positions.size()) + " positions for " +
+                       std::to_string(placed.size()) + " particles given by count",
+                   "give one line for each");
+    problems.throw_errors(Failure::deck);
+  }
+  for (std::size_t n = 0; n < placed.size(); ++n)
+    system.particles.x[placed[n]] = Eigen::Map<const Vec<D>>(positions[n].data());
+}
+
+template <int D>
+void place_at_random(const Deck::Source& source, const std::vector<Id>& placed, System<D>& system) {
+  const auto& radius = system.particles.radius;
+  const std::size_t done = insert_at_random<D>(system.box, system.particles.x, radius, placed, source.placement.seed);
+  if (done == placed.size()) return;
+  const double wanted = packing_fraction<D>(system.box.volume(), radius);
+  Problems problems;
+  problems.error(source.placement.at,
+                 "random insertion found no place for sphere " + std::to_string(done + 1) + " of " +
+                     std::to_string(placed.size()) + " (packing fraction wanted: " + std::to_string(wanted) + ")",
+                 std::string("take type = \"compressed\" or a lattice, a larger box or fewer spheres; insertion jams "
+                             "at a packing fraction of ") +
+                     (D == 2 ? "0.547" : "0.384"));
+  problems.throw_errors(Failure::initial_state);
+}
+
+template <int D>
+void place_by_compression(const Deck::Source& source, System<D>& system) {
+  using End = typename Compression<D>::End;
+  const PlacementConfig& placement = source.placement;
+  const auto& radius = system.particles.radius;
+  Compression<D> done = compress<D>(
+      system.box, radius,
+      {.seed = placement.seed, .growth_rate = placement.growth_rate, .max_collisions = placement.max_collisions});
+  if (done.reached()) {
+    system.particles.x = std::move(done.x);
+    return;
+  }
+  const double wanted = packing_fraction<D>(system.box.volume(), radius);
+  std::ostringstream what, remedy;
+  what.precision(4);
+  if (done.end == End::no_room) {
+    what << "the spheres have no room in the box: the largest diameter is "
+         << 2 * *std::max_element(radius.begin(), radius.end()) << ", the shortest edge "
+         << system.box.edges.minCoeff();
+    remedy << "enlarge the box or make the spheres smaller";
+  } else {
+    what << (done.end == End::jammed ? "the spheres jammed" : "compression gave up") << " at packing fraction "
+         << wanted * std::pow(done.factor, D) << ", short of " << wanted << " (reduced pressure "
+         << done.reduced_pressure << ", " << std::round(done.collisions) << " collisions a particle)";
+    if (done.end == End::too_many_collisions) remedy << "raise placement.max_collisions, or ";
+    remedy << "take a lower packing fraction, a smaller placement.growth_rate (is " << placement.growth_rate
+           << ") or another seed; "
+           << (D == 2 ? "discs of two sizes jam near 0.84, equal discs crystallise"
+                      : "equal spheres jam at 0.64 to 0.65 unless they crystallise");
+  }
+  Problems problems;
+  problems.error(placement.at, what.str(), remedy.str());
+  problems.throw_errors(Failure::initial_state);
+}
+
+/// Every species takes its sites in the order of their coordinates; which sites those are is drawn.
+template <int D>
+void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& system) {
+  std::vector<std::size_t> counts;
+  for (const SpeciesConfig& species : source.species) counts.push_back(species.count);
+  Particles<D>& p = system.particles;
+  double margin = 0;
+  for (const SpeciesConfig& species : source.species)
+    margin = std::max(margin, *std::ranges::max_element(species.radius));
+  const std::size_t n = source.particles();
+  std::vector<Id> next(counts.size());  // of each species
+  for (std::size_t s = 1; s < counts.size(); ++s) next[s] = next[s - 1] + static_cast<Id>(counts[s - 1]);
+  const std::size_t sites = fit_lattice(lattice, system.box, n, margin).sites;
+  // A species that takes all needs no drawing.
+  const std::vector<int> owner =
+      counts.size() > 1 || sites > n ? distribute(sites, counts, source.placement.seed) : std::vector<int>{};
+  const Id first = p.size() > 0 ? p.id_of(0) : 0;
+  std::size_t site = 0;
+  for_each_site<D>(lattice, system.box, n, margin, [&](const Vec<D>& x) {
+    const int species = owner.empty() ? 0 : owner[site];
+    ++site;
+    if (species < 0) return;
+    const Id id = next[static_cast<std::size_t>(species)]++;
+    if (id >= first && id - first < p.size()) p.x[id - first] = x;
+  });
+}
+
+}  // namespace
+
+std::vector<std::vector<double>> rows_in(const std::string& text, const std::filesystem::path& file,
+                                         std::size_t columns, const std::string& not_what) {
+  std::istringstream in(text);
+  std::vector<std::vector<double>> rows;
+  Problems problems;
+  std::string line;
+  bool heading = true;
+  for (int number = 1; std::getline(in, line); ++number) {
+    const auto row = numbers(line);
+    const bool first = heading;
+    if (!row || !row->empty()) heading = false;
+    if ((row && row->empty()) || (!row && first)) continue;
+    const bool good = row && row->size() == columns &&
+                      std::all_of(row->begin(), row->end(), [](double x) { return std::isfinite(x); });
+    if (!good)
+      problems.error({file.string(), number, 1}, not_what,
+                     "give " + std::to_string(columns) + " finite numbers, separated by commas or blanks");
+    else
+      rows.push_back(*row);
+  }
+  problems.throw_errors(Failure::deck);
+  return rows;
+}
+
+template <int D>
+void place_particles(const Deck::Source& source, System<D>& system) {
+  const PlacementConfig& placement = source.placement;
+  const bool centred = placement.type == "fcc" || placement.type == "hexagonal";
+  const Lattice lattice = centred ? Lattice::centred : Lattice::simple;
+  if (source.edges.empty()) {
+    const double filled = packing_fraction<D>(1, system.particles.radius, shared_by(system));
+    system.box.edges = commensurate_edges<D>(lattice, source.particles(), filled / *placement.packing_fraction);
+  }
+  if (built_in_shares(source)) {
+    place_on_lattice(source, lattice, system);
+    return;
+  }
+  std::vector<Id> placed;
+  Id id = 0;
+  for (const SpeciesConfig& species : source.species)
+    for (std::size_t n = 0; n < species.count; ++n, ++id) {
+      if (species.placed)
+        placed.push_back(id);
+      else
+        system.particles.x[id] = Eigen::Map<const Vec<D>>(species.position[n].data());
+    }
+  if (placed.empty()) return;
+  if (placement.type == "file")
+    place_from_file(source, placed, system);
+  else if (placement.type == "random")
+    place_at_random(source, placed, system);
+  else if (placement.type == "compressed")
+    place_by_compression(source, system);
+  else
+    place_on_lattice(source, lattice, system);
+}
+
+template void place_particles(const Deck::Source&, System<2>&);
+template void place_particles(const Deck::Source&, System<3>&);
+
+}  // namespace carom

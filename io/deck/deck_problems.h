@@ -1,0 +1,52 @@
+#pragma once
+// Collects what is wrong with a deck, so that all of it can be reported at once.
+//
+//   problems.error(place, "radius must be positive (is -1)", "give a number above 0");
+//   problems.throw_errors(Failure::deck);
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/base/error.h"
+
+namespace carom {
+
+/// Where in a deck: a file with line and column (0 = the file as a whole), or a `--set` option.
+struct Place {
+  std::string source;
+  int line = 0, column = 0;
+
+  /// `file:line:column`, `file` or `--set key`.
+  std::string text() const;
+};
+
+class Problems {
+ public:
+  void error(const Place& place, const std::string& what, const std::string& remedy);
+  void warning(const Place& place, const std::string& what, const std::string& remedy);
+  std::size_t errors() const { return errors_.size(); }
+  /// Throws a DeckError (Failure::deck) or an Error with all errors in the order of their places, if there are any.
+  void throw_errors(Failure failure) const;
+  /// `place: warning: what; remedy`, in the order they came.
+  std::vector<std::string> warnings() const;
+
+ private:
+  struct Problem {
+    Place place;
+    std::string text;
+  };
+  std::vector<Problem> errors_, warnings_;
+};
+
+/// The candidate that is most like `word`, or "" if none is near: Damerau–Levenshtein distance up to a third of the
+/// length, at least 2.
+std::string nearest(std::string_view word, const std::vector<std::string>& candidates);
+
+/// "; did you mean 'x'?" as a remedy, or the whole choice where nothing is near.
+std::string suggestion(std::string_view word, const std::vector<std::string>& candidates);
+
+/// "a, b, c"
+std::string join(const std::vector<std::string>& words);
+
+}  // namespace carom

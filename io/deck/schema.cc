@@ -1,0 +1,232 @@
+#include "io/deck/schema.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "engine/base/interaction.h"
+#include "engine/integrators/integrator.h"
+
+namespace carom {
+namespace {
+
+using enum Key::Type;
+using Range = Parameter::Range;
+
+Key::Type key_type(Parameter::Type type) {
+  switch (type) {
+    case Parameter::Type::boolean:
+      return boolean;
+    case Parameter::Type::integer:
+      return integer;
+    case Parameter::Type::real:
+      return real;
+    case Parameter::Type::real_list:
+      return real_list;
+    case Parameter::Type::text:
+      return text;
+    case Parameter::Type::text_list:
+      return text_list;
+    case Parameter::Type::pair_list:
+      return pair_list;
+  }
+  throw std::logic_error("unknown parameter type");
+}
+
+Variant variant(std::string_view name, const std::vector<Parameter>& parameters) {
+  Variant v{std::string(name), {}};
+  for (const Parameter& p : parameters)
+    v.keys.push_back({std::string(p.name),
+                      key_type(p.type),
+                      std::string(p.fallback),
+                      std::string(p.unit),
+                      std::string(p.meaning),
+                      p.range,
+                      {p.choices.begin(), p.choices.end()},
+                      p.former,
+                      p.most});
+  return v;
+}
+
+std::vector<Variant> interaction_variants() {
+  std::vector<Variant> all;
+  for (const InteractionInfo& info : interactions()) all.push_back(variant(info.name, info.parameters));
+  return all;
+}
+
+std::vector<Variant> integrator_variants() {
+  std::vector<Variant> all;
+  for (const IntegratorInfo& info : integrators()) all.push_back(variant(info.name, info.parameters));
+  return all;
+}
+
+std::string averages_of_all() {
+  std::string files;
+  for (const ObservableInfo& info : observables())
+    files += (files.empty() ? "" : &info == &observables().back() ? " and " : ", ") + std::string(info.name) + ".csv";
+  return files;
+}
+
+std::vector<Key> output_keys() {
+  std::vector<Key> keys = {
+      {"directory", text, "none", "-",
+       "where to; relative to the working directory; by default runs/ and the deck's name"},
+      {"frame_interval", real, "0.0", "time", "simulated time between frames of the trajectory; 0: first and last only",
+       Range::non_negative},
+      {"thermo_interval", real, "0.0", "time",
+       "simulated time between rows of the table of observables; 0: first and last only", Range::non_negative}};
+  for (const ObservableInfo& info : observables())
+    for (Key& key : variant(info.name, info.parameters).keys) {
+      key.name = output_key(info, key.name);
+      keys.push_back(std::move(key));
+    }
+  keys.push_back(
+      {"sample_start", real, "0.0", "time",
+       "simulated time of the first sample for " + averages_of_all() + ": what comes before is equilibration",
+       Range::non_negative});
+  keys.push_back({"checkpoint_wall", text, "\"\"", "-", "wall time between checkpoints, hh:mm:ss; empty: none"});
+  keys.push_back({"events", boolean, "false", "-", "write every collision to events.h5"});
+  return keys;
+}
+
+Key type_key(const std::string& meaning) { return {"type", text, "", "-", meaning}; }
+
+std::vector<TableSchema> make_schema() {
+  return {
+      {"",
+       false,
+       true,
+       "at the top of the deck",
+       {{"format", integer, "", "-", "version of the deck format: 1", Range::positive},
+        {"title", text, "\"\"", "-", "one line that says what the run shows"},
+        {"description", text, "\"\"", "-", "more about it: source, what to look at"}}},
+      {"system",
+       false,
+       true,
+       "the box",
+       {{"dimension", integer, "", "-", "2 or 3", Range::positive},
+        {"box", real_list, "none", "length",
+         "edges of the box, which begins at the origin; may be left out where placement.packing_fraction sets it",
+         Range::positive},
+        {"boundary",
+         text_list,
+         "",
+         "-",
+         "for each axis: hard elastic walls, periodic images, or nothing at all",
+         Range::any,
+         {"wall", "periodic", "open"}}}},
+      {"particles",
+       true,
+       true,
+       "a species, by explicit positions or by count; ids number all particles from 0 in deck order",
+       {{"name", text, "", "-", "name of the species"},
+        {"position", vector_list, "none", "length", "centres, one vector for each particle"},
+        {"velocity", vector_list, "none", "length/time",
+         "velocities that go with explicit positions; at rest where neither velocity nor temperature is given"},
+        {"count", integer, "none", "-", "number of particles, placed as [placement] says", Range::positive},
+        {"temperature", real, "none", "energy",
+         "draws Maxwell–Boltzmann velocities, total momentum removed and scaled to this temperature (k_B = 1)",
+         Range::non_negative},
+        {"radius", real_or_list, "", "length", "of the hard core", Range::positive},
+        {"mass", real_or_list, "1.0", "mass", "", Range::positive},
+        {"charge", real_or_list, "0.0", "charge", "for the interactions that know charges"}}},
+      {"placement",
+       false,
+       false,
+       "where the particles of species given by count stand at the start",
+       {type_key("the arrangement"),
+        {"packing_fraction", real, "none", "-",
+         "sets the box, as a cube or square (hexagonal: in the lattice's "
+         "proportions), where system.box is absent",
+         Range::positive},
+        {"seed", integer, "1", "-", "of the random places and velocities", Range::non_negative}},
+       {{"fcc", {}},
+        {"simple-cubic", {}},
+        {"hexagonal", {}},
+        {"square", {}},
+        {"random", {}},
+        {"compressed",
+         {{"growth_rate", real, "0.1", "-",
+           "speed at which the largest diameter grows, over the thermal speed; divided by the reduced pressure "
+           "PV/(NkT) as that rises. The slower, the denser the spheres jam",
+           Range::positive},
+          {"max_collisions", real, "100000.0", "-", "for each particle, before compression gives up",
+           Range::positive}}},
+        {"file",
+         {{"file", text, "", "-",
+           "table of positions, separated by commas or blanks, one particle a line; "
+           "relative to the deck's folder"}}}}},
+      {"interaction",
+       true,
+       false,
+       "a smooth force between or on the particles, besides their hard cores",
+       {type_key("which one")},
+       interaction_variants()},
+      {"integrator",
+       false,
+       true,
+       "the method; `carom methods` describes each",
+       {type_key("which one")},
+       integrator_variants(),
+       {{"acdda", "write \"edda\", which keeps the energy as exactly"},
+        {"acva", "write \"edda\", which keeps the energy exactly, or \"cva\""},
+        {"adaptive", "leave it out, or take a shorter 'step'"}}},
+      {"run",
+       false,
+       true,
+       "when the run ends: at the first of these that is reached; at least one is needed",
+       {{"steps", integer, "none", "-", "number of steps (free-flight: epochs)", Range::positive},
+        {"end_time", real, "none", "time", "simulated time; the last step is shortened to meet it", Range::positive},
+        {"collisions", integer, "none", "-", "number of pair collisions", Range::positive}}},
+      {"output", false, false, "what the run leaves behind", output_keys()}};
+}
+
+}  // namespace
+
+const Variant* TableSchema::variant(std::string_view type) const {
+  const auto at = std::find_if(variants.begin(), variants.end(), [&](const Variant& v) { return v.name == type; });
+  return at == variants.end() ? nullptr : &*at;
+}
+
+const std::vector<TableSchema>& deck_schema() {
+  static const std::vector<TableSchema> schema = make_schema();
+  return schema;
+}
+
+const TableSchema& table_schema(std::string_view name) {
+  for (const TableSchema& table : deck_schema())
+    if (table.name == name) return table;
+  throw std::logic_error("no table '" + std::string(name) + "' in the schema");
+}
+
+std::string output_key(const ObservableInfo& info, std::string_view parameter) {
+  return std::string(info.name) + "_" + std::string(parameter);
+}
+
+std::string type_name(const Key& key) {
+  const std::string range = key.range == Range::positive       ? "positive "
+                            : key.range == Range::non_negative ? "non-negative "
+                                                               : "";
+  switch (key.type) {
+    case boolean:
+      return "true or false";
+    case integer:
+      return range + "integer";
+    case real:
+      return range + "number";
+    case real_list:
+      return "list of " + range + "numbers";
+    case text:
+      return "text";
+    case text_list:
+      return "list of texts";
+    case pair_list:
+      return "list of pairs of particle ids";
+    case vector_list:
+      return "list of vectors";
+    case real_or_list:
+      return range + "number, or a list with one for each particle";
+  }
+  throw std::logic_error("unknown key type");
+}
+
+}  // namespace carom

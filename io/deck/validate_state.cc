@@ -1,0 +1,181 @@
+#include "io/deck/validate_state.h"
+
+#include <algorithm>
+#include <numbers>
+#include <sstream>
+#include <tuple>
+#include <utility>
+
+#include "engine/events/contact.h"
+#include "engine/forces/forces.h"
+#include "engine/forces/stiffness.h"
+#include "engine/ranks/part.h"
+#include "engine/ranks/shares.h"
+#include "engine/ranks/vicinity.h"
+#include "engine/setup/placement.h"
+
+namespace carom {
+namespace {
+
+/// Text with enough digits to distinguish a distance from a contact distance.
+template <class... Items>
+std::string say(const Items&... items) {
+  std::ostringstream text;
+  text.precision(15);
+  (text << ... << items);
+  return text.str();
+}
+
+std::string plural(std::size_t n, const std::string& one, const std::string& many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+/// Where the deck says the positions of this particle.
+const Place& place_of(const Deck::Source& source, Id id) {
+  const SpeciesConfig* config = source.species.data();
+  for (std::size_t end = config->count; end <= id; end += config->count) ++config;
+  return config->placed ? source.placement.at : config->at;
+}
+
+/// What all ranks have found, each in its share.
+template <int D>
+Outsiders all_outsiders(const System<D>& system) {
+  const Particles<D>& p = system.particles;
+  Outsiders all = find_outsiders<D>(system.box, p.x, p.radius);
+  if (!shared_by(system)) return all;
+  Bytes mine;
+  if (all.spheres > 0) all.worst = p.id_of(all.worst);
+  put(mine, std::exchange(all, {}));
+  for (const Bytes& bytes : system.ranks->gather(mine)) {
+    const auto found = Reader(bytes).get<Outsiders>();
+    const std::size_t spheres = all.spheres + found.spheres;
+    if (found.depth > all.depth) all = found;
+    all.spheres = spheres;
+  }
+  return all;
+}
+
+/// The same of pairs. The worst is the same for any number of ranks: among equals that with the lowest ids.
+template <int D>
+Overlaps all_overlaps(const System<D>& system) {
+  if (!shared_by(system)) return find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
+  const Vicinity<D> near = vicinity<D>(system.box, 2 * system.sizes->largest_radius(), *system.ranks, system.particles);
+  Overlaps all = find_overlaps<D>(system.box, near.x, near.radius, near.beyond);
+  if (all.pairs > 0) all.lo = near.id[all.lo], all.hi = near.id[all.hi];
+  Bytes mine;
+  put(mine, std::exchange(all, {}));
+  for (const Bytes& bytes : system.ranks->gather(mine)) {
+    const auto found = Reader(bytes).get<Overlaps>();
+    if (found.pairs == 0) continue;
+    const std::size_t pairs = all.pairs + found.pairs;
+    const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.hi, o.lo); };
+    if (all.pairs == 0 || order(found) < order(all)) all = found;
+    all.pairs = pairs;
+  }
+  return all;
+}
+
+template <int D>
+void check_box(const Deck::Source& source, const System<D>& system, Problems& problems) {
+  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
+  const double diameter = 2 * *std::max_element(radius.begin(), radius.end());
+  for (int k = 0; k < D; ++k) {
+    const double edge = system.box.edges[k];
+    if (!system.box.periodic(k) || edge >= diameter - GapTolerance(system.box.edges.maxCoeff())(diameter)) continue;
+    problems.error(source.box,
+                   say("the periodic box is ", edge, " long on axis ", k, ", less than a diameter of ", diameter),
+                   "enlarge the box; a sphere must not touch itself");
+  }
+  const double filled = packing_fraction<D>(system.box.volume(), system.particles.radius, shared_by(system));
+  if (filled > 1 && closed(system.box))
+    problems.error(source.box, say("the spheres fill ", filled, " of the box"),
+                   "enlarge the box or take fewer spheres");
+}
+
+template <int D>
+void check_spheres(const Deck::Source& source, const System<D>& system, Problems& problems) {
+  if (const Outsiders out = all_outsiders(system); out.spheres > 0)
+    problems.error(place_of(source, out.worst),
+                   say(plural(out.spheres, "sphere is", "spheres are"), " not inside the walls; the worst is particle ",
+                       out.worst, ", which reaches ", out.depth, " beyond a wall of axis ", out.axis),
+                   "move it inside (at least a radius from every wall), or enlarge the box");
+  if (const Overlaps overlaps = all_overlaps(system); overlaps.pairs > 0)
+    problems.error(place_of(source, overlaps.hi),
+                   say(plural(overlaps.pairs, "pair of spheres overlaps", "pairs of spheres overlap"),
+                       "; the worst is particles ", overlaps.lo, " and ", overlaps.hi, " at distance ",
+                       overlaps.distance, ", contact distance ", overlaps.contact),
+                   "move them apart, make the radii smaller or the box larger");
+}
+
+}  // namespace
+
+template <int D>
+bool closed(const Box<D>& box) {
+  return std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) == box.boundary.end();
+}
+
+template <int D>
+void check_state(const Deck& deck, const System<D>& system, Problems& problems) {
+  const Deck::Source& source = *deck.source;
+  if (!source.integrator->hard_cores) return;
+  check_box(source, system, problems);
+  if (problems.errors() == 0) check_spheres(source, system, problems);
+}
+
+template <int D>
+double shortest_period(const System<D>& system) {
+  return 2 * std::numbers::pi / std::sqrt(largest_squared_frequency(system));
+}
+
+template <int D>
+void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
+  const Deck::Source& source = *deck.source;
+  const Box<D>& box = system.box;
+  const bool walls = std::find(box.boundary.begin(), box.boundary.end(), Boundary::wall) != box.boundary.end();
+  if (!source.integrator->hard_cores && walls)
+    problems.warning(source.system, "walls do not act with " + deck.integrator + ", which knows no hard cores",
+                     "make the boundary open or periodic, or take another integrator");
+
+  const double close_packing = D == 2 ? std::numbers::pi / std::sqrt(12.0) : std::numbers::pi / std::sqrt(18.0);
+  const double filled = packing_fraction<D>(box.volume(), system.particles.radius, shared_by(system));
+  if (source.integrator->hard_cores && closed(box) && filled > close_packing)
+    problems.warning(source.box,
+                     say("packing fraction ", filled, " is beyond close packing of equal spheres, ", close_packing),
+                     "check box and radii");
+
+  double shortest = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < D; ++k)
+    if (box.periodic(k)) shortest = std::min(shortest, box.edges[k]);
+  for (const InteractionConfig& config : source.interactions)
+    if (config.parameters.has("cutoff") && config.parameters.real("cutoff") > shortest / 2)
+      problems.warning(config.at,
+                       say("cutoff ", config.parameters.real("cutoff"), " is more than half the box, ", shortest / 2),
+                       "particles meet several images of each other; enlarge the box");
+
+  constexpr std::uint64_t affordable = 500'000;  // particles or pairs: below a second of work
+  if (!source.integrator->stepping || system.interactions.empty() || system.size() > affordable) return;
+  std::optional<Part<D>> part;
+  system.quanta = quanta(system);
+  if (shared_by(system)) part.emplace(system, true, deck.plan.step);
+  const System<D>& known = part ? part->known() : system;
+  std::uint64_t pairs = 0;
+  for (const auto& term : known.interactions) pairs += term->interacting_pairs(known.particles.x);
+  if (part) part->ranks().sum({&pairs, 1});
+  if (pairs > affordable) return;
+  if (const double period = shortest_period(known); deck.plan.step > period / 10)
+    problems.warning(source.step,
+                     say("step ", deck.plan.step, " is long for the shortest period at the start, ", period),
+                     "a tenth of that period or less is usual");
+}
+
+template bool closed(const Box<2>&);
+template void check_state(const Deck&, const System<2>&, Problems&);
+template double shortest_period(const System<2>&);
+template void warn_of_state(const Deck&, System<2>&, Problems&);
+
+template bool closed(const Box<3>&);
+template void check_state(const Deck&, const System<3>&, Problems&);
+template double shortest_period(const System<3>&);
+template void warn_of_state(const Deck&, System<3>&, Problems&);
+
+}  // namespace carom

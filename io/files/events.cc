@@ -1,0 +1,122 @@
+#include "io/files/events.h"
+
+#include "io/files/hdf5.h"
+#include "io/files/version.h"
+
+namespace carom {
+
+namespace {
+
+/// One column: what waits in memory, and what is in the file.
+template <class T>
+struct Column {
+  std::vector<T> waiting;
+  hdf5::Series<T> written;
+  Column(hdf5::File& file, const hdf5::Handle& group, const char* name, std::vector<hsize_t> row_shape = {})
+      : written(file, group, name, std::move(row_shape)) {}
+  void write() {
+    written.append(waiting);
+    waiting.clear();
+  }
+};
+
+}  // namespace
+
+template <int D>
+struct EventWriter<D>::Contents {
+  static constexpr std::size_t kBatch = 16384;  // rows
+  // About how many bytes a row takes; only for the room to be reserved.
+  static constexpr std::uint64_t kRowBytes = 3 * 8 + 3 * 4 + 1 + D * (4 + 3 * 8);
+
+  Contents(const std::filesystem::path& path, const Deck& deck) : file(hdf5::File::create(path)) {
+    const hdf5::Handle parameters = file.group("parameters");
+    file.write_attribute(group, "version", std::vector<std::int32_t>{1, 0});
+    file.write_attribute(group, "creator", "carom " + version_string());
+    file.write_attribute(group, "dimension", std::int32_t{D});
+    file.write_text(parameters, "deck", deck.toml_text);
+    file.write_text(parameters, "title", deck.title);
+    file.write_text(parameters, "integrator", deck.integrator);
+    file.reserve(0);
+    file.flush();
+  }
+
+  void add(double slab_start, const Contact<D>& c) {
+    time.waiting.push_back(slab_start + c.key.time);
+    slab.waiting.push_back(slabs_done);
+    time_in_slab.waiting.push_back(c.key.time);
+    generation.waiting.push_back(c.key.generation);
+    kind.waiting.push_back(static_cast<std::uint8_t>(c.key.kind));
+    lo.waiting.push_back(c.key.lo);
+    hi.waiting.push_back(c.key.hi);
+    for (int k = 0; k < D; ++k) {
+      image.waiting.push_back(c.key.image[k]);
+      x_lo.waiting.push_back(c.x_lo[k]);
+      x_hi.waiting.push_back(c.x_hi[k]);
+      impulse.waiting.push_back(c.impulse[k]);
+    }
+  }
+
+  void write() {
+    if (time.waiting.empty()) return;
+    file.reserve(kRowBytes * time.waiting.size());
+    for (auto* column : {&time_in_slab, &x_lo, &x_hi, &impulse}) column->write();
+    for (auto* column : {&generation, &lo, &hi}) column->write();
+    slab.write();
+    kind.write();
+    image.write();
+    file.flush();
+    time.write();  // its length is the number of complete rows, also after a kill in the middle of a batch
+    file.flush();
+  }
+
+  hdf5::File file;
+  hdf5::Handle group = file.group("events");
+  Column<double> time{file, group, "time"};
+  Column<std::int64_t> slab{file, group, "slab"};
+  Column<double> time_in_slab{file, group, "time_in_slab"};
+  Column<std::uint32_t> generation{file, group, "generation"};
+  Column<std::uint8_t> kind{file, group, "kind"};
+  Column<std::uint32_t> lo{file, group, "lo"}, hi{file, group, "hi"};
+  Column<std::int32_t> image{file, group, "image", {D}};
+  Column<double> x_lo{file, group, "x_lo", {D}}, x_hi{file, group, "x_hi", {D}}, impulse{file, group, "impulse", {D}};
+  std::int64_t slabs_done = 0;
+};
+
+template <int D>
+EventWriter<D>::EventWriter(const std::filesystem::path& path, const Deck& deck)
+    : contents_(std::make_unique<Contents>(path, deck)) {}
+
+template <int D>
+EventWriter<D>::~EventWriter() = default;
+
+template <int D>
+void EventWriter<D>::contacts(double slab_start, std::span<const Contact<D>> contacts) {
+  for (const Contact<D>& c : contacts) contents_->add(slab_start, c);
+  if (contents_->time.waiting.size() >= Contents::kBatch) contents_->write();
+}
+
+template <int D>
+void EventWriter<D>::frame(const Snapshot<D>&) {
+  contents_->write();
+}
+
+template <int D>
+void EventWriter<D>::thermo(const Snapshot<D>&) {
+  contents_->write();
+}
+
+template <int D>
+void EventWriter<D>::progress(const Statistics& statistics) {
+  contents_->slabs_done = statistics.steps;
+}
+
+template <int D>
+void EventWriter<D>::close() {
+  contents_->write();
+  contents_->file.close();
+}
+
+template class EventWriter<2>;
+template class EventWriter<3>;
+
+}  // namespace carom

@@ -1,0 +1,46 @@
+#pragma once
+// events.h5: every collision of a run, exactly as it was executed, in the order of the event keys.
+//
+// One group /events of data sets, a row a collision; after a kill columns may be longer than `time`, which has the
+// complete rows:
+//   time          simulated time (slab start + time_in_slab, rounded)
+//   slab          number of the slab or epoch, from 0
+//   time_in_slab  the exact time, since the start of the slab
+//   generation    order within one instant
+//   kind          0 pair, 1 wall
+//   lo, hi        lower and higher id; at a wall: the particle, and 2·axis + (0 lower, 1 upper)
+//   image         [D] how many box edges `hi` is shifted by
+//   x_lo, x_hi    [D] centres at contact, x_hi shifted to that image; at a wall: the point touched
+//   impulse       [D] given to lo, taken from hi
+// /parameters holds the resolved deck. Rows are gathered and written in batches, at the latest with the next frame or
+// thermo row.
+
+#include <filesystem>
+#include <memory>
+
+#include "engine/run/simulation.h"
+#include "io/deck/deck.h"
+
+namespace carom {
+
+template <int D>
+class EventWriter : public Observer<D> {
+ public:
+  /// Creates the file. Throws Error(Failure::file).
+  EventWriter(const std::filesystem::path& path, const Deck& deck);
+  ~EventWriter() override;
+
+  void contacts(double slab_start, std::span<const Contact<D>> contacts) override;
+  void frame(const Snapshot<D>&) override;
+  void thermo(const Snapshot<D>&) override;
+  void progress(const Statistics& statistics) override;
+
+  /// Writes what is left and closes. Throws Error(Failure::file).
+  void close();
+
+ private:
+  struct Contents;
+  std::unique_ptr<Contents> contents_;
+};
+
+}  // namespace carom

@@ -1,0 +1,259 @@
+#include "io/files/h5md.h"
+
+#include <pwd.h>
+#include <unistd.h>
+
+#include <array>
+#include <map>
+#include <numeric>
+
+#include "io/files/hdf5.h"
+#include "io/files/version.h"
+
+namespace carom {
+
+namespace {
+
+using hdf5::File;
+using hdf5::Handle;
+using hdf5::Series;
+
+/// Vectors as rows of three columns, zero where there is no such axis.
+template <class T, class Vectors>
+std::vector<T> three_columns(const Vectors& vectors, int dimension) {
+  std::vector<T> rows(3 * vectors.size(), T{});
+  for (std::size_t i = 0; i < vectors.size(); ++i)
+    for (int k = 0; k < dimension; ++k) rows[3 * i + static_cast<std::size_t>(k)] = vectors[i][k];
+  return rows;
+}
+
+/// Arrays as a message, one after the other.
+template <class... Arrays>
+Bytes packed(const Arrays&... arrays) {
+  Bytes bytes;
+  bytes.reserve((std::as_bytes(std::span(arrays)).size() + ...));
+  const auto add = [&](std::span<const std::byte> more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
+  (add(std::as_bytes(std::span(arrays))), ...);
+  return bytes;
+}
+
+/// The next `n` of a message.
+template <class T>
+std::span<const T> next(Reader& message, std::size_t n) {
+  return {reinterpret_cast<const T*>(message.skip(n * sizeof(T))), n};
+}
+
+std::string user_name() {
+  const passwd* entry = getpwuid(getuid());
+  return entry != nullptr ? entry->pw_name : "unknown";
+}
+
+void write_origin(File& file) {
+  const Handle h5md = file.group("h5md"), author = file.group("h5md/author"), creator = file.group("h5md/creator");
+  file.write_attribute(h5md, "version", std::vector<std::int32_t>{1, 1});
+  file.write_attribute(author, "name", user_name());
+  file.write_attribute(creator, "name", std::string("carom"));
+  file.write_attribute(creator, "version", version_string());
+}
+
+template <int D>
+void write_parameters(File& file, const Deck& deck, const System<D>& system) {
+  const Handle group = file.group("parameters");
+  std::vector<std::string> boundary;
+  for (const Boundary b : system.box.boundary)
+    boundary.push_back(b == Boundary::wall ? "wall" : b == Boundary::periodic ? "periodic" : "open");
+  file.write_text(group, "deck", deck.toml_text);
+  file.write_text(group, "title", deck.title);
+  file.write_text(group, "integrator", deck.integrator);
+  file.write_number<std::int32_t>(group, "dimension", D);
+  file.write_texts(group, "boundary", boundary);
+  file.write_texts(group, "species", system.species);
+}
+
+/// A time-dependent element of H5MD: value, step and time.
+template <class T>
+struct Element {
+  Handle group;
+  Series<T> value;
+  Element(File& file, const std::string& name, std::vector<hsize_t> row_shape = {})
+      : group(file.group(name)), value(file, group, "value", std::move(row_shape)) {}
+  void share_clock(File& file, const Handle& clock) {
+    file.link(clock, "step", group, "step");
+    file.link(clock, "time", group, "time");
+  }
+};
+
+}  // namespace
+
+template <int D>
+struct TrajectoryWriter<D>::Contents {
+  Contents(const std::filesystem::path& path, const Deck& deck, const System<D>& system)
+      : file(File::create(path)),
+        position(file, "particles/trajectory/position", {system.size(), 3}),
+        velocity(file, "particles/trajectory/velocity", {system.size(), 3}),
+        image(file, "particles/trajectory/image", {system.size(), 3}),
+        step(file, position.group, "step"),
+        time(file, position.group, "time"),
+        box(file.group("particles/trajectory/box")),
+        edges(file, "particles/trajectory/box/edges", {3, 3}),
+        momentum(file, "observables/momentum", {3}),
+        collisions(file, "observables/collisions"),
+        ranks(system.ranks) {
+    write_origin(file);
+    write_parameters(file, deck, system);
+    write_box(system.box);
+    write_fixed(system);
+    for (const char* name : {"kinetic_energy", "potential_energy", "total_energy", "shadow_energy", "max_energy_error",
+                             "temperature", "pressure"})
+      observables.emplace(name, Element<double>(file, std::string("observables/") + name));
+    for (auto* element : {&velocity, &edges, &momentum}) element->share_clock(file, position.group);
+    image.share_clock(file, position.group);
+    collisions.share_clock(file, position.group);
+    for (auto& [name, element] : observables) element.share_clock(file, position.group);
+    file.reserve(0);
+    file.flush();
+  }
+
+  void write_box(const Box<D>& b) {
+    std::vector<std::string> boundary(3, "none");
+    for (int k = 0; k < D; ++k)
+      if (b.periodic(k)) boundary[static_cast<std::size_t>(k)] = "periodic";
+    file.write_attribute(box, "dimension", std::int32_t{3});
+    file.write_attribute(box, "boundary", boundary);
+    for (std::size_t k = 0; k < 3; ++k) edge_rows[4 * k] = static_cast<int>(k) < D ? b.edges[static_cast<int>(k)] : 1.0;
+  }
+
+  void write_fixed(const System<D>& system) {
+    const Handle group(H5Gopen2(file.id(), "particles/trajectory", H5P_DEFAULT), H5Gclose);
+    const std::size_t n = system.size();
+    const hdf5::Array<std::uint32_t> id(file, group, "id", n);
+    const hdf5::Array<std::int32_t> species(file, group, "species", n);
+    const hdf5::Array<double> mass(file, group, "mass", n), radius(file, group, "radius", n),
+        charge(file, group, "charge", n);
+    std::size_t first = 0;
+    const auto write = [&](std::span<const std::uint16_t> kinds, std::span<const double> masses,
+                           std::span<const double> radii, std::span<const double> charges) {
+      std::vector<std::uint32_t> ids(kinds.size());
+      std::iota(ids.begin(), ids.end(), static_cast<std::uint32_t>(first));
+      id.write(first, ids);
+      species.write(first, std::vector<std::int32_t>(kinds.begin(), kinds.end()));
+      mass.write(first, masses);
+      radius.write(first, radii);
+      charge.write(first, charges);
+      first += kinds.size();
+    };
+    const Particles<D>& p = system.particles;
+    if (!system.sizes) return write(p.species, p.mass, p.radius, p.charge);
+    one_after_the_other(
+        *ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); },
+        [&](int /*rank*/, const Bytes& message) {
+          const std::size_t here = message.size() / (3 * sizeof(double) + sizeof(std::uint16_t));
+          Reader reader(message);
+          const auto masses = next<double>(reader, here), radii = next<double>(reader, here),
+                     charges = next<double>(reader, here);
+          write(next<std::uint16_t>(reader, here), masses, radii, charges);
+        });
+  }
+
+  /// Writes what changes of the particles: a row of all that there are, from one state or from the shares of all ranks.
+  void write_particles(const Particles<D>& p) {
+    for (auto* element : {&position, &velocity}) element->value.append_row();
+    image.value.append_row();
+    if (p.id.empty()) {
+      write_part(0, p.x, p.v, p.image);
+      return;
+    }
+    std::size_t first = 0;
+    try {
+      one_after_the_other(
+          *ranks, [&] { return packed(p.x, p.v, p.image); },
+          [&](int /*rank*/, const Bytes& message) {
+            const std::size_t n = message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>));
+            Reader reader(message);
+            const auto x = next<Vec<D>>(reader, n), v = next<Vec<D>>(reader, n);
+            write_part(first, x, v, next<Image<D>>(reader, n));
+            first += n;
+          });
+    } catch (...) {  // a rank is lost: there is no such frame
+      for (auto* element : {&position, &velocity}) element->value.drop_row();
+      image.value.drop_row();
+      throw;
+    }
+  }
+  void write_part(std::size_t first, std::span<const Vec<D>> x, std::span<const Vec<D>> v,
+                  std::span<const Image<D>> images) {
+    velocity.value.write_part(first, three_columns<double>(v, D));
+    image.value.write_part(first, three_columns<std::int32_t>(images, D));
+    position.value.write_part(first, three_columns<double>(x, D));
+  }
+
+  std::uint64_t frame_bytes() const {
+    return position.value.row_bytes() + velocity.value.row_bytes() + image.value.row_bytes();
+  }
+
+  File file;
+  Element<double> position, velocity;
+  Element<std::int32_t> image;
+  Series<std::int64_t> step;
+  Series<double> time;
+  Handle box;
+  Element<double> edges, momentum;
+  Element<std::uint64_t> collisions;
+  std::map<std::string, Element<double>> observables;
+  std::array<double, 9> edge_rows{};
+  Exchange* ranks;
+};
+
+template <int D>
+TrajectoryWriter<D>::TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system)
+    : contents_(std::make_unique<Contents>(path, deck, system)) {}
+
+template <int D>
+TrajectoryWriter<D>::~TrajectoryWriter() = default;
+
+template <int D>
+void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
+  Contents& c = *contents_;
+  c.file.reserve(c.frame_bytes());
+  c.write_particles(*s.particles);
+  c.edges.value.append(c.edge_rows);
+  c.momentum.value.append(three_columns<double>(std::array{s.momentum}, D));
+  c.collisions.value.append(s.collisions);
+  const std::map<std::string, double> scalars = {
+      {"kinetic_energy", s.kinetic}, {"potential_energy", s.potential},        {"total_energy", s.total()},
+      {"shadow_energy", s.shadow},   {"max_energy_error", s.max_energy_error}, {"temperature", s.temperature},
+      {"pressure", s.pressure}};
+  for (const auto& [name, value] : scalars) c.observables.at(name).value.append(value);
+  c.time.append(s.time);
+  c.file.flush();
+  // The frames of the file are those that have a step: to MDAnalysis a missing step is the end of the file, and a
+  // missing position an error. So the step goes in when all else is safe; a kill in between leaves rows that are not
+  // read.
+  c.step.append(s.step);
+  c.file.flush();
+}
+
+template <int D>
+void TrajectoryWriter<D>::close() {
+  contents_->file.close();
+}
+
+template <int D>
+ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system) : ranks_(ranks) {
+  const Particles<D>& p = system.particles;
+  one_after_the_other(
+      ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); }, [](int, const Bytes&) {});
+}
+
+template <int D>
+void ShareTeller<D>::frame(const Snapshot<D>& s) {
+  one_after_the_other(
+      ranks_, [&] { return packed(s.particles->x, s.particles->v, s.particles->image); }, [](int, const Bytes&) {});
+}
+
+template class TrajectoryWriter<2>;
+template class TrajectoryWriter<3>;
+template class ShareTeller<2>;
+template class ShareTeller<3>;
+
+}  // namespace carom

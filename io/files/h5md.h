@@ -1,0 +1,59 @@
+#pragma once
+// The trajectory: an H5MD 1.1 file with one frame an output time (de Buyl, Colberg, Höfling, Comput. Phys. Commun. 185
+// (2014) 1546).
+//
+//   /particles/trajectory   position, velocity, image (value, step, time); id, species, mass, radius, charge; box
+//   /observables            kinetic_energy, …: one value a frame
+//   /parameters             deck, title, integrator, dimension, boundary, species
+//
+// Written so that MDAnalysis 2.4 can read it: three columns also in two dimensions (z = 0, a box edge of 1 and no
+// boundary along z; the true dimension and boundaries stand in /parameters), box edges at every frame, every `step` and
+// `time` explicit and shared by hard links, texts of fixed length, observables without subgroups. Units are reduced:
+// there are no `unit` attributes, so readers must be set not to convert. Positions are wrapped; unwrapped position =
+// position + image · edge. Every frame is flushed: it survives the end of the process; steps go in last, and their
+// number is the number of whole frames.
+//
+// Where ranks have shares of the particles (engine/ranks/shares.h) rank 0 writes one after the other, as a piece of the
+// same row: it never has more than one of them. The others have a ShareTeller each.
+
+#include <filesystem>
+#include <memory>
+
+#include "engine/ranks/shares.h"
+#include "engine/run/simulation.h"
+#include "io/deck/deck.h"
+
+namespace carom {
+
+template <int D>
+class TrajectoryWriter : public Observer<D> {
+ public:
+  /// Creates the file. `system` is read for what does not change: box, masses, radii, charges, species; and for the
+  /// ranks. Throws Error(Failure::file).
+  TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system);
+  ~TrajectoryWriter() override;
+
+  /// Appends a frame and flushes. Throws Error(Failure::file).
+  void frame(const Snapshot<D>& snapshot) override;
+
+  /// Flushes and closes. Throws Error(Failure::file).
+  void close();
+
+ private:
+  struct Contents;
+  std::unique_ptr<Contents> contents_;
+};
+
+/// Sends the particles of all other ranks to the writer on rank 0.
+template <int D>
+class ShareTeller : public Observer<D> {
+ public:
+  /// While the writer creates the file.
+  ShareTeller(Exchange& ranks, const System<D>& system);
+  void frame(const Snapshot<D>& snapshot) override;
+
+ private:
+  Exchange& ranks_;
+};
+
+}  // namespace carom

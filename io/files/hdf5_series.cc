@@ -1,0 +1,100 @@
+#include <algorithm>
+#include <numeric>
+
+#include "engine/base/error.h"
+#include "io/files/hdf5.h"
+
+namespace carom::hdf5 {
+
+namespace {
+
+/// Chunks of about 8 kB for small rows, and of at most 43,000 entries (about 1 MiB of positions) of large ones.
+std::vector<hsize_t> chunk_of(const std::vector<hsize_t>& shape, std::uint64_t row_bytes) {
+  constexpr hsize_t kMostEntries = 43000, kSmallChunk = 8192;
+  std::vector<hsize_t> chunk = shape;
+  chunk[0] = std::max<hsize_t>(1, kSmallChunk / std::max<hsize_t>(1, row_bytes));
+  for (std::size_t k = 1; k < chunk.size(); ++k) chunk[k] = std::clamp<hsize_t>(chunk[k], 1, kMostEntries);
+  return chunk;
+}
+
+}  // namespace
+
+SeriesBase::SeriesBase(const File& file, const Handle& where, const std::string& name, hid_t type,
+                       std::vector<hsize_t> row_shape)
+    : label_("write to data set " + name), file_(&file), shape_(std::move(row_shape)) {
+  row_elements_ = std::accumulate(shape_.begin(), shape_.end(), hsize_t{1}, std::multiplies<>());
+  row_bytes_ = row_elements_ * H5Tget_size(type);
+  shape_.insert(shape_.begin(), 0);
+  std::vector<hsize_t> limit = shape_;
+  limit[0] = H5S_UNLIMITED;
+  const int rank = static_cast<int>(shape_.size());
+  const Handle space(H5Screate_simple(rank, shape_.data(), limit.data()), H5Sclose);
+  const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_chunk(layout.id(), rank, chunk_of(shape_, row_bytes_).data());
+  dataset_ =
+      Handle(file.check(H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, layout.id(), H5P_DEFAULT),
+                        "create data set " + name),
+             H5Dclose);
+}
+
+ArrayBase::ArrayBase(const File& file, const Handle& where, const std::string& name, hid_t type, std::size_t size)
+    : label_("write to data set " + name), file_(&file) {
+  const hsize_t n = size;
+  const Handle space(H5Screate_simple(1, &n, nullptr), H5Sclose);
+  dataset_ =
+      Handle(file.check(H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                        "create data set " + name),
+             H5Dclose);
+}
+
+void ArrayBase::write(hid_t type, const void* data, std::size_t first, std::size_t elements) const {
+  if (elements == 0) return;
+  const hsize_t start = first, count = elements;
+  const Handle in_file(H5Dget_space(dataset_.id()), H5Sclose);
+  const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  H5Sselect_hyperslab(in_file.id(), H5S_SELECT_SET, &start, nullptr, &count, nullptr);
+  file_->check(H5Dwrite(dataset_.id(), type, in_memory.id(), in_file.id(), H5P_DEFAULT, data), label_);
+}
+
+void SeriesBase::append(hid_t type, const void* data, std::size_t elements) {
+  if (elements == 0) return;
+  std::vector<hsize_t> start(shape_.size(), 0), count = shape_;
+  start[0] = rows_;
+  count[0] = elements / row_elements_;
+  extend(count[0]);
+  write(type, data, start, count);
+}
+
+void SeriesBase::append_row() { extend(1); }
+
+void SeriesBase::drop_row() {
+  --rows_;
+  extend(0);
+}
+
+void SeriesBase::write_part(hid_t type, const void* data, std::size_t first, std::size_t elements) {
+  if (elements == 0) return;
+  std::vector<hsize_t> start(shape_.size(), 0), count = shape_;
+  start[0] = rows_ - 1;
+  count[0] = 1;
+  start[1] = first;
+  count[1] = elements / (row_elements_ / shape_[1]);
+  write(type, data, start, count);
+}
+
+void SeriesBase::extend(std::uint64_t rows) {
+  std::vector<hsize_t> size = shape_;
+  size[0] = rows_ + rows;
+  file_->check(H5Dset_extent(dataset_.id(), size.data()), label_);
+  rows_ = size[0];
+}
+
+void SeriesBase::write(hid_t type, const void* data, const std::vector<hsize_t>& start,
+                       const std::vector<hsize_t>& count) {
+  const Handle in_file(H5Dget_space(dataset_.id()), H5Sclose);
+  const Handle in_memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
+  H5Sselect_hyperslab(in_file.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+  file_->check(H5Dwrite(dataset_.id(), type, in_memory.id(), in_file.id(), H5P_DEFAULT, data), label_);
+}
+
+}  // namespace carom::hdf5

@@ -1,0 +1,87 @@
+#include "io/files/info.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <cstdio>
+
+#include "engine/base/error.h"
+#include "io/files/hdf5.h"
+
+namespace carom {
+
+namespace {
+
+std::string joined(const std::vector<std::string>& parts) {
+  std::string all;
+  for (const std::string& part : parts) all += (all.empty() ? "" : ", ") + part;
+  return all;
+}
+
+std::string line(const char* name, const std::string& value) { return fmt::format("{:<14}{}\n", name, value); }
+
+/// "from 0 to 12.5" of a data set that ascends.
+std::string range_of(const hdf5::File& file, const std::string& dataset, hsize_t rows) {
+  if (rows == 0) return "none";
+  return fmt::format("{:g} to {:g}", hdf5::number_at(file, dataset, 0), hdf5::number_at(file, dataset, rows - 1));
+}
+
+std::string optional_text(const hdf5::File& file, const std::string& dataset) {
+  return hdf5::exists(file, dataset) ? hdf5::text(file, dataset) : "unknown";
+}
+
+std::string describe_trajectory(const hdf5::File& file) {
+  const std::string particles = "/particles/trajectory";
+  const auto shape = hdf5::shape(file, particles + "/position/value");
+  const hsize_t frames = hdf5::shape(file, particles + "/position/step").at(0);
+  const int dimension = hdf5::exists(file, "/parameters/dimension")
+                            ? static_cast<int>(hdf5::number_at(file, "/parameters/dimension", 0))
+                            : static_cast<int>(shape.at(2));
+  const auto boundary = hdf5::attribute_texts(file, particles + "/box", "boundary");
+  std::vector<std::string> edges;
+  if (frames > 0)
+    for (int k = 0; k < dimension; ++k)
+      edges.push_back(fmt::format("{:g}", hdf5::diagonal_at(file, particles + "/box/edges/value", frames - 1, k)));
+  const auto version = hdf5::attribute_numbers(file, "/h5md", "version");
+  return line("kind", fmt::format("H5MD {}.{} trajectory", version.at(0), version.at(1))) +
+         line("written by", joined(hdf5::attribute_texts(file, "/h5md/creator", "name")) + " " +
+                                joined(hdf5::attribute_texts(file, "/h5md/creator", "version"))) +
+         line("title", optional_text(file, "/parameters/title")) +
+         line("integrator", optional_text(file, "/parameters/integrator")) +
+         line("dimension", std::to_string(dimension)) + line("particles", std::to_string(shape.at(1))) +
+         line("box", joined(edges)) +
+         line("boundary", hdf5::exists(file, "/parameters/boundary") ? joined(hdf5::texts(file, "/parameters/boundary"))
+                                                                     : joined(boundary)) +
+         line("frames", std::to_string(frames)) + line("times", range_of(file, particles + "/position/time", frames)) +
+         line("steps", range_of(file, particles + "/position/step", frames));
+}
+
+std::string describe_events(const hdf5::File& file) {
+  const hsize_t events = hdf5::shape(file, "/events/time").at(0);
+  const auto version = hdf5::attribute_numbers(file, "/events", "version");
+  return line("kind", fmt::format("events, format {}.{}", version.at(0), version.at(1))) +
+         line("written by", joined(hdf5::attribute_texts(file, "/events", "creator"))) +
+         line("title", optional_text(file, "/parameters/title")) +
+         line("integrator", optional_text(file, "/parameters/integrator")) +
+         line("dimension", std::to_string(hdf5::attribute_numbers(file, "/events", "dimension").at(0))) +
+         line("collisions", std::to_string(events)) + line("times", range_of(file, "/events/time", events));
+}
+
+}  // namespace
+
+std::string describe_file(const std::filesystem::path& path) {
+  const hdf5::File file = hdf5::File::open(path);
+  const std::string head = line("file", path.string());
+  if (hdf5::exists(file, "/h5md") && hdf5::exists(file, "/particles/trajectory/position/value"))
+    return head + describe_trajectory(file);
+  if (hdf5::exists(file, "/events/time_in_slab")) return head + describe_events(file);
+  throw Error(Failure::file, path.string() + ": an HDF5 file, but neither a trajectory nor events of carom");
+}
+
+int info_command(const std::filesystem::path& file) {
+  const std::string text = describe_file(file);
+  if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
+    throw Error(Failure::file, "standard output: cannot write to it");
+  return 0;
+}
+
+}  // namespace carom

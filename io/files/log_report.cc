@@ -1,0 +1,160 @@
+#include "io/files/log_report.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "io/files/progress.h"
+#include "io/files/version.h"
+
+namespace carom {
+
+namespace {
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown host";
+}
+
+std::string ends_at(const Plan& plan) {
+  std::string text;
+  auto add = [&](const std::string& end) { text += (text.empty() ? "" : " or ") + end; };
+  if (plan.steps) add(fmt::format("{} steps", *plan.steps));
+  if (plan.end_time) add(fmt::format("time {:g}", *plan.end_time));
+  if (plan.collisions) add(fmt::format("{} pair collisions", *plan.collisions));
+  return text;
+}
+
+/// The parts of a rank's time, as named below; the last two are what is left and the whole.
+std::array<double, 9> parts_of(const RankAccount& rank) {
+  const Counters::Seconds& t = rank.seconds;
+  std::array<double, 9> parts = {t.predict, t.queue, t.collide, t.force, t.sweep, t.communicate, t.output};
+  parts[7] = std::max(0.0, rank.wall_seconds - std::accumulate(parts.begin(), parts.begin() + 7, 0.0));
+  parts[8] = rank.wall_seconds;
+  return parts;
+}
+
+/// Shares are of the mean.
+std::string breakdown_text(std::span<const RankAccount> ranks) {
+  constexpr std::array names = {"predict",     "queue",  "collide", "force", "sweep",
+                                "communicate", "output", "other",   "total"};
+  std::vector<std::array<double, 9>> parts;
+  std::array<double, 9> mean{};
+  for (const RankAccount& rank : ranks) {
+    parts.push_back(parts_of(rank));
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += parts.back()[k] / static_cast<double>(ranks.size());
+  }
+  std::string text = ranks.size() == 1
+                         ? fmt::format("{:<12}{:>12}{:>9}", "part", "seconds", "share")
+                         : fmt::format("{:<12}{:>12}{:>12}{:>12}{:>9}", "part", "least", "mean", "most", "share");
+  for (std::size_t k = 0; k < mean.size(); ++k) {
+    const auto less = [k](const auto& a, const auto& b) { return a[k] < b[k]; };
+    const auto [least, most] = std::minmax_element(parts.begin(), parts.end(), less);
+    text += fmt::format("\n{:<12}", names[k]);
+    if (ranks.size() > 1) text += fmt::format("{:>12.3f}", (*least)[k]);
+    text += fmt::format("{:>12.3f}", mean[k]);
+    if (ranks.size() > 1) text += fmt::format("{:>12.3f}", (*most)[k]);
+    if (k + 1 < mean.size()) text += fmt::format("{:>8.1f}%", 100 * mean[k] / std::max(mean.back(), 1e-9));
+  }
+  return text;
+}
+
+/// What agreement between regions took; nothing where there is one region.
+std::string domains_text(std::span<const RankAccount> ranks) {
+  DomainCounts all;
+  std::uint64_t most = 0;
+  for (const RankAccount& rank : ranks) {
+    all.windows = rank.domains.windows;  // the same everywhere, like rounds
+    all.rounds = rank.domains.rounds;
+    all.events += rank.domains.events;
+    all.run_events += rank.domains.run_events;
+    all.redone_events += rank.domains.redone_events;
+    most = std::max(most, rank.domains.events);
+  }
+  if (all.windows == 0) return "";
+  const double events = std::max(static_cast<double>(all.events), 1.0);
+  return fmt::format(
+      "\n{} windows, {:.2f} rounds each; events at borders run twice {:.1f}%, redone {:.2f}%, imbalance {:.1f}%",
+      all.windows, static_cast<double>(all.rounds) / static_cast<double>(all.windows),
+      100 * (static_cast<double>(all.run_events) / events - 1), 100 * static_cast<double>(all.redone_events) / events,
+      100 * (static_cast<double>(most) * static_cast<double>(ranks.size()) / events - 1));
+}
+
+std::string memory_text(std::span<const RankAccount> ranks) {
+  constexpr double kMegabyte = 1e6;
+  double least = std::numeric_limits<double>::infinity(), sum = 0, most = 0;
+  for (const RankAccount& rank : ranks) {
+    const double megabytes = static_cast<double>(rank.peak_memory_bytes) / kMegabyte;
+    least = std::min(least, megabytes);
+    most = std::max(most, megabytes);
+    sum += megabytes;
+  }
+  if (ranks.size() == 1) return fmt::format("\nmemory at the peak {:.0f} MB", most);
+  return fmt::format("\nmemory of a rank at the peak {:.0f} to {:.0f} MB, {:.0f} on average", least, most,
+                     sum / static_cast<double>(ranks.size()));
+}
+
+}  // namespace
+
+std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
+  return fmt::format(
+      "carom {}\n"
+      "built with {}\n"
+      "{}\n"
+      "host {}, process {}, {}\n"
+      "deck {}{}\n"
+      "{} particles in {}-D, integrator {}, step {:g}, until {}\n"
+      "output in {}",
+      version_string(), compiler_string(), library_versions(), host_name(), getpid(),
+      ranks == 1 ? "1 rank" : fmt::format("{} ranks", ranks), deck.file.string(),
+      deck.title.empty() ? "" : ": " + deck.title, particles, deck.dimension, deck.integrator, deck.plan.step,
+      ends_at(deck.plan), deck.output.directory.string());
+}
+
+std::string report_text(const Deck& deck, const Statistics& s, std::span<const RankAccount> ranks) {
+  const Counters& c = s.counters;
+  const double scale = s.energy_reference > 0 ? s.energy_reference : 1;
+  std::string text = fmt::format(
+      "{} at time {:g} after {} steps: {} pair and {} wall collisions in {}, {:.3g} pair collisions/s\n"
+      "energy {:.10g}, largest error {:.2e} (relative {:.2e})",
+      s.stopped_early ? "stopped" : "done", s.end_time, s.steps, c.sphere_sphere, c.sphere_wall,
+      clock_text(s.wall_seconds), s.wall_seconds > 0 ? static_cast<double>(c.sphere_sphere) / s.wall_seconds : 0.0,
+      s.energy_final, s.max_energy_error, s.max_energy_error / scale);
+  if (s.max_shadow_energy_error)
+    text += fmt::format("\nshadow energy, largest error {:.2e}", *s.max_shadow_energy_error);
+  if (s.max_momentum_error) text += fmt::format("\nmomentum, largest error {:.2e}", *s.max_momentum_error);
+  text += fmt::format("\npressure {:.6g}, collision rate of a sphere {:.6g}, deepest overlap {:.1e}", s.mean_pressure,
+                      s.collision_rate, c.max_overlap);
+  if (s.mean_free_time)
+    text += fmt::format("\nmean free time {:.6g}, mean free path {:.6g}", *s.mean_free_time, *s.mean_free_path);
+  if (s.force_passes > 0)
+    text += fmt::format("\n{:.6g} force passes, {} sweeps, {} steps halved, {} fallbacks", s.force_passes, c.sweeps,
+                        c.slabs_halved, c.fallbacks);
+  if (c.divisions > 0)
+    text += fmt::format(
+        "\nparticles divided among {} ranks {} times, {} steps redone with more ghosts, {} of them with all particles",
+        ranks.size(), c.divisions, c.slabs_again, c.slabs_by_all);
+  text += domains_text(ranks) + memory_text(ranks);
+  return text + "\n" + breakdown_text(ranks) + "\nfiles in " + deck.output.directory.string();
+}
+
+template <int D>
+void ThermoTable<D>::thermo(const Snapshot<D>& s) {
+  if (!std::exchange(header_written_, true))
+    log_.note(fmt::format("{:>12} {:>10} {:>12} {:>14} {:>14} {:>16} {:>10} {:>12} {:>12}", "time", "step",
+                          "collisions", "kinetic", "potential", "total", "max |ΔE|", "temperature", "pressure"));
+  log_.note(fmt::format("{:>12.6g} {:>10} {:>12} {:>14.8g} {:>14.8g} {:>16.10g} {:>10.2e} {:>12.6g} {:>12.6g}", s.time,
+                        s.step, s.collisions, s.kinetic, s.potential, s.total(), s.max_energy_error, s.temperature,
+                        s.pressure));
+}
+
+template class ThermoTable<2>;
+template class ThermoTable<3>;
+
+}  // namespace carom

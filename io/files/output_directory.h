@@ -1,0 +1,27 @@
+#pragma once
+// The directory of a run: made where it is missing, and cleared of an earlier run without losing it.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "engine/run/observable.h"
+
+namespace carom {
+
+/// The files a run leaves there.
+namespace run_file {
+inline constexpr const char* deck = "deck.toml";
+inline constexpr const char* trajectory = "trajectory.h5md";
+inline constexpr const char* thermo = "thermo.csv";
+inline constexpr const char* events = "events.h5";
+inline constexpr const char* summary = "summary.json";
+inline constexpr const char* log = "run.log";
+inline std::string averages(const ObservableInfo& info) { return std::string(info.name) + ".csv"; }
+}  // namespace run_file
+
+/// Creates the directory if need be. If files of these names are there, moves them into its subdirectory `backup.1`, or
+/// the next number that is free, and returns that. Throws Error(Failure::file).
+std::optional<std::filesystem::path> prepare_output_directory(const std::filesystem::path& directory);
+
+}  // namespace carom

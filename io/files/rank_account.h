@@ -1,0 +1,28 @@
+#pragma once
+// What each rank sends to rank 0 at the end of a run: the time of its parts, and its memory.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/ranks/exchange.h"
+#include "engine/run/simulation.h"
+
+namespace carom {
+
+struct RankAccount {
+  Counters::Seconds seconds;
+  DomainCounts domains;
+  double wall_seconds = 0;
+  std::uint64_t peak_memory_bytes = 0;
+};
+
+/// Collective: the accounts of all ranks at work, by rank.
+std::vector<RankAccount> accounts_of_all(Exchange& at_work, const Statistics& mine);
+
+/// Largest resident memory of this process so far [bytes].
+std::uint64_t peak_memory_bytes();
+/// The largest of all.
+std::uint64_t peak_memory_bytes(std::span<const RankAccount> accounts);
+
+}  // namespace carom

@@ -1,0 +1,53 @@
+#pragma once
+// The files that grow while a run goes on, opened and closed together.
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "engine/run/simulation.h"
+#include "io/deck/deck.h"
+#include "io/files/averages.h"
+#include "io/files/events.h"
+#include "io/files/h5md.h"
+#include "io/files/thermo.h"
+
+namespace carom {
+
+/// Looks at the particles when the files of another rank do, so that all ranks stop at the same times.
+template <int D>
+class Onlooker : public Observer<D> {
+ public:
+  explicit Onlooker(const Sampling& sampling) : sampling_(sampling) {}
+  Sampling sampling() const override { return sampling_; }
+
+ private:
+  Sampling sampling_;
+};
+
+template <int D>
+class RunFiles {
+ public:
+  /// Creates them in deck.output.directory. Throws Error(Failure::file).
+  RunFiles(const Deck& deck, const System<D>& system);
+
+  /// Adds them as observers to the run. They must outlive it.
+  void add_to(Simulation<D>& simulation);
+
+  /// Writes what is left and closes. Throws Error(Failure::file).
+  void close();
+
+  /// The same for a run that has failed: each file is closed as well as it can be.
+  void close_after_failure();
+
+  /// What the averages say of species, for the summary.
+  std::vector<SpeciesValue> species_values() const;
+
+ private:
+  TrajectoryWriter<D> trajectory_;
+  ThermoWriter<D> thermo_;
+  std::unique_ptr<EventWriter<D>> events_;  // null where the deck does not want it
+  std::vector<AverageWriter<D>> averages_;
+};
+
+}  // namespace carom

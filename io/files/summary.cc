@@ -1,0 +1,65 @@
+#include "io/files/summary.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "io/files/rank_account.h"
+#include "io/files/version.h"
+
+namespace carom {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+}  // namespace
+
+std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Statistics& s) {
+  const Counters& c = s.counters;
+  const double rate = s.wall_seconds > 0 ? static_cast<double>(c.sphere_sphere) / s.wall_seconds : 0;
+  Json json = {
+      {"status", outcome.status},
+      {"deck", deck.file.string()},
+      {"title", deck.title},
+      {"version", version_string()},
+      {"integrator", deck.integrator},
+      {"dimension", deck.dimension},
+      {"particles", outcome.particles},
+      {"ranks", outcome.ranks},
+      {"steps", s.steps},
+      {"end_time", s.end_time},
+      {"events", {{"sphere_sphere", c.sphere_sphere}, {"sphere_wall", c.sphere_wall}}},
+      {"energy",
+       {{"initial", s.energy_initial},
+        {"after_first_step", s.energy_after_first_step},
+        {"final", s.energy_final},
+        {"reference", s.energy_reference},
+        {"max_abs_error", s.max_energy_error},
+        {"folded", s.energy_reference > 0 ? c.folded / s.energy_reference : 0.0}}},
+      {"tail", {{"energy", s.tail_energy}, {"pressure", s.tail_pressure}}},
+      {"shadow_energy", {{"max_abs_error", number_or_null(s.max_shadow_energy_error)}}},
+      {"momentum", {{"max_abs_error", number_or_null(s.max_momentum_error)}}},
+      {"max_overlap", c.max_overlap},
+      {"pressure", s.mean_pressure},
+      {"collision_rate", s.collision_rate},
+      {"mean_free_time", number_or_null(s.mean_free_time)},
+      {"mean_free_path", number_or_null(s.mean_free_path)},
+      {"force_passes", s.force_passes},
+      {"sweeps", c.sweeps},
+      {"pieces", c.pieces},
+      {"slabs_halved", c.slabs_halved},
+      {"frozen", c.frozen},
+      {"fallbacks", c.fallbacks},
+      {"wall_seconds", s.wall_seconds},
+      {"collisions_per_second", rate},
+      {"peak_memory_bytes", std::max(outcome.peak_memory_bytes, peak_memory_bytes())},
+  };
+  for (const SpeciesValue& value : outcome.species_values)
+    json[value.name].push_back({{"species", value.species}, {value.symbol, value.value}});
+  if (!outcome.error.empty()) json["error"] = outcome.error;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace carom

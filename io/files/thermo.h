@@ -1,0 +1,31 @@
+#pragma once
+// thermo.csv: one row an output time, each in the file before the run goes on.
+//
+// Columns: time, step, collisions, kinetic, potential, total, shadow, max_energy_error, momentum_x, momentum_y[,
+// momentum_z], temperature, pressure; reduced units; 17 digits, so that a row holds the exact doubles; `nan` where a
+// method has no shadow energy.
+
+#include <filesystem>
+
+#include "engine/run/simulation.h"
+#include "io/files/text_file.h"
+
+namespace carom {
+
+template <int D>
+class ThermoWriter : public Observer<D> {
+ public:
+  /// Creates the file with its header. Throws Error(Failure::file).
+  explicit ThermoWriter(const std::filesystem::path& path);
+
+  /// Appends a row. Throws Error(Failure::file).
+  void thermo(const Snapshot<D>& snapshot) override;
+
+  /// Puts everything on the disk. Throws Error(Failure::file).
+  void close() { file_.close(); }
+
+ private:
+  TextFile file_;
+};
+
+}  // namespace carom
