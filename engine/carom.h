@@ -10,7 +10,7 @@
 //   run.statistics().max_energy_error, run.system().particles.x …
 //
 // Integrators, interactions and their parameters have the names that they have in decks (`carom methods`, `carom
-// schema`). Mistakes throw carom::Error, whose message says what to do.
+// schema`). Mistakes throw carom::Error, with a remedy in its message.
 
 #include "engine/base/error.h"
 #include "engine/base/interaction.h"

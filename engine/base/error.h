@@ -21,10 +21,10 @@ class Error : public std::runtime_error {
   Failure failure_;
 };
 
-/// A number as messages show it: six digits, whatever its size.
-inline std::string short_text(double value) {
+/// A number as messages show it, with so many digits, whatever its size.
+inline std::string short_text(double value, int digits = 6) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
   return text;
 }
 

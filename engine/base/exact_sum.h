@@ -35,7 +35,7 @@ class ExactSum {
 };
 
 /// The same for many terms one after the other, most of them of about the size of the first that is not zero: those
-/// are split into multiples of two powers of two, whose sums are exact in a double.
+/// are split into multiples of two powers of two, and the sums of these are exact in a double.
 class ExactSeries {
  public:
   [[gnu::always_inline]] void add(double term) {

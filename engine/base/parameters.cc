@@ -41,40 +41,43 @@ std::string listed(std::span<const std::string_view> words) {
   return list;
 }
 
-void check_number(std::string_view of, const Parameter& parameter, double value) {
-  const std::string name = quoted(parameter.name);
-  if (!std::isfinite(value)) refuse(of, name + " is not finite", "give a finite number");
-  if (parameter.range == Parameter::Range::positive && !(value > 0))
-    refuse(of, name + " is " + std::to_string(value), "give a positive number");
-  if (parameter.range == Parameter::Range::non_negative && value < 0)
-    refuse(of, name + " is negative", "give zero or a positive number");
-  if (value > parameter.most)
-    refuse(of, name + " is " + std::to_string(value), "take at most " + std::to_string(parameter.most));
-}
-
 void check(std::string_view of, const Parameter& parameter, const ParameterValue& value) {
   const auto type = static_cast<std::size_t>(parameter.type);
   if (value.index() != type)
     refuse(of, quoted(parameter.name) + " is " + kTypes[value.index()], std::string("give ") + kTypes[type]);
-  if (const auto* real = std::get_if<double>(&value)) check_number(of, parameter, *real);
-  if (const auto* whole = std::get_if<std::int64_t>(&value)) check_number(of, parameter, static_cast<double>(*whole));
-  if (const auto* list = std::get_if<std::vector<double>>(&value))
-    for (const double each : *list) check_number(of, parameter, each);
-  const auto* text = std::get_if<std::string>(&value);
-  if (!text || parameter.choices.empty() || std::ranges::find(parameter.choices, *text) != parameter.choices.end())
-    return;
-  refuse(of, quoted(parameter.name) + " cannot be " + quoted(*text), "give one of: " + listed(parameter.choices));
+  const auto check_number = [&](double number) {
+    if (const auto error = number_error(number, parameter.range, parameter.most))
+      refuse(of, quoted(parameter.name) + " " + error->what, error->remedy);
+  };
+  std::string word;
+  if (const auto* real = std::get_if<double>(&value)) check_number(*real);
+  if (const auto* whole = std::get_if<std::int64_t>(&value)) {
+    check_number(static_cast<double>(*whole));
+    word = std::to_string(*whole);
+  }
+  if (const auto* list = std::get_if<std::vector<double>>(&value)) std::ranges::for_each(*list, check_number);
+  if (const auto* text = std::get_if<std::string>(&value)) word = *text;
+  if (parameter.choices.empty() || std::ranges::find(parameter.choices, word) != parameter.choices.end()) return;
+  for (const auto& [former, remedy] : parameter.former)
+    if (word == former) refuse(of, quoted(parameter.name) + " can no longer be " + quoted(word), std::string(remedy));
+  refuse(of, quoted(parameter.name) + " cannot be " + quoted(word), "give one of: " + listed(parameter.choices));
 }
 
 }  // namespace
 
+std::optional<ParameterError> number_error(double value, Parameter::Range range, double most) {
+  const std::string is = short_text(value, 15);
+  if (!std::isfinite(value)) return ParameterError{{}, "must be finite (is " + is + ")", "give an ordinary number"};
+  if (value > most) return ParameterError{{}, "is " + is, "take at most " + short_text(most, 15)};
+  if (range == Parameter::Range::positive && !(value > 0))
+    return ParameterError{{}, "must be positive (is " + is + ")", "give a number above 0"};
+  if (range == Parameter::Range::non_negative && value < 0)
+    return ParameterError{{}, "must be zero or positive (is " + is + ")", "give 0 or a number above"};
+  return {};
+}
+
 Parameters completed(std::string_view of, std::span<const Parameter> declared, Parameters given) {
-  for (const auto& [name, value] : given.all())
-    if (std::ranges::find(declared, name, &Parameter::name) == declared.end()) {
-      std::vector<std::string_view> known;
-      for (const Parameter& each : declared) known.push_back(each.name);
-      refuse(of, "unknown parameter " + quoted(name), "the parameters are: " + listed(known));
-    }
+  for (const auto& [name, value] : given.all()) find_named(declared, "parameter of " + std::string(of), name);
   for (const Parameter& parameter : declared) {
     const std::string name(parameter.name);
     if (!given.has(name)) {

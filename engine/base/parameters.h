@@ -4,12 +4,12 @@
 // A declaration is written once, beside the code that uses the value. The deck's schema, its validation, the
 // `carom schema` and `carom methods` pages and the resolved deck are all made from it.
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
 #include <map>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -65,6 +65,15 @@ class Parameters {
   std::map<std::string, ParameterValue, std::less<>> values_;
 };
 
+/// What is wrong with the value of a parameter, and what to do.
+struct ParameterError {
+  std::string_view parameter;
+  std::string what, remedy;
+};
+
+/// Of a number; nothing where it is finite, in the range and not above `most`.
+std::optional<ParameterError> number_error(double value, Parameter::Range range, double most);
+
 /// `given` with the defaults of what it leaves out. Throws Error(Failure::deck) where a value is missing, unknown, of
 /// another type, out of its range or none of the choices; `of` names what the parameters are for. A whole number is
 /// taken for a real one.
@@ -73,13 +82,14 @@ Parameters completed(std::string_view of, std::span<const Parameter> declared, P
 /// Throws Error(Failure::deck): there is no such `kind` of thing, and `known` are those there are.
 [[noreturn]] void throw_unknown(std::string_view kind, std::string_view name, std::span<const std::string_view> known);
 
-/// The declaration of that name in a registry.
-template <class Info>
-const Info& find_named(const std::vector<Info>& registry, std::string_view kind, std::string_view name) {
-  const auto found = std::ranges::find(registry, name, &Info::name);
-  if (found != registry.end()) return *found;
+/// The declaration of that name among others.
+template <class Infos>
+const auto& find_named(const Infos& declared, std::string_view kind, std::string_view name) {
   std::vector<std::string_view> known;
-  for (const Info& each : registry) known.push_back(each.name);
+  for (const auto& each : declared) {
+    if (each.name == name) return each;
+    known.push_back(each.name);
+  }
   throw_unknown(kind, name, known);
 }
 

@@ -30,7 +30,7 @@ void System<D>::check() const {
   same_length("image", p.image.size());
   for (int k = 0; k < D; ++k)
     if (!(box.edges[k] > 0) || !std::isfinite(box.edges[k]))
-      refuse("the edge of the box along axis " + std::to_string(k) + " is " + std::to_string(box.edges[k]),
+      refuse("the edge of the box along axis " + std::to_string(k) + " is " + short_text(box.edges[k]),
              "give a positive length");
   for (Id i = 0; i < p.size(); ++i) {
     const auto wrong = [&](const char* what, const char* remedy) {
@@ -41,7 +41,7 @@ void System<D>::check() const {
     if (!(p.mass[i] > 0) || !std::isfinite(p.mass[i])) wrong("mass", "give a positive one");
     if (!(p.radius[i] > 0) || !std::isfinite(p.radius[i])) wrong("radius", "give a positive one");
     if (!std::isfinite(p.charge[i])) wrong("charge", "give a finite one");
-    if (!species.empty() && p.species[i] >= species.size()) wrong("species", "give System::species a name for each");
+    if (p.species[i] >= species.size()) wrong("species", "give System::species a name for each");
   }
 }
 

@@ -33,7 +33,7 @@ struct System {
 
   Box<D> box;
   Particles<D> particles;
-  std::vector<std::string> species;  ///< names; empty: a run gives them
+  std::vector<std::string> species = {"particle"};  ///< names
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
   Exchange* ranks = nullptr;   ///< that advance this system together; null: one
   std::optional<Sizes> sizes;  ///< of all particles, where each rank has only its share of them (engine/ranks/shares.h)

@@ -28,7 +28,7 @@ bool any_rank(const System<D>& system, bool value) {
 /// Copies of particles that other ranks own get their positions and velocities from there.
 template <int D>
 void update_copies(System<D>& system) {
-  if (!system.part || system.part->knows_everybody()) return;
+  if (!system.part || system.part->knows_all()) return;
   Particles<D>& p = system.particles;
   system.part->tell([&](Id i, Bytes& to) { put(to, p.x[i]), put(to, p.v[i]); },
                     [&](Id i, Reader& from) { p.x[i] = from.get<Vec<D>>(), p.v[i] = from.get<Vec<D>>(); });
@@ -37,7 +37,7 @@ void update_copies(System<D>& system) {
 /// For what only a rank that knows all particles can do.
 template <int D>
 void need_all(const System<D>& system) {
-  if (system.part && !system.part->knows_everybody()) throw HaloTooSmall{};
+  if (system.part && !system.part->knows_all()) throw HaloTooSmall{};
 }
 
 /// How many particles all ranks have together.
@@ -105,7 +105,7 @@ void evaluate_mean_forces(const System<D>& system, Positions<D> x, Positions<D> 
   force_pass<D>(system, out, forces, counters, [&](const auto& term) { term.add_mean_forces(x, x_new, forces); });
 }
 
-/// Mean forces over a step whose end is changed again and again, for some particles only.
+/// Mean forces over a step with an end that is changed again and again, for some particles only.
 template <int D>
 class MeanForces {
  public:

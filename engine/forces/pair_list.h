@@ -67,7 +67,7 @@ class PairRecords {
 template <int D>
 class CutoffList {
  public:
-  /// `like`: a list whose skin is a good one to begin with; null: there is none.
+  /// `like`: a list with a skin that is good to begin with; null: there is none.
   CutoffList(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList* like = nullptr)
       : box_(box), cutoff_(cutoff), filter_(std::move(filter)) {
     if (like) learned_ = like->learned_;

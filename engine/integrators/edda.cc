@@ -230,7 +230,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     return most;
   }
 
-  /// Particles in collisions whose paths do not settle: a grazing contact may turn a small change into a larger one.
+  /// Particles in collisions, of which the paths do not settle: a grazing contact may turn a small change into a larger
+  /// one.
   void freeze_stalled(double largest) {
     any_freezes_ = true;
     for (Id i = 0; i < a_.size(); ++i)

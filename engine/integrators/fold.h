@@ -62,17 +62,17 @@ double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, Counters& 
   Exchange alone;
   Exchange& ranks = system.part ? system.part->ranks() : alone;
   Particles<D>& p = system.particles;
-  Bytes told;
-  for (const Lack<D>& each : mine) put(told, each);
+  Bytes message;
+  for (const Lack<D>& each : mine) put(message, each);
   std::vector<Lack<D>> lacks;
-  for (const Bytes& bytes : ranks.gather(told))
+  for (const Bytes& bytes : ranks.gather(message))
     for (Reader reader(bytes); reader.more();) lacks.push_back(reader.get<Lack<D>>());
   if (lacks.empty()) return 0;
   counters.frozen += lacks.size();
   std::ranges::sort(lacks, {}, &Lack<D>::id);
 
   std::vector<std::vector<Near>> near(lacks.size());
-  told.clear();
+  message.clear();
   for (std::size_t k = 0; k < lacks.size(); ++k) {
     for (Id j = 0; j < p.size(); ++j) {
       if (!p.owns(j)) continue;
@@ -83,10 +83,10 @@ double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, Counters& 
     const std::size_t most = std::min(kMost, near[k].size());
     std::ranges::partial_sort(near[k], near[k].begin() + static_cast<std::ptrdiff_t>(most), std::less<>{});
     near[k].resize(most);
-    for (const Near& each : near[k]) put(told, k), put(told, each);
+    for (const Near& each : near[k]) put(message, k), put(message, each);
     near[k].clear();
   }
-  for (const Bytes& bytes : ranks.gather(told))
+  for (const Bytes& bytes : ranks.gather(message))
     for (Reader reader(bytes); reader.more();) {
       const auto k = reader.get<std::size_t>();
       near[k].push_back(reader.get<Near>());

@@ -63,7 +63,7 @@ IntegratorInfo psa() {
           .conserves = "linear momentum to rounding; energy to order 1, lost at collisions",
           .parameters = {parameter::step(), parameter::max_events_per_step()},
           .documentation =
-              "Verlet whose drift is resolved event by event: half a kick, free flight with all its "
+              "Verlet with a drift that is resolved event by event: half a kick, free flight with all its "
               "collisions, half a kick. Collisions see velocities that lack the force of the step's other "
               "half: first order, and the cheapest.",
           .source = "Suh, Mier-y-Teran, White, Davis, Chem. Phys. 142 (1990) 203",

@@ -11,13 +11,13 @@
 namespace carom {
 namespace {
 
-constexpr double kLeastSlack = 0.5, kMostSlack = 2;  // that anybody comes between divisions [largest diameter]
+constexpr double kLeastSlack = 0.5, kMostSlack = 2;  // that a particle comes between divisions [largest diameter]
 constexpr double kSlabsApart = 16;                   // divisions, about
-constexpr double kFaster = 2;                        // than anybody is, somebody may come to be
+constexpr double kFaster = 2;                        // factor between the largest speed and the one allowed for
 constexpr double kRoom = 1.25;                       // for a path that was too long
-constexpr std::int64_t kSlabs = 64;                  // between divisions while everybody is known
+constexpr std::int64_t kSlabs = 64;                  // between divisions while all are known
 constexpr double kLeastDepth = 3;                    // of ghosts that do not matter [largest diameter]
-constexpr double kMost = 0.9;                        // of all particles; a rank that would know more knows everybody
+constexpr double kMost = 0.9;                        // of all particles; a rank that would know more knows all
 
 /// What ranks tell each other of a particle, beside its luggage.
 template <int D>
@@ -69,8 +69,8 @@ void Part<D>::collect() {
           Place{p.x[i], p.v[i], p.image[i], p.id_of(i)});
   Particles<D>& share = shares_.particles;
   const Id first = shares.first(ranks_.rank());
-  for (const Bytes& told : ranks_.swap(std::move(outgoing)))
-    for (Reader reader(told); reader.more();) {
+  for (const Bytes& message : ranks_.swap(std::move(outgoing)))
+    for (Reader reader(message); reader.more();) {
       const auto [x, v, image, id] = reader.get<Place>();
       share.x[id - first] = x;
       share.v[id - first] = v;
@@ -80,8 +80,8 @@ void Part<D>::collect() {
 
 template <int D>
 bool Part<D>::divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, double slab_length) {
-  if (everybody_ ? slab < next_ : !outdated()) return false;
-  if (!everybody_) {  // all has gone well since the last time
+  if (all_known_ ? slab < next_ : !outdated()) return false;
+  if (!all_known_) {  // all has gone well since the last time
     patience_ = std::max<std::int64_t>(patience_ / 2, 1);
     depth_ = std::max(0.75 * depth_, least_depth_);
     wanted_path_ *= 0.75;
@@ -94,28 +94,28 @@ bool Part<D>::divide_if_due(Luggage<D>& luggage, bool local, std::int64_t slab, 
 template <int D>
 void Part<D>::know_more(Luggage<D>& luggage, std::int64_t slab, double slab_length) {
   if (std::exchange(more_, false) && divide_some(&luggage, slab_length)) return;
-  tell_everybody(&luggage);
+  tell_all(&luggage);
   next_ = slab + patience_;
   patience_ = std::min(2 * patience_, kSlabs);
 }
 
 /// `luggage`: null before there is any.
 template <int D>
-void Part<D>::divide(Luggage<D>* luggage, bool everybody, double slab_length) {
-  if (!everybody && divide_some(luggage, slab_length)) return;
-  if (everybody_)
+void Part<D>::divide(Luggage<D>* luggage, bool all, double slab_length) {
+  if (!all && divide_some(luggage, slab_length)) return;
+  if (all_known_)
     own_anew();
   else
-    tell_everybody(luggage);
+    tell_all(luggage);
 }
 
 /// What this rank's own particles have to tell, put into the messages that for_each_receiver(place, visit) visits;
-/// `particles`: in each of them. Nobody is known any more after that.
+/// `particles`: in each of them. No particle is known any more after that.
 template <int D>
 std::vector<Bytes> Part<D>::pack(Luggage<D>* luggage, const std::vector<std::uint64_t>& particles,
                                  auto&& for_each_receiver) {
   const Particles<D>& p = known_ ? known_->particles : shares_.particles;
-  std::vector<Bytes> told(particles.size());
+  std::vector<Bytes> messages(particles.size());
   Bytes packed;
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
@@ -127,16 +127,16 @@ std::vector<Bytes> Part<D>::pack(Luggage<D>* luggage, const std::vector<std::uin
     const std::size_t size = packed.size() - before;
     std::memcpy(packed.data() + before - sizeof size, &size, sizeof size);
     for_each_receiver(p.x[i], [&](std::size_t message) {
-      if (told[message].empty()) told[message].reserve(particles[message] * packed.size());
-      told[message].insert(told[message].end(), packed.begin(), packed.end());
+      if (messages[message].empty()) messages[message].reserve(particles[message] * packed.size());
+      messages[message].insert(messages[message].end(), packed.begin(), packed.end());
     });
   }
   if (luggage) luggage->release();
   known_.reset();
-  return told;
+  return messages;
 }
 
-/// Gives each particle to the ranks that need it; false, and nothing has changed: all have to know everybody.
+/// Gives each particle to the ranks that need it; false, and nothing has changed: all ranks have to know all.
 template <int D>
 bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
   const System<D>& now = known_ ? *known_ : shares_;
@@ -163,34 +163,34 @@ bool Part<D>::divide_some(Luggage<D>* luggage, double slab_length) {
   ranks_.sum(known);
   if (static_cast<double>(std::ranges::max(known)) > kMost * static_cast<double>(total())) return false;
 
-  const auto told = ranks_.swap(
+  const auto messages = ranks_.swap(
       pack(luggage, mine, [&](const Vec<D>& x, auto&& visit) { division.for_each_near(division.wrapped(x), visit); }));
-  const auto arrivals = receive(told);
+  const auto arrivals = receive(messages);
   assign(division, near);
   path_ = path;
   slack_ = slack;
-  everybody_ = false;
-  unpack(luggage, told, arrivals);
+  all_known_ = false;
+  unpack(luggage, messages, arrivals);
   return true;
 }
 
 template <int D>
-void Part<D>::tell_everybody(Luggage<D>* luggage) {
-  const auto told =
+void Part<D>::tell_all(Luggage<D>* luggage) {
+  const auto messages =
       ranks_.gather(pack(luggage, {total() / holders_.size()}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
-  const auto arrivals = receive(told);
-  everybody_ = true;
+  const auto arrivals = receive(messages);
+  all_known_ = true;
   own_anew();
-  unpack(luggage, told, arrivals);
+  unpack(luggage, messages, arrivals);
 }
 
-/// Knows those of whom ranks have told; returns where in the messages they stand, by id.
+/// Takes in the particles of messages; returns where in these they stand, by id.
 template <int D>
-std::vector<typename Part<D>::Arrival> Part<D>::receive(const std::vector<Bytes>& told) {
+std::vector<typename Part<D>::Arrival> Part<D>::receive(const std::vector<Bytes>& messages) {
   std::vector<Arrival> arrivals;
-  for (std::size_t rank = 0; rank < told.size(); ++rank)
-    for (Reader from(told[rank]); from.more();) {
-      const std::size_t at = told[rank].size() - from.left();
+  for (std::size_t rank = 0; rank < messages.size(); ++rank)
+    for (Reader from(messages[rank]); from.more();) {
+      const std::size_t at = messages[rank].size() - from.left();
       const Id id = from.template get<State<D>>().id;
       from.skip(from.template get<std::size_t>());
       arrivals.push_back({id, rank, at});
@@ -205,7 +205,7 @@ std::vector<typename Part<D>::Arrival> Part<D>::receive(const std::vector<Bytes>
   Particles<D>& p = known_->particles;
   for_each_array(p, [&](auto& array) { array.reserve(arrivals.size()); });
   for (const Arrival& arrival : arrivals) {
-    Reader from(told[arrival.rank]);
+    Reader from(messages[arrival.rank]);
     from.skip(arrival.at);
     const auto s = from.template get<State<D>>();
     p.x.push_back(s.x);
@@ -223,15 +223,15 @@ std::vector<typename Part<D>::Arrival> Part<D>::receive(const std::vector<Bytes>
 
 /// Makes what acts on those known, and gives the method what it has to know of them.
 template <int D>
-void Part<D>::unpack(Luggage<D>* luggage, const std::vector<Bytes>& told, const std::vector<Arrival>& arrivals) {
+void Part<D>::unpack(Luggage<D>* luggage, const std::vector<Bytes>& messages, const std::vector<Arrival>& arrivals) {
   for (const auto& term : shares_.interactions) {
     known_->interactions.push_back(term->among(shares_.particles, known_->particles));
-    if (!known_->interactions.back()) throw std::logic_error("Part: somebody is missing whom an own particle feels");
+    if (!known_->interactions.back()) throw std::logic_error("Part: a particle is missing that an own particle feels");
   }
   if (!luggage) return;
   luggage->regroup(*known_);
   for (Id i = 0; i < arrivals.size(); ++i) {
-    Reader from(told[arrivals[i].rank]);
+    Reader from(messages[arrivals[i].rank]);
     from.skip(arrivals[i].at);
     from.template get<State<D>>();
     from.template get<std::size_t>();
@@ -239,7 +239,7 @@ void Part<D>::unpack(Luggage<D>* luggage, const std::vector<Bytes>& told, const 
   }
 }
 
-/// Everybody is known: says anew who owns whom.
+/// All are known: sets anew which rank owns each.
 template <int D>
 void Part<D>::own_anew() {
   constexpr double kAll = std::numeric_limits<double>::infinity();
@@ -247,7 +247,7 @@ void Part<D>::own_anew() {
   assign(Division<D>(known_->box, known_->particles.x, holders_.size(), kAll, alone), kAll);
 }
 
-/// Says of those known who owns them, and who knows this rank's own; ghosts nearer than `near` matter.
+/// Sets the owners of those known, and which ranks know this rank's own; ghosts nearer than `near` matter.
 template <int D>
 void Part<D>::assign(const Division<D>& division, double near) {
   Particles<D>& p = known_->particles;
@@ -277,7 +277,7 @@ void Part<D>::assign(const Division<D>& division, double near) {
 
 template <int D>
 bool Part<D>::covers(double path) {
-  if (everybody_ || path <= path_) return true;
+  if (all_known_ || path <= path_) return true;
   more_ = std::isfinite(path);
   if (more_) wanted_path_ = kRoom * path;
   return false;
@@ -285,14 +285,14 @@ bool Part<D>::covers(double path) {
 
 template <int D>
 bool Part<D>::covers(const Particles<D>& p, std::span<const Vec<D>> a, double length) {
-  if (everybody_) return true;
+  if (all_known_) return true;
   double farthest = 0;
   for (Id i = 0; i < p.size(); ++i)
     if (p.owns(i)) farthest = std::max(farthest, (p.v[i] + 0.5 * length * a[i]).squaredNorm());
   return covers(length * std::sqrt(largest(farthest)));
 }
 
-/// Whether somebody has come so far that the particles are to be divided anew. Looks only where somebody may have.
+/// Whether a particle has come so far that all are to be divided anew. Looks only where one may have.
 template <int D>
 bool Part<D>::outdated() {
   if (safe_slabs_ >= 1) {

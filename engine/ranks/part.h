@@ -2,7 +2,7 @@
 // What one rank does of a system that several ranks advance together.
 //
 // Every particle is owned by one rank, by where it is; others have copies of it, ghosts (Particles::ghost). What acts
-// on a particle is computed by its owner, with all its pairs, in sums of integers, and told to the others: the sums are
+// on a particle is computed by its owner, with all its pairs, in sums of integers, and sent to the others: the sums are
 // those of one rank alone, bit for bit. What is cheap beside that each rank does for all particles that it knows.
 //
 // A rank knows either all particles, or its own particles and those near them. For methods that can do with these
@@ -53,7 +53,7 @@ class Part {
 
   /// The particles that this rank knows.
   System<D>& known() { return *known_; }
-  bool knows_everybody() const { return everybody_; }
+  bool knows_all() const { return all_known_; }
   /// How many particles there are, known or not.
   std::size_t total() const { return shares_.size(); }
 
@@ -111,30 +111,30 @@ class Part {
     Id id;
     std::size_t rank, at;
   };
-  void divide(Luggage<D>* luggage, bool everybody, double slab_length);
+  void divide(Luggage<D>* luggage, bool all, double slab_length);
   bool divide_some(Luggage<D>* luggage, double slab_length);
-  void tell_everybody(Luggage<D>* luggage);
+  void tell_all(Luggage<D>* luggage);
   void own_anew();
   std::vector<Bytes> pack(Luggage<D>* luggage, const std::vector<std::uint64_t>& particles, auto&& for_each_receiver);
-  std::vector<Arrival> receive(const std::vector<Bytes>& told);
+  std::vector<Arrival> receive(const std::vector<Bytes>& messages);
   void assign(const Division<D>& division, double near);
-  void unpack(Luggage<D>* luggage, const std::vector<Bytes>& told, const std::vector<Arrival>& arrivals);
+  void unpack(Luggage<D>* luggage, const std::vector<Bytes>& messages, const std::vector<Arrival>& arrivals);
   bool outdated();
 
   System<D>& shares_;
   std::unique_ptr<System<D>> known_;
-  bool everybody_ = false;
+  bool all_known_ = false;
   TimedExchange ranks_;
   std::vector<std::vector<Id>> holders_, ghosts_;  // by rank: own particles that it knows, and ghosts of its particles
   std::vector<int> partners_;                      // the ranks of which there are any
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
   double path_ = 0, slack_ = 0;
-  double safe_slabs_ = 0;       // until somebody may have come too far
+  double safe_slabs_ = 0;       // until a particle may have come too far
   double wanted_path_ = 0;      // at least that, since one was too long not long ago
   bool more_ = false;           // ghosts would have been enough for the slab
   double least_depth_, depth_;  // of ghosts that do not matter [largest diameter]
-  std::int64_t next_ = 0;       // while everybody is known: the slab before which to divide
+  std::int64_t next_ = 0;       // while all are known: the slab before which to divide
   std::int64_t patience_ = 1;
 };
 

@@ -18,11 +18,11 @@ Bytes packed(std::span<const Contact<D>> contacts) {
   return {bytes.begin(), bytes.end()};
 }
 
-/// Appends the contacts that ranks have told, in the order of their keys.
+/// Appends the contacts that were received from ranks, in the order of their keys.
 template <int D>
-void merge_contacts(const std::vector<Bytes>& told, std::vector<Contact<D>>& to) {
+void merge_contacts(const std::vector<Bytes>& messages, std::vector<Contact<D>>& to) {
   const auto before = static_cast<std::ptrdiff_t>(to.size());
-  for (const Bytes& each : told)
+  for (const Bytes& each : messages)
     for (Reader reader(each); reader.more();) to.push_back(reader.get<Contact<D>>());
   std::sort(to.begin() + before, to.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
 }

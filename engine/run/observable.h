@@ -59,12 +59,6 @@ class Observable : public Observer<D> {
   std::uint64_t samples_ = 0;
 };
 
-/// What is wrong with one parameter, and what to do.
-struct ParameterError {
-  std::string_view parameter;
-  std::string what, remedy;
-};
-
 /// What a declaration says of D dimensions.
 template <int D>
 struct ObservableMaker {

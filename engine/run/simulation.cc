@@ -18,6 +18,12 @@ constexpr double kLeastInterval = 1e-6;
 template <int D>
 void check_spheres(const System<D>& system) {
   const Particles<D>& p = system.particles;
+  const double diameter = p.size() > 0 ? 2 * *std::ranges::max_element(p.radius) : 0;
+  for (int k = 0; k < D; ++k)
+    if (system.box.periodic(k) && system.box.edges[k] < diameter)
+      throw Error(Failure::initial_state, "the periodic box is " + short_text(system.box.edges[k]) + " long on axis " +
+                                              std::to_string(k) + ", less than a diameter of " + short_text(diameter) +
+                                              "; enlarge it, a sphere must not touch itself");
   if (const Outsiders out = find_outsiders<D>(system.box, p.x, p.radius); out.spheres > 0)
     throw Error(Failure::initial_state, "particle " + std::to_string(out.worst) + " is not inside the walls of axis " +
                                             std::to_string(out.axis) +
@@ -25,7 +31,7 @@ void check_spheres(const System<D>& system) {
   if (const Overlaps overlaps = find_overlaps<D>(system.box, p.x, p.radius); overlaps.pairs > 0)
     throw Error(Failure::initial_state, "particles " + std::to_string(overlaps.lo) + " and " +
                                             std::to_string(overlaps.hi) + " overlap, at distance " +
-                                            std::to_string(overlaps.distance) + "; move them apart");
+                                            short_text(overlaps.distance) + "; move them apart");
 }
 
 void check_interval(double interval, double step) {
@@ -54,8 +60,6 @@ typename Simulation<D>::Prepared Simulation<D>::prepare(std::unique_ptr<System<D
                                                         Parameters given, Plan plan) {
   const std::string name(info.name);
   system->check();
-  for (const std::uint16_t s : system->particles.species)
-    while (system->species.size() <= s) system->species.push_back("species " + std::to_string(system->species.size()));
   for (const auto& term : system->interactions)
     if (!info.smooth_forces && !term->common_acceleration())
       throw Error(Failure::deck, name + " knows no forces but a uniform-field; take psa, edda or their relatives");
@@ -118,7 +122,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
         part->know_more(*integrator_, slab.index, slab.length);
         monitor.regroup();
         ++before.slabs_again;
-        before.slabs_by_all += part->knows_everybody() ? 1 : 0;
+        before.slabs_by_all += part->knows_all() ? 1 : 0;
         s.counters = before;
         contacts.clear();
       }

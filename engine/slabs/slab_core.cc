@@ -100,7 +100,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     x_[each.id] = each.x + rest * each.v + (0.5 * rest * rest) * a_i;
     v_[each.id] = each.v + rest * a_i;
   }
-  const bool shared = system_.part && !system_.part->knows_everybody();
+  const bool shared = system_.part && !system_.part->knows_all();
   all_moved_ = 0;
   for (Id i = 0; i < x_.size(); ++i) {
     moved_[i] = x_[i] != last_x_[i];
@@ -351,7 +351,7 @@ void SlabCore<D>::agree(bool failed) {
 
 template <int D>
 void SlabCore<D>::commit(double time) {
-  if (!system_.part || system_.part->knows_everybody())
+  if (!system_.part || system_.part->knows_all())
     scan_.commit(time, contacts_);
   else if (!commit_contacts<D>(system_, contacts_, max_events_, *counters_, log_))
     throw HaloTooSmall{};  // with all particles known the error can name them

@@ -72,6 +72,7 @@ template <int D>
 void fill_box(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
+  system.species.clear();
   for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <sstream>
 
 #include "io/deck/deck_toml.h"
@@ -62,22 +61,10 @@ class NodeReader {
     return std::nullopt;
   }
 
-  template <class Number>
-  bool in_range(const toml::node& node, Number value) {
-    const bool positive = key_.range == Parameter::Range::positive;
-    if (static_cast<double>(value) > key_.most) {
-      std::ostringstream is, remedy;
-      is << std::setprecision(15) << "is " << value;
-      remedy << std::setprecision(15) << "take at most " << key_.most;
-      complain(node, is.str(), remedy.str());
-      return false;
-    }
-    if (key_.range == Parameter::Range::any || value > 0 || (!positive && value == 0)) return true;
-    std::ostringstream is;
-    is << value;
-    complain(node, std::string("must be ") + (positive ? "positive" : "zero or positive") + " (is " + is.str() + ")",
-             positive ? "give a number above 0" : "give 0 or a number above");
-    return false;
+  bool in_range(const toml::node& node, double value) {
+    const auto error = number_error(value, key_.range, key_.most);
+    if (error) complain(node, error->what, error->remedy);
+    return !error;
   }
 
   std::optional<double> read_real(const toml::node& node) {
@@ -88,10 +75,6 @@ class NodeReader {
       value = static_cast<double>(integer->get());
     else
       return wrong_type(node, "a number");
-    if (!std::isfinite(value)) {
-      complain(node, "must be finite (is " + std::to_string(value) + ")", "give an ordinary number");
-      return {};
-    }
     if (!in_range(node, value)) return {};
     return value;
   }
@@ -105,7 +88,7 @@ class NodeReader {
       value = static_cast<std::int64_t>(real->get());
     else
       return wrong_type(node, "an integer");
-    if (!in_range(node, value) || !chosen(node, std::to_string(value))) return {};
+    if (!in_range(node, static_cast<double>(value)) || !chosen(node, std::to_string(value))) return {};
     return value;
   }
 

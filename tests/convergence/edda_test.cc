@@ -426,7 +426,7 @@ TEST(Edda, AMeltOfStiffChainsTakesFewSweeps) {
 }
 
 TEST(Edda, StepsFarTooLongForTheSpringsAreHalvedAndLoseNoEnergy) {
-  // h²ω²/4 is 80, 640, 6400: sweeps that part further and further are no reason to freeze who collides.
+  // h²ω²/4 is 80, 640, 6400: sweeps that part further and further are no reason to freeze colliding particles.
   for (const double stiffness : {1e5, 8e5, 8e6}) {
     const auto run = test::run_steps<2>(spring_lattice(12, stiffness), "edda", 0.02, 4);
     const auto& s = run->statistics();

@@ -77,11 +77,11 @@ class Bonds {
   double reach(const Particles<D>& share, Exchange& ranks) const {
     const Id first = share.size() > 0 ? share.id_of(0) : 0;
     const auto here = [&](Id id) { return id >= first && id - first < share.size(); };
-    Bytes told;  // the higher partners of bonds, where another rank has the lower one
+    Bytes message;  // the higher partners of bonds, where another rank has the lower one
     for (const auto& [i, j] : pairs_)
-      if (!here(i) && here(j)) put(told, j), put(told, share.x[j - first]);
+      if (!here(i) && here(j)) put(message, j), put(message, share.x[j - first]);
     std::unordered_map<Id, Vec<D>> elsewhere;
-    for (const Bytes& each : ranks.gather(told))
+    for (const Bytes& each : ranks.gather(message))
       for (Reader reader(each); reader.more();) {
         const auto id = reader.get<Id>();
         elsewhere[id] = reader.get<Vec<D>>();

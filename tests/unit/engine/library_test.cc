@@ -1,4 +1,4 @@
-// The engine as a library: what a program may get wrong, and what it is told.
+// The engine as a library: what a program may get wrong, and the errors.
 
 #include <carom/carom.h>
 #include <gtest/gtest.h>
@@ -64,11 +64,14 @@ TEST(Library, MistakesAreErrorsWithARemedy) {
   const auto none = [](auto&) {};
   expect_says(run_message(Failure::deck, none, "leapfrog"),
               "unknown integrator 'leapfrog'; give one of: free-flight, ");
-  expect_says(run_message(Failure::deck, none, "psa", {{"step", 0.1}, {"order", 4}}), "psa: unknown parameter 'order'");
+  expect_says(run_message(Failure::deck, none, "psa", {{"step", 0.1}, {"order", 4}}),
+              "unknown parameter of psa 'order'; give one of: step, ");
   expect_says(run_message(Failure::deck, none, "psa", {}), "psa: missing parameter 'step'; give it: ");
   expect_says(run_message(Failure::deck, none, "psa", {{"step", 0.1}}, {.step = 0.1, .steps = 1}), "given twice");
   expect_says(run_message(Failure::deck, none, "psa", {{"step", "long"}}), "'step' is a text; give a number");
-  expect_says(run_message(Failure::deck, none, "psa", {{"step", -1.0}}), "give a positive number");
+  expect_says(run_message(Failure::deck, none, "psa", {{"step", -1.0}}),
+              "'step' must be positive (is -1); give a number above 0");
+  expect_says(run_message(Failure::deck, none, "cdda", {{"step", 0.1}, {"order", 3}}), "'order' cannot be '3'");
   expect_says(run_message(Failure::deck, none, "mcva", {{"step", 0.1}, {"variant", "other"}}), "give one of: grid");
   expect_says(run_message(Failure::deck, none, "psa", {{"step", 0.1}}, {}), "the plan has no end");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.mass.pop_back(); }),
@@ -80,6 +83,14 @@ TEST(Library, MistakesAreErrorsWithARemedy) {
               "particles 0 and 1 overlap");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.x[1][0] = 5.8; }), "not inside the walls");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.box.edges[1] = 0; }), "edge of the box along axis 1");
+  expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.species[1] = 1; }),
+              "species of particle 1");
+  expect_says(run_message(Failure::initial_state,
+                          [](auto& s) {
+                            s.box.boundary.fill(Boundary::periodic);
+                            s.box.edges[1] = 0.9;
+                          }),
+              "the periodic box is 0.9 long on axis 1, less than a diameter of 1");
   expect_says(run_message(Failure::deck, [](auto& s) { add_interaction(s, "springs", {}); }),
               "unknown interaction 'springs'; give one of: harmonic-bond, ");
   const auto with_gravity = [](auto& s) { add_interaction(s, "gravity", {{"constant", 1.0}}); };

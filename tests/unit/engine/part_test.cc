@@ -231,7 +231,7 @@ TEST(Part, GhostsThatGoWrong) {
     EXPECT_GT(c.slabs_again, c.slabs_by_all) << method;  // more ghosts were enough
   }
 }
-/// From bonds that ranks find in their shares to what they sum up over what they know: nobody has all.
+/// From bonds that ranks find in their shares to what they sum up over what they know: none has all.
 TEST(Part, NobodyHasEverybody) {
   const auto lattice = [] { return test::hard_spheres<2>(40, 0.5); };
   const test::Given bonds = {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}};
@@ -254,7 +254,7 @@ TEST(Part, NobodyHasEverybody) {
     Part<2> part(*system, true, 0.02);
     System<2>& known = part.known();
     Particles<2>& p = known.particles;
-    EXPECT_FALSE(part.knows_everybody());
+    EXPECT_FALSE(part.knows_all());
     EXPECT_EQ(part.total(), all.size());
     EXPECT_EQ(system->particles.size(), all.size() / 8);
     EXPECT_LT(p.size(), all.size() / 2);

@@ -41,7 +41,7 @@ Precise precise_quotient(F f, const Precise& b, const Precise& a) {
 }
 
 /// Compares at ρ log-uniform in [from, to] and ρ' = ρ (1 ± δ), δ from 1e-17 to 10 and 0. `allowed(ρ, δ)` multiplies
-/// what counts as one ε, for potentials whose arguments round.
+/// what counts as one ε, for potentials with arguments that round.
 template <Potential P, class V, class M, class Allowed>
 Errors measure(const P& potential, V exact, M scale, double from, double to, Allowed allowed, int count = 1500) {
   std::mt19937_64 random(7);

@@ -372,7 +372,7 @@ void expect_forces(const std::vector<Vec<D>>& f, const std::vector<typename Expe
     }
 }
 
-/// An error must name a pair, by ids, whose force or energy is too large, and say what to do.
+/// An error must name a pair, by ids, with a force or energy that is too large, and say what to do.
 template <int D>
 void expect_reason(const Error& error, const Expected<D>& expected, const Particles<D>& p) {
   EXPECT_EQ(error.failure(), Failure::numerical);
