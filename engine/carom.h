@@ -14,10 +14,10 @@
 
 #include "engine/base/error.h"
 #include "engine/base/interaction.h"
-#include "engine/base/system.h"
 #include "engine/forces/add_interaction.h"
 #include "engine/forces/forces.h"
 #include "engine/integrators/integrator.h"
+#include "engine/ranks/system.h"
 #include "engine/run/mean_squared_displacement.h"
 #include "engine/run/observable.h"
 #include "engine/run/radial_distribution.h"

@@ -6,8 +6,8 @@
 // the particles. Positions are passed in as arrays in id order. Forces, energies and virials are summed in fixed point
 // (force_sums.h): no sum depends on how the pairs were found.
 //
-// Where several ranks share a system (engine/ranks/part.h) sums over the system are over what this rank owns: its
-// particles, and the pairs of which it owns the lower id. What acts on a ghost is left incomplete.
+// Where several ranks share a system (engine/ranks/decomposition.h) sums over the system are over what this rank owns:
+// its particles, and the pairs of which it owns the lower id. What acts on a ghost is left incomplete.
 
 #include <memory>
 #include <span>
@@ -75,13 +75,13 @@ class Interaction {
   /// Adds V″(x) w.
   virtual void add_hessian_product(Positions<D> x, Positions<D> w, ForceSums<D>& out) const = 0;
 
-  /// The same term for `some` of all particles, which outlive it; `made_for`: the particles it was made for, all or a
-  /// share. Null where they are not enough for those of them that are owned.
-  virtual std::unique_ptr<Interaction> among(const Particles<D>& made_for, const Particles<D>& some) const = 0;
+  /// The same term for `some` of all particles, which outlive it. Null where they are not enough for those of them that
+  /// are owned.
+  virtual std::unique_ptr<Interaction> among(const Particles<D>& some) const = 0;
   /// How far it reaches from positions x, as far as this rank knows [length]; infinite: it needs all particles.
   virtual double reach(Positions<D> x) const = 0;
-  /// The same of a term that was made for a share of the particles. Collective.
-  virtual double reach(const Particles<D>& share, Exchange& ranks) const = 0;
+  /// The same of a term that was made for a block of the particles. Collective.
+  virtual double reach(const Particles<D>& block, Exchange& ranks) const = 0;
 
   /// How many pairs (or particles, for a field) of this rank one evaluation visits within reach: the unit of
   /// `force_passes`.
@@ -94,7 +94,7 @@ class Interaction {
   /// What its cutoff takes away, estimated; of all particles, on each rank.
   virtual Tail tail() const { return {}; }
 
-  /// The bonds it stands for, by ids, where it was made for all particles or a share; null where it has none.
+  /// The bonds it stands for, by ids, where it was made for all particles or a block; null where it has none.
   virtual const PairList* bonds() const { return nullptr; }
 
   /// How large its forces are where particles are so far apart on average [length]; a function of parameters and of
@@ -115,7 +115,7 @@ struct InteractionContext {
   const Particles<D>& particles;
   const std::vector<std::string>& species;   ///< names, in the order of Particles::species
   bool placed = true;                        ///< whether positions are known; else only the parameters count
-  std::size_t total = particles.size();      ///< how many there are on all ranks, where `particles` are a share of them
+  std::size_t total = particles.size();      ///< how many there are on all ranks, where `particles` are a block of them
   Exchange* ranks = nullptr;                 ///< these ranks; null: all particles are here
   std::shared_ptr<const BondTable> bonds{};  ///< of all terms of bonds; null: there are no such terms
 };

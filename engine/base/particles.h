@@ -1,8 +1,8 @@
 #pragma once
 // The particles of a run, in the order of their ids, as integrators and observers see them: all at the same time.
 //
-// Where several ranks share a system (engine/ranks/part.h) each has the particles it owns and copies of others, ghosts.
-// It may have only some of all then: their numbers here follow the order of their ids.
+// Where several ranks share a system (engine/ranks/decomposition.h) each has the particles it owns and copies of
+// others, ghosts. It may have only some of all then: their numbers here follow the order of their ids.
 
 #include <span>
 #include <string>

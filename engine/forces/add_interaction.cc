@@ -1,7 +1,6 @@
 #include "engine/forces/add_interaction.h"
 
 #include "engine/forces/pair_filter.h"
-#include "engine/ranks/shares.h"
 
 namespace carom {
 
@@ -13,7 +12,7 @@ void add_interaction(System<D>& system, std::string_view type, Parameters given)
                                                                              .particles = system.particles,
                                                                              .species = system.species,
                                                                              .total = system.size(),
-                                                                             .ranks = shared_by(system),
+                                                                             .ranks = system.decomposition.others(),
                                                                              .bonds = bonds_of(system.interactions)}));
 }
 

@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "engine/base/system.h"
+#include "engine/ranks/system.h"
 
 namespace carom {
 

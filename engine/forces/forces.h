@@ -8,50 +8,17 @@
 #include <span>
 
 #include "engine/base/counters.h"
-#include "engine/base/system.h"
-#include "engine/ranks/part.h"
+#include "engine/ranks/system.h"
 
 namespace carom {
 
-/// The sum over all ranks of what each has summed up over what it owns.
-template <int D, class Sums>
-Sums of_all_ranks(const System<D>& system, const Sums& mine) {
-  if (system.part) return sum_of_all(system.part->ranks(), mine);
-  return system.sizes ? sum_of_all(*system.ranks, mine) : mine;
-}
-
-template <int D>
-bool any_rank(const System<D>& system, bool value) {
-  return system.part ? system.part->largest(value ? 1 : 0) > 0 : value;
-}
-
-/// Copies of particles that other ranks own get their positions and velocities from there.
-template <int D>
-void update_copies(System<D>& system) {
-  if (!system.part || system.part->knows_all()) return;
-  Particles<D>& p = system.particles;
-  system.part->tell([&](Id i, Bytes& to) { put(to, p.x[i]), put(to, p.v[i]); },
-                    [&](Id i, Reader& from) { p.x[i] = from.get<Vec<D>>(), p.v[i] = from.get<Vec<D>>(); });
-}
-
-/// For what only a rank that knows all particles can do.
-template <int D>
-void need_all(const System<D>& system) {
-  if (system.part && !system.part->knows_all()) throw HaloTooSmall{};
-}
-
-/// How many particles all ranks have together.
-template <int D>
-std::size_t count_of_all(const System<D>& system) {
-  return system.part ? system.part->total() : system.size();
-}
 /// (V/N)^(1/D) [length].
 template <int D>
 double mean_distance(const System<D>& system) {
-  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, count_of_all(system))), 1.0 / D);
+  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, system.size())), 1.0 / D);
 }
 
-/// The quanta of a system; a function of its parameters, masses, charges and box. Collective where ranks have shares.
+/// The quanta of a system; a function of its parameters, masses, charges and box. Collective.
 template <int D>
 Quanta quanta(const System<D>& system) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -64,7 +31,7 @@ Quanta quanta(const System<D>& system) {
     most[2] = std::max(most[2], scale.spread * scale.force);
     most[3] = std::max(most[3], scale.spread * scale.energy);
   }
-  if (system.ranks && system.sizes) system.ranks->largest(most);
+  system.decomposition.ranks().largest(most);
   const auto power = [](double x) { return x < kNone ? std::exp2(std::floor(std::log2(std::max(x, 0x1p-900)))) : 1; };
   // Not so small that the largest do not fit.
   return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])),
@@ -83,7 +50,7 @@ void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, C
   const Stopwatch watch(counters.seconds.force);
   for (const auto& term : system.interactions) add(*term);
   for (Id i = 0; i < out.size(); ++i) out[i] = forces.value(i);
-  if (system.part) system.part->refresh(out);
+  system.decomposition.update(out);
   counters.force_passes += 1;
 }
 
@@ -141,7 +108,7 @@ void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions
   double most = 0;
   for (Id i = 0; i < w.size(); ++i)
     if (system.particles.owns(i)) most = std::max(most, w[i].template lpNorm<Eigen::Infinity>());
-  if (system.part) most = system.part->largest(most);
+  most = system.decomposition.largest(most);
   // The quantum of forces where particles are displaced by a part of their distance.
   const double share = most > 0 && std::isfinite(most) ? most / mean_distance(system) : 1;
   ForceSums<D> sums(x.size(), quanta_of(system).force * std::exp2(std::floor(std::log2(share)) + 2));
@@ -153,7 +120,7 @@ template <int D>
 PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
   PotentialSums sums{.quantum = quanta_of(system).energy};
   for (const auto& term : system.interactions) term->add_energy(x, sums);
-  return of_all_ranks(system, sums);
+  return system.decomposition.sum(sums);
 }
 
 /// Exact sums over all particles.
@@ -184,7 +151,7 @@ MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state
   }
   MotionSums<D> sums{kinetic.sum(), speed.sum(), {}};
   for (int k = 0; k < D; ++k) sums.momentum[k] = momentum[k].sum();
-  return of_all_ranks(system, sums);
+  return system.decomposition.sum(sums);
 }
 
 /// G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet follows to second order:
@@ -200,7 +167,7 @@ double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D>
     sum.add(at.v[i].dot(scratch[i]) / 12);
     sum.add(-at.mass[i] * a[i].squaredNorm() / 24);
   }
-  return of_all_ranks(system, sum.sum()).value();
+  return system.decomposition.sum(sum.sum()).value();
 }
 
 }  // namespace carom

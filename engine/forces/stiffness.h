@@ -22,7 +22,7 @@ double largest_squared_frequency(const System<D>& system) {
     ExactSum sum;
     for (Id i = 0; i < n; ++i)
       if (p.owns(i)) sum.add(u[i].squaredNorm());
-    return std::sqrt(of_all_ranks(system, sum).value());
+    return std::sqrt(system.decomposition.sum(sum).value());
   };
   Counters uncounted;
   double curvature = norm();

@@ -55,36 +55,29 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))),
         tolerance_(parameters.real("tolerance")) {}
 
-  bool local() const override { return true; }
-  void pack(Id i, Bytes& to) const override { past_.pack(i, to); }
-  void unpack(Id i, Reader& from) override { past_.unpack(i, from); }
-  void release() override {
-    core_.reset();
-    past_.release();
-    for (auto* each : {&a_, &mean_, &move_}) *each = {};
-    forces_ = {};
-  }
-  void regroup(System<D>& system) override {
-    core_.emplace(system, max_events_);
-    const std::size_t n = system.particles.size();
-    past_.resize(n);
-    for (auto* each : {&a_, &mean_, &move_}) each->resize(n, Vec<D>::Zero());
-    swaps_.resize(n);
-  }
-
   void start(System<D>& system, Counters& counters) override {
-    regroup(system);
     const auto& p = system.particles;
+    core_.emplace(system, max_events_);
+    system.fields.add_working(
+        this,
+        [this] {
+          for (auto* each : {&a_, &mean_, &move_}) std::vector<Vec<D>>().swap(*each);
+          forces_ = {};
+        },
+        [this, &p] {
+          for (auto* each : {&a_, &mean_, &move_}) each->resize(p.size(), Vec<D>::Zero());
+          swaps_.resize(p.size());
+        });
     evaluate_forces<D>(system, p.x, a_, counters);
     for (std::size_t i = 0; i < a_.size(); ++i) a_[i] /= p.mass[i];
-    past_.start(a_);
+    past_.start(system.fields, a_);
     const auto sum = [&](auto&& term) {
       ExactSum own;
       for (Id i = 0; i < p.size(); ++i)
         if (p.owns(i)) own.add(term(i));
-      return of_all_ranks(system, own).value();
+      return system.decomposition.sum(own).value();
     };
-    const double n = static_cast<double>(std::max<std::size_t>(1, count_of_all(system)));
+    const double n = static_cast<double>(std::max<std::size_t>(1, system.size()));
     speed_ = std::sqrt(sum([&](Id i) { return p.v[i].squaredNorm(); }) / n);
     strength_ = std::sqrt(sum([&](Id i) { return a_[i].squaredNorm(); }) / n);
     const double mass = sum([&](Id i) { return p.mass[i]; });
@@ -119,8 +112,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     bool to_contact = false;  // `longest` ends where a contact at rest is met or begins
     while (done < slab.length) {
       const bool resolved = found_.touching;
-      if (resolved && (found_.touching = any_rank(system, !scan.quiet(p.x, p.v)))) {
-        need_all(system);
+      if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(p.x, p.v)))) {
+        system.decomposition.need_all();
         scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
         found_.touching = !scan.resting().empty();
       }
@@ -135,7 +128,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         found_.touching = found_.touching || std::exchange(to_contact, false);
         continue;
       }
-      need_all(system);
+      system.decomposition.need_all();
       if (!end_.complete && !end_.wild) {
         scan.count_event(end_.key);
         to_contact = end_.time > 0;
@@ -212,18 +205,18 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const Stopwatch watch(counters_->seconds.force);
     const auto& p = system.particles;
     const auto& x = core_->x();
-    const bool all = first || kFew * core_->all_moved() > count_of_all(system);
+    const bool all = first || kFew * core_->all_moved() > system.size();
     std::uint64_t pairs =
         all ? forces_.evaluate(system, p.x, x) : forces_.update(system, p.x, core_->last_x(), x, core_->moved().data());
     for (Id i = 0; i < x.size(); ++i) mean_[i] = forces_[i];
-    if (system.part) system.part->refresh(mean_);
+    system.decomposition.update(std::span(mean_));
     for (Id i = 0; i < x.size(); ++i) mean_[i] /= p.mass[i];
     if (!core_->scan().resting().empty()) hold(system, h);
     std::array<double, 2> most{};
     for (Id i = 0; i < x.size(); ++i)
       if (p.owns(i) && !frozen(i)) most[0] = std::max(most[0], finite((mean_[i] - a_[i]).squaredNorm()));
     for (const Id i : core_->swapped()) most[1] = std::max(most[1], frozen(i) ? 0.0 : 1.0);
-    if (system.part) system.part->ranks().combine(most, {&pairs, 1});
+    system.decomposition.ranks().combine(most, {&pairs, 1});
     if (first) pairs_ = pairs;
     counters_->force_passes += pairs_ > 0 ? static_cast<double>(pairs) / static_cast<double>(pairs_) : 0.0;
     ++counters_->sweeps;
@@ -290,7 +283,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (frozen(i)) lacks.add(std::min(std::abs(lack(p, i, h)), std::numeric_limits<double>::max()));
       kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre_).squaredNorm());
     }
-    return of_all_ranks(system, lacks).value() <= kMostFolded * of_all_ranks(system, kinetic).value();
+    return system.decomposition.sum(lacks).value() <= kMostFolded * system.decomposition.sum(kinetic).value();
   }
 
   /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
@@ -310,7 +303,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
     const double left = any_freezes_ ? fold_near(system, of_frozen, *counters_) : 0;
     fold(system, centre_, lacks.sum(), left, *counters_);
-    update_copies(system);
+    system.decomposition.update_halo();
     past_.pass(h, mean_);
   }
 
@@ -359,6 +352,7 @@ IntegratorInfo edda() {
       .source =
           "this project; relatives: LaBudde, Greenspan, Numer. Math. 25 (1976) 323; Gonzalez, J. Nonlinear Sci. "
           "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 84 (2010) 1085",
+      .local = true,
       .in_2d = make<EventDrivenDiscreteGradient, 2>,
       .in_3d = make<EventDrivenDiscreteGradient, 3>};
 }

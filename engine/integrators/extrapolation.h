@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 #include <vector>
 
+#include "engine/base/fields.h"
 #include "engine/base/interaction.h"
-#include "engine/ranks/exchange.h"
 
 namespace carom::integrator {
 
@@ -14,23 +15,12 @@ template <int D>
 class Extrapolation {
  public:
   /// Accelerations at an instant: nothing is past yet.
-  void start(const std::vector<Vec<D>>& a) {
-    for (auto& past : past_) past = a;
+  void start(Fields& fields, const std::vector<Vec<D>>& a) {
+    for (std::size_t k = 0; k < past_.size(); ++k) {
+      past_[k] = a;
+      fields.add("past acceleration " + std::to_string(k), past_[k]);
+    }
     known_ = 0;
-  }
-  /// Frees what is known of particles; resize() follows.
-  void release() {
-    for (auto& past : past_) past = std::vector<Vec<D>>();
-  }
-  void resize(std::size_t particles) {
-    for (auto& past : past_) past.resize(particles);
-  }
-  /// What is known of a particle.
-  void pack(Id i, Bytes& to) const {
-    for (const auto& past : past_) put(to, past[i]);
-  }
-  void unpack(Id i, Reader& from) {
-    for (auto& past : past_) past[i] = from.get<Vec<D>>();
   }
   /// A slab of this length is done, with these accelerations.
   void pass(double length, const std::vector<Vec<D>>& a) {

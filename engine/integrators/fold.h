@@ -26,7 +26,7 @@ void fold(System<D>& system, const Vec<D>& centre, const ExactSum& lack, double 
   ExactSeries kinetic;
   for (Id i = 0; i < p.size(); ++i)
     if (p.owns(i)) kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre).squaredNorm());
-  const Sums sums = of_all_ranks(system, Sums{lack, kinetic.sum()});
+  const Sums sums = system.decomposition.sum(Sums{lack, kinetic.sum()});
   const double r = sums.lack.value() + more, share = r / sums.kinetic.value();
   if (!(std::abs(share) < 0.5) || share == 0) return;
   const double s = stretch(share);
@@ -59,8 +59,7 @@ double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, Counters& 
       return std::pair(squared_distance, id) < std::pair(other.squared_distance, other.id);
     }
   };
-  Exchange alone;
-  Exchange& ranks = system.part ? system.part->ranks() : alone;
+  Exchange& ranks = system.decomposition.ranks();
   Particles<D>& p = system.particles;
   Bytes message;
   for (const Lack<D>& each : mine) put(message, each);

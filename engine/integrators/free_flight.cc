@@ -20,9 +20,9 @@ class FreeFlight : public Integrator<D> {
       : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
 
   void start(System<D>& system, Counters&) override {
-    if (system.ranks) ranks_ = system.ranks;
+    ranks_ = &system.decomposition.ranks();
     if (ranks_->size() > 1)
-      domains_.emplace(system.box, system.sizes ? *system.sizes : Sizes(system.particles), *ranks_);
+      domains_.emplace(system.box, system.decomposition.sizes(), *ranks_);
     else
       core_.emplace(system.box, system.particles);
     for (const auto& term : system.interactions) {
@@ -46,12 +46,8 @@ class FreeFlight : public Integrator<D> {
     const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
                                                max_events_ * system.size()};
     const auto run = [&](double end) {
-      auto& seconds = report.counters.seconds;
-      const Stopwatch watch(seconds.queue);
-      const double before = seconds_waited();
-      const double reached = flight.run(end, events);
-      seconds.communicate += seconds_waited() - before;
-      return reached;
+      const Stopwatch watch(report.counters.seconds.queue);
+      return flight.run(end, events);
     };
     {
       const Stopwatch watch(report.counters.seconds.predict);
@@ -79,12 +75,9 @@ class FreeFlight : public Integrator<D> {
     system.wrap();
   }
 
-  double seconds_waited() const { return domains_ ? domains_->seconds_waited() : 0; }
-
   std::uint64_t max_events_;
   Vec<D> g_ = Vec<D>::Zero();
-  Exchange alone_;
-  Exchange* ranks_ = &alone_;
+  Exchange* ranks_ = nullptr;
   std::optional<EventCore<D>> core_;  // one of the two
   std::optional<Domains<D>> domains_;
   Particles<D> copies_;

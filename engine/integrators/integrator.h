@@ -11,8 +11,7 @@
 #include "engine/base/contact_log.h"
 #include "engine/base/counters.h"
 #include "engine/base/parameters.h"
-#include "engine/base/system.h"
-#include "engine/ranks/part.h"
+#include "engine/ranks/system.h"
 
 namespace carom {
 
@@ -37,17 +36,17 @@ struct SlabReport {
 };
 
 template <int D>
-class Integrator : public Luggage<D> {
+class Integrator {
  public:
-  /// Called once before the first slab. Where the system has several ranks each of them makes the same calls.
+  virtual ~Integrator() = default;
+
+  /// Called once before the first slab. What it keeps of each particle from slab to slab it registers as fields of the
+  /// system here. Where the system has several ranks each of them makes the same calls.
   virtual void start(System<D>&, Counters&) {}
 
   /// Advances the system from the start to the end of the slab; afterwards all particles are at its end, wrapped.
   /// Throws Error(Failure::numerical) with the particles' names where a step cannot be done.
   virtual void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) = 0;
-
-  /// Whether it can do with the particles near those that a rank owns (engine/ranks/part.h).
-  virtual bool local() const { return false; }
 
   /// The state at which energies are to be measured, where this is not the system itself (mcva, variant restart).
   virtual const Particles<D>* energy_state() const { return nullptr; }
@@ -70,7 +69,8 @@ struct IntegratorInfo {
   bool hard_cores = true;          ///< spheres collide; false: points
   bool stepping = true;  ///< advances by steps of fixed length and observes at their ends; false: exact at any time
   bool smooth_forces = true;  ///< knows any interaction; false: none but a common acceleration
-  bool shadow = false;        ///< a Verlet type: report the shadow energy S_h
+  bool local = false;   ///< on several ranks each can do with its own particles and those near them; else with all
+  bool shadow = false;  ///< a Verlet type: report the shadow energy S_h
   std::unique_ptr<Integrator<2>> (*in_2d)(const Parameters&) = nullptr;
   std::unique_ptr<Integrator<3>> (*in_3d)(const Parameters&) = nullptr;
 

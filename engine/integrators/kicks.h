@@ -10,9 +10,11 @@ struct Accelerations {
   std::vector<Vec<D>> a;  ///< [length/time²]
   PotentialSums sums;     ///< at the positions of the last update
 
-  void pack(Id i, Bytes& to) const { put(to, a[i]); }
-  void unpack(Id i, Reader& from) { a[i] = from.get<Vec<D>>(); }
-
+  /// At the start of a run.
+  void start(System<D>& system, Counters& counters) {
+    system.fields.add("acceleration", a);
+    update(system, counters);
+  }
   /// Evaluates a at the system's positions: one force pass.
   void update(const System<D>& system, Counters& counters) {
     a.resize(system.particles.size());

@@ -17,19 +17,11 @@ class PrimitiveSplitting : public Integrator<D> {
 
   void start(System<D>& system, Counters& counters) override {
     core_.emplace(system, max_events_);
-    accelerations_.update(system, counters);
+    accelerations_.start(system, counters);
   }
 
   const PotentialSums* potential() const override { return &accelerations_.sums; }
   Positions<D> accelerations() const override { return accelerations_.a; }
-  bool local() const override { return true; }
-  void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
-  void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }
-  void release() override { core_.reset(); }
-  void regroup(System<D>& system) override {
-    core_.emplace(system, max_events_);
-    accelerations_.a.resize(system.particles.size());
-  }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
@@ -40,7 +32,7 @@ class PrimitiveSplitting : public Integrator<D> {
     core_->fly({});
     core_->commit(0);
     core_->finish(p);
-    update_copies(system);
+    system.decomposition.update_halo();
     accelerations_.update(system, report.counters);
     kick(p.v, accelerations_.a, 0.5 * slab.length);
     system.wrap();
@@ -67,6 +59,7 @@ IntegratorInfo psa() {
               "collisions, half a kick. Collisions see velocities that lack the force of the step's other "
               "half: first order, and the cheapest.",
           .source = "Suh, Mier-y-Teran, White, Davis, Chem. Phys. 142 (1990) 203",
+          .local = true,
           .shadow = true,
           .in_2d = make<PrimitiveSplitting, 2>,
           .in_3d = make<PrimitiveSplitting, 3>};

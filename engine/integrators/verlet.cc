@@ -12,18 +12,14 @@ class Verlet : public Integrator<D> {
  public:
   explicit Verlet(const Parameters&) {}
 
-  void start(System<D>& system, Counters& counters) override { accelerations_.update(system, counters); }
+  void start(System<D>& system, Counters& counters) override { accelerations_.start(system, counters); }
 
   const PotentialSums* potential() const override { return &accelerations_.sums; }
   Positions<D> accelerations() const override { return accelerations_.a; }
-  bool local() const override { return true; }
-  void pack(Id i, Bytes& to) const override { accelerations_.pack(i, to); }
-  void unpack(Id i, Reader& from) override { accelerations_.unpack(i, from); }
-  void regroup(System<D>& system) override { accelerations_.a.resize(system.particles.size()); }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
-    if (system.part && !system.part->covers(p, accelerations_.a, slab.length)) throw HaloTooSmall{};
+    system.decomposition.need_step(accelerations_.a, slab.length);
     kick(p.v, accelerations_.a, 0.5 * slab.length);
     for (std::size_t i = 0; i < p.size(); ++i) p.x[i] += slab.length * p.v[i];
     accelerations_.update(system, report.counters);
@@ -49,6 +45,7 @@ IntegratorInfo verlet() {
               "points, their radii are not looked at.",
           .source = "Verlet, Phys. Rev. 159 (1967) 98; Swope, Andersen, Berens, Wilson, J. Chem. Phys. 76 (1982) 637",
           .hard_cores = false,
+          .local = true,
           .shadow = true,
           .in_2d = make<Verlet, 2>,
           .in_3d = make<Verlet, 3>};

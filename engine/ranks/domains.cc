@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "engine/base/error.h"
+#include "engine/ranks/halo.h"
 
 namespace carom {
 namespace {
@@ -110,15 +111,8 @@ Vec<D> Domains<D>::place(const Record<D>& r, double now) const {
 template <int D>
 template <class Spheres>
 void Domains<D>::load(double now, Spheres&& spheres) {
-  std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
-  spheres([&](const Record<D>& r) {
-    division_->for_each_near(place(r, now), [&](std::uint32_t region) { put(outgoing[region], r); });
-  });
-  std::vector<Record<D>> near;
-  for (Bytes& bytes : exchange_.swap(std::move(outgoing))) {
-    for (Reader reader(bytes); reader.more();) near.push_back(reader.get<Record<D>>());
-    Bytes().swap(bytes);
-  }
+  auto near = to_those_near<Record<D>>(
+      *division_, exchange_, [&](auto&& send) { spheres([&](const Record<D>& r) { send(place(r, now), r); }); });
   if (region_)
     region_->load(std::move(near), *division_, static_cast<std::uint32_t>(exchange_.rank()), g_, horizon_, now, stray_);
   now_ = now;
@@ -264,32 +258,31 @@ void Domains<D>::measure_work() {
   region_work_ = static_cast<std::uint32_t>(std::clamp(std::round(work * kUsualWork), 1.0, kMostWork));
 }
 
-/// Sends the spheres, flown to a time, to the ranks that have them in their shares; and their work by region_work_.
+/// Sends the spheres, flown to a time, to the ranks of their blocks; and their work by region_work_.
 template <int D>
 void Domains<D>::collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const {
-  struct Place {
-    Id id;
+  struct State {
     std::uint32_t work;
     Vec<D> x, v;
   };
-  const Shares shares = this->shares();
-  std::vector<Bytes> outgoing(static_cast<std::size_t>(exchange_.size()));
-  if (region_)
-    for (const Slot i : region_->own()) {
-      const Record<D> r = region_->flights().at(region_->after(i), time);
-      put(outgoing[static_cast<std::size_t>(shares.rank_of(r.id))], Place{r.id, region_work_, r.x, r.v});
-    }
-  const Id first = shares.first(exchange_.rank()), end = shares.first(exchange_.rank() + 1);
-  copies.x.resize(end - first);
-  copies.v.resize(end - first);
-  if (work) work->resize(end - first);
-  for (const Bytes& bytes : exchange_.swap(std::move(outgoing)))
-    for (Reader reader(bytes); reader.more();) {
-      const auto place = reader.get<Place>();
-      copies.x[place.id - first] = place.x;
-      copies.v[place.id - first] = place.v;
-      if (work) (*work)[place.id - first] = place.work;
-    }
+  const std::size_t here = blocks().first(exchange_.rank() + 1) - blocks().first(exchange_.rank());
+  copies.x.resize(here);
+  copies.v.resize(here);
+  if (work) work->resize(here);
+  to_id_blocks<State>(
+      blocks(), exchange_,
+      [&](auto&& send) {
+        if (!region_) return;
+        for (const Slot i : region_->own()) {
+          const Record<D> r = region_->flights().at(region_->after(i), time);
+          send(r.id, State{region_work_, r.x, r.v});
+        }
+      },
+      [&](std::size_t place, const State& state) {
+        copies.x[place] = state.x;
+        copies.v[place] = state.v;
+        if (work) (*work)[place] = state.work;
+      });
 }
 
 template <int D>

@@ -11,7 +11,7 @@
 //   domains.run(end, report);
 //   domains.give_back(end, particles);
 //
-// All of it is collective. No rank has all particles: between epochs it has its share of them (shares.h), in an epoch
+// All of it is collective. No rank has all particles: between epochs it has a block of them (id_blocks.h), in an epoch
 // those of its region and their ghosts. Where there are too few particles for all ranks, or the box has no room for so
 // many regions, the last ranks have none.
 
@@ -19,8 +19,8 @@
 
 #include "engine/ranks/division.h"
 #include "engine/ranks/exchange.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/ranks/region.h"
-#include "engine/ranks/shares.h"
 
 namespace carom {
 
@@ -33,7 +33,7 @@ class Domains {
   Domains(const Box<D>& box, Sizes sizes, Exchange& exchange, const SearchOptions& options = {},
           std::function<double()> window = {});
 
-  /// As EventCore::take(), load() and so on. Particles are this rank's share; contacts are reported on rank 0.
+  /// As EventCore::take(), load() and so on. Particles are this rank's block; contacts are reported on rank 0.
   void take(Particles<D>& particles, const Vec<D>& g, double horizon);
   double run(double end, const Report& report);
   void fly_to(double time, Particles<D>& copies) const;
@@ -43,12 +43,11 @@ class Domains {
   /// Of this rank, since the domains were made.
   EventCounts counts() const;
   DomainCounts domain_counts() const;
-  double seconds_waited() const { return exchange_.seconds(); }  ///< for other ranks, since the domains were made
 
  private:
   static constexpr double kFaster = 1.15;  // factor between the largest speed and the one allowed for
 
-  Shares shares() const { return {sizes_.spheres, static_cast<std::size_t>(exchange_.size())}; }
+  IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(exchange_.size())}; }
   void make_region(std::size_t regions);
   void measure_work();
   void collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const;
@@ -73,7 +72,7 @@ class Domains {
 
   const Box<D>& box_;
   Sizes sizes_;
-  mutable TimedExchange exchange_;
+  Exchange& exchange_;
   std::size_t regions_ = 0;
   SearchOptions options_;
   std::function<double()> forced_window_;
@@ -92,7 +91,7 @@ class Domains {
   bool cut_ = false;          // the last window was cut, and regions must be loaded again
   std::uint64_t events_ = 0;  // contacts since take()
   // How much the region had to do in the epoch, a sphere of it, the mean of all being kUsualWork; and each sphere of
-  // this rank's share.
+  // this rank's block.
   std::uint32_t region_work_ = 0;
   std::vector<std::uint32_t> work_;
   std::uint64_t run_before_ = 0;  // events of first runs, before the epoch

@@ -7,7 +7,7 @@
 
 #include "engine/base/contact_log.h"
 #include "engine/base/counters.h"
-#include "engine/ranks/part.h"
+#include "engine/ranks/system.h"
 
 namespace carom {
 
@@ -64,13 +64,13 @@ bool commit_contacts(const System<D>& system, std::span<const Contact<D>> found,
     if (contact.key.kind == EventKind::pair) contact.key.hi = p.id_of(contact.key.hi);
     own.push_back(contact);
   }
-  tally = sum_of_all(system.part->ranks(), tally);
+  tally = system.decomposition.sum(tally);
   if (tally.pairs + tally.bounces > most) return false;
   counters.sphere_sphere += tally.pairs;
   counters.sphere_wall += tally.bounces;
   counters.collision_virial.add(tally.virial);
   counters.max_overlap = std::max(counters.max_overlap, tally.overlap);
-  if (log) merge_contacts<D>(system.part->ranks().gather(packed<D>(own)), *log);
+  if (log) merge_contacts<D>(system.decomposition.ranks().gather(packed<D>(own)), *log);
   return true;
 }
 

@@ -7,8 +7,7 @@
 
 #include "engine/base/error.h"
 #include "engine/forces/forces.h"
-#include "engine/ranks/shares.h"
-#include "engine/ranks/vicinity.h"
+#include "engine/ranks/halo.h"
 
 namespace carom {
 
@@ -19,7 +18,7 @@ constexpr std::size_t kShadowAtEveryStep = 100;
 }  // namespace
 
 template <int D>
-Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const Plan& plan,
+Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& plan,
                     const std::vector<Observer<D>*>& observers, Statistics& statistics)
     : system_(system),
       info_(info),
@@ -38,24 +37,26 @@ Monitor<D>::Monitor(const System<D>& system, const IntegratorInfo& info, const P
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
   if (info.shadow) statistics.max_shadow_energy_error = 0;
-  regroup();
-}
-
-template <int D>
-void Monitor<D>::regroup() {
-  const Particles<D>& p = known().particles;
-  if (info_.hard_cores && !in_free_flight()) touching_.emplace(system_.box, p.radius, p.ghost);
-  if (!info_.shadow) return;
-  scratch_.resize(p.size());
+  system.fields.add_working(
+      this,
+      [this] {
+        touching_.reset();
+        std::vector<Vec<D>>().swap(scratch_);
+      },
+      [this] {
+        const Particles<D>& p = system_.particles;
+        if (info_.hard_cores) touching_.emplace(system_.box, p.radius, p.ghost);
+        if (info_.shadow) scratch_.resize(p.size());
+      });
 }
 
 template <int D>
 void Monitor<D>::start(const Integrator<D>& integrator) {
-  shot_ = measure(0, known().particles, &integrator, info_.shadow);
+  shot_ = measure(0, system_.particles, &integrator, info_.shadow);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   first_momentum_ = shot_.momentum;
   count_from(shot_);
-  sample(0, known().particles);
+  sample(0, system_.particles);
   show(shot_, true);
 }
 
@@ -106,7 +107,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
   const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.size() <= kShadowAtEveryStep);
   const double speed = speed_;
-  shot_ = measure(s.end_time, known().particles, &integrator, with_shadow);
+  shot_ = measure(s.end_time, system_.particles, &integrator, with_shadow);
   s.energy_final = shot_.total();
   if (s.steps == 1 && info_.stepping) count_from(shot_);
   s.max_energy_error = std::max(s.max_energy_error, std::abs(energy_ - first_energy_));
@@ -116,7 +117,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
     s.max_momentum_error = std::max(*s.max_momentum_error, (shot_.momentum - first_momentum_).norm());
   if (info_.hard_cores) {
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest_overlap());
-    if (system_.ranks) system_.ranks->largest({&s.counters.max_overlap, 1});
+    s.counters.max_overlap = system_.decomposition.largest(s.counters.max_overlap);
   }
   virial_time_ += elapsed * virial_;
   if (s.end_time > 0) {
@@ -129,7 +130,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
     s.mean_free_time = 1 / s.collision_rate;
     s.mean_free_path = path_ / s.end_time / s.collision_rate;
   }
-  sample(s.end_time, known().particles);
+  sample(s.end_time, system_.particles);
   show(shot_, last);
 }
 
@@ -146,9 +147,9 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   const Particles<D>* elsewhere = integrator ? integrator->energy_state() : nullptr;
   const Particles<D>& nodes = elsewhere ? *elsewhere : state;
   const PotentialSums* potential = integrator ? integrator->potential() : nullptr;
-  const PotentialSums sums = potential ? of_all_ranks(known(), *potential) : evaluate_energy<D>(known(), nodes.x);
+  const PotentialSums sums = potential ? system_.decomposition.sum(*potential) : evaluate_energy<D>(system_, nodes.x);
   const auto total = static_cast<double>(system_.size());
-  const MotionSums<D> motion = evaluate_motion(known(), state, nodes);
+  const MotionSums<D> motion = evaluate_motion(system_, state, nodes);
   shot.kinetic = motion.kinetic.value();
   energy_ = shot.kinetic + sums.energy.value();
   shot.potential = sums.energy.value() + tail_.energy;
@@ -156,7 +157,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   virial_ = 2 * shot.kinetic + sums.virial.value() + tail_.virial;
   if (with_shadow) {
     Counters uncounted;
-    const double g = shadow_term<D>(known(), nodes, integrator->accelerations(), scratch_, uncounted);
+    const double g = shadow_term<D>(system_, nodes, integrator->accelerations(), scratch_, uncounted);
     shot.shadow = shot.total() + plan_.step * plan_.step * g;
   }
   for (int k = 0; k < D; ++k) shot.momentum[k] = motion.momentum[k].value();
@@ -190,10 +191,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
     last_row_virial_ = collision_virial;
   }
   if (frame) {
-    if (system_.part) {
-      system_.part->collect();
-      shot.particles = &system_.particles;
-    }
+    if (system_.decomposition.by_place()) shot.particles = &system_.decomposition.block();
     for (auto* observer : observers_) observer->frame(shot);
     frames_.pass(now);
     last_frame_ = shot.time;
@@ -212,11 +210,12 @@ double Monitor<D>::deepest_overlap() {
       if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
     }
   };
-  const Particles<D>& p = known().particles;
-  if (in_free_flight()) {
-    const Vicinity<D> near = vicinity(system_.box, 2 * system_.sizes->largest_radius(), *system_.ranks, p);
-    NeighbourList<D> touching(system_.box, near.radius, near.beyond);
-    look(touching, near);
+  const Particles<D>& p = system_.particles;
+  const Decomposition<D>& ranks = system_.decomposition;
+  if (ranks.joined() && !ranks.by_place()) {
+    const Halo<D> halo = halo_of(system_.box, 2 * ranks.sizes().largest_radius(), ranks.ranks(), p);
+    NeighbourList<D> touching(system_.box, halo.radius, halo.ghost);
+    look(touching, halo);
   } else {
     look(*touching_, p);
   }
@@ -226,9 +225,9 @@ double Monitor<D>::deepest_overlap() {
 /// All particles, in a state of this rank's particles; where there are several ranks, on rank 0 only.
 template <int D>
 const Particles<D>& Monitor<D>::all_particles(const Particles<D>& state) {
-  if (!system_.sizes) return state;
-  if (system_.part) system_.part->collect();
-  return gathered_ = gathered(*system_.ranks, system_.part ? system_.particles : state);
+  Decomposition<D>& ranks = system_.decomposition;
+  if (!ranks.joined()) return state;
+  return gathered_ = gathered(ranks.ranks(), ranks.by_place() ? ranks.block() : state);
 }
 
 template class Monitor<2>;

@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "engine/ranks/part.h"
 #include "engine/run/simulation.h"
 #include "engine/search/neighbour_list.h"
 
@@ -34,8 +33,11 @@ template <int D>
 class Monitor {
  public:
   /// Keeps references to all of these.
-  Monitor(const System<D>& system, const IntegratorInfo& info, const Plan& plan,
-          const std::vector<Observer<D>*>& observers, Statistics& statistics);
+  Monitor(System<D>& system, const IntegratorInfo& info, const Plan& plan, const std::vector<Observer<D>*>& observers,
+          Statistics& statistics);
+  ~Monitor() { system_.fields.remove_working(this); }
+  Monitor(const Monitor&) = delete;
+  Monitor& operator=(const Monitor&) = delete;
 
   /// Measures and shows the state at the start; energies at the integrator's energy state.
   void start(const Integrator<D>& integrator);
@@ -53,9 +55,6 @@ class Monitor {
   /// Shows the last state, unless it has been shown.
   void finish() { show(shot_, true); }
 
-  /// The ranks have divided the particles anew.
-  void regroup();
-
   /// Due times and ends are met up to this [time].
   double time_slack() const { return 1e-9 * plan_.step; }
 
@@ -72,10 +71,8 @@ class Monitor {
   void count_from(const Snapshot<D>& shot);
   double deepest_overlap();
   const Particles<D>& all_particles(const Particles<D>& state);
-  bool in_free_flight() const { return system_.sizes && !system_.part; }  // of shares
-  const System<D>& known() const { return system_.part ? system_.part->known() : system_; }
 
-  const System<D>& system_;
+  System<D>& system_;
   const IntegratorInfo& info_;
   const Plan& plan_;
   const std::vector<Observer<D>*>& observers_;
@@ -95,7 +92,7 @@ class Monitor {
   Vec<D> first_momentum_ = Vec<D>::Zero();
   std::vector<Vec<D>> scratch_;               // for S_h
   std::optional<NeighbourList<D>> touching_;  // pairs that may overlap
-  Particles<D> gathered_;                     // from the shares of all ranks
+  Particles<D> gathered_;                     // from the blocks of all ranks
 };
 
 }  // namespace carom

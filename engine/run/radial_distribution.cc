@@ -146,7 +146,7 @@ void RadialDistribution<D>::count(const Particles<D>& p) {
 
 template <int D>
 double RadialDistribution<D>::longest_range(const System<D>& system) {
-  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
+  const auto radius = system.decomposition.radii();
   const double margin = radius.empty() ? 0 : 2 * *std::ranges::min_element(radius);
   double longest = std::numeric_limits<double>::infinity();
   for (int k = 0; k < D; ++k)
@@ -156,7 +156,7 @@ double RadialDistribution<D>::longest_range(const System<D>& system) {
 
 template <int D>
 double RadialDistribution<D>::usual_range(const System<D>& system) {
-  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
+  const auto radius = system.decomposition.radii();
   return std::min(longest_range(system), radius.empty() ? 1.0 : 6 * *std::ranges::max_element(radius));
 }
 

@@ -4,10 +4,9 @@
 
 #include "engine/base/error.h"
 #include "engine/forces/forces.h"
-#include "engine/ranks/shares.h"
 #include "engine/run/monitor.h"
 #include "engine/setup/epoch.h"
-#include "engine/setup/placement.h"
+#include "engine/setup/initial_state.h"
 
 namespace carom {
 
@@ -17,18 +16,18 @@ constexpr double kLeastInterval = 1e-6;
 
 template <int D>
 void check_spheres(const System<D>& system) {
-  const Particles<D>& p = system.particles;
-  const double diameter = p.size() > 0 ? 2 * *std::ranges::max_element(p.radius) : 0;
+  const auto radii = system.decomposition.radii();
+  const double diameter = radii.empty() ? 0 : 2 * *std::ranges::max_element(radii);
   for (int k = 0; k < D; ++k)
     if (system.box.periodic(k) && system.box.edges[k] < diameter)
       throw Error(Failure::initial_state, "the periodic box is " + short_text(system.box.edges[k]) + " long on axis " +
                                               std::to_string(k) + ", less than a diameter of " + short_text(diameter) +
                                               "; enlarge it, a sphere must not touch itself");
-  if (const Outsiders out = find_outsiders<D>(system.box, p.x, p.radius); out.spheres > 0)
+  if (const Outsiders out = find_outsiders(system); out.spheres > 0)
     throw Error(Failure::initial_state, "particle " + std::to_string(out.worst) + " is not inside the walls of axis " +
                                             std::to_string(out.axis) +
                                             "; keep it a radius from every wall, or enlarge the box");
-  if (const Overlaps overlaps = find_overlaps<D>(system.box, p.x, p.radius); overlaps.pairs > 0)
+  if (const Overlaps overlaps = find_overlaps(system); overlaps.pairs > 0)
     throw Error(Failure::initial_state, "particles " + std::to_string(overlaps.lo) + " and " +
                                             std::to_string(overlaps.hi) + " overlap, at distance " +
                                             short_text(overlaps.distance) + "; move them apart");
@@ -87,16 +86,13 @@ template <int D>
 void Simulation<D>::run(const std::function<bool()>& should_stop) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
-  if (system_->ranks && !system_->sizes) keep_share(*system_);
-  if (info_.smooth_forces) system_->quanta = quanta(*system_);
-  std::optional<Part<D>> part;
-  if (system_->ranks && info_.smooth_forces) {
-    part.emplace(*system_, integrator_->local(), plan_.step, info_.hard_cores);
-    ++s.counters.divisions;
+  Decomposition<D>& decomposition = system_->decomposition;
+  if (info_.smooth_forces) {
+    system_->quanta = quanta(*system_);
+    s.counters.divisions += decomposition.divide(info_.local, plan_.step, info_.hard_cores);
   }
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);
-  const auto known = [&]() -> System<D>& { return part ? part->known() : *system_; };
-  integrator_->start(known(), s.counters);
+  integrator_->start(*system_, s.counters);
   monitor.start(*integrator_);
 
   std::vector<Contact<D>> contacts;
@@ -106,23 +102,19 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
       break;
     }
     const Slab slab = next_slab(monitor.time_slack());
-    if (part && part->divide_if_due(*integrator_, integrator_->local(), slab.index, slab.length)) {
-      ++s.counters.divisions;
-      monitor.regroup();
-    }
+    s.counters.divisions += decomposition.divide_if_due(slab.index, slab.length);
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor.due_within(slab);
     contacts.clear();
     SlabReport<D> report{.counters = s.counters, .contacts = plan_.events ? &contacts : nullptr, .observe = due};
     report.observer = [&](double offset, const Particles<D>& copies) { monitor.observe(slab.start + offset, copies); };
     Counters before = s.counters;
     for (bool done = false; !done;) try {
-        integrator_->slab(known(), slab, report);
+        integrator_->slab(*system_, slab, report);
         done = true;
       } catch (HaloTooSmall) {
-        part->know_more(*integrator_, slab.index, slab.length);
-        monitor.regroup();
+        decomposition.enlarge_halo(slab.index, slab.length);
         ++before.slabs_again;
-        before.slabs_by_all += part->knows_all() ? 1 : 0;
+        before.slabs_by_all += decomposition.knows_all() ? 1 : 0;
         s.counters = before;
         contacts.clear();
       }
@@ -132,7 +124,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     s.end_time = report.reached < slab.length ? slab.start + report.reached
                  : slab.length == plan_.step  ? static_cast<double>(s.steps) * plan_.step
                                               : *plan_.end_time;
-    if (part) s.counters.seconds.communicate = part->seconds_waited();
+    s.counters.seconds.communicate = decomposition.seconds_waited();
     s.force_passes = s.counters.force_passes;
     s.fraction_done = fraction_done();
     s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
@@ -144,7 +136,7 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
     for (auto* observer : observers_) observer->progress(s);
   }
   if (s.stopped_early) monitor.finish();
-  if (part) part->collect();
+  decomposition.to_blocks();
   s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
 }
 

@@ -14,8 +14,8 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/system.h"
 #include "engine/integrators/integrator.h"
+#include "engine/ranks/system.h"
 
 namespace carom {
 
@@ -37,7 +37,7 @@ struct Snapshot {
   double time = 0;
   std::int64_t step = 0;                    ///< slabs completed (free flight: epochs begun or completed)
   std::uint64_t collisions = 0;             ///< pair collisions so far
-  const Particles<D>* particles = nullptr;  ///< all of them; where ranks have shares, this rank's (with ids)
+  const Particles<D>* particles = nullptr;  ///< all of them; several ranks: this rank's block (with ids)
   double kinetic = 0, potential = 0;        ///< [energy]; V with its long-range corrections
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN where the method has none
   double max_energy_error = 0;                               ///< largest |H − H₁| so far [energy]
@@ -60,12 +60,12 @@ class Observer {
   /// Called once, before the run begins.
   virtual Sampling sampling() const { return {}; }
   /// Copies of all particles at a time of sampling(): exactly then with free flight, else at the first step end at or
-  /// after it. Costs no measurement: this is the way to look often. Where ranks have shares rank 0 alone has the
+  /// after it. Costs no measurement: this is the way to look often. Of several ranks rank 0 alone has the
   /// particles.
   virtual void sample(double /*time*/, const Particles<D>&) {}
   virtual void frame(const Snapshot<D>&) {}
   virtual void thermo(const Snapshot<D>&) {}
-  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`. Where ranks have shares on rank
+  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`. Of several ranks on rank
   /// 0 only.
   virtual void contacts(double /*slab_start*/, std::span<const Contact<D>>) {}
   /// After every slab: how far the run has come. Cheap; called often.

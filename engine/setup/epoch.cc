@@ -4,7 +4,7 @@
 #include <charconv>
 #include <numbers>
 
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/setup/placement.h"
 
 namespace carom {
@@ -18,14 +18,14 @@ double default_epoch(const System<D>& system) {
   };
   Exchange alone;
   const auto [twice_kinetic, mass, diameter] =
-      handed_on(shared_by(system) ? *shared_by(system) : alone, Sums{}, [&](Sums& sums) {
+      handed_on(system.decomposition.others() ? *system.decomposition.others() : alone, Sums{}, [&](Sums& sums) {
         for (std::size_t i = 0; i < p.size(); ++i) {
           sums.twice_kinetic += p.mass[i] * p.v[i].squaredNorm();
           sums.mass += p.mass[i] / n;
           sums.diameter += 2 * p.radius[i] / n;
         }
       });
-  const double filled = packing_fraction<D>(system.box.volume(), p.radius, shared_by(system));
+  const double filled = packing_fraction<D>(system.box.volume(), p.radius, system.decomposition.others());
   if (twice_kinetic == 0) return 1;
   // Collision rate of one particle by Enskog's theory, contact value by Carnahan–Starling (3-D), Henderson (2-D).
   const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));

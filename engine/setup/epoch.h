@@ -1,7 +1,7 @@
 #pragma once
 // How long an epoch of free flight is where nothing else is said.
 
-#include "engine/base/system.h"
+#include "engine/ranks/system.h"
 
 namespace carom {
 

@@ -81,7 +81,7 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
 
 /// Maxwell–Boltzmann velocities for the particles `chosen`, one temperature each: drawn, freed of total momentum (not
 /// so a single particle) and scaled so that 2K = D Σ temperature exactly, up to rounding. With `ranks`, each does so
-/// for its share of the particles, with the same bits; collective.
+/// for its block of the particles, with the same bits; collective.
 template <int D>
 void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::span<const double> temperature,
                      std::uint64_t seed, RandomPurpose purpose = RandomPurpose::velocity, Exchange* ranks = nullptr);

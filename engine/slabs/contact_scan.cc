@@ -6,7 +6,6 @@
 
 #include "engine/base/error.h"
 #include "engine/events/collision.h"
-#include "engine/ranks/part.h"
 
 namespace carom {
 
@@ -14,7 +13,7 @@ template <int D>
 ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
     : box_(system.box),
       particles_(system.particles),
-      part_(system.part),
+      decomposition_(system.decomposition),
       largest_edge_(system.box.edges.maxCoeff()),
       tolerance_(largest_edge_),
       list_(system.box, system.particles.radius),
@@ -29,7 +28,7 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   std::array<double, 2> most{};  // squared speed and acceleration
   for (const auto& v : particles_.v) most[0] = std::max(most[0], v.squaredNorm());
   for (const auto& each : a) most[1] = std::max(most[1], each.squaredNorm());
-  if (part_) part_->ranks().largest(most);
+  decomposition_.ranks().largest(most);
   resting_speed_ = kRestingSpeed * (std::sqrt(most[0]) + length * std::sqrt(most[1]));
 }
 

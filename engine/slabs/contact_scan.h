@@ -10,8 +10,8 @@
 
 #include "engine/base/contact_log.h"
 #include "engine/base/counters.h"
-#include "engine/base/system.h"
 #include "engine/events/contact.h"
+#include "engine/ranks/system.h"
 #include "engine/search/neighbour_list.h"
 #include "engine/slabs/resting.h"
 
@@ -106,7 +106,7 @@ class ContactScan {
 
   const Box<D>& box_;
   const Particles<D>& particles_;
-  Part<D>* part_;
+  const Decomposition<D>& decomposition_;
   double largest_edge_;
   GapTolerance tolerance_;
   NeighbourList<D> list_;

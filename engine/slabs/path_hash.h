@@ -34,7 +34,8 @@ class PathHashes {
     add_to_hash(words_[key.lo], key, particles_);
     if (key.kind == EventKind::pair) add_to_hash(words_[key.hi], key, particles_);
   }
-  std::uint64_t operator[](Id i) const { return words_[i]; }
+  /// By particle.
+  const std::vector<std::uint64_t>& words() const { return words_; }
 
  private:
   const Particles<D>& particles_;

@@ -21,11 +21,23 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
     : system_(system),
       box_(system.box),
       particles_(system.particles),
-      scan_(system, max_events),
       max_events_(max_events),
-      wild_(kWild * mean_distance(system)),
-      slot_(system.particles.size()) {
+      wild_(kWild * mean_distance(system)) {
   for (int axis = 0; axis < D; ++axis) walls_ = walls_ || box_.walled(axis);
+  system.fields.add_working(
+      this, [this] { release(); },
+      [this] {
+        scan_.emplace(system_, max_events_);
+        slot_.assign(particles_.size(), 0);
+      });
+}
+
+/// Frees what has an entry for each particle.
+template <int D>
+void SlabCore<D>::release() {
+  scan_.reset();
+  const auto free = [](auto&... vectors) { (std::remove_reference_t<decltype(vectors)>().swap(vectors), ...); };
+  free(near_, reach_, room_, held_, x_, last_x_, v_, moved_, slot_, flights_, sequences_, last_sequences_);
 }
 
 template <int D>
@@ -41,8 +53,8 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   for (auto* each : {&room_, &reach_}) each->resize(n);
   for (auto* each : {&x_, &last_x_, &v_}) each->resize(n);
   moved_.resize(n);
-  held_.assign(scan_.resting().empty() ? 0 : n, 0);
-  for (const auto& contact : scan_.resting()) {
+  held_.assign(scan_->resting().empty() ? 0 : n, 0);
+  for (const auto& contact : scan_->resting()) {
     held_[contact.key.lo] = 1;
     if (contact.key.kind == EventKind::pair) held_[contact.key.hi] = 1;
   }
@@ -62,11 +74,11 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
 template <int D>
 void SlabCore<D>::find_near() {
   const auto& x = particles_.x;
-  pairs_ = scan_.candidates(x, margin_);
+  pairs_ = scan_->candidates(x, margin_);
   near_.clear();
   for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
     const auto& [i, j, image] = pairs_[k];
-    const double sigma = scan_.contact_distance(i, j), near = sigma + scan_.tolerance(sigma) + reach_[i] + reach_[j];
+    const double sigma = scan_->contact_distance(i, j), near = sigma + scan_->tolerance(sigma) + reach_[i] + reach_[j];
     if ((x[i] - x[j] + box_.shift(image)).squaredNorm() <= near * near) near_.push_back(k);
   }
 }
@@ -100,7 +112,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     x_[each.id] = each.x + rest * each.v + (0.5 * rest * rest) * a_i;
     v_[each.id] = each.v + rest * a_i;
   }
-  const bool shared = system_.part && !system_.part->knows_all();
+  const bool shared = !system_.decomposition.knows_all();
   all_moved_ = 0;
   for (Id i = 0; i < x_.size(); ++i) {
     moved_[i] = x_[i] != last_x_[i];
@@ -109,7 +121,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   if (shared)
     agree(!end.complete || crowded_ || strayed_ > 0);
   else if (crowded_)
-    scan_.too_many(end.key);
+    scan_->too_many(end.key);
   else if (strayed_ > 0 && !a_.empty())
     return {.complete = false, .wild = true};
   else if (strayed_ > 0) {
@@ -127,7 +139,7 @@ template <int D>
 void SlabCore<D>::predict_first() {
   for (const std::uint32_t k : near_) predict_pair(pairs_[k].i, pairs_[k].j, pairs_[k].image);
   for (const Id i : beyond_)
-    for (const auto& [j, pair] : scan_.candidate_partners().of(i))
+    for (const auto& [j, pair] : scan_->candidate_partners().of(i))
       predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
   if (walls_)
     for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
@@ -172,7 +184,7 @@ FlightEnd<D> SlabCore<D>::serve() {
     if (resolved_ && !(key.time > 0)) continue;  // rounding
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses nothing together: what does not approach needs no impulse.
-    if (held || (approach(key) >= -scan_.resting_speed() && !a_.empty()))
+    if (held || (approach(key) >= -scan_->resting_speed() && !a_.empty()))
       return {.complete = false, .time = key.time, .key = key};
     if (contacts_.size() >= max_events_) {
       crowded_ = true;
@@ -204,7 +216,7 @@ Vec<D> SlabCore<D>::velocity(Id i, double t) const {
 
 template <int D>
 void SlabCore<D>::predict_all(Id i) {
-  for (const auto& [j, pair] : scan_.candidate_partners().of(i))
+  for (const auto& [j, pair] : scan_->candidate_partners().of(i))
     predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
   if (walls_) predict_walls(i);
 }
@@ -212,14 +224,14 @@ void SlabCore<D>::predict_all(Id i) {
 /// The next contact of the present flights, looked at from the later of their starts.
 template <int D>
 void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
-  const double t = std::max(start(i), start(j)), sigma = scan_.contact_distance(i, j), rest = length_ - t;
+  const double t = std::max(start(i), start(j)), sigma = scan_->contact_distance(i, j), rest = length_ - t;
   const Vec<D> d = position(i, t) - position(j, t) + box_.shift(image), v = velocity(i, t) - velocity(j, t);
-  const double slack = sigma * scan_.resting_speed();
+  const double slack = sigma * scan_->resting_speed();
   const double s = a_.empty() ? contact_time<D>(d, v, sigma, slack)
-                              : contact_time<D>(d, v, a_[i] - a_[j], sigma, rest, scan_.touches(d, sigma), slack);
+                              : contact_time<D>(d, v, a_[i] - a_[j], sigma, rest, scan_->touches(d, sigma), slack);
   if (!(t + s < length_)) return;
   EventKey<D> key{.time = t + s, .kind = EventKind::pair, .lo = i, .hi = j, .image = image};
-  if (!held_.empty() && scan_.rests(key)) return;
+  if (!held_.empty() && scan_->rests(key)) return;
   key.generation = std::max(generation(i, key.time), generation(j, key.time));
   queue_.push_back({key, version(i), version(j)});
   if (!flights_.empty()) std::push_heap(queue_.begin(), queue_.end());
@@ -232,12 +244,12 @@ void SlabCore<D>::predict_walls(Id i) {
   for (int wall = 0; wall < 2 * D; ++wall) {
     const int axis = wall / 2;
     if (!box_.walled(axis)) continue;
-    const double gap = scan_.wall_gap(x, i, wall), inward = ContactScan<D>::inward(wall);
+    const double gap = scan_->wall_gap(x, i, wall), inward = ContactScan<D>::inward(wall);
     const double s = wall_contact_time(gap, inward * v[axis], inward * a[axis], length_ - t,
-                                       gap <= scan_.tolerance(particles_.radius[i]), scan_.resting_speed());
+                                       gap <= scan_->tolerance(particles_.radius[i]), scan_->resting_speed());
     if (!(t + s < length_)) continue;
     EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = static_cast<Id>(wall)};
-    if (!held_.empty() && scan_.rests(key)) continue;
+    if (!held_.empty() && scan_->rests(key)) continue;
     key.generation = generation(i, key.time);
     queue_.push_back({key, version(i)});
     if (!flights_.empty()) std::push_heap(queue_.begin(), queue_.end());
@@ -330,13 +342,14 @@ void SlabCore<D>::compare_sequences() {
 /// particle at its owner, or a path was longer than what is known allows. Collective.
 template <int D>
 void SlabCore<D>::agree(bool failed) {
-  Part<D>& part = *system_.part;
+  Decomposition<D>& decomposition = system_.decomposition;
   PathHashes<D> events(particles_);
   for (const Contact<D>& contact : contacts_) events.add(contact.key);
+  std::vector<std::uint64_t> at_owners = events.words();
+  decomposition.update(std::span(at_owners));
   bool agreed = true;
-  part.tell(
-      [&](Id i, Bytes& to) { put(to, events[i]); },
-      [&](Id i, Reader& from) { agreed = (from.get<std::uint64_t>() == events[i] || !part.matters(i)) && agreed; });
+  for (Id i = 0; i < at_owners.size(); ++i)
+    if (at_owners[i] != events.words()[i] && decomposition.matters(i)) agreed = false;
   std::array<double, 3> most = {failed ? 1.0 : 0.0, agreed ? 0.0 : 1.0, own_reach_};
   auto& [any_failed, any_wrong, farthest] = most;
   for (const Id i : beyond_)
@@ -344,15 +357,16 @@ void SlabCore<D>::agree(bool failed) {
   for (const Flight& f : flights_)
     if (particles_.owns(f.id))
       farthest = std::max(farthest, (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t));
-  part.ranks().combine(most, {&all_moved_, 1});
-  if (any_wrong > 0 && any_failed == 0) part.deepen();
-  if (any_failed > 0 || any_wrong > 0 || !part.covers(farthest)) throw HaloTooSmall{};
+  decomposition.ranks().combine(most, {&all_moved_, 1});
+  if (any_failed > 0) throw HaloTooSmall{};
+  if (any_wrong > 0) decomposition.need_deeper_halo();
+  decomposition.need_paths(farthest);
 }
 
 template <int D>
 void SlabCore<D>::commit(double time) {
-  if (!system_.part || system_.part->knows_all())
-    scan_.commit(time, contacts_);
+  if (system_.decomposition.knows_all())
+    scan_->commit(time, contacts_);
   else if (!commit_contacts<D>(system_, contacts_, max_events_, *counters_, log_))
     throw HaloTooSmall{};  // with all particles known the error can name them
 }

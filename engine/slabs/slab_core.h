@@ -9,14 +9,15 @@
 // their paths can bring together are predicted, and only particles in a collision are flown in pieces. A contact is a
 // function of two flights alone, so neither list, nor order, nor rank shows in the bits.
 //
-// Where each rank knows only some of the particles (engine/ranks/part.h), a flight is compared: owners send a hash of
-// the events of each particle that others have a copy of. Where a copy that matters went another way, or a path was
-// longer than what is known allows, fly() throws HaloTooSmall on all ranks. Nothing of the system has changed then.
+// Where each rank knows only some of the particles (engine/ranks/decomposition.h), a flight is compared: owners send a
+// hash of the events of each particle that others have a copy of. Where a copy that matters went another way, or a path
+// was longer than what is known allows, fly() throws HaloTooSmall on all ranks. Nothing of the system has changed then.
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
-#include "engine/ranks/part.h"
+#include "engine/ranks/system.h"
 #include "engine/slabs/contact_scan.h"
 
 namespace carom {
@@ -35,12 +36,15 @@ class SlabCore {
  public:
   /// `max_events` limits the contacts of one step.
   SlabCore(System<D>& system, std::uint64_t max_events);
+  ~SlabCore() { system_.fields.remove_working(this); }
+  SlabCore(const SlabCore&) = delete;
+  SlabCore& operator=(const SlabCore&) = delete;
 
   /// Starts a step; see ContactScan::begin_slab.
   void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length) {
     counters_ = &counters;
     log_ = contacts;
-    scan_.begin_slab(counters, contacts, a, length);
+    scan_->begin_slab(counters, contacts, a, length);
   }
 
   /// Finds the pairs that may meet in a slab of this length [time] from the system's positions with velocities v, under
@@ -75,7 +79,7 @@ class SlabCore {
   }
 
   /// Contacts at the slab's start, and those that rest.
-  ContactScan<D>& scan() { return scan_; }
+  ContactScan<D>& scan() { return *scan_; }
 
  private:
   /// A particle after its first collision in this slab.
@@ -97,6 +101,7 @@ class SlabCore {
     auto operator<=>(const Sequence&) const = default;
   };
 
+  void release();
   void find_near();
   void plain_ends();
   void predict_first();
@@ -125,7 +130,7 @@ class SlabCore {
   System<D>& system_;
   const Box<D>& box_;
   const Particles<D>& particles_;
-  ContactScan<D> scan_;
+  std::optional<ContactScan<D>> scan_;
   std::uint64_t max_events_;
   double wild_;  // path that an acceleration may bend in a slab [length]
   bool walls_ = false;

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "engine/base/system.h"
+#include "engine/ranks/system.h"
 
 namespace carom {
 

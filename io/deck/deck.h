@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "engine/base/error.h"
-#include "engine/base/system.h"
 #include "engine/integrators/integrator.h"
+#include "engine/ranks/system.h"
 #include "engine/run/observable.h"
 #include "engine/run/simulation.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_interactions.h"
@@ -28,7 +28,8 @@ void give_velocities(const Deck::Source& source, System<D>& system) {
     }
     first += species.count;
   }
-  draw_velocities<D>(p, drawn, temperature, source.placement.seed, RandomPurpose::velocity, shared_by(system));
+  draw_velocities<D>(p, drawn, temperature, source.placement.seed, RandomPurpose::velocity,
+                     system.decomposition.others());
 }
 
 /// Writes what was left to the initial state into the values of the deck, so that they say it themselves from now on.
@@ -60,7 +61,7 @@ void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
 
 }  // namespace
 
-bool built_in_shares(const Deck::Source& source) {
+bool built_in_blocks(const Deck::Source& source) {
   const std::string& type = source.placement.type;
   const bool lattice = !type.empty() && type != "file" && type != "random" && type != "compressed";
   return lattice && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
@@ -77,11 +78,11 @@ void fill_box(const Deck::Source& source, System<D>& system) {
 }
 
 template <int D>
-void fill_particles(const Deck::Source& source, System<D>& system) {
+void fill_particles(const Deck::Source& source, System<D>& system, Exchange* ranks) {
   Particles<D>& all = system.particles;
   std::size_t begin = 0, end = source.particles();  // ids of this rank
-  if (system.ranks && built_in_shares(source)) {
-    Sizes& sizes = system.sizes.emplace();
+  if (ranks && built_in_blocks(source)) {
+    Sizes sizes;
     sizes.spheres = end;
     sizes.by_species = true;
     for (const SpeciesConfig& species : source.species) {
@@ -89,9 +90,10 @@ void fill_particles(const Deck::Source& source, System<D>& system) {
       sizes.mass.push_back(species.mass[0]);
       sizes.number.push_back(static_cast<double>(species.count));
     }
-    const Shares shares{end, static_cast<std::size_t>(system.ranks->size())};
-    begin = shares.first(system.ranks->rank());
-    end = shares.first(system.ranks->rank() + 1);
+    system.decomposition.join(*ranks, std::move(sizes));
+    const IdBlocks blocks = system.decomposition.blocks();
+    begin = blocks.first(ranks->rank());
+    end = blocks.first(ranks->rank() + 1);
     for (std::size_t id = begin; id < end; ++id) all.id.push_back(static_cast<Id>(id));
   }
   std::size_t first = 0;  // id of the species
@@ -117,9 +119,8 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
   const Deck::Source& source = *deck.source;
   if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
   auto system = std::make_unique<System<D>>();
-  system->ranks = ranks;
   fill_box(source, *system);
-  fill_particles(source, *system);
+  fill_particles(source, *system, ranks);
   place_particles(source, *system);
   system->wrap();
   give_velocities(source, *system);
@@ -131,18 +132,18 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
   problems.throw_errors(Failure::deck);
   check_state(deck, *system, problems);
   problems.throw_errors(Failure::initial_state);
-  if (ranks && !system->sizes) keep_share(*system);
+  if (ranks && !system->decomposition.joined()) system->decomposition.join(*ranks);
   warn_of_state(deck, *system, problems);
   for (const std::string& warning : problems.warnings()) deck.warnings.push_back(warning);
   return system;
 }
 
 template void fill_box(const Deck::Source&, System<2>&);
-template void fill_particles(const Deck::Source&, System<2>&);
+template void fill_particles(const Deck::Source&, System<2>&, Exchange*);
 template std::unique_ptr<System<2>> build_system<2>(Deck&, Exchange*);
 
 template void fill_box(const Deck::Source&, System<3>&);
-template void fill_particles(const Deck::Source&, System<3>&);
+template void fill_particles(const Deck::Source&, System<3>&, Exchange*);
 template std::unique_ptr<System<3>> build_system<3>(Deck&, Exchange*);
 
 }  // namespace carom

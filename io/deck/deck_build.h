@@ -9,13 +9,13 @@ namespace carom {
 template <int D>
 void fill_box(const Deck::Source& source, System<D>& system);
 
-/// Masses, radii and charges; of this rank's share, where the system has ranks and built_in_shares().
+/// Masses, radii and charges; of this rank's block, where there are `ranks` and built_in_blocks().
 template <int D>
-void fill_particles(const Deck::Source& source, System<D>& system);
+void fill_particles(const Deck::Source& source, System<D>& system, Exchange* ranks);
 
-/// Whether ranks can build their shares of the initial state, each for itself: lattices of species with particles all
+/// Whether ranks can build their blocks of the initial state, each for itself: lattices of species with particles all
 /// alike.
-bool built_in_shares(const Deck::Source& source);
+bool built_in_blocks(const Deck::Source& source);
 
 /// Positions as [placement] says, for species given by count. Sets the box where the packing fraction does so.
 template <int D>

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "engine/forces/pair_filter.h"
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "io/deck/deck_build.h"
 #include "io/deck/deck_interpret.h"
 #include "io/deck/deck_species.h"
@@ -120,7 +120,7 @@ void make_interactions(const Deck::Source& source, const std::vector<bool>& skip
                                 .species = system.species,
                                 .placed = placed,
                                 .total = source.particles(),
-                                .ranks = shared_by(system)};
+                                .ranks = system.decomposition.others()};
   const auto bonded = [](const InteractionConfig& config) {
     return config.info->kind == InteractionInfo::Kind::bonded;
   };

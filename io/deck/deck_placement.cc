@@ -5,7 +5,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/setup/compression.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_build.h"
@@ -156,10 +156,10 @@ void place_particles(const Deck::Source& source, System<D>& system) {
   const bool centred = placement.type == "fcc" || placement.type == "hexagonal";
   const Lattice lattice = centred ? Lattice::centred : Lattice::simple;
   if (source.edges.empty()) {
-    const double filled = packing_fraction<D>(1, system.particles.radius, shared_by(system));
+    const double filled = packing_fraction<D>(1, system.particles.radius, system.decomposition.others());
     system.box.edges = commensurate_edges<D>(lattice, source.particles(), filled / *placement.packing_fraction);
   }
-  if (built_in_shares(source)) {
+  if (built_in_blocks(source)) {
     place_on_lattice(source, lattice, system);
     return;
   }

@@ -1,18 +1,14 @@
 #include "io/deck/validate_state.h"
 
 #include <algorithm>
+#include <limits>
 #include <numbers>
 #include <sstream>
-#include <tuple>
-#include <utility>
 
 #include "engine/events/contact.h"
 #include "engine/forces/forces.h"
 #include "engine/forces/stiffness.h"
-#include "engine/ranks/part.h"
-#include "engine/ranks/shares.h"
-#include "engine/ranks/vicinity.h"
-#include "engine/setup/placement.h"
+#include "engine/setup/initial_state.h"
 
 namespace carom {
 namespace {
@@ -37,47 +33,9 @@ const Place& place_of(const Deck::Source& source, Id id) {
   return config->placed ? source.placement.at : config->at;
 }
 
-/// What all ranks have found, each in its share.
-template <int D>
-Outsiders all_outsiders(const System<D>& system) {
-  const Particles<D>& p = system.particles;
-  Outsiders all = find_outsiders<D>(system.box, p.x, p.radius);
-  if (!shared_by(system)) return all;
-  Bytes mine;
-  if (all.spheres > 0) all.worst = p.id_of(all.worst);
-  put(mine, std::exchange(all, {}));
-  for (const Bytes& bytes : system.ranks->gather(mine)) {
-    const auto found = Reader(bytes).get<Outsiders>();
-    const std::size_t spheres = all.spheres + found.spheres;
-    if (found.depth > all.depth) all = found;
-    all.spheres = spheres;
-  }
-  return all;
-}
-
-/// The same of pairs. The worst is the same for any number of ranks: among equals that with the lowest ids.
-template <int D>
-Overlaps all_overlaps(const System<D>& system) {
-  if (!shared_by(system)) return find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
-  const Vicinity<D> near = vicinity<D>(system.box, 2 * system.sizes->largest_radius(), *system.ranks, system.particles);
-  Overlaps all = find_overlaps<D>(system.box, near.x, near.radius, near.beyond);
-  if (all.pairs > 0) all.lo = near.id[all.lo], all.hi = near.id[all.hi];
-  Bytes mine;
-  put(mine, std::exchange(all, {}));
-  for (const Bytes& bytes : system.ranks->gather(mine)) {
-    const auto found = Reader(bytes).get<Overlaps>();
-    if (found.pairs == 0) continue;
-    const std::size_t pairs = all.pairs + found.pairs;
-    const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.hi, o.lo); };
-    if (all.pairs == 0 || order(found) < order(all)) all = found;
-    all.pairs = pairs;
-  }
-  return all;
-}
-
 template <int D>
 void check_box(const Deck::Source& source, const System<D>& system, Problems& problems) {
-  const auto& radius = system.sizes ? system.sizes->radius : system.particles.radius;
+  const auto radius = system.decomposition.radii();
   const double diameter = 2 * *std::max_element(radius.begin(), radius.end());
   for (int k = 0; k < D; ++k) {
     const double edge = system.box.edges[k];
@@ -86,7 +44,8 @@ void check_box(const Deck::Source& source, const System<D>& system, Problems& pr
                    say("the periodic box is ", edge, " long on axis ", k, ", less than a diameter of ", diameter),
                    "enlarge the box; a sphere must not touch itself");
   }
-  const double filled = packing_fraction<D>(system.box.volume(), system.particles.radius, shared_by(system));
+  const double filled =
+      packing_fraction<D>(system.box.volume(), system.particles.radius, system.decomposition.others());
   if (filled > 1 && closed(system.box))
     problems.error(source.box, say("the spheres fill ", filled, " of the box"),
                    "enlarge the box or take fewer spheres");
@@ -94,12 +53,12 @@ void check_box(const Deck::Source& source, const System<D>& system, Problems& pr
 
 template <int D>
 void check_spheres(const Deck::Source& source, const System<D>& system, Problems& problems) {
-  if (const Outsiders out = all_outsiders(system); out.spheres > 0)
+  if (const Outsiders out = find_outsiders(system); out.spheres > 0)
     problems.error(place_of(source, out.worst),
                    say(plural(out.spheres, "sphere is", "spheres are"), " not inside the walls; the worst is particle ",
                        out.worst, ", which reaches ", out.depth, " beyond a wall of axis ", out.axis),
                    "move it inside (at least a radius from every wall), or enlarge the box");
-  if (const Overlaps overlaps = all_overlaps(system); overlaps.pairs > 0)
+  if (const Overlaps overlaps = find_overlaps(system); overlaps.pairs > 0)
     problems.error(place_of(source, overlaps.hi),
                    say(plural(overlaps.pairs, "pair of spheres overlaps", "pairs of spheres overlap"),
                        "; the worst is particles ", overlaps.lo, " and ", overlaps.hi, " at distance ",
@@ -137,7 +96,7 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
                      "make the boundary open or periodic, or take another integrator");
 
   const double close_packing = D == 2 ? std::numbers::pi / std::sqrt(12.0) : std::numbers::pi / std::sqrt(18.0);
-  const double filled = packing_fraction<D>(box.volume(), system.particles.radius, shared_by(system));
+  const double filled = packing_fraction<D>(box.volume(), system.particles.radius, system.decomposition.others());
   if (source.integrator->hard_cores && closed(box) && filled > close_packing)
     problems.warning(source.box,
                      say("packing fraction ", filled, " is beyond close packing of equal spheres, ", close_packing),
@@ -154,15 +113,14 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
 
   constexpr std::uint64_t affordable = 500'000;  // particles or pairs: below a second of work
   if (!source.integrator->stepping || system.interactions.empty() || system.size() > affordable) return;
-  std::optional<Part<D>> part;
   system.quanta = quanta(system);
-  if (shared_by(system)) part.emplace(system, true, deck.plan.step);
-  const System<D>& known = part ? part->known() : system;
+  system.decomposition.divide(true, deck.plan.step);
   std::uint64_t pairs = 0;
-  for (const auto& term : known.interactions) pairs += term->interacting_pairs(known.particles.x);
-  if (part) part->ranks().sum({&pairs, 1});
-  if (pairs > affordable) return;
-  if (const double period = shortest_period(known); deck.plan.step > period / 10)
+  for (const auto& term : system.interactions) pairs += term->interacting_pairs(system.particles.x);
+  system.decomposition.ranks().sum({&pairs, 1});
+  const double period = pairs <= affordable ? shortest_period(system) : std::numeric_limits<double>::infinity();
+  system.decomposition.to_blocks();
+  if (deck.plan.step > period / 10)
     problems.warning(source.step,
                      say("step ", deck.plan.step, " is long for the shortest period at the start, ", period),
                      "a tenth of that period or less is usual");

@@ -16,7 +16,7 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems);
 
 /// The shortest period of small vibrations about the present positions, 2π/√|λ| with λ the eigenvalue of M⁻¹V″ that is
 /// largest in magnitude (power iteration; for one harmonic bond 2π/√(k(1/m + 1/m'))). Infinite without forces. Of what
-/// all ranks know together, where the system is what one of them knows (engine/ranks/part.h). Collective.
+/// all ranks know together, where the system is what one of them knows (engine/ranks/decomposition.h). Collective.
 template <int D>
 double shortest_period(const System<D>& system);
 

@@ -98,7 +98,7 @@ struct TrajectoryWriter<D>::Contents {
         edges(file, "particles/trajectory/box/edges", {3, 3}),
         momentum(file, "observables/momentum", {3}),
         collisions(file, "observables/collisions"),
-        ranks(system.ranks) {
+        ranks(system.decomposition.ranks()) {
     write_origin(file);
     write_parameters(file, deck, system);
     write_box(system.box);
@@ -143,9 +143,9 @@ struct TrajectoryWriter<D>::Contents {
       first += kinds.size();
     };
     const Particles<D>& p = system.particles;
-    if (!system.sizes) return write(p.species, p.mass, p.radius, p.charge);
+    if (!system.decomposition.joined()) return write(p.species, p.mass, p.radius, p.charge);
     one_after_the_other(
-        *ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); },
+        ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); },
         [&](int /*rank*/, const Bytes& message) {
           const std::size_t here = message.size() / (3 * sizeof(double) + sizeof(std::uint16_t));
           Reader reader(message);
@@ -155,7 +155,7 @@ struct TrajectoryWriter<D>::Contents {
         });
   }
 
-  /// Writes what changes of the particles: a row of all that there are, from one state or from the shares of all ranks.
+  /// Writes what changes of the particles: a row of all that there are, from one state or from the blocks of all ranks.
   void write_particles(const Particles<D>& p) {
     for (auto* element : {&position, &velocity}) element->value.append_row();
     image.value.append_row();
@@ -166,7 +166,7 @@ struct TrajectoryWriter<D>::Contents {
     std::size_t first = 0;
     try {
       one_after_the_other(
-          *ranks, [&] { return packed(p.x, p.v, p.image); },
+          ranks, [&] { return packed(p.x, p.v, p.image); },
           [&](int /*rank*/, const Bytes& message) {
             const std::size_t n = message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>));
             Reader reader(message);
@@ -201,7 +201,7 @@ struct TrajectoryWriter<D>::Contents {
   Element<std::uint64_t> collisions;
   std::map<std::string, Element<double>> observables;
   std::array<double, 9> edge_rows{};
-  Exchange* ranks;
+  Exchange& ranks;
 };
 
 template <int D>

@@ -13,13 +13,13 @@
 // position + image · edge. Every frame is flushed: it survives the end of the process; steps go in last, and their
 // number is the number of whole frames.
 //
-// Where ranks have shares of the particles (engine/ranks/shares.h) rank 0 writes one after the other, as a piece of the
-// same row: it never has more than one of them. The others have a ShareTeller each.
+// Where ranks have blocks of the particles (engine/ranks/id_blocks.h) rank 0 writes one after the other, as a piece of
+// the same row: it never has more than one of them. The others have a ShareTeller each.
 
 #include <filesystem>
 #include <memory>
 
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/run/simulation.h"
 #include "io/deck/deck.h"
 

@@ -6,7 +6,7 @@
 
 #include "engine/base/random.h"
 #include "engine/forces/pair_filter.h"
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/setup/placement.h"
 
 namespace carom::test {

@@ -69,7 +69,7 @@ class FieldTerm final : public Interaction<D> {
   }
   ForceScale scale(double distance) const override { return {kShare * field_.least_force(distance), 0}; }
   bool keeps_momentum() const override { return false; }
-  std::unique_ptr<Interaction<D>> among(const Particles<D>&, const Particles<D>& some) const override {
+  std::unique_ptr<Interaction<D>> among(const Particles<D>& some) const override {
     return std::make_unique<FieldTerm>(some, field_.among(some));
   }
   double reach(Positions<D>) const override { return 0; }

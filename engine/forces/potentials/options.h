@@ -12,7 +12,7 @@
 #include "engine/forces/potentials/cut.h"
 #include "engine/forces/potentials/pair_term.h"
 #include "engine/forces/potentials/tail.h"
-#include "engine/ranks/vicinity.h"
+#include "engine/ranks/halo.h"
 #include "engine/search/neighbour_list.h"
 
 namespace carom::options {
@@ -63,8 +63,8 @@ PairList bonds(std::string_view type, const Parameters& parameters, const Intera
     }
   };
   if (context.ranks) {
-    const Vicinity<D> near = vicinity(context.box, distance, *context.ranks, context.particles);
-    add(near, [&](Id i) { return near.beyond[i] == 0; });
+    const Halo<D> near = halo_of(context.box, distance, *context.ranks, context.particles);
+    add(near, [&](Id i) { return near.ghost[i] == 0; });
     list = union_of_all(*context.ranks, list);
   } else {
     add(context.particles, [](Id) { return true; });

@@ -53,7 +53,7 @@ class PairTerm final : public Interaction<D> {
     evaluate({.x = x, .vectors = w}, &out, nullptr);
   }
 
-  std::unique_ptr<Interaction<D>> among(const Particles<D>& /*made_for*/, const Particles<D>& some) const override {
+  std::unique_ptr<Interaction<D>> among(const Particles<D>& some) const override {
     auto pairs = pairs_.among(some);
     if (!pairs) return nullptr;
     auto term = std::make_unique<PairTerm>(some, potential_, weight_, std::move(*pairs), scale_, tail_);
@@ -72,7 +72,7 @@ class PairTerm final : public Interaction<D> {
       return nullptr;
   }
   double reach(Positions<D> x) const override { return pairs_.reach(x); }
-  double reach(const Particles<D>& share, Exchange& ranks) const override { return pairs_.reach(share, ranks); }
+  double reach(const Particles<D>& block, Exchange& ranks) const override { return pairs_.reach(block, ranks); }
 
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t own = 0;

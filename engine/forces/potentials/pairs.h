@@ -9,7 +9,7 @@
 //   most_partners()             of any particle in these batches, or more
 //   use(kernels)                instead of pair_kernels()
 // and
-//   reach(x), reach(share, ranks)           how far apart partners are at most; infinite: no end
+//   reach(x), reach(block, ranks)           how far apart partners are at most; infinite: no end
 //   among(some)                             itself for some of the particles, if they are enough
 
 #include <algorithm>
@@ -74,12 +74,12 @@ class Bonds {
     for (const auto& [i, j] : pairs_) longest = std::max(longest, (x[i] - x[j] + shift_of(i, j, x)).norm());
     return longest;
   }
-  double reach(const Particles<D>& share, Exchange& ranks) const {
-    const Id first = share.size() > 0 ? share.id_of(0) : 0;
-    const auto here = [&](Id id) { return id >= first && id - first < share.size(); };
+  double reach(const Particles<D>& block, Exchange& ranks) const {
+    const Id first = block.size() > 0 ? block.id_of(0) : 0;
+    const auto here = [&](Id id) { return id >= first && id - first < block.size(); };
     Bytes message;  // the higher partners of bonds, where another rank has the lower one
     for (const auto& [i, j] : pairs_)
-      if (!here(i) && here(j)) put(message, j), put(message, share.x[j - first]);
+      if (!here(i) && here(j)) put(message, j), put(message, block.x[j - first]);
     std::unordered_map<Id, Vec<D>> elsewhere;
     for (const Bytes& each : ranks.gather(message))
       for (Reader reader(each); reader.more();) {
@@ -89,7 +89,7 @@ class Bonds {
     double longest = 0;
     for (const auto& [i, j] : pairs_) {
       if (!here(i)) continue;
-      const Vec<D> d = share.x[i - first] - (here(j) ? share.x[j - first] : elsewhere.at(j));
+      const Vec<D> d = block.x[i - first] - (here(j) ? block.x[j - first] : elsewhere.at(j));
       longest = std::max(longest, (d + box_.shift(box_.nearest_image(d))).norm());
     }
     return longest;

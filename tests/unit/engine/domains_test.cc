@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/event_cases.h"
 
@@ -47,10 +47,10 @@ Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr
     System<D> system;
     system.box = c.system->box;
     system.particles = c.system->particles;
-    system.ranks = &ranks;
-    keep_share(system);
+    system.decomposition.join(ranks);
     Particles<D>& p = system.particles;
-    Domains<D> domains(system.box, *system.sizes, ranks, {.method = way.method, .in_cache = way.in_cache}, way.window);
+    Domains<D> domains(system.box, system.decomposition.sizes(), ranks,
+                       {.method = way.method, .in_cache = way.in_cache}, way.window);
     Counters counters;
     std::vector<Contact<D>> contacts;
     for (int k = 0; k < c.slabs && counters.sphere_sphere < way.limit; ++k) {

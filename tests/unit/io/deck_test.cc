@@ -5,7 +5,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_source.h"
 #include "io/deck/validate_state.h"

@@ -108,8 +108,7 @@ TEST(TrajectoryFile, HasNoPartOfAFrameInWhichARankIsLost) {
   } ranks;
   const auto path = fresh_directory() / "t.h5md";
   const auto system = test::sample_system<3>();
-  system->ranks = &ranks;
-  system->sizes.emplace(system->particles);
+  system->decomposition.join(ranks, Sizes(system->particles));
   system->particles.id = {0, 1, 2};
   TrajectoryWriter<3> writer(path, test::sample_deck(3), *system);
   writer.frame(test::sample_snapshot<3>(system->particles, 0.0, 0));

@@ -351,10 +351,9 @@ TEST(PairSums, NameBondsAndStraysByTheIdsOfTheParticles) {
     some.id.push_back(i);
   }
   const auto bond =
-      scene.make("harmonic-bond", {{"pairs", PairList{{4, 9}}}, {"stiffness", 1.0}, {"rest_length", 1.0}})
-          ->among(scene.particles, some);
+      scene.make("harmonic-bond", {{"pairs", PairList{{4, 9}}}, {"stiffness", 1.0}, {"rest_length", 1.0}})->among(some);
   EXPECT_NE(refusal(*bond, some.x).find("the bond of particles 4 and 9 "), std::string::npos);
-  const auto fluid = scene.make("lennard-jones", cut_lennard_jones(0.8, 2.0))->among(scene.particles, some);
+  const auto fluid = scene.make("lennard-jones", cut_lennard_jones(0.8, 2.0))->among(some);
   auto x_new = some.x;
   x_new[1][0] += 40;
   ForceSums<2> mean(3, kQuantum);

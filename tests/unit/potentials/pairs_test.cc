@@ -213,7 +213,7 @@ TEST(Pairs, BondedPairsAreLeftOutAlsoAmongSomeOfTheParticles) {
     some.x.push_back(scene.particles.x[i]);
     some.species.push_back(scene.particles.species[i]);
   }
-  EXPECT_EQ(all->among(scene.particles, some)->interacting_pairs(some.x), 1u);
+  EXPECT_EQ(all->among(some)->interacting_pairs(some.x), 1u);
 }
 
 TEST(Refused, ToLeaveOutBondsThatAreNotThere) {

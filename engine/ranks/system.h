@@ -1,22 +1,18 @@
 #pragma once
-// The particles and what acts on them: the state that an integrator advances.
+// The particles and what acts on them: the state that an integrator advances, with its division among ranks.
 
 #include <algorithm>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/base/box.h"
+#include "engine/base/fields.h"
 #include "engine/base/interaction.h"
 #include "engine/base/particles.h"
-#include "engine/base/sizes.h"
+#include "engine/ranks/decomposition.h"
 
 namespace carom {
-
-class Exchange;
-template <int D>
-class Part;
 
 /// The units in which forces and energies of pairs are rounded: constants of a run, powers of two.
 struct Quanta {
@@ -24,24 +20,32 @@ struct Quanta {
   double energy = 0;  ///< 2^-46 of the smallest scale of their energies [energy]
 };
 
-/// Lives on the heap and is never moved: interactions refer to its box and particles.
+/// Lives on the heap and is never moved: interactions refer to its box and particles, the registry to its arrays.
 template <int D>
 struct System {
-  System() = default;
+  System() {
+    using Kind = Fields::Kind;
+    fields.add("position", particles.x);
+    fields.add("velocity", particles.v);
+    fields.add("image", particles.image);
+    fields.add("mass", particles.mass, Kind::constant);
+    fields.add("radius", particles.radius, Kind::constant);
+    fields.add("charge", particles.charge, Kind::constant);
+    fields.add("species", particles.species, Kind::constant);
+  }
   System(const System&) = delete;
   System& operator=(const System&) = delete;
 
   Box<D> box;
-  Particles<D> particles;
+  Particles<D> particles;                           ///< that this rank works with; one rank: all
   std::vector<std::string> species = {"particle"};  ///< names
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
-  Exchange* ranks = nullptr;   ///< that advance this system together; null: one
-  std::optional<Sizes> sizes;  ///< of all particles, where each rank has only its share of them (engine/ranks/shares.h)
-  Quanta quanta{};             ///< set before the first force pass
-  Part<D>* part = nullptr;     ///< what this rank does of it, where they share the work on forces
+  Quanta quanta{};  ///< set before the first force pass
+  Fields fields;    ///< what belongs to each particle
+  Decomposition<D> decomposition{*this};
 
   /// How many particles there are, on all ranks together, also while they are in the cores.
-  std::size_t size() const { return sizes ? sizes->spheres : particles.mass.size(); }
+  std::size_t size() const { return decomposition.total(); }
 
   /// Whether nothing changes the total momentum: no wall, no field.
   bool keeps_momentum() const {

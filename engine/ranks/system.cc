@@ -1,4 +1,4 @@
-#include "engine/base/system.h"
+#include "engine/ranks/system.h"
 
 #include <cmath>
 

@@ -1,11 +1,11 @@
 // Methods that share their work among ranks, against themselves on one: every bit.
 
-#include "engine/ranks/part.h"
+#include "engine/ranks/decomposition.h"
 
 #include <gtest/gtest.h>
 
 #include "engine/forces/forces.h"
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/run/simulation.h"
 #include "tests/support/experiments.h"
 #include "tests/support/thread_ranks.h"
@@ -50,7 +50,7 @@ template <int D>
 Account<D> run(const Scene<D>& scene, const std::string& method, const Plan& plan, const Given& given,
                Exchange* ranks) {
   auto system = scene();
-  system->ranks = ranks;
+  if (ranks) system->decomposition.join(*ranks);
   auto simulation = test::make_run<D>(std::move(system), method, plan, given);
   Account<D> account(ranks);
   simulation->add(account);
@@ -170,7 +170,7 @@ const std::vector<std::pair<std::string, Given>> kMethods = {
     {"cdda", {}}, {"cdda", {{"order", std::int64_t{4}}}},
     {"edda", {}}, {"edda", {{"tolerance", 0.0}}}};
 
-TEST(Part, Springs) {
+TEST(Decomposition, Springs) {
   for (const auto& [method, given] : kMethods) compare<2>([] { return springs(7); }, method, 0.02, 25, 20, given);
 }
 /// Spheres joined to their neighbours, which attract the others only; with a long-range correction, and a table.
@@ -190,24 +190,24 @@ std::unique_ptr<System<3>> chains() {
                          {"cut", std::string("force-shifted")}});
   return system;
 }
-TEST(Part, BondedPairsLeftOut) {
+TEST(Decomposition, BondedPairsLeftOut) {
   for (const char* method : {"psa", "cdda", "edda"}) compare<3>(chains, method, 0.01, 20, 20);
 }
-TEST(Part, Fluid) {
+TEST(Decomposition, Fluid) {
   for (const auto& [method, given] : kMethods) compare<3>(yukawa(0.35), method, 0.01, 12, 15, given);
 }
-TEST(Part, Cloud) {
+TEST(Decomposition, Cloud) {
   for (const auto& [method, given] : kMethods) compare<3>(cloud, method, 0.02, 30, 5, given);
 }
 /// So many that each rank knows only some.
-TEST(Part, ManySprings) {
+TEST(Decomposition, ManySprings) {
   for (const char* method : {"verlet", "psa", "edda"}) {
     const std::uint64_t contacts = std::string(method) == "verlet" ? 0 : 400;
     const Counters c = compare<2>([] { return springs(40); }, method, 0.02, 60, contacts).counters;
     EXPECT_EQ(c.slabs_again, 0u) << method;  // ghosts that go wrong at the rim are right again in the next slab
   }
 }
-TEST(Part, Rod) {
+TEST(Decomposition, Rod) {
   for (const char* method : {"psa", "edda"}) {
     const Statistics s = compare<3>(rod, method, 0.01, 40, 60);
     EXPECT_LT(s.counters.slabs_again, 5u) << method;
@@ -215,7 +215,7 @@ TEST(Part, Rod) {
 }
 /// Chains of collisions that reach from the rim of what a rank knows to what matters: discs in a long strip, so close
 /// that each collides more than once in two steps.
-TEST(Part, GhostsThatGoWrong) {
+TEST(Decomposition, GhostsThatGoWrong) {
   const auto strip = [] {
     std::vector<Vec<2>> x, v;
     for (int k = 0; k < 2400; ++k) {
@@ -231,8 +231,8 @@ TEST(Part, GhostsThatGoWrong) {
     EXPECT_GT(c.slabs_again, c.slabs_by_all) << method;  // more ghosts were enough
   }
 }
-/// From bonds that ranks find in their shares to what they sum up over what they know: none has all.
-TEST(Part, NobodyHasEverybody) {
+/// From bonds that ranks find in their blocks to what they sum up over what they know: none has all.
+TEST(Decomposition, NoRankHasAllParticles) {
   const auto lattice = [] { return test::hard_spheres<2>(40, 0.5); };
   const test::Given bonds = {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}};
   auto whole = lattice();
@@ -244,39 +244,36 @@ TEST(Part, NobodyHasEverybody) {
   evaluate_forces<2>(*whole, all.x, forces, uncounted);
   test::ThreadRanks(8).run([&](Exchange& exchange) {
     auto system = lattice();
-    system->ranks = &exchange;
-    keep_share(*system);
+    system->decomposition.join(exchange);
     test::add_interaction(*system, "harmonic-bond", bonds);
     double reach = system->interactions[0]->reach(system->particles, exchange);
     exchange.largest({&reach, 1});
     EXPECT_EQ(reach, whole->interactions[0]->reach(all.x));
     system->quanta = quanta(*system);
-    Part<2> part(*system, true, 0.02);
-    System<2>& known = part.known();
-    Particles<2>& p = known.particles;
-    EXPECT_FALSE(part.knows_all());
-    EXPECT_EQ(part.total(), all.size());
-    EXPECT_EQ(system->particles.size(), all.size() / 8);
+    Particles<2>& p = system->particles;
+    EXPECT_EQ(p.size(), all.size() / 8);
+    system->decomposition.divide(true, 0.02);
+    EXPECT_FALSE(system->decomposition.knows_all());
+    EXPECT_EQ(system->size(), all.size());
     EXPECT_LT(p.size(), all.size() / 2);
-    EXPECT_EQ(evaluate_energy<2>(known, p.x).energy.value(), energy);
+    EXPECT_EQ(evaluate_energy<2>(*system, p.x).energy.value(), energy);
     std::vector<Vec<2>> felt(p.size());
     Counters mine;
-    evaluate_forces<2>(known, p.x, felt, mine);
+    evaluate_forces<2>(*system, p.x, felt, mine);
     for (Id i = 0; i < p.size(); ++i) {
       EXPECT_EQ(p.x[i], all.x[p.id[i]]);
       EXPECT_EQ(felt[i], forces[p.id[i]]);
       if (p.owns(i)) p.x[i] += p.v[i];
     }
-    part.collect();
-    const Particles<2>& share = system->particles;
-    for (Id i = 0; i < share.size(); ++i) EXPECT_EQ(share.x[i], all.x[share.id[i]] + all.v[share.id[i]]);
+    system->decomposition.to_blocks();
+    for (Id i = 0; i < p.size(); ++i) EXPECT_EQ(p.x[i], all.x[p.id[i]] + all.v[p.id[i]]);
   });
 }
 /// In such long steps a collision is felt farther away than a rank knows.
-TEST(Part, StepsThatTakeEverybody) {
+TEST(Decomposition, StepsThatTakeAllParticles) {
   EXPECT_GT(compare<2>([] { return springs(40); }, "psa", 0.5, 2, 1000).counters.slabs_by_all, 0u);
 }
-TEST(Part, WithoutCores) {
+TEST(Decomposition, WithoutCores) {
   for (const auto& scene : {yukawa(0.1), yukawa(0.3)}) compare<3>(scene, "verlet", 0.01, 150, 0);
 }
 /// Discs joined to their neighbours by springs so stiff that sweeps are accelerated.
@@ -288,12 +285,12 @@ Scene<2> stiff(int cells, double packing_fraction) {
   };
 }
 /// Neighbours bounce so often in a step that the order of some collisions changes from sweep to sweep.
-TEST(Part, ParticlesThatAreFrozen) {
+TEST(Decomposition, ParticlesThatAreFrozen) {
   const Counters c = compare<2>(stiff(40, 0.74), "edda", 0.04, 12, 300).counters;
   EXPECT_GT(c.frozen, 0u);
   EXPECT_EQ(c.slabs_by_all, 0u);
 }
-TEST(Part, StiffForces) {
+TEST(Decomposition, StiffForces) {
   EXPECT_GT(compare<2>(stiff(7, 0.5), "edda", 0.05, 12, 0).counters.fallbacks, 0u);
   const Counters many = compare<2>(stiff(30, 0.5), "edda", 0.05, 2, 0).counters;
   EXPECT_GT(many.fallbacks, 0u);

@@ -1,21 +1,19 @@
 #pragma once
-// Which rank keeps which particles of a system that several ranks share: each has those of consecutive ids, its share,
-// at the start and whenever the system is observed. Else they are with their owners (domains.h, part.h).
+// Blocks of consecutive ids: the order in which several ranks keep particles for files and between epochs, one each.
 
 #include <cstring>
 #include <span>
 #include <vector>
 
 #include "engine/base/particles.h"
-#include "engine/base/system.h"
 #include "engine/ranks/exchange.h"
 
 namespace carom {
 
-struct Shares {
+struct IdBlocks {
   std::size_t particles = 0, ranks = 1;
 
-  /// The first id of a rank's share; that of the next rank is its end.
+  /// The first id of a rank's block; that of the next rank is its end.
   Id first(int rank) const { return static_cast<Id>(particles * static_cast<std::size_t>(rank) / ranks); }
   int rank_of(Id id) const {
     auto rank = static_cast<int>(id * ranks / particles);
@@ -24,10 +22,22 @@ struct Shares {
   }
 };
 
-/// The ranks that have shares of a system; null: all particles are here.
-template <int D>
-Exchange* shared_by(const System<D>& system) {
-  return system.sizes ? system.ranks : nullptr;
+/// Sends values of particles to the ranks of their blocks: for_each(send) calls send(id, value) for each on one of the
+/// ranks, take(place, value) is called for each where it belongs, place: in the block. Collective.
+template <class Value>
+void to_id_blocks(const IdBlocks& blocks, Exchange& ranks, auto&& for_each, auto&& take) {
+  std::vector<Bytes> outgoing(blocks.ranks);
+  for_each([&](Id id, const Value& value) {
+    Bytes& to = outgoing[static_cast<std::size_t>(blocks.rank_of(id))];
+    put(to, id);
+    put(to, value);
+  });
+  const Id first = blocks.first(ranks.rank());
+  for (const Bytes& bytes : ranks.swap(std::move(outgoing)))
+    for (Reader reader(bytes); reader.more();) {
+      const auto id = reader.get<Id>();
+      take(id - first, reader.get<Value>());
+    }
 }
 
 /// Calls visit(vector) for everything that is kept of each particle, but for its id and owner.
@@ -42,18 +52,6 @@ void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.species);
 }
 
-/// Leaves this rank its share of a system that it has in full.
-template <int D>
-void keep_share(System<D>& system) {
-  Particles<D>& p = system.particles;
-  system.sizes.emplace(p);
-  const Shares shares{p.size(), static_cast<std::size_t>(system.ranks->size())};
-  const Id first = shares.first(system.ranks->rank()), end = shares.first(system.ranks->rank() + 1);
-  for_each_array(
-      p, [&](auto& all) { all = std::remove_reference_t<decltype(all)>(all.begin() + first, all.begin() + end); });
-  for (Id i = first; i < end; ++i) p.id.push_back(i);
-}
-
 /// Sends the messages of all ranks to rank 0 one after the other, so that it never holds more than one. pack() makes a
 /// rank's message, visit(rank, message) is called on rank 0. Collective.
 template <class Pack, class Visit>
@@ -64,11 +62,11 @@ void one_after_the_other(Exchange& ranks, Pack&& pack, Visit&& visit) {
   }
 }
 
-/// Copies of all particles on rank 0, by id, from the shares of all ranks; none elsewhere. Collective.
+/// Copies of all particles on rank 0, by id, from the blocks of all ranks; none elsewhere. Collective.
 template <int D>
-Particles<D> gathered(Exchange& ranks, const Particles<D>& share) {
+Particles<D> gathered(Exchange& ranks, const Particles<D>& block) {
   Bytes mine;
-  for_each_array(const_cast<Particles<D>&>(share), [&](const auto& array) {
+  for_each_array(const_cast<Particles<D>&>(block), [&](const auto& array) {
     const auto bytes = std::as_bytes(std::span(array));
     mine.insert(mine.end(), bytes.begin(), bytes.end());
   });

@@ -1,6 +1,6 @@
-// Free flight on ranks that have shares of the particles, against one that has all.
+// Free flight on ranks that have blocks of the particles, against one that has all.
 
-#include "engine/ranks/shares.h"
+#include "engine/ranks/id_blocks.h"
 
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ using Scene = std::function<std::unique_ptr<System<D>>()>;
 template <int D>
 Account<D> run(const Scene<D>& scene, Exchange* ranks) {
   auto system = scene();
-  system->ranks = ranks;
+  if (ranks) system->decomposition.join(*ranks);
   auto run =
       test::make_run<D>(std::move(system), "free-flight",
                         {.step = 0.3, .end_time = 0.8, .frame_interval = 0.2, .thermo_interval = 0.07, .events = true});
@@ -88,10 +88,10 @@ void compare(const Scene<D>& scene, std::size_t contacts) {
   }
 }
 
-TEST(Shares, Fluid) {
+TEST(IdBlocks, Fluid) {
   compare<3>([] { return test::hard_spheres<3>(5, 0.3); }, 1500);
 }
-TEST(Shares, ManySizesBetweenWalls) {
+TEST(IdBlocks, ManySizesBetweenWalls) {
   compare<2>(
       [] {
         auto system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4);
@@ -100,7 +100,7 @@ TEST(Shares, ManySizesBetweenWalls) {
       },
       300);
 }
-TEST(Shares, Species) {
+TEST(IdBlocks, Species) {
   compare<3>(
       [] {
         auto system = random_system<3>(200, {8, 8, 8}, {O, P, P}, 0.5, 0.5, 9);
@@ -112,7 +112,7 @@ TEST(Shares, Species) {
 }
 
 /// Two that overlap and never move are seen by whichever rank, in whichever way the box is cut.
-TEST(Shares, OverlapsAreFound) {
+TEST(IdBlocks, OverlapsAreFound) {
   const auto grid = [] {
     std::vector<Vec<3>> x, v(125, Vec<3>::Zero());
     for (int k = 0; k < 125; ++k) x.push_back({1.0 + 2 * (k / 25), 1.0 + 2 * (k / 5 % 5), 1.0 + 2 * (k % 5)});

@@ -1,0 +1,319 @@
+#include "engine/ranks/decomposition.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "engine/ranks/division.h"
+#include "engine/ranks/system.h"
+
+namespace carom {
+namespace {
+
+constexpr double kLeastSlack = 0.5, kMostSlack = 2;  // that a particle comes between divisions [largest diameter]
+constexpr double kSlabsApart = 16;                   // divisions, about
+constexpr double kFaster = 2;                        // factor between the largest speed and the one allowed for
+constexpr double kRoom = 1.25;                       // for a path that was too long
+constexpr std::int64_t kSlabs = 64;                  // between divisions while all are known
+constexpr double kLeastDepth = 3;                    // of copies that do not matter [largest diameter]
+constexpr double kMost = 0.9;                        // of all particles; a rank that would know more knows all
+
+template <int D>
+Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
+  return p.x[i] + box.shift(p.image[i]);
+}
+
+}  // namespace
+
+template <int D>
+void Decomposition<D>::join(Exchange& ranks, Sizes of_all) {
+  ranks_ = std::make_unique<TimedExchange>(ranks);
+  sizes_ = std::move(of_all);
+}
+
+template <int D>
+void Decomposition<D>::join(Exchange& ranks) {
+  Particles<D>& p = system_.particles;
+  join(ranks, Sizes(p));
+  const Id first = blocks().first(ranks.rank()), end = blocks().first(ranks.rank() + 1);
+  for_each_array(
+      p, [&](auto& all) { all = std::remove_reference_t<decltype(all)>(all.begin() + first, all.begin() + end); });
+  for (Id i = first; i < end; ++i) p.id.push_back(i);
+}
+
+template <int D>
+std::size_t Decomposition<D>::total() const {
+  return joined() ? sizes_->spheres : system_.particles.mass.size();
+}
+
+template <int D>
+std::span<const double> Decomposition<D>::radii() const {
+  return joined() ? sizes_->radius : system_.particles.radius;
+}
+
+template <int D>
+bool Decomposition<D>::divide(bool local, double slab_length, bool cores) {
+  if (!joined()) return false;
+  local_ = local;
+  copied_to_.resize(static_cast<std::size_t>(ranks_->size()));
+  least_depth_ = depth_ = cores ? kLeastDepth : 0;
+  migrate(!local, slab_length);
+  next_ = kSlabs;
+  return true;
+}
+
+template <int D>
+void Decomposition<D>::to_blocks() {
+  if (!by_place_) return;
+  block();
+  system_.particles = std::exchange(block_, {});
+  system_.interactions = std::move(block_interactions_);
+  by_place_ = false;
+}
+
+template <int D>
+const Particles<D>& Decomposition<D>::block() {
+  if (!by_place_) return system_.particles;
+  struct State {
+    Vec<D> x, v;
+    Image<D> image;
+  };
+  const Particles<D>& p = system_.particles;
+  to_id_blocks<State>(
+      blocks(), *ranks_,
+      [&](auto&& send) {
+        for (Id i = 0; i < p.size(); ++i)
+          if (p.owns(i)) send(p.id_of(i), State{p.x[i], p.v[i], p.image[i]});
+      },
+      [&](std::size_t place, const State& state) {
+        block_.x[place] = state.x;
+        block_.v[place] = state.v;
+        block_.image[place] = state.image;
+      });
+  return block_;
+}
+
+template <int D>
+bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
+  if (!by_place_ || (all_known_ ? slab < next_ : !outdated())) return false;
+  if (!all_known_) {  // all has gone well since the last time
+    patience_ = std::max<std::int64_t>(patience_ / 2, 1);
+    depth_ = std::max(0.75 * depth_, least_depth_);
+    wanted_path_ *= 0.75;
+  }
+  migrate(!local_, slab_length);
+  next_ = slab + kSlabs;
+  return true;
+}
+
+template <int D>
+void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
+  if (std::exchange(more_, false) && migrate_to_those_near(slab_length)) return;
+  migrate_to_all();
+  next_ = slab + patience_;
+  patience_ = std::min(2 * patience_, kSlabs);
+}
+
+template <int D>
+void Decomposition<D>::migrate(bool all, double slab_length) {
+  if (!all && migrate_to_those_near(slab_length)) return;
+  if (by_place_ && all_known_)
+    own_anew();
+  else
+    migrate_to_all();
+}
+
+/// This rank's own particles with their fields, put into the messages that for_each_receiver(place, visit) visits;
+/// `particles`: in each of them. No particle is known any more after that.
+template <int D>
+std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver) {
+  Particles<D>& p = system_.particles;
+  std::vector<Bytes> messages(particles.size());
+  Bytes packed(sizeof(Id) + system_.fields.bytes());
+  for (Id i = 0; i < p.size(); ++i) {
+    if (!p.owns(i)) continue;
+    const Id id = p.id_of(i);
+    std::memcpy(packed.data(), &id, sizeof id);
+    system_.fields.pack(i, packed.data() + sizeof id);
+    for_each_receiver(p.x[i], [&](std::size_t message) {
+      if (messages[message].empty()) messages[message].reserve(particles[message] * packed.size());
+      messages[message].insert(messages[message].end(), packed.begin(), packed.end());
+    });
+  }
+  system_.fields.release_working();
+  if (!by_place_) {
+    block_ = std::move(p);
+    block_interactions_ = std::move(system_.interactions);
+    by_place_ = true;
+  }
+  system_.interactions.clear();
+  system_.fields.resize(0);
+  p.id = {};
+  return messages;
+}
+
+/// Gives each particle to the ranks that need it; false, and nothing has changed: all ranks have to know all.
+template <int D>
+bool Decomposition<D>::migrate_to_those_near(double slab_length) {
+  const Particles<D>& p = system_.particles;
+  std::array<double, 2> most{};  // reach and speed
+  auto& [reach, speed] = most;
+  for (const auto& term : system_.interactions)
+    reach = std::max(reach, by_place_ ? term->reach(p.x) : term->reach(p, *ranks_));
+  std::vector<Vec<D>> own;
+  for (Id i = 0; i < p.size(); ++i) {
+    if (!p.owns(i)) continue;
+    speed = std::max(speed, p.v[i].norm());
+    own.push_back(p.x[i]);
+  }
+  ranks_->largest(most);
+  const double diameter = 2 * sizes_->largest_radius();
+  const double path = std::max(kFaster * speed * slab_length, wanted_path_);
+  const double slack = std::clamp(kSlabsApart * speed * slab_length, kLeastSlack * diameter, kMostSlack * diameter);
+  const double near = std::max(reach, diameter) + 2 * path + 2 * slack, far = near + depth_ * diameter;
+  if (!std::isfinite(far)) return false;
+  const Division<D> division(system_.box, own, copied_to_.size(), far, *ranks_);
+  std::vector<std::uint64_t> known(copied_to_.size());
+  for (const Vec<D>& x : own) division.for_each_near(division.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
+  const std::vector<std::uint64_t> mine = known;
+  ranks_->sum(known);
+  if (static_cast<double>(std::ranges::max(known)) > kMost * static_cast<double>(total())) return false;
+
+  const auto messages = ranks_->swap(
+      pack(mine, [&](const Vec<D>& x, auto&& visit) { division.for_each_near(division.wrapped(x), visit); }));
+  all_known_ = false;
+  take_in(arrivals(messages));
+  assign(division, near);
+  path_ = path;
+  slack_ = slack;
+  system_.fields.prepare_working();
+  return true;
+}
+
+template <int D>
+void Decomposition<D>::migrate_to_all() {
+  const auto messages =
+      ranks_->gather(pack({total() / copied_to_.size()}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
+  all_known_ = true;
+  take_in(arrivals(messages));
+  own_anew();
+}
+
+/// The particles of messages by id.
+template <int D>
+std::vector<typename Decomposition<D>::Arrival> Decomposition<D>::arrivals(const std::vector<Bytes>& messages) const {
+  std::vector<Arrival> all;
+  for (const Bytes& message : messages)
+    for (Reader from(message); from.more();) {
+      const Id id = from.template get<Id>();
+      all.push_back({id, from.skip(system_.fields.bytes())});
+    }
+  std::ranges::sort(all, {}, &Arrival::id);
+  return all;
+}
+
+template <int D>
+void Decomposition<D>::take_in(const std::vector<Arrival>& arrivals) {
+  Particles<D>& p = system_.particles;
+  system_.fields.resize(arrivals.size());
+  for (Id i = 0; i < arrivals.size(); ++i) system_.fields.unpack(i, arrivals[i].at);
+  if (arrivals.size() < total())
+    for (const Arrival& arrival : arrivals) p.id.push_back(arrival.id);
+  p.ghost.assign(p.size(), 0);
+}
+
+/// All are known: sets anew which rank owns each.
+template <int D>
+void Decomposition<D>::own_anew() {
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  Exchange alone;
+  assign(Division<D>(system_.box, system_.particles.x, copied_to_.size(), kAll, alone), kAll);
+  system_.fields.release_working();
+  system_.fields.prepare_working();
+}
+
+/// Sets the owners of those known, and which ranks know this rank's own; copies nearer than `near` matter. Makes what
+/// acts on those known, where it is not there.
+template <int D>
+void Decomposition<D>::assign(const Division<D>& division, double near) {
+  Particles<D>& p = system_.particles;
+  copied_to_.assign(copied_to_.size(), {});
+  copies_of_ = copied_to_;
+  matters_.clear();
+  at_.clear();
+  safe_slabs_ = 0;
+  const auto me = static_cast<std::uint32_t>(ranks_->rank());
+  for (Id i = 0; i < p.size(); ++i) {
+    const Vec<D> x = division.wrapped(p.x[i]);
+    const std::uint32_t owner = division.owner(x);
+    p.ghost[i] = owner != me;
+    matters_.push_back(owner != me && division.squared_distance(me, x) <= near * near);
+    at_.push_back(unwrapped(system_.box, p, i));
+    if (owner != me)
+      copies_of_[owner].push_back(i);
+    else
+      division.for_each_near(x, [&](std::uint32_t rank) {
+        if (rank != me) copied_to_[rank].push_back(i);
+      });
+  }
+  neighbours_.clear();
+  for (std::size_t rank = 0; rank < copied_to_.size(); ++rank)
+    if (!copied_to_[rank].empty() || !copies_of_[rank].empty()) neighbours_.push_back(static_cast<int>(rank));
+  if (!system_.interactions.empty()) return;
+  for (const auto& term : block_interactions_) {
+    system_.interactions.push_back(term->among(p));
+    if (!system_.interactions.back()) throw std::logic_error("a particle is missing that an own particle feels");
+  }
+}
+
+template <int D>
+void Decomposition<D>::need_paths(double path) {
+  if (knows_all() || path <= path_) return;
+  more_ = std::isfinite(path);
+  if (more_) wanted_path_ = kRoom * path;
+  throw HaloTooSmall{};
+}
+
+template <int D>
+void Decomposition<D>::need_step(std::span<const Vec<D>> a, double length) {
+  if (knows_all()) return;
+  const Particles<D>& p = system_.particles;
+  double farthest = 0;
+  for (Id i = 0; i < p.size(); ++i)
+    if (p.owns(i)) farthest = std::max(farthest, (p.v[i] + 0.5 * length * a[i]).squaredNorm());
+  need_paths(length * std::sqrt(largest(farthest)));
+}
+
+template <int D>
+void Decomposition<D>::need_deeper_halo() {
+  depth_ *= 2;
+  more_ = true;
+  throw HaloTooSmall{};
+}
+
+template <int D>
+void Decomposition<D>::update_halo() {
+  if (!knows_all()) update(std::span(system_.particles.x), std::span(system_.particles.v));
+}
+
+/// Whether a particle has come so far that all are to be divided anew. Looks only where one may have.
+template <int D>
+bool Decomposition<D>::outdated() {
+  if (safe_slabs_ >= 1) {
+    --safe_slabs_;
+    return false;
+  }
+  const Particles<D>& p = system_.particles;
+  double farthest = 0;
+  for (Id i = 0; i < p.size(); ++i)
+    if (p.owns(i)) farthest = std::max(farthest, (unwrapped(system_.box, p, i) - at_[i]).squaredNorm());
+  const double left = 0.8 * slack_ - std::sqrt(largest(farthest));
+  safe_slabs_ = left / path_;
+  return left < 0;
+}
+
+template class Decomposition<2>;
+template class Decomposition<3>;
+
+}  // namespace carom

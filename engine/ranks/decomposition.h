@@ -1,0 +1,169 @@
+#pragma once
+// How the particles of a system are divided among the ranks that advance it together.
+//
+// It is always there. With one rank, the default, it owns everything and its exchanges do nothing. Several ranks keep
+// particles in one of two ways:
+//
+// * in blocks of consecutive ids (id_blocks.h): at the start, between epochs of free flight, and for files;
+// * by place, under forces: every particle is owned by one rank, and the ranks near it have copies, their halo
+//   (Particles::ghost). What acts on a particle is computed by its owner, with all its pairs, in sums of integers, and
+//   sent to the others: the sums are those of one rank alone, bit for bit. What is cheap beside that each rank does for
+//   all particles that it knows.
+//
+// A rank flies its copies like its own particles; those at the rim of the halo may go wrong, for they miss partners, so
+// it is checked that those near enough to matter did what they did at their owners (engine/slabs/slab_core.h). If they
+// did not, the slab is done again with a larger halo, in the end with all particles known. Particles migrate before one
+// has come too far: each goes from its owner to the ranks that know it from then on, with its fields.
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/base/fields.h"
+#include "engine/base/interaction.h"
+#include "engine/base/particles.h"
+#include "engine/base/sizes.h"
+#include "engine/ranks/exchange.h"
+#include "engine/ranks/id_blocks.h"
+
+namespace carom {
+
+template <int D>
+class Division;
+template <int D>
+struct System;
+
+/// Thrown on all ranks together, before anything of the system has changed: the particles that they know were not
+/// enough for a slab, which is to be done again after enlarge_halo().
+struct HaloTooSmall {};
+
+template <int D>
+class Decomposition {
+ public:
+  /// Of this system, by one rank.
+  explicit Decomposition(System<D>& system) : system_(system) {}
+  Decomposition(const Decomposition&) = delete;
+  Decomposition& operator=(const Decomposition&) = delete;
+
+  // The ranks. What follows is collective.
+
+  /// Several ranks, each of which has made all particles, advance the system from now on: this one keeps its block.
+  void join(Exchange& ranks);
+  /// The same before there are particles: this rank makes those of its block.
+  void join(Exchange& ranks, Sizes of_all);
+  bool joined() const { return sizes_.has_value(); }
+  /// Of one rank too.
+  Exchange& ranks() const { return *ranks_; }
+  /// Null: all particles are here.
+  Exchange* others() const { return joined() ? ranks_.get() : nullptr; }
+  double seconds_waited() const { return ranks_->seconds(); }  ///< for other ranks
+
+  /// How many particles all ranks have together.
+  std::size_t total() const;
+  /// Radii and masses of all particles, once several ranks have joined.
+  const Sizes& sizes() const { return *sizes_; }
+  /// Of all particles, or one of each species [length].
+  std::span<const double> radii() const;
+  IdBlocks blocks() const { return {total(), static_cast<std::size_t>(ranks_->size())}; }
+
+  /// What each rank has summed up over what it owns; exact.
+  template <class Sums>
+  Sums sum(const Sums& mine) const {
+    return joined() ? sum_of_all(*ranks_, mine) : mine;
+  }
+  double largest(double value) const {
+    ranks_->largest({&value, 1});
+    return value;
+  }
+  bool any(bool value) const { return largest(value ? 1 : 0) > 0; }
+
+  // Particles by place, for work on forces.
+
+  /// Divides the particles by place. `local`: a rank's own particles and those near them are enough for slabs of this
+  /// length [time], else all ranks know all. `cores`: particles collide. Returns whether there is anything to divide.
+  bool divide(bool local, double slab_length, bool cores = true);
+  /// Before a slab: divides anew if it is time for that; returns whether it was.
+  bool divide_if_due(std::int64_t slab, double slab_length);
+  /// After HaloTooSmall: knows more particles, where that was what lacked, or all.
+  void enlarge_halo(std::int64_t slab, double slab_length);
+  /// Back to blocks, with the interactions as they were before divide().
+  void to_blocks();
+  /// The particles of this rank's block as they are now; one rank: all.
+  const Particles<D>& block();
+
+  bool by_place() const { return by_place_; }
+  bool knows_all() const { return !by_place_ || all_known_; }
+  /// For what only a rank that knows all particles can do: throws HaloTooSmall.
+  void need_all() const {
+    if (!knows_all()) throw HaloTooSmall{};
+  }
+  /// Throws HaloTooSmall unless the particles that are known are enough for paths so long in a slab, those of all
+  /// ranks [length].
+  void need_paths(double path);
+  /// The same for a step of a kick-drift-kick method.
+  void need_step(std::span<const Vec<D>> a, double length);
+  /// Copies went wrong that matter: throws HaloTooSmall; the halo is to be deeper.
+  [[noreturn]] void need_deeper_halo();
+  /// Whether what a copy does matters to own particles.
+  bool matters(Id i) const { return matters_[i] != 0; }
+
+  /// Copies get the values of their owners; each vector has an entry for each particle known.
+  template <class... T>
+  void update(std::span<T>... values) const {
+    if (!by_place_) return;
+    std::vector<Bytes> outgoing(neighbours_.size());
+    for (std::size_t k = 0; k < neighbours_.size(); ++k) {
+      const auto& mine = copied_to_[static_cast<std::size_t>(neighbours_[k])];
+      outgoing[k].reserve(mine.size() * (sizeof(T) + ...));
+      for (const Id i : mine) (put(outgoing[k], values[i]), ...);
+    }
+    const std::vector<Bytes> incoming = ranks_->swap(std::move(outgoing), neighbours_);
+    for (std::size_t k = 0; k < neighbours_.size(); ++k) {
+      Reader from(incoming[k]);
+      for (const Id i : copies_of_[static_cast<std::size_t>(neighbours_[k])])
+        ((values[i] = from.template get<T>()), ...);
+    }
+  }
+  /// Positions and velocities of copies, which may have gone wrong at the rim. All particles known: none have.
+  void update_halo();
+
+ private:
+  /// Where in the messages of all ranks a particle is.
+  struct Arrival {
+    Id id;
+    const std::byte* at;
+  };
+  void migrate(bool all, double slab_length);
+  bool migrate_to_those_near(double slab_length);
+  void migrate_to_all();
+  void own_anew();
+  std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver);
+  std::vector<Arrival> arrivals(const std::vector<Bytes>& messages) const;
+  void take_in(const std::vector<Arrival>& arrivals);
+  void assign(const Division<D>& division, double near);
+  bool outdated();
+
+  System<D>& system_;
+  Exchange alone_;
+  std::unique_ptr<TimedExchange> ranks_ = std::make_unique<TimedExchange>(alone_);
+  std::optional<Sizes> sizes_;
+
+  bool by_place_ = false;
+  Particles<D> block_;                                               // by_place_: what does not change is up to date
+  std::vector<std::unique_ptr<Interaction<D>>> block_interactions_;  // by_place_: made for the block
+  bool local_ = false, all_known_ = false;
+  std::vector<std::vector<Id>> copied_to_, copies_of_;  // by rank: own particles that it knows, copies of its own
+  std::vector<int> neighbours_;                         // the ranks of which there are any
+  std::vector<char> matters_;
+  std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
+  double path_ = 0, slack_ = 0;
+  double safe_slabs_ = 0;               // until a particle may have come too far
+  double wanted_path_ = 0;              // at least that, since one was too long not long ago
+  bool more_ = false;                   // a larger halo would have been enough for the slab
+  double least_depth_ = 0, depth_ = 0;  // of copies that do not matter [largest diameter]
+  std::int64_t next_ = 0;               // while all are known: the slab before which to divide
+  std::int64_t patience_ = 1;
+};
+
+}  // namespace carom

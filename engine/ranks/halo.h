@@ -1,0 +1,64 @@
+#pragma once
+// Particles sorted by place, with copies of those near: what the owner of a place must know around it.
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "engine/base/particles.h"
+#include "engine/ranks/division.h"
+#include "engine/ranks/exchange.h"
+
+namespace carom {
+
+/// Sends values to all ranks that they concern by their places: for_each(send) calls send(x, value), x in the box.
+/// Returns the values that concern this rank, those of one rank after the other. Collective.
+template <class Value, int D>
+std::vector<Value> to_those_near(const Division<D>& division, Exchange& ranks, auto&& for_each) {
+  std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
+  for_each([&](const Vec<D>& x, const Value& value) {
+    division.for_each_near(x, [&](std::uint32_t rank) { put(outgoing[rank], value); });
+  });
+  std::vector<Value> near;
+  for (Bytes& bytes : ranks.swap(std::move(outgoing))) {
+    for (Reader reader(bytes); reader.more();) near.push_back(reader.get<Value>());
+    Bytes().swap(bytes);
+  }
+  return near;
+}
+
+/// The particles in this rank's part of the box, and copies of those near it; by id, ascending.
+template <int D>
+struct Halo {
+  std::vector<Vec<D>> x;
+  std::vector<double> radius;
+  std::vector<Id> id;
+  std::vector<char> ghost;  ///< 1: not in this part, but near it
+};
+
+/// Of the particles that all ranks have together, this one its block; near: nearer than `distance`, but for rounding.
+/// Collective.
+template <int D>
+Halo<D> halo_of(const Box<D>& box, double distance, Exchange& ranks, const Particles<D>& block) {
+  struct Copy {
+    Vec<D> x;
+    double radius;
+    Id id;
+  };
+  const Division<D> division(box, block.x, static_cast<std::size_t>(ranks.size()), distance * (1 + 1e-6), ranks);
+  auto copies = to_those_near<Copy>(division, ranks, [&](auto&& send) {
+    for (Id i = 0; i < block.size(); ++i)
+      send(division.wrapped(block.x[i]), Copy{block.x[i], block.radius[i], block.id_of(i)});
+  });
+  std::ranges::sort(copies, {}, &Copy::id);
+  Halo<D> halo;
+  for (const Copy& copy : copies) {
+    halo.x.push_back(copy.x);
+    halo.radius.push_back(copy.radius);
+    halo.id.push_back(copy.id);
+    halo.ghost.push_back(division.owner(division.wrapped(copy.x)) != static_cast<std::uint32_t>(ranks.rank()));
+  }
+  return halo;
+}
+
+}  // namespace carom
