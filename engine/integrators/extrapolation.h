@@ -21,6 +21,8 @@ class Extrapolation {
       fields.add("past acceleration " + std::to_string(k), past_[k]);
     }
     known_ = 0;
+    fields.add_value("past lengths", length_);
+    fields.add_value("past slabs", known_);
   }
   /// A slab of this length is done, with these accelerations.
   void pass(double length, const std::vector<Vec<D>>& a) {

@@ -51,6 +51,7 @@ class MeanSquaredDisplacement : public Observable<D> {
     std::array<Lag, kLags> lag;  // 0 stays empty: that is the first lag of the next decade
   };
   void add_sample(double time, const Particles<D>& particles) override;
+  void add_sums(Fields& fields, const std::string& name) override;
   void add(Lag& lag, double time, const Decade& from);
 
   const System<D>& system_;

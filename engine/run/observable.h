@@ -44,6 +44,10 @@ class Observable : public Observer<D> {
     add_sample(time, particles);
     ++samples_;
   }
+  void add_state(Fields& fields, const std::string& name) final {
+    fields.add_value(name + " samples", samples_);
+    add_sums(fields, name);
+  }
   /// How many have been taken.
   std::uint64_t samples() const { return samples_; }
 
@@ -54,6 +58,8 @@ class Observable : public Observer<D> {
  private:
   /// samples() have been added before. All particles, in the order of their ids; on several ranks on rank 0 only.
   virtual void add_sample(double time, const Particles<D>& particles) = 0;
+  /// Registers what add_sample() adds to, so that a run can be continued; `name` begins the names.
+  virtual void add_sums(Fields& fields, const std::string& name) = 0;
 
   Sampling sampling_;
   std::uint64_t samples_ = 0;

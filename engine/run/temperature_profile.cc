@@ -44,6 +44,11 @@ class TemperatureProfile : public Observable<D> {
     }
   }
 
+  void add_sums(Fields& fields, const std::string& name) override {
+    fields.add_list(name + " number", number_);
+    fields.add_list(name + " kinetic energy", twice_kinetic_);
+  }
+
   const Box<D>& box_;
   Eigen::Index axis_;
   std::vector<double> number_;  // of particles in each slab, all samples together
