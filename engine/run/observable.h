@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/base/archive.h"
 #include "engine/base/parameters.h"
 #include "engine/run/simulation.h"
 
@@ -51,7 +52,26 @@ class Observable : public Observer<D> {
   virtual std::vector<TableColumn> table() const = 0;
   virtual std::vector<SpeciesValue> species_values() const { return {}; }
 
+  /// What the samples have left: out of one that has them, and into another that was made with the same parameters.
+  /// Throws Error(Failure::file) where it is of another kind.
+  Archive::Bytes state() const {
+    Archive archive;
+    const_cast<Observable&>(*this).all_sums(archive);
+    return archive.bytes();
+  }
+  void restore(const Archive::Bytes& state) {
+    Archive archive(state);
+    all_sums(archive);
+    archive.finish();
+  }
+
  private:
+  void all_sums(Archive& archive) {
+    archive(samples_);
+    sums(archive);
+  }
+  /// Gives the archive everything that a sample changes and a later one or a table reads, always in the same order.
+  virtual void sums(Archive& archive) = 0;
   /// samples() have been added before. All particles, in the order of their ids; on several ranks on rank 0 only.
   virtual void add_sample(double time, const Particles<D>& particles) = 0;
 

@@ -44,6 +44,8 @@ class TemperatureProfile : public Observable<D> {
     }
   }
 
+  void sums(Archive& archive) override { archive(number_, twice_kinetic_); }
+
   const Box<D>& box_;
   Eigen::Index axis_;
   std::vector<double> number_;  // of particles in each slab, all samples together

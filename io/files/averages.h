@@ -16,6 +16,8 @@ template <int D>
 class AverageWriter : public Observer<D> {
  public:
   AverageWriter(std::filesystem::path path, std::unique_ptr<Observable<D>> average);
+  /// With the samples that have been taken before; the file is that of them. Throws Error(Failure::file).
+  AverageWriter(std::filesystem::path path, std::unique_ptr<Observable<D>> average, const Archive::Bytes& state);
 
   Sampling sampling() const override { return average_->sampling(); }
   /// Throws Error(Failure::file).

@@ -90,7 +90,7 @@ EventWriter<D>::EventWriter(const std::filesystem::path& path, const Deck& deck)
 }
 
 template <int D>
-EventWriter<D>::EventWriter(const std::filesystem::path& path, const Mark& mark)
+EventWriter<D>::EventWriter(const std::filesystem::path& path, const EventMark& mark)
     : contents_(std::make_unique<Contents>(hdf5::File::append(path))) {
   contents_->each([&](auto& column) { column.written.cut(mark.rows); });
   contents_->slabs_done = mark.slabs;
@@ -121,7 +121,7 @@ void EventWriter<D>::progress(const Statistics& statistics) {
 }
 
 template <int D>
-auto EventWriter<D>::mark() -> Mark {
+EventMark EventWriter<D>::mark() {
   contents_->write();
   return {contents_->time.written.rows(), contents_->slabs_done};
 }

@@ -22,18 +22,19 @@
 
 namespace carom {
 
+/// Where events.h5 stands.
+struct EventMark {
+  std::uint64_t rows = 0;
+  std::int64_t slabs = 0;  ///< done
+};
+
 template <int D>
 class EventWriter : public Observer<D> {
  public:
   /// Creates the file. Throws Error(Failure::file).
   EventWriter(const std::filesystem::path& path, const Deck& deck);
-  /// Where a file stands, after all that is known has been written.
-  struct Mark {
-    std::uint64_t rows = 0;
-    std::int64_t slabs = 0;  ///< done
-  };
   /// Opens it again to go on from there. Throws Error(Failure::file).
-  EventWriter(const std::filesystem::path& path, const Mark& mark);
+  EventWriter(const std::filesystem::path& path, const EventMark& mark);
   ~EventWriter() override;
 
   void contacts(double slab_start, std::span<const Contact<D>> contacts) override;
@@ -42,7 +43,7 @@ class EventWriter : public Observer<D> {
   void progress(const Statistics& statistics) override;
 
   /// Writes what is left, and says where the file then stands. Throws Error(Failure::file).
-  Mark mark();
+  EventMark mark();
   /// Writes what is left and closes. Throws Error(Failure::file).
   void close();
 
