@@ -72,7 +72,7 @@ template <int D>
 void show(RunFiles<D>& files, ThermoTable<D>& table, unsigned seed, double end_time) {
   Simulation<D> run(
       test::hard_spheres<D>(3, 0.3, seed), "psa", {},
-      {.step = 0.01, .end_time = end_time, .frame_interval = 0.02, .thermo_interval = 0.01, .events = true});
+      {.step = 0.05, .end_time = end_time, .frame_interval = 0.1, .thermo_interval = 0.05, .events = true});
   files.add_to(run);
   run.add(table);
   run.run();
@@ -92,8 +92,8 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
     RunFiles<D> files(whole, *system);
     RunLog log(whole.output.directory / run_file::log, true);
     ThermoTable<D> table(log);
-    show(files, table, 1, 1);
-    show(files, table, 2, 0.7);
+    show(files, table, 1, 5);
+    show(files, table, 2, 3.5);
     files.close();
     table.finish();
   }
@@ -102,11 +102,11 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
     RunFiles<D> files(cut, *system);
     RunLog log(cut.output.directory / run_file::log, true);
     ThermoTable<D> table(log);
-    show(files, table, 1, 1);
+    show(files, table, 1, 5);
     FileMarks at = files.mark();
     std::uint64_t bytes = log.size(), rows = table.rows();
     marks(at, bytes, rows);
-    show(files, table, 3, 1.3);  // what the checkpoint knows nothing of; more than a chunk
+    show(files, table, 3, 7);  // what the checkpoint knows nothing of; more than a chunk
   }
   EXPECT_NE(data_sets(whole.output.directory / run_file::events), data_sets(cut.output.directory / run_file::events));
   {
@@ -118,7 +118,7 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
     RunFiles<D> files(cut, *system, at);
     RunLog log(cut.output.directory / run_file::log, true, bytes);
     ThermoTable<D> table(log, rows);
-    show(files, table, 2, 0.7);
+    show(files, table, 2, 3.5);
     files.close();
     table.finish();
   }
