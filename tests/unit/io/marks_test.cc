@@ -59,7 +59,7 @@ Deck deck_of_all(const fs::path& directory, const System<D>& system) {
   deck.output.directory = directory;
   deck.plan.events = true;
   for (const ObservableInfo& info : observables()) {
-    Parameters parameters = completed(info.name, info.parameters, {{"interval", 0.25}});
+    Parameters parameters = completed(info.name, info.parameters, {{"interval", 0.1}});
     EXPECT_FALSE(info.template in<D>().complete(parameters, system));
     deck.output.observables.push_back({&info, parameters});
   }
@@ -72,7 +72,7 @@ template <int D>
 void show(RunFiles<D>& files, ThermoTable<D>& table, unsigned seed, double end_time) {
   Simulation<D> run(
       test::hard_spheres<D>(3, 0.6, seed), "psa", {},
-      {.step = 0.25, .end_time = end_time, .frame_interval = 0.5, .thermo_interval = 0.25, .events = true});
+      {.step = 0.05, .end_time = end_time, .frame_interval = 0.1, .thermo_interval = 0.05, .events = true});
   files.add_to(run);
   run.add(table);
   run.run();
@@ -92,8 +92,8 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
     RunFiles<D> files(whole, *system);
     RunLog log(whole.output.directory / run_file::log, true);
     ThermoTable<D> table(log);
-    show(files, table, 1, 25);
-    show(files, table, 2, 17);
+    show(files, table, 1, 2.5);
+    show(files, table, 2, 1.7);
     files.close();
     table.finish();
   }
@@ -102,11 +102,11 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
     RunFiles<D> files(cut, *system);
     RunLog log(cut.output.directory / run_file::log, true);
     ThermoTable<D> table(log);
-    show(files, table, 1, 25);
+    show(files, table, 1, 2.5);
     FileMarks at = files.mark();
     std::uint64_t bytes = log.size(), rows = table.rows();
     marks(at, bytes, rows);
-    show(files, table, 3, 30);  // what the checkpoint knows nothing of; more than a chunk
+    show(files, table, 3, 3);  // what the checkpoint knows nothing of; more than a chunk
   }
   EXPECT_NE(data_sets(whole.output.directory / run_file::events), data_sets(cut.output.directory / run_file::events));
   {
@@ -118,7 +118,7 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
     RunFiles<D> files(cut, *system, at);
     RunLog log(cut.output.directory / run_file::log, true, bytes);
     ThermoTable<D> table(log, rows);
-    show(files, table, 2, 17);
+    show(files, table, 2, 1.7);
     files.close();
     table.finish();
   }
