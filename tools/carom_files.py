@@ -8,12 +8,16 @@
 Needs Debian's python3-h5py and python3-numpy. Everything is in the reduced units of the deck.
 """
 
+import contextlib
 import csv
+import fcntl
 import json
 import os
 import pathlib
 import shutil
+import struct
 import subprocess
+import zlib
 
 import h5py
 import numpy as np
@@ -53,9 +57,54 @@ def run_carom(carom, deck, directory, overrides=(), launcher=(), environment=Non
     return read_summary(directory)
 
 
+@contextlib.contextmanager
+def reading(path):
+    """What goes wrong while a file is read ends the tool with one line that names the file, and exit code 1."""
+    try:
+        yield
+    except BlockingIOError as error:
+        raise SystemExit(f"{path}: a process is writing this file; wait for its end, or copy the file") from error
+    except UnicodeDecodeError as error:
+        raise SystemExit(f"{path}: is not a text file") from error
+    except OSError as error:
+        raise SystemExit(f"{path}: {os.strerror(error.errno) if error.errno else error}") from error
+    except (KeyError, ValueError, IndexError, TypeError, RuntimeError, AttributeError) as error:
+        raise SystemExit(f"{path}: is not a file that Carom left there, or damaged: {error}") from error
+
+
+def open_hdf5(path):
+    """A file of HDF5, opened for reading; a flush that a kill has interrupted is completed first."""
+    complete_flush(path)
+    return h5py.File(path, "r")
+
+
+def complete_flush(path):
+    """Writes what a complete journal beside the file holds to the file, and removes the journal (io/files/journal.h)."""
+    journal = pathlib.Path(f"{path}.journal")
+    if not journal.exists():
+        return
+    with open(path, "r+b") as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        data = journal.read_bytes()
+        magic, checksum, length, size = struct.unpack_from("<8sQQQ", data.ljust(32, b"\0"))
+        if magic == b"CAROMJ01" and 32 <= length <= len(data) and zlib.crc32(data[16:length]) == checksum:
+            at = 32
+            while at < length:
+                address, n = struct.unpack_from("<QQ", data, at)
+                file.seek(address)
+                file.write(data[at + 16:at + 16 + n])
+                at += 16 + n
+            file.truncate(size)
+            file.flush()
+            os.fsync(file.fileno())
+    journal.unlink()
+
+
 def read_summary(directory):
     """summary.json as nested dictionaries: read_summary(d)["energy"]["final"]."""
-    return json.loads((pathlib.Path(directory) / "summary.json").read_text())
+    path = pathlib.Path(directory) / "summary.json"
+    with reading(path):
+        return json.loads(path.read_text())
 
 
 def read_thermo(directory):
@@ -65,11 +114,11 @@ def read_thermo(directory):
 
 def read_table(path):
     """A CSV file of a run (thermo.csv, rdf.csv, msd.csv) as a dictionary of columns; an empty cell becomes NaN."""
-    with open(path, newline="") as file:
-        rows = list(csv.reader(file))
-    values = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows[1:]])
-    values = values.reshape(len(rows) - 1, len(rows[0]))
-    return {name: values[:, column] for column, name in enumerate(rows[0])}
+    with reading(path), open(path, newline="") as file:
+        rows = list(csv.reader(line for line in file if line.endswith("\n")))  # a kill may have left a part of a row
+        values = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows[1:]])
+        values = values.reshape(len(rows) - 1, len(rows[0]))
+        return {name: values[:, column] for column, name in enumerate(rows[0])}
 
 
 class Trajectory:

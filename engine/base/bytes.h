@@ -39,19 +39,4 @@ class Reader {
   const std::byte *at_, *end_;
 };
 
-/// A list with its length.
-template <class T>
-void put_list(Bytes& to, const std::vector<T>& values) {
-  put(to, values.size());
-  const auto bytes = std::as_bytes(std::span(values));
-  to.insert(to.end(), bytes.begin(), bytes.end());
-}
-template <class T>
-std::vector<T> get_list(Reader& from) {
-  std::vector<T> values(from.get<std::size_t>());
-  if (!values.empty())
-    std::memcpy(static_cast<void*>(values.data()), from.skip(values.size() * sizeof(T)), values.size() * sizeof(T));
-  return values;
-}
-
 }  // namespace carom

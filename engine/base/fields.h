@@ -20,7 +20,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "engine/base/bytes.h"
+#include "engine/base/archive.h"
 #include "engine/base/vec.h"
 
 namespace carom {
@@ -57,28 +57,19 @@ class Fields {
     std::erase_if(fields_, [&](const auto& field) { return field->name == name; });
     fields_.push_back(std::make_unique<List<T>>(std::move(name), kind, values));
   }
-  /// What there is one of a run, as bytes; where ranks differ in it that of rank 0 counts.
+  /// What there is one of a run; where ranks differ in it that of rank 0 counts.
   struct OfRun {
     std::string name;
-    std::function<void(Bytes& to)> save;
-    std::function<void(Reader& from)> load;
+    std::function<void(Archive&)> archive;  ///< gives and takes it
   };
   void add_of_run(OfRun entry) {
     std::erase_if(of_run_, [&](const OfRun& each) { return each.name == entry.name; });
     of_run_.push_back(std::move(entry));
   }
-  /// Registers a value of which there is one a run.
+  /// Registers a value, a list, or what has a member archive(Archive&), of which there is one a run.
   template <class T>
   void add_value(std::string name, T& value) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    add_of_run(
-        {std::move(name), [&value](Bytes& to) { put(to, value); }, [&value](Reader& from) { value = from.get<T>(); }});
-  }
-  /// Registers a list of any length, of which there is one a run.
-  template <class T>
-  void add_list(std::string name, std::vector<T>& values) {
-    add_of_run({std::move(name), [&values](Bytes& to) { put_list(to, values); },
-                [&values](Reader& from) { values = get_list<T>(from); }});
+    add_of_run({std::move(name), [&value](Archive& archive) { archive(value); }});
   }
 
   /// Registers working memory and calls prepare(). `owner` names it, for remove_working().

@@ -49,36 +49,6 @@ void MeanSquaredDisplacement<D>::add(Lag& lag, double time, const Decade& from) 
 }
 
 template <int D>
-void MeanSquaredDisplacement<D>::add_sums(Fields& fields, const std::string& name) {
-  fields.add_list(name + " number", number_);
-  fields.add_list(name + " species", species_);
-  const auto save = [this](Bytes& to) {
-    for (const Decade& decade : decades_) {
-      put(to, decade.origin_time);
-      put_list(to, decade.origin);
-      for (const Lag& lag : decade.lag) {
-        put(to, lag.origins);
-        put(to, lag.time);
-        put_list(to, lag.squares);
-      }
-    }
-  };
-  const auto load = [this](Reader& from) {
-    for (decades_.clear(); from.more();) {
-      Decade& decade = decades_.emplace_back();
-      decade.origin_time = from.get<double>();
-      decade.origin = get_list<Vec<D>>(from);
-      for (Lag& lag : decade.lag) {
-        lag.origins = from.get<std::uint64_t>();
-        lag.time = from.get<ExactSum>();
-        lag.squares = get_list<ExactSum>(from);
-      }
-    }
-  };
-  fields.add_of_run({name + " decades", save, load});
-}
-
-template <int D>
 auto MeanSquaredDisplacement<D>::rows() const -> std::vector<Row> {
   const double particles = std::accumulate(number_.begin(), number_.end(), 0.0);
   std::vector<Row> rows;

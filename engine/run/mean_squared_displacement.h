@@ -44,14 +44,16 @@ class MeanSquaredDisplacement : public Observable<D> {
     std::uint64_t origins = 0;
     ExactSum time;
     std::vector<ExactSum> squares;  // of each species
+    void archive(Archive& archive) { archive(origins, time, squares); }
   };
   struct Decade {
     double origin_time;
     std::vector<Vec<D>> origin;
     std::array<Lag, kLags> lag;  // 0 stays empty: that is the first lag of the next decade
+    void archive(Archive& archive) { archive(origin_time, origin, lag); }
   };
   void add_sample(double time, const Particles<D>& particles) override;
-  void add_sums(Fields& fields, const std::string& name) override;
+  void sums(Archive& archive) override { archive(number_, species_, decades_); }
   void add(Lag& lag, double time, const Decade& from);
 
   const System<D>& system_;

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/base/archive.h"
 #include "engine/base/parameters.h"
 #include "engine/run/simulation.h"
 
@@ -45,8 +46,10 @@ class Observable : public Observer<D> {
     ++samples_;
   }
   void add_state(Fields& fields, const std::string& name) final {
-    fields.add_value(name + " samples", samples_);
-    add_sums(fields, name);
+    fields.add_of_run({name, [this](Archive& archive) {
+                         archive(samples_);
+                         sums(archive);
+                       }});
   }
   /// How many have been taken.
   std::uint64_t samples() const { return samples_; }
@@ -56,10 +59,10 @@ class Observable : public Observer<D> {
   virtual std::vector<SpeciesValue> species_values() const { return {}; }
 
  private:
+  /// Gives the archive everything that a sample changes and a later one or a table reads, always in the same order.
+  virtual void sums(Archive& archive) = 0;
   /// samples() have been added before. All particles, in the order of their ids; on several ranks on rank 0 only.
   virtual void add_sample(double time, const Particles<D>& particles) = 0;
-  /// Registers what add_sample() adds to, so that a run can be continued; `name` begins the names.
-  virtual void add_sums(Fields& fields, const std::string& name) = 0;
 
   Sampling sampling_;
   std::uint64_t samples_ = 0;

@@ -167,14 +167,6 @@ std::size_t RadialDistribution<D>::pair_index(std::size_t a, std::size_t b) cons
 }
 
 template <int D>
-void RadialDistribution<D>::add_sums(Fields& fields, const std::string& name) {
-  fields.add_list(name + " counts", counts_);
-  fields.add_list(name + " number", number_);
-  fields.add_list(name + " smallest", smallest_);
-  fields.add_list(name + " largest", largest_);
-}
-
-template <int D>
 void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& particles) {
   if (this->samples() == 0) count(particles);
   const std::size_t n = particles.size(), bins = static_cast<std::size_t>(options_.bins);

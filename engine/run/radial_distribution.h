@@ -58,7 +58,7 @@ class RadialDistribution : public Observable<D> {
 
  private:
   void add_sample(double time, const Particles<D>& particles) override;
-  void add_sums(Fields& fields, const std::string& name) override;
+  void sums(Archive& archive) override { archive(number_, smallest_, largest_, counts_); }
   void count(const Particles<D>& particles);
   std::size_t pair_index(std::size_t a, std::size_t b) const;
   std::vector<double> normalised(const std::vector<std::uint64_t>& counts, double pairs, double margin) const;

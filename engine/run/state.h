@@ -29,9 +29,9 @@ void save_state(System<D>& system, const StateWriter& writer) {
   }
   if (ranks.rank() > 0) return;
   for (const Fields::OfRun& entry : system.fields.of_run()) {
-    Bytes bytes;
-    entry.save(bytes);
-    writer.of_run(entry.name, bytes);
+    Archive archive;
+    entry.archive(archive);
+    writer.of_run(entry.name, archive.bytes());
   }
 }
 
@@ -71,22 +71,24 @@ template <int D>
 void restore_state(System<D>& system, const StateReader& read) {
   restore_particles(system, read);
   Exchange& ranks = system.decomposition.ranks();
-  Bytes message;
+  Archive all;
   for (const Fields::OfRun& entry : system.fields.of_run()) {
     if (ranks.rank() > 0) break;
-    const Bytes bytes = read(entry.name);
-    put_list(message, std::vector<char>(entry.name.begin(), entry.name.end()));
-    put_list(message, bytes);
+    std::string name = entry.name;
+    Bytes bytes = read(name);
+    all(name, bytes);
   }
-  message = std::move(ranks.gather(message)[0]);
-  for (Reader from(message); from.more();) {
-    const auto name = get_list<char>(from);
-    const Bytes bytes = get_list<std::byte>(from);
-    for (const Fields::OfRun& entry : system.fields.of_run())
-      if (std::ranges::equal(entry.name, name)) {
-        Reader reader(bytes);
-        entry.load(reader);
-      }
+  Archive given(std::move(ranks.gather(all.bytes())[0]));
+  while (given.more()) {
+    std::string name;
+    Bytes bytes;
+    given(name, bytes);
+    for (const Fields::OfRun& entry : system.fields.of_run()) {
+      if (entry.name != name) continue;
+      Archive archive(bytes);
+      entry.archive(archive);
+      archive.finish();
+    }
   }
 }
 

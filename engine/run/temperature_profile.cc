@@ -44,10 +44,7 @@ class TemperatureProfile : public Observable<D> {
     }
   }
 
-  void add_sums(Fields& fields, const std::string& name) override {
-    fields.add_list(name + " number", number_);
-    fields.add_list(name + " kinetic energy", twice_kinetic_);
-  }
+  void sums(Archive& archive) override { archive(number_, twice_kinetic_); }
 
   const Box<D>& box_;
   Eigen::Index axis_;

@@ -109,6 +109,7 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
     if (!options.quiet) simulation.add(progress);
     simulation.run([&] { return deadline.passed(at_work); });
     progress.end_line();
+    table.finish();
     const auto accounts = accounts_of_all(at_work, statistics);
     files->close();
     outcome.species_values = files->species_values();
@@ -128,6 +129,7 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
     outcome.error = e.what();
     if (files) files->close_after_failure();
     at_best(summary);
+    at_best([&] { table.finish(); });
     at_best([&] { log.error(e.what()); });
     throw;
   }

@@ -25,10 +25,9 @@ struct Column {
 template <int D>
 struct EventWriter<D>::Contents {
   static constexpr std::size_t kBatch = 16384;  // rows
-  // About how many bytes a row takes; only for the room to be reserved.
-  static constexpr std::uint64_t kRowBytes = 3 * 8 + 3 * 4 + 1 + D * (4 + 3 * 8);
+  explicit Contents(hdf5::File at) : file(std::move(at)) {}
 
-  Contents(const std::filesystem::path& path, const Deck& deck) : file(hdf5::File::create(path)) {
+  void create(const Deck& deck) {
     const hdf5::Handle parameters = file.group("parameters");
     file.write_attribute(group, "version", std::vector<std::int32_t>{1, 0});
     file.write_attribute(group, "creator", "carom " + version_string());
@@ -36,8 +35,17 @@ struct EventWriter<D>::Contents {
     file.write_text(parameters, "deck", deck.toml_text);
     file.write_text(parameters, "title", deck.title);
     file.write_text(parameters, "integrator", deck.integrator);
-    file.reserve(0);
     file.flush();
+  }
+
+  /// Does something to every column.
+  template <class Action>
+  void each(Action action) {
+    for (auto* column : {&time, &time_in_slab, &x_lo, &x_hi, &impulse}) action(*column);
+    for (auto* column : {&generation, &lo, &hi}) action(*column);
+    action(slab);
+    action(kind);
+    action(image);
   }
 
   void add(double slab_start, const Contact<D>& c) {
@@ -58,14 +66,7 @@ struct EventWriter<D>::Contents {
 
   void write() {
     if (time.waiting.empty()) return;
-    file.reserve(kRowBytes * time.waiting.size());
-    for (auto* column : {&time_in_slab, &x_lo, &x_hi, &impulse}) column->write();
-    for (auto* column : {&generation, &lo, &hi}) column->write();
-    slab.write();
-    kind.write();
-    image.write();
-    file.flush();
-    time.write();  // its length is the number of complete rows, also after a kill in the middle of a batch
+    each([](auto& column) { column.write(); });
     file.flush();
   }
 
@@ -84,7 +85,16 @@ struct EventWriter<D>::Contents {
 
 template <int D>
 EventWriter<D>::EventWriter(const std::filesystem::path& path, const Deck& deck)
-    : contents_(std::make_unique<Contents>(path, deck)) {}
+    : contents_(std::make_unique<Contents>(hdf5::File::create(path))) {
+  contents_->create(deck);
+}
+
+template <int D>
+EventWriter<D>::EventWriter(const std::filesystem::path& path, const EventMark& mark)
+    : contents_(std::make_unique<Contents>(hdf5::File::append(path))) {
+  contents_->each([&](auto& column) { column.written.cut(mark.rows); });
+  contents_->slabs_done = mark.slabs;
+}
 
 template <int D>
 EventWriter<D>::~EventWriter() = default;
@@ -108,6 +118,12 @@ void EventWriter<D>::thermo(const Snapshot<D>&) {
 template <int D>
 void EventWriter<D>::progress(const Statistics& statistics) {
   contents_->slabs_done = statistics.steps;
+}
+
+template <int D>
+EventMark EventWriter<D>::mark() {
+  contents_->write();
+  return {contents_->time.written.rows(), contents_->slabs_done};
 }
 
 template <int D>

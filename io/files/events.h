@@ -1,8 +1,7 @@
 #pragma once
 // events.h5: every collision of a run, exactly as it was executed, in the order of the event keys.
 //
-// One group /events of data sets, a row a collision; after a kill columns may be longer than `time`, which has the
-// complete rows:
+// One group /events of data sets, a row a collision:
 //   time          simulated time (slab start + time_in_slab, rounded)
 //   slab          number of the slab or epoch, from 0
 //   time_in_slab  the exact time, since the start of the slab
@@ -23,11 +22,19 @@
 
 namespace carom {
 
+/// Where events.h5 stands.
+struct EventMark {
+  std::uint64_t rows = 0;
+  std::int64_t slabs = 0;  ///< done
+};
+
 template <int D>
 class EventWriter : public Observer<D> {
  public:
   /// Creates the file. Throws Error(Failure::file).
   EventWriter(const std::filesystem::path& path, const Deck& deck);
+  /// Opens it again to go on from there. Throws Error(Failure::file).
+  EventWriter(const std::filesystem::path& path, const EventMark& mark);
   ~EventWriter() override;
 
   void contacts(double slab_start, std::span<const Contact<D>> contacts) override;
@@ -35,6 +42,8 @@ class EventWriter : public Observer<D> {
   void thermo(const Snapshot<D>&) override;
   void progress(const Statistics& statistics) override;
 
+  /// Writes what is left, and says where the file then stands. Throws Error(Failure::file).
+  EventMark mark();
   /// Writes what is left and closes. Throws Error(Failure::file).
   void close();
 

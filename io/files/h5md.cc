@@ -87,8 +87,8 @@ struct Element {
 
 template <int D>
 struct TrajectoryWriter<D>::Contents {
-  Contents(const std::filesystem::path& path, const Deck& deck, const System<D>& system)
-      : file(File::create(path)),
+  Contents(File at, const System<D>& system)
+      : file(std::move(at)),
         position(file, "particles/trajectory/position", {system.size(), 3}),
         velocity(file, "particles/trajectory/velocity", {system.size(), 3}),
         image(file, "particles/trajectory/image", {system.size(), 3}),
@@ -99,10 +99,8 @@ struct TrajectoryWriter<D>::Contents {
         momentum(file, "observables/momentum", {3}),
         collisions(file, "observables/collisions"),
         ranks(system.decomposition.ranks()) {
-    write_origin(file);
-    write_parameters(file, deck, system);
-    write_box(system.box);
-    write_fixed(system);
+    for (std::size_t k = 0; k < 3; ++k)
+      edge_rows[4 * k] = static_cast<int>(k) < D ? system.box.edges[static_cast<int>(k)] : 1.0;
     for (const char* name : {"kinetic_energy", "potential_energy", "total_energy", "shadow_energy", "max_energy_error",
                              "temperature", "pressure"})
       observables.emplace(name, Element<double>(file, std::string("observables/") + name));
@@ -110,8 +108,23 @@ struct TrajectoryWriter<D>::Contents {
     image.share_clock(file, position.group);
     collisions.share_clock(file, position.group);
     for (auto& [name, element] : observables) element.share_clock(file, position.group);
-    file.reserve(0);
+  }
+
+  void create(const Deck& deck, const System<D>& system) {
+    write_origin(file);
+    write_parameters(file, deck, system);
+    write_box(system.box);
+    write_fixed(system);
     file.flush();
+  }
+
+  void cut(std::uint64_t frames) {
+    for (auto* element : {&position, &velocity, &edges, &momentum}) element->value.cut(frames);
+    for (auto& [name, element] : observables) element.value.cut(frames);
+    image.value.cut(frames);
+    collisions.value.cut(frames);
+    time.cut(frames);
+    step.cut(frames);
   }
 
   void write_box(const Box<D>& b) {
@@ -120,7 +133,6 @@ struct TrajectoryWriter<D>::Contents {
       if (b.periodic(k)) boundary[static_cast<std::size_t>(k)] = "periodic";
     file.write_attribute(box, "dimension", std::int32_t{3});
     file.write_attribute(box, "boundary", boundary);
-    for (std::size_t k = 0; k < 3; ++k) edge_rows[4 * k] = static_cast<int>(k) < D ? b.edges[static_cast<int>(k)] : 1.0;
   }
 
   void write_fixed(const System<D>& system) {
@@ -187,10 +199,6 @@ struct TrajectoryWriter<D>::Contents {
     position.value.write_part(first, three_columns<double>(x, D));
   }
 
-  std::uint64_t frame_bytes() const {
-    return position.value.row_bytes() + velocity.value.row_bytes() + image.value.row_bytes();
-  }
-
   File file;
   Element<double> position, velocity;
   Element<std::int32_t> image;
@@ -206,7 +214,15 @@ struct TrajectoryWriter<D>::Contents {
 
 template <int D>
 TrajectoryWriter<D>::TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system)
-    : contents_(std::make_unique<Contents>(path, deck, system)) {}
+    : contents_(std::make_unique<Contents>(File::create(path), system)) {
+  contents_->create(deck, system);
+}
+
+template <int D>
+TrajectoryWriter<D>::TrajectoryWriter(const std::filesystem::path& path, const System<D>& system, std::uint64_t frames)
+    : contents_(std::make_unique<Contents>(File::append(path), system)) {
+  contents_->cut(frames);
+}
 
 template <int D>
 TrajectoryWriter<D>::~TrajectoryWriter() = default;
@@ -214,7 +230,6 @@ TrajectoryWriter<D>::~TrajectoryWriter() = default;
 template <int D>
 void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   Contents& c = *contents_;
-  c.file.reserve(c.frame_bytes());
   c.write_particles(*s.particles);
   c.edges.value.append(c.edge_rows);
   c.momentum.value.append(three_columns<double>(std::array{s.momentum}, D));
@@ -225,12 +240,13 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
       {"pressure", s.pressure}};
   for (const auto& [name, value] : scalars) c.observables.at(name).value.append(value);
   c.time.append(s.time);
-  c.file.flush();
-  // The frames of the file are those that have a step: to MDAnalysis a missing step is the end of the file, and a
-  // missing position an error. So the step goes in when all else is safe; a kill in between leaves rows that are not
-  // read.
   c.step.append(s.step);
   c.file.flush();
+}
+
+template <int D>
+std::uint64_t TrajectoryWriter<D>::frames() const {
+  return contents_->step.rows();
 }
 
 template <int D>
@@ -239,7 +255,8 @@ void TrajectoryWriter<D>::close() {
 }
 
 template <int D>
-ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system) : ranks_(ranks) {
+ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system, bool creates) : ranks_(ranks) {
+  if (!creates) return;
   const Particles<D>& p = system.particles;
   one_after_the_other(
       ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); }, [](int, const Bytes&) {});

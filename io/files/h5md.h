@@ -10,8 +10,7 @@
 // boundary along z; the true dimension and boundaries stand in /parameters), box edges at every frame, every `step` and
 // `time` explicit and shared by hard links, texts of fixed length, observables without subgroups. Units are reduced:
 // there are no `unit` attributes, so readers must be set not to convert. Positions are wrapped; unwrapped position =
-// position + image · edge. Every frame is flushed: it survives the end of the process; steps go in last, and their
-// number is the number of whole frames.
+// position + image · edge. Every frame is flushed: it survives the end of the process (journal.h).
 //
 // Where ranks have blocks of the particles (engine/ranks/id_blocks.h) rank 0 writes one after the other, as a piece of
 // the same row: it never has more than one of them. The others have a ShareTeller each.
@@ -31,10 +30,14 @@ class TrajectoryWriter : public Observer<D> {
   /// Creates the file. `system` is read for what does not change: box, masses, radii, charges, species; and for the
   /// ranks. Throws Error(Failure::file).
   TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system);
+  /// Opens the file of the same run again to go on behind its first so many frames. Throws Error(Failure::file).
+  TrajectoryWriter(const std::filesystem::path& path, const System<D>& system, std::uint64_t frames);
   ~TrajectoryWriter() override;
 
   /// Appends a frame and flushes. Throws Error(Failure::file).
   void frame(const Snapshot<D>& snapshot) override;
+  /// How many there are.
+  std::uint64_t frames() const;
 
   /// Flushes and closes. Throws Error(Failure::file).
   void close();
@@ -48,8 +51,8 @@ class TrajectoryWriter : public Observer<D> {
 template <int D>
 class ShareTeller : public Observer<D> {
  public:
-  /// While the writer creates the file.
-  ShareTeller(Exchange& ranks, const System<D>& system);
+  /// `creates`: while the writer creates the file; else it opens one again.
+  ShareTeller(Exchange& ranks, const System<D>& system, bool creates = true);
   void frame(const Snapshot<D>& snapshot) override;
 
  private:

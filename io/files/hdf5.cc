@@ -1,17 +1,11 @@
 #include "io/files/hdf5.h"
 
-#include <fcntl.h>
-#include <sys/resource.h>
-#include <sys/statvfs.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <functional>
 #include <numeric>
 
 #include "engine/base/error.h"
+#include "io/files/journal.h"
 
 namespace carom::hdf5 {
 
@@ -41,19 +35,6 @@ std::string reason() {
   throw Error(Failure::file,
               path.string() + ": cannot " + action + ": " + why +
                   "; check free space, quota and permissions there, or choose another directory with -o");
-}
-
-/// Has the file system set `length` bytes aside from `start` on, beyond the end of the file; returns 0 or an error
-/// number.
-int set_aside(int descriptor, std::uint64_t start, std::uint64_t length) {
-  rlimit limit{};
-  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && start + length > limit.rlim_cur) return EFBIG;
-  if (fallocate(descriptor, FALLOC_FL_KEEP_SIZE, static_cast<off_t>(start), static_cast<off_t>(length)) == 0) return 0;
-  if (errno != EOPNOTSUPP && errno != ENOSYS) return errno;
-  // A file system that cannot: at least look whether there is room now.
-  struct statvfs disk {};
-  if (fstatvfs(descriptor, &disk) != 0) return 0;
-  return disk.f_bavail * disk.f_frsize < length ? ENOSPC : 0;
 }
 
 Handle fixed_text_type(std::size_t length) {
@@ -113,21 +94,34 @@ hid_t native_type<std::uint64_t>() {
   return H5T_NATIVE_UINT64;
 }
 
-File File::create(const std::filesystem::path& path) {
+File File::writable(const std::filesystem::path& path, const char* action,
+                    hid_t (*open)(const char* path, hid_t access)) {
   start_library();
-  const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-  if (id < 0) throw_write_error(path, "create the file", reason());
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_driver(access.id(), journal_driver(), nullptr);
+  const hid_t id = open(path.c_str(), access.id());
+  if (id < 0) throw_write_error(path, action, reason());
   return {path, id, true};
+}
+
+File File::create(const std::filesystem::path& path) {
+  return writable(path, "create the file",
+                  [](const char* name, hid_t access) { return H5Fcreate(name, H5F_ACC_TRUNC, H5P_DEFAULT, access); });
+}
+
+File File::append(const std::filesystem::path& path) {
+  replay_journal(path);
+  return writable(path, "open the file",
+                  [](const char* name, hid_t access) { return H5Fopen(name, H5F_ACC_RDWR, access); });
 }
 
 File File::open(const std::filesystem::path& path) {
   start_library();
+  replay_journal(path);
   const hid_t id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   if (id < 0) throw Error(Failure::file, path.string() + ": cannot read it as an HDF5 file: " + reason());
   return {path, id, false};
 }
-
-File::~File() { give_back_reserve(); }
 
 void File::fail(const std::string& action) const {
   if (writable_) throw_write_error(path_, action, reason());
@@ -135,42 +129,19 @@ void File::fail(const std::string& action) const {
 }
 
 Handle File::group(const std::string& name) {
+  if (exists(*this, name))
+    return {check(H5Gopen2(file_.id(), name.c_str(), H5P_DEFAULT), "open group " + name), H5Gclose};
   const Handle link(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
   H5Pset_create_intermediate_group(link.id(), 1);
   const hid_t id = H5Gcreate2(file_.id(), name.c_str(), link.id(), H5P_DEFAULT, H5P_DEFAULT);
   return {check(id, "create group " + name), H5Gclose};
 }
 
-void File::reserve(std::uint64_t bytes) {
-  constexpr std::uint64_t kMetadata = 1 << 18;  // chunk indices and headers that a flush may add
-  hsize_t size = 0;
-  check(H5Fget_filesize(file_.id(), &size), "find the size of the file");
-  if (size + bytes + kMetadata <= reserved_until_) return;
-  void* descriptor = nullptr;
-  check(H5Fget_vfd_handle(file_.id(), H5P_DEFAULT, &descriptor), "find the file's descriptor");
-  const std::uint64_t length = bytes + 2 * kMetadata;
-  if (const int error = set_aside(*static_cast<int*>(descriptor), size, length); error != 0)
-    throw_write_error(path_, "write more", std::strerror(error));
-  reserved_until_ = size + length;
-}
-
 void File::flush() { check(H5Fflush(file_.id(), H5F_SCOPE_LOCAL), "flush the file"); }
 
 void File::close() {
   flush();
-  give_back_reserve();
-  file_ = Handle();
-}
-
-void File::give_back_reserve() {
-  if (file_.id() < 0 || reserved_until_ == 0) return;
-  void* descriptor = nullptr;
-  hsize_t size = 0;
-  if (H5Fflush(file_.id(), H5F_SCOPE_LOCAL) < 0 || H5Fget_vfd_handle(file_.id(), H5P_DEFAULT, &descriptor) < 0 ||
-      H5Fget_filesize(file_.id(), &size) < 0)
-    return;
-  // Room beyond the end is given back by cutting the file to the size it has; no harm if that fails.
-  if (ftruncate(*static_cast<int*>(descriptor), static_cast<off_t>(size)) == 0) reserved_until_ = 0;
+  check(H5Fclose(file_.release()), "close the file");
 }
 
 void File::write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
@@ -218,6 +189,7 @@ void File::write_texts(const Handle& where, const std::string& name, const std::
 }
 
 void File::link(const Handle& from, const std::string& name, const Handle& to, const std::string& alias) {
+  if (H5Lexists(to.id(), alias.c_str(), H5P_DEFAULT) > 0) return;
   check(H5Lcreate_hard(from.id(), name.c_str(), to.id(), alias.c_str(), H5P_DEFAULT, H5P_DEFAULT), "link " + alias);
 }
 

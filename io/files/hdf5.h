@@ -10,10 +10,7 @@
 //
 // Every failure throws Error(Failure::file) that names the file and holds the reason from HDF5's error stack.
 //
-// A file must stay readable up to its last flush when the disk fills up. HDF5 cannot promise that: a write that fails
-// in the middle of a flush leaves metadata half written. So reserve() has the file system set the room aside first
-// (fallocate beyond the end of the file): a full disk is met before HDF5 writes anything. Where the file system cannot
-// do that, the free space is looked at instead.
+// What is written goes through a journal (journal.h): whenever the process ends, the file has the state of a flush.
 
 #include <hdf5.h>
 
@@ -46,6 +43,8 @@ class Handle {
     if (id_ >= 0) close_(id_);
   }
   hid_t id() const { return id_; }
+  /// To be closed by another hand.
+  hid_t release() { return std::exchange(id_, H5I_INVALID_HID); }
 
  private:
   hid_t id_ = H5I_INVALID_HID;
@@ -61,15 +60,15 @@ class File {
  public:
   /// A new, empty file; an old one of that name is replaced.
   static File create(const std::filesystem::path& path);
+  /// An existing file, to be changed; its groups and series are opened where they would be created.
+  static File append(const std::filesystem::path& path);
   /// An existing file, to be read.
   static File open(const std::filesystem::path& path);
-  File(File&&) = default;
-  ~File();
 
   const std::filesystem::path& path() const { return path_; }
   hid_t id() const { return file_.id(); }
 
-  /// Creates a group, and those on the way to it.
+  /// A group, created where it is missing, like those on the way to it.
   Handle group(const std::string& name);
   /// Throws Error(Failure::file) with the reason from HDF5 if `result` (an identifier or status) is a failure; else
   /// returns it.
@@ -78,11 +77,9 @@ class File {
     if (result < 0) fail(action);
     return result;
   }
-  /// Makes sure that `bytes` more will fit on the disk.
-  void reserve(std::uint64_t bytes);
   /// Hands everything to the operating system: from now on it survives the end of this process.
   void flush();
-  /// Flushes and closes. The destructor does so too, but cannot report errors.
+  /// Flushes and closes, also what is open in the file. The destructor does so too, but cannot report errors.
   void close();
 
   /// Attributes and small data sets of a group or of the file; texts are stored with fixed length.
@@ -96,10 +93,12 @@ class File {
   void write_number(const Handle& where, const std::string& name, T number) {
     write_array(where, name, native_type<T>(), &number, {});
   }
-  /// Makes `alias` a second name of the data set `name`.
+  /// Makes `alias` a second name of the data set `name`, unless there is one.
   void link(const Handle& from, const std::string& name, const Handle& to, const std::string& alias);
 
  private:
+  static File writable(const std::filesystem::path& path, const char* action,
+                       hid_t (*open)(const char* path, hid_t access));
   File(std::filesystem::path path, hid_t id, bool writable)
       : path_(std::move(path)), file_(id, H5Fclose), writable_(writable) {}
   [[noreturn]] void fail(const std::string& action) const;
@@ -107,19 +106,18 @@ class File {
                    const std::vector<hsize_t>& shape);
   void write_attribute(const Handle& where, const std::string& name, hid_t type, const void* data,
                        const std::vector<hsize_t>& shape);
-  void give_back_reserve();
 
   std::filesystem::path path_;
   Handle file_;
   bool writable_;
-  std::uint64_t reserved_until_ = 0;  // file size up to which the disk has room set aside; 0: nothing reserved
 };
 
 /// The untyped part of Series.
 class SeriesBase {
  public:
-  std::uint64_t row_bytes() const { return row_bytes_; }
   std::uint64_t rows() const { return rows_; }
+  /// Cuts off all rows behind the first so many. Throws Error(Failure::file) where there are fewer.
+  void cut(std::uint64_t rows);
 
  protected:
   SeriesBase(const File& file, const Handle& where, const std::string& name, hid_t type,
@@ -137,10 +135,11 @@ class SeriesBase {
   const File* file_;
   Handle dataset_;
   std::vector<hsize_t> shape_;  // of one row, with a leading axis for the rows
-  std::uint64_t row_elements_ = 1, row_bytes_ = 0, rows_ = 0;
+  std::uint64_t row_elements_ = 1, rows_ = 0;
 };
 
-/// A data set with a first axis that grows: one row an append, or several. The file must outlive it and not move.
+/// A data set with a first axis that grows: one row an append, or several. One that is there is opened, and goes on
+/// behind its last row. The file must outlive it and not move.
 template <class T>
 class Series : public SeriesBase {
  public:

@@ -23,14 +23,24 @@ SeriesBase::SeriesBase(const File& file, const Handle& where, const std::string&
                        std::vector<hsize_t> row_shape)
     : label_("write to data set " + name), file_(&file), shape_(std::move(row_shape)) {
   row_elements_ = std::accumulate(shape_.begin(), shape_.end(), hsize_t{1}, std::multiplies<>());
-  row_bytes_ = row_elements_ * H5Tget_size(type);
   shape_.insert(shape_.begin(), 0);
+  const int rank = static_cast<int>(shape_.size());
+  if (H5Lexists(where.id(), name.c_str(), H5P_DEFAULT) > 0) {
+    dataset_ = Handle(file.check(H5Dopen2(where.id(), name.c_str(), H5P_DEFAULT), "open data set " + name), H5Dclose);
+    const Handle space(H5Dget_space(dataset_.id()), H5Sclose);
+    std::vector<hsize_t> there(shape_.size());
+    const bool alike = H5Sget_simple_extent_ndims(space.id()) == rank &&
+                       H5Sget_simple_extent_dims(space.id(), there.data(), nullptr) == rank &&
+                       std::equal(shape_.begin() + 1, shape_.end(), there.begin() + 1);
+    if (!alike) throw Error(Failure::file, file.path().string() + ": data set " + name + " belongs to another run");
+    rows_ = there[0];
+    return;
+  }
   std::vector<hsize_t> limit = shape_;
   limit[0] = H5S_UNLIMITED;
-  const int rank = static_cast<int>(shape_.size());
   const Handle space(H5Screate_simple(rank, shape_.data(), limit.data()), H5Sclose);
   const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  H5Pset_chunk(layout.id(), rank, chunk_of(shape_, row_bytes_).data());
+  H5Pset_chunk(layout.id(), rank, chunk_of(shape_, row_elements_ * H5Tget_size(type)).data());
   dataset_ =
       Handle(file.check(H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, layout.id(), H5P_DEFAULT),
                         "create data set " + name),
@@ -67,8 +77,14 @@ void SeriesBase::append(hid_t type, const void* data, std::size_t elements) {
 
 void SeriesBase::append_row() { extend(1); }
 
-void SeriesBase::drop_row() {
-  --rows_;
+void SeriesBase::drop_row() { cut(rows_ - 1); }
+
+void SeriesBase::cut(std::uint64_t rows) {
+  if (rows > rows_)
+    throw Error(Failure::file, file_->path().string() + ": has " + std::to_string(rows_) + " rows of " +
+                                   std::to_string(rows) + ": it was cut or exchanged since that number was taken");
+  if (rows == rows_) return;
+  rows_ = rows;
   extend(0);
 }
 

@@ -15,7 +15,9 @@ namespace carom {
 /// spdlog swallows what a sink throws; this one keeps it for RunLog to throw again.
 class RunLog::FileSink : public spdlog::sinks::base_sink<std::mutex> {
  public:
-  explicit FileSink(const std::filesystem::path& path) : file_(path) {}
+  template <class... Size>
+  explicit FileSink(const std::filesystem::path& path, Size... size) : file_(path, size...) {}
+  std::uint64_t size() const { return file_.size(); }
   void rethrow_failure() {
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
   }
@@ -37,7 +39,12 @@ class RunLog::FileSink : public spdlog::sinks::base_sink<std::mutex> {
   std::exception_ptr failure_;
 };
 
-RunLog::RunLog(const std::filesystem::path& path, bool quiet) : sink_(std::make_shared<FileSink>(path)) {
+RunLog::RunLog(const std::filesystem::path& path, bool quiet) : RunLog(std::make_shared<FileSink>(path), quiet) {}
+
+RunLog::RunLog(const std::filesystem::path& path, bool quiet, std::uint64_t size)
+    : RunLog(std::make_shared<FileSink>(path, size), quiet) {}
+
+RunLog::RunLog(std::shared_ptr<FileSink> sink, bool quiet) : sink_(std::move(sink)) {
   auto to_stdout = std::make_shared<spdlog::sinks::stdout_sink_mt>();
   auto to_stderr = std::make_shared<spdlog::sinks::stderr_sink_mt>();
   if (quiet) to_stdout->set_level(spdlog::level::off);
@@ -55,6 +62,8 @@ void RunLog::note(std::string_view text) { log(*file_, spdlog::level::info, text
 void RunLog::say(std::string_view text) { log(*screen_, spdlog::level::info, text); }
 void RunLog::warn(std::string_view text) { log(*warnings_, spdlog::level::warn, text); }
 void RunLog::error(std::string_view text) { log(*file_, spdlog::level::err, std::string("error: ").append(text)); }
+
+std::uint64_t RunLog::size() const { return sink_->size(); }
 
 void RunLog::close() { sink_->close(); }
 

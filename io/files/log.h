@@ -6,6 +6,7 @@
 
 #include <spdlog/logger.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string_view>
@@ -16,17 +17,22 @@ class RunLog {
  public:
   /// Creates the file. `quiet`: nothing but warnings and errors goes to the terminal.
   RunLog(const std::filesystem::path& path, bool quiet);
+  /// Opens it again to go on behind its first so many bytes.
+  RunLog(const std::filesystem::path& path, bool quiet, std::uint64_t size);
   ~RunLog();
 
   void note(std::string_view text);   ///< to the file
   void say(std::string_view text);    ///< to the file and to stdout
   void warn(std::string_view text);   ///< to the file and to stderr; the text itself says that it is a warning
   void error(std::string_view text);  ///< to the file, as an error; the command prints it when it ends
+  /// In bytes.
+  std::uint64_t size() const;
   /// Puts everything on the disk.
   void close();
 
  private:
   class FileSink;
+  RunLog(std::shared_ptr<FileSink> sink, bool quiet);
   void log(spdlog::logger& to, spdlog::level::level_enum level, std::string_view text);
 
   std::shared_ptr<FileSink> sink_;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -146,9 +147,26 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
 
 template <int D>
 void ThermoTable<D>::thermo(const Snapshot<D>& s) {
-  if (!std::exchange(header_written_, true))
+  constexpr std::uint64_t kOfADoubling = 16;
+  if (rows_ == 0)
     log_.note(fmt::format("{:>12} {:>10} {:>12} {:>14} {:>14} {:>16} {:>10} {:>12} {:>12}", "time", "step",
                           "collisions", "kinetic", "potential", "total", "max |ΔE|", "temperature", "pressure"));
+  const std::uint64_t row = rows_++;
+  left_out_.reset();
+  if (row % std::max<std::uint64_t>(1, std::bit_floor(row) / kOfADoubling) == 0)
+    write(s);
+  else
+    left_out_ = s;
+}
+
+template <int D>
+void ThermoTable<D>::finish() {
+  if (left_out_) write(*left_out_);
+  left_out_.reset();
+}
+
+template <int D>
+void ThermoTable<D>::write(const Snapshot<D>& s) {
   log_.note(fmt::format("{:>12.6g} {:>10} {:>12} {:>14.8g} {:>14.8g} {:>16.10g} {:>10.2e} {:>12.6g} {:>12.6g}", s.time,
                         s.step, s.collisions, s.kinetic, s.potential, s.total(), s.max_energy_error, s.temperature,
                         s.pressure));

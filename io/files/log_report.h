@@ -1,6 +1,7 @@
 #pragma once
 // What stands in run.log beside the warnings: the banner, the thermo table, the final report with the timing breakdown.
 
+#include <optional>
 #include <span>
 #include <string>
 
@@ -17,16 +18,25 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 /// How the run ended, what it found and where the time of the ranks went: of several, least, mean and most.
 std::string report_text(const Deck& deck, const Statistics& statistics, std::span<const RankAccount> ranks);
 
-/// Writes thermo rows into the log as a table for human eyes.
+/// Writes thermo rows into the log as a table for human eyes: the first 32, then 16 of each doubling of their number
+/// (a million rows leave 270), and the last. The choice depends on the number of a row alone, so that a run that was
+/// interrupted has the same table.
 template <int D>
 class ThermoTable : public Observer<D> {
  public:
-  explicit ThermoTable(RunLog& log) : log_(log) {}
+  /// `rows`: so many have been shown to the table before.
+  explicit ThermoTable(RunLog& log, std::uint64_t rows = 0) : log_(log), rows_(rows) {}
   void thermo(const Snapshot<D>& snapshot) override;
+  /// How many have been shown to it.
+  std::uint64_t rows() const { return rows_; }
+  /// Writes the last row, unless it is there.
+  void finish();
 
  private:
+  void write(const Snapshot<D>& snapshot);
   RunLog& log_;
-  bool header_written_ = false;
+  std::uint64_t rows_;
+  std::optional<Snapshot<D>> left_out_;  // the last row, where it was
 };
 
 }  // namespace carom

@@ -4,18 +4,33 @@
 #include <exception>
 #include <iterator>
 
+#include "engine/base/error.h"
 #include "io/files/output_directory.h"
 
 namespace carom {
 
 template <int D>
-RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system)
-    : trajectory_(deck.output.directory / run_file::trajectory, deck, system),
-      thermo_(deck.output.directory / run_file::thermo) {
-  if (deck.plan.events) events_ = std::make_unique<EventWriter<D>>(deck.output.directory / run_file::events, deck);
-  for (const auto& [info, parameters] : deck.output.observables)
-    averages_.emplace_back(deck.output.directory / run_file::averages(*info),
-                           info->template in<D>().make(system, parameters, deck.output.sample_start));
+RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const FileMarks* marks)
+    : trajectory_(marks == nullptr
+                      ? TrajectoryWriter<D>(deck.output.directory / run_file::trajectory, deck, system)
+                      : TrajectoryWriter<D>(deck.output.directory / run_file::trajectory, system, marks->frames)),
+      thermo_(marks == nullptr ? ThermoWriter<D>(deck.output.directory / run_file::thermo)
+                               : ThermoWriter<D>(deck.output.directory / run_file::thermo, marks->thermo_bytes)) {
+  const auto& chosen = deck.output.observables;
+  const std::filesystem::path events = deck.output.directory / run_file::events;
+  if (deck.plan.events)
+    events_ = marks == nullptr ? std::make_unique<EventWriter<D>>(events, deck)
+                               : std::make_unique<EventWriter<D>>(events, marks->events);
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const auto& [info, parameters] = chosen[k];
+    const std::filesystem::path path = deck.output.directory / run_file::averages(*info);
+    averages_.emplace_back(path, info->template in<D>().make(system, parameters, deck.output.sample_start));
+  }
+}
+
+template <int D>
+FileMarks RunFiles<D>::mark() {
+  return {trajectory_.frames(), thermo_.size(), events_ ? events_->mark() : EventMark()};
 }
 
 template <int D>

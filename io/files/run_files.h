@@ -25,11 +25,24 @@ class Onlooker : public Observer<D> {
   Sampling sampling_;
 };
 
+/// Where the files of a run stand: what is needed to cut them back and to go on.
+struct FileMarks {
+  std::uint64_t frames = 0, thermo_bytes = 0;
+  EventMark events;
+  void archive(Archive& archive) { archive(frames, thermo_bytes, events); }
+};
+
 template <int D>
 class RunFiles {
  public:
   /// Creates them in deck.output.directory. Throws Error(Failure::file).
-  RunFiles(const Deck& deck, const System<D>& system);
+  RunFiles(const Deck& deck, const System<D>& system) : RunFiles(deck, system, nullptr) {}
+  /// Opens those of the same run again and cuts off what is behind the marks. Throws Error(Failure::file).
+  RunFiles(const Deck& deck, const System<D>& system, const FileMarks& marks) : RunFiles(deck, system, &marks) {}
+
+  /// Writes what waits; the files then hold what has been shown to them, and survive the end of the process. Throws
+  /// Error(Failure::file).
+  FileMarks mark();
 
   /// Adds them as observers to the run. They must outlive it.
   void add_to(Simulation<D>& simulation);
@@ -44,6 +57,8 @@ class RunFiles {
   std::vector<SpeciesValue> species_values() const;
 
  private:
+  RunFiles(const Deck& deck, const System<D>& system, const FileMarks* marks);
+
   TrajectoryWriter<D> trajectory_;
   ThermoWriter<D> thermo_;
   std::unique_ptr<EventWriter<D>> events_;  // null where the deck does not want it

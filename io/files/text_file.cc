@@ -17,22 +17,35 @@ TextFile::TextFile(std::filesystem::path path)
   if (descriptor_ < 0) fail(errno);
 }
 
+TextFile::TextFile(std::filesystem::path path, std::uint64_t size)
+    : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_WRONLY | O_CLOEXEC)), size_(size) {
+  if (descriptor_ < 0) fail(errno);
+  const off_t there = ::lseek(descriptor_, 0, SEEK_END);
+  if (there < static_cast<off_t>(size))
+    throw Error(Failure::file, path_.string() + ": has " + std::to_string(there) + " bytes of " + std::to_string(size) +
+                                   ": it was cut or exchanged since that number was taken");
+  if (::ftruncate(descriptor_, static_cast<off_t>(size)) != 0 ||
+      ::lseek(descriptor_, static_cast<off_t>(size), SEEK_SET) < 0)
+    fail(errno);
+}
+
 TextFile::~TextFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 void TextFile::append(std::string_view piece) {
-  const off_t start = ::lseek(descriptor_, 0, SEEK_CUR);
   for (std::size_t done = 0; done < piece.size();) {
     const ssize_t n = ::write(descriptor_, piece.data() + done, piece.size() - done);
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
       const int error_number = n < 0 ? errno : ENOSPC;
+      const auto start = static_cast<off_t>(size_);
       if (::ftruncate(descriptor_, start) == 0) ::lseek(descriptor_, start, SEEK_SET);
       fail(error_number);
     }
     done += static_cast<std::size_t>(n);
   }
+  size_ += piece.size();
 }
 
 void TextFile::close() {
@@ -47,6 +60,16 @@ void TextFile::fail(int error_number) const {
                   "; check free space, quota and permissions there, or choose another directory with -o");
 }
 
+void put_in_place(const std::filesystem::path& aside, const std::filesystem::path& path) try {
+  std::filesystem::rename(aside, path);
+  const int folder = ::open(path.has_parent_path() ? path.parent_path().c_str() : ".", O_RDONLY | O_CLOEXEC);
+  if (folder < 0) return;  // such a folder can't be synced
+  ::fsync(folder);
+  ::close(folder);
+} catch (const std::filesystem::filesystem_error& e) {
+  throw Error(Failure::file, path.string() + ": cannot put the new file in place: " + e.code().message());
+}
+
 void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
   std::filesystem::path aside = path;
   aside += ".part";
@@ -54,9 +77,7 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
     TextFile file(aside);
     file.append(text);
     file.close();
-    std::filesystem::rename(aside, path);
-  } catch (const std::filesystem::filesystem_error& e) {
-    throw Error(Failure::file, path.string() + ": cannot put the new file in place: " + e.code().message());
+    put_in_place(aside, path);
   } catch (const Error&) {
     std::error_code ignored;
     std::filesystem::remove(aside, ignored);

@@ -4,6 +4,7 @@
 // What has been appended survives the end of the process. A piece goes in as a whole or not at all: if the disk fills
 // up in the middle of one, its beginning is taken back. All failures throw Error(Failure::file) with the file's name.
 
+#include <cstdint>
 #include <filesystem>
 #include <string_view>
 
@@ -13,11 +14,15 @@ class TextFile {
  public:
   /// A new, empty file.
   explicit TextFile(std::filesystem::path path);
+  /// One that is there, to go on behind its first `size` bytes.
+  TextFile(std::filesystem::path path, std::uint64_t size);
   ~TextFile();
   TextFile(const TextFile&) = delete;
   TextFile& operator=(const TextFile&) = delete;
 
   void append(std::string_view piece);
+  /// In bytes.
+  std::uint64_t size() const { return size_; }
   /// Puts everything on the disk and closes; network file systems report a full disk only here.
   void close();
 
@@ -25,7 +30,12 @@ class TextFile {
   [[noreturn]] void fail(int error_number) const;
   std::filesystem::path path_;
   int descriptor_ = -1;
+  std::uint64_t size_ = 0;
 };
+
+/// Gives a finished file its name, in place of an older one, so that this survives a power failure too. Throws
+/// Error(Failure::file).
+void put_in_place(const std::filesystem::path& aside, const std::filesystem::path& path);
 
 /// Writes a whole file so that a reader sees the old one or the new one, never a part: aside, then renamed.
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);

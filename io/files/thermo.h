@@ -17,10 +17,14 @@ class ThermoWriter : public Observer<D> {
  public:
   /// Creates the file with its header. Throws Error(Failure::file).
   explicit ThermoWriter(const std::filesystem::path& path);
+  /// Opens it again to go on behind its first so many bytes. Throws Error(Failure::file).
+  ThermoWriter(const std::filesystem::path& path, std::uint64_t size) : file_(path, size) {}
 
   /// Appends a row. Throws Error(Failure::file).
   void thermo(const Snapshot<D>& snapshot) override;
 
+  /// In bytes.
+  std::uint64_t size() const { return file_.size(); }
   /// Puts everything on the disk. Throws Error(Failure::file).
   void close() { file_.close(); }
 

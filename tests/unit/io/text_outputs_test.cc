@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "io/files/log.h"
+#include "io/files/log_report.h"
 #include "io/files/output_directory.h"
 #include "io/files/progress.h"
 #include "io/files/summary.h"
@@ -74,6 +75,36 @@ TEST(TextFile, TakesBackWhatDoesNotFit) {
 
 TEST(Log, AFullDiskIsAnError) {
   EXPECT_THROW(RunLog("/dev/full", true).note("lost"), Error);  // spdlog alone would only print a message
+}
+
+// A table for people: few rows, evenly in each doubling, and always the last.
+TEST(Log, TheTableIsNoCopyOfThermo) {
+  const auto path = fresh_directory() / "run.log";
+  const auto system = test::sample_system<2>();
+  RunLog log(path, true);
+  ThermoTable<2> table(log);
+  constexpr int kRows = 100001;
+  for (int row = 0; row <= kRows; ++row) table.thermo(test::sample_snapshot<2>(system->particles, row, row));
+  table.finish();
+  table.finish();  // it is there
+  std::ifstream in(path);
+  std::vector<int> steps;
+  std::string line;
+  std::getline(in, line);
+  EXPECT_NE(line.find("temperature"), std::string::npos);
+  while (std::getline(in, line)) {
+    std::istringstream words(line);
+    std::string day, clock, time;
+    int step = -1;
+    words >> day >> clock >> time >> step;
+    steps.push_back(step);
+  }
+  EXPECT_EQ(steps.back(), kRows);
+  EXPECT_LT(steps.size(), 250u);
+  for (std::size_t n = 1; n < steps.size(); ++n) {
+    EXPECT_GT(steps[n], steps[n - 1]);
+    EXPECT_LE(steps[n] - steps[n - 1], std::max(1, steps[n] / 16)) << steps[n];
+  }
 }
 
 TEST(Summary, HasEveryPromisedName) {

@@ -1,0 +1,303 @@
+#include "io/files/journal.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "io/files/journal_blocks.h"
+#include "io/files/text_file.h"
+
+namespace carom::hdf5 {
+
+namespace {
+
+std::filesystem::path journal_of(std::filesystem::path file) { return file += ".journal"; }
+
+/// Calls again what a signal has interrupted.
+template <class Call>
+auto uninterrupted(Call call) {
+  auto result = call();
+  while (result < 0 && errno == EINTR) result = call();
+  return result;
+}
+
+/// Whether all could be written; else errno says why.
+bool write_all(int descriptor, const std::byte* data, std::size_t size, std::uint64_t at) {
+  while (size > 0) {
+    const ssize_t n = uninterrupted([&] { return ::pwrite(descriptor, data, size, static_cast<off_t>(at)); });
+    if (n == 0) errno = ENOSPC;
+    if (n <= 0) return false;
+    data += n;
+    at += static_cast<std::uint64_t>(n);
+    size -= static_cast<std::size_t>(n);
+  }
+  return true;
+}
+
+/// Up to `size` bytes; how many there are.
+std::optional<std::size_t> read_up_to(int descriptor, std::byte* data, std::size_t size, std::uint64_t at) {
+  std::size_t done = 0;
+  while (done < size) {
+    const ssize_t n =
+        uninterrupted([&] { return ::pread(descriptor, data + done, size - done, static_cast<off_t>(at + done)); });
+    if (n < 0) return {};
+    if (n == 0) break;
+    done += static_cast<std::size_t>(n);
+  }
+  return done;
+}
+
+bool resize(int descriptor, std::uint64_t size) {
+  return uninterrupted([&] { return ::ftruncate(descriptor, static_cast<off_t>(size)); }) == 0;
+}
+
+/// Room on the disk. File systems that cannot set it aside are believed to have it.
+bool set_aside(int descriptor, int mode, std::uint64_t start, std::uint64_t length) {
+  const auto call = [&] {
+    return ::fallocate(descriptor, mode, static_cast<off_t>(start), static_cast<off_t>(length));
+  };
+  return length == 0 || uninterrupted(call) == 0 || errno == EOPNOTSUPP || errno == ENOSYS;
+}
+
+bool sync(int descriptor) {
+  return uninterrupted([&] { return ::fdatasync(descriptor); }) == 0 || errno == EINVAL;
+}
+
+/// Whether no other process has the lock; file systems without locks have none to give.
+bool lock(int descriptor, int kind) { return ::flock(descriptor, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK; }
+
+/// A file that the driver has open.
+struct Journaled : H5FD_t {
+  std::filesystem::path path;
+  bool is_new = false;  // still called path.part
+  int file = -1, journal = -1;
+  haddr_t eoa = 0;            // the end of what HDF5 has allocated
+  std::uint64_t size = 0;     // of the file, as HDF5 sees it
+  std::uint64_t on_disk = 0;  // of the file, as the operating system sees it
+  std::uint64_t flushed = 0;  // of the file, by the last flush
+  Blocks waiting;
+  Bytes buffer;  // the journal of the last flush
+  // Once something could not be written, nothing is any more: HDF5 may close the file undisturbed, which then has the
+  // state of the last flush, or a complete journal, if that is what could not be written to the file.
+  bool failed = false, torn = false;
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point next_sync{};
+
+  std::filesystem::path name_now() const {
+    std::filesystem::path name = path;
+    return is_new ? name += ".part" : name;
+  }
+
+  /// Puts the reason onto HDF5's stack of errors.
+  herr_t fail() {
+    failed = true;
+    H5Epush2(H5E_DEFAULT, __FILE__, __func__, __LINE__, H5E_ERR_CLS, H5E_VFL, H5E_WRITEERROR, "%s",
+             std::strerror(errno));
+    return -1;
+  }
+
+  herr_t write(std::uint64_t address, std::size_t length, const std::byte* data) {
+    if (failed) return 0;
+    const std::size_t old =
+        address >= flushed ? 0 : static_cast<std::size_t>(std::min<std::uint64_t>(flushed - address, length));
+    if (old > 0) waiting.put(address, {data, old});
+    if (old < length && !write_all(file, data + old, length - old, address + old)) return fail();
+    size = std::max(size, address + length);
+    if (old < length) on_disk = std::max(on_disk, address + length);
+    return 0;
+  }
+
+  herr_t read(std::uint64_t address, std::size_t length, std::byte* data) {
+    const auto n = read_up_to(file, data, length, address);
+    if (!n) return fail();
+    std::memset(data + *n, 0, length - *n);
+    waiting.overlay(address, {data, length});
+    return 0;
+  }
+
+  herr_t flush() {
+    if (failed || (waiting.empty() && size == flushed)) return 0;
+    const bool durable = Clock::now() >= next_sync;
+    if (size > flushed) {
+      if (!set_aside(file, 0, flushed, size - flushed)) return fail();
+      on_disk = std::max(on_disk, size);
+    }
+    if (!waiting.empty() && !write_journal(durable)) return fail();
+    torn = true;
+    if (!waiting.empty() && !write_blocks(buffer)) return fail();
+    if (on_disk != size && !resize(file, size)) return fail();
+    const auto start = Clock::now();
+    if (durable && !sync(file)) return fail();
+    torn = false;
+    if (is_new) {
+      std::filesystem::remove(journal_of(path));  // of an older file
+      put_in_place(name_now(), path);
+      is_new = false;
+    } else if (!waiting.empty()) {
+      constexpr std::byte kNone[8] = {};
+      if (!write_all(journal, kNone, sizeof kNone, 0)) return fail();
+    }
+    if (durable) next_sync = Clock::now() + 20 * (Clock::now() - start);
+    waiting.clear();
+    flushed = on_disk = size;
+    return 0;
+  }
+
+  bool write_journal(bool durable) {
+    constexpr std::uint64_t kRoom = 1 << 18;  // also for the last words of a run whose disk is full
+    if (journal < 0) {
+      journal = ::open(journal_of(path).c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+      if (journal < 0 || !set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kRoom)) return false;
+    }
+    buffer = waiting.journal(size);
+    return write_all(journal, buffer.data(), buffer.size(), 0) && (!durable || (sync(file) && sync(journal)));
+  }
+
+  bool write_blocks(const Bytes& blocks) const {
+    return for_each_block(blocks, [&](std::uint64_t address, const std::byte* data, std::size_t length) {
+      return write_all(file, data, length, address);
+    });
+  }
+
+  herr_t close() {
+    herr_t result = flush();
+    if (failed && !torn) resize(file, flushed);  // gives back the room of what is behind the last flush
+    if (!failed && !sync(file)) result = fail();
+    std::error_code ignored;
+    if (!torn && journal >= 0) std::filesystem::remove(journal_of(path), ignored);
+    if (is_new) std::filesystem::remove(name_now(), ignored);
+    ::close(file);
+    if (journal >= 0) ::close(journal);
+    delete this;
+    return result;
+  }
+};
+
+/// An exception must not pass through HDF5: no memory, or a new file that cannot be put in place.
+template <class Action>
+herr_t guarded(Journaled& file, Action action) {
+  try {
+    return action();
+  } catch (const std::bad_alloc&) {
+    errno = ENOMEM;
+  } catch (const std::exception&) {
+  }
+  return file.fail();
+}
+
+Journaled& of(H5FD_t* file) { return *static_cast<Journaled*>(file); }
+const Journaled& of(const H5FD_t* file) { return *static_cast<const Journaled*>(file); }
+
+H5FD_t* open_file(const char* name, unsigned flags, hid_t, haddr_t) {
+  auto* file = new Journaled{};
+  file->path = name;
+  file->is_new = (flags & H5F_ACC_CREAT) != 0;
+  struct stat status {};
+  file->file = ::open(file->name_now().c_str(), O_RDWR | O_CLOEXEC | (file->is_new ? O_CREAT | O_TRUNC : 0), 0666);
+  if (file->file >= 0 && lock(file->file, LOCK_EX) && ::fstat(file->file, &status) == 0) {
+    file->size = file->on_disk = file->flushed = static_cast<std::uint64_t>(status.st_size);
+    return file;
+  }
+  file->fail();
+  if (file->file >= 0) ::close(file->file);
+  delete file;
+  return nullptr;
+}
+
+herr_t query(const H5FD_t*, unsigned long* flags) {  // those of the library's own driver for such files
+  *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
+           H5FD_FEAT_AGGREGATE_SMALLDATA | H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
+  return 0;
+}
+
+H5FD_class_t driver_class() {
+  H5FD_class_t driver{};
+  driver.name = "carom.journal";
+  driver.maxaddr = (haddr_t{1} << 63) - 1;
+  driver.fc_degree = H5F_CLOSE_STRONG;  // closing a file ends what is open in it: it must really be closed
+  driver.open = open_file;
+  driver.close = [](H5FD_t* file) { return of(file).close(); };
+  driver.query = query;
+  driver.get_eoa = [](const H5FD_t* file, H5FD_mem_t) { return of(file).eoa; };
+  driver.set_eoa = [](H5FD_t* file, H5FD_mem_t, haddr_t address) -> herr_t {
+    of(file).eoa = address;
+    return 0;
+  };
+  driver.get_eof = [](const H5FD_t* file, H5FD_mem_t) -> haddr_t { return of(file).size; };
+  driver.read = [](H5FD_t* file, H5FD_mem_t, hid_t, haddr_t address, size_t size, void* data) {
+    return of(file).read(address, size, static_cast<std::byte*>(data));
+  };
+  driver.write = [](H5FD_t* file, H5FD_mem_t, hid_t, haddr_t address, size_t size, const void* data) {
+    return guarded(of(file), [&] { return of(file).write(address, size, static_cast<const std::byte*>(data)); });
+  };
+  driver.flush = [](H5FD_t* file, hid_t, hbool_t closing) -> herr_t {
+    Journaled& f = of(file);
+    if (f.failed) return closing ? 0 : -1;
+    return guarded(f, [&] { return f.flush(); });
+  };
+  driver.truncate = [](H5FD_t* file, hid_t, hbool_t) -> herr_t {
+    of(file).size = of(file).eoa;
+    return 0;
+  };
+  const H5FD_mem_t one_list_for_each[] = H5FD_FLMAP_DICHOTOMY;
+  std::copy(std::begin(one_list_for_each), std::end(one_list_for_each), driver.fl_map);
+  return driver;
+}
+
+/// A descriptor that closes itself.
+struct Open {
+  int descriptor;
+  ~Open() {
+    if (descriptor >= 0) ::close(descriptor);
+  }
+};
+
+}  // namespace
+
+hid_t journal_driver() {
+  static const H5FD_class_t driver = driver_class();
+  static const hid_t id = H5FDregister(&driver);
+  return id;
+}
+
+void replay_journal(const std::filesystem::path& path) {
+  const std::filesystem::path beside = journal_of(path);
+  const auto fail = [&](const std::string& why) {
+    throw Error(Failure::file, path.string() + ": cannot take over what is in " + beside.string() + ": " + why);
+  };
+  Open file{::open(path.c_str(), O_RDWR | O_CLOEXEC)};
+  const int not_writable = file.descriptor < 0 ? errno : 0;
+  if (not_writable != 0) file.descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file.descriptor < 0) return;  // whoever opens the file says why it can't be read
+  if (!lock(file.descriptor, LOCK_SH))
+    throw Error(Failure::file, path.string() + ": a process is writing this file; wait for its end, or copy the file");
+  const Open journal{::open(beside.c_str(), O_RDONLY | O_CLOEXEC)};
+  struct stat status {};
+  if (journal.descriptor < 0 || ::fstat(journal.descriptor, &status) != 0) return;
+  Bytes blocks(static_cast<std::size_t>(status.st_size));
+  if (!read_up_to(journal.descriptor, blocks.data(), blocks.size(), 0)) fail(std::strerror(errno));
+  if (const auto size = complete_journal(blocks)) {
+    if (not_writable != 0) fail(std::strerror(not_writable));
+    if (!lock(file.descriptor, LOCK_EX)) fail("another process is reading the file; wait for its end");
+    const auto write = [&](std::uint64_t address, const std::byte* data, std::size_t length) {
+      return write_all(file.descriptor, data, length, address);
+    };
+    if (!for_each_block(blocks, write) || !resize(file.descriptor, *size) || !sync(file.descriptor))
+      fail(std::string(std::strerror(errno)) + "; check free space and permissions there");
+  }
+  ::unlink(beside.c_str());
+}
+
+}  // namespace carom::hdf5

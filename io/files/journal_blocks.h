@@ -1,0 +1,55 @@
+#pragma once
+// Blocks of a file that wait to be written, and how they stand in a journal (journal.h has its format).
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <span>
+
+#include "engine/ranks/exchange.h"
+
+namespace carom::hdf5 {
+
+/// Blocks that do not overlap, by their addresses.
+class Blocks {
+ public:
+  /// Takes the place of what is there; blocks that touch become one.
+  void put(std::uint64_t address, std::span<const std::byte> data);
+  /// Lays what is there in [address, address + its size) over `data`.
+  void overlay(std::uint64_t address, std::span<std::byte> data) const;
+  /// All of them as a journal of a file that then has so many bytes.
+  Bytes journal(std::uint64_t file_size) const;
+  bool empty() const { return blocks_.empty(); }
+  void clear() { blocks_.clear(); }
+
+ private:
+  using Block = std::pair<const std::uint64_t, Bytes>;
+  static std::uint64_t end_of(const Block& block) { return block.first + block.second.size(); }
+  std::map<std::uint64_t, Bytes> blocks_;
+};
+
+/// The size of the file, if the journal that `bytes` begin with is complete; what is behind it is cut off.
+std::optional<std::uint64_t> complete_journal(Bytes& bytes);
+
+/// What stands before each block of a journal.
+struct BlockHead {
+  std::uint64_t address, length;
+};
+constexpr std::size_t kJournalHead = 32;  // bytes
+
+/// write(address, data, length) for each block of a complete journal, while it returns true; whether all were written.
+template <class Write>
+bool for_each_block(const Bytes& journal, Write write) {
+  for (std::size_t at = kJournalHead; at < journal.size();) {
+    BlockHead block;
+    std::memcpy(&block, journal.data() + at, sizeof block);
+    at += sizeof block;
+    if (!write(block.address, journal.data() + at, block.length)) return false;
+    at += block.length;
+  }
+  return true;
+}
+
+}  // namespace carom::hdf5
