@@ -10,6 +10,7 @@
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/inverse_power.h"
 #include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/morse.h"
 #include "engine/forces/potentials/table.h"
 #include "engine/forces/potentials/wca.h"
 #include "engine/forces/potentials/yukawa.h"
@@ -25,6 +26,7 @@ using PairPotentials = PotentialList<HarmonicBond,                     // bonds
                                      Yukawa, Cut<Yukawa>,              //
                                      LennardJones, Cut<LennardJones>,  //
                                      Wca,                              //
+                                     Morse, Cut<Morse>,                //
                                      InversePower, Cut<InversePower>,  //
                                      Cut<Table>>;
 
