@@ -8,29 +8,6 @@
 namespace carom {
 namespace {
 
-template <int W>
-struct Width {
-  typedef double Double __attribute__((vector_size(8 * W)));
-  typedef long long Long __attribute__((vector_size(8 * W)));
-  typedef std::uint32_t Places __attribute__((vector_size(4 * W)));
-};
-using Two = Width<2>::Double;
-using Four = Width<4>::Double;
-using Eight = Width<8>::Double;
-
-#define CAROM_INLINE [[gnu::always_inline]] inline
-
-template <class V>
-CAROM_INLINE V load(const void* at) {
-  V lanes;
-  __builtin_memcpy(&lanes, at, sizeof lanes);
-  return lanes;
-}
-template <class V>
-CAROM_INLINE void store(void* at, V lanes) {
-  __builtin_memcpy(at, &lanes, sizeof lanes);
-}
-
 template <class V>
 struct Fields {
   V x, y, z, w;
@@ -63,40 +40,6 @@ CAROM_INLINE Fields<V> transposed(const auto& at) {
             __builtin_shufflevector(xz01, xz23, 2, 3, 10, 11, 6, 7, 14, 15),
             __builtin_shufflevector(yw01, yw23, 2, 3, 10, 11, 6, 7, 14, 15)};
   }
-}
-
-/// The sign of each lane, one bit a lane.
-template <class M>
-CAROM_INLINE unsigned bits(M mask) {
-#if defined(__AVX512DQ__)
-  if constexpr (sizeof mask == 64) return _mm512_movepi64_mask((__m512i)mask);
-#endif
-#if defined(__AVX__)
-  if constexpr (sizeof mask == 32) return static_cast<unsigned>(_mm256_movemask_pd((__m256d)mask));
-#endif
-#if defined(__SSE2__)
-  if constexpr (sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
-#endif
-  unsigned all = 0;
-  for (unsigned l = 0; l < sizeof mask / 8; ++l) all |= (static_cast<long long>(mask[l]) < 0 ? 1u : 0u) << l;
-  return all;
-}
-
-/// a < b, a mask: GCC for SSE2 takes the conjunction of two comparisons to pieces.
-template <class V>
-CAROM_INLINE IntegerOf<V> below(V a, V b) {
-#if defined(__SSE2__)
-  if constexpr (sizeof a == 16) return (IntegerOf<V>)_mm_cmplt_pd((__m128d)a, (__m128d)b);
-#endif
-  return (IntegerOf<V>)(a < b);
-}
-/// Where a < b, one bit a lane.
-template <class V>
-CAROM_INLINE unsigned less(V a, V b) {
-#if defined(__AVX512F__)
-  if constexpr (sizeof a == 64) return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ);
-#endif
-  return bits(a < b);
 }
 
 /// For each mask of four lanes the halves of those that are in it, first things first.
@@ -228,7 +171,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         compress(batch.d_new[2] + n, mask, ez);
       }
       if constexpr (weighted) compress(batch.weight + n, mask, product);
-      compress<W>(batch.second + n, mask, load<typename Width<W>::Places>(j));
+      compress<W>(batch.second + n, mask, load<typename Width<W>::Unsigned>(j));
       n += bits_in<W>(mask);
     }
     if (at < count) {
@@ -258,7 +201,7 @@ bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
 template <int W>
 void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums) {
   constexpr unsigned L = W < 4 ? W : 4, kParts = 4 / L;  // a record is no wider
-  using I = typename Width<L>::Long;
+  using I = IntegerOf<typename Width<L>::Double>;
   for (unsigned r = 0; r < batch.rows; ++r) {
     const unsigned end = batch.row[r + 1].begin;
     I own[kParts] = {};
@@ -295,7 +238,7 @@ template <int W>
 void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32_t end, PartnersFound& found) {
   using V = typename Width<W>::Double;
   using B = BitsOf<V>;
-  using Places = typename Width<W>::Places;
+  using Places = typename Width<W>::Unsigned;
   const V x = all<V>(search.own[0]), y = all<V>(search.own[1]), z = all<V>(search.own[2]);
   const V reach = all<V>(search.reach_squared);
   const int to_sign = __builtin_clzll(search.wanted);
