@@ -17,6 +17,7 @@
 #include "engine/base/system.h"
 #include "engine/forces/add_interaction.h"
 #include "engine/forces/forces.h"
+#include "engine/forces/potentials/options.h"
 #include "engine/integrators/integrator.h"
 #include "engine/run/mean_squared_displacement.h"
 #include "engine/run/observable.h"

@@ -2,8 +2,8 @@
 // compiled for different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so
 // that no function compiled for one machine can end up in another's binary.
 
-#include "engine/base/lanes.h"
-#include "engine/forces/simd/pair_kernels.h"
+#include "engine/forces/pair_formulas.h"
+#include "engine/forces/potentials/pair_potentials.h"
 
 namespace carom {
 namespace {
@@ -257,6 +257,16 @@ void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32
     compress<W>(found.other, mask & ~plain, places);
     found.other += bits_in<W>(mask & ~plain);
   }
+}
+
+template <int W, class... P>
+struct Formulas {
+  static constexpr PairFormula kAll[] = {pair_formula<W, P>()...};
+};
+
+template <int W, class... P>
+constexpr PairKernels kernels_of(const char* name, PotentialList<P...>) {
+  return {name, collect<W>, scatter<W>, find_partners<W>, Formulas<W, P...>::kAll};
 }
 
 }  // namespace
