@@ -87,7 +87,7 @@ template <int W, class P, Wanted wanted, bool wide>
         low += sum[s][0][l];
         if constexpr (wide) *totals_of[s] += static_cast<PairTotals::Whole>(sum[s][1][l]) << 40;
       }
-      low -= (batch.n + W - 1) / W * W * __builtin_bit_cast(std::uint64_t, kToInteger);
+      low -= (std::uint64_t{batch.n} + W - 1) / W * W * __builtin_bit_cast(std::uint64_t, kToInteger);
       *totals_of[s] += static_cast<std::int64_t>(low);
     }
   }

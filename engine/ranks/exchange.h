@@ -22,7 +22,7 @@ template <class T>
 void put(Bytes& to, const T& value) {
   const std::size_t at = to.size();
   to.resize(at + sizeof(T));
-  std::memcpy(to.data() + at, &value, sizeof(T));
+  std::memcpy(to.data() + at, static_cast<const void*>(&value), sizeof(T));
 }
 
 /// Reads what put() wrote, in its order.
@@ -55,7 +55,7 @@ class Exchange {
   virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing) { return outgoing; }
   /// The same among neighbours: outgoing[k] goes to partners[k], and this rank is among the partners of that one;
   /// returns what they have sent, in their order. Others are not waited for.
-  virtual std::vector<Bytes> swap(std::vector<Bytes> /*outgoing*/, std::span<const int> /*partners*/) { return {}; }
+  virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> /*partners*/) { return outgoing; }
   /// The messages of all ranks, by rank.
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
   /// Makes each of `most` the largest among all ranks and each of `sums` the sum over them.

@@ -48,7 +48,7 @@ struct Compression {
   alignas(16) std::uint32_t lane[16][4];
   constexpr Compression() : half{}, lane{} {
     for (unsigned mask = 0; mask < 16; ++mask) {
-      unsigned n = 0;
+      std::size_t n = 0;
       for (unsigned l = 0; l < 4; ++l)
         if ((mask >> l & 1) != 0) {
           half[mask][2 * n] = 2 * l, half[mask][2 * n + 1] = 2 * l + 1;
@@ -200,7 +200,7 @@ bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
 /// Adds the words to the sums of both particles.
 template <int W>
 void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums) {
-  constexpr unsigned L = W < 4 ? W : 4, kParts = 4 / L;  // a record is no wider
+  constexpr std::size_t L = W == 2 ? 2 : 4, kParts = 4 / L;  // a record is no wider
   using I = IntegerOf<typename Width<L>::Double>;
   for (unsigned r = 0; r < batch.rows; ++r) {
     const unsigned end = batch.row[r + 1].begin;
@@ -230,7 +230,7 @@ void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoo
       }
     }
     std::int64_t* const first = sums[batch.row[r].row].of;
-    for (unsigned part = 0; part < kParts; ++part) store(first + L * part, load<I>(first + L * part) + own[part]);
+    for (std::size_t part = 0; part < kParts; ++part) store(first + L * part, load<I>(first + L * part) + own[part]);
   }
 }
 

@@ -65,7 +65,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
   const double* const records = s.records;
   const double* const own = records + std::size_t{8} * self;
   const std::uint32_t slot_mask = s.slot_mask;
-  const V none = all<V>(kNever), t_i = all<V>(own[2 * D]);
+  const V none = all<V>(kNever), t_i = all<V>(own[std::ptrdiff_t{2} * D]);
   V x_i[D], v_i[D];
   for (int k = 0; k < D; ++k) x_i[k] = all<V>(own[k]), v_i[k] = all<V>(own[D + k]);
   V sigma = all<V>(s.diameter), best = none;
@@ -129,7 +129,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       const V root = elementary::sqrt(discriminant);
       time = now + (falling < 0.0 ? c / (root - falling) : (falling + root) / -outrun);
       time = (discriminant > 0.0) & ((falling < 0.0) | (outrun < 0.0)) ? time : none;
-      time = (c <= 0.0) ? ((falling < 0.0) & (d_squared > 0.0) ? all<V>(-kNever) : none) : time;  // but for the padding
+      time = (c <= 0.0) ? (((falling < 0.0) & (d_squared > 0.0)) ? all<V>(-kNever) : none) : time;  // but for the padding
     }
     store(to, time);
     best = elementary::min(time, best);
