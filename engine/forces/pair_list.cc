@@ -245,7 +245,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     if (cells.start[c] < cells.start[c + 1]) {
       std::size_t rest = c;
       for (int k = D - 1; k >= 0; --k) {
-        const auto count = static_cast<std::size_t>(cells.grid.count(k) * (k < D - 1 ? 1 : Cells<D>::kSlices));
+        const std::size_t slices = k < D - 1 ? 1 : Cells<D>::kSlices;
+        const std::size_t count = slices * static_cast<std::size_t>(cells.grid.count(k));
         centre[k] = static_cast<std::int32_t>(rest % count);
         rest /= count;
       }
