@@ -16,7 +16,7 @@ template <class T>
 void put(Bytes& to, const T& value) {
   const std::size_t at = to.size();
   to.resize(at + sizeof(T));
-  std::memcpy(to.data() + at, &value, sizeof(T));
+  std::memcpy(to.data() + at, static_cast<const void*>(&value), sizeof(T));
 }
 
 /// Reads what put() wrote, in its order.

@@ -94,7 +94,8 @@ double Domains<D>::first_pace(const Particles<D>& particles) const {
     bounds.push_back(extent.particles > 0 ? extent.high[k] : -std::numeric_limits<double>::infinity());
   }
   exchange_.largest(bounds);
-  for (int k = 0; k < D; ++k) extent.low[k] = -bounds[2 * k], extent.high[k] = bounds[2 * k + 1];
+  for (int k = 0; k < D; ++k)
+    extent.low[k] = -bounds[std::size_t{2} * k], extent.high[k] = bounds[std::size_t{2} * k + 1];
   extent.particles = sizes_.spheres;
   const double thermal = std::sqrt(sum_of_all(exchange_, squares).value() / static_cast<double>(D * sizes_.spheres));
   return kCollisions / (contacts_a_length(situation_of<D>(box_, sizes_.radius, extent, sizes_.number)) * thermal);

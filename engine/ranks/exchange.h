@@ -24,7 +24,7 @@ class Exchange {
   virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing) { return outgoing; }
   /// The same among neighbours: outgoing[k] goes to partners[k], and this rank is among the partners of that one;
   /// returns what they have sent, in their order. Others are not waited for.
-  virtual std::vector<Bytes> swap(std::vector<Bytes> /*outgoing*/, std::span<const int> /*partners*/) { return {}; }
+  virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> /*partners*/) { return outgoing; }
   /// The messages of all ranks, by rank.
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
   /// Makes each of `most` the largest among all ranks and each of `sums` the sum over them.
