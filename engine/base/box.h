@@ -4,15 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "engine/base/boundary.h"
 #include "engine/base/vec.h"
 
 namespace carom {
-
-enum class Boundary : std::uint8_t {
-  wall,      ///< hard, elastic: a sphere touches it when its centre is a radius away
-  periodic,  ///< what leaves on one side comes in on the other
-  open       ///< nothing there; the edge is only where the box is drawn
-};
 
 template <int D>
 struct Box {
@@ -21,6 +16,14 @@ struct Box {
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }
+  /// Whether all positions along the axis are between 0 and the edge.
+  bool bounded(int axis) const { return boundary[axis] != Boundary::open; }
+  /// Whether it is so along all axes: then the box has a density.
+  bool closed() const {
+    for (int k = 0; k < D; ++k)
+      if (!bounded(k)) return false;
+    return true;
+  }
   double volume() const { return edges.prod(); }
 
   /// The image of `d`, a difference of two positions, nearest to the origin: how many box edges to add on each axis.

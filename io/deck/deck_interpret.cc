@@ -67,10 +67,7 @@ class Interpreter {
     }
     if (const auto* boundary = table->find<std::vector<std::string>>("boundary")) {
       one_an_axis(*table, "boundary", boundary->size());
-      for (const std::string& b : *boundary)
-        source_.boundary.push_back(b == "wall"       ? Boundary::wall
-                                   : b == "periodic" ? Boundary::periodic
-                                                     : Boundary::open);
+      for (const std::string& name : *boundary) source_.boundary.push_back(find_boundary(name).boundary);
     }
   }
 

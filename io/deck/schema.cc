@@ -88,6 +88,15 @@ std::vector<Key> output_keys() {
   return keys;
 }
 
+Key boundary_key() {
+  Key key = {"boundary", text_list, "", "-", "for each axis"};
+  for (const BoundaryInfo& info : boundaries()) {
+    key.meaning += "; " + std::string(info.name) + ": " + std::string(info.meaning);
+    key.choices.emplace_back(info.name);
+  }
+  return key;
+}
+
 Key type_key(const std::string& meaning) { return {"type", text, "", "-", meaning}; }
 
 std::vector<TableSchema> make_schema() {
@@ -107,13 +116,7 @@ std::vector<TableSchema> make_schema() {
         {"box", real_list, "none", "length",
          "edges of the box, which begins at the origin; may be left out where placement.packing_fraction sets it",
          Range::positive},
-        {"boundary",
-         text_list,
-         "",
-         "-",
-         "for each axis: hard elastic walls, periodic images, or nothing at all",
-         Range::any,
-         {"wall", "periodic", "open"}}}},
+        boundary_key()}},
       {"particles",
        true,
        true,
