@@ -1,11 +1,13 @@
 #pragma once
 // The simulation box: a rectangle or cuboid from the origin to `edges`, with a boundary rule for each axis.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "engine/base/boundary.h"
-#include "engine/base/vec.h"
+#include "engine/base/wall.h"
 
 namespace carom {
 
@@ -24,6 +26,20 @@ struct Box {
       if (!bounded(k)) return false;
     return true;
   }
+  /// The wall of that number, on an axis with walls.
+  Wall<D> wall(Id number) const {
+    const int axis = wall_axis(number);
+    return number % 2 == 0 ? Wall<D>{axis, 1, 0} : Wall<D>{axis, -1, edges[axis]};
+  }
+  /// All of them, by their numbers.
+  std::vector<Wall<D>> walls() const {
+    std::vector<Wall<D>> all;
+    for (Id number = 0; number < 2 * D; ++number)
+      if (walled(wall_axis(number))) all.push_back(wall(number));
+    return all;
+  }
+  /// What counts as touching, anywhere in the box.
+  GapTolerance gap_tolerance() const { return GapTolerance(edges.maxCoeff()); }
   double volume() const { return edges.prod(); }
 
   /// The image of `d`, a difference of two positions, nearest to the origin: how many box edges to add on each axis.

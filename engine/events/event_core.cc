@@ -9,9 +9,13 @@
 namespace carom {
 template <int D>
 EventCore<D>::EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options)
-    : box_(box), sizes_(sizes), flights_(box), options_(options), kernels_(scan_kernels()), tuning_(options) {
-  for (int k = 0; k < D; ++k) walled_ = walled_ || box.walled(k);
-}
+    : box_(box),
+      sizes_(sizes),
+      flights_(box),
+      options_(options),
+      kernels_(scan_kernels()),
+      walled_(!box.walls().empty()),
+      tuning_(options) {}
 
 template <int D>
 EventCore<D>::~EventCore() = default;
@@ -261,18 +265,17 @@ void EventCore<D>::predict_pairs_one_by_one(const ScanTask& task) {
 template <int D>
 void EventCore<D>::predict_walls(Slot i) {
   Agenda<D>& a = agenda_[i];
-  for (int axis = 0; axis < D; ++axis)
-    for (int side = 0; side < 2 && box_.walled(axis); ++side) {
-      const double time = flights_.wall_contact(i, axis, side);
-      if (time > a.contact || time == kNever) continue;
-      const Agenda<D> before = a;
-      const bool first = before.contact == kNever;
-      const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
-      a.contact = time;
-      a.kind = EventKind::wall;
-      a.partner = static_cast<std::uint32_t>(2 * axis + side);
-      if (!first && !(key_of(i) < rival)) a = before;
-    }
+  for (const Wall<D>& wall : flights_.walls()) {
+    const double time = flights_.wall_contact(i, wall);
+    if (time > a.contact || time == kNever) continue;
+    const Agenda<D> before = a;
+    const bool first = before.contact == kNever;
+    const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
+    a.contact = time;
+    a.kind = EventKind::wall;
+    a.partner = wall.number();
+    if (!first && !(key_of(i) < rival)) a = before;
+  }
 }
 
 template <int D>
@@ -430,9 +433,8 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
 template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = key_of(i);
-  const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
   if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
-  const Blow<D> blow = flights_.bounce(i, axis, side, time, generation);
+  const Blow<D> blow = flights_.bounce(i, box_.wall(key.hi), time, generation);
   ++agenda_[i].version;
   if (report.trace) return report.trace->end(flights_[i], flights_[i], 0, blow.overlap);
   ++report.counters.sphere_wall;

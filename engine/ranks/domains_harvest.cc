@@ -87,8 +87,7 @@ Contact<D> Domains<D>::contact_of(Slot lo, std::size_t k) const {
   const Flights<D>& flights = region_->flights();
   Record<D> a = region_->before(lo, k);
   if (key.kind == EventKind::wall) {
-    const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
-    const Blow<D> blow = flights.bounce(lo, a, axis, side, key.time, key.generation);
+    const Blow<D> blow = flights.bounce(lo, a, box_.wall(key.hi), key.time, key.generation);
     return flights.contact_of(key, a, blow);
   }
   const Slot hi = region_->slot_of(key.hi);

@@ -15,8 +15,9 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
     : box_(system.box),
       particles_(system.particles),
       part_(system.part),
+      walls_(system.box.walls()),
       largest_edge_(system.box.edges.maxCoeff()),
-      tolerance_(largest_edge_),
+      tolerance_(system.box.gap_tolerance()),
       list_(system.box, system.particles.radius),
       max_events_(max_events) {}
 
@@ -31,12 +32,6 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   for (const auto& each : a) most[1] = std::max(most[1], each.squaredNorm());
   if (part_) part_->ranks().largest(most);
   resting_speed_ = kRestingSpeed * (std::sqrt(most[0]) + length * std::sqrt(most[1]));
-}
-
-template <int D>
-double ContactScan<D>::wall_gap(const Vec<D>& x, Id i, int wall) const {
-  const int axis = wall / 2;
-  return wall % 2 == 0 ? x[axis] - particles_.radius[i] : box_.edges[axis] - particles_.radius[i] - x[axis];
 }
 
 template <int D>
@@ -66,13 +61,12 @@ void ContactScan<D>::collect(double time, Positions<D> x, Positions<D> v) {
   key.kind = EventKind::wall;
   key.image = {};
   for (Id i = 0; i < x.size(); ++i)
-    for (int wall = 0; wall < 2 * D; ++wall) {
-      if (!box_.walled(wall / 2)) continue;
-      const double gap = wall_gap(x[i], i, wall);
+    for (const Wall<D>& wall : walls_) {
+      const double gap = wall.gap(x[i], particles_.radius[i]);
       if (gap > tolerance(particles_.radius[i])) continue;
       key.lo = i;
-      key.hi = static_cast<Id>(wall);
-      note(key, inward(wall) * Vec<D>::Unit(wall / 2), gap, particles_.radius[i]);
+      key.hi = wall.number();
+      note(key, wall.normal(), gap, particles_.radius[i]);
     }
 }
 
@@ -225,15 +219,13 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   key.kind = EventKind::wall;
   key.image = {};
   for (Id i = 0; i < x.size(); ++i)
-    for (int wall = 0; wall < 2 * D; ++wall) {
-      const int axis = wall / 2;
-      if (!box_.walled(axis)) continue;
-      const double gap = wall_gap(x[i], i, wall);
+    for (const Wall<D>& wall : walls_) {
+      const double gap = wall.gap(x[i], particles_.radius[i]);
       key.lo = i;
-      key.hi = static_cast<Id>(wall);
-      key.time = wall_contact_time(gap, inward(wall) * v[i][axis], inward(wall) * a[i][axis], rest,
+      key.hi = wall.number();
+      key.time = wall_contact_time(gap, wall.along_normal(v[i]), wall.along_normal(a[i]), rest,
                                    gap <= tolerance(particles_.radius[i]), resting_speed_);
-      if (key.time < kNever) offer(inward(wall) * Vec<D>::Unit(axis));
+      if (key.time < kNever) offer(wall.normal());
     }
   // Pieces that end in a contact without an impulse count too: there must be an end to them.
   if (first.key.time < kNever && events_ == events_at_last_cut_) count_event(first.key);
@@ -245,7 +237,7 @@ template <int D>
 void collide_elastically(const Touch<D>& touch, Particles<D>& particles) {
   const Id lo = touch.key.lo, hi = touch.key.hi;
   if (!touch.pair()) {
-    double& v = particles.v[lo][static_cast<int>(hi / 2)];
+    double& v = particles.v[lo][wall_axis(hi)];
     v = -v;
     return;
   }

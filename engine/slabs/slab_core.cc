@@ -24,9 +24,7 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       scan_(system, max_events),
       max_events_(max_events),
       wild_(kWild * mean_distance(system)),
-      slot_(system.particles.size()) {
-  for (int axis = 0; axis < D; ++axis) walls_ = walls_ || box_.walled(axis);
-}
+      slot_(system.particles.size()) {}
 
 template <int D>
 void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool resolved) {
@@ -129,8 +127,7 @@ void SlabCore<D>::predict_first() {
   for (const Id i : beyond_)
     for (const auto& [j, pair] : scan_.candidate_partners().of(i))
       predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
-  if (walls_)
-    for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
+  for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
   std::make_heap(queue_.begin(), queue_.end());
 }
 
@@ -206,7 +203,7 @@ template <int D>
 void SlabCore<D>::predict_all(Id i) {
   for (const auto& [j, pair] : scan_.candidate_partners().of(i))
     predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
-  if (walls_) predict_walls(i);
+  predict_walls(i);
 }
 
 /// The next contact of the present flights, looked at from the later of their starts.
@@ -227,16 +224,15 @@ void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
 
 template <int D>
 void SlabCore<D>::predict_walls(Id i) {
-  const double t = start(i);
+  if (scan_.walls().empty()) return;
+  const double t = start(i), radius = particles_.radius[i];
   const Vec<D> x = position(i, t), v = velocity(i, t), a = acceleration(i);
-  for (int wall = 0; wall < 2 * D; ++wall) {
-    const int axis = wall / 2;
-    if (!box_.walled(axis)) continue;
-    const double gap = scan_.wall_gap(x, i, wall), inward = ContactScan<D>::inward(wall);
-    const double s = wall_contact_time(gap, inward * v[axis], inward * a[axis], length_ - t,
-                                       gap <= scan_.tolerance(particles_.radius[i]), scan_.resting_speed());
+  for (const Wall<D>& wall : scan_.walls()) {
+    const double gap = wall.gap(x, radius);
+    const double s = wall_contact_time(gap, wall.along_normal(v), wall.along_normal(a), length_ - t,
+                                       gap <= scan_.tolerance(radius), scan_.resting_speed());
     if (!(t + s < length_)) continue;
-    EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = static_cast<Id>(wall)};
+    EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = wall.number()};
     if (!held_.empty() && scan_.rests(key)) continue;
     key.generation = generation(i, key.time);
     queue_.push_back({key, version(i)});
@@ -248,10 +244,7 @@ void SlabCore<D>::predict_walls(Id i) {
 template <int D>
 double SlabCore<D>::approach(const EventKey<D>& key) const {
   const Vec<D> v = velocity(key.lo, key.time);
-  if (key.kind == EventKind::wall) {
-    const int wall = static_cast<int>(key.hi);
-    return ContactScan<D>::inward(wall) * v[wall / 2];
-  }
+  if (key.kind == EventKind::wall) return box_.wall(key.hi).along_normal(v);
   const Vec<D> normal = position(key.lo, key.time) - position(key.hi, key.time) + box_.shift(key.image);
   return normal.dot(v - velocity(key.hi, key.time)) / normal.norm();
 }
@@ -290,11 +283,11 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     if (!(strays <= margin_)) stray(strays);
   };
   if (key.kind == EventKind::wall) {
-    const int axis = static_cast<int>(key.hi / 2), wall = static_cast<int>(key.hi);
-    double& v = lo.v[axis];
-    if (!(ContactScan<D>::inward(wall) * v < 0)) return;
-    contact.impulse[axis] = -2 * mass * v;
-    contact.x_hi[axis] = wall % 2 == 0 ? 0.0 : box_.edges[axis];
+    const Wall<D> wall = box_.wall(key.hi);
+    double& v = lo.v[wall.axis];
+    if (!(wall.along_normal(lo.v) < 0)) return;
+    contact.impulse[wall.axis] = -2 * mass * v;
+    contact.x_hi = wall.foot(lo.x);
     v = -v;
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];

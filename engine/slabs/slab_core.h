@@ -128,7 +128,6 @@ class SlabCore {
   ContactScan<D> scan_;
   std::uint64_t max_events_;
   double wild_;  // path that an acceleration may bend in a slab [length]
-  bool walls_ = false;
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
   double length_ = 0, margin_ = 0, own_reach_ = 0;
