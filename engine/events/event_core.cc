@@ -139,10 +139,7 @@ double EventCore<D>::run(double end, const Report& report) {
     if (generation > std::numeric_limits<std::uint16_t>::max())
       throw Error(Failure::numerical,
                   partners(key_of(i)) + " collide without end at one instant; separate the spheres that touch there");
-    if (++events_ > report.max_events)
-      throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
-                                          " collisions in one step, the last between " + partners(key_of(i)) +
-                                          "; use a smaller step or raise integrator.max_events_per_step");
+    if (++events_ > report.max_events) throw_too_many_contacts(report.max_events, partners(key_of(i)));
     if (a.kind == EventKind::wall) {
       collide_wall(i, now, generation, report);
       predict(i, now);
@@ -423,10 +420,9 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
   const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
   ++agenda.version;
   ++agenda_[j].version;
-  if (report.trace) return report.trace->end(flights_[i], flights_[j], blow.d.dot(blow.impulse), blow.overlap);
-  ++report.counters.sphere_sphere;
-  report.counters.collision_virial.add(blow.d.dot(blow.impulse));
-  report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
+  const double virial = blow.d.dot(blow.impulse);
+  if (report.trace) return report.trace->end(flights_[i], flights_[j], virial, blow.overlap);
+  report.counters.add(EventKind::pair, virial, blow.overlap);
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, blow));
 }
 
@@ -437,8 +433,7 @@ void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, c
   const Blow<D> blow = flights_.bounce(i, box_.wall(key.hi), time, generation);
   ++agenda_[i].version;
   if (report.trace) return report.trace->end(flights_[i], flights_[i], 0, blow.overlap);
-  ++report.counters.sphere_wall;
-  report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
+  report.counters.add(EventKind::wall, 0, blow.overlap);
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], blow));
 }
 

@@ -78,14 +78,7 @@ double ContactScan<D>::normal_speed(const Touch<D>& touch, Positions<D> v) const
 
 template <int D>
 void ContactScan<D>::count_event(const EventKey<D>& key) {
-  if (++events_ > max_events_) too_many(key);
-}
-
-template <int D>
-void ContactScan<D>::too_many(const EventKey<D>& key) const {
-  throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(max_events_) +
-                                      " collisions in one step, the last between " + partners(key) +
-                                      "; use a smaller step or raise integrator.max_events_per_step");
+  if (++events_ > max_events_) throw_too_many_contacts(max_events_, partners(key));
 }
 
 template <int D>
@@ -93,13 +86,7 @@ void ContactScan<D>::commit(double time, std::span<const Contact<D>> executed) {
   for (Contact<D> contact : executed) {
     count_event(contact.key);
     contact.key.time += time;
-    if (contact.key.kind == EventKind::pair) {
-      ++counters_->sphere_sphere;
-      counters_->collision_virial.add(contact.virial);
-    } else {
-      ++counters_->sphere_wall;
-    }
-    if (contacts_) contacts_->push_back(contact);
+    counters_->record(contact, contacts_);
   }
 }
 
@@ -119,15 +106,12 @@ void ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
       const Vec<D> given = particles_.mass[lo] * (v[lo] - v_before);
       Contact<D> contact{touch.key, x[lo], x[lo], given};
       if (touch.pair()) {
-        ++counters_->sphere_sphere;
         contact.virial = touch.normal.dot(given);
-        counters_->collision_virial.add(contact.virial);
         contact.x_hi = x[hi] - box_.shift(touch.key.image);
       } else {
-        ++counters_->sphere_wall;
-        contact.x_hi[hi / 2] = hi % 2 == 0 ? 0.0 : box_.edges[static_cast<int>(hi / 2)];
+        contact.x_hi = box_.wall(hi).foot(x[lo]);
       }
-      if (contacts_) contacts_->push_back(contact);
+      counters_->record(contact, contacts_);
     }
     collect(time, x, v);
   }

@@ -90,7 +90,6 @@ class ContactScan {
 
   /// Counts one more contact or empty piece; throws when the slab needs more than max_events.
   void count_event(const EventKey<D>& key);
-  [[noreturn]] void too_many(const EventKey<D>& last) const;
 
   /// Counts and logs contacts that were found and executed elsewhere, since `time` in the slab.
   void commit(double time, std::span<const Contact<D>> executed);

@@ -107,7 +107,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   if (shared)
     agree(!end.complete || crowded_ || strayed_ > 0);
   else if (crowded_)
-    scan_.too_many(end.key);
+    throw_too_many_contacts(max_events_, partners(end.key));
   else if (strayed_ > 0 && !a_.empty())
     return {.complete = false, .wild = true};
   else if (strayed_ > 0) {
