@@ -13,13 +13,27 @@ namespace carom {
 
 template <int D>
 struct Box {
-  Vec<D> edges = Vec<D>::Ones();  ///< [length]
+  Vec<D> edges = Vec<D>::Ones();  ///< [length]; under way, those at the start of the slab
   std::array<Boundary, D> boundary{};
+  Vec<D> edge_velocity = Vec<D>::Zero();  ///< of the upper walls along their axes [length/time]; not 0: a piston
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }
-  /// Whether all positions along the axis are between 0 and the edge.
-  bool bounded(int axis) const { return boundary[axis] != Boundary::open; }
+  bool piston(int axis) const { return walled(axis) && edge_velocity[axis] != 0; }
+  bool pistons() const {
+    for (int k = 0; k < D; ++k)
+      if (piston(k)) return true;
+    return false;
+  }
+  /// The box as it is a time later.
+  Box after(double time) const {
+    Box later = *this;
+    for (int k = 0; k < D; ++k)
+      if (piston(k)) later.edges[k] += edge_velocity[k] * time;
+    return later;
+  }
+  /// Whether all positions along the axis are between 0 and the edge, at any time.
+  bool bounded(int axis) const { return boundary[axis] != Boundary::open && !piston(axis); }
   /// Whether it is so along all axes: then the box has a density.
   bool closed() const {
     for (int k = 0; k < D; ++k)
@@ -29,7 +43,7 @@ struct Box {
   /// The wall of that number, on an axis with walls.
   Wall<D> wall(Id number) const {
     const int axis = wall_axis(number);
-    return number % 2 == 0 ? Wall<D>{axis, 1, 0} : Wall<D>{axis, -1, edges[axis]};
+    return number % 2 == 0 ? Wall<D>{axis, 1, 0, 0} : Wall<D>{axis, -1, edges[axis], -edge_velocity[axis]};
   }
   /// All of them, by their numbers.
   std::vector<Wall<D>> walls() const {

@@ -55,7 +55,7 @@ struct Contact {
   Vec<D> x_lo, x_hi;   ///< centres at contact [length]; x_hi is shifted to the image that is touched; at a wall: the
                        ///< point touched
   Vec<D> impulse;      ///< given to `lo`, taken from `hi` [mass·length/time]
-  double virial = 0;   ///< (x_lo − x_hi)·impulse of a pair, as it was computed [energy]
+  double virial = 0;   ///< (x_lo − x_hi)·impulse of a pair, as it was computed; of a wall its work [energy]
   double overlap = 0;  ///< at contact, relative to the contact distance; where the method knows it
 };
 

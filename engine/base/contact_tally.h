@@ -15,11 +15,13 @@ struct ContactTally {
   std::uint64_t sphere_wall = 0;    ///< executed wall collisions
   double max_overlap = 0;           ///< deepest overlap met, relative to the contact distance
   ExactSum collision_virial;        ///< Σ d·impulse over pair collisions [mass·length²/time]
+  ExactSum wall_work;               ///< done on spheres by walls that move [energy]
 
   std::uint64_t contacts() const { return sphere_sphere + sphere_wall; }
+  /// `virial`: of a pair; of a wall its work.
   void add(EventKind kind, double virial, double overlap) {
     ++(kind == EventKind::pair ? sphere_sphere : sphere_wall);
-    if (kind == EventKind::pair) collision_virial.add(virial);
+    (kind == EventKind::pair ? collision_virial : wall_work).add(virial);
     max_overlap = std::max(max_overlap, overlap);
   }
   void add(const ContactTally& other) {
@@ -27,6 +29,7 @@ struct ContactTally {
     sphere_wall += other.sphere_wall;
     max_overlap = std::max(max_overlap, other.max_overlap);
     collision_virial.add(other.collision_virial);
+    wall_work.add(other.wall_work);
   }
   /// Counts a contact and appends it to `log`, unless that is null.
   template <int D>

@@ -430,10 +430,12 @@ template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = key_of(i);
   if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
-  const Blow<D> blow = flights_.bounce(i, box_.wall(key.hi), time, generation);
+  const Wall<D> wall = box_.wall(key.hi);
+  const Blow<D> blow = flights_.bounce(i, wall, time, generation);
   ++agenda_[i].version;
-  if (report.trace) return report.trace->end(flights_[i], flights_[i], 0, blow.overlap);
-  report.counters.add(EventKind::wall, 0, blow.overlap);
+  const double work = wall.work(blow.impulse);
+  if (report.trace) return report.trace->end(flights_[i], flights_[i], work, blow.overlap);
+  report.counters.add(EventKind::wall, work, blow.overlap);
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], blow));
 }
 

@@ -27,6 +27,7 @@ void Flights<D>::assign(std::span<const Id> order) {
 
 template <int D>
 void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  walls_ = box_.walls();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = growth;
@@ -88,6 +89,7 @@ void Flights<D>::advance(Record<D>& r, double t) const {
 
 template <int D>
 void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon) {
+  walls_ = box_.walls();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
@@ -135,8 +137,8 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
 template <int D>
 double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const {
   const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
-  const double gap = wall.gap(r.x, at_record), opening = wall.along_normal(r.v) - rate;
-  const double slack = approach_slack(1.0, r.v.norm(), rate);
+  const double gap = wall.gap(r.x, at_record, r.t), opening = wall.opening(r.v) - rate;
+  const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity));
   const bool touching = gap <= gap_tolerance_(at_record);
   const double s = wall_contact_time(gap, opening, wall.along_normal(g_), horizon_ - r.t, touching, slack);
   if (s == 0 && !(opening < -slack))
@@ -171,8 +173,8 @@ Blow<D> Flights<D>::bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, 
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
   double& v = r.v[wall.axis];
-  const double after = wall.inward * (2 * rate) - v;
-  Blow<D> blow{r.x - wall.foot(r.x), Vec<D>::Zero(), -wall.gap(r.x, at_contact) / at_contact};
+  const double after = wall.reflected(v, rate);
+  Blow<D> blow{r.x - wall.foot(r.x, t), Vec<D>::Zero(), -wall.gap(r.x, at_contact, t) / at_contact};
   blow.impulse[wall.axis] = mass(i) * (after - v);
   v = after;
   r.generation = static_cast<std::uint16_t>(generation);
@@ -188,7 +190,8 @@ Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, co
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const {
-  return {key, r.x, box_.wall(key.hi).foot(r.x), blow.impulse, 0, blow.overlap};
+  const Wall<D> wall = box_.wall(key.hi);
+  return {key, r.x, wall.foot(r.x, key.time), blow.impulse, wall.work(blow.impulse), blow.overlap};
 }
 
 template class Flights<2>;

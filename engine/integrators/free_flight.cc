@@ -57,6 +57,11 @@ class FreeFlight : public Integrator<D> {
       const Stopwatch watch(report.counters.seconds.predict);
       flight.take(system.particles, g_, slab.length);
     }
+    const Box<D> start = system.box;
+    const auto end_at = [&](double time) {
+      flight.give_back(time, system.particles);
+      system.box = start.after(time);
+    };
     try {
       report.reached = slab.length;
       for (double due : report.observe) {
@@ -66,14 +71,16 @@ class FreeFlight : public Integrator<D> {
         flight.fly_to(due, copies_);
         copies_.image = system.particles.image;
         for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
+        system.box = start.after(due);
         report.observer(due, copies_);
+        system.box = start;
       }
       if (report.observe.empty() || report.reached == report.observe.back()) report.reached = run(slab.length);
     } catch (...) {
-      if (ranks_->size() == 1) flight.give_back(flight.now(), system.particles);
+      if (ranks_->size() == 1) end_at(flight.now());
       throw;
     }
-    flight.give_back(report.reached, system.particles);
+    end_at(report.reached);
     report.counters.events = flight.counts();
     if (domains_) report.counters.domains = domains_->domain_counts();
     system.wrap();

@@ -209,7 +209,10 @@ void Region<D>::contact(const Task& task) {
   Mended& a = mended(task.a) ? repairs_[mended_of_[task.a]] : mend(task.a, key);
   if (!pair) {
     Node<D> node{a.now, key};
-    node.overlap = core_.flights().bounce(a.slot, node.after, box_.wall(key.hi), key.time, key.generation).overlap;
+    const Wall<D> wall = box_.wall(key.hi);
+    const Blow<D> blow = core_.flights().bounce(a.slot, node.after, wall, key.time, key.generation);
+    node.virial = wall.work(blow.impulse);
+    node.overlap = blow.overlap;
     append(a, node);
     predict(a, key);
     return;

@@ -120,6 +120,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   }
   virial_time_ += elapsed * virial_;
   if (s.end_time > 0) {
+    if (system_.box.pistons()) virial_time_ = std::numeric_limits<double>::quiet_NaN();  // there is no one volume
     s.mean_pressure = (virial_time_ + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
     s.collision_rate =
         2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * s.end_time);
@@ -150,7 +151,8 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   const auto total = static_cast<double>(system_.size());
   const MotionSums<D> motion = evaluate_motion(known(), state, nodes);
   shot.kinetic = motion.kinetic.value();
-  energy_ = shot.kinetic + sums.energy.value();
+  // Of the spheres and of the walls that move: these have lost what work they did.
+  energy_ = shot.kinetic + sums.energy.value() - statistics_.counters.wall_work.value();
   shot.potential = sums.energy.value() + tail_.energy;
   magnitude_ = shot.kinetic + sums.magnitude.value();
   virial_ = 2 * shot.kinetic + sums.virial.value() + tail_.virial;

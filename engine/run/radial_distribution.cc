@@ -93,7 +93,7 @@ double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bo
 template <int D>
 std::optional<ParameterError> error_of(const System<D>& system, double range) {
   if (!system.box.closed())
-    return ParameterError{"interval", "g(r) needs a density, and a box with an open boundary has none",
+    return ParameterError{"interval", "g(r) needs a density, and a box with an open boundary or a piston has none",
                           "set rdf_interval = 0, or close the box"};
   const double longest = RadialDistribution<D>::longest_range(system);
   if (range > 0 && range <= longest * (1 + 1e-9)) return {};

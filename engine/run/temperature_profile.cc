@@ -55,7 +55,7 @@ std::optional<ParameterError> complete(Parameters& parameters, const System<D>& 
   if (parameters.integer("axis") >= D)
     return ParameterError{"axis", "there is no such axis", "the axes are numbered from 0"};
   if (system.box.closed()) return {};
-  return ParameterError{"interval", "a profile needs slabs, and a box with an open boundary has none",
+  return ParameterError{"interval", "a profile needs slabs, and a box with an open boundary or a piston has none",
                         "set profile_interval = 0, or close the box"};
 }
 

@@ -36,6 +36,8 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
 
 template <int D>
 void ContactScan<D>::collect(double time, Positions<D> x, Positions<D> v) {
+  if (box_.pistons())
+    throw Error(Failure::deck, "this method knows no walls that move; take free-flight or psa, or stop them");
   approaching_.clear();
   resting_.clear();
   auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma) {

@@ -24,7 +24,10 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       scan_(system, max_events),
       max_events_(max_events),
       wild_(kWild * mean_distance(system)),
-      slot_(system.particles.size()) {}
+      slot_(system.particles.size()) {
+  if (system.part && box_.pistons())
+    throw Error(Failure::deck, "forces and walls that move together need one rank; take one, or free-flight");
+}
 
 template <int D>
 void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool resolved) {
@@ -32,6 +35,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   start_v_ = v;
   a_ = a;
   length_ = length;
+  walls_ = box_.walls();
   resolved_ = resolved;
   last_sequences_.clear();
   sequences_.clear();
@@ -224,12 +228,12 @@ void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
 
 template <int D>
 void SlabCore<D>::predict_walls(Id i) {
-  if (scan_.walls().empty()) return;
+  if (walls_.empty()) return;
   const double t = start(i), radius = particles_.radius[i];
   const Vec<D> x = position(i, t), v = velocity(i, t), a = acceleration(i);
-  for (const Wall<D>& wall : scan_.walls()) {
-    const double gap = wall.gap(x, radius);
-    const double s = wall_contact_time(gap, wall.along_normal(v), wall.along_normal(a), length_ - t,
+  for (const Wall<D>& wall : walls_) {
+    const double gap = wall.gap(x, radius, t);
+    const double s = wall_contact_time(gap, wall.opening(v), wall.along_normal(a), length_ - t,
                                        gap <= scan_.tolerance(radius), scan_.resting_speed());
     if (!(t + s < length_)) continue;
     EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = wall.number()};
@@ -244,7 +248,7 @@ void SlabCore<D>::predict_walls(Id i) {
 template <int D>
 double SlabCore<D>::approach(const EventKey<D>& key) const {
   const Vec<D> v = velocity(key.lo, key.time);
-  if (key.kind == EventKind::wall) return box_.wall(key.hi).along_normal(v);
+  if (key.kind == EventKind::wall) return box_.wall(key.hi).opening(v);
   const Vec<D> normal = position(key.lo, key.time) - position(key.hi, key.time) + box_.shift(key.image);
   return normal.dot(v - velocity(key.hi, key.time)) / normal.norm();
 }
@@ -285,10 +289,12 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   if (key.kind == EventKind::wall) {
     const Wall<D> wall = box_.wall(key.hi);
     double& v = lo.v[wall.axis];
-    if (!(wall.along_normal(lo.v) < 0)) return;
-    contact.impulse[wall.axis] = -2 * mass * v;
-    contact.x_hi = wall.foot(lo.x);
-    v = -v;
+    if (!(wall.opening(lo.v) < 0)) return;
+    const double after = wall.reflected(v);
+    contact.impulse[wall.axis] = mass * (after - v);
+    contact.virial = wall.work(contact.impulse);
+    contact.x_hi = wall.foot(lo.x, key.time);
+    v = after;
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
     const double mass_hi = particles_.mass[key.hi];

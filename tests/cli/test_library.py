@@ -59,6 +59,15 @@ def test_an_integrator_of_ones_own_has_order_one(examples):
     assert all(1.7 < a / b < 2.3 for a, b in zip(errors, errors[1:]))
 
 
+def test_a_slow_piston_keeps_to_the_adiabat(examples):
+    *rows, account = run(examples / "piston").splitlines()
+    values = [[float(x) for x in re.findall(r"[-\d.]+", row)] for row in rows]
+    assert [edge for edge, *_ in values] == [40, 35, 30, 25, 20]
+    assert all(abs(temperature / adiabat - 1) < 0.03 for _, temperature, adiabat, _ in values)
+    assert values[-1][1] > 1.7 and abs(values[-1][3] / (750 * (values[-1][1] - 1)) - 1) < 1e-3  # work: 3/2 N (T - 1)
+    assert float(re.search(r"error (\S+)", account)[1]) < 1e-12
+
+
 def test_the_engine_alone_needs_neither_mpi_nor_hdf5(tmp_path):
     absent = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("MPI", "HDF5", "spdlog", "CLI11", "nlohmann_json")]
     run("cmake", "-S", ROOT, "-B", tmp_path, "-DCAROM_ENGINE_ONLY=ON", *absent)

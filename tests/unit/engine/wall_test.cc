@@ -6,6 +6,7 @@
 
 #include "engine/base/box.h"
 #include "engine/base/counters.h"
+#include "engine/base/error.h"
 
 namespace carom {
 namespace {
@@ -40,7 +41,7 @@ TEST(Walls, OfABox) {
 TEST(Walls, ToleranceIsOneForAllOfTheBox) {
   const Box<2> box{.edges = {4, 1024}};
   EXPECT_EQ(box.gap_tolerance()(1), 4 * std::numeric_limits<double>::epsilon() * 1024);  // 4 ulp
-  EXPECT_EQ(box.gap_tolerance()(100), 1e-11);
+  EXPECT_DOUBLE_EQ(box.gap_tolerance()(100), 1e-11);
 }
 
 TEST(Boundaries, AreFoundByTheirNames) {
@@ -66,8 +67,9 @@ TEST(Boundaries, BoxIsClosedWhereNoAxisIsOpen) {
 TEST(ContactTally, AddsUpWhatItsPartsCount) {
   std::vector<Contact<2>> log;
   Counters one, other;
-  const Contact<2> pair{.key = {.kind = EventKind::pair, .lo = 1, .hi = 2}, .virial = 0.1, .overlap = 3e-16};
-  const Contact<2> bounce{.key = {.kind = EventKind::wall, .lo = 1, .hi = 3}, .overlap = 5e-16};
+  const Vec<2> zero = Vec<2>::Zero();
+  const Contact<2> pair{{.kind = EventKind::pair, .lo = 1, .hi = 2}, zero, zero, zero, 0.1, 3e-16};
+  const Contact<2> bounce{{.kind = EventKind::wall, .lo = 1, .hi = 3}, zero, zero, zero, 0, 5e-16};
   one.record(pair, &log);
   one.record(bounce, &log);
   other.record<2>(pair, nullptr);
