@@ -1,26 +1,59 @@
 #pragma once
 // The simulation box: a rectangle or cuboid from the origin to `edges`, with a boundary rule for each axis.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
-#include "engine/base/vec.h"
+#include "engine/base/boundary.h"
+#include "engine/base/wall.h"
 
 namespace carom {
 
-enum class Boundary : std::uint8_t {
-  wall,      ///< hard, elastic: a sphere touches it when its centre is a radius away
-  periodic,  ///< what leaves on one side comes in on the other
-  open       ///< nothing there; the edge is only where the box is drawn
-};
-
 template <int D>
 struct Box {
-  Vec<D> edges = Vec<D>::Ones();  ///< [length]
+  Vec<D> edges = Vec<D>::Ones();  ///< [length]; under way, those at the start of the slab
   std::array<Boundary, D> boundary{};
+  Vec<D> edge_velocity = Vec<D>::Zero();  ///< of the upper walls along their axes [length/time]; not 0: a piston
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }
+  bool piston(int axis) const { return walled(axis) && edge_velocity[axis] != 0; }
+  bool pistons() const {
+    for (int k = 0; k < D; ++k)
+      if (piston(k)) return true;
+    return false;
+  }
+  /// The box as it is a time later.
+  Box after(double time) const {
+    Box later = *this;
+    for (int k = 0; k < D; ++k)
+      if (piston(k)) later.edges[k] += edge_velocity[k] * time;
+    return later;
+  }
+  /// Whether all positions along the axis are between 0 and the edge, at any time.
+  bool bounded(int axis) const { return boundary[axis] != Boundary::open && !piston(axis); }
+  /// Whether it is so along all axes: then the box has a density.
+  bool closed() const {
+    for (int k = 0; k < D; ++k)
+      if (!bounded(k)) return false;
+    return true;
+  }
+  /// The wall of that number, on an axis with walls.
+  Wall<D> wall(Id number) const {
+    const int axis = wall_axis(number);
+    return number % 2 == 0 ? Wall<D>{axis, 1, 0, 0} : Wall<D>{axis, -1, edges[axis], -edge_velocity[axis]};
+  }
+  /// All of them, by their numbers.
+  std::vector<Wall<D>> walls() const {
+    std::vector<Wall<D>> all;
+    for (Id number = 0; number < 2 * D; ++number)
+      if (walled(wall_axis(number))) all.push_back(wall(number));
+    return all;
+  }
+  /// What counts as touching, anywhere in the box.
+  GapTolerance gap_tolerance() const { return GapTolerance(edges.maxCoeff()); }
   double volume() const { return edges.prod(); }
 
   /// The image of `d`, a difference of two positions, nearest to the origin: how many box edges to add on each axis.

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "engine/base/vec.h"
+#include "engine/base/wall.h"
 
 namespace carom {
 
@@ -19,7 +19,7 @@ struct EventKey {
   std::uint32_t generation = 0;
   EventKind kind = EventKind::pair;
   Id lo = 0;  ///< the lower id; at a wall: the particle
-  Id hi = 0;  ///< the higher id; at a wall: 2·axis + (0 lower, 1 upper)
+  Id hi = 0;  ///< the higher id; at a wall: its number
   Image<D> image{};
   auto operator<=>(const EventKey&) const = default;
 };
@@ -45,8 +45,7 @@ template <int D>
 std::string partners(const EventKey<D>& key) {
   const std::string lo = std::to_string(key.lo);
   if (key.kind == EventKind::pair) return "particles " + lo + " and " + std::to_string(key.hi);
-  return "particle " + lo + " and the " + (key.hi % 2 == 0 ? "lower" : "upper") + " wall of axis " +
-         std::to_string(key.hi / 2);
+  return "particle " + lo + " and " + wall_name(key.hi);
 }
 
 /// One executed collision.
@@ -56,7 +55,7 @@ struct Contact {
   Vec<D> x_lo, x_hi;   ///< centres at contact [length]; x_hi is shifted to the image that is touched; at a wall: the
                        ///< point touched
   Vec<D> impulse;      ///< given to `lo`, taken from `hi` [mass·length/time]
-  double virial = 0;   ///< (x_lo − x_hi)·impulse of a pair, as it was computed [energy]
+  double virial = 0;   ///< (x_lo − x_hi)·impulse of a pair, as it was computed; of a wall its work [energy]
   double overlap = 0;  ///< at contact, relative to the contact distance; where the method knows it
 };
 

@@ -5,14 +5,12 @@
 #include <cstdint>
 #include <utility>
 
+#include "engine/base/contact_tally.h"
 #include "engine/base/event_counts.h"
-#include "engine/base/exact_sum.h"
 
 namespace carom {
 
-struct Counters {
-  std::uint64_t sphere_sphere = 0;  ///< executed pair collisions
-  std::uint64_t sphere_wall = 0;    ///< executed wall collisions
+struct Counters : ContactTally {
   double force_passes = 0;   ///< pair evaluations of forces and their kin / interacting pairs; energies not counted
   std::uint64_t sweeps = 0;  ///< iterations of implicit solves
   std::uint64_t pieces = 0;  ///< edda: in which steps were solved; more than the steps where one was cut
@@ -23,8 +21,6 @@ struct Counters {
   std::uint64_t divisions = 0;     ///< of the particles among ranks under forces
   std::uint64_t slabs_again = 0;   ///< done again, with more particles known
   std::uint64_t slabs_by_all = 0;  ///< of these, with all particles known
-  double max_overlap = 0;          ///< deepest overlap met, relative to the contact distance
-  ExactSum collision_virial;       ///< Σ d·impulse over pair collisions [mass·length²/time]
   EventCounts events;              ///< of the event core, at the end of the last slab; 0 where a method has none
   DomainCounts domains;            ///< of the regions of this rank; 0 where there is one
 

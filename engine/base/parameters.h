@@ -47,6 +47,7 @@ class Parameters {
   Parameters() = default;
   Parameters(std::initializer_list<std::pair<const std::string, ParameterValue>> values) : values_(values) {}
   void set(std::string name, ParameterValue value) { values_[std::move(name)] = std::move(value); }
+  void erase(const std::string& name) { values_.erase(name); }
   bool has(std::string_view name) const { return values_.find(name) != values_.end(); }
   /// The value of a declared parameter; std::out_of_range if it is absent, std::bad_variant_access on the wrong type.
   template <class T>

@@ -123,7 +123,7 @@ class Calendar {
     std::uint32_t count = 0;
   };
 
-  void append(Bin& bin, const CalendarEntry& entry) {
+  [[gnu::always_inline]] void append(Bin& bin, const CalendarEntry& entry) {
     const std::uint32_t at = bin.count % kChunk;
     if (at == 0) {
       std::uint32_t fresh = free_;

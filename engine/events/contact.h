@@ -25,16 +25,6 @@ inline double approach_slack(double sigma, double speed_i, double speed_j) {
   return 8 * kEpsilon * sigma * (speed_i + speed_j);
 }
 
-/// Gaps smaller than this count as touching: max(1e-13 contact distances, 4 ulp of the box) [length].
-class GapTolerance {
- public:
-  explicit GapTolerance(double largest_edge) : least_(4 * (std::nextafter(largest_edge, kNever) - largest_edge)) {}
-  double operator()(double sigma) const { return std::max(1e-13 * sigma, least_); }
-
- private:
-  double least_;
-};
-
 /// |d × v|², the squared area that d and v span. Unlike d²v² − (d·v)² it has no cancellation.
 template <int D>
 double squared_cross(const Vec<D>& d, const Vec<D>& v) {

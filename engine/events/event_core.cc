@@ -9,9 +9,13 @@
 namespace carom {
 template <int D>
 EventCore<D>::EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options)
-    : box_(box), sizes_(sizes), flights_(box), options_(options), kernels_(scan_kernels()), tuning_(options) {
-  for (int k = 0; k < D; ++k) walled_ = walled_ || box.walled(k);
-}
+    : box_(box),
+      sizes_(sizes),
+      flights_(box),
+      options_(options),
+      kernels_(scan_kernels()),
+      walled_(!box.walls().empty()),
+      tuning_(options) {}
 
 template <int D>
 EventCore<D>::~EventCore() = default;
@@ -135,10 +139,7 @@ double EventCore<D>::run(double end, const Report& report) {
     if (generation > std::numeric_limits<std::uint16_t>::max())
       throw Error(Failure::numerical,
                   partners(key_of(i)) + " collide without end at one instant; separate the spheres that touch there");
-    if (++events_ > report.max_events)
-      throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
-                                          " collisions in one step, the last between " + partners(key_of(i)) +
-                                          "; use a smaller step or raise integrator.max_events_per_step");
+    if (++events_ > report.max_events) throw_too_many_contacts(report.max_events, partners(key_of(i)));
     if (a.kind == EventKind::wall) {
       collide_wall(i, now, generation, report);
       predict(i, now);
@@ -261,18 +262,17 @@ void EventCore<D>::predict_pairs_one_by_one(const ScanTask& task) {
 template <int D>
 void EventCore<D>::predict_walls(Slot i) {
   Agenda<D>& a = agenda_[i];
-  for (int axis = 0; axis < D; ++axis)
-    for (int side = 0; side < 2 && box_.walled(axis); ++side) {
-      const double time = flights_.wall_contact(i, axis, side);
-      if (time > a.contact || time == kNever) continue;
-      const Agenda<D> before = a;
-      const bool first = before.contact == kNever;
-      const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
-      a.contact = time;
-      a.kind = EventKind::wall;
-      a.partner = static_cast<std::uint32_t>(2 * axis + side);
-      if (!first && !(key_of(i) < rival)) a = before;
-    }
+  for (const Wall<D>& wall : flights_.walls()) {
+    const double time = flights_.wall_contact(i, wall);
+    if (time > a.contact || time == kNever) continue;
+    const Agenda<D> before = a;
+    const bool first = before.contact == kNever;
+    const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
+    a.contact = time;
+    a.kind = EventKind::wall;
+    a.partner = wall.number();
+    if (!first && !(key_of(i) < rival)) a = before;
+  }
 }
 
 template <int D>
@@ -420,23 +420,22 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
   const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
   ++agenda.version;
   ++agenda_[j].version;
-  if (report.trace) return report.trace->end(flights_[i], flights_[j], blow.d.dot(blow.impulse), blow.overlap);
-  ++report.counters.sphere_sphere;
-  report.counters.collision_virial.add(blow.d.dot(blow.impulse));
-  report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
+  const double virial = blow.d.dot(blow.impulse);
+  if (report.trace) return report.trace->end(flights_[i], flights_[j], virial, blow.overlap);
+  report.counters.add(EventKind::pair, virial, blow.overlap);
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, blow));
 }
 
 template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = key_of(i);
-  const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
   if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
-  const Blow<D> blow = flights_.bounce(i, axis, side, time, generation);
+  const Wall<D> wall = box_.wall(key.hi);
+  const Blow<D> blow = flights_.bounce(i, wall, time, generation);
   ++agenda_[i].version;
-  if (report.trace) return report.trace->end(flights_[i], flights_[i], 0, blow.overlap);
-  ++report.counters.sphere_wall;
-  report.counters.max_overlap = std::max(report.counters.max_overlap, blow.overlap);
+  const double work = wall.work(blow.impulse);
+  if (report.trace) return report.trace->end(flights_[i], flights_[i], work, blow.overlap);
+  report.counters.add(EventKind::wall, work, blow.overlap);
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], blow));
 }
 

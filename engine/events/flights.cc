@@ -27,6 +27,7 @@ void Flights<D>::assign(std::span<const Id> order) {
 
 template <int D>
 void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  walls_ = box_.walls();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = growth;
@@ -88,6 +89,7 @@ void Flights<D>::advance(Record<D>& r, double t) const {
 
 template <int D>
 void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon) {
+  walls_ = box_.walls();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
@@ -133,19 +135,15 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
 }
 
 template <int D>
-double Flights<D>::wall_contact(Slot i, const Record<D>& r, int axis, int side) const {
+double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const {
   const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
-  const double inward = side == 0 ? 1.0 : -1.0;
-  const double gap = side == 0 ? r.x[axis] - at_record : box_.edges[axis] - at_record - r.x[axis];
-  const double opening = inward * r.v[axis] - rate;
-  const double tolerance = GapTolerance(box_.edges[axis])(2 * at_record);
-  const double slack = approach_slack(1.0, r.v.norm(), rate);
-  const bool touching = gap <= tolerance;
-  const double s = wall_contact_time(gap, opening, inward * g_[axis], horizon_ - r.t, touching, slack);
+  const double gap = wall.gap(r.x, at_record, r.t), opening = wall.opening(r.v) - rate;
+  const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity));
+  const bool touching = gap <= gap_tolerance_(at_record);
+  const double s = wall_contact_time(gap, opening, wall.along_normal(g_), horizon_ - r.t, touching, slack);
   if (s == 0 && !(opening < -slack))
     throw Error(Failure::numerical,
-                "particle " + std::to_string(r.id) + " rests on the " + (side == 0 ? "lower" : "upper") +
-                    " wall of axis " + std::to_string(axis) +
+                "particle " + std::to_string(r.id) + " rests on " + wall_name(wall.number()) +
                     " under the uniform field and would bounce without end; give it a height or a velocity");
   return r.t + s;
 }
@@ -171,15 +169,14 @@ Blow<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Ve
 }
 
 template <int D>
-Blow<D> Flights<D>::bounce(Slot i, Record<D>& r, int axis, int side, double t, std::uint32_t generation) const {
+Blow<D> Flights<D>::bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const {
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
-  const double after = (side == 0 ? 2 * rate : -2 * rate) - r.v[axis];
-  const double gap = side == 0 ? r.x[axis] - at_contact : box_.edges[axis] - at_contact - r.x[axis];
-  Blow<D> blow{Vec<D>::Zero(), Vec<D>::Zero(), -gap / at_contact};
-  blow.d[axis] = r.x[axis] - (side == 0 ? 0.0 : box_.edges[axis]);
-  blow.impulse[axis] = mass(i) * (after - r.v[axis]);
-  r.v[axis] = after;
+  double& v = r.v[wall.axis];
+  const double after = wall.reflected(v, rate);
+  Blow<D> blow{r.x - wall.foot(r.x, t), Vec<D>::Zero(), -wall.gap(r.x, at_contact, t) / at_contact};
+  blow.impulse[wall.axis] = mass(i) * (after - v);
+  v = after;
   r.generation = static_cast<std::uint16_t>(generation);
   return blow;
 }
@@ -193,9 +190,8 @@ Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, co
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const {
-  Contact<D> contact{key, r.x, r.x, blow.impulse, 0, blow.overlap};
-  contact.x_hi[key.hi / 2] = key.hi % 2 == 0 ? 0.0 : box_.edges[key.hi / 2];
-  return contact;
+  const Wall<D> wall = box_.wall(key.hi);
+  return {key, r.x, wall.foot(r.x, key.time), blow.impulse, wall.work(blow.impulse), blow.overlap};
 }
 
 template class Flights<2>;

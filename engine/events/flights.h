@@ -29,7 +29,7 @@ struct Blow {
 template <int D>
 class Flights {
  public:
-  explicit Flights(const Box<D>& box) : box_(box) {}
+  explicit Flights(const Box<D>& box) : box_(box), walls_(box.walls()), gap_tolerance_(box.gap_tolerance()) {}
 
   /// Gives every particle a slot.
   void assign(std::span<const Id> order);
@@ -77,25 +77,24 @@ class Flights {
   double pair_contact(Slot i, Slot j, const Vec<D>& shift) const {
     return pair_contact(i, records_[i], j, records_[j], shift);
   }
-  /// The same for a sphere and the lower (side 0) or upper wall of an axis. Throws Error(Failure::numerical) for a
-  /// sphere that rests there under the field.
-  double wall_contact(Slot i, int axis, int side) const { return wall_contact(i, records_[i], axis, side); }
+  /// The same for a sphere and a wall. Throws Error(Failure::numerical) for a sphere that rests there under the field.
+  double wall_contact(Slot i, const Wall<D>& wall) const { return wall_contact(i, records_[i], wall); }
 
   /// The two collide at time t.
   Blow<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
     return collide(i, records_[i], j, records_[j], shift, t, generation);
   }
   /// The sphere collides with a wall at time t; the second "centre" is the point touched.
-  Blow<D> bounce(Slot i, int axis, int side, double t, std::uint32_t generation) {
-    return bounce(i, records_[i], axis, side, t, generation);
+  Blow<D> bounce(Slot i, const Wall<D>& wall, double t, std::uint32_t generation) {
+    return bounce(i, records_[i], wall, t, generation);
   }
 
   // The same for spheres with other records than their present ones.
   double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
-  double wall_contact(Slot i, const Record<D>& r, int axis, int side) const;
+  double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
   Blow<D> collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
                   std::uint32_t generation) const;
-  Blow<D> bounce(Slot i, Record<D>& r, int axis, int side, double t, std::uint32_t generation) const;
+  Blow<D> bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const;
 
   /// Replaces a record.
   void set(Slot i, const Record<D>& r) { records_[i] = r; }
@@ -107,6 +106,9 @@ class Flights {
                         const Blow<D>& blow) const;
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const;
 
+  /// Those of the box.
+  std::span<const Wall<D>> walls() const { return walls_; }
+
   /// Whether all spheres have one radius.
   bool equal() const { return common_radius_ != 0; }
 
@@ -117,9 +119,11 @@ class Flights {
   double mass(Slot i) const { return mass_.empty() ? common_mass_ : mass_[i]; }
 
   const Box<D>& box_;
+  std::vector<Wall<D>> walls_;
   Vec<D> g_ = Vec<D>::Zero();
   bool field_ = false;
   double growth_ = 0, horizon_ = 0;
+  GapTolerance gap_tolerance_;
   PageVector<Record<D>> records_;      // by slot
   std::size_t room_ = 0;               // that there may be
   std::vector<double> radius_, mass_;  // by slot; empty where all are equal

@@ -20,7 +20,7 @@ template <int D>
 struct Node {
   Record<D> after;
   EventKey<D> key;
-  double virial = 0;   ///< d·impulse of a pair collision [mass·length²/time]
+  double virial = 0;   ///< d·impulse of a pair collision; of a wall its work [energy]
   double overlap = 0;  ///< at contact, relative to the contact distance
 
   /// The other sphere's id; kNoPartner at a wall.

@@ -49,15 +49,13 @@ class ChordContacts {
     key.kind = EventKind::wall;
     key.image = {};
     for (Id i = 0; i < x.size(); ++i)
-      for (int wall = 0; wall < 2 * D; ++wall) {
-        const int axis = wall / 2;
-        if (!system_.box.walled(axis)) continue;
+      for (const Wall<D>& wall : scan_.walls()) {
         key.lo = i;
-        key.hi = static_cast<Id>(wall);
+        key.hi = wall.number();
         if (scan_.rests(key)) continue;
-        const double inward = ContactScan<D>::inward(wall);
-        judge_wall(key, scan_.wall_gap(x[i], i, wall), inward * chord[i][axis], inward * v[i][axis],
-                   inward * v_end[i][axis], system_.particles.radius[i], tau, end);
+        const double radius = system_.particles.radius[i];
+        judge_wall(key, wall.gap(x[i], radius), wall.along_normal(chord[i]), wall.along_normal(v[i]),
+                   wall.along_normal(v_end[i]), radius, tau, end);
       }
     return end;
   }

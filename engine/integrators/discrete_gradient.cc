@@ -97,8 +97,7 @@ void DiscreteGradient<D>::hold(double tau, std::span<RestingContact<D>> resting)
       const Id lo = contact.key.lo, hi = contact.key.hi;
       contact.normal = 2 * (x_[lo] - x_[hi] + box.shift(contact.key.image)) + tau * (mean_[lo] - mean_[hi]);
     } else {
-      const int axis = static_cast<int>(contact.key.hi / 2);
-      contact.normal = (contact.key.hi % 2 == 0 ? 1.0 : -1.0) * Vec<D>::Unit(axis);
+      contact.normal = box.wall(contact.key.hi).normal();
     }
     if (tau < 0) contact.normal = -contact.normal;
     contact.lambda = contact.bound = 0;

@@ -70,6 +70,11 @@ class FreeFlight : public Integrator<D> {
       }
       return instants_.now == end;
     };
+    const Box<D> start = system.box;
+    const auto end_at = [&](double time) {
+      flight.give_back(time, system.particles);
+      system.box = start.after(time);
+    };
     try {
       bool all = true;
       for (double due : report.observe) {
@@ -79,16 +84,18 @@ class FreeFlight : public Integrator<D> {
         flight.fly_to(due, copies_);
         copies_.image = system.particles.image;
         for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
+        system.box = start.after(due);
         report.observer(due, copies_);
+        system.box = start;
       }
       if (all) run(slab.length);
     } catch (...) {
-      if (ranks_->size() == 1) flight.give_back(flight.now(), system.particles);
+      if (ranks_->size() == 1) end_at(flight.now());
       throw;
     }
     if (report.paused) return leave_off(flight, system.particles);
     report.reached = instants_.now;
-    flight.give_back(report.reached, system.particles);
+    end_at(report.reached);
     within_ = loaded_ = at_limit_ = false;
     instants_ = {};
     report.counters.events = flight.counts();

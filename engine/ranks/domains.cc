@@ -170,7 +170,7 @@ double Domains<D>::window_end(double end) {
 
 template <int D>
 double Domains<D>::run(double end, const Report& report) {
-  typename Region<D>::Tally sum;
+  ContactTally sum;
   std::vector<Contact<D>> contacts;
   std::uint64_t collisions = report.counters.sphere_sphere;
   double reached = end;
@@ -184,8 +184,8 @@ double Domains<D>::run(double end, const Report& report) {
     if (const double astray = first_astray(stop); astray < stop) stop = cut_at(astray);
     if (region_ && !region_->agrees(stop))
       throw Error(Failure::numerical, "internal error: regions do not agree about a window; please report this");
-    typename Region<D>::Tally got = tally();
-    std::uint64_t count = got.collisions;
+    ContactTally got = tally();
+    std::uint64_t count = got.sphere_sphere;
     exchange_.sum({&count, 1});
     if (collisions + count >= report.collision_limit) {  // there are enough
       count = report.collision_limit - collisions;
@@ -197,7 +197,7 @@ double Domains<D>::run(double end, const Report& report) {
     }
     if (report.contacts) add_contacts(contacts);
     sum.add(got);
-    counts_.events += got.collisions + got.bounces;
+    counts_.events += got.contacts();
     collisions += count;
     const double length = stop - now_, n = static_cast<double>(sizes_.spheres);
     now_ = stop;

@@ -78,9 +78,9 @@ class Domains {
   double window_end(double end);
   double first_astray(double end);
   double cut_at(double time);
-  typename Region<D>::Tally tally() const;
+  ContactTally tally() const { return region_ ? region_->tally() : ContactTally{}; }
   void add_contacts(std::vector<Contact<D>>& contacts) const;
-  void report_all(const typename Region<D>::Tally& sum, const std::vector<Contact<D>>& contacts, const Report& report);
+  void report_all(const ContactTally& sum, const std::vector<Contact<D>>& contacts, const Report& report);
   double astray_at(Slot i, double end) const;
   std::optional<EventKey<D>> key_of_collision(std::uint64_t number) const;
   Contact<D> contact_of(Slot lo, std::size_t k) const;

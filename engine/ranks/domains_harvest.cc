@@ -7,11 +7,6 @@
 
 namespace carom {
 
-template <int D>
-typename Region<D>::Tally Domains<D>::tally() const {
-  return region_ ? region_->tally() : typename Region<D>::Tally{};
-}
-
 /// When a sphere may first have come farther than the stray in the window; infinite: never.
 template <int D>
 double Domains<D>::first_astray(double end) {
@@ -63,21 +58,11 @@ void Domains<D>::add_contacts(std::vector<Contact<D>>& contacts) const {
 
 /// Adds up what all ranks have to report of a run.
 template <int D>
-void Domains<D>::report_all(const typename Region<D>::Tally& sum, const std::vector<Contact<D>>& contacts,
-                            const Report& report) {
-  std::array<std::uint64_t, 2> totals{sum.collisions, sum.bounces};
-  exchange_.sum(totals);
-  report.counters.sphere_sphere += totals[0];
-  report.counters.sphere_wall += totals[1];
-  double overlap = sum.overlap;
-  exchange_.largest({&overlap, 1});
-  report.counters.max_overlap = std::max(report.counters.max_overlap, overlap);
-  report.counters.collision_virial.add(sum_of_all(exchange_, sum.virial));
+void Domains<D>::report_all(const ContactTally& sum, const std::vector<Contact<D>>& contacts, const Report& report) {
+  const ContactTally all = sum_of_all(exchange_, sum);
+  report.counters.add(all);
   if (report.contacts) merge_contacts<D>(gather_on_first(exchange_, packed<D>(contacts)), *report.contacts);
-  if (events_ += totals[0] + totals[1]; events_ > report.max_events)
-    throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(report.max_events) +
-                                        " collisions in one step; use a smaller step or raise "
-                                        "integrator.max_events_per_step");
+  if (events_ += all.contacts(); events_ > report.max_events) throw_too_many_contacts(report.max_events);
 }
 
 /// The contact that node k of a path stands for.
@@ -87,8 +72,7 @@ Contact<D> Domains<D>::contact_of(Slot lo, std::size_t k) const {
   const Flights<D>& flights = region_->flights();
   Record<D> a = region_->before(lo, k);
   if (key.kind == EventKind::wall) {
-    const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
-    const Blow<D> blow = flights.bounce(lo, a, axis, side, key.time, key.generation);
+    const Blow<D> blow = flights.bounce(lo, a, box_.wall(key.hi), key.time, key.generation);
     return flights.contact_of(key, a, blow);
   }
   const Slot hi = region_->slot_of(key.hi);
@@ -117,17 +101,15 @@ std::optional<EventKey<D>> Domains<D>::key_of_collision(std::uint64_t number) co
   return keys[number - 1];
 }
 
-template typename Region<2>::Tally Domains<2>::tally() const;
 template double Domains<2>::first_astray(double);
 template double Domains<2>::cut_at(double);
 template void Domains<2>::add_contacts(std::vector<Contact<2>>&) const;
-template void Domains<2>::report_all(const Region<2>::Tally&, const std::vector<Contact<2>>&, const Report&);
+template void Domains<2>::report_all(const ContactTally&, const std::vector<Contact<2>>&, const Report&);
 template std::optional<EventKey<2>> Domains<2>::key_of_collision(std::uint64_t) const;
-template typename Region<3>::Tally Domains<3>::tally() const;
 template double Domains<3>::first_astray(double);
 template double Domains<3>::cut_at(double);
 template void Domains<3>::add_contacts(std::vector<Contact<3>>&) const;
-template void Domains<3>::report_all(const Region<3>::Tally&, const std::vector<Contact<3>>&, const Report&);
+template void Domains<3>::report_all(const ContactTally&, const std::vector<Contact<3>>&, const Report&);
 template std::optional<EventKey<3>> Domains<3>::key_of_collision(std::uint64_t) const;
 
 }  // namespace carom

@@ -155,20 +155,15 @@ bool Region<D>::agrees(double end) {
 }
 
 template <int D>
-typename Region<D>::Tally Region<D>::tally() const {
-  Tally tally;
-  const auto count = [&](bool pair, double virial, double overlap) {
-    ++(pair ? tally.collisions : tally.bounces);
-    if (pair) tally.virial.add(virial);
-    tally.overlap = std::max(tally.overlap, overlap);
-  };
+ContactTally Region<D>::tally() const {
+  ContactTally tally;
   for (const auto& event : trace_.events())
     if (const Slot lo = event.slot[0]; is_own(lo) && rewritten_[lo] == 0)
-      count(event.slot[1] != kNone, event.virial, event.overlap);
+      tally.add(event.slot[1] != kNone ? EventKind::pair : EventKind::wall, event.virial, event.overlap);
   for (const Slot i : paths_.slots()) {
     if (!is_own(i) || rewritten_[i] == 0) continue;
     for (const Node<D>& node : paths_.at(i).nodes)
-      if (node.key.lo == node.after.id) count(node.key.kind == EventKind::pair, node.virial, node.overlap);
+      if (node.key.lo == node.after.id) tally.add(node.key.kind, node.virial, node.overlap);
   }
   return tally;
 }

@@ -18,7 +18,7 @@
 #include <deque>
 #include <queue>
 
-#include "engine/base/exact_sum.h"
+#include "engine/base/contact_tally.h"
 #include "engine/events/event_core.h"
 #include "engine/ranks/by_slot.h"
 #include "engine/ranks/division.h"
@@ -31,20 +31,6 @@ template <int D>
 class Region {
  public:
   using Nodes = std::vector<Node<D>>;
-
-  /// What own spheres did in a window; each collision counts where its lower id is owned.
-  struct Tally {
-    std::uint64_t collisions = 0, bounces = 0;
-    ExactSum virial;
-    double overlap = 0;
-
-    void add(const Tally& other) {
-      collisions += other.collisions;
-      bounces += other.bounces;
-      virial.add(other.virial);
-      overlap = std::max(overlap, other.overlap);
-    }
-  };
 
   /// `sizes` has the masses and radii of all spheres, and outlives the region.
   Region(const Box<D>& box, const Sizes& sizes, const SearchOptions& options)
@@ -95,7 +81,8 @@ class Region {
   /// Which neighbours have an own sphere as a ghost: a bit for each.
   std::uint64_t holders(Slot i) const { return holders_[i]; }
   Slot slot_of(Id id) const { return slots_.find(id); }
-  Tally tally() const;
+  /// What own spheres did in a window; each collision counts where its lower id is owned.
+  ContactTally tally() const;
   /// The largest speed of any sphere after an event.
   double fastest() const { return std::sqrt(std::max(trace_.fastest_squared(), mended_fastest_squared_)); }
   /// Whether, before a time, all ghosts have the same events here as with their owners.

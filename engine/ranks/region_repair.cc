@@ -186,19 +186,18 @@ void Region<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>
 
 template <int D>
 void Region<D>::predict_walls(Mended& m) {
-  for (int axis = 0; axis < D; ++axis)
-    for (int side = 0; side < 2 && box_.walled(axis); ++side) {
-      const double t = core_.flights().wall_contact(m.slot, m.now, axis, side);
-      if (!(t < end_)) continue;
-      tasks_.push({.kind = Task::Kind::contact,
-                   .key = {.time = t,
-                           .generation = Flights<D>::generation_at(m.now, t),
-                           .kind = EventKind::wall,
-                           .lo = m.now.id,
-                           .hi = static_cast<Id>(2 * axis + side)},
-                   .a = m.slot,
-                   .version_a = m.version});
-    }
+  for (const Wall<D>& wall : core_.flights().walls()) {
+    const double t = core_.flights().wall_contact(m.slot, m.now, wall);
+    if (!(t < end_)) continue;
+    tasks_.push({.kind = Task::Kind::contact,
+                 .key = {.time = t,
+                         .generation = Flights<D>::generation_at(m.now, t),
+                         .kind = EventKind::wall,
+                         .lo = m.now.id,
+                         .hi = wall.number()},
+                 .a = m.slot,
+                 .version_a = m.version});
+  }
 }
 
 template <int D>
@@ -210,8 +209,10 @@ void Region<D>::contact(const Task& task) {
   Mended& a = mended(task.a) ? repairs_[mended_of_[task.a]] : mend(task.a, key);
   if (!pair) {
     Node<D> node{a.now, key};
-    const int axis = static_cast<int>(key.hi / 2), side = static_cast<int>(key.hi % 2);
-    node.overlap = core_.flights().bounce(a.slot, node.after, axis, side, key.time, key.generation).overlap;
+    const Wall<D> wall = box_.wall(key.hi);
+    const Blow<D> blow = core_.flights().bounce(a.slot, node.after, wall, key.time, key.generation);
+    node.virial = wall.work(blow.impulse);
+    node.overlap = blow.overlap;
     append(a, node);
     predict(a, key);
     return;

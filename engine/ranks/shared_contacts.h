@@ -27,27 +27,6 @@ void merge_contacts(const std::vector<Bytes>& messages, std::vector<Contact<D>>&
   std::sort(to.begin() + before, to.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
 }
 
-/// What contacts add to the counters.
-struct ContactTally {
-  std::uint64_t pairs = 0, bounces = 0;
-  double overlap = 0;
-  ExactSum virial;
-
-  template <int D>
-  void add(const Contact<D>& contact) {
-    const bool pair = contact.key.kind == EventKind::pair;
-    ++(pair ? pairs : bounces);
-    if (pair) virial.add(contact.virial);
-    overlap = std::max(overlap, contact.overlap);
-  }
-  void add(const ContactTally& other) {
-    pairs += other.pairs;
-    bounces += other.bounces;
-    virial.add(other.virial);
-    overlap = std::max(overlap, other.overlap);
-  }
-};
-
 /// Counts the contacts of all ranks and appends them to `log`, unless it is null; `found` are those that this rank has
 /// found, of its own particles and of ghosts. False where there are more than `most`: then nothing is done.
 template <int D>
@@ -58,18 +37,15 @@ bool commit_contacts(const System<D>& system, std::span<const Contact<D>> found,
   std::vector<Contact<D>> own;
   for (Contact<D> contact : found) {
     if (!p.owns(contact.key.lo)) continue;
-    tally.add(contact);
+    tally.add(contact.key.kind, contact.virial, contact.overlap);
     if (!log) continue;
     contact.key.lo = p.id_of(contact.key.lo);
     if (contact.key.kind == EventKind::pair) contact.key.hi = p.id_of(contact.key.hi);
     own.push_back(contact);
   }
   tally = system.decomposition.sum(tally);
-  if (tally.pairs + tally.bounces > most) return false;
-  counters.sphere_sphere += tally.pairs;
-  counters.sphere_wall += tally.bounces;
-  counters.collision_virial.add(tally.virial);
-  counters.max_overlap = std::max(counters.max_overlap, tally.overlap);
+  if (tally.contacts() > most) return false;
+  counters.add(tally);
   if (log) merge_contacts<D>(system.decomposition.ranks().gather(packed<D>(own)), *log);
   return true;
 }

@@ -32,6 +32,7 @@ struct System {
     fields.add("radius", particles.radius, Kind::constant);
     fields.add("charge", particles.charge, Kind::constant);
     fields.add("species", particles.species, Kind::constant);
+    fields.add_value("edges", box.edges);
   }
   System(const System&) = delete;
   System& operator=(const System&) = delete;

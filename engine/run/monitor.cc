@@ -132,6 +132,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   }
   account_.virial_time += elapsed * account_.virial;
   if (s.end_time > 0) {
+    if (system_.box.pistons()) account_.virial_time = std::numeric_limits<double>::quiet_NaN();  // no one volume
     s.mean_pressure =
         (account_.virial_time + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
     s.collision_rate =
@@ -163,7 +164,8 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   const auto total = static_cast<double>(system_.size());
   const MotionSums<D> motion = evaluate_motion(system_, state, nodes);
   shot.kinetic = motion.kinetic.value();
-  account_.energy = shot.kinetic + sums.energy.value();
+  // Of the spheres and of the walls that move: these have lost what work they did.
+  account_.energy = shot.kinetic + sums.energy.value() - statistics_.counters.wall_work.value();
   shot.potential = sums.energy.value() + tail_.energy;
   account_.magnitude = shot.kinetic + sums.magnitude.value();
   account_.virial = 2 * shot.kinetic + sums.virial.value() + tail_.virial;

@@ -87,7 +87,8 @@ struct Statistics {
   /// The long-range corrections in the energies above and in pressures (engine/forces/potentials/tail.h). They are
   /// constants; energy_reference and the errors of H are without them.
   double tail_energy = 0, tail_pressure = 0;
-  double max_energy_error = 0;  ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the start)
+  double max_energy_error = 0;  ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the
+                                ///< start); H less the work of walls that move
   std::optional<double>
       max_shadow_energy_error;  ///< Verlet types; of more than 100 particles at thermo rows and frames only
   std::optional<double> max_momentum_error;  ///< where nothing takes momentum (no walls, no fields): max |P − P₀|

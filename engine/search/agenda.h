@@ -27,7 +27,7 @@ struct alignas(64) Agenda {
     double centre[D];   ///< of the region: where the sphere was when its list was made
     CellPlace<D> cell;  ///< where the core works on cells alone
   } where{};
-  std::uint32_t partner = 0;          ///< as a candidate (Packing); at a wall: 2·axis + (0 lower, 1 upper)
+  std::uint32_t partner = 0;          ///< as a candidate (Packing); at a wall: its number
   std::uint32_t partner_version = 0;  ///< the contact is stale when the partner's has moved on
   std::uint32_t version = 0;          ///< grows with every contact of the sphere
   std::uint32_t list = 0;             ///< where its list starts, in units of ScanKernels::lanes candidates

@@ -42,7 +42,7 @@ class CellGrid {
     const double most =
         std::max(1.0, std::floor(std::pow(cells_a_particle * static_cast<double>(extent.particles), 1.0 / D)));
     for (int k = 0; k < D; ++k) {
-      const bool open = box.boundary[k] == Boundary::open;
+      const bool open = !box.bounded(k);
       const double low = open ? extent.low[k] : 0, high = open ? extent.high[k] : box.edges[k];
       const double length = box.periodic(k) ? high - low : std::max(high - low, smallest);
       // Not quite full: rounding must never make a cell smaller than what it is to hold.

@@ -57,8 +57,8 @@ SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, c
   }
   double volume = 1;
   for (int k = 0; k < D; ++k) {
-    const bool open = box.boundary[k] == Boundary::open;  // as far as there are spheres
-    volume *= open ? extent.high[k] - extent.low[k] + 2 * largest : box.edges[k];
+    const double occupied = extent.high[k] - extent.low[k] + 2 * largest;
+    volume *= box.bounded(k) ? box.edges[k] : occupied;
   }
   const double filled = (D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * sum_of_powers / volume;
   return {D, n / volume, filled, 2 * sum / n, 2 * largest};

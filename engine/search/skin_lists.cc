@@ -31,7 +31,7 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
       skin_(skin),
       agenda_(agenda),
       lists_(packing, kernels.lanes, agenda) {
-  exact_ = !equal || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
+  exact_ = !equal || !box.closed();
   if (!equal) {
     level_.resize(radius.size());
     for (std::size_t i = 0; i < radius.size(); ++i) level_[i] = octave(largest, radius[i]);
@@ -50,8 +50,7 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
   levels_.clear();
   const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
   double volume = 1;
-  for (int k = 0; k < D; ++k)
-    volume *= box_.boundary[k] == Boundary::open ? extent.high[k] - extent.low[k] : box_.edges[k];
+  for (int k = 0; k < D; ++k) volume *= box_.bounded(k) ? box_.edges[k] : extent.high[k] - extent.low[k];
   for (std::size_t l = 0; l < levels; ++l) {
     double largest = l == 0 ? largest_ : 0;
     std::size_t members = equal_ ? n : 0;

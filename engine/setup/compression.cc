@@ -21,6 +21,7 @@ class Compressor {
  public:
   Compressor(const Box<D>& box, std::span<const double> radius, const CompressionOptions& options)
       : box_(box), radius_(radius), options_(options), core_(box_, particles_) {
+    box_.edge_velocity.setZero();
     const std::size_t n = radius.size();
     particles_.x.resize(n);
     particles_.v.assign(n, Vec<D>::Zero());
@@ -114,7 +115,7 @@ class Compressor {
     return temperature;
   }
 
-  const Box<D> box_;
+  Box<D> box_;
   const std::span<const double> radius_;
   const CompressionOptions options_;
   double largest_ = 0;

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "engine/base/random.h"
-#include "engine/events/contact.h"
 #include "engine/setup/placement_grid.h"
 
 namespace carom {
@@ -187,7 +186,7 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
   Overlaps found;
   if (x.empty()) return found;
   PlacementGrid<D> grid(box, radius);
-  const GapTolerance tolerance(box.edges.maxCoeff());
+  const GapTolerance tolerance = box.gap_tolerance();
   double worst = 1;
   for (Id i = 0; i < x.size(); ++i) {
     Vec<D> inside = x[i];
@@ -217,17 +216,17 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
 template <int D>
 Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius) {
   Outsiders found;
-  const GapTolerance tolerance(box.edges.maxCoeff());
+  const GapTolerance tolerance = box.gap_tolerance();
+  const auto walls = box.walls();
   for (Id i = 0; i < x.size(); ++i) {
     bool outside = false;
-    for (int k = 0; k < D; ++k) {
-      if (!box.walled(k)) continue;
-      const double depth = std::max(radius[i] - x[i][k], x[i][k] + radius[i] - box.edges[k]);
+    for (const Wall<D>& wall : walls) {
+      const double depth = -wall.gap(x[i], radius[i]);
       if (depth <= tolerance(radius[i])) continue;
       outside = true;
       if (depth <= found.depth) continue;
       found.worst = i;
-      found.axis = k;
+      found.axis = wall.axis;
       found.depth = depth;
     }
     if (outside) ++found.spheres;

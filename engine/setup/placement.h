@@ -57,7 +57,7 @@ template <int D>
 std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<const double> radius,
                              std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries = 20000);
 
-/// Pairs closer than their contact distance by more than the gap tolerance (engine/events/contact.h), through periodic
+/// Pairs closer than their contact distance by more than the gap tolerance (engine/base/wall.h), through periodic
 /// images too; without those with the later sphere `beyond` what is looked at.
 struct Overlaps {
   std::size_t pairs = 0;

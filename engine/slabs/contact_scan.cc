@@ -14,8 +14,9 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
     : box_(system.box),
       particles_(system.particles),
       decomposition_(system.decomposition),
+      walls_(system.box.walls()),
       largest_edge_(system.box.edges.maxCoeff()),
-      tolerance_(largest_edge_),
+      tolerance_(system.box.gap_tolerance()),
       list_(system.box, system.particles.radius),
       max_events_(max_events) {}
 
@@ -33,13 +34,9 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
 }
 
 template <int D>
-double ContactScan<D>::wall_gap(const Vec<D>& x, Id i, int wall) const {
-  const int axis = wall / 2;
-  return wall % 2 == 0 ? x[axis] - particles_.radius[i] : box_.edges[axis] - particles_.radius[i] - x[axis];
-}
-
-template <int D>
 void ContactScan<D>::collect(double time, Positions<D> x, Positions<D> v) {
+  if (box_.pistons())
+    throw Error(Failure::deck, "this method knows no walls that move; take free-flight or psa, or stop them");
   approaching_.clear();
   resting_.clear();
   auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma) {
@@ -65,13 +62,12 @@ void ContactScan<D>::collect(double time, Positions<D> x, Positions<D> v) {
   key.kind = EventKind::wall;
   key.image = {};
   for (Id i = 0; i < x.size(); ++i)
-    for (int wall = 0; wall < 2 * D; ++wall) {
-      if (!box_.walled(wall / 2)) continue;
-      const double gap = wall_gap(x[i], i, wall);
+    for (const Wall<D>& wall : walls_) {
+      const double gap = wall.gap(x[i], particles_.radius[i]);
       if (gap > tolerance(particles_.radius[i])) continue;
       key.lo = i;
-      key.hi = static_cast<Id>(wall);
-      note(key, inward(wall) * Vec<D>::Unit(wall / 2), gap, particles_.radius[i]);
+      key.hi = wall.number();
+      note(key, wall.normal(), gap, particles_.radius[i]);
     }
 }
 
@@ -83,14 +79,7 @@ double ContactScan<D>::normal_speed(const Touch<D>& touch, Positions<D> v) const
 
 template <int D>
 void ContactScan<D>::count_event(const EventKey<D>& key) {
-  if (++events_ > max_events_) too_many(key);
-}
-
-template <int D>
-void ContactScan<D>::too_many(const EventKey<D>& key) const {
-  throw Error(Failure::numerical, "more than max_events_per_step = " + std::to_string(max_events_) +
-                                      " collisions in one step, the last between " + partners(key) +
-                                      "; use a smaller step or raise integrator.max_events_per_step");
+  if (++events_ > max_events_) throw_too_many_contacts(max_events_, partners(key));
 }
 
 template <int D>
@@ -98,13 +87,7 @@ void ContactScan<D>::commit(double time, std::span<const Contact<D>> executed) {
   for (Contact<D> contact : executed) {
     count_event(contact.key);
     contact.key.time += time;
-    if (contact.key.kind == EventKind::pair) {
-      ++counters_->sphere_sphere;
-      counters_->collision_virial.add(contact.virial);
-    } else {
-      ++counters_->sphere_wall;
-    }
-    if (contacts_) contacts_->push_back(contact);
+    counters_->record(contact, contacts_);
   }
 }
 
@@ -124,15 +107,12 @@ void ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
       const Vec<D> given = particles_.mass[lo] * (v[lo] - v_before);
       Contact<D> contact{touch.key, x[lo], x[lo], given};
       if (touch.pair()) {
-        ++counters_->sphere_sphere;
         contact.virial = touch.normal.dot(given);
-        counters_->collision_virial.add(contact.virial);
         contact.x_hi = x[hi] - box_.shift(touch.key.image);
       } else {
-        ++counters_->sphere_wall;
-        contact.x_hi[hi / 2] = hi % 2 == 0 ? 0.0 : box_.edges[static_cast<int>(hi / 2)];
+        contact.x_hi = box_.wall(hi).foot(x[lo]);
       }
-      if (contacts_) contacts_->push_back(contact);
+      counters_->record(contact, contacts_);
     }
     collect(time, x, v);
   }
@@ -224,15 +204,13 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   key.kind = EventKind::wall;
   key.image = {};
   for (Id i = 0; i < x.size(); ++i)
-    for (int wall = 0; wall < 2 * D; ++wall) {
-      const int axis = wall / 2;
-      if (!box_.walled(axis)) continue;
-      const double gap = wall_gap(x[i], i, wall);
+    for (const Wall<D>& wall : walls_) {
+      const double gap = wall.gap(x[i], particles_.radius[i]);
       key.lo = i;
-      key.hi = static_cast<Id>(wall);
-      key.time = wall_contact_time(gap, inward(wall) * v[i][axis], inward(wall) * a[i][axis], rest,
+      key.hi = wall.number();
+      key.time = wall_contact_time(gap, wall.along_normal(v[i]), wall.along_normal(a[i]), rest,
                                    gap <= tolerance(particles_.radius[i]), resting_speed_);
-      if (key.time < kNever) offer(inward(wall) * Vec<D>::Unit(axis));
+      if (key.time < kNever) offer(wall.normal());
     }
   // Pieces that end in a contact without an impulse count too: there must be an end to them.
   if (first.key.time < kNever && events_ == events_at_last_cut_) count_event(first.key);
@@ -244,7 +222,7 @@ template <int D>
 void collide_elastically(const Touch<D>& touch, Particles<D>& particles) {
   const Id lo = touch.key.lo, hi = touch.key.hi;
   if (!touch.pair()) {
-    double& v = particles.v[lo][static_cast<int>(hi / 2)];
+    double& v = particles.v[lo][wall_axis(hi)];
     v = -v;
     return;
   }

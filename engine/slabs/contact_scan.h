@@ -86,13 +86,10 @@ class ContactScan {
   double floor(double gap_at_start, double tolerance) const {
     return std::min(-tolerance, gap_at_start - std::numeric_limits<double>::epsilon() * largest_edge_);
   }
-  /// The gap of particle i to a wall (2·axis + side), and the wall's inward normal component along its axis.
-  double wall_gap(const Vec<D>& x, Id i, int wall) const;
-  static double inward(int wall) { return wall % 2 == 0 ? 1.0 : -1.0; }
+  std::span<const Wall<D>> walls() const { return walls_; }
 
   /// Counts one more contact or empty piece; throws when the slab needs more than max_events.
   void count_event(const EventKey<D>& key);
-  [[noreturn]] void too_many(const EventKey<D>& last) const;
 
   /// Counts and logs contacts that were found and executed elsewhere, since `time` in the slab.
   void commit(double time, std::span<const Contact<D>> executed);
@@ -107,6 +104,7 @@ class ContactScan {
   const Box<D>& box_;
   const Particles<D>& particles_;
   const Decomposition<D>& decomposition_;
+  std::vector<Wall<D>> walls_;
   double largest_edge_;
   GapTolerance tolerance_;
   NeighbourList<D> list_;

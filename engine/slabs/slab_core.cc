@@ -23,7 +23,8 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       particles_(system.particles),
       max_events_(max_events),
       wild_(kWild * mean_distance(system)) {
-  for (int axis = 0; axis < D; ++axis) walls_ = walls_ || box_.walled(axis);
+  if (system.decomposition.joined() && box_.pistons())
+    throw Error(Failure::deck, "forces and walls that move together need one rank; take one, or free-flight");
   system.fields.add_working(
       this, [this] { release(); },
       [this] {
@@ -46,6 +47,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   start_v_ = v;
   a_ = a;
   length_ = length;
+  walls_ = box_.walls();
   resolved_ = resolved;
   last_sequences_.clear();
   sequences_.clear();
@@ -121,7 +123,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   if (shared)
     agree(!end.complete || crowded_ || strayed_ > 0);
   else if (crowded_)
-    scan_->too_many(end.key);
+    throw_too_many_contacts(max_events_, partners(end.key));
   else if (strayed_ > 0 && !a_.empty())
     return {.complete = false, .wild = true};
   else if (strayed_ > 0) {
@@ -141,8 +143,7 @@ void SlabCore<D>::predict_first() {
   for (const Id i : beyond_)
     for (const auto& [j, pair] : scan_->candidate_partners().of(i))
       predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
-  if (walls_)
-    for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
+  for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
   std::make_heap(queue_.begin(), queue_.end());
 }
 
@@ -218,7 +219,7 @@ template <int D>
 void SlabCore<D>::predict_all(Id i) {
   for (const auto& [j, pair] : scan_->candidate_partners().of(i))
     predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
-  if (walls_) predict_walls(i);
+  predict_walls(i);
 }
 
 /// The next contact of the present flights, looked at from the later of their starts.
@@ -239,16 +240,15 @@ void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
 
 template <int D>
 void SlabCore<D>::predict_walls(Id i) {
-  const double t = start(i);
+  if (walls_.empty()) return;
+  const double t = start(i), radius = particles_.radius[i];
   const Vec<D> x = position(i, t), v = velocity(i, t), a = acceleration(i);
-  for (int wall = 0; wall < 2 * D; ++wall) {
-    const int axis = wall / 2;
-    if (!box_.walled(axis)) continue;
-    const double gap = scan_->wall_gap(x, i, wall), inward = ContactScan<D>::inward(wall);
-    const double s = wall_contact_time(gap, inward * v[axis], inward * a[axis], length_ - t,
-                                       gap <= scan_->tolerance(particles_.radius[i]), scan_->resting_speed());
+  for (const Wall<D>& wall : walls_) {
+    const double gap = wall.gap(x, radius, t);
+    const double s = wall_contact_time(gap, wall.opening(v), wall.along_normal(a), length_ - t,
+                                       gap <= scan_->tolerance(radius), scan_->resting_speed());
     if (!(t + s < length_)) continue;
-    EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = static_cast<Id>(wall)};
+    EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = wall.number()};
     if (!held_.empty() && scan_->rests(key)) continue;
     key.generation = generation(i, key.time);
     queue_.push_back({key, version(i)});
@@ -260,10 +260,7 @@ void SlabCore<D>::predict_walls(Id i) {
 template <int D>
 double SlabCore<D>::approach(const EventKey<D>& key) const {
   const Vec<D> v = velocity(key.lo, key.time);
-  if (key.kind == EventKind::wall) {
-    const int wall = static_cast<int>(key.hi);
-    return ContactScan<D>::inward(wall) * v[wall / 2];
-  }
+  if (key.kind == EventKind::wall) return box_.wall(key.hi).opening(v);
   const Vec<D> normal = position(key.lo, key.time) - position(key.hi, key.time) + box_.shift(key.image);
   return normal.dot(v - velocity(key.hi, key.time)) / normal.norm();
 }
@@ -302,12 +299,14 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     if (!(strays <= margin_)) stray(strays);
   };
   if (key.kind == EventKind::wall) {
-    const int axis = static_cast<int>(key.hi / 2), wall = static_cast<int>(key.hi);
-    double& v = lo.v[axis];
-    if (!(ContactScan<D>::inward(wall) * v < 0)) return;
-    contact.impulse[axis] = -2 * mass * v;
-    contact.x_hi[axis] = wall % 2 == 0 ? 0.0 : box_.edges[axis];
-    v = -v;
+    const Wall<D> wall = box_.wall(key.hi);
+    double& v = lo.v[wall.axis];
+    if (!(wall.opening(lo.v) < 0)) return;
+    const double after = wall.reflected(v);
+    contact.impulse[wall.axis] = mass * (after - v);
+    contact.virial = wall.work(contact.impulse);
+    contact.x_hi = wall.foot(lo.x, key.time);
+    v = after;
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
     const double mass_hi = particles_.mass[key.hi];

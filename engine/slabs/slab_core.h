@@ -72,10 +72,11 @@ class SlabCore {
   /// Counts and logs the contacts of the last flight; `time`: of the slab's start within the step.
   void commit(double time);
 
-  /// Moves the particles to the slab's end.
+  /// Moves the particles, and walls that move, to the slab's end.
   void finish(Particles<D>& particles) {
     particles.x.swap(x_);
     particles.v.swap(v_);
+    system_.box = system_.box.after(length_);
   }
 
   /// Contacts at the slab's start, and those that rest.
@@ -131,9 +132,9 @@ class SlabCore {
   const Box<D>& box_;
   const Particles<D>& particles_;
   std::optional<ContactScan<D>> scan_;
+  std::vector<Wall<D>> walls_;
   std::uint64_t max_events_;
   double wild_;  // path that an acceleration may bend in a slab [length]
-  bool walls_ = false;
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
   double length_ = 0, margin_ = 0, own_reach_ = 0;

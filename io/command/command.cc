@@ -17,10 +17,8 @@ namespace {
 template <int D>
 std::string box_text(const Box<D>& box) {
   std::ostringstream out;
-  for (int k = 0; k < D; ++k) {
-    const char* boundary = box.periodic(k) ? "periodic" : box.walled(k) ? "wall" : "open";
-    out << (k > 0 ? " x " : "") << box.edges[k] << " (" << boundary << ")";
-  }
+  for (int k = 0; k < D; ++k)
+    out << (k > 0 ? " x " : "") << box.edges[k] << " (" << find_boundary(box.boundary[k]).name << ")";
   return out.str();
 }
 
@@ -58,7 +56,7 @@ int describe(Deck& deck) {
     std::cout << (s == 0 ? ": " : ", ") << std::count(p.species.begin(), p.species.end(), s) << " "
               << system->species[s];
   std::cout << "\nbox               " << box_text(system->box) << '\n';
-  if (closed(system->box))
+  if (system->box.closed())
     std::cout << "packing fraction  " << packing_fraction<D>(system->box.volume(), p.radius) << '\n';
   std::cout << "interactions      " << system->interactions.size() << '\n';
   std::cout << "integrator        " << deck.integrator << ", step " << deck.plan.step << '\n';

@@ -90,14 +90,17 @@ int carom_main(int argc, char** argv) {
 
   carom::RunOptions options;
   CLI::App& run = *app.add_subcommand("run", "Run a deck");
-  run.add_option("deck", options.deck, "The deck (TOML)")->required()->type_name("DECK");
+  auto* const run_deck = run.add_option("deck", options.deck, "The deck (TOML)")->type_name("DECK");
+  run.add_option("--continue", options.go_on, "Go on with the run in this directory from its last checkpoint")
+      ->type_name("DIR")
+      ->excludes(run_deck);
   add_set(run, options.set);
   run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")->type_name("DIR");
   const auto wall_time = [&](const std::string& text) {
     options.max_wall_seconds = carom::wall_seconds(text);
     if (!options.max_wall_seconds) throw CLI::ValidationError("--max-wall", "'" + text + "' is not hh:mm:ss");
   };
-  run.add_option_function<std::string>("--max-wall", wall_time, "Stop after this wall time with exit code 75")
+  run.add_option_function<std::string>("--max-wall", wall_time, "Stop after this wall time with a checkpoint and exit code 75")
       ->type_name("HH:MM:SS");
   run.add_option("--silence", options.silence,
                  "Of several ranks: give up after so many seconds without a word from one; 0: never")
@@ -117,7 +120,7 @@ int carom_main(int argc, char** argv) {
   schema.add_flag("--markdown", markdown, "As Markdown");
   CLI::App& methods =
       *app.add_subcommand("methods", "Every integrator: order, conserved quantities, parameters, source; the averages");
-  CLI::App& info = *app.add_subcommand("info", "What is in a trajectory");
+  CLI::App& info = *app.add_subcommand("info", "What is in a trajectory, a file of events or a checkpoint");
   info.add_option("file", file, "The file")->required()->type_name("FILE");
 
   carom::BenchOptions bench;
@@ -129,6 +132,9 @@ int carom_main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return once([&] { return app.exit(e) == 0 ? 0 : usage_error; });
   }
+
+  if (run.parsed() && options.deck.empty() && !options.go_on)
+    return once([&] { return app.exit(CLI::RequiredError("DECK, or --continue DIR,")) == 0 ? 0 : usage_error; });
 
   // 3. Do it.
   if (run.parsed()) return carom::run_command(options);

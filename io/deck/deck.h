@@ -18,6 +18,7 @@
 #include "engine/ranks/system.h"
 #include "engine/run/observable.h"
 #include "engine/run/simulation.h"
+#include "engine/run/state.h"
 
 namespace carom {
 
@@ -28,7 +29,7 @@ struct ObservableConfig {
 
 struct OutputConfig {
   std::filesystem::path directory;
-  std::string checkpoint_wall;                ///< hh:mm:ss of wall time between checkpoints, or empty
+  std::optional<double> checkpoint_wall;      ///< wall time between checkpoints [s]; else none but at the end
   double sample_start = 0;                    ///< simulated time of the first sample of the observables
   std::vector<ObservableConfig> observables;  ///< those with an interval
 };
@@ -72,9 +73,20 @@ void set_output_directory(Deck& deck, const std::filesystem::path& directory);
 /// How many particles it has.
 std::size_t particle_count(const Deck& deck);
 
-/// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
-/// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards.
+/// A state to go on from, instead of the initial one that the deck describes.
+struct GivenState {
+  StateReader read;             ///< called on rank 0
+  std::vector<PairList> bonds;  ///< of each interaction that finds them in the initial state, in their order
+};
+
+/// Of each interaction of the deck that finds its bonds in the initial state, in their order.
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks = nullptr);
+std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system);
+
+/// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
+/// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards. With a given
+/// state it is that instead of the initial one, and nothing is checked or warned of anew.
+template <int D>
+std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks = nullptr, const GivenState* given = nullptr);
 
 }  // namespace carom

@@ -59,6 +59,16 @@ void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
   deck.toml_text = write_deck(source.values);
 }
 
+/// Gives the interactions that find their bonds in the initial state those that they have found there.
+void take_bonds(Deck::Source& source, const std::vector<PairList>& bonds) {
+  std::size_t n = 0;
+  for (InteractionConfig& config : source.interactions)
+    if (config.parameters.has("within") && n < bonds.size()) {
+      config.parameters.erase("within");
+      config.parameters.set("pairs", bonds[n++]);
+    }
+}
+
 }  // namespace
 
 bool built_in_blocks(const Deck::Source& source) {
@@ -115,19 +125,38 @@ void fill_particles(const Deck::Source& source, System<D>& system, Exchange* ran
 }
 
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
+std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system) {
+  std::vector<PairList> found;
+  const auto& all = deck.source->interactions;
+  for (std::size_t n = 0, term = 0; n < all.size(); ++n)
+    if (all[n].info->kind == InteractionInfo::Kind::bonded) {
+      const PairList* bonds = system.interactions[term++]->bonds();
+      if (bonds != nullptr && all[n].parameters.has("within")) found.push_back(*bonds);
+    }
+  return found;
+}
+
+template <int D>
+std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks, const GivenState* given) {
   const Deck::Source& source = *deck.source;
   if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
   auto system = std::make_unique<System<D>>();
   fill_box(source, *system);
   fill_particles(source, *system, ranks);
-  place_particles(source, *system);
-  system->wrap();
-  give_velocities(source, *system);
+  if (given) {
+    if (ranks && !system->decomposition.joined()) system->decomposition.join(*ranks);
+    restore_particles(*system, given->read);
+    take_bonds(*deck.source, given->bonds);
+  } else {
+    place_particles(source, *system);
+    system->wrap();
+    give_velocities(source, *system);
+  }
 
   Problems problems;
   make_interactions(source, {}, *system, true, problems);
   problems.throw_errors(Failure::deck);
+  if (given) return system;
   complete_values(deck, *system, problems);
   problems.throw_errors(Failure::deck);
   check_state(deck, *system, problems);
@@ -140,10 +169,12 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks) {
 
 template void fill_box(const Deck::Source&, System<2>&);
 template void fill_particles(const Deck::Source&, System<2>&, Exchange*);
-template std::unique_ptr<System<2>> build_system<2>(Deck&, Exchange*);
+template std::unique_ptr<System<2>> build_system<2>(Deck&, Exchange*, const GivenState*);
+template std::vector<PairList> found_bonds(const Deck&, const System<2>&);
 
 template void fill_box(const Deck::Source&, System<3>&);
 template void fill_particles(const Deck::Source&, System<3>&, Exchange*);
-template std::unique_ptr<System<3>> build_system<3>(Deck&, Exchange*);
+template std::unique_ptr<System<3>> build_system<3>(Deck&, Exchange*, const GivenState*);
+template std::vector<PairList> found_bonds(const Deck&, const System<3>&);
 
 }  // namespace carom

@@ -67,10 +67,7 @@ class Interpreter {
     }
     if (const auto* boundary = table->find<std::vector<std::string>>("boundary")) {
       one_an_axis(*table, "boundary", boundary->size());
-      for (const std::string& b : *boundary)
-        source_.boundary.push_back(b == "wall"       ? Boundary::wall
-                                   : b == "periodic" ? Boundary::periodic
-                                                     : Boundary::open);
+      for (const std::string& name : *boundary) source_.boundary.push_back(find_boundary(name).boundary);
     }
   }
 
@@ -196,12 +193,10 @@ class Interpreter {
     }
     if (const auto* events = table->find<bool>("events")) deck_.plan.events = *events;
     if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {
-      deck_.output.checkpoint_wall = *wall;
-      if (!wall_seconds(*wall))
+      deck_.output.checkpoint_wall = wall_seconds(*wall);
+      if (!deck_.output.checkpoint_wall)
         problems_.error(table->place("checkpoint_wall"), "'" + *wall + "' is not a time",
                         "write hh:mm:ss, for instance 00:05:00");
-      problems_.warning(table->place("checkpoint_wall"), "this version writes no checkpoints",
-                        "the run ends as it should, but cannot be continued");
     }
   }
 

@@ -83,9 +83,18 @@ std::vector<Key> output_keys() {
       {"sample_start", real, "0.0", "time",
        "simulated time of the first sample for " + averages_of_all() + ": what comes before is equilibration",
        Range::non_negative});
-  keys.push_back({"checkpoint_wall", text, "\"\"", "-", "wall time between checkpoints, hh:mm:ss; empty: none"});
+  keys.push_back({"checkpoint_wall", text, "\"00:05:00\"", "-", "wall time between checkpoints, hh:mm:ss; empty: only when the run ends or is stopped"});
   keys.push_back({"events", boolean, "false", "-", "write every collision to events.h5"});
   return keys;
+}
+
+Key boundary_key() {
+  Key key = {"boundary", text_list, "", "-", "for each axis"};
+  for (const BoundaryInfo& info : boundaries()) {
+    key.meaning += "; " + std::string(info.name) + ": " + std::string(info.meaning);
+    key.choices.emplace_back(info.name);
+  }
+  return key;
 }
 
 Key type_key(const std::string& meaning) { return {"type", text, "", "-", meaning}; }
@@ -107,13 +116,7 @@ std::vector<TableSchema> make_schema() {
         {"box", real_list, "none", "length",
          "edges of the box, which begins at the origin; may be left out where placement.packing_fraction sets it",
          Range::positive},
-        {"boundary",
-         text_list,
-         "",
-         "-",
-         "for each axis: hard elastic walls, periodic images, or nothing at all",
-         Range::any,
-         {"wall", "periodic", "open"}}}},
+        boundary_key()}},
       {"particles",
        true,
        true,

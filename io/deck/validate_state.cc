@@ -5,7 +5,6 @@
 #include <numbers>
 #include <sstream>
 
-#include "engine/events/contact.h"
 #include "engine/forces/forces.h"
 #include "engine/forces/stiffness.h"
 #include "engine/setup/initial_state.h"
@@ -39,14 +38,14 @@ void check_box(const Deck::Source& source, const System<D>& system, Problems& pr
   const double diameter = 2 * *std::max_element(radius.begin(), radius.end());
   for (int k = 0; k < D; ++k) {
     const double edge = system.box.edges[k];
-    if (!system.box.periodic(k) || edge >= diameter - GapTolerance(system.box.edges.maxCoeff())(diameter)) continue;
+    if (!system.box.periodic(k) || edge >= diameter - system.box.gap_tolerance()(diameter)) continue;
     problems.error(source.box,
                    say("the periodic box is ", edge, " long on axis ", k, ", less than a diameter of ", diameter),
                    "enlarge the box; a sphere must not touch itself");
   }
   const double filled =
       packing_fraction<D>(system.box.volume(), system.particles.radius, system.decomposition.others());
-  if (filled > 1 && closed(system.box))
+  if (filled > 1 && system.box.closed())
     problems.error(source.box, say("the spheres fill ", filled, " of the box"),
                    "enlarge the box or take fewer spheres");
 }
@@ -69,11 +68,6 @@ void check_spheres(const Deck::Source& source, const System<D>& system, Problems
 }  // namespace
 
 template <int D>
-bool closed(const Box<D>& box) {
-  return std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) == box.boundary.end();
-}
-
-template <int D>
 void check_state(const Deck& deck, const System<D>& system, Problems& problems) {
   const Deck::Source& source = *deck.source;
   if (!source.integrator->hard_cores) return;
@@ -90,14 +84,13 @@ template <int D>
 void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
   const Deck::Source& source = *deck.source;
   const Box<D>& box = system.box;
-  const bool walls = std::find(box.boundary.begin(), box.boundary.end(), Boundary::wall) != box.boundary.end();
-  if (!source.integrator->hard_cores && walls)
+  if (!source.integrator->hard_cores && !box.walls().empty())
     problems.warning(source.system, "walls do not act with " + deck.integrator + ", which knows no hard cores",
                      "make the boundary open or periodic, or take another integrator");
 
   const double close_packing = D == 2 ? std::numbers::pi / std::sqrt(12.0) : std::numbers::pi / std::sqrt(18.0);
   const double filled = packing_fraction<D>(box.volume(), system.particles.radius, system.decomposition.others());
-  if (source.integrator->hard_cores && closed(box) && filled > close_packing)
+  if (source.integrator->hard_cores && box.closed() && filled > close_packing)
     problems.warning(source.box,
                      say("packing fraction ", filled, " is beyond close packing of equal spheres, ", close_packing),
                      "check box and radii");
@@ -126,12 +119,10 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
                      "a tenth of that period or less is usual");
 }
 
-template bool closed(const Box<2>&);
 template void check_state(const Deck&, const System<2>&, Problems&);
 template double shortest_period(const System<2>&);
 template void warn_of_state(const Deck&, System<2>&, Problems&);
 
-template bool closed(const Box<3>&);
 template void check_state(const Deck&, const System<3>&, Problems&);
 template double shortest_period(const System<3>&);
 template void warn_of_state(const Deck&, System<3>&, Problems&);

@@ -20,8 +20,4 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems);
 template <int D>
 double shortest_period(const System<D>& system);
 
-/// Whether all of space belongs to the box: no axis is open.
-template <int D>
-bool closed(const Box<D>& box);
-
 }  // namespace carom

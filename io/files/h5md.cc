@@ -60,8 +60,7 @@ template <int D>
 void write_parameters(File& file, const Deck& deck, const System<D>& system) {
   const Handle group = file.group("parameters");
   std::vector<std::string> boundary;
-  for (const Boundary b : system.box.boundary)
-    boundary.push_back(b == Boundary::wall ? "wall" : b == Boundary::periodic ? "periodic" : "open");
+  for (const Boundary b : system.box.boundary) boundary.emplace_back(find_boundary(b).name);
   file.write_text(group, "deck", deck.toml_text);
   file.write_text(group, "title", deck.title);
   file.write_text(group, "integrator", deck.integrator);
@@ -129,8 +128,7 @@ struct TrajectoryWriter<D>::Contents {
 
   void write_box(const Box<D>& b) {
     std::vector<std::string> boundary(3, "none");
-    for (int k = 0; k < D; ++k)
-      if (b.periodic(k)) boundary[static_cast<std::size_t>(k)] = "periodic";
+    for (std::size_t k = 0; k < D; ++k) boundary[k] = find_boundary(b.boundary[k]).h5md;
     file.write_attribute(box, "dimension", std::int32_t{3});
     file.write_attribute(box, "boundary", boundary);
   }

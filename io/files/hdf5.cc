@@ -109,6 +109,15 @@ File File::create(const std::filesystem::path& path) {
                   [](const char* name, hid_t access) { return H5Fcreate(name, H5F_ACC_TRUNC, H5P_DEFAULT, access); });
 }
 
+File File::create_plain(const std::filesystem::path& path, std::uint64_t block) {
+  start_library();
+  const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
+  H5Pset_userblock(creation.id(), block);
+  const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.id(), H5P_DEFAULT);
+  if (id < 0) throw_write_error(path, "create the file", reason());
+  return {path, id, true};
+}
+
 File File::append(const std::filesystem::path& path) {
   replay_journal(path);
   return writable(path, "open the file",

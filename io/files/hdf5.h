@@ -60,6 +60,8 @@ class File {
  public:
   /// A new, empty file; an old one of that name is replaced.
   static File create(const std::filesystem::path& path);
+  /// The same without a journal, behind a block of so many bytes that are not HDF5's: to be renamed once it is closed.
+  static File create_plain(const std::filesystem::path& path, std::uint64_t block);
   /// An existing file, to be changed; its groups and series are opened where they would be created.
   static File append(const std::filesystem::path& path);
   /// An existing file, to be read.
@@ -93,6 +95,8 @@ class File {
   void write_number(const Handle& where, const std::string& name, T number) {
     write_array(where, name, native_type<T>(), &number, {});
   }
+  void write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
+                   const std::vector<hsize_t>& shape);
   /// Makes `alias` a second name of the data set `name`, unless there is one.
   void link(const Handle& from, const std::string& name, const Handle& to, const std::string& alias);
 
@@ -102,8 +106,6 @@ class File {
   File(std::filesystem::path path, hid_t id, bool writable)
       : path_(std::move(path)), file_(id, H5Fclose), writable_(writable) {}
   [[noreturn]] void fail(const std::string& action) const;
-  void write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
-                   const std::vector<hsize_t>& shape);
   void write_attribute(const Handle& where, const std::string& name, hid_t type, const void* data,
                        const std::vector<hsize_t>& shape);
 
@@ -188,6 +190,8 @@ double number_at(const File& file, const std::string& dataset, hsize_t index);
 /// Element [row][k][k] of a data set with three axes.
 double diagonal_at(const File& file, const std::string& dataset, hsize_t row, int k);
 std::string text(const File& file, const std::string& dataset);
+/// A data set as it is stored.
+std::vector<std::byte> bytes(const File& file, const std::string& dataset);
 std::vector<std::string> texts(const File& file, const std::string& dataset);
 std::vector<std::string> attribute_texts(const File& file, const std::string& object, const std::string& name);
 std::vector<std::int32_t> attribute_numbers(const File& file, const std::string& object, const std::string& name);

@@ -85,6 +85,16 @@ double diagonal_at(const File& file, const std::string& dataset, hsize_t row, in
   return one_number(file, dataset, set, space, {row, axis, axis});
 }
 
+std::vector<std::byte> bytes(const File& file, const std::string& dataset) {
+  const Handle set = open_set(file, dataset);
+  const Handle type(H5Dget_type(set.id()), H5Tclose);
+  const Handle space(H5Dget_space(set.id()), H5Sclose);
+  std::vector<std::byte> all(product(shape_of_space(space.id())) * H5Tget_size(type.id()));
+  if (!all.empty())
+    file.check(H5Dread(set.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()), "read " + dataset);
+  return all;
+}
+
 std::string text(const File& file, const std::string& dataset) { return texts(file, dataset).at(0); }
 
 std::vector<std::string> texts(const File& file, const std::string& dataset) {

@@ -66,6 +66,15 @@ def test_a_potential_of_ones_own_has_its_quotient_and_its_forces(examples):
     assert 1e-7 < error["psa, step 0.01"] < error["psa, step 0.02"] < 1e-2
 
 
+def test_a_slow_piston_keeps_to_the_adiabat(examples):
+    *rows, account = run(examples / "piston").splitlines()
+    values = [[float(x) for x in re.findall(r"[-\d.]+", row)] for row in rows]
+    assert [edge for edge, *_ in values] == [40, 35, 30, 25, 20]
+    assert all(abs(temperature / adiabat - 1) < 0.01 for _, temperature, adiabat, _ in values)
+    assert values[-1][1] > 1.7 and abs(values[-1][3] / (750 * (values[-1][1] - 1)) - 1) < 1e-3  # work: 3/2 N (T - 1)
+    assert float(re.search(r"error (\S+)", account)[1]) < 1e-12
+
+
 def test_the_engine_alone_needs_neither_mpi_nor_hdf5(tmp_path):
     absent = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("MPI", "HDF5", "spdlog", "CLI11", "nlohmann_json")]
     run("cmake", "-S", ROOT, "-B", tmp_path, "-DCAROM_ENGINE_ONLY=ON", *absent)

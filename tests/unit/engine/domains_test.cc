@@ -26,14 +26,16 @@ Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std
   Outcome<D> out;
   out.particles = c.system->particles;
   Particles<D>& p = out.particles;
-  EventCore<D> core(c.system->box, p);
+  Box<D> box = c.system->box;
+  EventCore<D> core(box, p);
   Counters counters;
   for (int k = 0; k < c.slabs && counters.sphere_sphere < limit; ++k) {
     core.load(p, c.g, c.slab);
     const double reached =
         core.run(c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = limit});
     core.fly_to(reached, p);
-    for (std::size_t i = 0; i < p.size(); ++i) c.system->box.wrap(p.x[i], p.image[i]);
+    for (std::size_t i = 0; i < p.size(); ++i) box.wrap(p.x[i], p.image[i]);
+    box = box.after(reached);
   }
   if (counted) *counted = counters;
   return out;
@@ -59,6 +61,7 @@ Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr
           domains.run(c.slab, {.counters = counters, .contacts = &contacts, .collision_limit = way.limit});
       domains.give_back(reached, p);
       system.wrap();
+      system.box = system.box.after(reached);
     }
     Particles<D> all = gathered(ranks, p);
     if (ranks.rank() > 0) return;
@@ -87,6 +90,7 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
       EXPECT_EQ(one.sphere_wall, many.sphere_wall) << what;
       EXPECT_EQ(one.collision_virial.value(), many.collision_virial.value()) << what;
       EXPECT_EQ(one.max_overlap, many.max_overlap) << what;
+      EXPECT_EQ(one.wall_work.value(), many.wall_work.value()) << what;
       if (getenv("SHOW"))
         std::cerr << what << ": windows " << counts.windows << " rounds " << counts.rounds << " cut " << counts.cut
                   << " events " << counts.events << " run " << counts.run_events << " redone " << counts.redone_events
@@ -167,6 +171,14 @@ TEST(Domains, WallsAndFields) {
       {.system = random_system<3>(150, {6, 6, 9}, {P, P, W}, 0.5, 0.5, 7), .g = {0.1, 0, -1}, .slab = 1}, 1000);
   expect_the_same_however_divided<2>(
       {.system = random_system<2>(40, {7, 12}, {W, W}, 0.3, 0.5, 8), .g = {0, -0.5}, .slab = 1}, 200);
+}
+
+TEST(Domains, Pistons) {
+  for (const double speed : {-0.3, 0.7}) {
+    Case<3> c{.system = random_system<3>(150, {7, 6, 8}, {W, P, W}, 0.4, 0.5, 25), .slab = 1};
+    c.system->box.edge_velocity = {speed, 0, -0.2};
+    expect_the_same_however_divided<3>(c, 800);
+  }
 }
 
 /// Regions with more events a sphere become smaller: that changes no path.

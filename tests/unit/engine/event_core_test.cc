@@ -52,9 +52,9 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
       }
       for (int k = 0; k < D; ++k)
         for (int side = 0; side < 2 && box.walled(k); ++side) {
-          const double sign = side == 0 ? 1 : -1,
-                       gap = side == 0 ? p.x[i][k] - p.radius[i] : box.edges[k] - p.radius[i] - p.x[i][k];
-          const double v = sign * p.v[i][k], a = sign * g[k];
+          const double sign = side == 0 ? 1 : -1, wall = side == 0 ? 0 : box.edges[k] + now * box.edge_velocity[k],
+                       gap = sign * (p.x[i][k] - wall) - p.radius[i];
+          const double v = sign * (p.v[i][k] - side * box.edge_velocity[k]), a = sign * g[k];
           double s = kNever;
           if (a == 0)
             s = v < 0 ? std::max(0.0, gap / -v) : kNever;
@@ -72,7 +72,8 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
     now += best;
     hits.push_back(next);
     if (next.kind == EventKind::wall) {
-      p.v[next.lo][next.hi / 2] *= -1;
+      double& v = p.v[next.lo][next.hi / 2];
+      v = 2 * (next.hi % 2) * box.edge_velocity[next.hi / 2] - v;
     } else {
       const Vec<D> d = p.x[next.lo] - p.x[next.hi] + best_shift;
       const double f = collision_factor<D>(d, p.v[next.lo] - p.v[next.hi], p.mass[next.lo], p.mass[next.hi]);
@@ -139,6 +140,17 @@ TEST(EventCore, FindsTheEventsThatTryingEverythingFinds) {
 TEST(EventCore, FindsThemInAUniformField) {
   expect_same_events<2>(*random_spheres<2>(8, 5, {P, W}, 7), Vec<2>(0, -1), 5, 20);
   expect_same_events<3>(*random_spheres<3>(8, 4, {W, P, W}, 8), Vec<3>(0.3, 0.5, -1), 4, 20);
+}
+
+TEST(EventCore, FindsThemWhereWallsMove) {
+  for (const double speed : {-0.15, 0.4}) {
+    const auto flat = random_spheres<2>(8, 4, {W, P}, 2);
+    flat->box.edge_velocity = {speed, 0};
+    expect_same_events<2>(*flat, Vec<2>::Zero(), 6, 20);
+    const auto deep = random_spheres<3>(10, 3.5, {W, W, W}, 6);
+    deep->box.edge_velocity = {speed, 0.1, 0};
+    expect_same_events<3>(*deep, Vec<3>(0, 0, -0.5), 4, 20);
+  }
 }
 
 TEST(EventCore, TwoSpheresInADiluteBoxMeetThroughAFarImage) {

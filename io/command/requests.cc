@@ -1,0 +1,73 @@
+#include "io/command/requests.h"
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+
+namespace carom {
+namespace {
+
+volatile std::sig_atomic_t stop_signal = 0, keep_signal = 0;
+
+extern "C" void note_signal(int number) {
+  if (number == SIGUSR1) {
+    keep_signal = 1;
+    return;
+  }
+  stop_signal = number;
+  if (number == SIGINT) std::signal(SIGINT, SIG_DFL);
+}
+
+constexpr double kBetweenLooks = 0.01;  // [s]
+constexpr double kMostCalls = 1e4;      // between looks
+
+}  // namespace
+
+Requests::Requests(std::optional<double> most) : most_(most) {
+  for (const int number : {SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2}) {
+    struct sigaction action {};
+    action.sa_handler = note_signal;
+    action.sa_flags = SA_RESTART;
+    sigemptyset(&action.sa_mask);
+    struct sigaction before {};
+    sigaction(number, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) sigaction(number, &action, nullptr);  // nohup stays as it is
+  }
+}
+
+Requests::Asked Requests::now(Exchange& ranks) {
+  const bool first = ranks.rank() == 0;
+  const bool over = first && most_ && seconds_since(start_) >= *most_;
+  const bool due = first && interval_ && seconds_since(last_checkpoint_) >= *interval_;
+  const double calls = static_cast<double>(skip_ + 1), life = seconds_since(last_look_);
+  std::array<double, 3> asked = {stop_signal != 0 || over ? 1.0 : 0.0, keep_signal != 0 || due ? 1.0 : 0.0,
+                                 first ? std::clamp(calls * kBetweenLooks / life, 1.0, kMostCalls) : 0.0};
+  ranks.largest(asked);
+  skip_ = static_cast<std::uint64_t>(asked[2]) - 1;
+  left_ = skip_;
+  last_look_ = Clock::now();
+  return {asked[0] + asked[1] > 0, asked[0] > 0};
+}
+
+Requests::Asked Requests::now_and_then(Exchange& ranks) {
+  if (left_ == 0) return now(ranks);
+  --left_;
+  return {};
+}
+
+void Requests::checkpoint_is_written() {
+  keep_signal = 0;
+  last_checkpoint_ = Clock::now();
+}
+
+std::string_view Requests::reason() const {
+  switch (stop_signal) {
+    case SIGTERM: return "SIGTERM";
+    case SIGINT: return "SIGINT";
+    case SIGHUP: return "SIGHUP";
+    case SIGUSR2: return "SIGUSR2";
+    default: return "--max-wall";
+  }
+}
+
+}  // namespace carom

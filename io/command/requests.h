@@ -1,0 +1,47 @@
+#pragma once
+// What is asked of a run from outside while it goes on: signals and the wall clock.
+//
+//   TERM, INT, HUP   write a checkpoint and stop; a second INT ends the process at once
+//   USR1             write a checkpoint and go on
+//   USR2             write a checkpoint and stop (mpirun passes USR1 and USR2 on to its ranks)
+//
+// Handlers only set a flag. All ranks look at it together: whichever of them has been told, all do it.
+
+#include <chrono>
+#include <optional>
+
+#include "engine/ranks/exchange.h"
+
+namespace carom {
+
+class Requests {
+ public:
+  /// Takes the signals over. `most`: wall time until the run is to stop; `between`: checkpoints [s].
+  explicit Requests(std::optional<double> most);
+
+  /// Wall time between checkpoints [s]; nothing: none but when the run ends or is stopped.
+  void set_interval(std::optional<double> seconds) { interval_ = seconds; }
+
+  struct Asked {
+    bool checkpoint = false, stop = false;
+  };
+  /// What has been asked by now, on any rank; rank 0's clock counts. Collective.
+  Asked now(Exchange& ranks);
+  /// The same, looked at only now and then where calls come fast.
+  Asked now_and_then(Exchange& ranks);
+  /// A checkpoint has been written.
+  void checkpoint_is_written();
+  /// Why the run was stopped, for people: the signal's name, or --max-wall.
+  std::string_view reason() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  }
+  std::optional<double> most_, interval_;
+  Clock::time_point start_ = Clock::now(), last_checkpoint_ = start_, last_look_ = start_;
+  std::uint64_t skip_ = 0, left_ = 0;  // calls of now_and_then() between looks; until the next
+};
+
+}  // namespace carom
