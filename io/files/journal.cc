@@ -145,6 +145,7 @@ struct Journaled : H5FD_t {
       std::filesystem::remove(journal_of(path));  // of an older file
       put_in_place(name_now(), path);
       is_new = false;
+      if (!open_journal()) return fail();
     } else if (!waiting.empty()) {
       constexpr std::byte kNone[8] = {};
       if (!write_all(journal, kNone, sizeof kNone, 0)) return fail();
@@ -155,12 +156,14 @@ struct Journaled : H5FD_t {
     return 0;
   }
 
-  bool write_journal(bool durable) {
+  bool open_journal() {
     constexpr std::uint64_t kRoom = 1 << 18;  // also for the last words of a run whose disk is full
-    if (journal < 0) {
-      journal = ::open(journal_of(path).c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-      if (journal < 0 || !set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kRoom)) return false;
-    }
+    journal = ::open(journal_of(path).c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    return journal >= 0 && set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kRoom);
+  }
+
+  bool write_journal(bool durable) {
+    if (journal < 0 && !open_journal()) return false;
     buffer = waiting.journal(size, last);
     return write_all(journal, buffer.data(), buffer.size(), 0) && (!durable || (sync(file) && sync(journal)));
   }
