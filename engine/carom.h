@@ -16,6 +16,7 @@
 #include "engine/base/interaction.h"
 #include "engine/forces/add_interaction.h"
 #include "engine/forces/forces.h"
+#include "engine/forces/potentials/options.h"
 #include "engine/integrators/integrator.h"
 #include "engine/ranks/system.h"
 #include "engine/run/mean_squared_displacement.h"

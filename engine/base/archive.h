@@ -13,29 +13,31 @@
 // bytes are for the same program on a machine of the same kind.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
+#include "engine/base/bytes.h"
 #include "engine/base/error.h"
 
 namespace carom {
 
 class Archive {
  public:
-  using Bytes = std::vector<std::byte>;
   /// Takes state.
   Archive() = default;
   /// Gives it back.
-  explicit Archive(const Bytes& bytes) : bytes_(bytes), reading_(true) {}
+  explicit Archive(Bytes bytes) : bytes_(std::move(bytes)), reading_(true) {}
 
   template <class... Values>
   void operator()(Values&... values) {
     (one(values), ...);
   }
   const Bytes& bytes() const { return bytes_; }
+  bool more() const { return at_ < bytes_.size(); }
   /// After all has been read: throws Error(Failure::file) if there is more.
   void finish() const {
     if (at_ != bytes_.size()) mismatch();
@@ -52,6 +54,11 @@ class Archive {
       raw(&value, sizeof value);
     else
       value.archive(*this);
+  }
+  void one(std::string& text) {
+    std::vector<char> values(text.begin(), text.end());
+    one(values);
+    text.assign(values.begin(), values.end());
   }
   template <class T>
   void one(std::vector<T>& values) {

@@ -1,14 +1,17 @@
 #pragma once
-// The arrays with one entry a particle, registered once by name: what belongs to a particle goes where it goes.
+// The state of a run, registered once by name: arrays with one entry a particle, and what there is one of a run.
 //
 //   system.fields.add("acceleration", a_);                         // a field: it migrates with its particle
 //   system.fields.add_working([&] { list_.reset(); },              // working memory: freed before other particles
 //                             [&] { list_.emplace(…); });          // come, made again for them
+//   system.fields.add_value("debt", debt_);                        // one of a run
 //
 // The particles' own arrays are fields from the start. What divides or keeps particles walks over the registry; no
 // method packs or unpacks anything by hand.
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <functional>
 #include <memory>
@@ -17,6 +20,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "engine/base/archive.h"
 #include "engine/base/vec.h"
 
 namespace carom {
@@ -25,19 +29,50 @@ class Fields {
  public:
   /// What a field is to a run.
   enum class Kind {
-    constant,  ///< given by the initial state, never changed
-    state      ///< part of the state: what goes on with the same state goes on with the same bits
+    constant,  ///< one entry a particle, given by the initial state, never changed
+    state      ///< one entry a particle: from the same state the same bits follow
+  };
+  /// What an entry consists of, as far as other programs can read it.
+  enum class Scalar { float64, int32, uint32, uint16, bytes };
+
+  /// An array with one entry a particle.
+  struct Field {
+    Field(std::string name_, Kind kind_, Scalar scalar_, std::size_t size_, std::size_t columns_)
+        : name(std::move(name_)), kind(kind_), scalar(scalar_), size(size_), columns(columns_) {}
+    virtual ~Field() = default;
+    virtual std::byte* data() = 0;  ///< of the first entry
+    virtual std::size_t entries() const = 0;
+    virtual void resize(std::size_t entries) = 0;  ///< 0: frees the memory
+    const std::string name;
+    const Kind kind;
+    const Scalar scalar;
+    const std::size_t size;     ///< of an entry [bytes]
+    const std::size_t columns;  ///< scalars of an entry
   };
 
   /// Registers a vector that has an entry for each particle of this rank and outlives the registry's use. A name that
   /// is there already now stands for this vector.
   template <class T>
   void add(std::string name, std::vector<T>& values, Kind kind = Kind::state) {
-    static_assert(std::is_trivially_copyable_v<T> || std::is_same_v<T, Vec<2>> || std::is_same_v<T, Vec<3>>);
     std::erase_if(fields_, [&](const auto& field) { return field->name == name; });
-    fields_.push_back(std::make_unique<Of<T>>(std::move(name), kind, values));
+    fields_.push_back(std::make_unique<List<T>>(std::move(name), kind, values));
   }
-  /// Registers working memory and calls prepare(). `owner` names it, for remove().
+  /// What there is one of a run; where ranks differ in it that of rank 0 counts.
+  struct OfRun {
+    std::string name;
+    std::function<void(Archive&)> archive;  ///< gives and takes it
+  };
+  void add_of_run(OfRun entry) {
+    std::erase_if(of_run_, [&](const OfRun& each) { return each.name == entry.name; });
+    of_run_.push_back(std::move(entry));
+  }
+  /// Registers a value, a list, or what has a member archive(Archive&), of which there is one a run.
+  template <class T>
+  void add_value(std::string name, T& value) {
+    add_of_run({std::move(name), [&value](Archive& archive) { archive(value); }});
+  }
+
+  /// Registers working memory and calls prepare(). `owner` names it, for remove_working().
   void add_working(const void* owner, std::function<void()> release, std::function<void()> prepare) {
     prepare();
     working_.push_back({owner, std::move(release), std::move(prepare)});
@@ -48,17 +83,10 @@ class Fields {
 
   // For the decomposition and for checkpoints.
 
-  /// One registered field.
-  struct Field {
-    Field(std::string name_, Kind kind_, std::size_t size_) : name(std::move(name_)), kind(kind_), size(size_) {}
-    virtual ~Field() = default;
-    virtual std::byte* data() = 0;                 ///< of the first particle
-    virtual void resize(std::size_t entries) = 0;  ///< 0: frees the memory
-    const std::string name;
-    const Kind kind;
-    const std::size_t size;  ///< of an entry [bytes]
-  };
-  const std::vector<std::unique_ptr<Field>>& all() const { return fields_; }
+  /// The fields with an entry for each particle, and those of the run.
+  const std::vector<std::unique_ptr<Field>>& of_particles() const { return fields_; }
+  const std::vector<OfRun>& of_run() const { return of_run_; }
+
   /// What all fields hold of one particle [bytes].
   std::size_t bytes() const {
     std::size_t sum = 0;
@@ -91,10 +119,28 @@ class Fields {
 
  private:
   template <class T>
-  struct Of final : Field {
-    Of(std::string name_, Kind kind_, std::vector<T>& values_)
-        : Field(std::move(name_), kind_, sizeof(T)), values(values_) {}
+  static constexpr Scalar scalar_of() {
+    if constexpr (std::is_same_v<T, double> || std::is_same_v<T, Vec<2>> || std::is_same_v<T, Vec<3>>)
+      return Scalar::float64;
+    else if constexpr (std::is_same_v<T, Image<2>> || std::is_same_v<T, Image<3>>)
+      return Scalar::int32;
+    else if constexpr (std::is_same_v<T, std::uint32_t>)
+      return Scalar::uint32;
+    else
+      return std::is_same_v<T, std::uint16_t> ? Scalar::uint16 : Scalar::bytes;
+  }
+  static constexpr std::size_t width(Scalar scalar) {
+    constexpr std::array<std::size_t, 5> kWidth{8, 4, 4, 2, 1};
+    return kWidth[static_cast<std::size_t>(scalar)];
+  }
+  template <class T>
+  struct List final : Field {
+    static_assert(std::is_trivially_copyable_v<T> || scalar_of<T>() != Scalar::bytes);
+    List(std::string name_, Kind kind_, std::vector<T>& values_)
+        : Field(std::move(name_), kind_, scalar_of<T>(), sizeof(T), sizeof(T) / width(scalar_of<T>())),
+          values(values_) {}
     std::byte* data() override { return reinterpret_cast<std::byte*>(values.data()); }
+    std::size_t entries() const override { return values.size(); }
     void resize(std::size_t entries) override {
       if (entries == 0)
         std::vector<T>().swap(values);
@@ -109,6 +155,7 @@ class Fields {
   };
 
   std::vector<std::unique_ptr<Field>> fields_;
+  std::vector<OfRun> of_run_;
   std::vector<Working> working_;
 };
 

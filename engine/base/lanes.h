@@ -15,6 +15,8 @@
 #include <immintrin.h>
 #endif
 
+#define CAROM_INLINE [[gnu::always_inline]] inline
+
 namespace carom {
 
 /// A vector of doubles.
@@ -44,36 +46,86 @@ using IntegerOf = typename LanesOf<T>::Integer;
 
 /// The same number in every lane.
 template <class T>
-[[gnu::always_inline]] inline T all(double value) {
+CAROM_INLINE T all(double value) {
   if constexpr (std::same_as<T, double>)
     return value;
   else
     return value - T{};
 }
 
+/// The vectors of W lanes.
+template <int W>
+struct Width {
+  typedef double Double __attribute__((vector_size(8 * W)));
+  typedef int Int __attribute__((vector_size(4 * W)));
+  typedef unsigned Unsigned __attribute__((vector_size(4 * W)));
+};
+using Two = Width<2>::Double;
+using Four = Width<4>::Double;
+using Eight = Width<8>::Double;
+
+template <class V>
+CAROM_INLINE V load(const void* at) {
+  V lanes;
+  __builtin_memcpy(&lanes, at, sizeof lanes);
+  return lanes;
+}
+template <class V>
+CAROM_INLINE void store(void* at, V lanes) {
+  __builtin_memcpy(at, &lanes, sizeof lanes);
+}
+
+/// The sign of each lane, one bit a lane; of lanes of 32 or 64 bits.
+template <class M>
+CAROM_INLINE unsigned bits(M mask) {
+  constexpr bool kHalf = sizeof mask[0] == 4;
+#if defined(__AVX512DQ__)
+  if constexpr (!kHalf && sizeof mask == 64) return _mm512_movepi64_mask((__m512i)mask);
+#endif
+#if defined(__AVX__)
+  if constexpr (!kHalf && sizeof mask == 32) return static_cast<unsigned>(_mm256_movemask_pd((__m256d)mask));
+  if constexpr (kHalf && sizeof mask == 32) return static_cast<unsigned>(_mm256_movemask_ps((__m256)mask));
+#endif
+#if defined(__SSE2__)
+  if constexpr (!kHalf && sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
+  if constexpr (kHalf && sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_ps((__m128)mask));
+  if constexpr (kHalf && sizeof mask == 32)
+    return bits(__builtin_shufflevector(mask, mask, 0, 1, 2, 3)) | bits(__builtin_shufflevector(mask, mask, 4, 5, 6, 7))
+                                                                       << 4;
+#endif
+  unsigned all = 0;
+  for (unsigned l = 0; l < sizeof mask / sizeof mask[0]; ++l)
+    all |= static_cast<unsigned>(mask[l] >> (8 * sizeof mask[0] - 1) & 1) << l;
+  return all;
+}
+
+/// a < b, a mask: GCC for SSE2 takes the conjunction of two comparisons to pieces.
+template <class V>
+CAROM_INLINE IntegerOf<V> below(V a, V b) {
+#if defined(__SSE2__)
+  if constexpr (sizeof a == 16) return (IntegerOf<V>)_mm_cmplt_pd((__m128d)a, (__m128d)b);
+#endif
+  return (IntegerOf<V>)(a < b);
+}
+/// Where a < b, one bit a lane.
+template <class V>
+CAROM_INLINE unsigned less(V a, V b) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof a == 64) return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ);
+#endif
+  return bits(a < b);
+}
+
 namespace elementary {
 
 /// Whether a comparison holds in any lane.
-[[gnu::always_inline]] inline bool any(bool mask) { return mask; }
+CAROM_INLINE bool any(bool mask) { return mask; }
 template <class Mask>
-requires(sizeof(Mask) > sizeof(long long)) [[gnu::always_inline]] inline bool any(Mask mask) {
-#if defined(__AVX512DQ__)
-  if constexpr (sizeof mask == 64) return _mm512_movepi64_mask((__m512i)mask) != 0;
-#endif
-#if defined(__AVX__)
-  if constexpr (sizeof mask == 32) return _mm256_movemask_pd((__m256d)mask) != 0;
-#endif
-#if defined(__SSE2__)
-  if constexpr (sizeof mask == 16) return _mm_movemask_pd((__m128d)mask) != 0;
-#endif
-  long long found = 0;
-  for (unsigned l = 0; l < sizeof mask / sizeof found; ++l) found |= mask[l];
-  return found != 0;
-}
+requires(sizeof(Mask) > sizeof(long long)) CAROM_INLINE bool any(Mask mask) { return bits(mask) != 0; }
 
-[[gnu::always_inline]] inline double sqrt(double x) { return __builtin_sqrt(x); }
+CAROM_INLINE double sqrt(double x) { return __builtin_sqrt(x); }
 template <Lanes T>
-[[gnu::always_inline]] inline T sqrt(T x) {
+CAROM_INLINE T sqrt(T x) {
 #if defined(__AVX512F__)
   if constexpr (sizeof x == 64) return (T)_mm512_sqrt_pd((__m512d)x);
 #endif
@@ -89,27 +141,36 @@ template <Lanes T>
 
 /// |x|, also of −0.
 template <class T>
-[[gnu::always_inline]] inline T abs(T x) {
+CAROM_INLINE T abs(T x) {
   return __builtin_bit_cast(T, __builtin_bit_cast(BitsOf<T>, x) & 0x7fffffffffffffffULL);
 }
 /// The lesser and the greater of two numbers; the second where one is no number.
 template <class T>
-[[gnu::always_inline]] inline T min(T a, T b) {
+CAROM_INLINE T min(T a, T b) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof a == 64) return (T)_mm512_min_pd((__m512d)a, (__m512d)b);
+#endif
+#if defined(__AVX__)
+  if constexpr (sizeof a == 32) return (T)_mm256_min_pd((__m256d)a, (__m256d)b);
+#endif
+#if defined(__SSE2__)
+  if constexpr (sizeof a == 16) return (T)_mm_min_pd((__m128d)a, (__m128d)b);
+#endif
   return a < b ? a : b;
 }
 template <class T>
-[[gnu::always_inline]] inline T max(T a, T b) {
+CAROM_INLINE T max(T a, T b) {
   return a > b ? a : b;
 }
 
 /// The nearest integer, the even one of two, for |x| < 2^51.
 template <class T>
-[[gnu::always_inline]] inline T nearest_integer(T x) {
+CAROM_INLINE T nearest_integer(T x) {
   return (x + 0x1.8p52) - 0x1.8p52;
 }
 /// 2^k for an integer −1022 ≤ k ≤ 1023.
 template <class T>
-[[gnu::always_inline]] inline T power_of_two(T k) {
+CAROM_INLINE T power_of_two(T k) {
   return __builtin_bit_cast(T, __builtin_bit_cast(BitsOf<T>, k + (0x1.8p52 + 1023)) << 52);
 }
 

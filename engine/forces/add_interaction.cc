@@ -6,7 +6,11 @@ namespace carom {
 
 template <int D>
 void add_interaction(System<D>& system, std::string_view type, Parameters given) {
-  const InteractionInfo& info = find_interaction(type);
+  add_interaction(system, find_interaction(type), std::move(given));
+}
+
+template <int D>
+void add_interaction(System<D>& system, const InteractionInfo& info, Parameters given) {
   system.interactions.push_back(
       info.make<D>(completed(info.name, info.parameters, std::move(given)), {.box = system.box,
                                                                              .particles = system.particles,
@@ -18,5 +22,7 @@ void add_interaction(System<D>& system, std::string_view type, Parameters given)
 
 template void add_interaction(System<2>&, std::string_view, Parameters);
 template void add_interaction(System<3>&, std::string_view, Parameters);
+template void add_interaction(System<2>&, const InteractionInfo&, Parameters);
+template void add_interaction(System<3>&, const InteractionInfo&, Parameters);
 
 }  // namespace carom

@@ -1,5 +1,5 @@
 #pragma once
-// Terms of V by their names.
+// Terms of V by their names, or by a declaration of one's own.
 
 #include <string_view>
 
@@ -11,5 +11,8 @@ namespace carom {
 /// Error(Failure::deck). Particles must be there, and bonds before terms that exclude bonded pairs.
 template <int D>
 void add_interaction(System<D>& system, std::string_view type, Parameters given);
+/// The same of a type that only this program has (engine/examples/own_potential.cc).
+template <int D>
+void add_interaction(System<D>& system, const InteractionInfo& info, Parameters given);
 
 }  // namespace carom

@@ -1,10 +1,14 @@
-// Kernels that turn separations into forces, one for each potential, and the table of all kernels; included, as
-// pair_kernel.h, by pair_kernels_*.cc only.
+#pragma once
+// From separations to forces: the loop over a batch of pairs for one potential, written once for any number of lanes.
+//
+// The kernels have it for the potentials of pair_potentials.h in every vector width; for others it is compiled where
+// they are used (pair_term.h). Linkage is internal, so that no function compiled for one machine can end up in
+// another's binary.
 
 #include <type_traits>
 
-#include "engine/forces/potentials/pair_potentials.h"
-#include "engine/forces/simd/pair_kernel.h"
+#include "engine/base/lanes.h"
+#include "engine/forces/simd/pair_kernels.h"
 
 namespace carom {
 namespace {
@@ -83,7 +87,7 @@ template <int W, class P, Wanted wanted, bool wide>
         low += sum[s][0][l];
         if constexpr (wide) *totals_of[s] += static_cast<PairTotals::Whole>(sum[s][1][l]) << 40;
       }
-      low -= (batch.n + W - 1) / W * W * __builtin_bit_cast(std::uint64_t, kToInteger);
+      low -= (std::uint64_t{batch.n} + W - 1) / W * W * __builtin_bit_cast(std::uint64_t, kToInteger);
       *totals_of[s] += static_cast<std::int64_t>(low);
     }
   }
@@ -91,22 +95,12 @@ template <int W, class P, Wanted wanted, bool wide>
 }
 
 template <int W, class P>
-constexpr PairFormula formula() {
+constexpr PairFormula pair_formula() {
   using enum Wanted;
   return {{evaluate<W, P, forces, false>, evaluate<W, P, forces, true>},
           {evaluate<W, P, forces_and_sums, false>, evaluate<W, P, forces_and_sums, true>},
           {evaluate<W, P, mean_forces, false>, evaluate<W, P, mean_forces, true>},
           {evaluate<W, P, hessian_product, false>, evaluate<W, P, hessian_product, true>}};
-}
-
-template <int W, class... P>
-struct Formulas {
-  static constexpr PairFormula kAll[] = {formula<W, P>()...};
-};
-
-template <int W, class... P>
-constexpr PairKernels kernels_of(const char* name, PotentialList<P...>) {
-  return {name, collect<W>, scatter<W>, find_partners<W>, Formulas<W, P...>::kAll};
 }
 
 }  // namespace

@@ -8,95 +8,8 @@
 
 namespace carom {
 
-template <int D>
-void PairRecords<D>::clear() {
-  for (int kind = 0; kind < kKinds; ++kind) runs[kind].clear(), partners[kind].clear();
-  order.clear();
-  box.clear();
-}
-
 namespace {
 
-template <int D>
-PairRecord record(const Vec<D>& x, double w) {
-  return {x[0], x[1], D == 3 ? x[D - 1] : 0, w};
-}
-
-}  // namespace
-
-template <int D>
-void PairRecords<D>::load(const PairStep<D>& step) {
-  x_.resize(order.size());
-  for (std::size_t r = 0; r < order.size(); ++r)
-    x_[r] = record<D>(step.x[order[r]], step.weight ? (*step.weight)[order[r]] : 1);
-  const auto& other = step.vectors.empty() ? step.x_new : step.vectors;
-  if (other.empty()) return;
-  x_new_.resize(order.size());
-  for (std::size_t r = 0; r < order.size(); ++r) x_new_[r] = record<D>(other[order[r]], 1);
-}
-
-template <int D>
-PairRows PairRecords<D>::rows(Kind kind, const Box<D>& in, const PairStep<D>& step) {
-  PairRows rows{.x = x_.data()};
-  rows.vectors = !step.vectors.empty();
-  if (rows.vectors || !step.x_new.empty()) rows.x_new = x_new_.data();
-  if (kind != kPlain && !box.empty()) rows.box = box.data();
-  for (int k = 0; k < D; ++k) rows.edges[k] = in.edges[k];
-  rows.weighted = step.weight != nullptr;
-  rows.partner = partners[kind].data();
-  rows.run = runs[kind].data();
-  rows.runs = runs[kind].size();
-  if (!step.changed) return rows;
-  some_runs_.clear();
-  some_partners_.clear();
-  for (const PairRun& run : runs[kind]) {
-    PairRun some = run;
-    some.begin = static_cast<std::uint32_t>(some_partners_.size());
-    const std::uint32_t* const partner = partners[kind].data() + run.begin;
-    if (step.changed[order[run.row]] != 0) {
-      some_partners_.insert(some_partners_.end(), partner, partner + run.count);
-    } else {
-      for (std::uint32_t k = 0; k < run.count; ++k)
-        if (step.changed[order[partner[k]]] != 0) some_partners_.push_back(partner[k]);
-    }
-    some.count = static_cast<std::uint32_t>(some_partners_.size()) - some.begin;
-    if (some.count > 0) some_runs_.push_back(some);
-  }
-  some_partners_.resize(some_partners_.size() + 8);
-  rows.partner = some_partners_.data();
-  rows.run = some_runs_.data();
-  rows.runs = some_runs_.size();
-  return rows;
-}
-
-template <int D>
-ForceWords* PairRecords<D>::low() {
-  low_.assign(order.size(), {});
-  high_.clear();
-  return low_.data();
-}
-
-template <int D>
-ForceWords* PairRecords<D>::high() {
-  high_.resize(order.size());
-  return high_.data();
-}
-
-template <int D>
-void PairRecords<D>::pass_on(ForceSums<D>& sums) {
-  ForceWords* const low = sums.low();
-  for (std::size_t r = 0; r < low_.size(); ++r) low[order[r]].add(low_[r]);
-  if (high_.empty()) return;
-  ForceWords* const high = sums.high();
-  for (std::size_t r = 0; r < high_.size(); ++r) high[order[r]].add(high_[r]);
-}
-
-namespace {
-
-constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
-constexpr double kCalls = 16;    // a skin is as wide as particles come in so many calls: half of it lasts for eight,
-constexpr double kWidest = 0.8;  // where it need not be wider than this for it [cutoff]
-constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
 constexpr std::size_t kMostPairs = 100'000'000, kMostPartners = 5000;  // a particle; more are a step gone wild
 
 /// The larger of two squared distances; a step to where there is no number does not count, its force will tell.
@@ -132,25 +45,16 @@ template <int D>
 PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>& particles) {
   const bool still = step.x_new.empty();
   double squared_from_build = 0, squared_step = 0;
-  bool known = rebuilds_ > 0 && particles_ == step.x.size() && ghost_ == particles.ghost;
+  bool known = made_ && particles_ == step.x.size() && ghost_ == particles.ghost;
   known = known && follow(step, squared_from_build, squared_step);
   if (!known && !still)
     for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
-  const double length = std::sqrt(squared_step), from_build = std::sqrt(squared_from_build);
-  const double to_last = kCalls * from_build / static_cast<double>(++calls_);
-  const double room = known && to_last <= kWidest * cutoff_ ? to_last : 0;
-  const double wanted = std::max({kLeastSkin * cutoff_, 4 * length, room});
-  const bool wasteful = length > 0 && skin_ > kTooWide * wanted;  // made for one wild step
-  if (!(known && from_build <= 0.5 * skin_) || wasteful) {
+  if (!made_) skin_.begin(2 * *learned_);
+  const double length = std::sqrt(squared_step);
+  if (!skin_.lasts(known, std::sqrt(squared_from_build), length)) {
     need_finite(particles, step.x);
-    for (int k = 0; k < D; ++k)
-      if (box_.periodic(k) && !(length <= kMostBoxes * box_.edges[k]))
-        throw Error(Failure::numerical, "particle " + std::to_string(particles.id_of(farthest(step))) +
-                                            " moves farther than " + std::to_string(kMostBoxes) +
-                                            " edges of the periodic box within one step; use a smaller "
-                                            "integrator.step");
-    const double kept = rebuilds_ == 0 ? *learned_ : 0.5 * skin_;
-    *learned_ = skin_ = std::max(wanted, wasteful ? 0.0 : kept);
+    skin_.renew(box_, length, [&] { return "particle " + std::to_string(particles.id_of(farthest(step))); });
+    *learned_ = skin_.width();
     ghost_ = particles.ghost;
     build(step, particles);
   }
@@ -162,7 +66,7 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
 /// time; false where one has that was not expected to, or where a position is not finite.
 template <int D>
 bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, double& squared_step) {
-  const double allowed = 0.25 * skin_ * skin_;
+  const double allowed = 0.25 * skin_.width() * skin_.width();
   for (std::size_t r = 0; r < records_.order.size(); ++r) {
     const Id i = records_.order[r];
     Vec<D> home;
@@ -280,8 +184,7 @@ struct Cells {
 
 template <int D>
 void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles) {
-  ++rebuilds_;
-  calls_ = 0;
+  made_ = true;
   particles_ = step.x.size();
   records_.clear();
   plain_size_ = 0;
@@ -289,7 +192,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   Extent<D> extent;
   for (Id i = 0; i < step.x.size(); ++i)
     if (filter_.species.code(i) != 0) members.push_back(i), extent.add(step.x[i]);
-  const double reach = cutoff_ + skin_;
+  const double reach = cutoff_ + skin_.width();
   Cells<D> cells(CellGrid<D>(box_, reach, extent), reach);
 
   // Counting sort by cell.
@@ -319,8 +222,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     if (!ghost_.empty() && ghost_[i] != 0) code |= PartnerSearch::kGhost | PartnerSearch::kOdd;
     bool moving = boxes[r] != Image<D>{};
     for (int k = 0; k < D; ++k)
-      moving = moving ||
-               (box_.periodic(k) && std::min(home[k], box_.edges[k] - home[k]) <= 0.5 * skin_ + 1e-9 * box_.edges[k]);
+      moving = moving || (box_.periodic(k) &&
+                          std::min(home[k], box_.edges[k] - home[k]) <= 0.5 * skin_.width() + 1e-9 * box_.edges[k]);
     if (moving) code |= PartnerSearch::kMoving | PartnerSearch::kOdd;
     any_moving = any_moving || moving;
     for (int k = 0; k < D; ++k) built_at_[k][r] = home[k];
@@ -342,7 +245,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     if (cells.start[c] < cells.start[c + 1]) {
       std::size_t rest = c;
       for (int k = D - 1; k >= 0; --k) {
-        const auto count = static_cast<std::size_t>(cells.grid.count(k) * (k < D - 1 ? 1 : Cells<D>::kSlices));
+        const std::size_t slices = k < D - 1 ? 1 : Cells<D>::kSlices;
+        const std::size_t count = slices * static_cast<std::size_t>(cells.grid.count(k));
         centre[k] = static_cast<std::int32_t>(rest % count);
         rest /= count;
       }
@@ -354,9 +258,9 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
         if (among) ranges[0].begin = r + 1;
         find_pairs(r, ranges);
         if (plain_size_ + records_.partners[PairRecords<D>::kMoving].size() > kMostPairs + kMostPartners * particles_) {
-          rebuilds_ = 0;
+          made_ = false;
           throw Error(Failure::numerical, "far too many pairs are within " + short_text(reach) +
-                                              " of each other: the cutoff and " + short_text(skin_) +
+                                              " of each other: the cutoff and " + short_text(skin_.width()) +
                                               " for steps as long as that of particle " +
                                               std::to_string(particles.id_of(farthest(step))) +
                                               "; use a smaller integrator.step or cutoff");
@@ -374,7 +278,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
 template <int D>
 void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> ranges) {
   const std::uint64_t code = code_[row];
-  const double reach = (cutoff_ + skin_) * (1 + 1e-12);
+  const double reach = (cutoff_ + skin_.width()) * (1 + 1e-12);
   const bool is_ghost = (code & PartnerSearch::kGhost) != 0;
   PartnerSearch search{.x = {built_at_[0].data(), built_at_[1].data(), built_at_[2].data()},
                        .code = code_.data(),
@@ -422,8 +326,6 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
   }
 }
 
-template class PairRecords<2>;
-template class PairRecords<3>;
 template class CutoffList<2>;
 template class CutoffList<3>;
 

@@ -16,7 +16,7 @@ class VerletPieces {
  public:
   VerletPieces(System<D>& system, std::uint64_t max_events) : system_(system), scan_(system, max_events) {}
 
-  void start(Counters& counters) { accelerations_.update(system_, counters); }
+  void start(Counters& counters) { accelerations_.start(system_, counters); }
 
   void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, double length) {
     counters_ = &counters;

@@ -11,7 +11,7 @@ constexpr double kWorstContraction = 0.5;
 }  // namespace
 
 template <int D>
-DiscreteGradient<D>::DiscreteGradient(const System<D>& system, int order) : system_(system) {
+DiscreteGradient<D>::DiscreteGradient(System<D>& system, int order) : system_(system) {
   if (order == 4) {
     constexpr double gamma = 0.41449077179437573714;  // 1/(4 − 4^{1/3})
     fractions_ = {gamma, gamma, 1 - 4 * gamma, gamma, gamma};
@@ -20,6 +20,8 @@ DiscreteGradient<D>::DiscreteGradient(const System<D>& system, int order) : syst
   }
   const std::size_t n = system.particles.size();
   mean_acceleration_.assign(fractions_.size(), std::vector<Vec<D>>(n, Vec<D>::Zero()));
+  for (std::size_t stage = 0; stage < mean_acceleration_.size(); ++stage)
+    system.fields.add("mean acceleration " + std::to_string(stage), mean_acceleration_[stage]);
   for (auto* field : {&x_, &v_, &chord_, &trial_, &force_, &mean_, &next_}) field->assign(n, Vec<D>::Zero());
 }
 

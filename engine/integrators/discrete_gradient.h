@@ -19,7 +19,7 @@ template <int D>
 class DiscreteGradient {
  public:
   /// order: 2 or 4.
-  DiscreteGradient(const System<D>& system, int order);
+  DiscreteGradient(System<D>& system, int order);
 
   /// Computes x() and v() from (x, v) over `tau`. Resting contacts are held by reactions λ(d + d'), λ ≥ 0, that do no
   /// work because |d'| = |d|. False where the iteration does not contract well: take a shorter piece.

@@ -71,6 +71,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     evaluate_forces<D>(system, p.x, a_, counters);
     for (std::size_t i = 0; i < a_.size(); ++i) a_[i] /= p.mass[i];
     past_.start(system.fields, a_);
+    system.fields.add_value("edda", scales_);
+    system.fields.add_value("edda found", kept_);
     const auto sum = [&](auto&& term) {
       ExactSum own;
       for (Id i = 0; i < p.size(); ++i)
@@ -78,11 +80,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       return system.decomposition.sum(own).value();
     };
     const double n = static_cast<double>(std::max<std::size_t>(1, system.size()));
-    speed_ = std::sqrt(sum([&](Id i) { return p.v[i].squaredNorm(); }) / n);
-    strength_ = std::sqrt(sum([&](Id i) { return a_[i].squaredNorm(); }) / n);
+    scales_.speed = std::sqrt(sum([&](Id i) { return p.v[i].squaredNorm(); }) / n);
+    scales_.strength = std::sqrt(sum([&](Id i) { return a_[i].squaredNorm(); }) / n);
     const double mass = sum([&](Id i) { return p.mass[i]; });
     const bool free = n > 1 && system.keeps_momentum();  // and more than it moves
-    for (int k = 0; k < D; ++k) centre_[k] = free ? sum([&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass : 0.0;
+    for (int k = 0; k < D; ++k)
+      scales_.centre[k] = free ? sum([&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass : 0.0;
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
@@ -159,7 +162,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     std::ranges::fill(swaps_, 0);
     std::ranges::fill(move_, Vec<D>::Zero());
     any_freezes_ = false;
-    const double scale = std::max(speed_, h * strength_);
+    const double scale = std::max(scales_.speed, h * scales_.strength);
     const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
     std::array<double, kMostSweeps + 1> residual{};                                  // by sweep
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
@@ -236,6 +239,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     return static_cast<Id>(most - a_.begin());
   }
 
+  Vec<D> centre() const { return Vec<D>(scales_.centre.data()); }
   bool frozen(Id i) const { return swaps_[i] > kSwaps; }
   static double finite(double value) { return std::isnan(value) ? kNever : value; }
 
@@ -281,7 +285,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
       if (frozen(i)) lacks.add(std::min(std::abs(lack(p, i, h)), std::numeric_limits<double>::max()));
-      kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre_).squaredNorm());
+      kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre()).squaredNorm());
     }
     return system.decomposition.sum(lacks).value() <= kMostFolded * system.decomposition.sum(kinetic).value();
   }
@@ -302,15 +306,17 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     core_->finish(p);
     for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
     const double left = any_freezes_ ? fold_near(system, of_frozen, *counters_) : 0;
-    fold(system, centre_, lacks.sum(), left, *counters_);
+    fold(system, centre(), lacks.sum(), left, *counters_);
     system.decomposition.update_halo();
     past_.pass(h, mean_);
   }
 
   std::uint64_t max_events_;
-  double tolerance_;                 // what sweeps may leave of h a, relative to the speed scale
-  double speed_ = 0, strength_ = 0;  // root mean square velocity and acceleration at the start of the run
-  Vec<D> centre_ = Vec<D>::Zero();   // velocity of the centre of mass, where it is kept
+  double tolerance_;  // what sweeps may leave of h a, relative to the speed scale
+  struct Scales {
+    double speed = 0, strength = 0;  // root mean square velocity and acceleration at the start of the run
+    std::array<double, D> centre{};  // velocity of the centre of mass, where it is kept
+  } scales_;
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> past_;
   MeanForces<D> forces_;

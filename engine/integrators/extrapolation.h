@@ -21,11 +21,13 @@ class Extrapolation {
       fields.add("past acceleration " + std::to_string(k), past_[k]);
     }
     known_ = 0;
+    fields.add_value("past lengths", length_);
+    fields.add_value("past slabs", known_);
   }
   /// A slab of this length is done, with these accelerations.
   void pass(double length, const std::vector<Vec<D>>& a) {
-    std::ranges::rotate(length_, length_.end() - 1);
-    std::ranges::rotate(past_, past_.end() - 1);
+    std::rotate(length_.begin(), length_.end() - 1, length_.end());
+    std::rotate(past_.begin(), past_.end() - 1, past_.end());
     length_[0] = length;
     past_[0] = a;
     known_ = std::min(known_ + 1, kOrder + 1);

@@ -2,6 +2,7 @@
 //
 // The slab is an epoch: at its end all records are flown to one time and wrapped, so that times stay small and their
 // last digits fine. Between events x(t) = x + v s + ½ g s² holds exactly; there is no step and no truncation error.
+// Within an epoch it can leave off with the records as state: plans are pure functions of them.
 
 #include <optional>
 
@@ -25,6 +26,10 @@ class FreeFlight : public Integrator<D> {
       domains_.emplace(system.box, system.decomposition.sizes(), *ranks_);
     else
       core_.emplace(system.box, system.particles);
+    system.fields.add("time of last event", instants_.t);
+    system.fields.add("generation", instants_.generation);
+    system.fields.add_value("epoch time", instants_.now);
+    system.fields.add_value("within epoch", within_);
     for (const auto& term : system.interactions) {
       if (!term->common_acceleration())
         throw Error(Failure::deck, "free-flight knows no forces but a uniform-field; use psa, cva, mcva or cdda");
@@ -33,46 +38,99 @@ class FreeFlight : public Integrator<D> {
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
-    if (core_)
-      run_epoch(*core_, system, slab, report);
-    else
+    if (domains_)
       run_epoch(*domains_, system, slab, report);
+    else if (within_ && !loaded_)
+      run_epoch(resumed_.emplace(system.box, Sizes(system.particles), *ranks_), system, slab, report);
+    else if (resumed_)
+      run_epoch(*resumed_, system, slab, report);
+    else
+      run_epoch(*core_, system, slab, report);
   }
 
  private:
+  /// About as many collisions are run between looks at SlabReport::pause.
+  static constexpr double kCollisionsBetweenLooks = 5e5;
+
   /// `flight`: an EventCore, or Domains.
   template <class Flight>
   void run_epoch(Flight& flight, System<D>& system, const Slab& slab, SlabReport<D>& report) {
     const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
                                                max_events_ * system.size()};
+    begin(flight, system, slab, report.counters);
+    const double looks = std::max(1.0, 20.0 * static_cast<double>(system.size()) / kCollisionsBetweenLooks);
+    // Flies to `end`, or as far as it comes; false: not to its end.
     const auto run = [&](double end) {
       const Stopwatch watch(report.counters.seconds.queue);
-      return flight.run(end, events);
+      while (!at_limit_ && !report.paused && instants_.now < end) {
+        const double next = report.pause ? std::min(end, instants_.now + slab.length / looks) : end;
+        instants_.now = flight.run(next, events);
+        at_limit_ = instants_.now < next;
+        if (report.pause && instants_.now < slab.length) report.paused = at_limit_ || report.pause();
+      }
+      return instants_.now == end;
     };
-    {
-      const Stopwatch watch(report.counters.seconds.predict);
-      flight.take(system.particles, g_, slab.length);
-    }
     try {
-      report.reached = slab.length;
+      bool all = true;
       for (double due : report.observe) {
-        report.reached = run(due);
-        if (report.reached < due) break;
+        all = all && run(due);
+        if (!all) break;
         if (copies_.mass.empty()) copies_ = system.particles;
         flight.fly_to(due, copies_);
         copies_.image = system.particles.image;
         for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
         report.observer(due, copies_);
       }
-      if (report.observe.empty() || report.reached == report.observe.back()) report.reached = run(slab.length);
+      if (all) run(slab.length);
     } catch (...) {
       if (ranks_->size() == 1) flight.give_back(flight.now(), system.particles);
       throw;
     }
+    if (report.paused) return leave_off(flight, system.particles);
+    report.reached = instants_.now;
     flight.give_back(report.reached, system.particles);
+    within_ = loaded_ = at_limit_ = false;
+    instants_ = {};
     report.counters.events = flight.counts();
     if (domains_) report.counters.domains = domains_->domain_counts();
+    resumed_.reset();
     system.wrap();
+  }
+
+  /// Gives the flight the particles, those of an epoch that was left off as they were.
+  template <class Flight>
+  void begin(Flight& flight, System<D>& system, const Slab& slab, Counters& counters) {
+    const Stopwatch watch(counters.seconds.predict);
+    Particles<D>& p = system.particles;
+    if (!within_) {
+      instants_ = {};
+      flight.take(p, g_, slab.length);
+    } else if (loaded_) {
+      std::vector<Vec<D>>().swap(p.x);
+      std::vector<Vec<D>>().swap(p.v);
+    } else if constexpr (requires { flight.go_on(p, g_, slab.length, instants_); }) {
+      flight.go_on(p, g_, slab.length, instants_);
+    }
+    within_ = loaded_ = true;
+  }
+
+  /// Writes the records into the state of the run, for a checkpoint; the flight has them still.
+  template <class Flight>
+  void leave_off(const Flight& flight, Particles<D>& p) {
+    if constexpr (requires { flight.records(p, instants_); }) {
+      flight.records(p, instants_);
+    } else {
+      const std::size_t n = p.mass.size();
+      for (auto* each : {&p.x, &p.v}) each->resize(n);
+      instants_.t.resize(n);
+      instants_.generation.resize(n);
+      for (const Record<D>& r : flight.flights().records()) {
+        p.x[r.id] = r.x;
+        p.v[r.id] = r.v;
+        instants_.t[r.id] = r.t;
+        instants_.generation[r.id] = r.generation;
+      }
+    }
   }
 
   std::uint64_t max_events_;
@@ -80,6 +138,11 @@ class FreeFlight : public Integrator<D> {
   Exchange* ranks_ = nullptr;
   std::optional<EventCore<D>> core_;  // one of the two
   std::optional<Domains<D>> domains_;
+  std::optional<Domains<D>> resumed_;  // one rank: for the rest of an epoch that was left off in another process
+  bool within_ = false;                // an epoch that was left off
+  bool loaded_ = false;                // whose flights are here
+  bool at_limit_ = false;              // of collisions
+  Instants instants_;
   Particles<D> copies_;
 };
 

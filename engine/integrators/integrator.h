@@ -31,8 +31,11 @@ struct SlabReport {
   std::vector<Contact<D>>* contacts = nullptr;  ///< where to put the executed contacts, in key order; null: not wanted
   std::span<const double> observe{};  ///< ascending times within the slab at which to observe (free flight only)
   std::function<void(double, const Particles<D>&)> observer{};  ///< given copies flown to each of these times
+  /// Asked now and then within an epoch of free flight: true, and the integrator leaves off with `paused`. Collective.
+  std::function<bool()> pause{};
   double reached =
       0;  ///< set by the integrator: the time within the slab it came to; less than its length only at collision_limit
+  bool paused = false;  ///< the slab is not done: slab() is to be called again with the same slab, which goes on in it
 };
 
 template <int D>

@@ -32,6 +32,12 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     force_.resize(n);
     product_.resize(n);
     w_.assign(n, Vec<D>::Zero());
+    system.fields.add_value("debt", debt_);
+    if (!restart_) return;
+    system.fields.add_value("lag", lag_);
+    system.fields.add("node position", node_.x);
+    system.fields.add("node velocity", node_.v);
+    system.fields.add("node image", node_.image);
   }
 
   const PotentialSums* potential() const override { return &pieces_->potential(); }

@@ -95,6 +95,28 @@ const Particles<D>& Decomposition<D>::block() {
 }
 
 template <int D>
+Bytes Decomposition<D>::block_of(Fields::Field& field) const {
+  const Particles<D>& p = system_.particles;
+  const std::byte* data = field.data();
+  if (!by_place_) return {data, data + field.entries() * field.size};
+  std::vector<Bytes> outgoing(copied_to_.size());
+  for (Id i = 0; i < p.size(); ++i) {
+    if (!p.owns(i)) continue;
+    Bytes& to = outgoing[static_cast<std::size_t>(blocks().rank_of(p.id_of(i)))];
+    put(to, p.id_of(i));
+    to.insert(to.end(), data + i * field.size, data + (i + 1) * field.size);
+  }
+  const Id first = blocks().first(ranks_->rank()), end = blocks().first(ranks_->rank() + 1);
+  Bytes block((end - first) * field.size);
+  for (const Bytes& bytes : ranks_->swap(std::move(outgoing)))
+    for (Reader reader(bytes); reader.more();) {
+      const auto id = reader.get<Id>();
+      std::memcpy(block.data() + (id - first) * field.size, reader.skip(field.size), field.size);
+    }
+  return block;
+}
+
+template <int D>
 bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
   if (!by_place_ || (all_known_ ? slab < next_ : !outdated())) return false;
   if (!all_known_) {  // all has gone well since the last time

@@ -91,6 +91,8 @@ class Decomposition {
   void to_blocks();
   /// The particles of this rank's block as they are now; one rank: all.
   const Particles<D>& block();
+  /// A field of particles, for those of this rank's block; one rank: all.
+  Bytes block_of(Fields::Field& field) const;
 
   bool by_place() const { return by_place_; }
   bool knows_all() const { return !by_place_ || all_known_; }

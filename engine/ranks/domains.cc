@@ -38,7 +38,7 @@ void Domains<D>::make_region(std::size_t regions) {
 }
 
 template <int D>
-void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) {
+void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants* instants) {
   g_ = g;
   horizon_ = horizon;
   events_ = 0;
@@ -48,8 +48,19 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
   if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(particles);
   fastest_ = kFaster * fastest_ + g_.norm() * horizon_;
   stray_ = std::clamp(1.05 * pace_ * fastest_, kSmallestStray * diameter_, kLargestStray * diameter_);
+  const auto record = [&](Id i) {
+    Record<D> r{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]};
+    if (instants) r.t = instants->t[i], r.generation = instants->generation[i];
+    return r;
+  };
+  std::vector<Vec<D>> places;  // where they are now
+  for (Id i = 0; instants && i < particles.size(); ++i) {
+    const double s = instants->now - instants->t[i];
+    Image<D> image{};
+    box_.wrap(places.emplace_back(particles.x[i] + s * particles.v[i] + (0.5 * s * s) * g_), image);
+  }
   const auto divide = [&](std::size_t regions) {
-    division_.emplace(box_, particles.x, regions, diameter_ + 2 * stray_, exchange_, work_);
+    division_.emplace(box_, instants ? places : particles.x, regions, diameter_ + 2 * stray_, exchange_, work_);
     for (std::uint32_t r = 0; r < regions; ++r)
       if (division_->neighbours(r).size() > kMostNeighbours) return false;
     return true;
@@ -62,9 +73,8 @@ void Domains<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) 
     for (const std::uint32_t r : division_->neighbours(static_cast<std::uint32_t>(exchange_.rank())))
       partners_.push_back(static_cast<int>(r));
   outgoing_.assign(partners_.size(), {});
-  load(0, [&](auto&& add) {
-    for (Id i = 0; i < particles.size(); ++i)
-      add(Record<D>{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]});
+  load(instants ? instants->now : 0, [&](auto&& add) {
+    for (Id i = 0; i < particles.size(); ++i) add(record(i));
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
@@ -84,7 +94,8 @@ double Domains<D>::first_pace(const Particles<D>& particles) const {
     bounds.push_back(extent.particles > 0 ? extent.high[k] : -std::numeric_limits<double>::infinity());
   }
   exchange_.largest(bounds);
-  for (int k = 0; k < D; ++k) extent.low[k] = -bounds[2 * k], extent.high[k] = bounds[2 * k + 1];
+  for (int k = 0; k < D; ++k)
+    extent.low[k] = -bounds[std::size_t{2} * k], extent.high[k] = bounds[std::size_t{2} * k + 1];
   extent.particles = sizes_.spheres;
   const double thermal = std::sqrt(sum_of_all(exchange_, squares).value() / static_cast<double>(D * sizes_.spheres));
   return kCollisions / (contacts_a_length(situation_of<D>(box_, sizes_.radius, extent, sizes_.number)) * thermal);
@@ -237,6 +248,28 @@ void Domains<D>::send_paths() {
 template <int D>
 void Domains<D>::fly_to(double time, Particles<D>& copies) const {
   collect(time, copies, nullptr);
+}
+
+template <int D>
+void Domains<D>::records(Particles<D>& particles, Instants& instants) const {
+  const std::size_t here = blocks().first(exchange_.rank() + 1) - blocks().first(exchange_.rank());
+  instants.now = now_;
+  particles.x.resize(here);
+  particles.v.resize(here);
+  instants.t.resize(here);
+  instants.generation.resize(here);
+  to_id_blocks<Record<D>>(
+      blocks(), exchange_,
+      [&](auto&& send) {
+        if (!region_) return;
+        for (const Slot i : region_->own()) send(region_->after(i).id, region_->after(i));
+      },
+      [&](std::size_t place, const Record<D>& r) {
+        particles.x[place] = r.x;
+        particles.v[place] = r.v;
+        instants.t[place] = r.t;
+        instants.generation[place] = r.generation;
+      });
 }
 
 template <int D>

@@ -24,6 +24,13 @@
 
 namespace carom {
 
+/// When each particle had its last event in an epoch that is left off at `now`.
+struct Instants {
+  double now = 0;                         ///< since the start of the epoch [time]
+  std::vector<double> t;                  ///< of the last event
+  std::vector<std::uint16_t> generation;  ///< of that event
+};
+
 template <int D>
 class Domains {
  public:
@@ -34,7 +41,14 @@ class Domains {
           std::function<double()> window = {});
 
   /// As EventCore::take(), load() and so on. Particles are this rank's block; contacts are reported on rank 0.
-  void take(Particles<D>& particles, const Vec<D>& g, double horizon);
+  void take(Particles<D>& particles, const Vec<D>& g, double horizon) { take(particles, g, horizon, nullptr); }
+  /// Goes on in an epoch from what records() gave. Collective.
+  void go_on(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants& instants) {
+    take(particles, g, horizon, &instants);
+  }
+  /// The records of the particles of this rank's block as they are now: positions and velocities at their instants.
+  /// Collective.
+  void records(Particles<D>& particles, Instants& instants) const;
   double run(double end, const Report& report);
   void fly_to(double time, Particles<D>& copies) const;
   void give_back(double time, Particles<D>& particles);
@@ -48,6 +62,7 @@ class Domains {
   static constexpr double kFaster = 1.15;  // factor between the largest speed and the one allowed for
 
   IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(exchange_.size())}; }
+  void take(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants* instants);
   void make_region(std::size_t regions);
   void measure_work();
   void collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const;

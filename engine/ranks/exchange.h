@@ -4,46 +4,15 @@
 // By default there is one rank. parallel/ has the class for MPI. Every call is collective: all ranks make the same
 // calls in the same order.
 
-#include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "engine/base/bytes.h"
 #include "engine/base/counters.h"
 
 namespace carom {
-
-using Bytes = std::vector<std::byte>;
-
-/// Appends a value, byte by byte: all ranks are the same program.
-template <class T>
-void put(Bytes& to, const T& value) {
-  const std::size_t at = to.size();
-  to.resize(at + sizeof(T));
-  std::memcpy(to.data() + at, &value, sizeof(T));
-}
-
-/// Reads what put() wrote, in its order.
-class Reader {
- public:
-  explicit Reader(const Bytes& bytes) : at_(bytes.data()), end_(bytes.data() + bytes.size()) {}
-  bool more() const { return at_ < end_; }
-  std::size_t left() const { return static_cast<std::size_t>(end_ - at_); }
-  template <class T>
-  T get() {
-    T value;
-    std::memcpy(static_cast<void*>(&value), at_, sizeof(T));
-    at_ += sizeof(T);
-    return value;
-  }
-  /// Where the next so many bytes stand, and goes on behind them.
-  const std::byte* skip(std::size_t bytes) { return std::exchange(at_, at_ + bytes); }
-
- private:
-  const std::byte *at_, *end_;
-};
 
 class Exchange {
  public:
@@ -55,7 +24,7 @@ class Exchange {
   virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing) { return outgoing; }
   /// The same among neighbours: outgoing[k] goes to partners[k], and this rank is among the partners of that one;
   /// returns what they have sent, in their order. Others are not waited for.
-  virtual std::vector<Bytes> swap(std::vector<Bytes> /*outgoing*/, std::span<const int> /*partners*/) { return {}; }
+  virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> /*partners*/) { return outgoing; }
   /// The messages of all ranks, by rank.
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
   /// Makes each of `most` the largest among all ranks and each of `sums` the sum over them.

@@ -134,8 +134,8 @@ class Region {
 
   /// The repair of the path of a sphere.
   struct Mended {
+    Record<D> now;  // at the time that repair has come to
     Slot slot;
-    Record<D> now;              // at the time that repair has come to
     std::uint32_t version = 0;  // grows with every change: what was planned before no longer holds
     bool strays = false;        // a ghost that no longer follows its script
     std::size_t script = 0;     // the next node of its script

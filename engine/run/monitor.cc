@@ -37,7 +37,17 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
   if (info.shadow) statistics.max_shadow_energy_error = 0;
-  system.fields.add_working(
+  Fields& fields = system.fields;
+  fields.add_value("statistics", statistics);
+  fields.add_value("account", account_);
+  fields.add_value("next frame", frames_.next());
+  fields.add_value("next row", rows_.next());
+  for (std::size_t k = 0; k < samplers_.size(); ++k) {
+    const std::string name = "observer " + std::to_string(k);
+    fields.add_value(name + " next", samplers_[k].due.next());
+    samplers_[k].observer->add_state(fields, name);
+  }
+  fields.add_working(
       this,
       [this] {
         touching_.reset();
@@ -54,7 +64,7 @@ template <int D>
 void Monitor<D>::start(const Integrator<D>& integrator) {
   shot_ = measure(0, system_.particles, &integrator, info_.shadow);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
-  first_momentum_ = shot_.momentum;
+  std::copy_n(shot_.momentum.begin(), D, account_.first_momentum.begin());
   count_from(shot_);
   sample(0, system_.particles);
   show(shot_, true);
@@ -64,9 +74,9 @@ void Monitor<D>::start(const Integrator<D>& integrator) {
 template <int D>
 void Monitor<D>::count_from(const Snapshot<D>& shot) {
   statistics_.energy_after_first_step = shot.total();
-  first_energy_ = energy_;
-  first_shadow_ = shot.shadow;
-  statistics_.energy_reference = std::max(std::abs(energy_), magnitude_);
+  account_.first_energy = account_.energy;
+  account_.first_shadow = shot.shadow;
+  statistics_.energy_reference = std::max(std::abs(account_.energy), account_.magnitude);
 }
 
 template <int D>
@@ -106,32 +116,34 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
   const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.size() <= kShadowAtEveryStep);
-  const double speed = speed_;
+  const double speed = account_.speed;
   shot_ = measure(s.end_time, system_.particles, &integrator, with_shadow);
   s.energy_final = shot_.total();
   if (s.steps == 1 && info_.stepping) count_from(shot_);
-  s.max_energy_error = std::max(s.max_energy_error, std::abs(energy_ - first_energy_));
+  s.max_energy_error = std::max(s.max_energy_error, std::abs(account_.energy - account_.first_energy));
   if (with_shadow)
-    s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - first_shadow_));
+    s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - account_.first_shadow));
   if (s.max_momentum_error)
-    s.max_momentum_error = std::max(*s.max_momentum_error, (shot_.momentum - first_momentum_).norm());
+    s.max_momentum_error =
+        std::max(*s.max_momentum_error, (shot_.momentum - Vec<D>(account_.first_momentum.data())).norm());
   if (info_.hard_cores) {
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest_overlap());
     s.counters.max_overlap = system_.decomposition.largest(s.counters.max_overlap);
   }
-  virial_time_ += elapsed * virial_;
+  account_.virial_time += elapsed * account_.virial;
   if (s.end_time > 0) {
-    s.mean_pressure = (virial_time_ + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
+    s.mean_pressure =
+        (account_.virial_time + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
     s.collision_rate =
         2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * s.end_time);
   }
-  path_ += elapsed * 0.5 * (speed + speed_);
+  account_.path += elapsed * 0.5 * (speed + account_.speed);
   if (s.collision_rate > 0) {
     s.mean_free_time = 1 / s.collision_rate;
-    s.mean_free_path = path_ / s.end_time / s.collision_rate;
+    s.mean_free_path = account_.path / s.end_time / s.collision_rate;
   }
   sample(s.end_time, system_.particles);
-  show(shot_, last);
+  show(shot_, false);
 }
 
 /// `integrator`: null where the particles are not its own.
@@ -151,10 +163,10 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   const auto total = static_cast<double>(system_.size());
   const MotionSums<D> motion = evaluate_motion(system_, state, nodes);
   shot.kinetic = motion.kinetic.value();
-  energy_ = shot.kinetic + sums.energy.value();
+  account_.energy = shot.kinetic + sums.energy.value();
   shot.potential = sums.energy.value() + tail_.energy;
-  magnitude_ = shot.kinetic + sums.magnitude.value();
-  virial_ = 2 * shot.kinetic + sums.virial.value() + tail_.virial;
+  account_.magnitude = shot.kinetic + sums.magnitude.value();
+  account_.virial = 2 * shot.kinetic + sums.virial.value() + tail_.virial;
   if (with_shadow) {
     Counters uncounted;
     const double g = shadow_term<D>(system_, nodes, integrator->accelerations(), scratch_, uncounted);
@@ -163,7 +175,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   for (int k = 0; k < D; ++k) shot.momentum[k] = motion.momentum[k].value();
   if (total > 0) {
     shot.temperature = 2 * shot.kinetic / (D * total);
-    speed_ = motion.speed.value() / total;
+    account_.speed = motion.speed.value() / total;
   }
   if (!std::isfinite(shot.total()))
     throw Error(Failure::numerical, "the energy is not finite at step " + std::to_string(shot.step) + ", time " +
@@ -174,27 +186,27 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
 template <int D>
 void Monitor<D>::show(Snapshot<D> shot, bool last) {
   const double now = shot.time + time_slack();
-  const bool frame = frames_.due() <= now || (last && shot.time > last_frame_);
-  const bool row = rows_.due() <= now || (last && shot.time > last_row_);
+  const bool frame = frames_.due() <= now || (last && shot.time > account_.last_frame);
+  const bool row = rows_.due() <= now || (last && shot.time > account_.last_row);
   if (!frame && !row) return;
   const Stopwatch watch(statistics_.counters.seconds.output);
   const double collision_virial = statistics_.counters.collision_virial.value();
-  const double collisions = last_row_ >= 0 && shot.time > last_row_
-                                ? (collision_virial - last_row_virial_) / (shot.time - last_row_)
+  const double collisions = account_.last_row >= 0 && shot.time > account_.last_row
+                                ? (collision_virial - account_.last_row_virial) / (shot.time - account_.last_row)
                                 : 0;  // nothing has collided before the start
-  shot.pressure = (virial_ + collisions) / (D * system_.box.volume());
+  shot.pressure = (account_.virial + collisions) / (D * system_.box.volume());
   shot.max_energy_error = statistics_.max_energy_error;
   if (row) {
     for (auto* observer : observers_) observer->thermo(shot);
     rows_.pass(now);
-    last_row_ = shot.time;
-    last_row_virial_ = collision_virial;
+    account_.last_row = shot.time;
+    account_.last_row_virial = collision_virial;
   }
   if (frame) {
     if (system_.decomposition.by_place()) shot.particles = &system_.decomposition.block();
     for (auto* observer : observers_) observer->frame(shot);
     frames_.pass(now);
-    last_frame_ = shot.time;
+    account_.last_frame = shot.time;
   }
 }
 

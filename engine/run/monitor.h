@@ -23,6 +23,8 @@ class Schedule {
   void pass(double time) {
     while (due() <= time) ++next_;
   }
+  /// Which of the times is next.
+  std::int64_t& next() { return next_; }
 
  private:
   double interval_, start_ = 0;
@@ -39,7 +41,8 @@ class Monitor {
   Monitor(const Monitor&) = delete;
   Monitor& operator=(const Monitor&) = delete;
 
-  /// Measures and shows the state at the start; energies at the integrator's energy state.
+  /// Measures and shows the state at the start, of a run that is not continued; energies at the integrator's energy
+  /// state.
   void start(const Integrator<D>& integrator);
 
   /// Due times inside a slab, for integrators that are exact at any time: since the slab's start, ascending.
@@ -53,7 +56,10 @@ class Monitor {
   void end_of_slab(double elapsed, const Integrator<D>& integrator, bool last);
 
   /// Shows the last state, unless it has been shown.
-  void finish() { show(shot_, true); }
+  void finish(const Integrator<D>& integrator) {
+    if (!shot_.particles) shot_ = measure(statistics_.end_time, system_.particles, &integrator, info_.shadow);
+    show(shot_, true);
+  }
 
   /// Due times and ends are met up to this [time].
   double time_slack() const { return 1e-9 * plan_.step; }
@@ -80,16 +86,19 @@ class Monitor {
 
   Schedule frames_, rows_;
   std::vector<Sampler> samplers_;
-  double last_frame_ = -1, last_row_ = -1;      // when they were last shown; −1: not yet
-  double last_row_virial_ = 0;                  // collision virial up to the last row
-  Snapshot<D> shot_;                            // of the last slab's end
-  Tail tail_;                                   // added to what is shown, not to H and its errors
-  double energy_ = 0;                           // H of the last measurement
-  double magnitude_ = 0, virial_ = 0;           // of the last measurement: K + Σ|V|, 2K + Σ d·F
-  double virial_time_ = 0;                      // ∫ (2K + Σ d·F) dt
-  double speed_ = 0, path_ = 0;                 // mean |v| at the last slab's end; ∫ mean |v| dt
-  double first_energy_ = 0, first_shadow_ = 0;  // H₁ and S_h,1
-  Vec<D> first_momentum_ = Vec<D>::Zero();
+  /// What goes on with a run that is continued.
+  struct Account {
+    double last_frame = -1, last_row = -1;      // when they were last shown; −1: not yet
+    double last_row_virial = 0;                 // collision virial up to the last row
+    double energy = 0;                          // H of the last measurement
+    double magnitude = 0, virial = 0;           // of the last measurement: K + Σ|V|, 2K + Σ d·F
+    double virial_time = 0;                     // ∫ (2K + Σ d·F) dt
+    double speed = 0, path = 0;                 // mean |v| at the last slab's end; ∫ mean |v| dt
+    double first_energy = 0, first_shadow = 0;  // H₁ and S_h,1
+    std::array<double, D> first_momentum{};
+  } account_;
+  Snapshot<D> shot_;                          // of the last slab's end
+  Tail tail_;                                 // added to what is shown, not to H and its errors
   std::vector<Vec<D>> scratch_;               // for S_h
   std::optional<NeighbourList<D>> touching_;  // pairs that may overlap
   Particles<D> gathered_;                     // from the blocks of all ranks

@@ -45,6 +45,12 @@ class Observable : public Observer<D> {
     add_sample(time, particles);
     ++samples_;
   }
+  void add_state(Fields& fields, const std::string& name) final {
+    fields.add_of_run({name, [this](Archive& archive) {
+                         archive(samples_);
+                         sums(archive);
+                       }});
+  }
   /// How many have been taken.
   std::uint64_t samples() const { return samples_; }
 
@@ -52,24 +58,7 @@ class Observable : public Observer<D> {
   virtual std::vector<TableColumn> table() const = 0;
   virtual std::vector<SpeciesValue> species_values() const { return {}; }
 
-  /// What the samples have left: out of one that has them, and into another that was made with the same parameters.
-  /// Throws Error(Failure::file) where it is of another kind.
-  Archive::Bytes state() const {
-    Archive archive;
-    const_cast<Observable&>(*this).all_sums(archive);
-    return archive.bytes();
-  }
-  void restore(const Archive::Bytes& state) {
-    Archive archive(state);
-    all_sums(archive);
-    archive.finish();
-  }
-
  private:
-  void all_sums(Archive& archive) {
-    archive(samples_);
-    sums(archive);
-  }
   /// Gives the archive everything that a sample changes and a later one or a table reads, always in the same order.
   virtual void sums(Archive& archive) = 0;
   /// samples() have been added before. All particles, in the order of their ids; on several ranks on rank 0 only.

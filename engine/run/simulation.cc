@@ -83,34 +83,56 @@ void Simulation<D>::add(Observer<D>& observer) {
 }
 
 template <int D>
-void Simulation<D>::run(const std::function<bool()>& should_stop) {
+void Simulation<D>::run(const Hooks& hooks) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
   Decomposition<D>& decomposition = system_->decomposition;
+  const auto divide = [&] { return decomposition.divide(info_.local, plan_.step, info_.hard_cores); };
   if (info_.smooth_forces) {
     system_->quanta = quanta(*system_);
-    s.counters.divisions += decomposition.divide(info_.local, plan_.step, info_.hard_cores);
+    s.counters.divisions += divide();
   }
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);
+  system_->fields.add_value("paused", paused_);
   integrator_->start(*system_, s.counters);
-  monitor.start(*integrator_);
+  if (hooks.restore) {
+    decomposition.to_blocks();
+    hooks.restore(system_->fields);
+    if (decomposition.ranks().rank() > 0) s.counters.seconds = {}, s.counters.events = {}, s.counters.domains = {};
+    if (info_.smooth_forces) divide();
+    s.stopped_early = false;
+  } else {
+    monitor.start(*integrator_);
+  }
 
+  const double seconds_before = s.wall_seconds;
+  const auto take_time = [&] {
+    const auto life = std::chrono::steady_clock::now() - clock_start;
+    s.wall_seconds = seconds_before + std::chrono::duration<double>(life).count();
+  };
   std::vector<Contact<D>> contacts;
-  while (!finished(monitor.time_slack())) {
-    if (should_stop && should_stop()) {
+  for (;;) {
+    const bool done = finished() && !paused_;
+    take_time();
+    if (hooks.should_stop && hooks.should_stop() && !done) {
       s.stopped_early = true;
       break;
     }
-    const Slab slab = next_slab(monitor.time_slack());
+    if (done) break;
+    const Slab slab = next_slab();
     s.counters.divisions += decomposition.divide_if_due(slab.index, slab.length);
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor.due_within(slab);
     contacts.clear();
-    SlabReport<D> report{.counters = s.counters, .contacts = plan_.events ? &contacts : nullptr, .observe = due};
-    report.observer = [&](double offset, const Particles<D>& copies) { monitor.observe(slab.start + offset, copies); };
+    SlabReport<D> report{
+        .counters = s.counters,
+        .contacts = plan_.events ? &contacts : nullptr,
+        .observe = due,
+        .observer = [&](double offset, const Particles<D>& copies) { monitor.observe(slab.start + offset, copies); },
+        .pause = hooks.pause};
     Counters before = s.counters;
-    for (bool done = false; !done;) try {
+    for (bool complete = false; !complete;) try {
         integrator_->slab(*system_, slab, report);
-        done = true;
+        complete = true;
       } catch (HaloTooSmall) {
         decomposition.enlarge_halo(slab.index, slab.length);
         ++before.slabs_again;
@@ -118,43 +140,51 @@ void Simulation<D>::run(const std::function<bool()>& should_stop) {
         s.counters = before;
         contacts.clear();
       }
+    if (plan_.events) {
+      const Stopwatch watch(s.counters.seconds.output);
+      for (auto* observer : observers_) observer->contacts(slab.start, contacts);
+    }
+    s.counters.seconds.communicate = decomposition.seconds_waited();
+    if (paused_ = report.paused; paused_) continue;
 
     ++s.steps;
     // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
     s.end_time = report.reached < slab.length ? slab.start + report.reached
                  : slab.length == plan_.step  ? static_cast<double>(s.steps) * plan_.step
                                               : *plan_.end_time;
-    s.counters.seconds.communicate = decomposition.seconds_waited();
     s.force_passes = s.counters.force_passes;
     s.fraction_done = fraction_done();
-    s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
-    if (plan_.events) {
-      const Stopwatch watch(s.counters.seconds.output);
-      for (auto* observer : observers_) observer->contacts(slab.start, contacts);
-    }
-    monitor.end_of_slab(report.reached, *integrator_, finished(monitor.time_slack()));
+    take_time();
+    monitor.end_of_slab(report.reached, *integrator_, finished());
     for (auto* observer : observers_) observer->progress(s);
   }
-  if (s.stopped_early) monitor.finish();
+  if (!paused_) monitor.finish(*integrator_);
   decomposition.to_blocks();
-  s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
+  take_time();
 }
 
 template <int D>
-Slab Simulation<D>::next_slab(double slack) const {
+bool Simulation<D>::is_last_on_the_way() const {
+  if (paused_) return finished();
+  const bool whole = statistics_.end_time == static_cast<double>(statistics_.steps) * plan_.step;
+  return whole && (finished() || next_slab().length != plan_.step);
+}
+
+template <int D>
+Slab Simulation<D>::next_slab() const {
   Slab slab;
   slab.index = statistics_.steps;
   slab.start = static_cast<double>(slab.index) * plan_.step;
-  const bool shortened = plan_.end_time && slab.start + plan_.step > *plan_.end_time - slack;
+  const bool shortened = plan_.end_time && slab.start + plan_.step > *plan_.end_time - time_slack();
   slab.length = shortened ? *plan_.end_time - slab.start : plan_.step;
   if (plan_.collisions && !info_.stepping) slab.collision_limit = *plan_.collisions;
   return slab;
 }
 
 template <int D>
-bool Simulation<D>::finished(double slack) const {
+bool Simulation<D>::finished() const {
   const Statistics& s = statistics_;
-  return (plan_.steps && s.steps >= *plan_.steps) || (plan_.end_time && s.end_time >= *plan_.end_time - slack) ||
+  return (plan_.steps && s.steps >= *plan_.steps) || (plan_.end_time && s.end_time >= *plan_.end_time - time_slack()) ||
          (plan_.collisions && s.counters.sphere_sphere >= *plan_.collisions);
 }
 

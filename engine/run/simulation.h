@@ -63,6 +63,8 @@ class Observer {
   /// after it. Costs no measurement: this is the way to look often. Of several ranks rank 0 alone has the
   /// particles.
   virtual void sample(double /*time*/, const Particles<D>&) {}
+  /// Registers what it accumulates as state of the run; `name` begins the names.
+  virtual void add_state(Fields& /*fields*/, const std::string& /*name*/) {}
   virtual void frame(const Snapshot<D>&) {}
   virtual void thermo(const Snapshot<D>&) {}
   /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`. Of several ranks on rank
@@ -118,8 +120,24 @@ class Simulation {
   /// Observers outlive the run. Throws Error(deck) where one wants samples at intervals that cannot be counted.
   void add(Observer<D>& observer);
 
-  /// Runs to the end of the plan, or until should_stop() returns true at the end of a slab. Throws Error.
-  void run(const std::function<bool()>& should_stop = {});
+  /// What a caller does while a run goes on; all of it is collective.
+  struct Hooks {
+    /// Before each slab, within an epoch of free flight where it was paused, and at the end: true stops the run. What
+    /// system().fields holds then is the state of the run, from which it can be continued.
+    std::function<bool()> should_stop{};
+    /// Asked now and then within an epoch of free flight: true has should_stop() asked soon.
+    std::function<bool()> pause{};
+    /// Continues a run: sets all fields of the particles of this rank's block (one rank: all), and those of the run.
+    /// The system has the particles as they were at that state already.
+    std::function<void(Fields&)> restore{};
+  };
+  /// Runs to the end of the plan, or until it is stopped. Throws Error.
+  void run(const Hooks& hooks);
+  void run(std::function<bool()> should_stop = {}) { run(Hooks{.should_stop = std::move(should_stop)}); }
+
+  /// In should_stop(): whether a run with a later end would go on from here as this one has come here, and no longer
+  /// after the next slab, which meets the end, or after the end.
+  bool is_last_on_the_way() const;
 
   const Statistics& statistics() const { return statistics_; }
   const System<D>& system() const { return *system_; }
@@ -134,8 +152,9 @@ class Simulation {
   static Prepared prepare(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan);
   explicit Simulation(Prepared p) : Simulation(std::move(p.system), p.info, std::move(p.integrator), p.plan) {}
 
-  Slab next_slab(double slack) const;
-  bool finished(double slack) const;
+  Slab next_slab() const;
+  bool finished() const;
+  double time_slack() const { return 1e-9 * plan_.step; }  ///< ends are met up to this [time]
   double fraction_done() const;
 
   std::unique_ptr<System<D>> system_;
@@ -144,6 +163,7 @@ class Simulation {
   Plan plan_;
   std::vector<Observer<D>*> observers_;
   Statistics statistics_;
+  bool paused_ = false;  // within a slab
 };
 
 }  // namespace carom

@@ -230,7 +230,7 @@ class CellTable {
     if (inside) {  // no images, and the cells of a row stand together
       Cell<D> row;
       for (int k = 0; k < D; ++k) row[k] = centre[k] - range[k];
-      const auto length = static_cast<std::size_t>(2 * range[D - 1] + 1);
+      const auto length = 2 * static_cast<std::size_t>(range[D - 1]) + 1;
       do {
         const std::size_t first = grid_.index(row);
         for (std::uint32_t q = start_[first]; q < start_[first + length]; ++q) visit(ids_[q], boxes_[ids_[q]]);

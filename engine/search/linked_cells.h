@@ -2,6 +2,8 @@
 // The spheres of each cell, for dilute systems: cells as small as a diameter, most of them empty, with a list through
 // the spheres of each. A sphere that crosses into another cell looks at the new ones around it.
 
+#include <utility>
+
 #include "engine/base/pages.h"
 #include "engine/base/prefetch.h"
 #include "engine/search/agenda.h"
@@ -191,12 +193,12 @@ class LinkedCells {
   void spread() {
     const CellGrid<D> before = grid_;
     const auto old_steps = steps_;
-    const PageVector<std::uint32_t> old_first = std::move(first_);
+    const PageVector<std::uint32_t> old_first = std::exchange(first_, {});
     grid_.spread();
     lay_out();
     const auto start = [](const auto& steps, const Cell<D>& row) {
       std::ptrdiff_t at = 0;
-      for (std::size_t k = 0; k + 1 < D; ++k) at += steps[k][static_cast<std::size_t>(row[k] + 1)].offset;
+      for (std::size_t k = 0; k + 1 < D; ++k) at += (steps[k].data() + row[k] + 1)->offset;
       return at;
     };
     Cell<D> row{};
@@ -215,7 +217,7 @@ class LinkedCells {
     if (!periodic_[D - 1] || (z > 0 && z < last)) return;
     const std::size_t at = index(place);
     const std::uint32_t first = first_[at], box = shifted(one_[D - 1]);
-    const auto row = static_cast<std::size_t>(last + 1);
+    const auto row = static_cast<std::size_t>(last) + 1;
     if (z == 0) first_[at + row] = first == kEmpty ? first : first - box;
     if (z == last) first_[at - row] = first == kEmpty ? first : first + box;
   }
@@ -237,7 +239,7 @@ class LinkedCells {
         low = std::max(low, -here);
         high = std::min(high, grid_.count(k) - 1 - here);
       }
-      task.step[k] = &steps_[k][static_cast<std::size_t>(here + 1 + low)];
+      task.step[k] = steps_[k].data() + here + 1 + low;
       task.steps[k] = static_cast<unsigned>(std::max(high - low + 1, 0));
     }
     return task;
@@ -270,8 +272,7 @@ class LinkedCells {
     for (std::int32_t c = first; c <= last; ++c) {
       const std::int32_t boxes = grid_.boxes(axis, c), seen = away + boxes * one_[axis];
       const std::int32_t wrapped = c - boxes * count;
-      const std::ptrdiff_t cell =
-          at + (axis < D - 1 ? steps_[axis][static_cast<std::size_t>(wrapped + 1)].offset : wrapped);
+      const std::ptrdiff_t cell = at + (axis < D - 1 ? (steps_[axis].data() + wrapped + 1)->offset : wrapped);
       if (axis < D - 1) {
         collect(low, high, found, axis + 1, cell, seen);
         continue;

@@ -11,10 +11,6 @@
 namespace carom {
 
 namespace {
-constexpr double kTooWide = 64;  // skins wider than this, in skins that would do, are given up
-constexpr double kCalls = 6;  // a skin that is half as wide as any particle comes in so many calls; so it lasts three,
-constexpr double kWidest = 1.6;  // where it need not be wider than this for it [mean reach]
-constexpr int kMostBoxes = 4;    // edges of a periodic box that a particle may move in a step
 constexpr std::size_t kMostPairs = 10'000'000, kMostPartners = 200;  // a particle; more are a step gone wild
 }  // namespace
 
@@ -29,14 +25,18 @@ struct SizeClass {
   std::vector<Id> ids;  ///< of the members; empty: all particles
 };
 
+namespace {
+double mean(const std::vector<double>& of) {
+  return std::accumulate(of.begin(), of.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, of.size()));
+}
+}  // namespace
+
 template <int D>
 NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without)
-    : box_(box), reach_(std::move(reach)), without_(without) {
-  const double mean =
-      std::accumulate(reach_.begin(), reach_.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, reach_.size()));
-  least_skin_ = skin_ = 0.3 * mean;  // 15 % of a mean pair reach
-  widest_ = kWidest * mean;
-}
+    : box_(box),
+      reach_(std::move(reach)),
+      without_(without),
+      skin_(0.3 * mean(reach_), 6, 1.6 * mean(reach_)) {}  // at least 15 % of a mean pair reach
 
 template <int D>
 std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new,
@@ -57,22 +57,12 @@ std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>
     for (auto& pair : pairs_)  // the images of two particles all change by as much: their order stays
       for (int k = 0; k < D; ++k) pair.image[k] += crossed[pair.i][k] - crossed[pair.j][k];
   const double step = std::sqrt(squared_step) + margin, from_build = std::sqrt(squared_from_build);
-  const bool covers = known && from_build + margin <= 0.5 * skin_;
-  const double to_last = kCalls * from_build / static_cast<double>(++calls_);
-  const double room = known && to_last <= widest_ ? to_last : 0;  // for some calls more
-  const double wanted = std::max({least_skin_, 4 * step, room});  // room for the step and for some more of its size
-  const bool wasteful = step > 0 && skin_ > kTooWide * wanted;    // made for one wild step
-  if (!covers || wasteful) {
-    for (int k = 0; k < D; ++k)
-      if (box_.periodic(k) && !(step <= kMostBoxes * box_.edges[k]))
-        throw Error(Failure::numerical,
-                    "a particle moves farther than " + std::to_string(kMostBoxes) +
-                        " edges of the periodic box within one step; use a smaller integrator.step");
-    skin_ = std::max(wanted, wasteful ? 0.0 : 0.5 * skin_);
+  if (!skin_.lasts(known, from_build, step, margin)) {
+    skin_.renew(box_, step, [] { return std::string("a particle"); });
     if (build(x)) return pairs_;
-    skin_ = 2 * step;  // no room for more
+    skin_.begin(2 * step);  // no room for more
     if (build(x)) return pairs_;
-    skin_ = least_skin_;
+    skin_.begin(0);
     built_at_.clear();
     throw Error(Failure::numerical, "a particle may come " + short_text(step) +
                                         " far within one step, which gives far too many candidates for collisions; use "
@@ -108,7 +98,6 @@ bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
       throw Error(Failure::numerical,
                   "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
   ++rebuilds_;
-  calls_ = 0;
   built_at_.assign(x.begin(), x.end());
   pairs_.clear();
   partners_.clear();
@@ -117,11 +106,11 @@ bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
     if (!without_.empty() && without_[i] != 0) continue;
     const std::size_t first = pairs_.size();
     for (const SizeClass<D>& size : sizes)
-      size.table.for_each_near(x[i], reach_[i] + size.largest + skin_, [&](Id member, const Image<D>& image) {
+      size.table.for_each_near(x[i], reach_[i] + size.largest + skin_.width(), [&](Id member, const Image<D>& image) {
         const Id j = size.id(member);
         if (j <= i) return;
         const Vec<D> d = x[i] - x[j] + box_.shift(image);
-        const double reach = reach_[i] + reach_[j] + skin_;
+        const double reach = reach_[i] + reach_[j] + skin_.width();
         if (d.squaredNorm() <= reach * reach) pairs_.push_back({static_cast<Id>(i), j, image});
       });
     std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
@@ -138,7 +127,7 @@ std::vector<SizeClass<D>> NeighbourList<D>::group(std::span<const Vec<D>> x) con
   if (x.empty()) return sizes;
   const auto [least, most] = std::ranges::minmax_element(reach_);
   if (!(*least > 0) || *most < 2 * *least) {
-    sizes.emplace_back(box_, *most, skin_, x, std::vector<Id>{});
+    sizes.emplace_back(box_, *most, skin_.width(), x, std::vector<Id>{});
     return sizes;
   }
   std::map<int, std::vector<Id>> octaves;
@@ -148,7 +137,7 @@ std::vector<SizeClass<D>> NeighbourList<D>::group(std::span<const Vec<D>> x) con
     at.clear();
     double largest = 0;
     for (const Id i : ids) at.push_back(x[i]), largest = std::max(largest, reach_[i]);
-    sizes.emplace_back(box_, largest, skin_, at, std::move(ids));
+    sizes.emplace_back(box_, largest, skin_.width(), at, std::move(ids));
   }
   return sizes;
 }

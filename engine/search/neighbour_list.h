@@ -12,6 +12,7 @@
 #include "engine/base/box.h"
 #include "engine/base/vec.h"
 #include "engine/search/partners.h"
+#include "engine/search/skin.h"
 
 namespace carom {
 
@@ -52,8 +53,7 @@ class NeighbourList {
   const Box<D>& box_;
   std::vector<double> reach_;
   std::span<const char> without_;
-  double least_skin_, skin_, widest_;
-  std::uint64_t calls_ = 0;       // of cover() since the last build
+  Skin skin_;
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
   std::vector<NeighbourPair<D>> pairs_;
   Partners partners_;  // empty: not used since the last build

@@ -6,7 +6,6 @@ namespace carom {
 namespace {
 
 constexpr double kPlaces = 1024;     // to a cell, along each axis
-constexpr unsigned kSlack = 3;       // candidates that a new list has room for, beside those it has
 constexpr double kMembers = 4;       // of a cell, at least: fewer would waste its line
 constexpr std::int32_t kMargin = 2;  // cells, round those of a part
 
@@ -26,12 +25,12 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
     : box_(box),
       packing_(packing),
       kernels_(kernels),
-      lanes_(kernels.lanes),
       radius_(radius),
       equal_(equal),
       largest_(largest),
       skin_(skin),
-      agenda_(agenda) {
+      agenda_(agenda),
+      lists_(packing, kernels.lanes, agenda) {
   exact_ = !equal || std::find(box.boundary.begin(), box.boundary.end(), Boundary::open) != box.boundary.end();
   if (!equal) {
     level_.resize(radius.size());
@@ -85,13 +84,10 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
     insert(static_cast<Slot>(i), x);
   }
   // 3. Lists.
-  pool_.clear();
-  used_ = 0;
-  pool_.reserve(24 * n);
-  for (auto& unused : unused_) unused.clear();
-  for (std::size_t i = 0; i < n; ++i) {
+  lists_.clear(n);
+  for (Slot i = 0; i < n; ++i) {
     agenda_[i].capacity = 0;
-    assign(static_cast<Slot>(i), surround(static_cast<Slot>(i), centre(agenda_[i])));
+    lists_.assign(i, surround(i, centre(agenda_[i])));
   }
 }
 
@@ -191,9 +187,9 @@ void SkinLists<D>::remove(Slot i, const Vec<D>& x) {
   const std::uint32_t first = static_cast<std::uint32_t>(level.grid.index(level.grid.cell(x)));
   for (std::uint32_t line = first, before = kEmpty;; before = line, line = level.next[line]) {
     CellLine& cell = level.lines[line];
-    for (int q = 0; q < 8; ++q) {
-      if (cell.slot[q] != i) continue;
-      cell.slot[q] = kEmpty;
+    for (Slot& slot : cell.slot) {
+      if (slot != i) continue;
+      slot = kEmpty;
       const bool empty = std::all_of(cell.slot, cell.slot + 8, [](auto s) { return s == kEmpty; });
       if (before != kEmpty && empty) {
         level.next[before] = level.next[line];
@@ -205,12 +201,12 @@ void SkinLists<D>::remove(Slot i, const Vec<D>& x) {
   }
 }
 
-/// Fills found_ with the candidates of a sphere at x; returns how many.
+/// The candidates of a sphere at x; good until the next call.
 template <int D>
-unsigned SkinLists<D>::surround(Slot i, const Vec<D>& x, double astray) {
+std::span<const std::uint32_t> SkinLists<D>::surround(Slot i, const Vec<D>& x, double astray) {
   unsigned found = 0;
   for (const Level& level : levels_) look_into(level, i, x, astray, found);
-  return found;
+  return {found_.data(), found};
 }
 
 template <int D>
@@ -233,9 +229,9 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double
     const std::int32_t range = places <= edge ? 1 : static_cast<std::int32_t>(std::ceil(places / edge));
     std::int32_t low = -range, high = range;
     if (!box_.periodic(k)) low = std::max(low, -here), high = std::min(high, count - 1 - here);
-    const CellStep* step = &level.steps[k][static_cast<std::size_t>(here + low + level.margin)];
+    const CellStep* step = level.steps[k].data() + here + low + level.margin;
     auto& views = views_[k];
-    views.resize(static_cast<std::size_t>(high - low + 1));
+    views.resize(static_cast<std::size_t>(high - low) + 1);
     float corner = static_cast<float>(low * static_cast<std::int32_t>(kPlaces) - place[k]);
     for (CellView& view : views) {
       const float gap = std::max(std::max(corner - 1, -corner - static_cast<float>(kPlaces)), 0.0f) * task.scale[k];
@@ -254,7 +250,7 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double
   const std::size_t most = 8 * (cells + (level.lines.size() - level.grid.cells()) * images);
   if (slots_.size() < most) slots_.resize(2 * most), away_.resize(2 * most);
   const unsigned n = kernels_.near(task, slots_.data(), away_.data());
-  if (found_.size() < found + n + 8) found_.resize(2 * (found + n + 8));
+  if (found_.size() < found + n + 8) found_.resize(std::size_t{2} * (found + n + 8));
 
   const std::int32_t carried = packing_.linear(boxes);
   const bool far = 2 * widest_ > packing_.largest();
@@ -278,104 +274,25 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double
 }
 
 template <int D>
-std::uint32_t SkinLists<D>::take(unsigned units) {
-  if (unused_.size() <= units) unused_.resize(units + 1);
-  if (!unused_[units].empty()) {
-    const std::uint32_t list = unused_[units].back();
-    unused_[units].pop_back();
-    return list;
-  }
-  const std::size_t at = used_;
-  used_ += std::size_t{lanes_} * units;
-  pool_.resize(used_ + 8);  // lists are compared by eight
-  return static_cast<std::uint32_t>(at / lanes_);
-}
-
-/// Makes the first n of found_ the list of a sphere.
-template <int D>
-void SkinLists<D>::assign(Slot i, unsigned n) {
-  Agenda<D>& a = agenda_[i];
-  const unsigned units = (n + kSlack + lanes_ - 1) / lanes_;
-  if (n > lanes_ * a.capacity || a.capacity == 0) {
-    if (units > std::numeric_limits<std::uint16_t>::max() / lanes_)
-      throw Error(Failure::numerical, "a sphere has more than 65 thousand neighbours");
-    if (a.capacity > 0) unused_[a.capacity].push_back(a.list);
-    a.list = take(units);
-    a.capacity = static_cast<std::uint16_t>(units);
-  }
-  std::uint32_t* const list = start_of(a);
-  const std::uint32_t self = packing_.pack(i, 0);
-  std::copy_n(found_.begin(), n, list);
-  std::fill(list + n, list + lanes_ * a.capacity, self);
-  a.count = static_cast<std::uint16_t>(n);
-  divide(a);
-}
-
-/// Moves those in the same box to the start of a list.
-template <int D>
-void SkinLists<D>::divide(Agenda<D>& a) {
-  std::uint32_t* const list = start_of(a);
-  const auto* const others = std::partition(list, list + a.count, [&](auto c) { return same_box(c); });
-  a.same = static_cast<std::uint16_t>(others - list);
-}
-
-template <int D>
-void SkinLists<D>::add(Slot i, std::uint32_t candidate) {
-  Agenda<D>& a = agenda_[i];
-  if (a.count == lanes_ * a.capacity) {
-    std::vector<std::uint32_t> longer(candidates(a), candidates(a) + a.count);
-    longer.push_back(candidate);
-    longer.swap(found_);
-    assign(i, a.count + 1u);
-    longer.swap(found_);
-    return;
-  }
-  std::uint32_t* const list = start_of(a);
-  list[a.count] = candidate;
-  if (same_box(candidate)) std::swap(list[a.same++], list[a.count]);
-  ++a.count;
-}
-
-/// Takes a candidate out of the list of a sphere.
-template <int D>
-void SkinLists<D>::drop(Slot i, std::uint32_t candidate) {
-  const std::uint32_t* const list = candidates(agenda_[i]);
-  remove_from_list(i, static_cast<unsigned>(std::find(list, list + agenda_[i].count, candidate) - list));
-}
-
-/// The same, given its place; one from behind moves there.
-template <int D>
-void SkinLists<D>::remove_from_list(Slot i, unsigned q) {
-  Agenda<D>& a = agenda_[i];
-  if (q == a.count) return;
-  std::uint32_t* const list = start_of(a);
-  if (q < a.same) {
-    list[q] = list[--a.same];
-    q = a.same;
-  }
-  list[q] = list[--a.count];
-  list[a.count] = packing_.pack(i, 0);
-}
-
-template <int D>
 std::span<const std::uint32_t> SkinLists<D>::renew(Slot i, const Vec<D>& x) {
   Agenda<D>& a = agenda_[i];
   remove(i, centre(a));
   for (int k = 0; k < D; ++k) a.where.centre[k] = x[k];
   insert(i, x);
-  const unsigned n = surround(i, x);
+  const std::span<const std::uint32_t> found = surround(i, x);
+  const auto n = static_cast<unsigned>(found.size());
   if (fresh_.size() < n + 8) fresh_.resize(2 * n + 8);
   kept_.assign(a.count / 64 + 1u, 0);
   const std::uint32_t* const list = candidates(a);
-  const unsigned fresh = kernels_.compare(list, a.count, found_.data(), n, fresh_.data(), kept_.data());
+  const unsigned fresh = kernels_.compare(list, a.count, found.data(), n, fresh_.data(), kept_.data());
   for (unsigned q = a.count; q-- > 0;) {  // from the end: the one that moves up has been looked at
     if ((kept_[q / 64] >> (q % 64) & 1) != 0) continue;
-    drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
-    remove_from_list(i, q);
+    lists_.drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
+    lists_.remove(i, q);
   }
   for (unsigned q = 0; q < fresh; ++q) {
-    add(i, fresh_[q]);
-    add(packing_.slot(fresh_[q]), packing_.reversed(i, fresh_[q]));
+    lists_.add(i, fresh_[q]);
+    lists_.add(packing_.slot(fresh_[q]), packing_.reversed(i, fresh_[q]));
   }
   std::fill_n(fresh_.begin() + fresh, 8, packing_.pack(i, 0));
   return {fresh_.data(), fresh};
@@ -388,21 +305,21 @@ void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
   for (int k = 0; k < D; ++k) a.where.centre[k] += boxes[k] * box_.edges[k];
   const std::int32_t linear = packing_.linear(boxes);
   boxes_[i] += linear;
-  std::uint32_t* const list = start_of(a);
+  std::uint32_t* const list = lists_.of(a);
   for (unsigned q = 0; q < a.count; ++q) {
     const std::uint32_t old = list[q], own = packing_.reversed(i, old);
     const Slot j = packing_.slot(old);
     list[q] = packing_.pack(j, packing_.linear(old) - linear);
     Agenda<D>& other = agenda_[j];
-    std::uint32_t* const others = start_of(other);
+    std::uint32_t* const others = lists_.of(other);
     for (unsigned p = 0; p < other.count; ++p)
       if (others[p] == own) {
         others[p] = packing_.reversed(i, list[q]);
-        divide(other);
+        lists_.divide(other);
         break;
       }
   }
-  divide(a);
+  lists_.divide(a);
 }
 
 template <int D>
@@ -437,10 +354,9 @@ void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> radius
   for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[k];
   agenda_[i].count = agenda_[i].same = 0;
   insert(i, x);
-  const unsigned n = surround(i, x);
-  assign(i, n);
-  const std::vector<std::uint32_t> list(found_.begin(), found_.begin() + n);
-  for (const std::uint32_t candidate : list) add(packing_.slot(candidate), packing_.reversed(i, candidate));
+  const std::span<const std::uint32_t> list = surround(i, x);
+  lists_.assign(i, list);
+  for (const std::uint32_t candidate : list) lists_.add(packing_.slot(candidate), packing_.reversed(i, candidate));
 }
 
 template <int D>
@@ -448,8 +364,8 @@ void SkinLists<D>::dismiss(Slot i) {
   Agenda<D>& a = agenda_[i];
   remove(i, centre(a));
   const std::uint32_t* const list = candidates(a);
-  for (unsigned q = 0; q < a.count; ++q) drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
-  assign(i, 0);
+  for (unsigned q = 0; q < a.count; ++q) lists_.drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
+  lists_.assign(i, {});
 }
 
 template <int D>
@@ -462,8 +378,7 @@ bool SkinLists<D>::move(Slot i, const Vec<D>& x, double room) {
 
 template <int D>
 std::span<const std::uint32_t> SkinLists<D>::find_near(Slot i, double astray) {
-  const unsigned n = surround(i, centre(agenda_[i]), astray);
-  return {found_.data(), n};
+  return surround(i, centre(agenda_[i]), astray);
 }
 
 template class SkinLists<2>;

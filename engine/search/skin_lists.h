@@ -12,9 +12,9 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/pages.h"
 #include "engine/base/prefetch.h"
 #include "engine/search/agenda.h"
+#include "engine/search/candidate_lists.h"
 #include "engine/search/cell_grid.h"
 #include "engine/search/simd/scan.h"
 
@@ -29,7 +29,7 @@ class SkinLists {
             bool equal, double largest, double skin, PageVector<Agenda<D>>& agenda);
 
   double skin() const { return skin_; }
-  const std::uint32_t* candidates(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
+  const std::uint32_t* candidates(const Agenda<D>& a) const { return lists_.of(a); }
 
   /// Makes all lists for n spheres, with centres place(slot). find_near() will be called with `astray`.
   void build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent, double astray = 0);
@@ -77,32 +77,21 @@ class SkinLists {
   Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
   void insert(Slot i, const Vec<D>& x);
   void remove(Slot i, const Vec<D>& x);
-  unsigned surround(Slot i, const Vec<D>& x, double astray = 0);
+  std::span<const std::uint32_t> surround(Slot i, const Vec<D>& x, double astray = 0);
   void look_into(const Level& level, Slot i, const Vec<D>& x, double astray, unsigned& found);
-  void assign(Slot i, unsigned n);
-  std::uint32_t* start_of(const Agenda<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
-  bool same_box(std::uint32_t candidate) const { return packing_.linear(candidate) == 0; }
-  void divide(Agenda<D>& a);
-  void add(Slot i, std::uint32_t candidate);
-  void drop(Slot i, std::uint32_t candidate);
-  void remove_from_list(Slot i, unsigned q);
   void shift(Slot i, const Image<D>& boxes);
-  std::uint32_t take(unsigned units);
 
   Box<D> box_;
   Packing<D> packing_;
   const ScanKernels& kernels_;
-  const unsigned lanes_;  // lists start and end at multiples of so many candidates
   std::span<const double> radius_;
   bool equal_;
   double largest_, skin_, astray_ = 0;
   PageVector<Agenda<D>>& agenda_;
+  CandidateLists<D> lists_;
   std::vector<Level> levels_;
-  std::vector<std::uint8_t> level_;                 // by slot; empty where all are equal
-  PageVector<std::int32_t> boxes_;                  // by slot: the box of the region's centre, as a linear image
-  PageVector<std::uint32_t> pool_;                  // the lists
-  std::size_t used_ = 0;                            // of the pool
-  std::vector<std::vector<std::uint32_t>> unused_;  // lists given back, by capacity
+  std::vector<std::uint8_t> level_;  // by slot; empty where all are equal
+  PageVector<std::int32_t> boxes_;   // by slot: the box of the region's centre, as a linear image
 
   std::array<std::vector<CellView>, D> views_;
   std::vector<std::uint32_t> slots_, found_, fresh_;

@@ -147,10 +147,10 @@ std::unique_ptr<System<D>> read_state(const std::filesystem::path& file) {
   for (std::size_t i = 0; i < n; ++i) {
     const char* wanted = "position, velocity and radius of a sphere";
     const auto& row = reader.next(wanted);
-    if (row.size() != 2 * D + 1 || row[2 * D] <= 0) reader.fail("not a sphere", wanted);
+    if (row.size() != 2 * D + 1 || row.back() <= 0) reader.fail("not a sphere", wanted);
     p.x.push_back(Eigen::Map<const Vec<D>>(row.data()));
     p.v.push_back(Eigen::Map<const Vec<D>>(row.data() + D));
-    p.radius.push_back(row[2 * D]);
+    p.radius.push_back(row.back());
     twice_kinetic += p.v.back().squaredNorm();
   }
   if (twice_kinetic == 0)

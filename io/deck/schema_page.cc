@@ -120,7 +120,7 @@ std::string schema_page(bool markdown) {
 
 std::string methods_page() {
   std::ostringstream out;
-  const auto about = [&](const auto& info, std::vector<Key> keys) {
+  const auto about = [&](const auto& info, const std::vector<Key>& keys) {
     out << "  " << wrapped(std::string(info.documentation), 2) << "\n  parameters:\n";
     plain_keys(out, keys, 4);
     out << "  source: " << wrapped(std::string(info.source), 10) << "\n\n";

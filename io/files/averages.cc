@@ -26,16 +26,6 @@ AverageWriter<D>::AverageWriter(std::filesystem::path path, std::unique_ptr<Obse
     : path_(std::move(path)), average_(std::move(average)) {}
 
 template <int D>
-AverageWriter<D>::AverageWriter(std::filesystem::path path, std::unique_ptr<Observable<D>> average,
-                                const Archive::Bytes& state)
-    : AverageWriter(std::move(path), std::move(average)) {
-  average_->restore(state);
-  std::error_code ignored;
-  if (average_->samples() == 0) std::filesystem::remove(path_, ignored);
-  close();
-}
-
-template <int D>
 void AverageWriter<D>::sample(double time, const Particles<D>& particles) {
   average_->sample(time, particles);
   if (std::has_single_bit(average_->samples())) close();

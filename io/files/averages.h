@@ -16,10 +16,9 @@ template <int D>
 class AverageWriter : public Observer<D> {
  public:
   AverageWriter(std::filesystem::path path, std::unique_ptr<Observable<D>> average);
-  /// With the samples that have been taken before; the file is that of them. Throws Error(Failure::file).
-  AverageWriter(std::filesystem::path path, std::unique_ptr<Observable<D>> average, const Archive::Bytes& state);
 
   Sampling sampling() const override { return average_->sampling(); }
+  void add_state(Fields& fields, const std::string& name) override { average_->add_state(fields, name); }
   /// Throws Error(Failure::file).
   void sample(double time, const Particles<D>& particles) override;
   /// The average up to now. Throws Error(Failure::file).

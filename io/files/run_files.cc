@@ -17,8 +17,6 @@ RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const FileMarks
       thermo_(marks == nullptr ? ThermoWriter<D>(deck.output.directory / run_file::thermo)
                                : ThermoWriter<D>(deck.output.directory / run_file::thermo, marks->thermo_bytes)) {
   const auto& chosen = deck.output.observables;
-  if (marks != nullptr && marks->averages.size() != chosen.size())
-    throw Error(Failure::file, deck.output.directory.string() + ": the marks are those of a run with other averages");
   const std::filesystem::path events = deck.output.directory / run_file::events;
   if (deck.plan.events)
     events_ = marks == nullptr ? std::make_unique<EventWriter<D>>(events, deck)
@@ -26,19 +24,13 @@ RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const FileMarks
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const auto& [info, parameters] = chosen[k];
     const std::filesystem::path path = deck.output.directory / run_file::averages(*info);
-    auto average = info->template in<D>().make(system, parameters, deck.output.sample_start);
-    if (marks == nullptr)
-      averages_.emplace_back(path, std::move(average));
-    else
-      averages_.emplace_back(path, std::move(average), marks->averages[k]);
+    averages_.emplace_back(path, info->template in<D>().make(system, parameters, deck.output.sample_start));
   }
 }
 
 template <int D>
 FileMarks RunFiles<D>::mark() {
-  FileMarks marks{trajectory_.frames(), thermo_.size(), events_ ? events_->mark() : EventMark(), {}};
-  for (const auto& average : averages_) marks.averages.push_back(average.average().state());
-  return marks;
+  return {trajectory_.frames(), thermo_.size(), events_ ? events_->mark() : EventMark()};
 }
 
 template <int D>

@@ -29,8 +29,7 @@ class Onlooker : public Observer<D> {
 struct FileMarks {
   std::uint64_t frames = 0, thermo_bytes = 0;
   EventMark events;
-  std::vector<Archive::Bytes> averages;  ///< what they have summed up, in the order of the deck
-  void archive(Archive& archive) { archive(frames, thermo_bytes, events, averages); }
+  void archive(Archive& archive) { archive(frames, thermo_bytes, events); }
 };
 
 template <int D>

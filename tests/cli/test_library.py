@@ -59,6 +59,13 @@ def test_an_integrator_of_ones_own_has_order_one(examples):
     assert all(1.7 < a / b < 2.3 for a, b in zip(errors, errors[1:]))
 
 
+def test_a_potential_of_ones_own_has_its_quotient_and_its_forces(examples):
+    error = {line.split(":")[0]: float(re.search(r"energy error ([^,]+)", line)[1])
+             for line in run(examples / "own_potential").splitlines()}
+    assert error["edda, step 0.02"] < 1e-12 and error["edda, step 0.01"] < 1e-12
+    assert 1e-7 < error["psa, step 0.01"] < error["psa, step 0.02"] < 1e-2
+
+
 def test_the_engine_alone_needs_neither_mpi_nor_hdf5(tmp_path):
     absent = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("MPI", "HDF5", "spdlog", "CLI11", "nlohmann_json")]
     run("cmake", "-S", ROOT, "-B", tmp_path, "-DCAROM_ENGINE_ONLY=ON", *absent)

@@ -1,5 +1,5 @@
 #pragma once
-// The potentials that pair kernels are made for: a new one takes a line here.
+// The potentials that pair kernels are made for in every vector width: a new one takes a line here.
 
 #include <cstddef>
 #include <type_traits>
@@ -10,6 +10,7 @@
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/inverse_power.h"
 #include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/morse.h"
 #include "engine/forces/potentials/table.h"
 #include "engine/forces/potentials/wca.h"
 #include "engine/forces/potentials/yukawa.h"
@@ -17,7 +18,9 @@
 namespace carom {
 
 template <class... P>
-struct PotentialList {};
+struct PotentialList {
+  static constexpr std::size_t kLength = sizeof...(P);
+};
 
 using PairPotentials = PotentialList<HarmonicBond,                     // bonds
                                      InverseDistance,                  // gravity, Coulomb
@@ -25,16 +28,16 @@ using PairPotentials = PotentialList<HarmonicBond,                     // bonds
                                      Yukawa, Cut<Yukawa>,              //
                                      LennardJones, Cut<LennardJones>,  //
                                      Wca,                              //
+                                     Morse, Cut<Morse>,                //
                                      InversePower, Cut<InversePower>,  //
                                      Cut<Table>>;
 
-/// Where in the list a potential stands.
-template <class P, class First, class... Rest>
-constexpr std::size_t place_of(PotentialList<First, Rest...>) {
-  if constexpr (std::is_same_v<P, First>)
-    return 0;
-  else
-    return 1 + place_of<P>(PotentialList<Rest...>{});
+/// Where in the list a potential stands; its length where it does not.
+template <class P, class... Listed>
+constexpr std::size_t place_of(PotentialList<Listed...>) {
+  std::size_t place = 0;
+  (void)((std::is_same_v<P, Listed> || (++place, false)) || ...);
+  return place;
 }
 
 }  // namespace carom

@@ -11,6 +11,7 @@
 #include <memory>
 #include <utility>
 
+#include "engine/forces/pair_formulas.h"
 #include "engine/forces/potentials/pair_potentials.h"
 #include "engine/forces/potentials/pairs.h"
 
@@ -95,6 +96,16 @@ class PairTerm final : public Interaction<D> {
   }
 
  private:
+  /// From the kernels where the potential is listed; else two lanes wide, compiled here.
+  const PairFormula& formula() const {
+    constexpr std::size_t place = place_of<P>(PairPotentials{});
+    if constexpr (place < PairPotentials::kLength) {
+      return kernels_->formulas[place];
+    } else {
+      static constexpr PairFormula own = pair_formula<2, P>();
+      return own;
+    }
+  }
   double cutoff_squared() const {
     if constexpr (ShortRanged<P>)
       return potential_.cutoff_squared();
@@ -119,7 +130,7 @@ class PairTerm final : public Interaction<D> {
 
   /// The loop over pairs. Returns how many are this rank's, for mean forces.
   std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1) const {
-    const PairFormula& formula = kernels_->formulas[place_of<P>(PairPotentials{})];
+    const PairFormula& formula = this->formula();
     const auto& function = sums                     ? formula.forces_and_sums
                            : !given.vectors.empty() ? formula.hessian_product
                            : given.x_new.empty()    ? formula.forces

@@ -138,7 +138,7 @@ class Bonds {
   Vec<D> shift_of(Id i, Id j, Positions<D> x) const {
     const Vec<D> straight = x[i] - x[j];
     if ((straight.array().abs() <= kLongest * box_.edges.array()).all()) return Vec<D>::Zero();
-    const Vec<D> shift = box_.shift(box_.nearest_image(straight));
+    Vec<D> shift = box_.shift(box_.nearest_image(straight));
     for (int k = 0; k < D; ++k)
       if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > kLongest * box_.edges[k])
         throw Error(Failure::numerical, "the bond of particles " + std::to_string(ids_.empty() ? i : ids_[i]) +

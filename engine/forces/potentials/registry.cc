@@ -13,6 +13,7 @@ const std::vector<InteractionInfo>& interactions() {
       types::yukawa(),         // screened charges
       types::lennard_jones(),  // van der Waals
       types::wca(),            // its repulsive part
+      types::morse(),          // a well of any width
       types::inverse_power(),  // soft spheres
       types::table(),          // any pair potential, from points
       types::uniform_field(),  // weight

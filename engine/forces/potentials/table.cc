@@ -66,7 +66,7 @@ Table::Table(std::span<const double> r, std::span<const double> values, std::spa
   const double cells = std::min(std::ceil((last_ - first_) / narrowest), kMostCells);
   inverse_cell_ = cells / (last_ - first_), last_cell_ = cells - 1;
   std::uint32_t at = 1;
-  for (double cell = 0; cell < cells; ++cell) {
+  for (std::uint32_t cell = 0; cell < cells; ++cell) {
     while (cell >= (pieces[at + 1].start - first_) * inverse_cell_) ++at;
     data->cells.push_back(at);
   }

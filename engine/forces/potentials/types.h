@@ -11,6 +11,7 @@ InteractionInfo coulomb();
 InteractionInfo yukawa();
 InteractionInfo lennard_jones();
 InteractionInfo wca();
+InteractionInfo morse();
 InteractionInfo inverse_power();
 InteractionInfo table();
 InteractionInfo uniform_field();

@@ -2,34 +2,11 @@
 // compiled for different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so
 // that no function compiled for one machine can end up in another's binary.
 
-#include "engine/base/lanes.h"
-#include "engine/forces/simd/pair_kernels.h"
+#include "engine/forces/pair_formulas.h"
+#include "engine/forces/potentials/pair_potentials.h"
 
 namespace carom {
 namespace {
-
-template <int W>
-struct Width {
-  typedef double Double __attribute__((vector_size(8 * W)));
-  typedef long long Long __attribute__((vector_size(8 * W)));
-  typedef std::uint32_t Places __attribute__((vector_size(4 * W)));
-};
-using Two = Width<2>::Double;
-using Four = Width<4>::Double;
-using Eight = Width<8>::Double;
-
-#define CAROM_INLINE [[gnu::always_inline]] inline
-
-template <class V>
-CAROM_INLINE V load(const void* at) {
-  V lanes;
-  __builtin_memcpy(&lanes, at, sizeof lanes);
-  return lanes;
-}
-template <class V>
-CAROM_INLINE void store(void* at, V lanes) {
-  __builtin_memcpy(at, &lanes, sizeof lanes);
-}
 
 template <class V>
 struct Fields {
@@ -65,47 +42,13 @@ CAROM_INLINE Fields<V> transposed(const auto& at) {
   }
 }
 
-/// The sign of each lane, one bit a lane.
-template <class M>
-CAROM_INLINE unsigned bits(M mask) {
-#if defined(__AVX512DQ__)
-  if constexpr (sizeof mask == 64) return _mm512_movepi64_mask((__m512i)mask);
-#endif
-#if defined(__AVX__)
-  if constexpr (sizeof mask == 32) return static_cast<unsigned>(_mm256_movemask_pd((__m256d)mask));
-#endif
-#if defined(__SSE2__)
-  if constexpr (sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
-#endif
-  unsigned all = 0;
-  for (unsigned l = 0; l < sizeof mask / 8; ++l) all |= (static_cast<long long>(mask[l]) < 0 ? 1u : 0u) << l;
-  return all;
-}
-
-/// a < b, a mask: GCC for SSE2 takes the conjunction of two comparisons to pieces.
-template <class V>
-CAROM_INLINE IntegerOf<V> below(V a, V b) {
-#if defined(__SSE2__)
-  if constexpr (sizeof a == 16) return (IntegerOf<V>)_mm_cmplt_pd((__m128d)a, (__m128d)b);
-#endif
-  return (IntegerOf<V>)(a < b);
-}
-/// Where a < b, one bit a lane.
-template <class V>
-CAROM_INLINE unsigned less(V a, V b) {
-#if defined(__AVX512F__)
-  if constexpr (sizeof a == 64) return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ);
-#endif
-  return bits(a < b);
-}
-
 /// For each mask of four lanes the halves of those that are in it, first things first.
 struct Compression {
   alignas(32) std::uint32_t half[16][8];
   alignas(16) std::uint32_t lane[16][4];
   constexpr Compression() : half{}, lane{} {
     for (unsigned mask = 0; mask < 16; ++mask) {
-      unsigned n = 0;
+      std::size_t n = 0;
       for (unsigned l = 0; l < 4; ++l)
         if ((mask >> l & 1) != 0) {
           half[mask][2 * n] = 2 * l, half[mask][2 * n + 1] = 2 * l + 1;
@@ -228,7 +171,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         compress(batch.d_new[2] + n, mask, ez);
       }
       if constexpr (weighted) compress(batch.weight + n, mask, product);
-      compress<W>(batch.second + n, mask, load<typename Width<W>::Places>(j));
+      compress<W>(batch.second + n, mask, load<typename Width<W>::Unsigned>(j));
       n += bits_in<W>(mask);
     }
     if (at < count) {
@@ -257,8 +200,8 @@ bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
 /// Adds the words to the sums of both particles.
 template <int W>
 void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums) {
-  constexpr unsigned L = W < 4 ? W : 4, kParts = 4 / L;  // a record is no wider
-  using I = typename Width<L>::Long;
+  constexpr std::size_t L = W == 2 ? 2 : 4, kParts = 4 / L;  // a record is no wider
+  using I = IntegerOf<typename Width<L>::Double>;
   for (unsigned r = 0; r < batch.rows; ++r) {
     const unsigned end = batch.row[r + 1].begin;
     I own[kParts] = {};
@@ -287,7 +230,7 @@ void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoo
       }
     }
     std::int64_t* const first = sums[batch.row[r].row].of;
-    for (unsigned part = 0; part < kParts; ++part) store(first + L * part, load<I>(first + L * part) + own[part]);
+    for (std::size_t part = 0; part < kParts; ++part) store(first + L * part, load<I>(first + L * part) + own[part]);
   }
 }
 
@@ -295,7 +238,7 @@ template <int W>
 void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32_t end, PartnersFound& found) {
   using V = typename Width<W>::Double;
   using B = BitsOf<V>;
-  using Places = typename Width<W>::Places;
+  using Places = typename Width<W>::Unsigned;
   const V x = all<V>(search.own[0]), y = all<V>(search.own[1]), z = all<V>(search.own[2]);
   const V reach = all<V>(search.reach_squared);
   const int to_sign = __builtin_clzll(search.wanted);
@@ -314,6 +257,16 @@ void find_partners(const PartnerSearch& search, std::uint32_t begin, std::uint32
     compress<W>(found.other, mask & ~plain, places);
     found.other += bits_in<W>(mask & ~plain);
   }
+}
+
+template <int W, class... P>
+struct Formulas {
+  static constexpr PairFormula kAll[] = {pair_formula<W, P>()...};
+};
+
+template <int W, class... P>
+constexpr PairKernels kernels_of(const char* name, PotentialList<P...>) {
+  return {name, collect<W>, scatter<W>, find_partners<W>, Formulas<W, P...>::kAll};
 }
 
 }  // namespace

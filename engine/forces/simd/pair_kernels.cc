@@ -2,7 +2,6 @@
 
 #include <cstdlib>
 #include <string>
-#include <string_view>
 
 #include "engine/base/error.h"
 
@@ -19,13 +18,19 @@ bool available(const PairKernels& kernels) {
   return true;
 }
 
+/// What CAROM_SIMD says; nothing: any.
+std::string wanted_width() {
+  const char* const wanted = std::getenv("CAROM_SIMD");
+  return wanted ? wanted : "";
+}
+
 }  // namespace
 
 std::vector<const PairKernels*> available_pair_kernels() {
   std::vector<const PairKernels*> all = {&kernels::pairs_avx512, &kernels::pairs_avx2, &kernels::pairs_sse2};
-  const char* const wanted = std::getenv("CAROM_SIMD");
+  const std::string wanted = wanted_width();
   std::erase_if(all, [&](const PairKernels* each) {
-    return (wanted && std::string_view(wanted) != each->name) || !available(*each);
+    return (!wanted.empty() && wanted != each->name) || !available(*each);
   });
   return all;
 }
@@ -33,7 +38,7 @@ std::vector<const PairKernels*> available_pair_kernels() {
 const PairKernels& pair_kernels() {
   const auto all = available_pair_kernels();
   if (!all.empty()) return *all.front();
-  throw Error(Failure::deck, "CAROM_SIMD=" + std::string(std::getenv("CAROM_SIMD")) +
+  throw Error(Failure::deck, "CAROM_SIMD=" + wanted_width() +
                                  " names no vector width of this machine; use sse2, avx2 or avx512, or unset it");
 }
 

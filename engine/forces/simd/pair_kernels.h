@@ -1,7 +1,7 @@
 #pragma once
 // The interface between loops over pairs and their kernels, which exist once for each vector width.
 //
-// A loop works on batches: kernels collect pairs within the cutoff from a list (pair_list.h) into arrays of one
+// A loop works on batches: kernels collect pairs within the cutoff from a list (pair_records.h) into arrays of one
 // coordinate each, a potential's formula turns them into forces in quanta, and kernels add these to the sums of both
 // particles. Particles are numbered here by their place in the list. Two dimensions are three with z = 0.
 

@@ -1,4 +1,4 @@
-#include "engine/forces/pair_formulas.h"
+#include "engine/forces/simd/pair_kernel.h"
 
 namespace carom::kernels {
 constinit const PairKernels pairs_avx512 = kernels_of<8>("avx512", PairPotentials{});

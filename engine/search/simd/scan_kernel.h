@@ -2,94 +2,41 @@
 // different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so that no
 // function compiled for one machine can end up in another's binary.
 
-#if defined(__SSE2__)
-#include <immintrin.h>
-#endif
-
+#include "engine/base/lanes.h"
 #include "engine/search/simd/scan.h"
 
 namespace carom {
 namespace {
 
 template <int W>
-struct Lanes {
-  typedef double Double __attribute__((vector_size(8 * W)));
-  typedef long long Long __attribute__((vector_size(8 * W)));
-  typedef int Int __attribute__((vector_size(4 * W)));
-  typedef unsigned Bits __attribute__((vector_size(4 * W)));
-};
-using Two = Lanes<2>::Double;
-using Four = Lanes<4>::Double;
-using Eight = Lanes<8>::Double;
+using Double = typename Width<W>::Double;
 
-template <int W>
-using Double = typename Lanes<W>::Double;
-template <int W>
-using Long = typename Lanes<W>::Long;
-
-inline Two load(const double* at) {
-  Two pair;
-  __builtin_memcpy(&pair, at, sizeof pair);
-  return pair;
-}
-inline Four load(const double* low, const double* high) {
+inline Four load_two(const double* low, const double* high) {
 #if defined(__AVX__)
   return (Four)_mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(low)), _mm_loadu_pd(high), 1);
 #else
-  return __builtin_shufflevector(load(low), load(high), 0, 1, 2, 3);
+  return __builtin_shufflevector(load<Two>(low), load<Two>(high), 0, 1, 2, 3);
 #endif
 }
 inline Eight join(Four a, Four b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7); }
 
 /// Two neighbouring doubles of W records: `first` and `second` hold one each of all records.
 inline void load_pairs(const double* const* record, int at, Two& first, Two& second) {
-  const Two even = load(record[0] + at), odd = load(record[1] + at);
+  const Two even = load<Two>(record[0] + at), odd = load<Two>(record[1] + at);
   first = __builtin_shufflevector(even, odd, 0, 2);
   second = __builtin_shufflevector(even, odd, 1, 3);
 }
 inline void load_pairs(const double* const* record, int at, Four& first, Four& second) {
-  const Four even = load(record[0] + at, record[2] + at);
-  const Four odd = load(record[1] + at, record[3] + at);
+  const Four even = load_two(record[0] + at, record[2] + at);
+  const Four odd = load_two(record[1] + at, record[3] + at);
   first = __builtin_shufflevector(even, odd, 0, 4, 2, 6);
   second = __builtin_shufflevector(even, odd, 1, 5, 3, 7);
 }
 inline void load_pairs(const double* const* record, int at, Eight& first, Eight& second) {
-  const Eight even = join(load(record[0] + at, record[2] + at), load(record[4] + at, record[6] + at));
-  const Eight odd = join(load(record[1] + at, record[3] + at), load(record[5] + at, record[7] + at));
+  const Eight even = join(load_two(record[0] + at, record[2] + at), load_two(record[4] + at, record[6] + at));
+  const Eight odd = join(load_two(record[1] + at, record[3] + at), load_two(record[5] + at, record[7] + at));
   first = __builtin_shufflevector(even, odd, 0, 8, 2, 10, 4, 12, 6, 14);
   second = __builtin_shufflevector(even, odd, 1, 9, 3, 11, 5, 13, 7, 15);
-}
-
-template <int W>
-inline Double<W> square_root(Double<W> x) {
-#if defined(__AVX512F__)
-  if constexpr (W == 8) return (Eight)_mm512_sqrt_pd((__m512d)x);
-#endif
-#if defined(__AVX__)
-  if constexpr (W == 4) return (Four)_mm256_sqrt_pd((__m256d)x);
-#endif
-#if defined(__SSE2__)
-  if constexpr (W == 2) return (Two)_mm_sqrt_pd((__m128d)x);
-#endif
-  for (int l = 0; l < W; ++l) x[l] = __builtin_sqrt(x[l]);
-  return x;
-}
-
-/// One bit a lane.
-template <int W>
-inline unsigned bits(Long<W> mask) {
-#if defined(__AVX512DQ__)
-  if constexpr (W == 8) return _mm512_movepi64_mask((__m512i)mask);
-#endif
-#if defined(__AVX__)
-  if constexpr (W == 4) return static_cast<unsigned>(_mm256_movemask_pd((__m256d)mask));
-#endif
-#if defined(__SSE2__)
-  if constexpr (W == 2) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
-#endif
-  unsigned all = 0;
-  for (int l = 0; l < W; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
-  return all;
 }
 
 template <int W>
@@ -105,28 +52,6 @@ inline double smallest(Double<W> x) {
   }
 }
 
-template <int W>
-inline Double<W> all(double x) {
-  Double<W> lanes;
-  for (int l = 0; l < W; ++l) lanes[l] = x;
-  return lanes;
-}
-
-/// The lesser of two in every lane; the second where one is no number.
-template <int W>
-inline Double<W> least(Double<W> a, Double<W> b) {
-#if defined(__AVX512F__)
-  if constexpr (W == 8) return (Eight)_mm512_min_pd((__m512d)a, (__m512d)b);
-#endif
-#if defined(__AVX__)
-  if constexpr (W == 4) return (Four)_mm256_min_pd((__m256d)a, (__m256d)b);
-#endif
-#if defined(__SSE2__)
-  if constexpr (W == 2) return (Two)_mm_min_pd((__m128d)a, (__m128d)b);
-#endif
-  return a < b ? a : b;
-}
-
 constexpr unsigned kBlock = 64;  // candidates per block: their times are kept until the first is known
 
 /// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: never, if it
@@ -140,10 +65,10 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
   const double* const records = s.records;
   const double* const own = records + std::size_t{8} * self;
   const std::uint32_t slot_mask = s.slot_mask;
-  const V none = all<W>(kNever), t_i = all<W>(own[2 * D]);
+  const V none = all<V>(kNever), t_i = all<V>(own[std::ptrdiff_t{2} * D]);
   V x_i[D], v_i[D];
-  for (int k = 0; k < D; ++k) x_i[k] = all<W>(own[k]), v_i[k] = all<W>(own[D + k]);
-  V sigma = all<W>(s.diameter), best = none;
+  for (int k = 0; k < D; ++k) x_i[k] = all<V>(own[k]), v_i[k] = all<V>(own[D + k]);
+  V sigma = all<V>(s.diameter), best = none;
   const auto look = [&]<bool shifted>(const std::uint32_t* some, double* to) __attribute__((always_inline)) {
     const double* record[W];
     for (int l = 0; l < W; ++l) record[l] = records + std::size_t{8} * (some[l] & slot_mask);
@@ -165,11 +90,10 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       }
     }
     if constexpr (shifted) {
-      typename Lanes<W>::Bits code;
-      __builtin_memcpy(&code, some, sizeof code);
+      const auto code = load<typename Width<W>::Unsigned>(some);
       const unsigned mask = (1u << s.field_bits) - 1, zero = 1u << (s.field_bits - 1);
       for (int k = 0; k < D; ++k) {
-        const auto image = (typename Lanes<W>::Int)((code >> (s.slot_bits + k * s.field_bits) & mask) - zero);
+        const auto image = (typename Width<W>::Int)((code >> (s.slot_bits + k * s.field_bits) & mask) - zero);
         d[k] -= __builtin_convertvector(image, V) * s.edges[k];
       }
     }
@@ -191,10 +115,10 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
     if constexpr (plain) {
       const V c = d_squared - sigma * sigma;
       const V discriminant = v_squared * sigma * sigma - cross;
-      time = now + c / (square_root<W>(discriminant) - b);
-      const Long<W> parting = b >= 0.0;
-      time = (V)((Long<W>)time | parting | (discriminant <= 0.0));  // all bits set: no number
-      time = (c <= 0.0) & ~parting ? all<W>(-kNever) : time;
+      time = now + c / (elementary::sqrt(discriminant) - b);
+      const IntegerOf<V> parting = b >= 0.0;
+      time = (V)((IntegerOf<V>)time | parting | (discriminant <= 0.0));  // all bits set: no number
+      time = (c <= 0.0) & ~parting ? all<V>(-kNever) : time;
     } else {
       if (s.radius)
         for (int l = 0; l < W; ++l) sigma[l] = s.radius[self] + s.radius[some[l] & slot_mask];
@@ -202,13 +126,13 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       const V rate = sigma * s.growth, reach = sigma * (1.0 + s.growth * now);
       const V c = d_squared - reach * reach, falling = b - reach * rate, outrun = v_squared - rate * rate;
       const V discriminant = v_squared * reach * reach - cross + rate * (rate * d_squared - 2.0 * reach * b);
-      const V root = square_root<W>(discriminant);
+      const V root = elementary::sqrt(discriminant);
       time = now + (falling < 0.0 ? c / (root - falling) : (falling + root) / -outrun);
       time = (discriminant > 0.0) & ((falling < 0.0) | (outrun < 0.0)) ? time : none;
-      time = (c <= 0.0) ? ((falling < 0.0) & (d_squared > 0.0) ? all<W>(-kNever) : none) : time;  // but for the padding
+      time = (c <= 0.0) ? (((falling < 0.0) & (d_squared > 0.0)) ? all<V>(-kNever) : none) : time;  // but for the padding
     }
-    __builtin_memcpy(to, &time, sizeof time);
-    best = least<W>(time, best);
+    store(to, time);
+    best = elementary::min(time, best);
   };
   const unsigned surely = same == n ? n : same / W * W;  // the padding is in the same box
   unsigned q = 0;
@@ -223,9 +147,7 @@ inline ScanResult first_of(const double* times, unsigned n, Double<W> best) {
   const double first = smallest<W>(best);
   std::uint64_t at = 0;
   for (unsigned q = 0; q < n; q += W) {
-    Double<W> some;
-    __builtin_memcpy(&some, times + q, sizeof some);
-    at |= static_cast<std::uint64_t>(bits<W>(some == first)) << q;
+    at |= static_cast<std::uint64_t>(bits(load<Double<W>>(times + q) == first)) << q;
   }
   return {first, static_cast<std::uint32_t>(__builtin_ctzll(at | std::uint64_t{1} << 63)), (at & (at - 1)) != 0};
 }
@@ -275,24 +197,8 @@ void scan_two(const ScanSetting& s, const ScanTask* task, ScanResult* result) {
   for (int k = 0; k < 2; ++k) result[k] = first_of<W>(times[k], task[k].n, best[k]);
 }
 
-typedef int Ints __attribute__((vector_size(32)));
+using Ints = Width<8>::Int;
 typedef float Floats __attribute__((vector_size(32)));
-
-/// One bit a lane.
-inline unsigned bits(Ints mask) {
-#if defined(__AVX2__)
-  return static_cast<unsigned>(_mm256_movemask_ps((__m256)mask));
-#elif defined(__SSE2__)
-  typedef int Half __attribute__((vector_size(16)));
-  const Half low = __builtin_shufflevector(mask, mask, 0, 1, 2, 3),
-             high = __builtin_shufflevector(mask, mask, 4, 5, 6, 7);
-  return static_cast<unsigned>(_mm_movemask_ps((__m128)low) | _mm_movemask_ps((__m128)high) << 4);
-#else
-  unsigned all = 0;
-  for (int l = 0; l < 8; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
-  return all;
-#endif
-}
 
 [[maybe_unused]] unsigned near(const NearTask& task, std::uint32_t* slots, std::int32_t* away) {
   const Floats scale_x = Floats{} + task.scale[0], scale_y = Floats{} + task.scale[1],
@@ -306,9 +212,7 @@ inline unsigned bits(Ints mask) {
   } places[8];
   unsigned lines = 0;
   const auto within = [&](const Place& at, const CellLine& line) {
-    Ints place, slot;
-    __builtin_memcpy(&place, line.place, sizeof place);
-    __builtin_memcpy(&slot, line.slot, sizeof slot);
+    const Ints place = load<Ints>(line.place), slot = load<Ints>(line.slot);
     const Floats x = __builtin_convertvector(place & 1023, Floats) * scale_x + at.x;
     const Floats y = __builtin_convertvector(place >> 10 & 1023, Floats) * scale_y + at.y;
     const Floats z = __builtin_convertvector(place >> 20, Floats) * scale_z + at.z;
@@ -361,9 +265,8 @@ inline unsigned bits(Ints mask) {
     const Ints one = Ints{} + static_cast<int>(candidates[q]);
     unsigned hit = 0;
     for (unsigned p = 0; p < length; p += 8) {
-      Ints eight;
-      __builtin_memcpy(&eight, list + p, sizeof eight);
-      const unsigned inside = length - p < 8 ? (1u << (length - p)) - 1 : 0xff, same = bits(eight == one) & inside;
+      const unsigned inside = length - p < 8 ? (1u << (length - p)) - 1 : 0xff;
+      const unsigned same = bits(load<Ints>(list + p) == one) & inside;
       hit |= same;
       kept[p / 64] |= static_cast<std::uint64_t>(same) << (p % 64);
     }
@@ -373,7 +276,7 @@ inline unsigned bits(Ints mask) {
   return count;
 }
 
-typedef unsigned Quad __attribute__((vector_size(16)));
+using Quad = Width<4>::Unsigned;
 
 /// Those of four that a mask names, moved to the front.
 inline Quad pack(Quad four, unsigned mask) {
@@ -395,16 +298,6 @@ inline Quad pack(Quad four, unsigned mask) {
 #endif
 }
 
-inline unsigned bits(Quad mask) {
-#if defined(__SSE2__)
-  return static_cast<unsigned>(_mm_movemask_ps((__m128)mask));
-#else
-  unsigned all = 0;
-  for (unsigned l = 0; l < 4; ++l) all |= (mask[l] != 0 ? 1u : 0u) << l;
-  return all;
-#endif
-}
-
 [[maybe_unused]] Heads heads(const HeadsTask& task, std::uint32_t* candidates) {
   const std::uint32_t* const first = task.first;
   const HeadStep* const inner = task.step[1];
@@ -417,14 +310,12 @@ inline unsigned bits(Quad mask) {
     const std::uint32_t* const row = first + outer->offset;
     const std::uint32_t box = task.away + outer->away;
     for (unsigned b = 0; b < steps; ++b) {
-      Quad four;
-      __builtin_memcpy(&four, row + inner[b].offset, sizeof four);
+      const Quad four = load<Quad>(row + inner[b].offset);
       const Quad filled = ~(Quad)(four == kEmpty) & wanted;
       const unsigned mask = bits(filled);
       const Quad seen = four - (box + inner[b].away);
       any |= (seen ^ here) & filled;
-      const Quad front = pack(seen, mask);
-      __builtin_memcpy(end, &front, sizeof front);
+      store(end, pack(seen, mask));
       end += __builtin_popcount(mask);
     }
   }

@@ -8,6 +8,7 @@
 #include "engine/forces/potentials/damped_coulomb.h"
 #include "engine/forces/potentials/inverse_power.h"
 #include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/morse.h"
 #include "engine/forces/potentials/tail.h"
 #include "engine/forces/potentials/yukawa.h"
 #include "tests/unit/potentials/accuracy.h"
@@ -250,6 +251,8 @@ TEST(TailCorrection, IsTheIntegralOfWhatTheCutTakesAway) {
   expect_tail<3>(LennardJones(1.3, 0.9));
   expect_tail<2>(Yukawa(-2, 0.8));
   expect_tail<3>(Yukawa(-2, 0.8));
+  expect_tail<2>(Morse(1.3, 2.1, 1.2));
+  expect_tail<3>(Morse(1.3, 2.1, 1.2));
   expect_tail<2>(InversePower(0.7, 1.1, 5.5));
   expect_tail<3>(InversePower(0.7, 1.1, 5.5));
 }

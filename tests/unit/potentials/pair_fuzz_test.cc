@@ -157,6 +157,24 @@ Law yukawa(double strength, double kappa, bool charges) {
   return law;
 }
 
+Law morse(double depth, double alpha, double r0) {
+  Law law{.type = "morse", .given = {{"depth", depth}, {"alpha", alpha}, {"r0", r0}}};
+  const auto decay = [=](Real r) {
+    const Real u = std::exp(-alpha * (r - r0));
+    return Sized(u, (4 + alpha * (r + r0)) * u);
+  };
+  law.value = [=](Real rho) {
+    const Sized u = decay(std::sqrt(rho));
+    return depth * u * (u - 2);
+  };
+  law.slope = [=](Real rho) {
+    const Real r = std::sqrt(rho);
+    const Sized u = decay(r);
+    return Sized(-depth * alpha / r) * u * (u - 1);
+  };
+  return law;
+}
+
 Law damped_coulomb(double strength, double damping, double cutoff) {
   Law law{.type = "coulomb", .weight = Law::charges};
   law.given = {{"constant", strength}, {"form", "damped-shifted"s}, {"damping", damping}, {"cutoff", cutoff}};
@@ -219,14 +237,15 @@ Law table(Dice& dice, double strength, double last) {
 Law random_law(Dice& dice, std::size_t particles, double edge, bool periodic) {
   const double strength = dice.decades(-8, 8), either = dice.one_in(2) ? strength : -strength;
   const double length = edge * dice.decades(-3, -0.3);
-  const std::size_t type = dice.below(periodic ? 7 : 9);
+  const std::size_t type = dice.below(periodic ? 8 : 10);
   if (type == 0) return bonds(dice, particles, strength, length);
   if (type == 1) return lennard_jones(strength, length, true);
   if (type == 2) return damped_coulomb(strength, dice.decades(-1, 1) / edge, edge * dice.uniform(0.05, 0.7));
-  if (type == 7) return inverse_distance("gravity", strength);
-  if (type == 8) return inverse_distance("coulomb", either);
+  if (type == 8) return inverse_distance("gravity", strength);
+  if (type == 9) return inverse_distance("coulomb", either);
   Law law = type == 3   ? lennard_jones(strength, length, false)
             : type == 4 ? inverse_power(either, length, dice.uniform(0.5, 40))
+            : type == 7 ? morse(strength, dice.uniform(0.5, 20) / length, length)
             : type == 5 ? yukawa(either, dice.decades(-1, 3) / edge, dice.one_in(2))
                         : table(dice, strength, length);
   if (!periodic && type != 6 && dice.one_in(2)) return law;

@@ -7,6 +7,7 @@
 #include "engine/forces/potentials/cut.h"
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/options.h"
 #include "engine/forces/potentials/yukawa.h"
 #include "engine/forces/simd/pair_kernels.h"
 #include "tests/unit/potentials/cases.h"
@@ -250,6 +251,29 @@ TEST(PairSums, DoNotDependOnTheHistoryOfTheList) {
     travel<2>(6, 60, 0.07, width);
     travel<3>(4, 90, 0.02, width);
     travel<3>(1.5, 12, 0.03, width);
+  }
+}
+
+/// No kernels are made for it.
+struct OwnYukawa : Yukawa {
+  using Yukawa::Yukawa;
+};
+
+TEST(PairSums, OfAPotentialThatIsNotListedAreTheSame) {
+  Scene<3> scene(200, 6, Boundary::periodic, 0.4);
+  const auto x_new = test::displaced(scene.particles.x, scene.random_vectors(0.1), 1);
+  for (const char* cut : {"switch", "shifted", "force-shifted"}) {
+    const Given given = {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", true}, {"cutoff", 2.0}, {"cut", cut + ""s}};
+    Parameters parameters;
+    for (const auto& [name, value] : given) parameters.set(name, value);
+    const auto own = options::pair_term<3>(
+        "own", OwnYukawa(2.0, 1.1), PairWeight::charges, parameters,
+        {.box = scene.box, .particles = scene.particles, .species = scene.species, .bonds = nullptr});
+    const Outcome<3> expected = outcome(*scene.make("yukawa", given), scene.particles.x, x_new);
+    for (const PairKernels* kernels : available_pair_kernels()) {
+      own->use(*kernels);
+      EXPECT_TRUE(outcome(*own, scene.particles.x, x_new) == expected) << kernels->name;
+    }
   }
 }
 

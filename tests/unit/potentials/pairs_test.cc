@@ -322,7 +322,7 @@ TEST(Registry, NamesEveryTypeOnceAndDocumentsIt) {
     EXPECT_FALSE(info.formula.empty() || info.documentation.empty() || info.source.empty()) << info.name;
     for (const Parameter& parameter : info.parameters) EXPECT_FALSE(parameter.meaning.empty()) << parameter.name;
   }
-  EXPECT_EQ(names.size(), 10u);
+  EXPECT_EQ(names.size(), 11u);
 }
 
 TEST(Pairs, ScaleOfAShortRangedAttractionIsThatAtContact) {

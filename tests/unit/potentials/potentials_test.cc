@@ -7,6 +7,7 @@
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/inverse_power.h"
 #include "engine/forces/potentials/lennard_jones.h"
+#include "engine/forces/potentials/morse.h"
 #include "engine/forces/potentials/wca.h"
 #include "engine/forces/potentials/yukawa.h"
 #include "tests/unit/potentials/accuracy.h"
@@ -107,6 +108,28 @@ TEST(Accuracy, WcaAlsoAcrossItsCutoff) {
   expect_within(measure(wca, exact, scale, 0.01, 3), 6);
   EXPECT_EQ(wca.value(wca.cutoff_squared()), 0);
   EXPECT_EQ(wca.quotient(1.1 * wca.cutoff_squared(), 2 * wca.cutoff_squared()), 0);
+}
+
+TEST(Accuracy, Morse) {
+  const double depth = 1.7, r0 = 1.1;
+  for (const double alpha : {0.3, 5.0, 30.0}) {
+    const auto terms = [&](const Precise& rho, int sign) {
+      const Precise u = exp(-Precise(alpha) * (sqrt(rho) - Precise(r0)));
+      return Precise(Precise(depth) * (u * u + sign * 2 * u));
+    };
+    const auto rounding = [&](double rho, double) { return 1 + alpha * (std::sqrt(rho) + r0) / 2; };
+    expect_within(measure(
+                      Morse(depth, alpha, r0), [&](const Precise& rho) { return terms(rho, -1); },
+                      [&](const Precise& rho) { return terms(rho, 1); }, 1e-3, 30, rounding),
+                  4);
+  }
+}
+
+TEST(Morse, HoldsThirteenInAnIcosahedron) {  // Doye, Wales, Berry, J. Chem. Phys. 103 (1995) 4234: -42.439863
+  const Morse morse(1, 6, 1);
+  const double radius2 = 0.96470275 * 0.96470275, golden2 = 0.5 * (3 + std::sqrt(5.0)), edge2 = 4 / (1 + golden2);
+  const auto pairs = [&](int count, double over_radius2) { return count * morse.value(over_radius2 * radius2); };
+  EXPECT_NEAR(pairs(12, 1) + pairs(30, edge2) + pairs(30, edge2 * golden2) + pairs(6, 4), -42.439863, 5e-7);
 }
 
 TEST(Accuracy, InversePower) {

@@ -1,0 +1,42 @@
+#pragma once
+// Values as bytes, for messages and checkpoints: all readers are the same program on the same kind of machine.
+
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace carom {
+
+using Bytes = std::vector<std::byte>;
+
+/// Appends a value, byte by byte.
+template <class T>
+void put(Bytes& to, const T& value) {
+  const std::size_t at = to.size();
+  to.resize(at + sizeof(T));
+  std::memcpy(to.data() + at, static_cast<const void*>(&value), sizeof(T));
+}
+
+/// Reads what put() wrote, in its order.
+class Reader {
+ public:
+  explicit Reader(const Bytes& bytes) : at_(bytes.data()), end_(bytes.data() + bytes.size()) {}
+  bool more() const { return at_ < end_; }
+  std::size_t left() const { return static_cast<std::size_t>(end_ - at_); }
+  template <class T>
+  T get() {
+    T value;
+    std::memcpy(static_cast<void*>(&value), at_, sizeof(T));
+    at_ += sizeof(T);
+    return value;
+  }
+  /// Where the next so many bytes stand, and goes on behind them.
+  const std::byte* skip(std::size_t bytes) { return std::exchange(at_, at_ + bytes); }
+
+ private:
+  const std::byte *at_, *end_;
+};
+
+}  // namespace carom

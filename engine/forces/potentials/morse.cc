@@ -1,0 +1,37 @@
+#include "engine/forces/potentials/morse.h"
+
+#include "engine/forces/potentials/options.h"
+#include "engine/forces/potentials/types.h"
+
+namespace carom::types {
+namespace {
+
+using Type = Parameter::Type;
+using Range = Parameter::Range;
+
+template <int D>
+std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
+  return options::pair_term<D>("morse", Morse(p.real("depth"), p.real("alpha"), p.real("r0")), PairWeight::one, p,
+                               context);
+}
+
+}  // namespace
+
+InteractionInfo morse() {
+  return {.name = "morse",
+          .kind = InteractionInfo::Kind::pair,
+          .parameters = options::with_pair_options(
+              {{"depth", Type::real, "", "energy", "D, of the well; D0 in LAMMPS and HOOMD", Range::non_negative},
+               {"alpha", Type::real, "", "1/length", "inverse width of the well", Range::positive},
+               {"r0", Type::real, "", "length", "distance at which V is least", Range::non_negative}}),
+          .formula = "sum over pairs of D [(1 - exp(-alpha (r - r0)))^2 - 1]",
+          .documentation =
+              "Bonds that can break, metals, colloids with a short attraction: alpha r0 = 6 has the well of "
+              "Lennard-Jones, 14 and more that of sticky spheres. At r = 0 it is finite, so alpha r0 is to be well "
+              "above 1 where cores are to hold.",
+          .source = "Morse, Phys. Rev. 34 (1929) 57",
+          .in_2d = make<2>,
+          .in_3d = make<3>};
+}
+
+}  // namespace carom::types

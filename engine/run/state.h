@@ -1,0 +1,95 @@
+#pragma once
+// The state of a run as bytes, field by field: what a checkpoint holds, on any number of ranks.
+
+#include <algorithm>
+#include <functional>
+#include <string>
+
+#include "engine/base/error.h"
+#include "engine/ranks/system.h"
+
+namespace carom {
+
+/// Where a state goes: fields of particles, whole and in the order of ids, and what there is one of a run.
+struct StateWriter {
+  std::function<void(const Fields::Field&, const Bytes&)> field;
+  std::function<void(const std::string& name, const Bytes&)> of_run;
+};
+
+/// Gives rank 0's writer the state of a run: in Simulation::Hooks::should_stop all that it needs to go on. Collective.
+template <int D>
+void save_state(System<D>& system, const StateWriter& writer) {
+  Exchange& ranks = system.decomposition.ranks();
+  for (const auto& field : system.fields.of_particles()) {
+    if (field->kind == Fields::Kind::constant) continue;
+    Bytes all;
+    for (const Bytes& block : gather_on_first(ranks, system.decomposition.block_of(*field)))
+      all.insert(all.end(), block.begin(), block.end());
+    if (ranks.rank() == 0) writer.field(*field, all);
+  }
+  if (ranks.rank() > 0) return;
+  for (const Fields::OfRun& entry : system.fields.of_run()) {
+    Archive archive;
+    entry.archive(archive);
+    writer.of_run(entry.name, archive.bytes());
+  }
+}
+
+/// Where a state comes from; called on rank 0 only.
+using StateReader = std::function<Bytes(const std::string& name)>;
+
+/// Sets a field of a system that is in blocks of ids. Throws Error(Failure::file) where the length is wrong.
+/// Collective.
+template <int D>
+void restore_field(System<D>& system, Fields::Field& field, const StateReader& read) {
+  Exchange& ranks = system.decomposition.ranks();
+  const IdBlocks blocks = system.decomposition.blocks();
+  std::vector<Bytes> outgoing(blocks.ranks);
+  if (ranks.rank() == 0) {
+    const Bytes all = read(field.name);
+    if (!all.empty() && all.size() != blocks.particles * field.size)
+      throw Error(Failure::file, "the state has no '" + field.name + "' for each particle of this run");
+    for (int rank = 0; rank < ranks.size() && !all.empty(); ++rank) {
+      const auto at = [&](Id id) { return all.begin() + static_cast<std::ptrdiff_t>(id * field.size); };
+      outgoing[static_cast<std::size_t>(rank)].assign(at(blocks.first(rank)), at(blocks.first(rank + 1)));
+    }
+  }
+  const Bytes mine = std::move(ranks.swap(std::move(outgoing))[0]);
+  field.resize(mine.size() / field.size);
+  if (!mine.empty()) std::memcpy(field.data(), mine.data(), mine.size());
+}
+
+/// Sets the particles of a system: what a run that is to be continued starts from.
+template <int D>
+void restore_particles(System<D>& system, const StateReader& read) {
+  for (const auto& field : system.fields.of_particles())
+    if (field->kind != Fields::Kind::constant) restore_field(system, *field, read);
+}
+
+/// Sets the whole state, in Simulation::Hooks::restore. Collective.
+template <int D>
+void restore_state(System<D>& system, const StateReader& read) {
+  restore_particles(system, read);
+  Exchange& ranks = system.decomposition.ranks();
+  Archive all;
+  for (const Fields::OfRun& entry : system.fields.of_run()) {
+    if (ranks.rank() > 0) break;
+    std::string name = entry.name;
+    Bytes bytes = read(name);
+    all(name, bytes);
+  }
+  Archive given(std::move(ranks.gather(all.bytes())[0]));
+  while (given.more()) {
+    std::string name;
+    Bytes bytes;
+    given(name, bytes);
+    for (const Fields::OfRun& entry : system.fields.of_run()) {
+      if (entry.name != name) continue;
+      Archive archive(bytes);
+      entry.archive(archive);
+      archive.finish();
+    }
+  }
+}
+
+}  // namespace carom

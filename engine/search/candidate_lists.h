@@ -1,0 +1,118 @@
+#pragma once
+// Lists of candidates, one a sphere, in one array.
+//
+// A list starts and ends at multiples of the kernels' lanes and is padded with the sphere itself; candidates in the
+// same periodic box come first in it. A list that grows out of its place gets a new one; places are used again.
+
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "engine/base/pages.h"
+#include "engine/search/agenda.h"
+
+namespace carom {
+
+template <int D>
+class CandidateLists {
+ public:
+  /// Where the list of a sphere stands and how long it is, is kept in `agenda`.
+  CandidateLists(const Packing<D>& packing, unsigned lanes, PageVector<Agenda<D>>& agenda)
+      : packing_(packing), lanes_(lanes), agenda_(agenda) {}
+
+  const std::uint32_t* of(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
+  std::uint32_t* of(const Agenda<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
+
+  /// Forgets all lists, and expects those of n spheres, which have no capacity now.
+  void clear(std::size_t n) {
+    pool_.clear();
+    used_ = 0;
+    pool_.reserve(24 * n);
+    for (auto& unused : unused_) unused.clear();
+  }
+
+  /// Makes these the list of a sphere.
+  void assign(Slot i, std::span<const std::uint32_t> candidates) {
+    Agenda<D>& a = agenda_[i];
+    const auto n = static_cast<unsigned>(candidates.size());
+    const unsigned units = (n + kSlack + lanes_ - 1) / lanes_;
+    if (n > lanes_ * a.capacity || a.capacity == 0) {
+      if (units > std::numeric_limits<std::uint16_t>::max() / lanes_)
+        throw Error(Failure::numerical, "a sphere has more than 65 thousand neighbours");
+      if (a.capacity > 0) unused_[a.capacity].push_back(a.list);
+      a.list = take(units);
+      a.capacity = static_cast<std::uint16_t>(units);
+    }
+    std::uint32_t* const list = of(a);
+    std::fill(std::ranges::copy(candidates, list).out, list + std::size_t{lanes_} * a.capacity, packing_.pack(i, 0));
+    a.count = static_cast<std::uint16_t>(n);
+    divide(a);
+  }
+
+  /// Moves those in the same box to the start of a list.
+  void divide(Agenda<D>& a) {
+    std::uint32_t* const list = of(a);
+    const auto* const others = std::partition(list, list + a.count, [&](auto c) { return same_box(c); });
+    a.same = static_cast<std::uint16_t>(others - list);
+  }
+
+  void add(Slot i, std::uint32_t candidate) {
+    Agenda<D>& a = agenda_[i];
+    std::uint32_t* list = of(a);
+    if (a.count == lanes_ * a.capacity) {
+      std::vector<std::uint32_t> longer(list, list + a.count);
+      longer.push_back(candidate);
+      assign(i, longer);
+      return;
+    }
+    list[a.count] = candidate;
+    if (same_box(candidate)) std::swap(list[a.same++], list[a.count]);
+    ++a.count;
+  }
+
+  /// Takes a candidate out of the list of a sphere.
+  void drop(Slot i, std::uint32_t candidate) {
+    const std::uint32_t* const list = of(agenda_[i]);
+    remove(i, static_cast<unsigned>(std::find(list, list + agenda_[i].count, candidate) - list));
+  }
+  /// The same, given its place; one from behind moves there.
+  void remove(Slot i, unsigned q) {
+    Agenda<D>& a = agenda_[i];
+    if (q == a.count) return;
+    std::uint32_t* const list = of(a);
+    if (q < a.same) {
+      list[q] = list[--a.same];
+      q = a.same;
+    }
+    list[q] = list[--a.count];
+    list[a.count] = packing_.pack(i, 0);
+  }
+
+ private:
+  static constexpr unsigned kSlack = 3;  // candidates that a new list has room for, beside those it has
+
+  bool same_box(std::uint32_t candidate) const { return packing_.linear(candidate) == 0; }
+  std::uint32_t take(unsigned units) {
+    if (unused_.size() <= units) unused_.resize(units + 1);
+    if (!unused_[units].empty()) {
+      const std::uint32_t list = unused_[units].back();
+      unused_[units].pop_back();
+      return list;
+    }
+    const std::size_t at = used_;
+    used_ += std::size_t{lanes_} * units;
+    pool_.resize(used_ + 8);  // lists are compared by eight
+    return static_cast<std::uint32_t>(at / lanes_);
+  }
+
+  Packing<D> packing_;
+  unsigned lanes_;  // lists start and end at multiples of so many candidates
+  PageVector<Agenda<D>>& agenda_;
+  PageVector<std::uint32_t> pool_;
+  std::size_t used_ = 0;                            // of the pool
+  std::vector<std::vector<std::uint32_t>> unused_;  // places given back, by capacity
+};
+
+}  // namespace carom

@@ -1,0 +1,240 @@
+// A run that is stopped, taken up from its state and ended, against one that went on: every bit, whatever the method
+// and the ranks before and after.
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <span>
+
+#include "engine/run/observable.h"
+#include "engine/run/state.h"
+#include "tests/support/experiments.h"
+#include "tests/support/thread_ranks.h"
+
+namespace carom {
+namespace {
+
+using test::Given;
+using State = std::map<std::string, Bytes>;
+
+/// All that a run shows.
+template <int D>
+struct Account : Observer<D> {
+  explicit Account(Exchange* others) : ranks(others) {}
+  Sampling sampling() const override { return {.interval = 0.05}; }
+  void sample(double time, const Particles<D>& state) override { note(time), note(state); }
+  void frame(const Snapshot<D>& shot) override {
+    note(shot), note(ranks ? gathered(*ranks, *shot.particles) : *shot.particles);
+  }
+  void thermo(const Snapshot<D>& shot) override { note(shot); }
+  void contacts(double start, std::span<const Contact<D>> all) override {
+    for (const auto& contact : all) {
+      events.insert(events.end(), {start, contact.key.time});
+      for (const Vec<D>& v : {contact.x_lo, contact.x_hi, contact.impulse})
+        events.insert(events.end(), v.begin(), v.end());
+    }
+  }
+  void note(double value) { values.push_back(std::isnan(value) ? 0 : value); }
+  void note(const Vec<D>& value) { values.insert(values.end(), value.begin(), value.end()); }
+  void note(const Snapshot<D>& s) {
+    for (const double value : {s.time, s.kinetic, s.potential, s.shadow, s.pressure, s.max_energy_error}) note(value);
+    note(static_cast<double>(s.step)), note(static_cast<double>(s.collisions)), note(s.momentum);
+  }
+  void note(const Particles<D>& p) {
+    for (Id i = 0; i < p.size(); ++i) {
+      note(p.x[i]), note(p.v[i]);
+      for (const auto n : p.image[i]) note(n);
+    }
+  }
+  Exchange* ranks;
+  std::vector<double> values, events;
+};
+
+template <int D>
+struct Scene {
+  std::function<std::unique_ptr<System<D>>()> make;
+  std::string method;
+  Plan plan;
+  Given given{};
+};
+
+/// When a run is left off: at the n-th question.
+struct Leave {
+  int at = std::numeric_limits<int>::max();
+  bool within_epochs = false;
+  bool at_last = false;  ///< where the state is the last on the way of a longer run
+};
+
+template <int D>
+struct Outcome {
+  std::vector<double> values, events, averages;
+  Statistics statistics;
+  State state;
+};
+
+template <int D>
+Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& leave, const State* from = nullptr) {
+  Outcome<D> out;
+  test::ThreadRanks(std::max(1, ranks)).run([&](Exchange& exchange) {
+    auto system = scene.make();
+    if (ranks > 0) system->decomposition.join(exchange);
+    const bool first = exchange.rank() == 0;
+    auto simulation = test::make_run<D>(std::move(system), scene.method, plan, scene.given);
+    auto& state_of = const_cast<System<D>&>(simulation->system());
+    const auto read = [&](const std::string& name) { return from->at(name); };
+    if (from) restore_particles(state_of, read);
+    Account<D> account(ranks > 0 ? &exchange : nullptr);
+    simulation->add(account);
+    std::vector<std::unique_ptr<Observable<D>>> averages;
+    for (const ObservableInfo& info : observables()) {
+      averages.push_back(make_observable<D>(info.name, simulation->system(), {{"interval", 1.5 * plan.step}}));
+      simulation->add(*averages.back());
+    }
+    int asked = 0;
+    const auto stop = [&] {
+      const bool now = asked++ == leave.at || (leave.at_last && simulation->is_last_on_the_way());
+      if (now)
+        save_state(state_of, {[&](const Fields::Field& field, const Bytes& bytes) { out.state[field.name] = bytes; },
+                              [&](const std::string& name, const Bytes& bytes) { out.state[name] = bytes; }});
+      return now;
+    };
+    simulation->run(
+        {.should_stop = stop,
+         .pause = leave.within_epochs ? std::function<bool()>([] { return true; }) : nullptr,
+         .restore = from ? [&](Fields&) { restore_state(state_of, read); } : std::function<void(Fields&)>()});
+    if (!first) return;
+    out.values = std::move(account.values);
+    out.events = std::move(account.events);
+    for (const auto& average : averages)
+      for (const TableColumn& column : average->table())
+        for (const double value : column.values) out.averages.push_back(std::isnan(value) ? -1 : value);
+    out.statistics = simulation->statistics();
+  });
+  return out;
+}
+
+void expect_same(const Statistics& a, const Statistics& b) {
+  EXPECT_EQ(a.steps, b.steps);
+  EXPECT_EQ(a.end_time, b.end_time);
+  EXPECT_EQ(a.force_passes, b.force_passes);
+  EXPECT_EQ(a.energy_initial, b.energy_initial);
+  EXPECT_EQ(a.energy_final, b.energy_final);
+  EXPECT_EQ(a.max_energy_error, b.max_energy_error);
+  EXPECT_EQ(a.max_momentum_error, b.max_momentum_error);
+  EXPECT_EQ(a.max_shadow_energy_error, b.max_shadow_energy_error);
+  EXPECT_EQ(a.mean_pressure, b.mean_pressure);
+  EXPECT_EQ(a.mean_free_path, b.mean_free_path);
+  EXPECT_EQ(a.counters.sphere_sphere, b.counters.sphere_sphere);
+  EXPECT_EQ(a.counters.sphere_wall, b.counters.sphere_wall);
+  EXPECT_EQ(a.counters.max_overlap, b.counters.max_overlap);
+  EXPECT_EQ(a.counters.sweeps, b.counters.sweeps);
+  EXPECT_EQ(a.counters.folded, b.counters.folded);
+}
+
+/// `rest` is the end of `whole`.
+void expect_tail(const std::vector<double>& whole, const std::vector<double>& rest) {
+  ASSERT_LE(rest.size(), whole.size());
+  const std::span<const double> tail = std::span(whole).last(rest.size());
+  for (std::size_t k = 0; k < rest.size(); ++k) ASSERT_EQ(rest[k], tail[k]) << "value " << k << " of " << rest.size();
+}
+
+/// What is shown after a state is taken up is the end of what the undisturbed run shows.
+template <int D>
+void expect_continued(const Outcome<D>& whole, const Outcome<D>& rest) {
+  ASSERT_GT(rest.values.size(), 0u);
+  expect_tail(whole.values, rest.values);
+  expect_tail(whole.events, rest.events);
+  EXPECT_TRUE(whole.averages == rest.averages);
+  expect_same(whole.statistics, rest.statistics);
+}
+
+template <int D>
+void compare(const Scene<D>& scene, std::vector<std::array<int, 2>> ranks, std::vector<int> leave_at,
+             bool within_epochs = false) {
+  SCOPED_TRACE(scene.method);
+  const Outcome<D> whole = run<D>(scene, 0, scene.plan, {});
+  for (const auto& [before, after] : ranks)
+    for (const int at : leave_at) {
+      SCOPED_TRACE(testing::Message() << "left off at " << at << " on " << before << " ranks, taken up by " << after);
+      const Outcome<D> begun = run<D>(scene, before, scene.plan, {.at = at, .within_epochs = within_epochs});
+      ASSERT_TRUE(begun.statistics.stopped_early);
+      expect_continued(whole, run<D>(scene, after, scene.plan, {.within_epochs = within_epochs}, &begun.state));
+      if (::testing::Test::HasFailure()) return;
+    }
+}
+
+const std::vector<std::array<int, 2>> kRanks = {{0, 0}, {1, 2}, {2, 3}, {4, 0}};
+
+Plan plan_of(double step, std::int64_t steps) {
+  return {.step = step, .steps = steps, .frame_interval = 3 * step, .thermo_interval = 2 * step, .events = true};
+}
+
+Scene<2> springs(const std::string& method, const Given& given = {}) {
+  return {
+      [] {
+        auto system = test::hard_spheres<2>(8, 0.5);
+        test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}});
+        return system;
+      },
+      method, plan_of(0.02, 24), given};
+}
+Scene<3> yukawa(const std::string& method, const Given& given = {}) {
+  return {[] {
+            auto system = test::hard_spheres<3>(5, 0.3);
+            test::add_interaction(*system, "yukawa", {{"amplitude", 1.0}, {"kappa", 2.0}, {"cutoff", 2.0}});
+            return system;
+          },
+          method, plan_of(0.02, 18), given};
+}
+
+TEST(Continue, SlabMethods) {
+  for (const char* method : {"verlet", "psa", "edda"}) {
+    compare<2>(springs(method), kRanks, {1, 7, 16});
+    compare<3>(yukawa(method), kRanks, {5});
+  }
+}
+TEST(Continue, MethodsThatCutTheStepOfAll) {
+  for (const auto& [method, given] : std::vector<std::pair<std::string, Given>>{{"cva", {}},
+                                                                                {"mcva", {}},
+                                                                                {"mcva", {{"variant", "restart"}}},
+                                                                                {"cdda", {}},
+                                                                                {"cdda", {{"order", std::int64_t{4}}}}})
+    compare<2>(springs(method, given), {{0, 0}, {2, 3}}, {1, 9});
+}
+Scene<3> fluid() {
+  return {[] { return test::hard_spheres<3>(6, 0.35); },
+          "free-flight",
+          {.step = 0.4, .end_time = 2.2, .frame_interval = 0.3, .thermo_interval = 0.11, .events = true}};
+}
+TEST(Continue, FreeFlightBetweenEpochs) { compare<3>(fluid(), kRanks, {1, 3}); }
+TEST(Continue, FreeFlightWithinEpochs) { compare<3>(fluid(), kRanks, {1, 3, 5}, true); }
+
+/// A run with a later end goes on as if it had had that end from the start.
+TEST(Continue, ALaterEnd) {
+  std::vector<std::pair<Scene<3>, std::array<Plan, 2>>> cases;
+  const auto ends = [](const Plan& base, auto&& set) {
+    std::array<Plan, 2> plans{base, base};
+    for (int k = 0; k < 2; ++k) {
+      plans[k].steps.reset(), plans[k].end_time.reset(), plans[k].collisions.reset();
+      set(plans[k], k == 0);
+    }
+    return plans;
+  };
+  for (const Scene<3>& scene : {yukawa("psa"), fluid()}) {
+    cases.push_back({scene, ends(scene.plan, [](Plan& p, bool short_) { p.steps = short_ ? 2 : 5; })});
+    cases.push_back(
+        {scene, ends(scene.plan, [](Plan& p, bool short_) { p.end_time = (short_ ? 2.5 : 5.1) * p.step; })});
+  }
+  cases.push_back({fluid(), ends(fluid().plan, [](Plan& p, bool short_) { p.collisions = short_ ? 500 : 1500; })});
+  for (const auto& [scene, plans] : cases)
+    for (const int ranks : {0, 2}) {
+      SCOPED_TRACE(scene.method + " on " + std::to_string(ranks) + " ranks");
+      const auto whole = run<3>(scene, 0, plans[1], {.within_epochs = true});
+      const auto begun = run<3>(scene, ranks, plans[0], {.within_epochs = true, .at_last = true});
+      ASSERT_FALSE(begun.state.empty());
+      expect_continued(whole, run<3>(scene, ranks, plans[1], {.within_epochs = true}, &begun.state));
+    }
+}
+
+}  // namespace
+}  // namespace carom
