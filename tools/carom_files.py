@@ -129,11 +129,16 @@ class Trajectory:
 
     def __init__(self, path):
         path = pathlib.Path(path)
-        self._file = h5py.File(path / TRAJECTORY if path.is_dir() else path, "r")
+        self.path = path / TRAJECTORY if path.is_dir() else path
+        with reading(self.path):
+            self._open()
+
+    def _open(self):
+        self._file = open_hdf5(self.path)
         self._group = self._file["particles/trajectory"]
         self.dimension = int(self._file["parameters/dimension"][()])
-        self.step = self._group["position/step"][:]  # written last: a kill may have left one more of everything else
-        self.time = self._group["position/time"][:len(self.step)]
+        self.step = self._group["position/step"][:]
+        self.time = self._group["position/time"][:]
         self.radius = self._group["radius"][:]
         self.mass = self._group["mass"][:]
         self.species = self._group["species"][:]  # indices into species_names
@@ -168,13 +173,12 @@ class Trajectory:
 
     def edges(self, frame=0):
         """Edge lengths of the box [length]."""
-        return np.diag(self._group["box/edges/value"][self._index(frame)])[: self.dimension].copy()
-
-    def _index(self, frame):
-        return frame if frame >= 0 else len(self) + frame
+        with reading(self.path):
+            return np.diag(self._group["box/edges/value"][frame])[: self.dimension].copy()
 
     def _read(self, name, frame):
-        return self._group[name]["value"][self._index(frame)][:, : self.dimension]
+        with reading(self.path):
+            return self._group[name]["value"][frame][:, : self.dimension]
 
 
 def as_text(value):

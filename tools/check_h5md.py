@@ -4,7 +4,7 @@
     tools/check_h5md.py runs/five-springs
     tools/check_h5md.py runs/five-springs/trajectory.h5md --no-mdanalysis
 
-Prints every violation and ends with exit code 1 if there is one (2: not an HDF5 file). Besides the format
+Prints every violation and ends with exit code 1 if there is one. Besides the format
 (https://www.nongnu.org/h5md/h5md.html, version 1.1) it checks what keeps the file readable by MDAnalysis and VMD: one group
 of particles, positions in three columns, a time-dependent box that shares step and time with the positions, no units,
 fixed-length strings, an old superblock. Then the contents: finite numbers, times that rise, centres inside the box, and
@@ -19,7 +19,7 @@ import warnings
 import h5py
 import numpy as np
 
-from carom_files import TRAJECTORY, as_text
+from carom_files import TRAJECTORY, as_text, open_hdf5, reading
 
 PARTICLES = "particles/trajectory"
 OVERHANG = 1e-12  # how far a sphere may stand over a wall, relative to the edge
@@ -49,20 +49,18 @@ class Checker:
         return self.file[path].attrs[name]
 
     def element(self, path):
-        """A time-dependent element: value, step and time of equal length, but for a last frame that has no step after a
-        kill. Returns whether it can be read."""
+        """A time-dependent element: value, step and time of equal length. Returns whether it can be read."""
         if not self.has(path, h5py.Group):
             return False
         if not all([self.has(f"{path}/{part}", h5py.Dataset) for part in ("value", "step", "time")]):
             return False
         value, step, time = (self.file[path][part] for part in ("value", "step", "time"))
         good = self.expect(step.ndim == 1 and time.ndim == 1, f"/{path}: step and time must be explicit, one a frame")
-        good = good and self.expect(value.ndim >= 1 and 0 <= len(value) - len(step) <= 1
-                                    and 0 <= len(time) - len(step) <= 1,
+        good = good and self.expect(value.ndim >= 1 and len(value) == len(step) == len(time),
                                     f"/{path}: value, step and time differ in length")
         self.expect(np.issubdtype(step.dtype, np.integer), f"/{path}/step: must be an integer")
         if good and len(time) > 1:
-            self.expect(np.all(np.diff(time[:len(step)]) > 0), f"/{path}/time: must rise from frame to frame")
+            self.expect(np.all(np.diff(time[:]) > 0), f"/{path}/time: must rise from frame to frame")
             self.expect(np.all(np.diff(step[:].astype(np.int64)) >= 0), f"/{path}/step: must not fall")
         if np.issubdtype(value.dtype, np.floating) and not path.startswith("observables"):
             self.expect(all(np.isfinite(value[frame]).all() for frame in range(len(value))),
@@ -209,10 +207,10 @@ class Checker:
 
 
 def violations(path, with_mdanalysis=True):
-    """All violations of a trajectory (the file or its run's directory), one line each. OSError: not an HDF5 file."""
+    """All violations of a trajectory (the file or its run's directory), one line each. One that can't be read ends the program."""
     path = pathlib.Path(path)
     path = path / TRAJECTORY if path.is_dir() else path
-    with h5py.File(path, "r") as file:
+    with reading(path), open_hdf5(path) as file:
         checker = Checker(file)
         checker.check_metadata()
         checker.check_storage()
@@ -232,11 +230,7 @@ def main(arguments=None):
     parser.add_argument("run", type=pathlib.Path, help="directory of a run, or its trajectory")
     parser.add_argument("--no-mdanalysis", action="store_true", help="don't open it with MDAnalysis")
     options = parser.parse_args(arguments)
-    try:
-        found = violations(options.run, not options.no_mdanalysis)
-    except OSError as error:
-        print(f"{options.run}: {error}")
-        return 2
+    found = violations(options.run, not options.no_mdanalysis)
     print("\n".join(found) if found else f"{options.run}: conforms to H5MD 1.1 and Carom's rules")
     return 1 if found else 0
 

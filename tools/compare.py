@@ -16,13 +16,18 @@ import sys
 import h5py
 import numpy as np
 
-from carom_files import TRAJECTORY, read_thermo
+from carom_files import TRAJECTORY, open_hdf5, read_thermo, reading
 
 
-def data_sets(file, groups=None):
+def data_sets(path, groups):
     """All data sets of an HDF5 file below the given groups, by their full names."""
+    with reading(path), open_hdf5(path) as file:
+        return _data_sets(file, groups)
+
+
+def _data_sets(file, groups):
     found = {}
-    for group in groups or file:
+    for group in groups:
         if group in file:
             file[group].visititems(
                 lambda name, item: found.update({f"/{group}/{name}": item[()]}) if isinstance(item, h5py.Dataset) else None)
@@ -64,15 +69,14 @@ def differences(a, b, tolerance):
 def compare(a, b, tolerance=None, last=False):
     """What is different between two runs, one line each; empty: nothing."""
     a, b = pathlib.Path(a), pathlib.Path(b)
-    with h5py.File(a / TRAJECTORY, "r") as left, h5py.File(b / TRAJECTORY, "r") as right:
-        sets = [data_sets(file, ("particles", "observables")) for file in (left, right)]
+    sets = [data_sets(run / TRAJECTORY, ("particles", "observables")) for run in (a, b)]
     if last:
         return differences(*map(last_frame, sets), tolerance)
     lines = differences(*sets, tolerance)
     lines += [f"thermo.csv, {line}" for line in differences(read_thermo(a), read_thermo(b), tolerance)]
     if (a / "events.h5").exists() and (b / "events.h5").exists():
-        with h5py.File(a / "events.h5", "r") as left, h5py.File(b / "events.h5", "r") as right:
-            lines += [f"events.h5, {line}" for line in differences(data_sets(left, ["events"]), data_sets(right, ["events"]), tolerance)]
+        events = [data_sets(run / "events.h5", ["events"]) for run in (a, b)]
+        lines += [f"events.h5, {line}" for line in differences(*events, tolerance)]
     return lines
 
 

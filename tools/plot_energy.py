@@ -13,18 +13,19 @@ import pathlib
 
 import numpy as np
 
-from carom_files import read_summary, read_thermo
+from carom_files import read_summary, read_thermo, reading
 from carom_plot import picture
 
 
 def energy_errors(directory, relative=False):
     """Time, H - H1, and S_h minus its first value (None where the method has no shadow energy)."""
-    thermo, energy = read_thermo(directory), read_summary(directory)["energy"]
-    scale = energy["reference"] if relative else 1.0
-    shadow = thermo["shadow"]
-    known = np.flatnonzero(np.isfinite(shadow))
-    shadow_error = (shadow - shadow[known[0]]) / scale if len(known) else None
-    return thermo["time"], (thermo["total"] - energy["after_first_step"]) / scale, shadow_error
+    thermo, summary = read_thermo(directory), read_summary(directory)
+    with reading(directory):
+        energy, shadow = summary["energy"], thermo["shadow"]
+        scale = energy["reference"] if relative else 1.0
+        known = np.flatnonzero(np.isfinite(shadow))
+        shadow_error = (shadow - shadow[known[0]]) / scale if len(known) else None
+        return thermo["time"], (thermo["total"] - energy["after_first_step"]) / scale, shadow_error
 
 
 def draw(directories, relative, logarithmic, file):

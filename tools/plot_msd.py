@@ -16,7 +16,7 @@ import pathlib
 
 import numpy as np
 
-from carom_files import Trajectory, read_table
+from carom_files import Trajectory, read_table, reading
 from carom_plot import picture
 
 
@@ -63,8 +63,9 @@ def main(arguments=None):
         parser.error("--fit takes two lags")
     if options.run.suffix == ".csv":
         columns = read_table(options.run)
-        lag = columns.pop("time")
-        columns.pop("origins")
+        with reading(options.run):
+            lag = columns.pop("time")
+            columns.pop("origins")
         diffusion = {name: diffusion_coefficient(lag, msd, options.dimension, between) for name, msd in columns.items()}
         file = options.output or options.run.with_suffix(".png")
         draw(file, lag, columns, diffusion)

@@ -17,7 +17,7 @@ import pathlib
 import numpy as np
 from scipy.spatial import cKDTree
 
-from carom_files import Trajectory, read_table
+from carom_files import Trajectory, read_table, reading
 from carom_plot import picture
 
 
@@ -81,7 +81,8 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
 def curves_of_table(file, species=None):
     """What a run's rdf.csv holds: r, and g by name; all of it, or that of two species."""
     columns = read_table(file)
-    r = columns.pop("r")
+    with reading(file):
+        r = columns.pop("r")
     if species is None:
         return r, columns
     names = [f"g_{a}_{b}" for a, b in (species, species[::-1])]

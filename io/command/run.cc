@@ -11,6 +11,7 @@
 
 #include "engine/base/error.h"
 #include "io/deck/deck.h"
+#include "io/files/directory_lock.h"
 #include "io/files/hdf5.h"
 #include "io/files/log.h"
 #include "io/files/log_report.h"
@@ -84,6 +85,7 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
   auto simulation = simulation_of<D>(deck, at_work);
   const Statistics& statistics = simulation.statistics();
   const auto& directory = deck.output.directory;
+  const DirectoryLock lock(directory);
   const auto backup = prepare_output_directory(directory);
   RunLog log(directory / run_file::log, options.quiet);
   RunOutcome outcome{.status = "done", .particles = simulation.system().size(), .ranks = ranks};
@@ -93,6 +95,7 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
     log.warn(
         fmt::format("warning: {} particles under forces are too few to be shared; one rank works, the other {} wait",
                     outcome.particles, ranks - 1));
+  if (!lock.warning().empty()) log.warn(lock.warning());
   if (backup) log.warn("warning: the files of an earlier run in this directory are now in " + backup->string());
   write_file_atomically(directory / run_file::deck, deck.toml_text);
 

@@ -149,7 +149,12 @@ Handle File::group(const std::string& name) {
 void File::flush() { check(H5Fflush(file_.id(), H5F_SCOPE_LOCAL), "flush the file"); }
 
 void File::close() {
-  flush();
+  try {
+    flush();
+  } catch (const Error&) {  // closed all the same: that gives back the room of what could not be written
+    H5Fclose(file_.release());
+    throw;
+  }
   check(H5Fclose(file_.release()), "close the file");
 }
 

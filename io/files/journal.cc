@@ -87,8 +87,8 @@ struct Journaled : H5FD_t {
   std::uint64_t size = 0;     // of the file, as HDF5 sees it
   std::uint64_t on_disk = 0;  // of the file, as the operating system sees it
   std::uint64_t flushed = 0;  // of the file, by the last flush
-  Blocks waiting;
-  Bytes buffer;  // the journal of the last flush
+  Blocks waiting, last;       // to be written by the next flush; written by the last one
+  Bytes buffer;               // the journal of the last flush
   // Once something could not be written, nothing is any more: HDF5 may close the file undisturbed, which then has the
   // state of the last flush, or a complete journal, if that is what could not be written to the file.
   bool failed = false, torn = false;
@@ -145,23 +145,26 @@ struct Journaled : H5FD_t {
       std::filesystem::remove(journal_of(path));  // of an older file
       put_in_place(name_now(), path);
       is_new = false;
+      if (!open_journal()) return fail();
     } else if (!waiting.empty()) {
       constexpr std::byte kNone[8] = {};
       if (!write_all(journal, kNone, sizeof kNone, 0)) return fail();
     }
     if (durable) next_sync = Clock::now() + 20 * (Clock::now() - start);
-    waiting.clear();
+    last = std::exchange(waiting, {});
     flushed = on_disk = size;
     return 0;
   }
 
-  bool write_journal(bool durable) {
+  bool open_journal() {
     constexpr std::uint64_t kRoom = 1 << 18;  // also for the last words of a run whose disk is full
-    if (journal < 0) {
-      journal = ::open(journal_of(path).c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-      if (journal < 0 || !set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kRoom)) return false;
-    }
-    buffer = waiting.journal(size);
+    journal = ::open(journal_of(path).c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    return journal >= 0 && set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kRoom);
+  }
+
+  bool write_journal(bool durable) {
+    if (journal < 0 && !open_journal()) return false;
+    buffer = waiting.journal(size, last);
     return write_all(journal, buffer.data(), buffer.size(), 0) && (!durable || (sync(file) && sync(journal)));
   }
 

@@ -12,9 +12,9 @@
 // A power failure can do no harm to a flush that was synced to the disk. To sync takes milliseconds: so it is done
 // only when twenty times as long as the last one took has gone by since, and when the file is closed.
 //
-// The journal, in 64-bit numbers, little-endian, of carom.journal version 1: "CAROMJ01"; the CRC-32 of all behind it;
-// the length of the whole; the size of the file; then for each block its address, its length, and its bytes. An empty
-// one starts with 0. tools/carom_files.py reads it too. A file is locked (flock) while a driver has it open.
+// The journal, in 64-bit numbers, little-endian: "CAROMJ01"; the CRC-32 of all behind it; the length of the whole; the
+// size of the file; then for each block its address, its length, and its bytes. An empty one starts with 0.
+// tools/carom_files.py reads it too. A file is locked (flock) while a driver has it open.
 
 #include <hdf5.h>
 

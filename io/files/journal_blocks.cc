@@ -24,22 +24,38 @@ std::uint64_t checksum(const Bytes& journal) {
   return crc32_z(0, reinterpret_cast<const unsigned char*>(journal.data() + kFrom), journal.size() - kFrom);
 }
 
+/// Calls take(first, last) for the stretches of `data` that differ from as many others, in steps of a cache line.
+template <class Take>
+void for_each_difference(std::span<const std::byte> data, std::span<const std::byte> others, Take take) {
+  constexpr std::size_t kStep = 64;
+  const auto same = [&](std::size_t at) {
+    return std::memcmp(&data[at], &others[at], std::min(kStep, data.size() - at)) == 0;
+  };
+  for (std::size_t at = 0; at < data.size(); at += kStep) {
+    if (same(at)) continue;
+    const std::size_t first = at;
+    while (at < data.size() && !same(at)) at += kStep;
+    take(first, std::min(at, data.size()));
+  }
+}
+
 }  // namespace
 
 void Blocks::put(std::uint64_t address, std::span<const std::byte> data) {
   const std::uint64_t end = address + data.size();
   auto first = blocks_.upper_bound(address);
-  if (first != blocks_.begin() && end_of(*std::prev(first)) >= address)
+  if (first != blocks_.begin() && end_of(*std::prev(first)) >= address) {
     --first;
-  else
-    first = blocks_.emplace_hint(first, address, Bytes());
-  Bytes& block = first->second;
-  if (end_of(*first) < end) block.resize(static_cast<std::size_t>(end - first->first));
-  std::ranges::copy(data, block.begin() + static_cast<std::ptrdiff_t>(address - first->first));
+    const std::size_t from = address - first->first, over = std::min(data.size(), first->second.size() - from);
+    std::memcpy(first->second.data() + from, data.data(), over);
+    first->second.insert(first->second.end(), data.begin() + static_cast<std::ptrdiff_t>(over), data.end());
+  } else {
+    first = blocks_.emplace_hint(first, address, Bytes(data.begin(), data.end()));
+  }
   for (auto next = std::next(first); next != blocks_.end() && next->first <= end; next = blocks_.erase(next))
     if (end_of(*next) > end)
-      block.insert(block.end(), next->second.end() - static_cast<std::ptrdiff_t>(end_of(*next) - end),
-                   next->second.end());
+      first->second.insert(first->second.end(), next->second.end() - static_cast<std::ptrdiff_t>(end_of(*next) - end),
+                           next->second.end());
 }
 
 void Blocks::overlay(std::uint64_t address, std::span<std::byte> data) const {
@@ -54,19 +70,26 @@ void Blocks::overlay(std::uint64_t address, std::span<std::byte> data) const {
   }
 }
 
-Bytes Blocks::journal(std::uint64_t file_size) const {
+Bytes Blocks::journal(std::uint64_t file_size, const Blocks& there) const {
   Head head{};
   std::memcpy(head.magic, kMagic, sizeof head.magic);
-  head.length = sizeof head;
-  for (const auto& [address, data] : blocks_) head.length += sizeof(BlockHead) + data.size();
   head.file_size = file_size;
   Bytes journal;
-  journal.reserve(head.length);
   carom::put(journal, head);
   for (const auto& [address, data] : blocks_) {
-    carom::put(journal, BlockHead{address, data.size()});
-    journal.insert(journal.end(), data.begin(), data.end());
+    const auto add = [&journal, at = address, &data = data](std::size_t first, std::size_t last) {
+      carom::put(journal, BlockHead{at + first, last - first});
+      journal.insert(journal.end(), data.begin() + static_cast<std::ptrdiff_t>(first),
+                     data.begin() + static_cast<std::ptrdiff_t>(last));
+    };
+    const auto old = there.blocks_.find(address);
+    if (old != there.blocks_.end() && old->second.size() == data.size())
+      for_each_difference(data, old->second, add);
+    else
+      add(0, data.size());
   }
+  head.length = journal.size();
+  std::memcpy(journal.data(), &head, sizeof head);
   head.checksum = checksum(journal);
   std::memcpy(journal.data(), &head, sizeof head);
   return journal;

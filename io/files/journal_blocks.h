@@ -19,10 +19,10 @@ class Blocks {
   void put(std::uint64_t address, std::span<const std::byte> data);
   /// Lays what is there in [address, address + its size) over `data`.
   void overlay(std::uint64_t address, std::span<std::byte> data) const;
-  /// All of them as a journal of a file that then has so many bytes.
-  Bytes journal(std::uint64_t file_size) const;
+  /// All of them as a journal of a file that then has so many bytes. Of blocks that are known to stand in the file what
+  /// is the same is left out: HDF5 writes a whole chunk for each new row.
+  Bytes journal(std::uint64_t file_size, const Blocks& there) const;
   bool empty() const { return blocks_.empty(); }
-  void clear() { blocks_.clear(); }
 
  private:
   using Block = std::pair<const std::uint64_t, Bytes>;

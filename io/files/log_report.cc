@@ -11,17 +11,13 @@
 #include <utility>
 #include <vector>
 
+#include "io/files/directory_lock.h"
 #include "io/files/progress.h"
 #include "io/files/version.h"
 
 namespace carom {
 
 namespace {
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown host";
-}
 
 std::string ends_at(const Plan& plan) {
   std::string text;

@@ -9,12 +9,31 @@ namespace carom {
 
 namespace fs = std::filesystem;
 
-std::optional<fs::path> prepare_output_directory(const fs::path& directory) try {
+namespace {
+
+[[noreturn]] void fail(const fs::path& directory, const fs::filesystem_error& e) {
+  throw Error(Failure::file, directory.string() + ": cannot be the directory for output: " + e.code().message() +
+                                 (e.path1().empty() || e.path1() == directory ? "" : " (" + e.path1().string() + ")") +
+                                 "; choose another one with -o or output.directory");
+}
+
+}  // namespace
+
+void make_output_directory(const fs::path& directory) try {
   fs::create_directories(directory);
+} catch (const fs::filesystem_error& e) {
+  fail(directory, e);
+}
+
+std::optional<fs::path> prepare_output_directory(const fs::path& directory) try {
   std::optional<fs::path> backup;
   std::vector<std::string> names = {run_file::deck,   run_file::trajectory, run_file::thermo,
                                     run_file::events, run_file::summary,    run_file::log};
   for (const ObservableInfo& info : observables()) names.push_back(run_file::averages(info));
+  // What a kill leaves: the journal belongs to its file, and parts of files that were never finished go with them.
+  const std::size_t files = names.size();
+  for (std::size_t n = 0; n < files; ++n)
+    for (const char* left : {".journal", ".part"}) names.push_back(names[n] + left);
   for (const std::string& name : names) {
     if (!fs::exists(fs::symlink_status(directory / name))) continue;
     for (int n = 1; !backup; ++n) {
@@ -26,9 +45,7 @@ std::optional<fs::path> prepare_output_directory(const fs::path& directory) try 
   }
   return backup;
 } catch (const fs::filesystem_error& e) {
-  throw Error(Failure::file, directory.string() + ": cannot be the directory for output: " + e.code().message() +
-                                 (e.path1().empty() || e.path1() == directory ? "" : " (" + e.path1().string() + ")") +
-                                 "; choose another one with -o or output.directory");
+  fail(directory, e);
 }
 
 }  // namespace carom

@@ -1,5 +1,6 @@
 #pragma once
-// The directory of a run: made where it is missing, and cleared of an earlier run without losing it.
+// The directory of a run: made where it is missing, and cleared of an earlier run without losing it. (One run at a
+// time: directory_lock.h.)
 
 #include <filesystem>
 #include <optional>
@@ -17,10 +18,14 @@ inline constexpr const char* thermo = "thermo.csv";
 inline constexpr const char* events = "events.h5";
 inline constexpr const char* summary = "summary.json";
 inline constexpr const char* log = "run.log";
+inline constexpr const char* lock = "carom.lock";
 inline std::string averages(const ObservableInfo& info) { return std::string(info.name) + ".csv"; }
 }  // namespace run_file
 
-/// Creates the directory if need be. If files of these names are there, moves them into its subdirectory `backup.1`, or
+/// Creates the directory if need be. Throws Error(Failure::file).
+void make_output_directory(const std::filesystem::path& directory);
+
+/// The directory is there. If files of these names are there, moves them into its subdirectory `backup.1`, or
 /// the next number that is free, and returns that. Throws Error(Failure::file).
 std::optional<std::filesystem::path> prepare_output_directory(const std::filesystem::path& directory);
 

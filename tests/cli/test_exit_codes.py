@@ -47,6 +47,36 @@ def test_full_disk(size, tmp_path):
 
 
 @needs_mount
+@pytest.mark.parametrize("what", ["frames", "thermo", "events", "averages"])
+def test_each_file_may_meet_a_full_disk(what, tmp_path):
+    """Of all files what has been flushed is there, and is what a run on an empty disk has written."""
+    deck, disk, kept, free = write_deck(tmp_path, SPHERES), tmp_path / "disk", tmp_path / "kept", tmp_path / "free"
+    disk.mkdir()
+    often = {"frames": ["output.frame_interval=0.005"], "thermo": ["output.thermo_interval=0.0002"],
+             "events": ["output.events=true"], "averages": ["output.rdf_interval=0.1", "output.rdf_bins=40000"]}[what]
+    overrides = ["run.end_time=1000000.0", "output.frame_interval=0.0", "output.thermo_interval=0.5"] + often
+    done = in_mount("size=2m", disk, command(deck, disk, overrides), kept)
+    assert done.returncode == 5, done.stderr
+    assert str(disk) in done.stderr and "No space left" in done.stderr and "free space" in done.stderr
+    left = {path.name for path in kept.iterdir()}
+    assert {"deck.toml", "run.log", "summary.json", "thermo.csv", "trajectory.h5md"} <= left
+    assert not any(name.endswith((".journal", ".part", ".lock")) for name in left)
+    s, rows = summary(kept), thermo(kept)
+    assert s["status"] == "failed" and "No space left" in s["error"] and "No space left" in (kept / "run.log").read_text()
+    run(deck, free, [f"run.end_time={rows['time'][-1] + 1}"] + overrides[1:])
+    names = {"trajectory.h5md": "particles/trajectory/position/step", "events.h5": "events/time"}
+    for name, clock in names.items():
+        if name in left:
+            part, whole = data_sets(kept / name), data_sets(free / name)
+            n = len(part[clock])
+            assert n > 0 and all(len(value) == n for key, value in part.items() if key.startswith("events/") or key.endswith("/value"))
+            grown = {key: value for key, value in part.items() if key.startswith("events/") or key.endswith(("/value", "/step", "/time"))}
+            assert same(grown, {key: whole[key][:n] for key in grown})
+    text = (kept / "thermo.csv").read_text()
+    assert text.endswith("\n") and (free / "thermo.csv").read_text().startswith(text)
+
+
+@needs_mount
 def test_disk_full_from_the_start(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()

@@ -1,7 +1,6 @@
 """The trajectory in MDAnalysis, and `carom info`."""
 
 import pathlib
-import shutil
 import subprocess
 import sys
 import warnings
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "tools"))
-import check_h5md
 from runs import CAROM, SPHERES, SPRINGS, needs_carom, run, thermo, write_deck
 
 warnings.filterwarnings("ignore", category=DeprecationWarning)
@@ -33,19 +31,6 @@ def universe(path):
         n = file["particles/trajectory/position/value"].shape[1]
     u = MDAnalysis.Universe.empty(n, trajectory=True, velocities=True)
     return u.load_new(str(path), convert_units=False)
-
-
-def test_a_frame_cut_off_by_a_kill_is_the_end_of_the_file(output, tmp_path):
-    path = tmp_path / "trajectory.h5md"
-    shutil.copy(output / "trajectory.h5md", path)
-    with h5py.File(path, "a") as file:
-        step = file["particles/trajectory/position/step"]
-        whole = len(step) - 1
-        step.resize(whole, axis=0)  # written last
-    assert len([ts.frame for ts in universe(path).trajectory]) == whole
-    assert check_h5md.violations(path) == []
-    info = subprocess.run([CAROM, "info", str(path)], capture_output=True, text=True, check=True).stdout
-    assert any(line.split() == ["frames", str(whole)] for line in info.splitlines())
 
 
 def test_mdanalysis_reads_what_was_written(output):

@@ -181,6 +181,42 @@ def test_an_earlier_run_is_kept(tmp_path):
     assert summary(out)["steps"] == 10 and not (out / "backup.2").exists()
 
 
+def test_one_run_at_a_time(tmp_path):
+    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
+    child = subprocess.Popen(command(deck, out, ["run.steps=100000000"]))
+    while not (out / "trajectory.h5md").exists():
+        assert child.poll() is None
+        time.sleep(0.01)
+    assert f"process {child.pid}\n" in (out / "carom.lock").read_text()
+    done = run(deck, out, code=5)
+    assert f"process {child.pid} on host" in done.stderr and "wait for its end" in done.stderr and "-o" in done.stderr
+    assert child.poll() is None and not (out / "backup.1").exists()
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    before = (out / "carom.lock").read_text()
+    done = run(deck, out)
+    assert f"process {child.pid}" in done.stderr and done.stderr.startswith("warning: ")
+    assert "ended from outside" in (out / "run.log").read_text()
+    assert (out / "backup.1" / "trajectory.h5md").exists() and not (out / "carom.lock").exists()
+    # The number of a process that began at another time; what a run on another host has left; something else.
+    (out / "carom.lock").write_text(before.replace(f"process {child.pid}", f"process {os.getpid()}"))
+    assert "ended from outside" in run(deck, out).stderr
+    (out / "carom.lock").write_text(re.sub("host .*", "host elsewhere", before))
+    assert "delete " + str(out / "carom.lock") in run(deck, out, code=5).stderr
+    (out / "carom.lock").write_text("")
+    assert "ended from outside" in run(deck, out).stderr and not (out / "carom.lock").exists()
+    run(deck, out, ["integrator.max_events_per_step=1", "integrator.step=0.5"], code=4)  # also of a run that fails
+    assert not (out / "carom.lock").exists()
+
+
+def test_of_two_runs_that_start_at_once_one_runs(tmp_path):
+    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
+    runs = [subprocess.Popen(command(deck, out, ["run.steps=100000000"], ("--quiet", "--max-wall", "00:00:03")),
+                             stderr=subprocess.PIPE) for _ in range(4)]
+    assert sorted(child.wait() for child in runs if child.communicate()) == [5, 5, 5, 75]
+    assert summary(out)["status"] == "stopped" and not (out / "backup.1").exists()
+
+
 def test_terminal(tmp_path):
     deck = write_deck(tmp_path, SPRINGS)
     assert run(deck, tmp_path / "quiet").stdout == ""

@@ -1,6 +1,8 @@
 """The Python tools against files with known contents, and the studies against the command itself ($CAROM)."""
 
 import csv
+import fcntl
+import subprocess
 import sys
 import tomllib
 
@@ -8,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from runs import ROOT, mpi_environment, needs_carom
+from runs import CAROM, ROOT, mpi_environment, needs_carom
 
 sys.path.insert(0, str(ROOT / "tools"))
 
@@ -123,8 +125,87 @@ def test_check_h5md_exit_codes(tmp_path, capsys):
         del file["observables"]
     assert check_h5md.main([str(run), "--no-mdanalysis"]) == 1
     assert "/observables" in capsys.readouterr().out
+
+
+def corrupt(path):
+    """Other bytes in the middle, where tables of the file stand."""
+    data = bytearray(path.read_bytes())
+    start, end = len(data) // 4, len(data) // 2
+    data[start:end] = b"\xa5" * (end - start)
+    path.write_bytes(data)
+
+
+def foreign(path):
+    with h5py.File(path, "w") as file:
+        file["particles/trajectory"] = np.zeros(3)
+        file["events"] = np.zeros(3)
+
+
+DAMAGES = {
+    "missing": lambda path: path.unlink(),
+    "empty": lambda path: path.write_bytes(b""),
+    "text": lambda path: path.write_text("no HDF5\n1,2\n"),
+    "bytes": lambda path: path.write_bytes(bytes(range(256))),
+    "truncated": lambda path: path.write_bytes(path.read_bytes()[:len(path.read_bytes()) // 2]),
+    "corrupt": corrupt,
+    "foreign": foreign,
+    "a directory": lambda path: (path.unlink(), path.mkdir()),
+}
+READERS = {
+    "plot_rdf": (plot_rdf.main, "trajectory.h5md", []),
+    "plot_msd": (plot_msd.main, "trajectory.h5md", []),
+    "movie": (movie.main, "trajectory.h5md", []),
+    "check_h5md": (check_h5md.main, "trajectory.h5md", ["--no-mdanalysis"]),
+    "compare": (compare.main, "trajectory.h5md", ["sound"]),
+    "compare thermo": (compare.main, "thermo.csv", ["sound"]),
+    "plot_energy": (plot_energy.main, "thermo.csv", []),
+    "plot_energy summary": (plot_energy.main, "summary.json", []),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("tool", READERS)
+def test_a_damaged_file_is_one_line(tmp_path, monkeypatch, capsys, tool, damage):
+    monkeypatch.chdir(tmp_path)
+    main, name, arguments = READERS[tool]
+    if (tool, damage) == ("plot_energy", "truncated"):
+        return  # it is shorter, and the rows that are left are whole
+    make_run(tmp_path / "run"), make_run(tmp_path / "sound")
+    DAMAGES[damage](tmp_path / "run" / name)
+    with pytest.raises(SystemExit) as end:
+        code = main(["run", *arguments])
+        # A foreign file that can be read is a violation, or a difference.
+        assert damage in ("foreign", "text", "corrupt", "truncated") and code == 1
+        raise SystemExit(f"run/{name}: {capsys.readouterr().out.splitlines()[0]}")
+    assert isinstance(end.value.code, str) and "\n" not in end.value.code, end.value.code
+    assert end.value.code.startswith("run"), end.value.code
+
+
+def test_a_locked_file_is_one_line(tmp_path):
+    make_run(tmp_path / "run")
+    path = tmp_path / "run" / "trajectory.h5md"
+    with open(path, "rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        for journal in (False, True):  # a run at work, before and after its second flush
+            if journal:
+                path.with_name("trajectory.h5md.journal").write_bytes(b"")
+            with pytest.raises(SystemExit, match="^[^\n]*run/trajectory.h5md: a process is writing this file[^\n]*$"):
+                plot_rdf.main([str(tmp_path / "run")])
+            if CAROM:
+                info = subprocess.run([CAROM, "info", str(path)], capture_output=True, text=True)
+                assert info.returncode == 5 and "a process is writing this file" in info.stderr
+
+
+@needs_carom
+def test_as_a_program_too(tmp_path):
     (tmp_path / "text").write_text("no HDF5")
-    assert check_h5md.main([str(tmp_path / "text")]) == 2
+    done = subprocess.run([sys.executable, ROOT / "tools" / "check_h5md.py", tmp_path / "text"], capture_output=True, text=True)
+    assert done.returncode == 1 and done.stdout == "" and len(done.stderr.splitlines()) == 1
+    for damage in DAMAGES:
+        path = make_run(tmp_path / "runs" / damage) / "trajectory.h5md"
+        DAMAGES[damage](path)
+        info = subprocess.run([CAROM, "info", str(path)], capture_output=True, text=True)
+        assert info.returncode == 5 and len(info.stderr.splitlines()) == 1 and str(path) in info.stderr, info
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -153,6 +153,7 @@ TEST(Summary, HasEveryPromisedName) {
 
 TEST(OutputDirectory, KeepsEarlierRunsInBackups) {
   const auto directory = fresh_directory() / "a" / "b";
+  make_output_directory(directory);
   EXPECT_FALSE(prepare_output_directory(directory));
   for (int run = 1; run <= 2; ++run) {
     std::ofstream(directory / run_file::thermo) << run;
@@ -168,7 +169,7 @@ TEST(OutputDirectory, KeepsEarlierRunsInBackups) {
 TEST(OutputDirectory, BelowAFileIsAnError) {
   const auto file = fresh_directory() / "file";
   std::ofstream(file) << "x";
-  EXPECT_THROW(prepare_output_directory(file / "run"), Error);
+  EXPECT_THROW(make_output_directory(file / "run"), Error);
 }
 
 // The estimate follows the recent pace, not the mean since the start.

@@ -1,0 +1,105 @@
+#include "io/files/directory_lock.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spdlog/fmt/chrono.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <sstream>
+
+#include "engine/base/error.h"
+#include "io/files/output_directory.h"
+#include "io/files/text_file.h"
+
+namespace carom {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string contents(const fs::path& path) {
+  std::ifstream in(path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// When a process began, in clock ticks since the machine did: the 22nd field of Linux's /proc/…/stat. Empty: unknown,
+/// or there is no such process.
+std::string began(const std::string& process) {
+  const std::string all = contents("/proc/" + process + "/stat");
+  const auto name_ends = all.rfind(')');
+  if (name_ends == std::string::npos) return {};
+  std::istringstream fields(all.substr(name_ends + 1));
+  std::string field;
+  for (int n = 3; n <= 22; ++n) fields >> field;
+  return field;
+}
+
+/// "key value" in each line.
+std::map<std::string, std::string> entries(const std::string& text) {
+  std::map<std::string, std::string> found;
+  std::istringstream in(text);
+  for (std::string key, value; in >> key && std::getline(in >> std::ws, value);) found[key] = value;
+  return found;
+}
+
+bool alive(const std::map<std::string, std::string>& lock) {
+  const pid_t process = std::atoi(lock.at("process").c_str());
+  if (process <= 0 || (::kill(process, 0) != 0 && errno == ESRCH)) return false;
+  const std::string since = began(lock.at("process"));
+  return since.empty() || since == lock.at("ticks");
+}
+
+}  // namespace
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown host";
+}
+
+DirectoryLock::DirectoryLock(const fs::path& directory) : path_(directory / run_file::lock) {
+  make_output_directory(directory);
+  const int folder = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder >= 0)
+    ::flock(folder, LOCK_EX);  // where that can't be had, two runs must start at the same instant to fail
+  const struct Close {
+    int descriptor;
+    ~Close() {
+      if (descriptor >= 0) ::close(descriptor);
+    }
+  } unlock{folder};
+
+  if (fs::exists(fs::symlink_status(path_))) {
+    auto lock = entries(contents(path_));
+    for (const char* key : {"host", "process", "started", "ticks"}) lock.try_emplace(key, "unknown");
+    const std::string run =
+        fmt::format("process {} on host {}, started {}", lock["process"], lock["host"], lock["started"]);
+    if (lock["host"] != host_name() && lock["host"] != "unknown")
+      throw Error(Failure::file,
+                  fmt::format("{}: a run on another host has this directory: {}; if it has ended, delete "
+                              "{}, else choose another directory with -o",
+                              directory.string(), run, path_.string()));
+    if (alive(lock))
+      throw Error(Failure::file, fmt::format("{}: a run is at work in this directory: {}; wait for its end, or choose "
+                                             "another directory with -o",
+                                             directory.string(), run));
+    warning_ = fmt::format("warning: the run before in this directory was ended from outside ({})", run);
+  }
+  text_ = fmt::format("host {}\nprocess {}\nstarted {:%Y-%m-%d %H:%M:%S}\nticks {}\n", host_name(), ::getpid(),
+                      fmt::localtime(std::time(nullptr)), began("self"));
+  write_file_atomically(path_, text_);
+}
+
+DirectoryLock::~DirectoryLock() {
+  std::error_code ignored;
+  if (contents(path_) == text_) fs::remove(path_, ignored);
+}
+
+}  // namespace carom
