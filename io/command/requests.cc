@@ -62,11 +62,16 @@ void Requests::checkpoint_is_written() {
 
 std::string_view Requests::reason() const {
   switch (stop_signal) {
-    case SIGTERM: return "SIGTERM";
-    case SIGINT: return "SIGINT";
-    case SIGHUP: return "SIGHUP";
-    case SIGUSR2: return "SIGUSR2";
-    default: return "--max-wall";
+    case SIGTERM:
+      return "SIGTERM";
+    case SIGINT:
+      return "SIGINT";
+    case SIGHUP:
+      return "SIGHUP";
+    case SIGUSR2:
+      return "SIGUSR2";
+    default:
+      return "--max-wall";
   }
 }
 

@@ -4,13 +4,16 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <functional>
 #include <optional>
+#include <utility>
 
 #include "engine/base/error.h"
+#include "io/command/requests.h"
 #include "io/deck/deck.h"
+#include "io/files/checkpoint.h"
 #include "io/files/directory_lock.h"
 #include "io/files/hdf5.h"
 #include "io/files/log.h"
@@ -20,6 +23,7 @@
 #include "io/files/run_files.h"
 #include "io/files/summary.h"
 #include "io/files/text_file.h"
+#include "io/files/version.h"
 #include "parallel/mpi_exchange.h"
 
 namespace carom {
@@ -27,25 +31,6 @@ namespace carom {
 namespace {
 
 constexpr int kDone = 0, kStoppedEarly = 75;
-
-/// Whether the wall time that the user granted is used up.
-class Deadline {
- public:
-  explicit Deadline(std::optional<double> seconds) : seconds_(seconds) {}
-  /// Rank 0 decides for all.
-  bool passed(Exchange& ranks) const {
-    if (!seconds_) return false;
-    double answer = ranks.rank() == 0 && elapsed() >= *seconds_ ? 1 : 0;
-    ranks.largest({&answer, 1});
-    return answer > 0;
-  }
-
- private:
-  double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-  std::optional<double> seconds_;
-};
 
 /// Forces on fewer particles than these cost less than sending them.
 constexpr std::size_t kFewestToShare = 64;
@@ -71,31 +56,132 @@ TextReader reader_for(Exchange& ranks) {
   };
 }
 
+/// A run to be continued: its checkpoint on rank 0, and what all ranks know of it.
+struct Continued {
+  std::filesystem::path directory;
+  std::optional<Checkpoint> checkpoint;
+  CheckpointHead head;
+  std::string warning;
+
+  StateReader reader() const {
+    return [this](const std::string& name) { return checkpoint->read(name); };
+  }
+};
+
+/// Reads the last checkpoint on rank 0, for all.
+Continued find_checkpoint(const std::filesystem::path& directory, Exchange& ranks) {
+  Continued found{.directory = directory, .checkpoint = {}, .head = {}, .warning = {}};
+  Archive out;
+  if (ranks.rank() == 0) {
+    found.checkpoint.emplace(last_checkpoint(directory, found.warning));
+    found.head = found.checkpoint->head();
+    found.head.archive(out);
+    out(found.head.deck);
+  }
+  Archive in(std::move(ranks.gather(out.bytes())[0]));
+  found.head.archive(in);
+  in(found.head.deck);
+  return found;
+}
+
+/// The deck of a run that is continued, where only the end may be another.
+Deck deck_of(const Continued& run, const RunOptions& options, Exchange& ranks) {
+  for (const std::string& set : options.set)
+    if (!set.starts_with("run."))
+      throw Error(Failure::deck, "--set " + set +
+                                     ": a run that is continued keeps its deck; only its end may be set "
+                                     "anew (run.steps, run.end_time, run.collisions); start a new run for the rest");
+  const auto file = run.directory / run_file::deck;
+  const TextReader others = reader_for(ranks);
+  Deck deck = read_deck(file, options.set, [&](const std::filesystem::path& path) {
+    // Positions are in the checkpoint: their file may be gone.
+    return path == file ? run.head.deck : others(path).value_or("");
+  });
+  set_output_directory(deck, run.directory);
+  return deck;
+}
+
 template <int D>
-Simulation<D> simulation_of(Deck& deck, Exchange& ranks) {
+Simulation<D> simulation_of(Deck& deck, Exchange& ranks, const Continued* continued) {
   const IntegratorInfo& info = find_integrator(deck.integrator);
-  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr);
+  std::optional<GivenState> given;
+  if (continued) given = {continued->reader(), continued->head.bonds};
+  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, given ? &*given : nullptr);
   auto integrator = info.make<D>(deck.integrator_parameters);
   return Simulation<D>(std::move(system), info, std::move(integrator), deck.plan);
 }
 
+/// What the ranks do alike while a run goes on: stop or write checkpoints when they are asked to.
+template <int D>
+class Keeper {
+ public:
+  /// `head`: that of the next checkpoint, on rank 0.
+  Keeper(Simulation<D>& simulation, const Deck& deck, Exchange& ranks, Requests& requests,
+         std::function<CheckpointHead()> head)
+      : simulation_(simulation), deck_(deck), ranks_(ranks), requests_(requests), head_(std::move(head)) {
+    requests_.set_interval(deck.output.checkpoint_wall);
+  }
+  typename Simulation<D>::Hooks hooks(const Continued* continued) {
+    typename Simulation<D>::Hooks hooks;
+    hooks.should_stop = [this] { return should_stop(); };
+    hooks.pause = [this] {
+      asked_ = requests_.now(ranks_);
+      return asked_.checkpoint;
+    };
+    if (continued) hooks.restore = [this, continued](Fields&) { restore_state(system(), continued->reader()); };
+    return hooks;
+  }
+
+ private:
+  bool should_stop() {
+    if (!asked_.checkpoint) asked_ = requests_.now_and_then(ranks_);
+    const auto [checkpoint, stop] = std::exchange(asked_, {});
+    if (checkpoint || simulation_.is_last_on_the_way()) {
+      write_checkpoint(deck_.output.directory, ranks_.rank() == 0 ? head_() : CheckpointHead{}, system());
+      requests_.checkpoint_is_written();
+    }
+    return stop;
+  }
+  System<D>& system() { return const_cast<System<D>&>(simulation_.system()); }
+
+  Simulation<D>& simulation_;
+  const Deck& deck_;
+  Exchange& ranks_;
+  Requests& requests_;
+  std::function<CheckpointHead()> head_;
+  Requests::Asked asked_;
+};
+
 /// Runs a deck in D dimensions and writes its files. `at_work`: the ranks that share the work, of all that there are.
 template <int D>
-int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks, const Deadline& deadline) {
-  auto simulation = simulation_of<D>(deck, at_work);
-  const Statistics& statistics = simulation.statistics();
+int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks, Requests& requests,
+             const Continued* continued) {
   const auto& directory = deck.output.directory;
-  const DirectoryLock lock(directory);
-  const auto backup = prepare_output_directory(directory);
-  RunLog log(directory / run_file::log, options.quiet);
+  std::optional<DirectoryLock> lock;
+  if (continued) lock.emplace(directory);
+  auto simulation = simulation_of<D>(deck, at_work, continued);
+  const Statistics& statistics = simulation.statistics();
+  if (!lock) lock.emplace(directory);
+  const auto backup = continued ? std::nullopt : prepare_output_directory(directory);
+  std::optional<RunLog> log_file;
+  if (continued)
+    log_file.emplace(directory / run_file::log, options.quiet, continued->head.log_bytes);
+  else
+    log_file.emplace(directory / run_file::log, options.quiet);
+  RunLog& log = *log_file;
   RunOutcome outcome{.status = "done", .particles = simulation.system().size(), .ranks = ranks};
-  log.say(banner_text(deck, outcome.particles, ranks));
-  for (const std::string& warning : deck.warnings) log.warn(warning);
+  if (continued) {
+    log.say(fmt::format("continued at step {} on {} {}", continued->head.step, ranks, ranks == 1 ? "rank" : "ranks"));
+    if (!continued->warning.empty()) log.warn("warning: " + continued->warning);
+  } else {
+    log.say(banner_text(deck, outcome.particles, ranks));
+    for (const std::string& warning : deck.warnings) log.warn(warning);
+  }
   if (at_work.size() < ranks)
     log.warn(
         fmt::format("warning: {} particles under forces are too few to be shared; one rank works, the other {} wait",
                     outcome.particles, ranks - 1));
-  if (!lock.warning().empty()) log.warn(lock.warning());
+  if (!lock->warning().empty()) log.warn(lock->warning());
   if (backup) log.warn("warning: the files of an earlier run in this directory are now in " + backup->string());
   write_file_atomically(directory / run_file::deck, deck.toml_text);
 
@@ -103,26 +189,43 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
     write_file_atomically(directory / run_file::summary, summary_text(deck, outcome, statistics));
   };
   std::optional<RunFiles<D>> files;
-  ThermoTable<D> table(log);
+  ThermoTable<D> table(log, continued ? continued->head.log_rows : 0);
   Progress<D> progress(stdout, isatty(STDOUT_FILENO) == 1);
   try {
-    files.emplace(deck, simulation.system());
+    if (continued)
+      files.emplace(deck, simulation.system(), continued->head.files);
+    else
+      files.emplace(deck, simulation.system());
     files->add_to(simulation);
     simulation.add(table);
     if (!options.quiet) simulation.add(progress);
-    simulation.run([&] { return deadline.passed(at_work); });
+    const auto bonds = continued ? continued->head.bonds : found_bonds(deck, simulation.system());
+    Keeper<D> keeper(simulation, deck, at_work, requests, [&] {
+      return CheckpointHead{.deck = deck.toml_text,
+                            .version = version_string(),
+                            .integrator = deck.integrator,
+                            .dimension = D,
+                            .particles = outcome.particles,
+                            .step = statistics.steps,
+                            .time = statistics.end_time,
+                            .files = files->mark(),
+                            .log_bytes = log.size(),
+                            .log_rows = table.rows(),
+                            .bonds = bonds};
+    });
+    simulation.run(keeper.hooks(continued));
     progress.end_line();
     table.finish();
     const auto accounts = accounts_of_all(at_work, statistics);
     files->close();
     outcome.species_values = files->species_values();
     outcome.peak_memory_bytes = peak_memory_bytes(accounts);
-    if (statistics.stopped_early) outcome.status = "stopped";
+    if (statistics.stopped_early) outcome.status = "interrupted";
     log.say(report_text(deck, statistics, accounts));
     if (const auto regions = statistics.counters.domains.regions; regions > 0 && regions < static_cast<unsigned>(ranks))
       log.warn(fmt::format("warning: there is work for {} of {} ranks only; use so many", regions, ranks));
     if (statistics.stopped_early)
-      log.warn("warning: stopped by --max-wall; this version writes no checkpoint, so the run cannot be continued");
+      log.warn(fmt::format("stopped by {}; carom run --continue {} goes on", requests.reason(), directory.string()));
     log.close();
     summary();
   } catch (const std::exception& e) {
@@ -144,29 +247,31 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
 
 /// The same run on a rank other than 0, which shows nothing of it.
 template <int D>
-int run_beside(Deck& deck, Exchange& at_work, const Deadline& deadline) {
-  auto simulation = simulation_of<D>(deck, at_work);
+int run_beside(Deck& deck, Exchange& at_work, Requests& requests, const Continued* continued) {
+  auto simulation = simulation_of<D>(deck, at_work, continued);
   std::vector<Onlooker<D>> onlookers;
   for (const auto& [info, parameters] : deck.output.observables)
     onlookers.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
   for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
-  ShareTeller<D> teller(at_work, simulation.system());
+  ShareTeller<D> teller(at_work, simulation.system(), continued == nullptr);
   simulation.add(teller);
-  simulation.run([&] { return deadline.passed(at_work); });
+  Keeper<D> keeper(simulation, deck, at_work, requests, {});
+  simulation.run(keeper.hooks(continued));
   accounts_of_all(at_work, simulation.statistics());
   return simulation.statistics().stopped_early ? kStoppedEarly : kDone;
 }
 
 template <int D>
-int run_on_rank(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks, const Deadline& deadline) {
-  return at_work.rank() == 0 ? run_deck<D>(deck, options, at_work, ranks, deadline)
-                             : run_beside<D>(deck, at_work, deadline);
+int run_on_rank(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks, Requests& requests,
+                const Continued* continued) {
+  return at_work.rank() == 0 ? run_deck<D>(deck, options, at_work, ranks, requests, continued)
+                             : run_beside<D>(deck, at_work, requests, continued);
 }
 
 }  // namespace
 
 int run_command(const RunOptions& options) {
-  const Deadline deadline(options.max_wall_seconds);
+  Requests requests(options.max_wall_seconds);
   // A file that grows beyond its limit and a reader of stdout that goes away are errors to report, not reasons to die.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
@@ -178,15 +283,22 @@ int run_command(const RunOptions& options) {
   Exchange& all = team ? *team : alone;
 
   Deck deck;
+  std::optional<Continued> continued;
   const int failure = ranks.on_all([&] {
-    deck = read_deck(options.deck, options.set, reader_for(all));
-    if (options.output) set_output_directory(deck, *options.output);
+    if (options.go_on) {
+      continued.emplace(find_checkpoint(*options.go_on, all));
+      deck = deck_of(*continued, options, all);
+    } else {
+      deck = read_deck(options.deck, options.set, reader_for(all));
+      if (options.output) set_output_directory(deck, *options.output);
+    }
     return 0;
   });
   if (failure != 0) return failure;
   const auto run = [&](Exchange& at_work) {
-    return deck.dimension == 2 ? run_on_rank<2>(deck, options, at_work, ranks.size(), deadline)
-                               : run_on_rank<3>(deck, options, at_work, ranks.size(), deadline);
+    const Continued* from = continued ? &*continued : nullptr;
+    return deck.dimension == 2 ? run_on_rank<2>(deck, options, at_work, ranks.size(), requests, from)
+                               : run_on_rank<3>(deck, options, at_work, ranks.size(), requests, from);
   };
   const bool few = find_integrator(deck.integrator).smooth_forces && particle_count(deck) < kFewestToShare;
   if (few) return ranks.on_first([&] { return run(alone); });

@@ -54,7 +54,9 @@ void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
     if (const auto wrong = info->template in<D>().complete(parameters, system))
       problems.error(output.place(output_key(*info, wrong->parameter)), wrong->what, wrong->remedy);
     for (const auto& [name, value] : parameters.all())
-      std::visit([&, &info = info, &key = name](const auto& v) { output.values.insert_or_assign(output_key(*info, key), v); }, value);
+      std::visit(
+          [&, &info = info, &key = name](const auto& v) { output.values.insert_or_assign(output_key(*info, key), v); },
+          value);
   }
   deck.toml_text = write_deck(source.values);
 }

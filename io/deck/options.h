@@ -11,12 +11,12 @@ namespace carom {
 
 struct RunOptions {
   std::filesystem::path deck;
-  std::vector<std::string> set;                  ///< `table.key=value`, in the order given
-  std::optional<std::filesystem::path> output;   ///< instead of output.directory; relative to the working directory
-  std::optional<std::filesystem::path> go_on;    ///< instead of a deck: the directory of a run to be continued
-  std::optional<double> max_wall_seconds;        ///< stop early after this much wall time
-  double silence = 600;  ///< seconds after which ranks that do not answer are given up; 0: never
-  bool quiet = false;    ///< no progress line, no banner
+  std::vector<std::string> set;                 ///< `table.key=value`, in the order given
+  std::optional<std::filesystem::path> output;  ///< instead of output.directory; relative to the working directory
+  std::optional<std::filesystem::path> go_on;   ///< instead of a deck: the directory of a run to be continued
+  std::optional<double> max_wall_seconds;       ///< stop early after this much wall time
+  double silence = 600;                         ///< seconds after which ranks that do not answer are given up; 0: never
+  bool quiet = false;                           ///< no progress line, no banner
 };
 
 /// Seconds of wall time written hh:mm:ss, mm:ss or ss, fractions allowed; nothing if it is not such a text.

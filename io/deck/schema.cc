@@ -83,7 +83,8 @@ std::vector<Key> output_keys() {
       {"sample_start", real, "0.0", "time",
        "simulated time of the first sample for " + averages_of_all() + ": what comes before is equilibration",
        Range::non_negative});
-  keys.push_back({"checkpoint_wall", text, "\"00:05:00\"", "-", "wall time between checkpoints, hh:mm:ss; empty: only when the run ends or is stopped"});
+  keys.push_back({"checkpoint_wall", text, "\"00:05:00\"", "-",
+                  "wall time between checkpoints, hh:mm:ss; empty: only when the run ends or is stopped"});
   keys.push_back({"events", boolean, "false", "-", "write every collision to events.h5"});
   return keys;
 }

@@ -13,6 +13,7 @@
 
 #include "engine/base/error.h"
 #include "io/files/hdf5.h"
+#include "io/files/output_directory.h"
 
 namespace carom {
 namespace {
@@ -87,11 +88,16 @@ void verify(const std::filesystem::path& path) {
 
 hid_t type_of(Fields::Scalar scalar) {
   switch (scalar) {
-    case Fields::Scalar::float64: return H5T_NATIVE_DOUBLE;
-    case Fields::Scalar::int32: return H5T_NATIVE_INT32;
-    case Fields::Scalar::uint32: return H5T_NATIVE_UINT32;
-    case Fields::Scalar::uint16: return H5T_NATIVE_UINT16;
-    case Fields::Scalar::bytes: break;
+    case Fields::Scalar::float64:
+      return H5T_NATIVE_DOUBLE;
+    case Fields::Scalar::int32:
+      return H5T_NATIVE_INT32;
+    case Fields::Scalar::uint32:
+      return H5T_NATIVE_UINT32;
+    case Fields::Scalar::uint16:
+      return H5T_NATIVE_UINT16;
+    case Fields::Scalar::bytes:
+      break;
   }
   return H5T_NATIVE_UINT8;
 }
@@ -101,7 +107,7 @@ void sync_directory(const std::filesystem::path& directory) {
 }
 
 /// The file is complete: signs it, and puts it in the place of the last one.
-void put_in_place(const std::filesystem::path& aside, const std::filesystem::path& directory) {
+void sign_and_rename(const std::filesystem::path& aside, const std::filesystem::path& directory) {
   {
     const Descriptor file(aside, O_RDWR);
     const auto block = block_of(sum_of(file));
@@ -129,9 +135,7 @@ void write_checkpoint(const std::filesystem::path& directory, const CheckpointHe
         if (field.columns > 1) shape.push_back(field.columns);
         write(*particles, field.name, type_of(field.scalar), bytes, shape);
       },
-      [&](const std::string& name, const Bytes& bytes) {
-        write(*run, name, H5T_NATIVE_UINT8, bytes, {bytes.size()});
-      }};
+      [&](const std::string& name, const Bytes& bytes) { write(*run, name, H5T_NATIVE_UINT8, bytes, {bytes.size()}); }};
   try {
     if (system.decomposition.ranks().rank() == 0) {
       file.emplace(hdf5::File::create_plain(aside, kBlock));
@@ -148,7 +152,7 @@ void write_checkpoint(const std::filesystem::path& directory, const CheckpointHe
     particles.reset();
     run.reset();
     file->close();
-    put_in_place(aside, directory);
+    sign_and_rename(aside, directory);
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(aside, ignored);

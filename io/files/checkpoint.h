@@ -24,11 +24,6 @@ namespace hdf5 {
 class File;
 }
 
-namespace run_file {
-inline constexpr const char* checkpoint = "checkpoint.h5";
-inline constexpr const char* previous_checkpoint = "checkpoint.previous.h5";
-}  // namespace run_file
-
 /// What a checkpoint says beside the state.
 struct CheckpointHead {
   std::string deck;        ///< as resolved, TOML

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "engine/base/error.h"
+#include "io/files/checkpoint.h"
 #include "io/files/hdf5.h"
 
 namespace carom {
@@ -66,11 +67,21 @@ std::string describe_events(const hdf5::File& file) {
          line("collisions", std::to_string(events)) + line("times", range_of(file, "/events/time", events));
 }
 
+std::string describe_checkpoint(const std::filesystem::path& path) {
+  const Checkpoint checkpoint(path);
+  const CheckpointHead& head = checkpoint.head();
+  return line("kind", "checkpoint, good") + line("written by", "carom " + head.version) +
+         line("integrator", head.integrator) + line("dimension", std::to_string(head.dimension)) +
+         line("particles", std::to_string(head.particles)) + line("step", std::to_string(head.step)) +
+         line("time", fmt::format("{:g}", head.time)) + line("frames", std::to_string(head.files.frames));
+}
+
 }  // namespace
 
 std::string describe_file(const std::filesystem::path& path) {
-  const hdf5::File file = hdf5::File::open(path);
   const std::string head = line("file", path.string());
+  if (is_checkpoint(path)) return head + describe_checkpoint(path);
+  const hdf5::File file = hdf5::File::open(path);
   if (hdf5::exists(file, "/h5md") && hdf5::exists(file, "/particles/trajectory/position/value"))
     return head + describe_trajectory(file);
   if (hdf5::exists(file, "/events/time_in_slab")) return head + describe_events(file);

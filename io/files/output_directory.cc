@@ -27,8 +27,9 @@ void make_output_directory(const fs::path& directory) try {
 
 std::optional<fs::path> prepare_output_directory(const fs::path& directory) try {
   std::optional<fs::path> backup;
-  std::vector<std::string> names = {run_file::deck,   run_file::trajectory, run_file::thermo,
-                                    run_file::events, run_file::summary,    run_file::log};
+  std::vector<std::string> names = {
+      run_file::deck,    run_file::trajectory, run_file::thermo,     run_file::events,
+      run_file::summary, run_file::log,        run_file::checkpoint, run_file::previous_checkpoint};
   for (const ObservableInfo& info : observables()) names.push_back(run_file::averages(info));
   // What a kill leaves: the journal belongs to its file, and parts of files that were never finished go with them.
   const std::size_t files = names.size();

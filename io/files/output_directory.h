@@ -18,6 +18,8 @@ inline constexpr const char* thermo = "thermo.csv";
 inline constexpr const char* events = "events.h5";
 inline constexpr const char* summary = "summary.json";
 inline constexpr const char* log = "run.log";
+inline constexpr const char* checkpoint = "checkpoint.h5";
+inline constexpr const char* previous_checkpoint = "checkpoint.previous.h5";
 inline constexpr const char* lock = "carom.lock";
 inline std::string averages(const ObservableInfo& info) { return std::string(info.name) + ".csv"; }
 }  // namespace run_file
