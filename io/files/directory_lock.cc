@@ -8,12 +8,14 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <sstream>
+#include <thread>
 
 #include "engine/base/error.h"
 #include "io/files/output_directory.h"
@@ -30,15 +32,18 @@ std::string contents(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// When a process began, in clock ticks since the machine did: the 22nd field of Linux's /proc/…/stat. Empty: unknown,
-/// or there is no such process.
+/// When a process began, in clock ticks since the machine did: the 22nd field of Linux's /proc/…/stat. Empty: unknown.
+/// "ended" of one that nobody has waited for yet (the third field is its state).
 std::string began(const std::string& process) {
   const std::string all = contents("/proc/" + process + "/stat");
   const auto name_ends = all.rfind(')');
   if (name_ends == std::string::npos) return {};
   std::istringstream fields(all.substr(name_ends + 1));
   std::string field;
-  for (int n = 3; n <= 22; ++n) fields >> field;
+  for (int n = 3; n <= 22; ++n) {
+    fields >> field;
+    if (n == 3 && (field == "Z" || field == "X")) return "ended";
+  }
   return field;
 }
 
@@ -48,6 +53,13 @@ std::map<std::string, std::string> entries(const std::string& text) {
   std::istringstream in(text);
   for (std::string key, value; in >> key && std::getline(in >> std::ws, value);) found[key] = value;
   return found;
+}
+
+/// What a lock says; "unknown" where it does not.
+std::map<std::string, std::string> read_lock(const fs::path& path) {
+  auto lock = entries(contents(path));
+  for (const char* key : {"host", "process", "started", "ticks"}) lock.try_emplace(key, "unknown");
+  return lock;
 }
 
 bool alive(const std::map<std::string, std::string>& lock) {
@@ -66,6 +78,9 @@ std::string host_name() {
 
 DirectoryLock::DirectoryLock(const fs::path& directory) : path_(directory / run_file::lock) {
   make_output_directory(directory);
+  // A launcher that was told to stop may be gone before its processes are.
+  for (int tenths = 0; tenths < 20 && alive(read_lock(path_)); ++tenths)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
   const int folder = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder >= 0)
     ::flock(folder, LOCK_EX);  // where that can't be had, two runs must start at the same instant to fail
@@ -77,8 +92,7 @@ DirectoryLock::DirectoryLock(const fs::path& directory) : path_(directory / run_
   } unlock{folder};
 
   if (fs::exists(fs::symlink_status(path_))) {
-    auto lock = entries(contents(path_));
-    for (const char* key : {"host", "process", "started", "ticks"}) lock.try_emplace(key, "unknown");
+    auto lock = read_lock(path_);
     const std::string run =
         fmt::format("process {} on host {}, started {}", lock["process"], lock["host"], lock["started"]);
     if (lock["host"] != host_name() && lock["host"] != "unknown")

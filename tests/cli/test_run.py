@@ -192,9 +192,9 @@ def test_one_run_at_a_time(tmp_path):
     assert f"process {child.pid} on host" in done.stderr and "wait for its end" in done.stderr and "-o" in done.stderr
     assert child.poll() is None and not (out / "backup.1").exists()
     child.send_signal(signal.SIGKILL)
-    child.wait()
     before = (out / "carom.lock").read_text()
-    done = run(deck, out)
+    done = run(deck, out)  # also while nobody has waited for the process
+    child.wait()
     assert f"process {child.pid}" in done.stderr and done.stderr.startswith("warning: ")
     assert "ended from outside" in (out / "run.log").read_text()
     assert (out / "backup.1" / "trajectory.h5md").exists() and not (out / "carom.lock").exists()
@@ -211,7 +211,7 @@ def test_one_run_at_a_time(tmp_path):
 
 def test_of_two_runs_that_start_at_once_one_runs(tmp_path):
     deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
-    runs = [subprocess.Popen(command(deck, out, ["run.steps=100000000"], ("--quiet", "--max-wall", "00:00:03")),
+    runs = [subprocess.Popen(command(deck, out, ["run.steps=100000000"], ("--quiet", "--max-wall", "00:00:06")),
                              stderr=subprocess.PIPE) for _ in range(4)]
     assert sorted(child.wait() for child in runs if child.communicate()) == [5, 5, 5, 75]
     assert summary(out)["status"] == "stopped" and not (out / "backup.1").exists()

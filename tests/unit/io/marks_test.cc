@@ -134,9 +134,9 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
   // The lines of the log begin with the time of day.
   const auto rows_of = [](const fs::path& of) {
     std::ifstream in(of / run_file::log);
-    std::vector<std::string> rows;
-    for (std::string line; std::getline(in, line);) rows.push_back(line.substr(line.find("  ")));
-    return rows;
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(in, line);) lines.push_back(line.substr(line.find("  ")));
+    return lines;
   };
   EXPECT_GT(rows_of(whole.output.directory).size(), 50u);
   EXPECT_EQ(rows_of(whole.output.directory), rows_of(cut.output.directory));
