@@ -16,7 +16,7 @@ double default_epoch(const System<D>& system) {
   struct Sums {
     double twice_kinetic = 0, mass = 0, diameter = 0;
   };
-  Exchange alone;
+  Communicator alone;
   const auto [twice_kinetic, mass, diameter] =
       handed_on(system.decomposition.others() ? *system.decomposition.others() : alone, Sums{}, [&](Sums& sums) {
         for (std::size_t i = 0; i < p.size(); ++i) {

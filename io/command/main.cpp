@@ -18,7 +18,7 @@
 #include "io/command/run.h"
 #include "io/deck/options.h"
 #include "io/files/info.h"
-#include "parallel/communicator.h"
+#include "parallel/world.h"
 
 namespace {
 
@@ -78,8 +78,8 @@ void add_bench(CLI::App& app, carom::BenchOptions& options) {
 
 /// One process does it, however many a launcher has started.
 int once(const std::function<int()>& work) {
-  if (!carom::Communicator::launched()) return work();
-  return carom::Communicator().on_first(work);
+  if (!carom::World::launched()) return work();
+  return carom::World().on_first(work);
 }
 
 int carom_main(int argc, char** argv) {
@@ -100,7 +100,8 @@ int carom_main(int argc, char** argv) {
     options.max_wall_seconds = carom::wall_seconds(text);
     if (!options.max_wall_seconds) throw CLI::ValidationError("--max-wall", "'" + text + "' is not hh:mm:ss");
   };
-  run.add_option_function<std::string>("--max-wall", wall_time, "Stop after this wall time with a checkpoint and exit code 75")
+  run.add_option_function<std::string>("--max-wall", wall_time,
+                                       "Stop after this wall time with a checkpoint and exit code 75")
       ->type_name("HH:MM:SS");
   run.add_option("--silence", options.silence,
                  "Of several ranks: give up after so many seconds without a word from one; 0: never")

@@ -207,7 +207,7 @@ struct TrajectoryWriter<D>::Contents {
   Element<std::uint64_t> collisions;
   std::map<std::string, Element<double>> observables;
   std::array<double, 9> edge_rows{};
-  Exchange& ranks;
+  Communicator& ranks;
 };
 
 template <int D>
@@ -253,7 +253,7 @@ void TrajectoryWriter<D>::close() {
 }
 
 template <int D>
-ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system, bool creates) : ranks_(ranks) {
+ShareTeller<D>::ShareTeller(Communicator& ranks, const System<D>& system, bool creates) : ranks_(ranks) {
   if (!creates) return;
   const Particles<D>& p = system.particles;
   one_after_the_other(

@@ -52,11 +52,11 @@ template <int D>
 class ShareTeller : public Observer<D> {
  public:
   /// `creates`: while the writer creates the file; else it opens one again.
-  ShareTeller(Exchange& ranks, const System<D>& system, bool creates = true);
+  ShareTeller(Communicator& ranks, const System<D>& system, bool creates = true);
   void frame(const Snapshot<D>& snapshot) override;
 
  private:
-  Exchange& ranks_;
+  Communicator& ranks_;
 };
 
 }  // namespace carom

@@ -20,7 +20,7 @@ using State = std::map<std::string, Bytes>;
 /// All that a run shows.
 template <int D>
 struct Account : Observer<D> {
-  explicit Account(Exchange* others) : ranks(others) {}
+  explicit Account(Communicator* others) : ranks(others) {}
   Sampling sampling() const override { return {.interval = 0.05}; }
   void sample(double time, const Particles<D>& state) override { note(time), note(state); }
   void frame(const Snapshot<D>& shot) override {
@@ -46,7 +46,7 @@ struct Account : Observer<D> {
       for (const auto n : p.image[i]) note(n);
     }
   }
-  Exchange* ranks;
+  Communicator* ranks;
   std::vector<double> values, events;
 };
 
@@ -75,7 +75,7 @@ struct Outcome {
 template <int D>
 Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& leave, const State* from = nullptr) {
   Outcome<D> out;
-  test::ThreadRanks(std::max(1, ranks)).run([&](Exchange& exchange) {
+  test::ThreadRanks(std::max(1, ranks)).run([&](Communicator& exchange) {
     auto system = scene.make();
     if (ranks > 0) system->decomposition.join(exchange);
     const bool first = exchange.rank() == 0;
