@@ -58,6 +58,7 @@ class FreeFlight : public Integrator<D> {
     const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
                                                max_events_ * system.size()};
     begin(flight, system, slab, report.counters);
+    at_limit_ = report.counters.sphere_sphere >= slab.collision_limit;
     const double looks = std::max(1.0, 20.0 * static_cast<double>(system.size()) / kCollisionsBetweenLooks);
     // Flies to `end`, or as far as it comes; false: not to its end.
     const auto run = [&](double end) {

@@ -40,6 +40,10 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   Fields& fields = system.fields;
   fields.add_value("statistics", statistics);
   fields.add_value("account", account_);
+  fields.add_of_run({"last measurement", [this](Archive& archive) {
+                       archive(shot_.time, shot_.step, shot_.collisions, shot_.kinetic, shot_.potential, shot_.shadow,
+                               shot_.momentum, shot_.temperature);
+                     }});
   fields.add_value("next frame", frames_.next());
   fields.add_value("next row", rows_.next());
   for (std::size_t k = 0; k < samplers_.size(); ++k) {

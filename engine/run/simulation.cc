@@ -158,7 +158,7 @@ void Simulation<D>::run(const Hooks& hooks) {
     monitor.end_of_slab(report.reached, *integrator_, finished());
     for (auto* observer : observers_) observer->progress(s);
   }
-  if (!paused_) monitor.finish(*integrator_);
+  if (!paused_) monitor.finish();
   decomposition.to_blocks();
   take_time();
 }

@@ -91,11 +91,16 @@ int carom_main(int argc, char** argv) {
   carom::RunOptions options;
   CLI::App& run = *app.add_subcommand("run", "Run a deck");
   auto* const run_deck = run.add_option("deck", options.deck, "The deck (TOML)")->type_name("DECK");
-  run.add_option("--continue", options.go_on, "Go on with the run in this directory from its last checkpoint")
-      ->type_name("DIR")
-      ->excludes(run_deck);
+  auto* const go_on =
+      run.add_option("--continue", options.go_on, "Go on with the run in this directory from its last checkpoint");
+  go_on->type_name("DIR")->excludes(run_deck);
+  run.add_flag("--take-over", options.take_over,
+               "Of --continue: the process that had the directory on another host has ended")
+      ->needs(go_on);
   add_set(run, options.set);
-  run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")->type_name("DIR");
+  run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")
+      ->type_name("DIR")
+      ->excludes(go_on);
   const auto wall_time = [&](const std::string& text) {
     options.max_wall_seconds = carom::wall_seconds(text);
     if (!options.max_wall_seconds) throw CLI::ValidationError("--max-wall", "'" + text + "' is not hh:mm:ss");

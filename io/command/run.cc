@@ -98,6 +98,7 @@ Deck deck_of(const Continued& run, const RunOptions& options, Communicator& rank
     return path == file ? run.head.deck : others(path).value_or("");
   });
   set_output_directory(deck, run.directory);
+  deck.file = run.head.deck_file;
   return deck;
 }
 
@@ -158,7 +159,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
              const Continued* continued) {
   const auto& directory = deck.output.directory;
   std::optional<DirectoryLock> lock;
-  if (continued) lock.emplace(directory);
+  if (continued) lock.emplace(directory, options.take_over);
   auto simulation = simulation_of<D>(deck, at_work, continued);
   const Statistics& statistics = simulation.statistics();
   if (!lock) lock.emplace(directory);
@@ -202,6 +203,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     const auto bonds = continued ? continued->head.bonds : found_bonds(deck, simulation.system());
     Keeper<D> keeper(simulation, deck, at_work, requests, [&] {
       return CheckpointHead{.deck = deck.toml_text,
+                            .deck_file = deck.file.string(),
                             .version = version_string(),
                             .integrator = deck.integrator,
                             .dimension = D,

@@ -130,11 +130,10 @@ template <int D>
 std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system) {
   std::vector<PairList> found;
   const auto& all = deck.source->interactions;
-  for (std::size_t n = 0, term = 0; n < all.size(); ++n)
-    if (all[n].info->kind == InteractionInfo::Kind::bonded) {
-      const PairList* bonds = system.interactions[term++]->bonds();
-      if (bonds != nullptr && all[n].parameters.has("within")) found.push_back(*bonds);
-    }
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    const PairList* bonds = system.interactions[n]->bonds();
+    if (bonds != nullptr && all[n].parameters.has("within")) found.push_back(*bonds);
+  }
   return found;
 }
 

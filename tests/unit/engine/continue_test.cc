@@ -233,6 +233,10 @@ TEST(Continue, ALaterEnd) {
       const auto begun = run<3>(scene, ranks, plans[0], {.within_epochs = true, .at_last = true});
       ASSERT_FALSE(begun.state.empty());
       expect_continued(whole, run<3>(scene, ranks, plans[1], {.within_epochs = true}, &begun.state));
+      // With the same end it ends as it has ended, if it ended within an epoch.
+      if (!plans[0].collisions) continue;
+      const auto ended = run<3>(scene, 0, plans[0], {.within_epochs = true});
+      expect_same(ended.statistics, run<3>(scene, ranks, plans[0], {.within_epochs = true}, &begun.state).statistics);
     }
 }
 
