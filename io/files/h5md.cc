@@ -169,7 +169,7 @@ struct TrajectoryWriter<D>::Contents {
   void write_particles(const Particles<D>& p) {
     for (auto* element : {&position, &velocity}) element->value.append_row();
     image.value.append_row();
-    if (p.id.empty()) {
+    if (ranks.size() == 1) {
       write_part(0, p.x, p.v, p.image);
       return;
     }

@@ -335,3 +335,27 @@ def test_a_rank_without_memory(tmp_path):
     limited = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = 1 ]; then ulimit -v {limit}; fi; exec "$@"', "sh"]
     done = mpirun(2, limited + command(tmp_path / "input.toml", tmp_path / "large", ["particles.0.count=256000"]), code=70)
     assert "carom: rank 1 of 2: out of memory" in done.stderr
+
+
+# Decks with fewer spheres than ranks.
+FEW = {
+    "one": ([[2.0, 2.0, 2.0]], [[1.0, 0.5, 0.25]]),
+    "three": ([[1.0, 1.0, 1.0], [3.5, 3.5, 3.5], [1.0, 3.5, 1.0]], [[1.0, 0.5, 0.25], [-1.0, 0.3, 0.2], [0.2, 1.0, 0.3]])}
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "wall"])
+@pytest.mark.parametrize("which", FEW)
+def test_fewer_spheres_than_ranks(which, boundary, tmp_path):
+    position, velocity = FEW[which]
+    few = tomllib.loads(SPHERES) | {
+        "system": {"dimension": 3, "box": [5.0, 5.0, 5.0], "boundary": ["periodic", boundary, "periodic"]},
+        "particles": [{"name": "sphere", "position": position, "velocity": velocity, "radius": 0.5}],
+        "run": {"end_time": 20.0},
+        "output": {"directory": "unused", "frame_interval": 1.0, "thermo_interval": 1.0, "events": True,
+                   "msd_interval": 0.5}}
+    del few["placement"]
+    run(write_deck(tmp_path, toml_text(few)), tmp_path / "plain")
+    for ranks in 2, 4:
+        mpirun(ranks, command("input.toml", tmp_path / str(ranks)), cwd=tmp_path)
+        assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
+        assert filecmp.cmp(tmp_path / "plain" / "msd.csv", tmp_path / str(ranks) / "msd.csv", shallow=False)
