@@ -169,14 +169,14 @@ Plan plan_of(double step, std::int64_t steps) {
   return {.step = step, .steps = steps, .frame_interval = 3 * step, .thermo_interval = 2 * step, .events = true};
 }
 
-Scene<2> springs(const std::string& method, const Given& given = {}) {
-  return {
-      [] {
-        auto system = test::hard_spheres<2>(8, 0.5);
-        test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}});
-        return system;
-      },
-      method, plan_of(0.02, 24), given};
+Scene<2> springs(const std::string& method, const Given& given = {}, double stiffness = 3) {
+  return {[=] {
+            auto system = test::hard_spheres<2>(8, 0.5);
+            test::add_interaction(*system, "harmonic-bond",
+                                  {{"within", 1.4}, {"stiffness", stiffness}, {"rest_length", 1.2}});
+            return system;
+          },
+          method, plan_of(0.02, 24), given};
 }
 Scene<3> yukawa(const std::string& method, const Given& given = {}) {
   return {[] {
@@ -193,6 +193,8 @@ TEST(Continue, SlabMethods) {
     compare<3>(yukawa(method), kRanks, {5});
   }
 }
+/// Sweeps are accelerated once the largest frequency is known, which is part of the state.
+TEST(Continue, StiffForces) { compare<2>(springs("edda", {}, 1000), {{0, 0}, {2, 3}}, {7}); }
 TEST(Continue, MethodsThatCutTheStepOfAll) {
   for (const auto& [method, given] : std::vector<std::pair<std::string, Given>>{{"cva", {}},
                                                                                 {"mcva", {}},
