@@ -256,8 +256,8 @@ int run_beside(Deck& deck, Communicator& at_work, Requests& requests, const Cont
   for (const auto& [info, parameters] : deck.output.observables)
     onlookers.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
   for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
-  ShareTeller<D> teller(at_work, simulation.system(), continued == nullptr);
-  simulation.add(teller);
+  BlockSender<D> sender(at_work, simulation.system(), continued == nullptr);
+  simulation.add(sender);
   Keeper<D> keeper(simulation, deck, at_work, requests, {});
   simulation.run(keeper.hooks(continued));
   accounts_of_all(at_work, simulation.statistics());
