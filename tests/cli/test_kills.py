@@ -74,7 +74,7 @@ def journal_is_complete(path):
 def test_every_other_write(killer, place):
     changes = killed_run(killer, place)
     assert sorted(path.name for path in (place / "out").iterdir()) == [
-        "deck.toml", "events.h5", "rdf.csv", "run.log", "summary.json", "thermo.csv", "trajectory.h5md"]
+        "checkpoint.h5", "deck.toml", "events.h5", "rdf.csv", "run.log", "summary.json", "thermo.csv", "trajectory.h5md"]
     whole = {name: data_sets(place / "out" / name) for name in FILES}
     rows = (place / "out" / "thermo.csv").read_text()
     assert changes > 150

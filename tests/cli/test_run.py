@@ -33,7 +33,7 @@ def last_records(output):
 def test_files(tmp_path):
     deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
     run(deck, out)
-    assert sorted(p.name for p in out.iterdir()) == ["deck.toml", "run.log", "summary.json", "thermo.csv",
+    assert sorted(p.name for p in out.iterdir()) == ["checkpoint.h5", "deck.toml", "run.log", "summary.json", "thermo.csv",
                                                      "trajectory.h5md"]
     s, rows = summary(out), thermo(out)
     for name in PROMISED:
@@ -214,7 +214,7 @@ def test_of_two_runs_that_start_at_once_one_runs(tmp_path):
     runs = [subprocess.Popen(command(deck, out, ["run.steps=100000000"], ("--quiet", "--max-wall", "00:00:06")),
                              stderr=subprocess.PIPE) for _ in range(4)]
     assert sorted(child.wait() for child in runs if child.communicate()) == [5, 5, 5, 75]
-    assert summary(out)["status"] == "stopped" and not (out / "backup.1").exists()
+    assert summary(out)["status"] == "interrupted" and not (out / "backup.1").exists()
 
 
 def test_terminal(tmp_path):
@@ -249,9 +249,9 @@ def test_max_wall(tmp_path):
     done = run(deck, out, ["run.steps=100000000", "output.thermo_interval=100.0", "output.frame_interval=0.0"],
                ("--quiet", "--max-wall", "00:00:01"), code=75)
     assert time.monotonic() - start < 60  # it does stop by itself
-    assert "no checkpoint" in done.stderr
+    assert f"stopped by --max-wall; carom run --continue {out} goes on" in done.stderr
     s, last = summary(out), last_records(out)
-    assert s["status"] == "stopped" and 0 < s["steps"] < 100000000
+    assert s["status"] == "interrupted" and 0 < s["steps"] < 100000000
     assert last["time"] == s["end_time"] == thermo(out)["time"][-1]
     assert last["step"] == s["steps"]
     assert s["energy"]["max_abs_error"] <= 1e-10
