@@ -224,6 +224,31 @@ def test_max_wall_again_and_again(tmp_path):
     expect_same(whole, out)
 
 
+def test_the_script_for_slurm(tmp_path):
+    """With stand-ins for Slurm and mpirun: it asks to be queued again until the run is done, but not where it was cancelled."""
+    deck, whole, out, queue = spheres(tmp_path, 400000), tmp_path / "whole", tmp_path / "out", tmp_path / "queue"
+    run(deck, whole)
+    for name, text in {"mpirun": 'exec "$@"', "scontrol": f'echo "$@" >>{queue}', "sbatch": f'echo "$@" >>{queue}'}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "SLURM_JOB_ID": "17"}
+    script = ROOT / "tools" / "slurm-run"
+    for number, code, queued in [(signal.SIGUSR2, 0, 1), (signal.SIGTERM, INTERRUPTED, 1), (None, 0, 1)]:
+        before = (out / "run.log").read_text().count("continued") if out.exists() else 0
+        job = subprocess.Popen([script, deck, out], env=environment, stderr=subprocess.PIPE, text=True)
+        if before == 0 and number == signal.SIGUSR2:
+            wait_for_rows(job, out)
+        while number == signal.SIGTERM and (out / "run.log").read_text().count("continued") == before:
+            assert job.poll() is None
+        if number is not None:
+            job.send_signal(number)
+        assert job.wait(60) == code, job.stderr.read()
+        assert queue.read_text().count("requeue 17\n") == queued
+    expect_same(whole, out)
+    subprocess.run([script, "deck", "there", "--nodes=2"], env={k: v for k, v in environment.items() if k != "SLURM_JOB_ID"}, check=True)
+    assert queue.read_text().endswith(f"--nodes=2 {script} deck there\n")
+
+
 def killed(killer, deck, out, at, overrides, go=False, where=""):
     """Runs and dies at a change of its files; None: counts the changes. True: it has died."""
     environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": f"{out}/{where}", "KILL_HALF": str((at or 0) % 2)}
