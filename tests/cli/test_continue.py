@@ -13,7 +13,7 @@ import time
 import pytest
 
 from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, in_mount, killer_library, mpi_environment, mpirun, needs_carom,
-                  needs_compiler, needs_mount, run, summary, thermo, write_deck)
+                  needs_compiler, needs_mount, run, summary, write_deck)
 
 sys.path.insert(0, str(ROOT / "tools"))
 from carom_files import toml_text
