@@ -158,13 +158,20 @@ class Run:
                 found.append(int(process.name))
         return found
 
+    @staticmethod
+    def kill(process, number):
+        try:
+            os.kill(process, number)
+        except ProcessLookupError:  # it has ended
+            pass
+
     def end(self, job, codes, most=PATIENCE):
         """Waits for it; its exit code must be one of these."""
         try:
             error = job.communicate(timeout=most)[1].strip()
         except subprocess.TimeoutExpired as expired:
             for process in [*self.processes(), job.pid]:
-                os.kill(process, signal.SIGKILL)
+                self.kill(process, signal.SIGKILL)
             job.communicate()
             raise Found("it does not end") from expired
         for _ in range(1000):  # mpirun does not wait for those it kills
@@ -187,10 +194,12 @@ class Run:
         time.sleep(seconds)
         number = getattr(signal, "SIG" + how)
         at = [job.pid, *self.processes()] if how == "KILL" and ranks > 1 else [job.pid]
-        try:
-            os.kill(self.dice.choice(at), number)
-        except ProcessLookupError:
-            pass
+        victim = self.dice.choice(at)
+        self.kill(victim, number)
+        if victim == job.pid and how == "KILL" and ranks > 1:
+            time.sleep(0.5)  # those that mpirun has started end by themselves then, but not within MPI_Init
+            for process in self.processes():
+                self.kill(process, number)
         # A signal may come before the command, or mpirun, is ready for it, or after it; a killed rank has codes of its own.
         self.end(job, range(-64, 256) if how == "KILL" else (0, 75, -number, 128 + number))
 

@@ -4,8 +4,8 @@
 //   carom validate DECK     carom schema --markdown     carom methods     carom info FILE     carom --version
 //   carom bench --n 10000 --packing-fraction 0.49
 //
-// Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75 stopped
-// early.
+// Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75
+// interrupted.
 
 #include <CLI/CLI.hpp>
 #include <functional>

@@ -101,10 +101,11 @@ DirectoryLock::DirectoryLock(const fs::path& directory, bool take_over) : path_(
     const std::string run =
         fmt::format("process {} on host {}, started {}", lock["process"], lock["host"], lock["started"]);
     if (elsewhere(lock) && !take_over)
-      throw Error(Failure::file,
-                  fmt::format("{}: a run on another host has this directory: {}; if it has ended, go on with "
-                              "--continue and --take-over, else choose another directory with -o",
-                              directory.string(), run));
+      throw Error(
+          Failure::file,
+          fmt::format("{}: a run on another host has this directory: {}; if it has ended, go on with --continue "
+                      "and --take-over or delete {}, else choose another directory with -o",
+                      directory.string(), run, path_.string()));
     if (at_work_here(lock))
       throw Error(Failure::file, fmt::format("{}: a run is at work in this directory: {}; wait for its end, or choose "
                                              "another directory with -o",

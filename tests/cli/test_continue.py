@@ -13,7 +13,7 @@ import time
 import pytest
 
 from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, in_mount, killer_library, mpi_environment, mpirun, needs_carom,
-                  needs_compiler, needs_mount, run, summary, thermo, write_deck)
+                  needs_compiler, needs_mount, run, summary, write_deck)
 
 sys.path.insert(0, str(ROOT / "tools"))
 from carom_files import toml_text
@@ -208,19 +208,45 @@ def test_a_second_interrupt_ends_at_once(tmp_path):
 
 def test_max_wall_again_and_again(tmp_path):
     """A run that goes on in pieces of the wall clock, on ranks as they come, until exit code 0."""
-    deck, whole, out = write_deck(tmp_path, box("edda", 3, 600)), tmp_path / "whole", tmp_path / "out"
+    deck, whole, out = write_deck(tmp_path, box("edda", 3, 2000)), tmp_path / "whole", tmp_path / "out"
     run(deck, whole, ALL_OUTPUT)
     run(deck, out, ALL_OUTPUT, arguments=("--quiet", "--max-wall", "0.05"), code=INTERRUPTED)
     pieces = 0
-    for pieces in range(200):
+    for pieces in range(40):
         ranks = 2 if pieces == 1 else 1
-        done = subprocess.run((["mpirun", "-n", "2"] if ranks > 1 else []) + [CAROM, "run", "--continue", str(out), "--quiet", "--max-wall", "0.1"],
+        wall = ["--max-wall", f"{0.2 * (1 + pieces):.1f}"]  # which starting takes a part of
+        done = subprocess.run((["mpirun", "-n", "2"] if ranks > 1 else []) + [CAROM, "run", "--continue", str(out), "--quiet", *wall],
                               env=mpi_environment(), capture_output=True, text=True, timeout=60)
         if done.returncode == 0:
             break
         assert done.returncode == INTERRUPTED, done.stderr
-    assert pieces > 2
+    assert pieces > 1
     expect_same(whole, out)
+
+
+def test_the_script_for_slurm(tmp_path):
+    """With stand-ins for Slurm and mpirun: it asks to be queued again until the run is done, but not where it was cancelled."""
+    deck, whole, out, queue = spheres(tmp_path, 400000), tmp_path / "whole", tmp_path / "out", tmp_path / "queue"
+    run(deck, whole)
+    for name, text in {"mpirun": 'exec "$@"', "scontrol": f'echo "$@" >>{queue}', "sbatch": f'echo "$@" >>{queue}'}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "SLURM_JOB_ID": "17"}
+    script = ROOT / "tools" / "slurm-run"
+    for number, code, queued in [(signal.SIGUSR2, 0, 1), (signal.SIGTERM, INTERRUPTED, 1), (None, 0, 1)]:
+        before = (out / "run.log").read_text().count("continued") if out.exists() else 0
+        job = subprocess.Popen([script, deck, out], env=environment, stderr=subprocess.PIPE, text=True)
+        if before == 0 and number == signal.SIGUSR2:
+            wait_for_rows(job, out)
+        while number == signal.SIGTERM and (out / "run.log").read_text().count("continued") == before:
+            assert job.poll() is None
+        if number is not None:
+            job.send_signal(number)
+        assert job.wait(60) == code, job.stderr.read()
+        assert queue.read_text().count("requeue 17\n") == queued
+    expect_same(whole, out)
+    subprocess.run([script, "deck", "there", "--nodes=2"], env={k: v for k, v in environment.items() if k != "SLURM_JOB_ID"}, check=True)
+    assert queue.read_text().endswith(f"--nodes=2 {script} deck there\n")
 
 
 def killed(killer, deck, out, at, overrides, go=False, where=""):

@@ -14,7 +14,8 @@ import tomllib
 
 import pytest
 
-from runs import (CAROM, MPIRUN, ROOT, SPHERES, SPRINGS, command, data_sets, frames_are_sound, mpi_environment, mpirun, needs_carom, run, summary, thermo, write_deck)
+from runs import (CAROM, MPIRUN, ROOT, SPHERES, SPRINGS, command, data_sets, frames_are_sound, mpi_environment, mpirun, needs_carom,
+                  run, summary, thermo, write_deck)
 
 sys.path.insert(0, str(ROOT / "tools"))
 import compare
