@@ -151,6 +151,7 @@ IntegratorInfo cdda() {
       .source =
           "Enomoto, thesis, 2011; Gonzalez, J. Nonlinear Sci. 6 (1996) 449; LaBudde, Greenspan, Numer. Math. "
           "25 (1976) 323; Suzuki, Phys. Lett. A 146 (1990) 319",
+      .exact = true,
       .in_2d = make<CollisionDiscreteDerivative, 2>,
       .in_3d = make<CollisionDiscreteDerivative, 3>};
 }

@@ -358,6 +358,7 @@ IntegratorInfo edda() {
       .source =
           "this project; relatives: LaBudde, Greenspan, Numer. Math. 25 (1976) 323; Gonzalez, J. Nonlinear Sci. "
           "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 84 (2010) 1085",
+      .exact = true,
       .local = true,
       .in_2d = make<EventDrivenDiscreteGradient, 2>,
       .in_3d = make<EventDrivenDiscreteGradient, 3>};

@@ -178,6 +178,7 @@ IntegratorInfo free_flight() {
           "Lubachevsky, J. Comput. Phys. 94 (1991) 255",
       .stepping = false,
       .smooth_forces = false,
+      .exact = true,
       .in_2d = make<FreeFlight, 2>,
       .in_3d = make<FreeFlight, 3>};
 }

@@ -15,6 +15,17 @@ namespace {
 /// S_h costs two passes over all pairs. Systems larger than this are measured at thermo rows and frames only.
 constexpr std::size_t kShadowAtEveryStep = 100;
 
+// What ends a run while it goes on: it is no motion of the deck's system any more.
+
+/// |H| over its scale at the start. Inexact methods with steps far too long reach 1e4 and come back.
+constexpr double kBlownUp = 1e10;
+/// |H − H of the last slab|, of a method that keeps it to rounding, over K + Σ|V|. Positions are rounded to 1e-16 of the
+/// box, which potentials 10⁴ times steeper than the box is long turn into 1e-12: that leaves six digits before a bound
+/// which is still far below what a method of second order loses.
+constexpr double kMostJump = 1e-6;
+/// Depth over contact distance. The methods leave 1e-12; the box may be 10⁹ diameters long.
+constexpr double kDeepest = 1e-6;
+
 }  // namespace
 
 template <int D>
@@ -81,6 +92,41 @@ void Monitor<D>::count_from(const Snapshot<D>& shot) {
   account_.first_energy = account_.energy;
   account_.first_shadow = shot.shadow;
   statistics_.energy_reference = std::max(std::abs(account_.energy), account_.magnitude);
+  if (statistics_.energy_scale == 0) statistics_.energy_scale = statistics_.energy_reference;
+}
+
+/// Throws where the run has blown up. What is looked at is the same on all ranks.
+template <int D>
+void Monitor<D>::guard(double energy_before, double magnitude_before) {
+  const Statistics& s = statistics_;
+  const auto fail = [&](const std::string& what) {
+    throw Error(Failure::numerical, what + " at step " + std::to_string(s.steps) + ", time " + short_text(s.end_time) +
+                                        "; " + fastest(system_.particles) + "; use a smaller integrator.step");
+  };
+  const double energy = std::abs(account_.energy), jump = std::abs(account_.energy - energy_before);
+  // Where the start was all but at rest its energy is rounding, and so may be the energy now.
+  if (energy > kBlownUp * s.energy_scale && energy > 0.5 * account_.magnitude)
+    fail("the run has blown up: the energy, " + short_text(s.energy_initial) + " at the start, is " +
+         short_text(account_.energy));
+  if (info_.exact && jump > kMostJump * std::max({s.energy_reference, magnitude_before, account_.magnitude}))
+    fail("the energy, which " + std::string(info_.name) + " keeps to rounding, jumped by " + short_text(jump) + " to " +
+         short_text(account_.energy));
+}
+
+/// Which particle is the fastest, for people. Collective.
+template <int D>
+std::string Monitor<D>::fastest(const Particles<D>& state) const {
+  constexpr double kNone = -std::numeric_limits<double>::infinity();
+  double speed = -1, id = kNone;
+  for (Id i = 0; i < state.size(); ++i) {
+    const double each = state.v[i].norm(), finite = std::isfinite(each) ? each : -kNone;
+    if (!state.owns(i) || finite <= speed) continue;
+    speed = finite;
+    id = -static_cast<double>(state.id_of(i));
+  }
+  const double most = system_.decomposition.largest(speed);
+  id = -system_.decomposition.largest(speed == most ? id : kNone);
+  return "particle " + short_text(id, 10) + " is the fastest, with a speed of " + short_text(most);
 }
 
 template <int D>
@@ -120,19 +166,24 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
   const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.size() <= kShadowAtEveryStep);
-  const double speed = account_.speed;
+  const double speed = account_.speed, energy = account_.energy, magnitude = account_.magnitude;
   shot_ = measure(s.end_time, system_.particles, &integrator, with_shadow);
   s.energy_final = shot_.total();
   if (s.steps == 1 && info_.stepping) count_from(shot_);
   s.max_energy_error = std::max(s.max_energy_error, std::abs(account_.energy - account_.first_energy));
   if (with_shadow)
     s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - account_.first_shadow));
+  guard(energy, magnitude);
   if (s.max_momentum_error)
     s.max_momentum_error =
         std::max(*s.max_momentum_error, (shot_.momentum - Vec<D>(account_.first_momentum.data())).norm());
   if (info_.hard_cores) {
-    s.counters.max_overlap = std::max(s.counters.max_overlap, deepest_overlap());
-    s.counters.max_overlap = system_.decomposition.largest(s.counters.max_overlap);
+    const double deepest = system_.decomposition.largest(deepest_overlap());
+    s.counters.max_overlap = std::max(s.counters.max_overlap, deepest);
+    if (deepest > kDeepest)
+      throw Error(Failure::numerical, "spheres overlap, by " + short_text(deepest) + " of their contact distance, at step " +
+                                          std::to_string(s.steps) + ", time " + short_text(s.end_time) +
+                                          "; use a smaller integrator.step");
   }
   account_.virial_time += elapsed * account_.virial;
   if (s.end_time > 0) {
@@ -185,7 +236,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   }
   if (!std::isfinite(shot.total()))
     throw Error(Failure::numerical, "the energy is not finite at step " + std::to_string(shot.step) + ", time " +
-                                        std::to_string(time) + "; use a smaller integrator.step");
+                                        short_text(time) + "; " + fastest(state) + "; use a smaller integrator.step");
   return shot;
 }
 

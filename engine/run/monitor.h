@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/run/simulation.h"
@@ -75,6 +76,8 @@ class Monitor {
   Snapshot<D> measure(double time, const Particles<D>& state, const Integrator<D>* integrator, bool with_shadow);
   void show(Snapshot<D> shot, bool last);
   void count_from(const Snapshot<D>& shot);
+  void guard(double energy_before, double magnitude_before);
+  std::string fastest(const Particles<D>& state) const;
   double deepest_overlap();
   const Particles<D>& all_particles(const Particles<D>& state);
 

@@ -139,6 +139,10 @@ void Simulation<D>::run(const Hooks& hooks) {
         before.slabs_by_all += decomposition.knows_all() ? 1 : 0;
         s.counters = before;
         contacts.clear();
+      } catch (const Error& e) {
+        if (e.failure() != Failure::numerical) throw;
+        throw Error(Failure::numerical, std::string(e.what()) + " (in step " + std::to_string(slab.index + 1) +
+                                            ", from time " + short_text(slab.start) + ")");
       }
     if (plan_.events) {
       const Stopwatch watch(s.counters.seconds.output);

@@ -84,6 +84,7 @@ struct Statistics {
 
   double energy_initial = 0, energy_after_first_step = 0, energy_final = 0;
   double energy_reference = 0;  ///< max(|H₁|, K₁ + Σ|V|): what to divide energy errors by
+  double energy_scale = 0;      ///< the same at the start, H₀; where that is 0, energy_reference
   /// The long-range corrections in the energies above and in pressures (engine/forces/potentials/tail.h). They are
   /// constants; energy_reference and the errors of H are without them.
   double tail_energy = 0, tail_pressure = 0;

@@ -170,7 +170,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
   else
     log_file.emplace(directory / run_file::log, options.quiet);
   RunLog& log = *log_file;
-  RunOutcome outcome{.status = "done", .particles = simulation.system().size(), .ranks = ranks};
+  RunOutcome outcome{.status = "done", .warnings = deck.warnings, .particles = simulation.system().size(), .ranks = ranks};
   if (continued) {
     log.say(fmt::format("continued at step {} on {} {}", continued->head.step, ranks, ranks == 1 ? "rank" : "ranks"));
     if (!continued->warning.empty()) log.warn("warning: " + continued->warning);
@@ -224,6 +224,10 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     outcome.peak_memory_bytes = peak_memory_bytes(accounts);
     if (statistics.stopped_early) outcome.status = "interrupted";
     log.say(report_text(deck, statistics, accounts));
+    if (const auto warning = energy_warning(statistics)) {
+      outcome.warnings.push_back(*warning);
+      log.warn(*warning);
+    }
     if (const auto subdomains = statistics.counters.windows.subdomains;
         subdomains > 0 && subdomains < static_cast<unsigned>(ranks))
       log.warn(fmt::format("warning: there is work for {} of {} ranks only; use so many", subdomains, ranks));

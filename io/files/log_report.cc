@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -112,6 +113,18 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
       ranks == 1 ? "1 rank" : fmt::format("{} ranks", ranks), deck.file.string(),
       deck.title.empty() ? "" : ": " + deck.title, particles, deck.dimension, deck.integrator, deck.plan.step,
       ends_at(deck.plan), deck.output.directory.string());
+}
+
+std::optional<std::string> energy_warning(const Statistics& s) {
+  // Errors count from the end of the first step, which may have been the wild one.
+  const auto share = [](double error, double of) { return of > 0 ? error / of : 0; };
+  const double later = share(s.max_energy_error, s.energy_reference),
+               first = share(std::abs(s.energy_after_first_step - s.energy_initial), s.energy_scale);
+  if (std::max(first, later) <= 1) return {};
+  return fmt::format(
+      "warning: the energy was wrong by {:.2g} times its own size{}: what the run shows is no motion of this system; "
+      "use a smaller integrator.step",
+      std::max(first, later), first > later ? " after the first step" : "");
 }
 
 std::string report_text(const Deck& deck, const Statistics& s, std::span<const RankAccount> ranks) {

@@ -58,6 +58,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
   };
   for (const SpeciesValue& value : outcome.species_values)
     json[value.name].push_back({{"species", value.species}, {value.symbol, value.value}});
+  json["warnings"] = outcome.warnings;
   if (!outcome.error.empty()) json["error"] = outcome.error;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

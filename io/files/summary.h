@@ -15,6 +15,7 @@ namespace carom {
 struct RunOutcome {
   std::string status;   ///< "done", "interrupted" (on request; can be continued), "failed"
   std::string error{};  ///< why it failed; empty otherwise
+  std::vector<std::string> warnings{};  ///< of the deck and of the run
   std::size_t particles = 0;
   int ranks = 1;
   std::vector<SpeciesValue> species_values{};  ///< of the averages

@@ -199,6 +199,51 @@ TEST(Simulation, ForcesThatAreNotFiniteEndTheRun) {
   EXPECT_THROW(test::run_steps<2>(std::move(system), "verlet", 0.1, 10), Error);
 }
 
+/// Two particles on a spring that is stretched.
+std::unique_ptr<System<2>> oscillator(double stiffness) {
+  auto system = test::make_system<2>({60, 60}, Boundary::open, {{1, 0}, {40, 0}}, {{0, 0}, {0, 0}});
+  test::add_interaction(*system, "harmonic-bond",
+                  {{"pairs", PairList{{0, 1}}}, {"stiffness", stiffness}, {"rest_length", 38.0}});
+  return system;
+}
+
+std::string failure_of(Simulation<2>& run) {
+  try {
+    run.run();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.exit_code(), 4);
+    return e.what();
+  }
+  return "none";
+}
+
+TEST(Simulation, ARunThatHasBlownUpEnds) {
+  Simulation<2> later(oscillator(1), "verlet", {{"step", 3.0}}, {.steps = 1000});
+  const std::string message = failure_of(later);
+  for (const char* part : {"the run has blown up: the energy, 0.5 at the start, is ", " at step ", "time ", "particle ",
+                           " is the fastest, with a speed of ", "use a smaller integrator.step"})
+    EXPECT_NE(message.find(part), std::string::npos) << part << " in " << message;
+  EXPECT_LT(later.statistics().steps, 30);
+  Simulation<2> at_once(oscillator(1e6), "verlet", {{"step", 1.0}}, {.steps = 1000});
+  EXPECT_NE(failure_of(at_once).find("blown up"), std::string::npos);
+  EXPECT_EQ(at_once.statistics().steps, 1);
+  EXPECT_EQ(at_once.statistics().max_energy_error, 0);
+  Simulation<2> wild(oscillator(1), "verlet", {{"step", 1.2}}, {.steps = 1000});
+  EXPECT_EQ(failure_of(wild), "none");
+}
+
+TEST(Simulation, AJumpOfTheEnergyEndsAnExactMethod) {
+  IntegratorInfo info = find_integrator("verlet");
+  for (const bool exact : {false, true}) {
+    info.exact = exact;
+    Simulation<2> run(oscillator(1), info, {{"step", 0.1}}, {.steps = 20});
+    const std::string message = failure_of(run);
+    EXPECT_EQ(message.starts_with("the energy, which verlet keeps to rounding, jumped by "), exact) << message;
+  }
+  for (const auto& method : integrators())
+    EXPECT_EQ(method.exact, method.name == "free-flight" || method.name == "cdda" || method.name == "edda");
+}
+
 TEST(Simulation, RefusesAPlanWithoutEnd) {
   EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0.1}), Error);
   EXPECT_THROW(test::make_run<2>(test::five_springs(), "cva", {.step = 0, .steps = 1}), Error);
