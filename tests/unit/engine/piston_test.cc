@@ -122,7 +122,7 @@ TEST(Piston, EnergyAndWorkAddUpUnderForces) {
 std::string message(const std::function<void(System<2>&)>& change, const std::string& method,
                     Exchange* ranks = nullptr) {
   auto system = one_sphere(10, 1, -0.1);
-  system->ranks = ranks;
+  if (ranks) system->decomposition.join(*ranks);
   change(*system);
   try {
     system->check();
