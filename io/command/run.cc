@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdio>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -59,6 +60,8 @@ TextReader reader_for(Communicator& ranks) {
 /// A run to be continued: its checkpoint on rank 0, and what all ranks know of it.
 struct Continued {
   std::filesystem::path directory;
+  mutable std::unique_ptr<DirectoryLock>
+      lock;  // goes to the run; taken before the checkpoint is read: a process that is ending may write another
   std::optional<Checkpoint> checkpoint;
   CheckpointHead head;
   std::string warning;
@@ -69,11 +72,15 @@ struct Continued {
 };
 
 /// Reads the last checkpoint on rank 0, for all.
-Continued find_checkpoint(const std::filesystem::path& directory, Communicator& ranks) {
-  Continued found{.directory = directory, .checkpoint = {}, .head = {}, .warning = {}};
+Continued find_checkpoint(const std::filesystem::path& directory, bool take_over, Communicator& ranks) {
+  Continued found{.directory = directory, .lock = {}, .checkpoint = {}, .head = {}, .warning = {}};
   Archive out;
   if (ranks.rank() == 0) {
+    if (std::filesystem::is_directory(directory)) found.lock = std::make_unique<DirectoryLock>(directory, take_over);
     found.checkpoint.emplace(last_checkpoint(directory, found.warning));
+    // The next checkpoint takes the place of one that is damaged, not of the one that is good.
+    if (const auto last = directory / run_file::checkpoint; found.checkpoint->file() != last)
+      std::filesystem::rename(found.checkpoint->file(), last);
     found.head = found.checkpoint->head();
     found.head.archive(out);
     out(found.head.deck);
@@ -158,11 +165,9 @@ template <int D>
 int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
              const Continued* continued) {
   const auto& directory = deck.output.directory;
-  std::optional<DirectoryLock> lock;
-  if (continued) lock.emplace(directory, options.take_over);
   auto simulation = simulation_of<D>(deck, at_work, continued);
   const Statistics& statistics = simulation.statistics();
-  if (!lock) lock.emplace(directory);
+  const auto lock = continued ? std::move(continued->lock) : std::make_unique<DirectoryLock>(directory);
   const auto backup = continued ? std::nullopt : prepare_output_directory(directory);
   std::optional<RunLog> log_file;
   if (continued)
@@ -293,7 +298,7 @@ int run_command(const RunOptions& options) {
   std::optional<Continued> continued;
   const int failure = ranks.on_all([&] {
     if (options.go_on) {
-      continued.emplace(find_checkpoint(*options.go_on, all));
+      continued.emplace(find_checkpoint(*options.go_on, options.take_over, all));
       deck = deck_of(*continued, options, all);
     } else {
       deck = read_deck(options.deck, options.set, reader_for(all));

@@ -362,6 +362,49 @@ def test_the_other_slot(tmp_path):
     expect_same(whole, out)
 
 
+@needs_compiler
+def test_a_damaged_slot_and_kills(killer, memory):
+    """A run that goes on from the earlier checkpoint keeps that until there is another good one."""
+    (memory / "slots").mkdir()
+    whole, out = interrupted(memory / "slots")
+    (out / "checkpoint.h5").write_bytes(b"damaged")
+    trial, at, deaths = memory / "slots" / "trial", 0, 0
+    while True:
+        at += 1
+        shutil.rmtree(trial, ignore_errors=True)
+        shutil.copytree(out, trial)
+        if not killed(killer, None, trial, at, [], go=True, where="checkpoint"):
+            break
+        deaths += 1
+        go_on(trial)
+    assert deaths > 4
+
+
+def test_the_checkpoint_is_read_when_the_directory_is_free(tmp_path):
+    """A process that is ending may write another meanwhile."""
+    whole, out = interrupted(tmp_path)
+    earlier = tmp_path / "earlier"
+    run(tmp_path / "input.toml", earlier, [*ALL_OUTPUT, "run.steps=100"])
+    late = (out / "checkpoint.h5").read_bytes()
+    (out / "checkpoint.h5").write_bytes((earlier / "checkpoint.h5").read_bytes())
+    owner = subprocess.Popen(["sleep", "60"])
+    lock_of(out, owner.pid)
+    job = subprocess.Popen([CAROM, "run", "--continue", str(out), "--set", "run.steps=300"], stdout=subprocess.PIPE, text=True)
+    time.sleep(0.7)  # it waits up to two seconds for a process to end
+    (out / "checkpoint.h5").write_bytes(late)
+    owner.kill()
+    owner.wait()
+    assert "continued at step 200" in job.communicate()[0] and job.returncode == 0
+    expect_same(whole, out)
+
+
+def lock_of(out, process, host=None):
+    """Leaves the lock of a process."""
+    ticks = pathlib.Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[19]
+    host = host or pathlib.Path("/proc/sys/kernel/hostname").read_text().strip()
+    (out / "carom.lock").write_text(f"host {host}\nprocess {process}\nstarted then\nticks {ticks}\n")
+
+
 @pytest.mark.parametrize("arguments, code, words", [
     (["--set", "integrator.step=0.1"], 2, "keeps its deck"),
     (["--set", "output.events=false"], 2, "keeps its deck"),
@@ -398,18 +441,15 @@ def test_locks(tmp_path):
     deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
     run(deck, out)
     job = subprocess.Popen(["sleep", "60"])
-    ticks = pathlib.Path(f"/proc/{job.pid}/stat").read_text().rsplit(")", 1)[1].split()[19]
-    lock = "host {}\nprocess {}\nstarted then\nticks {}\n"
-    here = pathlib.Path("/proc/sys/kernel/hostname").read_text().strip()
     try:
         for arguments in ([], ["--take-over"]):
-            (out / "carom.lock").write_text(lock.format(here, job.pid, ticks))
+            lock_of(out, job.pid)
             assert "is at work in this directory" in go_on(out, arguments, code=5).stderr
     finally:
         job.kill()
         job.wait()
     go_on(out)
-    (out / "carom.lock").write_text(lock.format("another", 1, 1))
+    lock_of(out, os.getpid(), "another")
     assert "--take-over" in go_on(out, code=5).stderr
     assert "ended from outside" in go_on(out, ["--take-over"]).stderr
     assert not (out / "carom.lock").exists()
