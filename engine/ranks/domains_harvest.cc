@@ -62,7 +62,6 @@ void Domains<D>::report_all(const ContactTally& sum, const std::vector<Contact<D
   const ContactTally all = sum_of_all(exchange_, sum);
   report.counters.add(all);
   if (report.contacts) merge_contacts<D>(gather_on_first(exchange_, packed<D>(contacts)), *report.contacts);
-  if (events_ += all.contacts(); events_ > report.max_events) throw_too_many_contacts(report.max_events);
 }
 
 /// The contact that node k of a path stands for.
