@@ -4,9 +4,10 @@
     tools/compare.py runs/a runs/b                      # every frame and every thermo row, bit for bit
     tools/compare.py runs/a runs/b --tolerance 1e-9     # largest absolute difference of positions, velocities, thermo
     tools/compare.py runs/a runs/b --last               # only the final records: for runs with other output intervals
+    tools/compare.py runs/a runs/b --summary            # summary.json too, but for wall clock, memory and ranks
 
-Compared are all data sets of /particles and /observables of the trajectory, thermo.csv, and events.h5 where both have one;
-the resolved deck is not, nor are times of the wall clock. Exit code 0: the same; 1: they differ.
+Compared are all data sets of /particles and /observables of the trajectory, thermo.csv, and events.h5 and averages where both
+have them; the resolved deck is not, nor are times of the wall clock. Exit code 0: the same; 1: they differ.
 """
 
 import argparse
@@ -16,7 +17,11 @@ import sys
 import h5py
 import numpy as np
 
-from carom_files import TRAJECTORY, open_hdf5, read_thermo, reading
+from carom_files import TRAJECTORY, open_hdf5, read_summary, read_table, read_thermo, reading
+
+TABLES = ["rdf.csv", "msd.csv", "profile.csv"]
+# What the summary says of the machine and the place, not of the run.
+OF_THE_MACHINE = {"deck", "version", "ranks", "wall_seconds", "collisions_per_second", "peak_memory_bytes"}
 
 
 def data_sets(path, groups):
@@ -66,6 +71,13 @@ def differences(a, b, tolerance):
     return lines
 
 
+def summary_differences(a, b):
+    """One line for each field of two summaries that differs, but for those of the machine."""
+    a, b = read_summary(a), read_summary(b)
+    return [f"summary.json, {name}: {a.get(name)} against {b.get(name)}"
+            for name in sorted((a.keys() | b.keys()) - OF_THE_MACHINE) if a.get(name) != b.get(name)]
+
+
 def compare(a, b, tolerance=None, last=False):
     """What is different between two runs, one line each; empty: nothing."""
     a, b = pathlib.Path(a), pathlib.Path(b)
@@ -74,6 +86,9 @@ def compare(a, b, tolerance=None, last=False):
         return differences(*map(last_frame, sets), tolerance)
     lines = differences(*sets, tolerance)
     lines += [f"thermo.csv, {line}" for line in differences(read_thermo(a), read_thermo(b), tolerance)]
+    for name in TABLES:
+        if (a / name).exists() and (b / name).exists():
+            lines += [f"{name}, {line}" for line in differences(read_table(a / name), read_table(b / name), tolerance)]
     if (a / "events.h5").exists() and (b / "events.h5").exists():
         events = [data_sets(run / "events.h5", ["events"]) for run in (a, b)]
         lines += [f"events.h5, {line}" for line in differences(*events, tolerance)]
@@ -86,8 +101,11 @@ def main(arguments=None):
     parser.add_argument("b", type=pathlib.Path, help="directory of another")
     parser.add_argument("--tolerance", type=float, help="allowed absolute difference; default: none, bit for bit")
     parser.add_argument("--last", action="store_true", help="compare the final records only")
+    parser.add_argument("--summary", action="store_true", help="compare summary.json too")
     options = parser.parse_args(arguments)
     lines = compare(options.a, options.b, options.tolerance, options.last)
+    if options.summary:
+        lines += summary_differences(options.a, options.b)
     print("\n".join(lines) if lines else "the same")
     return 1 if lines else 0
 

@@ -1,18 +1,18 @@
 #!/usr/bin/python3
-"""What to expect of many ranks: counts of runs with many regions, and a model of the efficiency fitted to them.
+"""What to expect of many ranks: counts of runs with many ranks, and a model of the efficiency fitted to them.
 
     tools/rank_study.py
     tools/rank_study.py --ranks 8,64 --per-rank 500,2000 --collisions 20 --rate 1e6
 
 Measured, for a deck of free flight on so many ranks: windows, rounds a window, events run twice at borders, events redone,
 and the imbalance of the whole run, as in run.log. Where there are more ranks than cores, `. tools/mpi-env.sh` first. Spheres
-start at random places (--placement): cut between the layers of a crystal, regions get unequal shares until they are made anew.
+start at random places (--placement): cut between the layers of a crystal, ranks get unequal shares until they are made anew.
 
-Fitted to the runs with regions that have neighbours on all sides, with s = (spheres a region)^(-1/D):
+Fitted to the runs with ranks that have neighbours on all sides, with s = (spheres a rank)^(-1/D):
 events run twice (1 + h s)^D - 1, a shell around a cube; events redone r s, a surface; rounds a window a + b log2(spheres
 at all borders), a chain of repairs that gets longer by one with a probability.
 
-Modelled from that: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a region.
+Modelled from that: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a rank.
 The work is its collisions by --rate. The imbalance is that of independent events, sqrt(2 ln P / events), times
 --imbalance. Messages: a window has rounds + 1 exchanges and rounds + 3 reductions; a reduction takes
 log2 P times --latency, an exchange --latency and --overhead for each of 3^D - 1 neighbours. Left out: volume of data,
@@ -31,9 +31,9 @@ from studies import processor_seconds, read_deck, run_deck, write_table
 
 COUNTS = re.compile(r"(\d+) windows, ([\d.]+) rounds each; events at borders run twice ([\d.]+)%, redone ([\d.]+)%, "
                     r"imbalance ([\d.]+)%")
-COLUMNS = ["regions", "per_region", "particles", "windows", "events", "rounds", "twice", "redone", "redone_events",
+COLUMNS = ["ranks", "per_rank", "particles", "windows", "events", "rounds", "twice", "redone", "redone_events",
            "imbalance"]
-MODEL = ["regions", "per_region", "rounds", "twice", "redone", "imbalance", "messages", "efficiency"]
+MODEL = ["ranks", "per_rank", "rounds", "twice", "redone", "imbalance", "messages", "efficiency"]
 RATE_COLLISIONS = 1_000_000
 
 
@@ -41,14 +41,14 @@ def parse_arguments(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     default = pathlib.Path(__file__).resolve().parent.parent / "inputs" / "hard-sphere-fluid.toml"
     parser.add_argument("deck", type=pathlib.Path, nargs="?", default=default, help="default: inputs/hard-sphere-fluid.toml")
-    parser.add_argument("--ranks", default="2,4,8,16,32,64", help="numbers of ranks, a region each")
-    parser.add_argument("--per-rank", default="500,2000,10000", help="spheres a region")
+    parser.add_argument("--ranks", default="2,4,8,16,32,64", help="numbers of ranks, a rank each")
+    parser.add_argument("--per-rank", default="500,2000,10000", help="spheres a rank")
     parser.add_argument("--most", type=int, default=130000, help="spheres of a run; larger ones are left out")
     parser.add_argument("--collisions", type=float, default=10, help="of a sphere in a run")
     parser.add_argument("--placement", default="random", help="of the spheres, instead of the deck's")
     parser.add_argument("--imbalance", type=float,
                         help="factor by which the imbalance exceeds that of independent events; default: fitted")
-    parser.add_argument("--rate", type=float, help="collisions a second of one core; default: measured without regions")
+    parser.add_argument("--rate", type=float, help="collisions a second of one core; default: measured without ranks")
     parser.add_argument("--latency", type=float, default=5e-6, help="of a message [s], an assumption")
     parser.add_argument("--overhead", type=float, default=5e-7, help="of each further message of an exchange [s], likewise")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="changes the deck, as in carom run")
@@ -64,10 +64,10 @@ def parse_arguments(arguments=None):
 
 
 def counts_of(log):
-    """The line about regions in a run.log: windows, rounds a window, and the shares of events."""
+    """The line about ranks in a run.log: windows, rounds a window, and the shares of events."""
     found = COUNTS.search(log)
     if not found:
-        raise SystemExit("run.log has nothing about windows: is the deck one of free flight, and are there several regions?")
+        raise SystemExit("run.log has nothing about windows: is the deck one of free flight, and are there several ranks?")
     windows, rounds, *percent = found.groups()
     return {"windows": int(windows), "rounds": float(rounds)} | {
         name: float(value) / 100 for name, value in zip(("twice", "redone", "imbalance"), percent)}
@@ -85,82 +85,82 @@ def run(options, deck, particles, collisions, **how):
         return summary, (place / "run.log").read_text(), min(summary["wall_seconds"], processor_seconds() - before)
 
 
-def measure(options, deck, regions, per_region):
+def measure(options, deck, ranks, per_rank):
     """A row of the table of counts."""
-    particles = regions * per_region
+    particles = ranks * per_rank
     summary, log, _ = run(options, deck, particles, particles * options.collisions / 2,
-                          launcher=["mpirun", "-n", str(regions)])
-    row = counts_of(log) | {"regions": regions, "per_region": per_region, "particles": particles}
-    row["events"] = sum(summary["events"].values()) / row["windows"] / regions
+                          launcher=["mpirun", "-n", str(ranks)])
+    row = counts_of(log) | {"ranks": ranks, "per_rank": per_rank, "particles": particles}
+    row["events"] = sum(summary["events"].values()) / row["windows"] / ranks
     row["redone_events"] = row["redone"] * row["events"]
-    print("{regions:7} {per_region:10} {windows:8} {events:8.0f} {rounds:7.2f} {twice:8.1%} {redone:8.2%} "
+    print("{ranks:7} {per_rank:10} {windows:8} {events:8.0f} {rounds:7.2f} {twice:8.1%} {redone:8.2%} "
           "{redone_events:8.2f} {imbalance:9.1%}".format(**row), flush=True)
     return row
 
 
 def measured_rate(options, deck):
-    """Collisions a second of one core, without regions, and the number of spheres."""
+    """Collisions a second of one core, without ranks, and the number of spheres."""
     particles = options.per_rank[-1]
     summary, _, seconds = run(options, deck, particles, RATE_COLLISIONS)
     return summary["events"]["sphere_sphere"] / seconds, particles
 
 
-def border(regions, per_region, dimension):
+def border(ranks, per_rank, dimension):
     """About how many spheres are at borders, as a logarithm."""
-    return np.log2(regions * per_region ** (1 - 1 / dimension))
+    return np.log2(ranks * per_rank ** (1 - 1 / dimension))
 
 
 def fit(rows, dimension, imbalance=None):
     """What the model takes from the counts."""
-    inner = [row for row in rows if row["regions"] >= 2**dimension]
-    if len({border(row["regions"], row["per_region"], dimension) for row in inner}) < 2:
-        raise SystemExit(f"The fit needs two runs of {2**dimension} or more regions.")
+    inner = [row for row in rows if row["ranks"] >= 2**dimension]
+    if len({border(row["ranks"], row["per_rank"], dimension) for row in inner}) < 2:
+        raise SystemExit(f"The fit needs two runs of {2**dimension} or more ranks.")
     column = lambda name: np.array([row[name] for row in inner])
-    s = column("per_region") ** (-1 / dimension)
-    b, a = np.polyfit(border(column("regions"), column("per_region"), dimension), column("rounds"), 1)
+    s = column("per_rank") ** (-1 / dimension)
+    b, a = np.polyfit(border(column("ranks"), column("per_rank"), dimension), column("rounds"), 1)
     if imbalance is None:
-        factors = column("imbalance") * np.sqrt(column("events") * column("windows") / (2 * np.log(column("regions"))))
+        factors = column("imbalance") * np.sqrt(column("events") * column("windows") / (2 * np.log(column("ranks"))))
         imbalance = np.mean(factors)
     return {"dimension": dimension, "h": np.mean(((1 + column("twice")) ** (1 / dimension) - 1) / s),
             "r": np.mean(column("redone") / s), "a": a, "b": b,
-            "events": np.mean(column("events") / column("per_region")), "imbalance": imbalance}
+            "events": np.mean(column("events") / column("per_rank")), "imbalance": imbalance}
 
 
-def modelled(fitted, options, regions, per_region):
+def modelled(fitted, options, ranks, per_rank):
     """A row of the table of efficiencies; messages are in units of the work."""
-    dimension, s = fitted["dimension"], per_region ** (-1 / fitted["dimension"])
-    rounds = fitted["a"] + fitted["b"] * border(regions, per_region, dimension)
+    dimension, s = fitted["dimension"], per_rank ** (-1 / fitted["dimension"])
+    rounds = fitted["a"] + fitted["b"] * border(ranks, per_rank, dimension)
     twice, redone = (1 + fitted["h"] * s) ** dimension - 1, fitted["r"] * s
-    events = fitted["events"] * per_region
-    imbalance = fitted["imbalance"] * np.sqrt(2 * np.log(regions) / events)
+    events = fitted["events"] * per_rank
+    imbalance = fitted["imbalance"] * np.sqrt(2 * np.log(ranks) / events)
     work = events / options.rate
-    exchange = options.latency + options.overhead * min(3**dimension, regions)
-    messages = ((rounds + 1) * exchange + (rounds + 3) * np.log2(regions) * options.latency) / work
-    return {"regions": regions, "per_region": per_region, "rounds": rounds, "twice": twice, "redone": redone,
+    exchange = options.latency + options.overhead * min(3**dimension, ranks)
+    messages = ((rounds + 1) * exchange + (rounds + 3) * np.log2(ranks) * options.latency) / work
+    return {"ranks": ranks, "per_rank": per_rank, "rounds": rounds, "twice": twice, "redone": redone,
             "imbalance": imbalance, "messages": messages, "efficiency": 1 / (1 + twice + redone + imbalance + messages)}
 
 
 def draw(rows, fitted, options, title, file):
-    sizes = np.geomspace(min(row["per_region"] for row in rows), 1e6)
-    with panels(file, {"title": title, "xlabel": "spheres a region", "ylabel": "share of the events (points: measured)"},
-                {"title": "model", "xlabel": "spheres a region", "ylabel": "efficiency", "xscale": "log"}) as (left, right):
+    sizes = np.geomspace(min(row["per_rank"] for row in rows), 1e6)
+    with panels(file, {"title": title, "xlabel": "spheres a rank", "ylabel": "share of the events (points: measured)"},
+                {"title": "model", "xlabel": "spheres a rank", "ylabel": "efficiency", "xscale": "log"}) as (left, right):
         curves = [modelled(fitted, options, options.ranks[-1], size) for size in sizes]
         for name, colour in (("twice", "C0"), ("redone", "C1")):
-            left.loglog([row["per_region"] for row in rows], [row[name] for row in rows], "o", color=colour)
+            left.loglog([row["per_rank"] for row in rows], [row[name] for row in rows], "o", color=colour)
             left.loglog(sizes, [row[name] for row in curves], color=colour, label=name)
-        for regions in (64, 1000, 10000):
-            curves = [modelled(fitted, options, regions, size) for size in sizes]
-            right.plot(sizes, [row["efficiency"] for row in curves], label=f"{regions} ranks")
+        for ranks in (64, 1000, 10000):
+            curves = [modelled(fitted, options, ranks, size) for size in sizes]
+            right.plot(sizes, [row["efficiency"] for row in curves], label=f"{ranks} ranks")
 
 
 def main(arguments=None):
     options = parse_arguments(arguments)
     deck = read_deck(options)
     options.output.mkdir(parents=True, exist_ok=True)
-    print("Measured; events, and events redone, are of a region in a window.")
-    print("regions per region  windows   events  rounds    twice   redone   events imbalance")
-    rows = [measure(options, deck, regions, per_region) for per_region in options.per_rank for regions in options.ranks
-            if regions * per_region <= options.most]
+    print("Measured; events, and events redone, are of a rank in a window.")
+    print("  ranks   per rank  windows   events  rounds    twice   redone   events imbalance")
+    rows = [measure(options, deck, ranks, per_rank) for per_rank in options.per_rank for ranks in options.ranks
+            if ranks * per_rank <= options.most]
     fitted = fit(rows, deck["system"]["dimension"], options.imbalance)
     how = "given"
     if options.rate is None:
@@ -170,11 +170,11 @@ def main(arguments=None):
           "imbalance {imbalance:.2f} of independent events".format(**fitted))
     print(f"One core: {options.rate:.3g} collisions/s ({how}). Assumed: {options.latency:.1e} s a message, "
           f"{options.overhead:.1e} s each further one")
-    print("Modelled:\nregions per region  rounds    twice   redone imbalance messages efficiency")
-    model = [modelled(fitted, options, regions, per_region) for per_region in (10**4, 10**5, 10**6)
-             for regions in (64, 1000, 10000)]
+    print("Modelled:\n  ranks   per rank  rounds    twice   redone imbalance messages efficiency")
+    model = [modelled(fitted, options, ranks, per_rank) for per_rank in (10**4, 10**5, 10**6)
+             for ranks in (64, 1000, 10000)]
     for row in model:
-        print("{regions:7} {per_region:10} {rounds:7.2f} {twice:8.1%} {redone:8.2%} {imbalance:9.1%} {messages:8.1%} "
+        print("{ranks:7} {per_rank:10} {rounds:7.2f} {twice:8.1%} {redone:8.2%} {imbalance:9.1%} {messages:8.1%} "
               "{efficiency:10.2f}".format(**row))
     table, prediction, figure = (options.output / name for name in ("ranks.csv", "model.csv", "ranks.png"))
     write_table(table, COLUMNS, rows)

@@ -22,7 +22,7 @@ struct Counters : ContactTally {
   std::uint64_t slabs_again = 0;   ///< done again, with more particles known
   std::uint64_t slabs_by_all = 0;  ///< of these, with all particles known
   EventCounts events;              ///< of the event core, at the end of the last slab; 0 where a method has none
-  DomainCounts domains;            ///< of the regions of this rank; 0 where there is one
+  WindowCounts windows;            ///< of the subdomains of this rank; 0 where there is one
 
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;

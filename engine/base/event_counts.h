@@ -26,9 +26,9 @@ struct EventCounts {
   }
 };
 
-/// What agreement between regions took on one rank (engine/ranks/domains.h).
-struct DomainCounts {
-  std::uint64_t regions = 0;  ///< of all ranks; fewer than requested where the box has no room for more
+/// What agreement between subdomains took on one rank (engine/ranks/windowed_flight.h).
+struct WindowCounts {
+  std::uint64_t subdomains = 0;  ///< of all ranks; fewer than requested where the box has no room for more
   std::uint64_t windows = 0;
   std::uint64_t rounds = 0;         ///< of exchange and repair
   std::uint64_t cut = 0;            ///< windows that were cut because a sphere was too fast

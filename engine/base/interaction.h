@@ -24,7 +24,7 @@
 namespace carom {
 
 class BondTable;
-class Exchange;
+class Communicator;
 struct PairKernels;
 
 template <int D>
@@ -81,7 +81,7 @@ class Interaction {
   /// How far it reaches from positions x, as far as this rank knows [length]; infinite: it needs all particles.
   virtual double reach(Positions<D> x) const = 0;
   /// The same of a term that was made for a block of the particles. Collective.
-  virtual double reach(const Particles<D>& block, Exchange& ranks) const = 0;
+  virtual double reach(const Particles<D>& block, Communicator& ranks) const = 0;
 
   /// How many pairs (or particles, for a field) of this rank one evaluation visits within reach: the unit of
   /// `force_passes`.
@@ -116,7 +116,7 @@ struct InteractionContext {
   const std::vector<std::string>& species;   ///< names, in the order of Particles::species
   bool placed = true;                        ///< whether positions are known; else only the parameters count
   std::size_t total = particles.size();      ///< how many there are on all ranks, where `particles` are a block of them
-  Exchange* ranks = nullptr;                 ///< these ranks; null: all particles are here
+  Communicator* ranks = nullptr;             ///< these ranks; null: all particles are here
   std::shared_ptr<const BondTable> bonds{};  ///< of all terms of bonds; null: there are no such terms
 };
 

@@ -21,14 +21,14 @@ template <int D>
 EventCore<D>::~EventCore() = default;
 
 template <int D>
-bool EventCore<D>::stale(const Agenda<D>& a) const {
-  return a.kind == EventKind::pair && agenda_[packing_.slot(a.partner)].version != a.partner_version;
+bool EventCore<D>::stale(const NextEvent<D>& a) const {
+  return a.kind == EventKind::pair && next_events_[packing_.slot(a.partner)].version != a.partner_version;
 }
 
 /// Of the contact that is planned.
 template <int D>
 std::uint32_t EventCore<D>::generation_of(Slot i) const {
-  const Agenda<D>& a = agenda_[i];
+  const NextEvent<D>& a = next_events_[i];
   const std::uint32_t own = flights_.generation_at(i, a.contact);
   if (a.kind == EventKind::wall) return own;
   return std::max(own, flights_.generation_at(packing_.slot(a.partner), a.contact));
@@ -36,7 +36,7 @@ std::uint32_t EventCore<D>::generation_of(Slot i) const {
 
 template <int D>
 EventKey<D> EventCore<D>::key_of(Slot i) const {
-  const Agenda<D>& a = agenda_[i];
+  const NextEvent<D>& a = next_events_[i];
   const Record<D>& r = flights_[i];
   if (a.kind == EventKind::wall)
     return {.time = a.contact, .generation = generation_of(i), .kind = a.kind, .lo = r.id, .hi = a.partner};
@@ -46,7 +46,7 @@ EventKey<D> EventCore<D>::key_of(Slot i) const {
 
 template <int D>
 typename EventCore<D>::Tied EventCore<D>::tie(Slot i) const {
-  const Agenda<D>& a = agenda_[i];
+  const NextEvent<D>& a = next_events_[i];
   if (a.update < a.contact) return {Tied::Rank::update, EventKey<D>{.lo = flights_[i].id}, i};
   return {stale(a) ? Tied::Rank::stale : Tied::Rank::contact, key_of(i), i};
 }
@@ -54,7 +54,7 @@ typename EventCore<D>::Tied EventCore<D>::tie(Slot i) const {
 /// Whether two spheres plan the same contact, and it still holds.
 template <int D>
 bool EventCore<D>::mirrored(Slot i, Slot j) const {
-  const Agenda<D>&a = agenda_[i], &b = agenda_[j];
+  const NextEvent<D>&a = next_events_[i], &b = next_events_[j];
   return a.kind == EventKind::pair && b.kind == EventKind::pair && b.contact == a.contact && a.contact <= a.update &&
          b.contact <= b.update && packing_.slot(a.partner) == j && b.partner == packing_.reversed(i, a.partner) &&
          !stale(a) && !stale(b);
@@ -63,7 +63,7 @@ bool EventCore<D>::mirrored(Slot i, Slot j) const {
 /// The next event before `end`: the smallest time, and of equal times the smallest key.
 template <int D>
 bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
-  const auto holds = [&](const CalendarEntry& entry) { return agenda_[entry.slot].due() == entry.time; };
+  const auto holds = [&](const CalendarEntry& entry) { return next_events_[entry.slot].due() == entry.time; };
   for (;;) {
     if (tied_.empty()) {
       const CalendarEntry* const top = calendar_.top(holds);
@@ -99,7 +99,7 @@ bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
     const Tied first = tied_.top();
     tied_.pop();
     slot = first.slot;
-    if (agenda_[slot].due() != time) continue;  // its plans have changed, and its new ones are in the calendar
+    if (next_events_[slot].due() != time) continue;  // its plans have changed, and its new ones are in the calendar
     const Tied now = tie(slot);
     if (now == first) return true;
     tied_.push(now);  // what it plans has another place among these: its partner has collided
@@ -111,8 +111,8 @@ bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
 template <int D>
 void EventCore<D>::settle() {
   for (; planned_ > 0; --planned_) {
-    Agenda<D>& a = agenda_[just_planned_[planned_ - 1]];
-    if (a.kind == EventKind::pair) a.partner_version = agenda_[packing_.slot(a.partner)].version;
+    NextEvent<D>& a = next_events_[just_planned_[planned_ - 1]];
+    if (a.kind == EventKind::pair) a.partner_version = next_events_[packing_.slot(a.partner)].version;
   }
 }
 
@@ -124,7 +124,7 @@ double EventCore<D>::run(double end, const Report& report) {
     now_ = now;
     if (!small_) prefetch_upcoming();
     settle();
-    Agenda<D>& a = agenda_[i];
+    NextEvent<D>& a = next_events_[i];
     if (a.update < a.contact) {
       update(i, now);
       continue;
@@ -178,7 +178,7 @@ void EventCore<D>::predict(Slot i, double now) {
 template <int D>
 void EventCore<D>::foresee(Slot i, double now) {
   ++counts_.predictions;
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   a.contact = kNever;
   if (lists_) {
     predict_pairs({i, lists_->candidates(a), a.count, a.same}, flights_[i].t == now);
@@ -194,7 +194,7 @@ void EventCore<D>::foresee(Slot i, double now) {
 template <int D>
 void EventCore<D>::predict_two(Slot i, Slot j, double now) {
   counts_.predictions += 2;
-  Agenda<D>&a = agenda_[i], &b = agenda_[j];
+  NextEvent<D>&a = next_events_[i], &b = next_events_[j];
   ScanTask task[2];
   if (lists_) {
     task[0] = {i, lists_->candidates(a), a.count, a.same};
@@ -228,44 +228,44 @@ void EventCore<D>::predict_pairs(const ScanTask& task, bool latest) {
 
 template <int D>
 void EventCore<D>::take(const ScanTask& task, const ScanResult& first) {
-  Agenda<D>& a = agenda_[task.self];
+  NextEvent<D>& a = next_events_[task.self];
   if (first.time > a.contact || first.time == kNever) return;
   if (first.tied || first.time == a.contact || first.time == -kNever) return predict_pairs_one_by_one(task);
   a.contact = first.time;
   a.kind = EventKind::pair;
   a.partner = task.candidates[first.which];
-  prefetch_line(&agenda_[packing_.slot(a.partner)]);
+  prefetch_line(&next_events_[packing_.slot(a.partner)]);
   just_planned_[planned_++] = task.self;
 }
 
 template <int D>
 void EventCore<D>::predict_pairs_one_by_one(const ScanTask& task) {
   const Slot i = task.self;
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   for (unsigned q = 0; q < task.n; ++q) {
     const std::uint32_t candidate = task.candidates[q];
     const Slot j = packing_.slot(candidate);
     if (j == i) continue;
     const double time = flights_.pair_contact(i, j, box_.shift(packing_.image(candidate)));
     if (time > a.contact || time == kNever) continue;
-    const Agenda<D> before = a;
+    const NextEvent<D> before = a;
     const bool first = before.contact == kNever;
     const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
     a.contact = time;
     a.kind = EventKind::pair;
     a.partner = candidate;
-    a.partner_version = agenda_[j].version;
+    a.partner_version = next_events_[j].version;
     if (!first && !(key_of(i) < rival)) a = before;
   }
 }
 
 template <int D>
 void EventCore<D>::predict_walls(Slot i) {
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   for (const Wall<D>& wall : flights_.walls()) {
     const double time = flights_.wall_contact(i, wall);
     if (time > a.contact || time == kNever) continue;
-    const Agenda<D> before = a;
+    const NextEvent<D> before = a;
     const bool first = before.contact == kNever;
     const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
     a.contact = time;
@@ -283,17 +283,17 @@ void EventCore<D>::predict_update(Slot i, double now) {
     predict_crossing(i, now);
 }
 
-/// How far a sphere may go from the centre of its region.
+/// How far a sphere may go from the centre of its subdomain.
 template <int D>
 double EventCore<D>::room(Slot i) const {
-  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? astray_ : 0);
+  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
 }
 
-/// When does the sphere leave the region its list is good for? Its contact has been planned.
+/// When does the sphere leave the subdomain its list is good for? Its contact has been planned.
 template <int D>
 void EventCore<D>::predict_leaving(Slot i, double now) {
   const Record<D>& r = flights_[i];
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   Vec<D> e;
   for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
   const double skin = room(i) * (1 - 1e-6);
@@ -321,7 +321,7 @@ void EventCore<D>::predict_crossing(Slot i, double now) {
   if (flights_.field()) return predict_crossing_in_field(i, now);
   const Record<D>& r = flights_[i];
   const CellGrid<D>& grid = cells_->grid();
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   // Without a branch, which could not be predicted: times that are not negative are in the order of their bits.
   std::uint64_t first = std::bit_cast<std::uint64_t>(kNever);
   unsigned face = 0;
@@ -342,7 +342,7 @@ template <int D>
 void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
   const Record<D> r = flights_.at(i, now);
   const CellGrid<D>& grid = cells_->grid();
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   a.update = kNever;
   for (int k = 0; k < D; ++k)
     for (int side = 0; side < 2; ++side) {
@@ -363,7 +363,7 @@ void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
 
 template <int D>
 void EventCore<D>::schedule(Slot i) {
-  calendar_.push(agenda_[i].due(), i);
+  calendar_.push(next_events_[i].due(), i);
   ++counts_.scheduled;
 }
 
@@ -372,7 +372,7 @@ template <int D>
 void EventCore<D>::update(Slot i, double now) {
   if (!lists_) return cross(i, now);
   const Record<D> r = flights_.at(i, now);
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   if (flights_.field()) {  // it may still be far from where its list ends
     Vec<D> e;
     for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
@@ -394,7 +394,7 @@ void EventCore<D>::update(Slot i, double now) {
 template <int D>
 void EventCore<D>::cross(Slot i, double now) {
   ++counts_.crossings;
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   const int axis = a.face / 2, step = a.face % 2 == 1 ? 1 : -1;
   cells_->cross(i, a.where.cell, axis, step);
   cells_->ahead(i, a.where.cell, axis, step, found_);
@@ -405,21 +405,21 @@ void EventCore<D>::cross(Slot i, double now) {
 
 template <int D>
 void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, const Report& report) {
-  Agenda<D>& agenda = agenda_[i];
-  const Slot j = packing_.slot(agenda.partner);
+  NextEvent<D>& next_events = next_events_[i];
+  const Slot j = packing_.slot(next_events.partner);
   if (report.trace) {
     if (flights_[i].id < flights_[j].id)
-      report.trace->begin(i, flights_[i], j, flights_[j], agenda.partner, generation);
+      report.trace->begin(i, flights_[i], j, flights_[j], next_events.partner, generation);
     else
-      report.trace->begin(j, flights_[j], i, flights_[i], packing_.reversed(i, agenda.partner), generation);
+      report.trace->begin(j, flights_[j], i, flights_[i], packing_.reversed(i, next_events.partner), generation);
   }
   EventKey<D> key;
   if (report.contacts) key = key_of(i);
   Vec<D> shift = Vec<D>::Zero();
-  if (packing_.linear(agenda.partner) != 0) shift = box_.shift(packing_.image(agenda.partner));
+  if (packing_.linear(next_events.partner) != 0) shift = box_.shift(packing_.image(next_events.partner));
   const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
-  ++agenda.version;
-  ++agenda_[j].version;
+  ++next_events.version;
+  ++next_events_[j].version;
   const double virial = blow.d.dot(blow.impulse);
   if (report.trace) return report.trace->end(flights_[i], flights_[j], virial, blow.overlap);
   report.counters.add(EventKind::pair, virial, blow.overlap);
@@ -432,7 +432,7 @@ void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, c
   if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
   const Wall<D> wall = box_.wall(key.hi);
   const Blow<D> blow = flights_.bounce(i, wall, time, generation);
-  ++agenda_[i].version;
+  ++next_events_[i].version;
   const double work = wall.work(blow.impulse);
   if (report.trace) return report.trace->end(flights_[i], flights_[i], work, blow.overlap);
   report.counters.add(EventKind::wall, work, blow.overlap);

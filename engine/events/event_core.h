@@ -30,8 +30,8 @@
 #include "engine/events/calendar.h"
 #include "engine/events/flights.h"
 #include "engine/events/trace.h"
-#include "engine/search/agenda.h"
 #include "engine/search/linked_cells.h"
+#include "engine/search/next_event.h"
 #include "engine/search/search_tuning.h"
 #include "engine/search/skin_lists.h"
 
@@ -84,11 +84,11 @@ class EventCore {
   /// Since the core was made.
   const EventCounts& counts() const { return counts_; }
 
-  // For a core that runs a part of a larger system (engine/ranks/region.h). All of this happens at a time `now` that no
-  // event precedes any more.
+  // For a core that runs a part of a larger system (engine/ranks/subdomain.h). All of this happens at a time `now` that
+  // no event precedes any more.
 
-  /// Starts with these spheres only; no record is of a later time than `now`. find_near() will use `astray`.
-  void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double astray);
+  /// Starts with these spheres only; no record is of a later time than `now`. find_near() will use `max_displacement`.
+  void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double max_displacement);
   const Flights<D>& flights() const { return flights_; }
   const Packing<D>& packing() const { return packing_; }
   /// Takes a sphere in; false: there is no room left, load anew.
@@ -97,11 +97,11 @@ class EventCore {
   void dismiss(Slot i);
   /// Replaces the records of these spheres.
   void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
-  /// Sets the spheres at the border of a region: their lists are good for each other wherever they come in a window,
+  /// Sets the spheres at the border of a subdomain: their lists are good for each other wherever they come in a window,
   /// and need not be searched for.
   void set_border(std::span<const Slot> slots, double now);
-  /// Candidates for contacts of a sphere: all that may touch it where each of the two has come up to `astray` (load)
-  /// from where the core knows it to be. Good until the next call.
+  /// Candidates for contacts of a sphere: all that may touch it where each of the two has come up to `max_displacement`
+  /// (load) from where the core knows it to be. Good until the next call.
   std::span<const std::uint32_t> find_near(Slot i);
   /// The same for one at the border, where only others matter that are at the border and between two corners.
   std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high);
@@ -126,14 +126,14 @@ class EventCore {
   void prefetch_few_cells() const;
   void prefetch_cells();
   void prefetch(Slot i) const {
-    prefetch_line(&agenda_[i]);
+    prefetch_line(&next_events_[i]);
     prefetch_line(&flights_[i]);
   }
-  static bool meets(const Agenda<D>& a) { return a.contact < a.update && a.kind == EventKind::pair; }
+  static bool meets(const NextEvent<D>& a) { return a.contact < a.update && a.kind == EventKind::pair; }
   void settle();
   bool mirrored(Slot i, Slot j) const;
   bool next_event(double end, Slot& slot, double& time);
-  bool stale(const Agenda<D>& a) const;
+  bool stale(const NextEvent<D>& a) const;
   std::uint32_t generation_of(Slot i) const;
   EventKey<D> key_of(Slot i) const;
   Tied tie(Slot i) const;
@@ -163,12 +163,12 @@ class EventCore {
   SearchOptions options_;
   const ScanKernels& kernels_;
   bool walled_ = false;
-  PageVector<Agenda<D>> agenda_;
+  PageVector<NextEvent<D>> next_events_;
   std::vector<std::uint32_t> near_;
-  double astray_ = 0, largest_ = 0;      // how far spheres may be from where the core has them; largest radius
-  std::vector<std::uint8_t> at_border_;  // by slot; empty: no sphere is
-  std::vector<Slot> free_;               // slots of dismissed spheres
-  std::vector<double> radii_;            // that lists or cells are made for; one where all are equal
+  double max_displacement_ = 0, largest_ = 0;  // how far spheres may be from where the core has them; largest radius
+  std::vector<std::uint8_t> at_border_;        // by slot; empty: no sphere is
+  std::vector<Slot> free_;                     // slots of dismissed spheres
+  std::vector<double> radii_;                  // that lists or cells are made for; one where all are equal
   Packing<D> packing_;
   ScanSetting setting_;
   Calendar calendar_;

@@ -42,12 +42,13 @@ void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double h
 }
 
 template <int D>
-void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double astray) {
+void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now,
+                        double max_displacement) {
   const auto order = along_curve<D>(records.size(), [&](std::size_t i) -> const Vec<D>& { return records[i].x; });
   std::vector<Record<D>> sorted(records.size());
   for (std::size_t i = 0; i < records.size(); ++i) sorted[i] = records[order[i]];
   std::vector<Record<D>>().swap(records);
-  astray_ = astray;
+  max_displacement_ = max_displacement;
   at_border_.clear();
   events_ = since_sort_ = 0;
   now_ = now;
@@ -102,25 +103,25 @@ void EventCore<D>::plan(bool anew, double now) {
   std::vector<double> radii = flights_.radii(flights_.horizon());
   if (lists_ && !anew && radii_ == radii) {  // lists outlive a slab while they are good for its radii
     lists_->follow(flights_.records());
-    for (auto& a : agenda_) a.version = 0;
+    for (auto& a : next_events_) a.version = 0;
   } else {
-    agenda_.clear();
-    agenda_.reserve(flights_.room());
-    agenda_.assign(n, Agenda<D>{});
+    next_events_.clear();
+    next_events_.reserve(flights_.room());
+    next_events_.assign(n, NextEvent<D>{});
     radii_ = std::move(radii);
     choose_search(now);
   }
   for (std::size_t i = 0; i < n; ++i) foresee(static_cast<Slot>(i), now), settle();
   constexpr std::size_t kSample = 8192;
   std::vector<double> some;
-  for (std::size_t i = 0; i < n; i += n / kSample + 1) some.push_back(agenda_[i].due());
+  for (std::size_t i = 0; i < n; i += n / kSample + 1) some.push_back(next_events_[i].due());
   calendar_.reset(flights_.horizon(), n, options_.entries_per_bin, std::move(some), now);
   for (std::size_t i = 0; i < n; ++i) schedule(static_cast<Slot>(i));
 }
 
 template <int D>
 void EventCore<D>::choose_search(double now) {
-  // The density is that of the whole system: a region has a part of it, or no spheres yet; larger ones may come.
+  // The density is that of the whole system: a subdomain has a part of it, or no spheres yet; larger ones may come.
   const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : radii_;
   if (counts_.predictions == 0) tuning_ = SearchTuning(options_);
   Extent<D> extent = flights_.extent();
@@ -138,8 +139,8 @@ void EventCore<D>::choose_search(double now) {
     cells_ = std::make_unique<LinkedCells<D>>(box_, packing_, kernels_, tuning_.cell(), extent, flights_.size());
     if (flights_.size() < extent.particles) cells_->confine(flights_.places(now));
     for (Slot i = 0; i < flights_.size(); ++i) {
-      agenda_[i].where.cell = cells_->place(flights_.at(i, now).x);
-      cells_->insert(i, agenda_[i].where.cell);
+      next_events_[i].where.cell = cells_->place(flights_.at(i, now).x);
+      cells_->insert(i, next_events_[i].where.cell);
     }
     return;
   }
@@ -147,9 +148,10 @@ void EventCore<D>::choose_search(double now) {
   double skin = tuning_.skin();
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
-  lists_ = std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, flights_.equal(), largest_, skin, agenda_);
+  lists_ =
+      std::make_unique<SkinLists<D>>(box_, packing_, kernels_, radii_, flights_.equal(), largest_, skin, next_events_);
   lists_->build(
-      flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, astray_);
+      flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, max_displacement_);
 }
 
 template <int D>
@@ -163,21 +165,21 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
   }
   const double radius = sizes_->radius_of(r);
   flights_.admit(slot, r, radius, sizes_->mass_of(r));
-  if (slot == agenda_.size()) {
-    agenda_.emplace_back();
+  if (slot == next_events_.size()) {
+    next_events_.emplace_back();
     if (!flights_.equal()) radii_.push_back(radius);
   } else if (!flights_.equal()) {
     radii_[slot] = radius;
   }
-  ++agenda_[slot].version;
+  ++next_events_[slot].version;
   setting_ = flights_.setting(packing_);
   const Vec<D> x = flights_.at(slot, now).x;
-  if (!at_border_.empty()) at_border_[slot] = lists_ && lists_->skin() >= 3 * astray_ ? 1 : 0;
+  if (!at_border_.empty()) at_border_[slot] = lists_ && lists_->skin() >= 3 * max_displacement_ ? 1 : 0;
   if (lists_) {
     lists_->admit(slot, x, radii_);
   } else {
-    agenda_[slot].where.cell = cells_->place(x);
-    cells_->admit(slot, agenda_[slot].where.cell);
+    next_events_[slot].where.cell = cells_->place(x);
+    cells_->admit(slot, next_events_[slot].where.cell);
   }
   predict(slot, now), settle();
   return true;
@@ -185,7 +187,7 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
 
 template <int D>
 void EventCore<D>::dismiss(Slot i) {
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   ++a.version;  // contacts planned with it are stale
   a.contact = a.update = kNever;
   if (lists_)
@@ -199,14 +201,14 @@ template <int D>
 void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, double now) {
   for (const auto& [i, r] : records) {
     flights_.set(i, r);
-    ++agenda_[i].version;
+    ++next_events_[i].version;
   }
   for (const auto& [i, r] : records) {
     const Vec<D> x = flights_.at(i, now).x;
     if (lists_) {
       lists_->move(i, x, room(i));
     } else {
-      CellPlace<D>& cell = agenda_[i].where.cell;
+      CellPlace<D>& cell = next_events_[i].where.cell;
       cells_->remove(i, cell);
       cell = cells_->place(x);
       cells_->admit(i, cell);
@@ -217,8 +219,8 @@ void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, doub
 
 template <int D>
 std::span<const std::uint32_t> EventCore<D>::find_near(Slot i) {
-  if (lists_) return lists_->find_near(i, astray_);
-  cells_->find_near(agenda_[i].where.cell, 2 * (largest_ + astray_), near_);
+  if (lists_) return lists_->find_near(i, max_displacement_);
+  cells_->find_near(next_events_[i].where.cell, 2 * (largest_ + max_displacement_), near_);
   return near_;
 }
 
@@ -229,13 +231,13 @@ std::span<const std::uint32_t> EventCore<D>::find_near_at_border(Slot i, const V
     return near_;
   }
   if (room(i) == lists_->skin()) return find_near(i);
-  return {lists_->candidates(agenda_[i]), agenda_[i].count};
+  return {lists_->candidates(next_events_[i]), next_events_[i].count};
 }
 
 template <int D>
 void EventCore<D>::set_border(std::span<const Slot> slots, double now) {
   at_border_.assign(flights_.room(), 0);
-  if (!lists_ || lists_->skin() < 3 * astray_) return;
+  if (!lists_ || lists_->skin() < 3 * max_displacement_) return;
   for (const Slot i : slots) {
     at_border_[i] = 1;
     if (lists_->move(i, flights_.at(i, now).x, room(i)))

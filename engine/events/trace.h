@@ -2,7 +2,7 @@
 // The log of a window that the event core writes: enough to take any event back, and to read the path of any sphere.
 //
 // The log is in the order of keys and costs an event three cache lines, one after the other. Paths are read from it
-// where they are wanted, which is for the few spheres near the border of a region (engine/ranks/region.h).
+// where they are wanted, which is for the few spheres near the border of a region (engine/ranks/subdomain.h).
 
 #include <algorithm>
 #include <limits>
@@ -50,12 +50,12 @@ class Trace {
   struct Event {
     double time, virial, overlap;
     std::uint32_t generation;
-    std::uint32_t partner;  ///< of the first, as the core has it (Agenda)
+    std::uint32_t partner;  ///< of the first, as the core has it (NextEvent)
     Id id[2];
     Slot slot[2];           ///< kNone: a wall
-    std::uint32_t last[2];  ///< the share that the sphere had in an event before, or kNone
+    std::uint32_t last[2];  ///< the entry that the sphere had in an event before, or kNone
   };
-  // A share in an event has the number 2·event + 0 or 1.
+  // A entry in an event has the number 2·event + 0 or 1.
 
   /// Removes all events, and makes room for so many slots.
   void clear(std::size_t slots) {
@@ -81,8 +81,8 @@ class Trace {
     event.id[1] = b.id;
     event.slot[0] = i;
     event.slot[1] = j;
-    event.last[0] = take_share(i, 0);
-    event.last[1] = j == kNone ? kNone : take_share(j, 1);
+    event.last[0] = take_entry(i, 0);
+    event.last[1] = j == kNone ? kNone : take_entry(j, 1);
     before_.push_back(a);
     before_.push_back(b);
   }
@@ -96,12 +96,12 @@ class Trace {
   }
 
   std::span<const Event> events() const { return events_; }
-  const Event& event_of(std::uint32_t share) const { return events_[share / 2]; }
-  /// The sphere before its share in an event.
-  const Record<D>& before(std::uint32_t share) const { return before_[share]; }
+  const Event& event_of(std::uint32_t entry) const { return events_[entry / 2]; }
+  /// The sphere before its entry in an event.
+  const Record<D>& before(std::uint32_t entry) const { return before_[entry]; }
   bool has(Slot i) const { return latest_[i] >= base_; }
-  /// The shares of a sphere in the order of time; good until the next call.
-  std::span<const std::uint32_t> shares(Slot i) const {
+  /// The entries of a sphere in the order of time; good until the next call.
+  std::span<const std::uint32_t> entries(Slot i) const {
     shares_.clear();
     for (std::uint32_t s = has(i) ? latest_[i] - base_ : kNone; s != kNone; s = event_of(s).last[s % 2])
       shares_.push_back(s);
@@ -114,15 +114,15 @@ class Trace {
   // So many fit into a log: a window has 0.3 of a sphere.
   static constexpr std::size_t kMostEvents = 20'000, kMostEventsOfASphere = 16;
 
-  std::uint32_t take_share(Slot i, std::uint32_t which) {
+  std::uint32_t take_entry(Slot i, std::uint32_t which) {
     const std::uint32_t last = has(i) ? latest_[i] - base_ : kNone;
     latest_[i] = base_ + 2 * static_cast<std::uint32_t>(events_.size() - 1) + which;
     return last;
   }
 
   std::vector<Event> events_;
-  PageVector<Record<D>> before_;       // by share
-  std::vector<std::uint32_t> latest_;  // by slot: base_ + share; what is less is of windows before
+  PageVector<Record<D>> before_;       // by entry
+  std::vector<std::uint32_t> latest_;  // by slot: base_ + entry; what is less is of windows before
   std::uint32_t base_ = 1;
   std::size_t most_ = 0;
   double fastest_squared_ = 0;

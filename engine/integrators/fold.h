@@ -59,7 +59,7 @@ double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, Counters& 
       return std::pair(squared_distance, id) < std::pair(other.squared_distance, other.id);
     }
   };
-  Exchange& ranks = system.decomposition.ranks();
+  Communicator& ranks = system.decomposition.ranks();
   Particles<D>& p = system.particles;
   Bytes message;
   for (const Lack<D>& each : mine) put(message, each);

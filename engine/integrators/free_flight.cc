@@ -9,7 +9,7 @@
 #include "engine/base/error.h"
 #include "engine/events/event_core.h"
 #include "engine/integrators/registry.h"
-#include "engine/ranks/domains.h"
+#include "engine/ranks/windowed_flight.h"
 
 namespace carom::integrator {
 namespace {
@@ -23,7 +23,7 @@ class FreeFlight : public Integrator<D> {
   void start(System<D>& system, Counters&) override {
     ranks_ = &system.decomposition.ranks();
     if (ranks_->size() > 1)
-      domains_.emplace(system.box, system.decomposition.sizes(), *ranks_);
+      windowed_.emplace(system.box, system.decomposition.sizes(), *ranks_);
     else
       core_.emplace(system.box, system.particles);
     system.fields.add("time of last event", instants_.t);
@@ -38,8 +38,8 @@ class FreeFlight : public Integrator<D> {
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
-    if (domains_)
-      run_epoch(*domains_, system, slab, report);
+    if (windowed_)
+      run_epoch(*windowed_, system, slab, report);
     else if (within_ && !loaded_)
       run_epoch(resumed_.emplace(system.box, Sizes(system.particles), *ranks_), system, slab, report);
     else if (resumed_)
@@ -52,12 +52,13 @@ class FreeFlight : public Integrator<D> {
   /// About as many collisions are run between looks at SlabReport::pause.
   static constexpr double kCollisionsBetweenLooks = 5e5;
 
-  /// `flight`: an EventCore, or Domains.
+  /// `flight`: an EventCore, or WindowedFlight.
   template <class Flight>
   void run_epoch(Flight& flight, System<D>& system, const Slab& slab, SlabReport<D>& report) {
     const typename EventCore<D>::Report events{report.counters, report.contacts, slab.collision_limit,
                                                max_events_ * system.size()};
     begin(flight, system, slab, report.counters);
+    at_limit_ = report.counters.sphere_sphere >= slab.collision_limit;
     const double looks = std::max(1.0, 20.0 * static_cast<double>(system.size()) / kCollisionsBetweenLooks);
     // Flies to `end`, or as far as it comes; false: not to its end.
     const auto run = [&](double end) {
@@ -99,7 +100,7 @@ class FreeFlight : public Integrator<D> {
     within_ = loaded_ = at_limit_ = false;
     instants_ = {};
     report.counters.events = flight.counts();
-    if (domains_) report.counters.domains = domains_->domain_counts();
+    if (windowed_) report.counters.windows = windowed_->window_counts();
     resumed_.reset();
     system.wrap();
   }
@@ -142,13 +143,13 @@ class FreeFlight : public Integrator<D> {
 
   std::uint64_t max_events_;
   Vec<D> g_ = Vec<D>::Zero();
-  Exchange* ranks_ = nullptr;
+  Communicator* ranks_ = nullptr;
   std::optional<EventCore<D>> core_;  // one of the two
-  std::optional<Domains<D>> domains_;
-  std::optional<Domains<D>> resumed_;  // one rank: for the rest of an epoch that was left off in another process
-  bool within_ = false;                // an epoch that was left off
-  bool loaded_ = false;                // whose flights are here
-  bool at_limit_ = false;              // of collisions
+  std::optional<WindowedFlight<D>> windowed_;
+  std::optional<WindowedFlight<D>> resumed_;  // one rank: for the rest of an epoch that was left off in another process
+  bool within_ = false;                       // an epoch that was left off
+  bool loaded_ = false;                       // whose flights are here
+  bool at_limit_ = false;                     // of collisions
   Instants instants_;
   Particles<D> copies_;
 };

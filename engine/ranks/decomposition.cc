@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "engine/ranks/division.h"
+#include "engine/ranks/bisection.h"
 #include "engine/ranks/system.h"
 
 namespace carom {
@@ -27,13 +27,13 @@ Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
 }  // namespace
 
 template <int D>
-void Decomposition<D>::join(Exchange& ranks, Sizes of_all) {
-  ranks_ = std::make_unique<TimedExchange>(ranks);
+void Decomposition<D>::join(Communicator& ranks, Sizes of_all) {
+  ranks_ = std::make_unique<TimedCommunicator>(ranks);
   sizes_ = std::move(of_all);
 }
 
 template <int D>
-void Decomposition<D>::join(Exchange& ranks) {
+void Decomposition<D>::join(Communicator& ranks) {
   Particles<D>& p = system_.particles;
   join(ranks, Sizes(p));
   const Id first = blocks().first(ranks.rank()), end = blocks().first(ranks.rank() + 1);
@@ -195,18 +195,18 @@ bool Decomposition<D>::migrate_to_those_near(double slab_length) {
   const double slack = std::clamp(kSlabsApart * speed * slab_length, kLeastSlack * diameter, kMostSlack * diameter);
   const double near = std::max(reach, diameter) + 2 * path + 2 * slack, far = near + depth_ * diameter;
   if (!std::isfinite(far)) return false;
-  const Division<D> division(system_.box, own, copied_to_.size(), far, *ranks_);
+  const Bisection<D> bisection(system_.box, own, copied_to_.size(), far, *ranks_);
   std::vector<std::uint64_t> known(copied_to_.size());
-  for (const Vec<D>& x : own) division.for_each_near(division.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
+  for (const Vec<D>& x : own) bisection.for_each_near(bisection.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
   const std::vector<std::uint64_t> mine = known;
   ranks_->sum(known);
   if (static_cast<double>(std::ranges::max(known)) > kMost * static_cast<double>(total())) return false;
 
   const auto messages = ranks_->swap(
-      pack(mine, [&](const Vec<D>& x, auto&& visit) { division.for_each_near(division.wrapped(x), visit); }));
+      pack(mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); }));
   all_known_ = false;
   take_in(arrivals(messages));
-  assign(division, near);
+  assign(bisection, near);
   path_ = path;
   slack_ = slack;
   system_.fields.prepare_working();
@@ -249,8 +249,8 @@ void Decomposition<D>::take_in(const std::vector<Arrival>& arrivals) {
 template <int D>
 void Decomposition<D>::own_anew() {
   constexpr double kAll = std::numeric_limits<double>::infinity();
-  Exchange alone;
-  assign(Division<D>(system_.box, system_.particles.x, copied_to_.size(), kAll, alone), kAll);
+  Communicator alone;
+  assign(Bisection<D>(system_.box, system_.particles.x, copied_to_.size(), kAll, alone), kAll);
   system_.fields.release_working();
   system_.fields.prepare_working();
 }
@@ -258,7 +258,7 @@ void Decomposition<D>::own_anew() {
 /// Sets the owners of those known, and which ranks know this rank's own; copies nearer than `near` matter. Makes what
 /// acts on those known, where it is not there.
 template <int D>
-void Decomposition<D>::assign(const Division<D>& division, double near) {
+void Decomposition<D>::assign(const Bisection<D>& bisection, double near) {
   Particles<D>& p = system_.particles;
   copied_to_.assign(copied_to_.size(), {});
   copies_of_ = copied_to_;
@@ -267,15 +267,15 @@ void Decomposition<D>::assign(const Division<D>& division, double near) {
   safe_slabs_ = 0;
   const auto me = static_cast<std::uint32_t>(ranks_->rank());
   for (Id i = 0; i < p.size(); ++i) {
-    const Vec<D> x = division.wrapped(p.x[i]);
-    const std::uint32_t owner = division.owner(x);
+    const Vec<D> x = bisection.wrapped(p.x[i]);
+    const std::uint32_t owner = bisection.owner(x);
     p.ghost[i] = owner != me;
-    matters_.push_back(owner != me && division.squared_distance(me, x) <= near * near);
+    matters_.push_back(owner != me && bisection.squared_distance(me, x) <= near * near);
     at_.push_back(unwrapped(system_.box, p, i));
     if (owner != me)
       copies_of_[owner].push_back(i);
     else
-      division.for_each_near(x, [&](std::uint32_t rank) {
+      bisection.for_each_near(x, [&](std::uint32_t rank) {
         if (rank != me) copied_to_[rank].push_back(i);
       });
   }

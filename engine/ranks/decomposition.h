@@ -24,13 +24,13 @@
 #include "engine/base/interaction.h"
 #include "engine/base/particles.h"
 #include "engine/base/sizes.h"
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 #include "engine/ranks/id_blocks.h"
 
 namespace carom {
 
 template <int D>
-class Division;
+class Bisection;
 template <int D>
 struct System;
 
@@ -49,14 +49,14 @@ class Decomposition {
   // The ranks. What follows is collective.
 
   /// Several ranks, each of which has made all particles, advance the system from now on: this one keeps its block.
-  void join(Exchange& ranks);
+  void join(Communicator& ranks);
   /// The same before there are particles: this rank makes those of its block.
-  void join(Exchange& ranks, Sizes of_all);
+  void join(Communicator& ranks, Sizes of_all);
   bool joined() const { return sizes_.has_value(); }
   /// Of one rank too.
-  Exchange& ranks() const { return *ranks_; }
+  Communicator& ranks() const { return *ranks_; }
   /// Null: all particles are here.
-  Exchange* others() const { return joined() ? ranks_.get() : nullptr; }
+  Communicator* others() const { return joined() ? ranks_.get() : nullptr; }
   double seconds_waited() const { return ranks_->seconds(); }  ///< for other ranks
 
   /// How many particles all ranks have together.
@@ -143,12 +143,12 @@ class Decomposition {
   std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver);
   std::vector<Arrival> arrivals(const std::vector<Bytes>& messages) const;
   void take_in(const std::vector<Arrival>& arrivals);
-  void assign(const Division<D>& division, double near);
+  void assign(const Bisection<D>& bisection, double near);
   bool outdated();
 
   System<D>& system_;
-  Exchange alone_;
-  std::unique_ptr<TimedExchange> ranks_ = std::make_unique<TimedExchange>(alone_);
+  Communicator alone_;
+  std::unique_ptr<TimedCommunicator> ranks_ = std::make_unique<TimedCommunicator>(alone_);
   std::optional<Sizes> sizes_;
 
   bool by_place_ = false;
@@ -158,7 +158,7 @@ class Decomposition {
   std::vector<std::vector<Id>> copied_to_, copies_of_;  // by rank: own particles that it knows, copies of its own
   std::vector<int> neighbours_;                         // the ranks of which there are any
   std::vector<char> matters_;
-  std::vector<Vec<D>> at_;  // where those known were at the last division, images undone
+  std::vector<Vec<D>> at_;  // where those known were at the last bisection, images undone
   double path_ = 0, slack_ = 0;
   double safe_slabs_ = 0;               // until a particle may have come too far
   double wanted_path_ = 0;              // at least that, since one was too long not long ago

@@ -6,18 +6,18 @@
 #include <vector>
 
 #include "engine/base/particles.h"
-#include "engine/ranks/division.h"
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/bisection.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom {
 
 /// Sends values to all ranks that they concern by their places: for_each(send) calls send(x, value), x in the box.
 /// Returns the values that concern this rank, those of one rank after the other. Collective.
 template <class Value, int D>
-std::vector<Value> to_those_near(const Division<D>& division, Exchange& ranks, auto&& for_each) {
+std::vector<Value> to_those_near(const Bisection<D>& bisection, Communicator& ranks, auto&& for_each) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
   for_each([&](const Vec<D>& x, const Value& value) {
-    division.for_each_near(x, [&](std::uint32_t rank) { put(outgoing[rank], value); });
+    bisection.for_each_near(x, [&](std::uint32_t rank) { put(outgoing[rank], value); });
   });
   std::vector<Value> near;
   for (Bytes& bytes : ranks.swap(std::move(outgoing))) {
@@ -39,16 +39,16 @@ struct Halo {
 /// Of the particles that all ranks have together, this one its block; near: nearer than `distance`, but for rounding.
 /// Collective.
 template <int D>
-Halo<D> halo_of(const Box<D>& box, double distance, Exchange& ranks, const Particles<D>& block) {
+Halo<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, const Particles<D>& block) {
   struct Copy {
     Vec<D> x;
     double radius;
     Id id;
   };
-  const Division<D> division(box, block.x, static_cast<std::size_t>(ranks.size()), distance * (1 + 1e-6), ranks);
-  auto copies = to_those_near<Copy>(division, ranks, [&](auto&& send) {
+  const Bisection<D> bisection(box, block.x, static_cast<std::size_t>(ranks.size()), distance * (1 + 1e-6), ranks);
+  auto copies = to_those_near<Copy>(bisection, ranks, [&](auto&& send) {
     for (Id i = 0; i < block.size(); ++i)
-      send(division.wrapped(block.x[i]), Copy{block.x[i], block.radius[i], block.id_of(i)});
+      send(bisection.wrapped(block.x[i]), Copy{block.x[i], block.radius[i], block.id_of(i)});
   });
   std::ranges::sort(copies, {}, &Copy::id);
   Halo<D> halo;
@@ -56,7 +56,7 @@ Halo<D> halo_of(const Box<D>& box, double distance, Exchange& ranks, const Parti
     halo.x.push_back(copy.x);
     halo.radius.push_back(copy.radius);
     halo.id.push_back(copy.id);
-    halo.ghost.push_back(division.owner(division.wrapped(copy.x)) != static_cast<std::uint32_t>(ranks.rank()));
+    halo.ghost.push_back(bisection.owner(bisection.wrapped(copy.x)) != static_cast<std::uint32_t>(ranks.rank()));
   }
   return halo;
 }

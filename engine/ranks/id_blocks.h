@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/base/particles.h"
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom {
 
@@ -25,7 +25,7 @@ struct IdBlocks {
 /// Sends values of particles to the ranks of their blocks: for_each(send) calls send(id, value) for each on one of the
 /// ranks, take(place, value) is called for each where it belongs, place: in the block. Collective.
 template <class Value>
-void to_id_blocks(const IdBlocks& blocks, Exchange& ranks, auto&& for_each, auto&& take) {
+void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, auto&& for_each, auto&& take) {
   std::vector<Bytes> outgoing(blocks.ranks);
   for_each([&](Id id, const Value& value) {
     Bytes& to = outgoing[static_cast<std::size_t>(blocks.rank_of(id))];
@@ -55,7 +55,7 @@ void for_each_array(Particles<D>& p, Visit&& visit) {
 /// Sends the messages of all ranks to rank 0 one after the other, so that it never holds more than one. pack() makes a
 /// rank's message, visit(rank, message) is called on rank 0. Collective.
 template <class Pack, class Visit>
-void one_after_the_other(Exchange& ranks, Pack&& pack, Visit&& visit) {
+void one_after_the_other(Communicator& ranks, Pack&& pack, Visit&& visit) {
   for (int rank = 0; rank < ranks.size(); ++rank) {
     const auto received = gather_on_first(ranks, rank == ranks.rank() ? pack() : Bytes());
     if (ranks.rank() == 0) visit(rank, received[static_cast<std::size_t>(rank)]);
@@ -64,7 +64,7 @@ void one_after_the_other(Exchange& ranks, Pack&& pack, Visit&& visit) {
 
 /// Copies of all particles on rank 0, by id, from the blocks of all ranks; none elsewhere. Collective.
 template <int D>
-Particles<D> gathered(Exchange& ranks, const Particles<D>& block) {
+Particles<D> gathered(Communicator& ranks, const Particles<D>& block) {
   Bytes mine;
   for_each_array(const_cast<Particles<D>&>(block), [&](const auto& array) {
     const auto bytes = std::as_bytes(std::span(array));

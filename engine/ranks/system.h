@@ -1,5 +1,5 @@
 #pragma once
-// The particles and what acts on them: the state that an integrator advances, with its division among ranks.
+// The particles and what acts on them: the state that an integrator advances, with its bisection among ranks.
 
 #include <algorithm>
 #include <memory>

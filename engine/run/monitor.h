@@ -57,8 +57,8 @@ class Monitor {
   void end_of_slab(double elapsed, const Integrator<D>& integrator, bool last);
 
   /// Shows the last state, unless it has been shown.
-  void finish(const Integrator<D>& integrator) {
-    if (!shot_.particles) shot_ = measure(statistics_.end_time, system_.particles, &integrator, info_.shadow);
+  void finish() {
+    shot_.particles = &system_.particles;
     show(shot_, true);
   }
 

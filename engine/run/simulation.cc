@@ -98,7 +98,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   if (hooks.restore) {
     decomposition.to_blocks();
     hooks.restore(system_->fields);
-    if (decomposition.ranks().rank() > 0) s.counters.seconds = {}, s.counters.events = {}, s.counters.domains = {};
+    if (decomposition.ranks().rank() > 0) s.counters.seconds = {}, s.counters.events = {}, s.counters.windows = {};
     if (info_.smooth_forces) divide();
     s.stopped_early = false;
   } else {
@@ -162,7 +162,7 @@ void Simulation<D>::run(const Hooks& hooks) {
     monitor.end_of_slab(report.reached, *integrator_, finished());
     for (auto* observer : observers_) observer->progress(s);
   }
-  if (!paused_) monitor.finish(*integrator_);
+  if (!paused_) monitor.finish();
   decomposition.to_blocks();
   take_time();
 }

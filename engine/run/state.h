@@ -19,7 +19,7 @@ struct StateWriter {
 /// Gives rank 0's writer the state of a run: in Simulation::Hooks::should_stop all that it needs to go on. Collective.
 template <int D>
 void save_state(System<D>& system, const StateWriter& writer) {
-  Exchange& ranks = system.decomposition.ranks();
+  Communicator& ranks = system.decomposition.ranks();
   for (const auto& field : system.fields.of_particles()) {
     if (field->kind == Fields::Kind::constant) continue;
     Bytes all;
@@ -42,7 +42,7 @@ using StateReader = std::function<Bytes(const std::string& name)>;
 /// Collective.
 template <int D>
 void restore_field(System<D>& system, Fields::Field& field, const StateReader& read) {
-  Exchange& ranks = system.decomposition.ranks();
+  Communicator& ranks = system.decomposition.ranks();
   const IdBlocks blocks = system.decomposition.blocks();
   std::vector<Bytes> outgoing(blocks.ranks);
   if (ranks.rank() == 0) {
@@ -70,7 +70,7 @@ void restore_particles(System<D>& system, const StateReader& read) {
 template <int D>
 void restore_state(System<D>& system, const StateReader& read) {
   restore_particles(system, read);
-  Exchange& ranks = system.decomposition.ranks();
+  Communicator& ranks = system.decomposition.ranks();
   Archive all;
   for (const Fields::OfRun& entry : system.fields.of_run()) {
     if (ranks.rank() > 0) break;

@@ -11,19 +11,19 @@
 
 #include "engine/base/error.h"
 #include "engine/base/pages.h"
-#include "engine/search/agenda.h"
+#include "engine/search/next_event.h"
 
 namespace carom {
 
 template <int D>
 class CandidateLists {
  public:
-  /// Where the list of a sphere stands and how long it is, is kept in `agenda`.
-  CandidateLists(const Packing<D>& packing, unsigned lanes, PageVector<Agenda<D>>& agenda)
-      : packing_(packing), lanes_(lanes), agenda_(agenda) {}
+  /// Where the list of a sphere stands and how long it is, is kept in `next_events`.
+  CandidateLists(const Packing<D>& packing, unsigned lanes, PageVector<NextEvent<D>>& next_events)
+      : packing_(packing), lanes_(lanes), next_events_(next_events) {}
 
-  const std::uint32_t* of(const Agenda<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
-  std::uint32_t* of(const Agenda<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
+  const std::uint32_t* of(const NextEvent<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
+  std::uint32_t* of(const NextEvent<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
 
   /// Forgets all lists, and expects those of n spheres, which have no capacity now.
   void clear(std::size_t n) {
@@ -35,7 +35,7 @@ class CandidateLists {
 
   /// Makes these the list of a sphere.
   void assign(Slot i, std::span<const std::uint32_t> candidates) {
-    Agenda<D>& a = agenda_[i];
+    NextEvent<D>& a = next_events_[i];
     const auto n = static_cast<unsigned>(candidates.size());
     const unsigned units = (n + kSlack + lanes_ - 1) / lanes_;
     if (n > lanes_ * a.capacity || a.capacity == 0) {
@@ -52,14 +52,14 @@ class CandidateLists {
   }
 
   /// Moves those in the same box to the start of a list.
-  void divide(Agenda<D>& a) {
+  void divide(NextEvent<D>& a) {
     std::uint32_t* const list = of(a);
     const auto* const others = std::partition(list, list + a.count, [&](auto c) { return same_box(c); });
     a.same = static_cast<std::uint16_t>(others - list);
   }
 
   void add(Slot i, std::uint32_t candidate) {
-    Agenda<D>& a = agenda_[i];
+    NextEvent<D>& a = next_events_[i];
     std::uint32_t* list = of(a);
     if (a.count == lanes_ * a.capacity) {
       std::vector<std::uint32_t> longer(list, list + a.count);
@@ -74,12 +74,12 @@ class CandidateLists {
 
   /// Takes a candidate out of the list of a sphere.
   void drop(Slot i, std::uint32_t candidate) {
-    const std::uint32_t* const list = of(agenda_[i]);
-    remove(i, static_cast<unsigned>(std::find(list, list + agenda_[i].count, candidate) - list));
+    const std::uint32_t* const list = of(next_events_[i]);
+    remove(i, static_cast<unsigned>(std::find(list, list + next_events_[i].count, candidate) - list));
   }
   /// The same, given its place; one from behind moves there.
   void remove(Slot i, unsigned q) {
-    Agenda<D>& a = agenda_[i];
+    NextEvent<D>& a = next_events_[i];
     if (q == a.count) return;
     std::uint32_t* const list = of(a);
     if (q < a.same) {
@@ -109,7 +109,7 @@ class CandidateLists {
 
   Packing<D> packing_;
   unsigned lanes_;  // lists start and end at multiples of so many candidates
-  PageVector<Agenda<D>>& agenda_;
+  PageVector<NextEvent<D>>& next_events_;
   PageVector<std::uint32_t> pool_;
   std::size_t used_ = 0;                            // of the pool
   std::vector<std::vector<std::uint32_t>> unused_;  // places given back, by capacity

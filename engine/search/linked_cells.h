@@ -6,7 +6,7 @@
 
 #include "engine/base/pages.h"
 #include "engine/base/prefetch.h"
-#include "engine/search/agenda.h"
+#include "engine/search/next_event.h"
 #include "engine/search/simd/scan.h"
 
 namespace carom {

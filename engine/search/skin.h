@@ -26,8 +26,8 @@ class Skin {
   void begin(double width) { width_ = width; }
 
   /// Whether a list serves a step: particles have come, or will, so far from where they were when it was made
-  /// (`from_build`), may stray by `margin` besides, and move by `step` at most, with the margin. False where the list
-  /// is not `known`.
+  /// (`from_build`), may max_displacement by `margin` besides, and move by `step` at most, with the margin. False where
+  /// the list is not `known`.
   bool lasts(bool known, double from_build, double step, double margin = 0) {
     const double to_last = per_calls_ * from_build / static_cast<double>(++calls_);
     wanted_ = std::max({least_, 4 * step, known && to_last <= widest_ ? to_last : 0});

@@ -10,7 +10,7 @@ constexpr double kMembers = 4;       // of a cell, at least: fewer would waste i
 constexpr std::int32_t kMargin = 2;  // cells, round those of a part
 
 template <int D>
-Vec<D> centre(const Agenda<D>& a) {
+Vec<D> centre(const NextEvent<D>& a) {
   Vec<D> c;
   for (int k = 0; k < D; ++k) c[k] = a.where.centre[k];
   return c;
@@ -21,7 +21,7 @@ Vec<D> centre(const Agenda<D>& a) {
 template <int D>
 SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels,
                         std::span<const double> radius, bool equal, double largest, double skin,
-                        PageVector<Agenda<D>>& agenda)
+                        PageVector<NextEvent<D>>& next_events)
     : box_(box),
       packing_(packing),
       kernels_(kernels),
@@ -29,8 +29,8 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
       equal_(equal),
       largest_(largest),
       skin_(skin),
-      agenda_(agenda),
-      lists_(packing, kernels.lanes, agenda) {
+      next_events_(next_events),
+      lists_(packing, kernels.lanes, next_events) {
   exact_ = !equal || !box.closed();
   if (!equal) {
     level_.resize(radius.size());
@@ -45,7 +45,7 @@ std::uint8_t SkinLists<D>::octave(double largest, double radius) {
 
 template <int D>
 void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent,
-                         double astray) {
+                         double max_displacement) {
   // 1. Cells for each size.
   levels_.clear();
   const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
@@ -73,33 +73,33 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
     levels_.push_back(std::move(level));
   }
   widest_ = 0;
-  astray_ = astray;
-  for (Level& level : levels_) lay_out(level, astray);
+  max_displacement_ = max_displacement;
+  for (Level& level : levels_) lay_out(level, max_displacement);
   // 2. Every sphere into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const Vec<D> x = place(static_cast<Slot>(i));
-    for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[k];
+    for (int k = 0; k < D; ++k) next_events_[i].where.centre[k] = x[k];
     insert(static_cast<Slot>(i), x);
   }
   // 3. Lists.
   lists_.clear(n);
   for (Slot i = 0; i < n; ++i) {
-    agenda_[i].capacity = 0;
-    lists_.assign(i, surround(i, centre(agenda_[i])));
+    next_events_[i].capacity = 0;
+    lists_.assign(i, surround(i, centre(next_events_[i])));
   }
 }
 
 /// Makes empty cells, and tabulates the steps to all that the spheres of a level can be seen from.
 template <int D>
-void SkinLists<D>::lay_out(Level& level, double astray) {
+void SkinLists<D>::lay_out(Level& level, double max_displacement) {
   level.lines.resize(level.grid.cells());
   for (auto& line : level.lines) std::fill_n(line.slot, 8, kEmpty);
   level.next.assign(level.grid.cells(), kEmpty);
   level.free = kEmpty;
   level.steps = {};
   for (int k = 0; k < D; ++k) {
-    const double places = most_places(levels_[0].largest_radius, level, astray);
+    const double places = most_places(levels_[0].largest_radius, level, max_displacement);
     level.margin = std::max(level.margin, static_cast<std::int32_t>(std::ceil(places / level.grid.edge(k))));
   }
   for (int k = 0; k < D; ++k) {
@@ -116,8 +116,8 @@ void SkinLists<D>::lay_out(Level& level, double astray) {
 
 /// How far a sphere sees spheres of a level, with room for places that are rounded.
 template <int D>
-double SkinLists<D>::most_places(double radius, const Level& level, double astray) const {
-  return (radius + level.largest_radius + 2 * (skin_ + astray)) * (1 + 2 * std::sqrt(D) / kPlaces);
+double SkinLists<D>::most_places(double radius, const Level& level, double max_displacement) const {
+  return (radius + level.largest_radius + 2 * (skin_ + max_displacement)) * (1 + 2 * std::sqrt(D) / kPlaces);
 }
 
 template <int D>
@@ -176,8 +176,8 @@ void SkinLists<D>::spread(Level& level) {
       if (i != kEmpty) members.push_back(i);
   level.grid.spread();
   level.lines.clear();
-  lay_out(level, astray_);
-  for (const Slot i : members) insert(i, centre(agenda_[i]));
+  lay_out(level, max_displacement_);
+  for (const Slot i : members) insert(i, centre(next_events_[i]));
 }
 
 template <int D>
@@ -202,14 +202,14 @@ void SkinLists<D>::remove(Slot i, const Vec<D>& x) {
 
 /// The candidates of a sphere at x; good until the next call.
 template <int D>
-std::span<const std::uint32_t> SkinLists<D>::surround(Slot i, const Vec<D>& x, double astray) {
+std::span<const std::uint32_t> SkinLists<D>::surround(Slot i, const Vec<D>& x, double max_displacement) {
   unsigned found = 0;
-  for (const Level& level : levels_) look_into(level, i, x, astray, found);
+  for (const Level& level : levels_) look_into(level, i, x, max_displacement, found);
   return {found_.data(), found};
 }
 
 template <int D>
-void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double astray, unsigned& found) {
+void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double max_displacement, unsigned& found) {
   static constexpr CellView kHere{};
   Place place;
   const Cell<D> cell = locate(level, x, place);
@@ -217,7 +217,7 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double
   NearTask task{};
   task.lines = level.lines.data();
   task.next = level.next.data();
-  const double places = most_places(radius(i), level, astray);
+  const double places = most_places(radius(i), level, max_displacement);
   double rounding = 0;
   std::size_t cells = 1, images = 1;  // images: how often a cell may be seen
   for (int k = 0; k < D; ++k) {
@@ -243,7 +243,8 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double
     images *= 1 + 2 * static_cast<std::size_t>(range) / static_cast<std::size_t>(count);
   }
   if constexpr (D == 2) task.view[2] = &kHere, task.views[2] = 1;
-  const double limit = (radius(i) + level.largest_radius + 2 * (skin_ + astray) + std::sqrt(rounding)) * (1 + 1e-5);
+  const double limit =
+      (radius(i) + level.largest_radius + 2 * (skin_ + max_displacement) + std::sqrt(rounding)) * (1 + 1e-5);
   task.limit_squared = static_cast<float>(limit * limit);
   // Lines beyond the first of their cells may all be here.
   const std::size_t most = 8 * (cells + (level.lines.size() - level.grid.cells()) * images);
@@ -263,8 +264,8 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double
     }
     const std::uint32_t candidate = packing_.pack(j, boxes_[j] - away_[q] - carried);
     if (exact_) {
-      const Vec<D> d = x - centre(agenda_[j]) + box_.shift(packing_.image(candidate));
-      const double within = radius(i) + radius(j) + 2 * (skin_ + astray);
+      const Vec<D> d = x - centre(next_events_[j]) + box_.shift(packing_.image(candidate));
+      const double within = radius(i) + radius(j) + 2 * (skin_ + max_displacement);
       if (!(d.squaredNorm() < within * within)) continue;
     }
     found_[found] = candidate;
@@ -274,7 +275,7 @@ void SkinLists<D>::look_into(const Level& level, Slot i, const Vec<D>& x, double
 
 template <int D>
 std::span<const std::uint32_t> SkinLists<D>::renew(Slot i, const Vec<D>& x) {
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   remove(i, centre(a));
   for (int k = 0; k < D; ++k) a.where.centre[k] = x[k];
   insert(i, x);
@@ -300,7 +301,7 @@ std::span<const std::uint32_t> SkinLists<D>::renew(Slot i, const Vec<D>& x) {
 /// The sphere has been carried by so many boxes: its region goes with it, and the images in the lists follow.
 template <int D>
 void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   for (int k = 0; k < D; ++k) a.where.centre[k] += boxes[k] * box_.edges[k];
   const std::int32_t linear = packing_.linear(boxes);
   boxes_[i] += linear;
@@ -309,7 +310,7 @@ void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
     const std::uint32_t old = list[q], own = packing_.reversed(i, old);
     const Slot j = packing_.slot(old);
     list[q] = packing_.pack(j, packing_.linear(old) - linear);
-    Agenda<D>& other = agenda_[j];
+    NextEvent<D>& other = next_events_[j];
     std::uint32_t* const others = lists_.of(other);
     for (unsigned p = 0; p < other.count; ++p)
       if (others[p] == own) {
@@ -328,15 +329,15 @@ void SkinLists<D>::follow(std::span<const Record<D>> records) {
     bool carried = false;
     for (int k = 0; k < D; ++k) {
       if (!box_.periodic(k)) continue;
-      boxes[k] =
-          static_cast<std::int32_t>(std::nearbyint((records[i].x[k] - agenda_[i].where.centre[k]) / box_.edges[k]));
+      boxes[k] = static_cast<std::int32_t>(
+          std::nearbyint((records[i].x[k] - next_events_[i].where.centre[k]) / box_.edges[k]));
       carried = carried || boxes[k] != 0;
     }
     if (carried) shift(i, boxes);
   }
   const double limit = skin_ * skin_ * 0.9;
   for (Slot i = 0; i < records.size(); ++i)
-    if (!((records[i].x - centre(agenda_[i])).squaredNorm() < limit)) renew(i, records[i].x);
+    if (!((records[i].x - centre(next_events_[i])).squaredNorm() < limit)) renew(i, records[i].x);
 }
 
 template <int D>
@@ -350,8 +351,8 @@ void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> radius
         std::find_if(levels_.rbegin(), levels_.rend(), [&](const Level& l) { return l.largest_radius >= radius[i]; });
     level_[i] = static_cast<std::uint8_t>(levels_.rend() - level - 1);
   }
-  for (int k = 0; k < D; ++k) agenda_[i].where.centre[k] = x[k];
-  agenda_[i].count = agenda_[i].same = 0;
+  for (int k = 0; k < D; ++k) next_events_[i].where.centre[k] = x[k];
+  next_events_[i].count = next_events_[i].same = 0;
   insert(i, x);
   const std::span<const std::uint32_t> list = surround(i, x);
   lists_.assign(i, list);
@@ -360,7 +361,7 @@ void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> radius
 
 template <int D>
 void SkinLists<D>::dismiss(Slot i) {
-  Agenda<D>& a = agenda_[i];
+  NextEvent<D>& a = next_events_[i];
   remove(i, centre(a));
   const std::uint32_t* const list = candidates(a);
   for (unsigned q = 0; q < a.count; ++q) lists_.drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
@@ -370,14 +371,14 @@ void SkinLists<D>::dismiss(Slot i) {
 template <int D>
 bool SkinLists<D>::move(Slot i, const Vec<D>& x, double room) {
   const double limit = room * (1 - 1e-6);
-  if ((x - centre(agenda_[i])).squaredNorm() < limit * limit) return false;
+  if ((x - centre(next_events_[i])).squaredNorm() < limit * limit) return false;
   renew(i, x);
   return true;
 }
 
 template <int D>
-std::span<const std::uint32_t> SkinLists<D>::find_near(Slot i, double astray) {
-  return surround(i, centre(agenda_[i]), astray);
+std::span<const std::uint32_t> SkinLists<D>::find_near(Slot i, double max_displacement) {
+  return surround(i, centre(next_events_[i]), max_displacement);
 }
 
 template class SkinLists<2>;

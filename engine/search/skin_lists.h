@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "engine/base/prefetch.h"
-#include "engine/search/agenda.h"
 #include "engine/search/candidate_lists.h"
 #include "engine/search/cell_grid.h"
+#include "engine/search/next_event.h"
 #include "engine/search/simd/scan.h"
 
 namespace carom {
@@ -26,13 +26,14 @@ class SkinLists {
   /// `radius` by slot, the largest one they will have; where all are `equal`, for ever, of the first one alone. Spheres
   /// admitted later are not larger than `largest`.
   SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> radius,
-            bool equal, double largest, double skin, PageVector<Agenda<D>>& agenda);
+            bool equal, double largest, double skin, PageVector<NextEvent<D>>& next_events);
 
   double skin() const { return skin_; }
-  const std::uint32_t* candidates(const Agenda<D>& a) const { return lists_.of(a); }
+  const std::uint32_t* candidates(const NextEvent<D>& a) const { return lists_.of(a); }
 
-  /// Makes all lists for n spheres, with centres place(slot). find_near() will be called with `astray`.
-  void build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent, double astray = 0);
+  /// Makes all lists for n spheres, with centres place(slot). find_near() will be called with `max_displacement`.
+  void build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent,
+             double max_displacement = 0);
 
   /// The sphere is now at x: makes its list anew and mends those of its neighbours. Returns what is new in it, padded
   /// like a list; good until the next call.
@@ -50,11 +51,11 @@ class SkinLists {
   /// it was.
   bool move(Slot i, const Vec<D>& x, double room);
   /// Starts to fetch the list of a sphere; of a long one what a list of equal spheres would be.
-  void prefetch(const Agenda<D>& a) const {
+  void prefetch(const NextEvent<D>& a) const {
     for (const unsigned q : {0u, 16u, 32u}) prefetch_line(candidates(a) + q);
   }
-  /// All spheres that a sphere may touch where both have come up to `astray` from their regions.
-  std::span<const std::uint32_t> find_near(Slot i, double astray);
+  /// All spheres that a sphere may touch where both have come up to `max_displacement` from their regions.
+  std::span<const std::uint32_t> find_near(Slot i, double max_displacement);
 
  private:
   struct Level {  // spheres of similar size
@@ -71,14 +72,14 @@ class SkinLists {
   static std::uint8_t octave(double largest, double radius);
   std::size_t level_of(Slot i) const { return equal_ ? 0 : level_[i]; }
   double radius(Slot i) const { return radius_[equal_ ? 0 : i]; }
-  void lay_out(Level& level, double astray);
+  void lay_out(Level& level, double max_displacement);
   void spread(Level& level);
-  double most_places(double radius, const Level& level, double astray) const;
+  double most_places(double radius, const Level& level, double max_displacement) const;
   Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
   void insert(Slot i, const Vec<D>& x);
   void remove(Slot i, const Vec<D>& x);
-  std::span<const std::uint32_t> surround(Slot i, const Vec<D>& x, double astray = 0);
-  void look_into(const Level& level, Slot i, const Vec<D>& x, double astray, unsigned& found);
+  std::span<const std::uint32_t> surround(Slot i, const Vec<D>& x, double max_displacement = 0);
+  void look_into(const Level& level, Slot i, const Vec<D>& x, double max_displacement, unsigned& found);
   void shift(Slot i, const Image<D>& boxes);
 
   Box<D> box_;
@@ -86,8 +87,8 @@ class SkinLists {
   const ScanKernels& kernels_;
   std::span<const double> radius_;
   bool equal_;
-  double largest_, skin_, astray_ = 0;
-  PageVector<Agenda<D>>& agenda_;
+  double largest_, skin_, max_displacement_ = 0;
+  PageVector<NextEvent<D>>& next_events_;
   CandidateLists<D> lists_;
   std::vector<Level> levels_;
   std::vector<std::uint8_t> level_;  // by slot; empty where all are equal

@@ -19,7 +19,7 @@ double default_epoch(const System<D>& system) {
   struct Sums {
     double twice_kinetic = 0, mass = 0, diameter = 0, fastest = 0, lightest = std::numeric_limits<double>::infinity();
   };
-  Exchange alone;
+  Communicator alone;
   const auto [twice_kinetic, mass, diameter, fastest, lightest] =
       handed_on(system.decomposition.others() ? *system.decomposition.others() : alone, Sums{}, [&](Sums& sums) {
         for (std::size_t i = 0; i < p.size(); ++i) {
@@ -46,8 +46,7 @@ double default_epoch(const System<D>& system) {
   const double speed = std::max(fastest, 5 * std::sqrt(twice_kinetic / (D * n * lightest)));
   const Packing<D> packing(std::min(records_room(system.size()), std::size_t{1} << 24));
   for (int k = 0; k < D; ++k)
-    if (system.box.periodic(k))
-      epoch = std::min(epoch, packing.largest() * system.box.edges[k] / speed);
+    if (system.box.periodic(k)) epoch = std::min(epoch, packing.largest() * system.box.edges[k] / speed);
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), epoch, std::chars_format::scientific, 1).ptr;
   double rounded = epoch;

@@ -11,7 +11,7 @@ namespace {
 
 /// Calls visit(found) with what each rank has found, on all ranks.
 template <class Found>
-void for_each_found(const Found& mine, Exchange& ranks, auto&& visit) {
+void for_each_found(const Found& mine, Communicator& ranks, auto&& visit) {
   Bytes message;
   put(message, mine);
   for (const Bytes& bytes : ranks.gather(message)) visit(Reader(bytes).get<Found>());

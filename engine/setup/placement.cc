@@ -236,8 +236,8 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
 
 template <int D>
 void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::span<const double> temperature,
-                     std::uint64_t seed, RandomPurpose purpose, Exchange* ranks) {
-  Exchange alone;
+                     std::uint64_t seed, RandomPurpose purpose, Communicator* ranks) {
+  Communicator alone;
   for (std::size_t n = 0; n < chosen.size(); ++n) {
     const Id i = chosen[n];
     RandomStream random(seed, purpose, particles.id_of(i));
@@ -270,8 +270,8 @@ void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::s
 }
 
 template <int D>
-double packing_fraction(double volume, std::span<const double> radius, Exchange* ranks) {
-  Exchange alone;
+double packing_fraction(double volume, std::span<const double> radius, Communicator* ranks) {
+  Communicator alone;
   const double filled = handed_on(ranks ? *ranks : alone, 0.0, [&](double& sum) {
     for (const double r : radius) sum += D == 2 ? std::numbers::pi * r * r : 4 * std::numbers::pi / 3 * r * r * r;
   });
@@ -288,8 +288,8 @@ template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::spa
 template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>, std::span<const char>);
 template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
 template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
-                              Exchange*);
-template double packing_fraction<2>(double, std::span<const double>, Exchange*);
+                              Communicator*);
+template double packing_fraction<2>(double, std::span<const double>, Communicator*);
 
 template LatticeCells<3> fit_lattice(Lattice, const Box<3>&, std::size_t, double);
 template std::size_t for_each_site(Lattice, const Box<3>&, std::size_t, double,
@@ -301,7 +301,7 @@ template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::spa
 template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>, std::span<const char>);
 template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
 template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
-                              Exchange*);
-template double packing_fraction<3>(double, std::span<const double>, Exchange*);
+                              Communicator*);
+template double packing_fraction<3>(double, std::span<const double>, Communicator*);
 
 }  // namespace carom

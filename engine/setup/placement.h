@@ -16,7 +16,7 @@
 #include "engine/base/box.h"
 #include "engine/base/particles.h"
 #include "engine/base/random.h"
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom {
 
@@ -84,10 +84,11 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
 /// for its block of the particles, with the same bits; collective.
 template <int D>
 void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::span<const double> temperature,
-                     std::uint64_t seed, RandomPurpose purpose = RandomPurpose::velocity, Exchange* ranks = nullptr);
+                     std::uint64_t seed, RandomPurpose purpose = RandomPurpose::velocity,
+                     Communicator* ranks = nullptr);
 
 /// The part of the box that the spheres fill, 0 … 1; with `ranks`, those of all of them.
 template <int D>
-double packing_fraction(double volume, std::span<const double> radius, Exchange* ranks = nullptr);
+double packing_fraction(double volume, std::span<const double> radius, Communicator* ranks = nullptr);
 
 }  // namespace carom

@@ -69,7 +69,7 @@ class ContactScan {
   /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, Positions<D> x_new) { return list_.cover(x, x_new); }
 
-  /// The candidates while no particle strays farther than `margin` from x; and for each particle its partners among
+  /// The candidates while no particle far farther than `margin` from x; and for each particle its partners among
   /// them.
   std::span<const NeighbourPair<D>> candidates(Positions<D> x, double margin) { return list_.cover(x, margin); }
   const Partners& candidate_partners() { return list_.partners(); }

@@ -95,19 +95,19 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     flights_.clear();
     queue_.clear();
     contacts_.clear();
-    strayed_ = std::isfinite(margin_) ? 0 : kNever;
+    longest_path_ = std::isfinite(margin_) ? 0 : kNever;
     crowded_ = false;
     plain_ends();
-    if (strayed_ == 0) {
+    if (longest_path_ == 0) {
       const Stopwatch watch(counters_->seconds.queue);
       predict_first();
       end = serve();
     }
-    if (strayed_ > 0 && std::isfinite(strayed_)) {
-      margin_ = kRoom * strayed_;
+    if (longest_path_ > 0 && std::isfinite(longest_path_)) {
+      margin_ = kRoom * longest_path_;
       find_near();
     }
-  } while (strayed_ > 0 && std::isfinite(strayed_));
+  } while (longest_path_ > 0 && std::isfinite(longest_path_));
   for (const Flight& each : flights_) {
     const double rest = length_ - each.t;
     const Vec<D> a_i = acceleration(each.id);
@@ -121,12 +121,12 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     if (!shared || particles_.owns(i)) all_moved_ += moved_[i];
   }
   if (shared)
-    agree(!end.complete || crowded_ || strayed_ > 0);
+    agree(!end.complete || crowded_ || longest_path_ > 0);
   else if (crowded_)
     throw_too_many_contacts(max_events_, partners(end.key));
-  else if (strayed_ > 0 && !a_.empty())
+  else if (longest_path_ > 0 && !a_.empty())
     return {.complete = false, .wild = true};
-  else if (strayed_ > 0) {
+  else if (longest_path_ > 0) {
     Id i = 0;
     while (i + 1 < x_.size() && std::isfinite(reach_[i]) && x_[i].allFinite()) ++i;
     throw Error(Failure::numerical, "the position or velocity of particle " + std::to_string(particles_.id_of(i)) +
@@ -169,13 +169,13 @@ void SlabCore<D>::plain_ends() {
   }
   for (const Id i : beyond_)
     if (const double far = path(start_v_[i], a_[i], h); !(far <= margin_))
-      stray(half * a_[i].norm() <= wild_ ? far : kNever);
+      note_path(half * a_[i].norm() <= wild_ ? far : kNever);
 }
 
 /// Serves the queue until it is empty.
 template <int D>
 FlightEnd<D> SlabCore<D>::serve() {
-  while (!queue_.empty() && strayed_ == 0) {
+  while (!queue_.empty() && longest_path_ == 0) {
     std::pop_heap(queue_.begin(), queue_.end());
     const Planned event = queue_.back();
     queue_.pop_back();
@@ -294,9 +294,9 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   Flight& lo = flights_[slot_[key.lo] - 1];
   const double mass = particles_.mass[key.lo];
   Contact<D> contact{key, lo.x, lo.x, Vec<D>::Zero()};
-  const auto stays_near = [&](const Flight& f) {
-    const double strays = (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t);
-    if (!(strays <= margin_)) stray(strays);
+  const auto checks_path = [&](const Flight& f) {
+    const double far = (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t);
+    if (!(far <= margin_)) note_path(far);
   };
   if (key.kind == EventKind::wall) {
     const Wall<D> wall = box_.wall(key.hi);
@@ -318,9 +318,9 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     contact.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse);
     lo.v += (g / mass) * d;
     hi.v -= (g / mass_hi) * d;
-    stays_near(hi);
+    checks_path(hi);
   }
-  stays_near(lo);
+  checks_path(lo);
   contacts_.push_back(contact);
 }
 

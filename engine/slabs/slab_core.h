@@ -115,7 +115,7 @@ class SlabCore {
   Flight& flight(Id i, const EventKey<D>& key);
   double path(const Vec<D>& v, const Vec<D>& a, double time) const { return time * (v.norm() + 0.5 * time * a.norm()); }
   /// A particle comes so far.
-  void stray(double path) { strayed_ = std::isnan(path) ? kNever : std::max(strayed_, path); }
+  void note_path(double path) { longest_path_ = std::isnan(path) ? kNever : std::max(longest_path_, path); }
   void compare_sequences();
   void agree(bool failed);
 
@@ -138,7 +138,7 @@ class SlabCore {
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
   double length_ = 0, margin_ = 0, own_reach_ = 0;
-  double strayed_ = 0;  // > 0: how far a particle came, beyond margin_, in this flight
+  double longest_path_ = 0;  // > 0: how far a particle came, beyond margin_, in this flight
   bool crowded_ = false, resolved_ = false;
   Positions<D> start_v_, a_;  // of the slab
   std::span<const NeighbourPair<D>> pairs_;

@@ -4,8 +4,8 @@
 //   carom validate DECK     carom schema --markdown     carom methods     carom info FILE     carom --version
 //   carom bench --n 10000 --packing-fraction 0.49
 //
-// Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75 stopped
-// early.
+// Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75
+// interrupted.
 
 #include <CLI/CLI.hpp>
 #include <functional>
@@ -18,7 +18,7 @@
 #include "io/command/run.h"
 #include "io/deck/options.h"
 #include "io/files/info.h"
-#include "parallel/communicator.h"
+#include "parallel/world.h"
 
 namespace {
 
@@ -78,8 +78,8 @@ void add_bench(CLI::App& app, carom::BenchOptions& options) {
 
 /// One process does it, however many a launcher has started.
 int once(const std::function<int()>& work) {
-  if (!carom::Communicator::launched()) return work();
-  return carom::Communicator().on_first(work);
+  if (!carom::World::launched()) return work();
+  return carom::World().on_first(work);
 }
 
 int carom_main(int argc, char** argv) {
@@ -91,16 +91,22 @@ int carom_main(int argc, char** argv) {
   carom::RunOptions options;
   CLI::App& run = *app.add_subcommand("run", "Run a deck");
   auto* const run_deck = run.add_option("deck", options.deck, "The deck (TOML)")->type_name("DECK");
-  run.add_option("--continue", options.go_on, "Go on with the run in this directory from its last checkpoint")
-      ->type_name("DIR")
-      ->excludes(run_deck);
+  auto* const go_on =
+      run.add_option("--continue", options.go_on, "Go on with the run in this directory from its last checkpoint");
+  go_on->type_name("DIR")->excludes(run_deck);
+  run.add_flag("--take-over", options.take_over,
+               "Of --continue: the process that had the directory on another host has ended")
+      ->needs(go_on);
   add_set(run, options.set);
-  run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")->type_name("DIR");
+  run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")
+      ->type_name("DIR")
+      ->excludes(go_on);
   const auto wall_time = [&](const std::string& text) {
     options.max_wall_seconds = carom::wall_seconds(text);
     if (!options.max_wall_seconds) throw CLI::ValidationError("--max-wall", "'" + text + "' is not hh:mm:ss");
   };
-  run.add_option_function<std::string>("--max-wall", wall_time, "Stop after this wall time with a checkpoint and exit code 75")
+  run.add_option_function<std::string>("--max-wall", wall_time,
+                                       "Stop after this wall time with a checkpoint and exit code 75")
       ->type_name("HH:MM:SS");
   run.add_option("--silence", options.silence,
                  "Of several ranks: give up after so many seconds without a word from one; 0: never")

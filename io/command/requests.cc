@@ -35,7 +35,7 @@ Requests::Requests(std::optional<double> most) : most_(most) {
   }
 }
 
-Requests::Asked Requests::now(Exchange& ranks) {
+Requests::Asked Requests::now(Communicator& ranks) {
   const bool first = ranks.rank() == 0;
   const bool over = first && most_ && seconds_since(start_) >= *most_;
   const bool due = first && interval_ && seconds_since(last_checkpoint_) >= *interval_;
@@ -49,7 +49,7 @@ Requests::Asked Requests::now(Exchange& ranks) {
   return {asked[0] + asked[1] > 0, asked[0] > 0};
 }
 
-Requests::Asked Requests::now_and_then(Exchange& ranks) {
+Requests::Asked Requests::now_and_then(Communicator& ranks) {
   if (left_ == 0) return now(ranks);
   --left_;
   return {};

@@ -10,7 +10,7 @@
 #include <chrono>
 #include <optional>
 
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom {
 
@@ -26,9 +26,9 @@ class Requests {
     bool checkpoint = false, stop = false;
   };
   /// What has been asked by now, on any rank; rank 0's clock counts. Collective.
-  Asked now(Exchange& ranks);
+  Asked now(Communicator& ranks);
   /// The same, looked at only now and then where calls come fast.
-  Asked now_and_then(Exchange& ranks);
+  Asked now_and_then(Communicator& ranks);
   /// A checkpoint has been written.
   void checkpoint_is_written();
   /// Why the run was stopped, for people: the signal's name, or --max-wall.

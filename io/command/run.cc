@@ -24,7 +24,7 @@
 #include "io/files/summary.h"
 #include "io/files/text_file.h"
 #include "io/files/version.h"
-#include "parallel/mpi_exchange.h"
+#include "parallel/mpi_communicator.h"
 
 namespace carom {
 
@@ -45,7 +45,7 @@ void at_best(Action&& action) {
 }
 
 /// Reads a file on rank 0, for all: the others may not see it.
-TextReader reader_for(Exchange& ranks) {
+TextReader reader_for(Communicator& ranks) {
   return [&ranks](const std::filesystem::path& file) -> std::optional<std::string> {
     auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
     if (text) text->push_back('.');  // it can be read, and may be empty
@@ -69,7 +69,7 @@ struct Continued {
 };
 
 /// Reads the last checkpoint on rank 0, for all.
-Continued find_checkpoint(const std::filesystem::path& directory, Exchange& ranks) {
+Continued find_checkpoint(const std::filesystem::path& directory, Communicator& ranks) {
   Continued found{.directory = directory, .checkpoint = {}, .head = {}, .warning = {}};
   Archive out;
   if (ranks.rank() == 0) {
@@ -85,7 +85,7 @@ Continued find_checkpoint(const std::filesystem::path& directory, Exchange& rank
 }
 
 /// The deck of a run that is continued, where only the end may be another.
-Deck deck_of(const Continued& run, const RunOptions& options, Exchange& ranks) {
+Deck deck_of(const Continued& run, const RunOptions& options, Communicator& ranks) {
   for (const std::string& set : options.set)
     if (!set.starts_with("run."))
       throw Error(Failure::deck, "--set " + set +
@@ -98,11 +98,12 @@ Deck deck_of(const Continued& run, const RunOptions& options, Exchange& ranks) {
     return path == file ? run.head.deck : others(path).value_or("");
   });
   set_output_directory(deck, run.directory);
+  deck.file = run.head.deck_file;
   return deck;
 }
 
 template <int D>
-Simulation<D> simulation_of(Deck& deck, Exchange& ranks, const Continued* continued) {
+Simulation<D> simulation_of(Deck& deck, Communicator& ranks, const Continued* continued) {
   const IntegratorInfo& info = find_integrator(deck.integrator);
   std::optional<GivenState> given;
   if (continued) given = {continued->reader(), continued->head.bonds};
@@ -116,7 +117,7 @@ template <int D>
 class Keeper {
  public:
   /// `head`: that of the next checkpoint, on rank 0.
-  Keeper(Simulation<D>& simulation, const Deck& deck, Exchange& ranks, Requests& requests,
+  Keeper(Simulation<D>& simulation, const Deck& deck, Communicator& ranks, Requests& requests,
          std::function<CheckpointHead()> head)
       : simulation_(simulation), deck_(deck), ranks_(ranks), requests_(requests), head_(std::move(head)) {
     requests_.set_interval(deck.output.checkpoint_wall);
@@ -146,7 +147,7 @@ class Keeper {
 
   Simulation<D>& simulation_;
   const Deck& deck_;
-  Exchange& ranks_;
+  Communicator& ranks_;
   Requests& requests_;
   std::function<CheckpointHead()> head_;
   Requests::Asked asked_;
@@ -154,11 +155,11 @@ class Keeper {
 
 /// Runs a deck in D dimensions and writes its files. `at_work`: the ranks that share the work, of all that there are.
 template <int D>
-int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks, Requests& requests,
+int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
              const Continued* continued) {
   const auto& directory = deck.output.directory;
   std::optional<DirectoryLock> lock;
-  if (continued) lock.emplace(directory);
+  if (continued) lock.emplace(directory, options.take_over);
   auto simulation = simulation_of<D>(deck, at_work, continued);
   const Statistics& statistics = simulation.statistics();
   if (!lock) lock.emplace(directory);
@@ -202,6 +203,7 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
     const auto bonds = continued ? continued->head.bonds : found_bonds(deck, simulation.system());
     Keeper<D> keeper(simulation, deck, at_work, requests, [&] {
       return CheckpointHead{.deck = deck.toml_text,
+                            .deck_file = deck.file.string(),
                             .version = version_string(),
                             .integrator = deck.integrator,
                             .dimension = D,
@@ -226,8 +228,9 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
       outcome.warnings.push_back(*warning);
       log.warn(*warning);
     }
-    if (const auto regions = statistics.counters.domains.regions; regions > 0 && regions < static_cast<unsigned>(ranks))
-      log.warn(fmt::format("warning: there is work for {} of {} ranks only; use so many", regions, ranks));
+    if (const auto subdomains = statistics.counters.windows.subdomains;
+        subdomains > 0 && subdomains < static_cast<unsigned>(ranks))
+      log.warn(fmt::format("warning: there is work for {} of {} ranks only; use so many", subdomains, ranks));
     if (statistics.stopped_early)
       log.warn(fmt::format("stopped by {}; carom run --continue {} goes on", requests.reason(), directory.string()));
     log.close();
@@ -251,14 +254,14 @@ int run_deck(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks
 
 /// The same run on a rank other than 0, which shows nothing of it.
 template <int D>
-int run_beside(Deck& deck, Exchange& at_work, Requests& requests, const Continued* continued) {
+int run_beside(Deck& deck, Communicator& at_work, Requests& requests, const Continued* continued) {
   auto simulation = simulation_of<D>(deck, at_work, continued);
   std::vector<Onlooker<D>> onlookers;
   for (const auto& [info, parameters] : deck.output.observables)
     onlookers.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
   for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
-  ShareTeller<D> teller(at_work, simulation.system(), continued == nullptr);
-  simulation.add(teller);
+  BlockSender<D> sender(at_work, simulation.system(), continued == nullptr);
+  simulation.add(sender);
   Keeper<D> keeper(simulation, deck, at_work, requests, {});
   simulation.run(keeper.hooks(continued));
   accounts_of_all(at_work, simulation.statistics());
@@ -266,7 +269,7 @@ int run_beside(Deck& deck, Exchange& at_work, Requests& requests, const Continue
 }
 
 template <int D>
-int run_on_rank(Deck& deck, const RunOptions& options, Exchange& at_work, int ranks, Requests& requests,
+int run_on_rank(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
                 const Continued* continued) {
   return at_work.rank() == 0 ? run_deck<D>(deck, options, at_work, ranks, requests, continued)
                              : run_beside<D>(deck, at_work, requests, continued);
@@ -280,11 +283,11 @@ int run_command(const RunOptions& options) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   hdf5::start_library();
-  const Communicator ranks(options.silence);
-  Exchange alone;
-  std::optional<MpiExchange> team;
+  const World ranks(options.silence);
+  Communicator alone;
+  std::optional<MpiCommunicator> team;
   if (ranks.size() > 1) team.emplace(ranks);
-  Exchange& all = team ? *team : alone;
+  Communicator& all = team ? *team : alone;
 
   Deck deck;
   std::optional<Continued> continued;
@@ -299,7 +302,7 @@ int run_command(const RunOptions& options) {
     return 0;
   });
   if (failure != 0) return failure;
-  const auto run = [&](Exchange& at_work) {
+  const auto run = [&](Communicator& at_work) {
     const Continued* from = continued ? &*continued : nullptr;
     return deck.dimension == 2 ? run_on_rank<2>(deck, options, at_work, ranks.size(), requests, from)
                                : run_on_rank<3>(deck, options, at_work, ranks.size(), requests, from);

@@ -87,6 +87,6 @@ std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system);
 /// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards. With a given
 /// state it is that instead of the initial one, and nothing is checked or warned of anew.
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks = nullptr, const GivenState* given = nullptr);
+std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks = nullptr, const GivenState* given = nullptr);
 
 }  // namespace carom

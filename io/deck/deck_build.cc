@@ -91,7 +91,7 @@ void fill_box(const Deck::Source& source, System<D>& system) {
 }
 
 template <int D>
-void fill_particles(const Deck::Source& source, System<D>& system, Exchange* ranks) {
+void fill_particles(const Deck::Source& source, System<D>& system, Communicator* ranks) {
   Particles<D>& all = system.particles;
   std::size_t begin = 0, end = source.particles();  // ids of this rank
   if (ranks && built_in_blocks(source)) {
@@ -131,16 +131,15 @@ template <int D>
 std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system) {
   std::vector<PairList> found;
   const auto& all = deck.source->interactions;
-  for (std::size_t n = 0, term = 0; n < all.size(); ++n)
-    if (all[n].info->kind == InteractionInfo::Kind::bonded) {
-      const PairList* bonds = system.interactions[term++]->bonds();
-      if (bonds != nullptr && all[n].parameters.has("within")) found.push_back(*bonds);
-    }
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    const PairList* bonds = system.interactions[n]->bonds();
+    if (bonds != nullptr && all[n].parameters.has("within")) found.push_back(*bonds);
+  }
   return found;
 }
 
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks, const GivenState* given) {
+std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const GivenState* given) {
   const Deck::Source& source = *deck.source;
   if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
   auto system = std::make_unique<System<D>>();
@@ -174,13 +173,13 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Exchange* ranks, const Given
 }
 
 template void fill_box(const Deck::Source&, System<2>&);
-template void fill_particles(const Deck::Source&, System<2>&, Exchange*);
-template std::unique_ptr<System<2>> build_system<2>(Deck&, Exchange*, const GivenState*);
+template void fill_particles(const Deck::Source&, System<2>&, Communicator*);
+template std::unique_ptr<System<2>> build_system<2>(Deck&, Communicator*, const GivenState*);
 template std::vector<PairList> found_bonds(const Deck&, const System<2>&);
 
 template void fill_box(const Deck::Source&, System<3>&);
-template void fill_particles(const Deck::Source&, System<3>&, Exchange*);
-template std::unique_ptr<System<3>> build_system<3>(Deck&, Exchange*, const GivenState*);
+template void fill_particles(const Deck::Source&, System<3>&, Communicator*);
+template std::unique_ptr<System<3>> build_system<3>(Deck&, Communicator*, const GivenState*);
 template std::vector<PairList> found_bonds(const Deck&, const System<3>&);
 
 }  // namespace carom

@@ -11,7 +11,7 @@ void fill_box(const Deck::Source& source, System<D>& system);
 
 /// Masses, radii and charges; of this rank's block, where there are `ranks` and built_in_blocks().
 template <int D>
-void fill_particles(const Deck::Source& source, System<D>& system, Exchange* ranks);
+void fill_particles(const Deck::Source& source, System<D>& system, Communicator* ranks);
 
 /// Whether ranks can build their blocks of the initial state, each for itself: lattices of species with particles all
 /// alike.

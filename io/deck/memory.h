@@ -1,5 +1,6 @@
 #pragma once
-// How much memory a deck will take, and how much there is: a run that cannot have what it needs ends before it takes it.
+// How much memory a deck will take, and how much there is: a run that cannot have what it needs ends before it takes
+// it.
 
 #include "engine/base/box.h"
 #include "io/deck/deck_source.h"

@@ -14,6 +14,7 @@ struct RunOptions {
   std::vector<std::string> set;                 ///< `table.key=value`, in the order given
   std::optional<std::filesystem::path> output;  ///< instead of output.directory; relative to the working directory
   std::optional<std::filesystem::path> go_on;   ///< instead of a deck: the directory of a run to be continued
+  bool take_over = false;                       ///< of a run that is continued: the process on another host has ended
   std::optional<double> max_wall_seconds;       ///< stop early after this much wall time
   double silence = 600;                         ///< seconds after which ranks that do not answer are given up; 0: never
   bool quiet = false;                           ///< no progress line, no banner

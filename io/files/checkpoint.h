@@ -27,6 +27,7 @@ class File;
 /// What a checkpoint says beside the state.
 struct CheckpointHead {
   std::string deck;        ///< as resolved, TOML
+  std::string deck_file;   ///< that the run was started with
   std::string version;     ///< of the program that wrote it
   std::string integrator;  ///< its name
   std::int32_t dimension = 0;
@@ -38,7 +39,7 @@ struct CheckpointHead {
   std::vector<PairList> bonds;  ///< of each interaction that finds them in the initial state, in their order
 
   void archive(Archive& archive) {
-    archive(version, integrator, dimension, particles, step, time, files, log_bytes, log_rows, bonds);
+    archive(deck_file, version, integrator, dimension, particles, step, time, files, log_bytes, log_rows, bonds);
   }
 };
 

@@ -62,7 +62,12 @@ std::map<std::string, std::string> read_lock(const fs::path& path) {
   return lock;
 }
 
-bool alive(const std::map<std::string, std::string>& lock) {
+bool elsewhere(const std::map<std::string, std::string>& lock) {
+  return lock.at("host") != host_name() && lock.at("host") != "unknown";
+}
+
+bool at_work_here(const std::map<std::string, std::string>& lock) {
+  if (elsewhere(lock)) return false;
   const pid_t process = std::atoi(lock.at("process").c_str());
   if (process <= 0 || (::kill(process, 0) != 0 && errno == ESRCH)) return false;
   const std::string since = began(lock.at("process"));
@@ -76,10 +81,10 @@ std::string host_name() {
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown host";
 }
 
-DirectoryLock::DirectoryLock(const fs::path& directory) : path_(directory / run_file::lock) {
+DirectoryLock::DirectoryLock(const fs::path& directory, bool take_over) : path_(directory / run_file::lock) {
   make_output_directory(directory);
   // A launcher that was told to stop may be gone before its processes are.
-  for (int tenths = 0; tenths < 20 && alive(read_lock(path_)); ++tenths)
+  for (int tenths = 0; tenths < 20 && at_work_here(read_lock(path_)); ++tenths)
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   const int folder = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder >= 0)
@@ -95,12 +100,13 @@ DirectoryLock::DirectoryLock(const fs::path& directory) : path_(directory / run_
     auto lock = read_lock(path_);
     const std::string run =
         fmt::format("process {} on host {}, started {}", lock["process"], lock["host"], lock["started"]);
-    if (lock["host"] != host_name() && lock["host"] != "unknown")
-      throw Error(Failure::file,
-                  fmt::format("{}: a run on another host has this directory: {}; if it has ended, delete "
-                              "{}, else choose another directory with -o",
-                              directory.string(), run, path_.string()));
-    if (alive(lock))
+    if (elsewhere(lock) && !take_over)
+      throw Error(
+          Failure::file,
+          fmt::format("{}: a run on another host has this directory: {}; if it has ended, go on with --continue "
+                      "and --take-over or delete {}, else choose another directory with -o",
+                      directory.string(), run, path_.string()));
+    if (at_work_here(lock))
       throw Error(Failure::file, fmt::format("{}: a run is at work in this directory: {}; wait for its end, or choose "
                                              "another directory with -o",
                                              directory.string(), run));

@@ -15,8 +15,8 @@ std::string host_name();
 class DirectoryLock {
  public:
   /// Makes the directory where it is missing. Throws Error(Failure::file) if another run is at work there, or one on
-  /// another host has left its lock, of which nobody here can tell whether it has ended.
-  explicit DirectoryLock(const std::filesystem::path& directory);
+  /// another host has left its lock: whether that has ended cannot be told from here. `take_over`: it has.
+  explicit DirectoryLock(const std::filesystem::path& directory, bool take_over = false);
   /// Takes the lock away.
   ~DirectoryLock();
   DirectoryLock(const DirectoryLock&) = delete;

@@ -207,7 +207,7 @@ struct TrajectoryWriter<D>::Contents {
   Element<std::uint64_t> collisions;
   std::map<std::string, Element<double>> observables;
   std::array<double, 9> edge_rows{};
-  Exchange& ranks;
+  Communicator& ranks;
 };
 
 template <int D>
@@ -253,7 +253,7 @@ void TrajectoryWriter<D>::close() {
 }
 
 template <int D>
-ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system, bool creates) : ranks_(ranks) {
+BlockSender<D>::BlockSender(Communicator& ranks, const System<D>& system, bool creates) : ranks_(ranks) {
   if (!creates) return;
   const Particles<D>& p = system.particles;
   one_after_the_other(
@@ -261,14 +261,14 @@ ShareTeller<D>::ShareTeller(Exchange& ranks, const System<D>& system, bool creat
 }
 
 template <int D>
-void ShareTeller<D>::frame(const Snapshot<D>& s) {
+void BlockSender<D>::frame(const Snapshot<D>& s) {
   one_after_the_other(
       ranks_, [&] { return packed(s.particles->x, s.particles->v, s.particles->image); }, [](int, const Bytes&) {});
 }
 
 template class TrajectoryWriter<2>;
 template class TrajectoryWriter<3>;
-template class ShareTeller<2>;
-template class ShareTeller<3>;
+template class BlockSender<2>;
+template class BlockSender<3>;
 
 }  // namespace carom

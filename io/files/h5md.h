@@ -13,7 +13,7 @@
 // position + image · edge. Every frame is flushed: it survives the end of the process (journal.h).
 //
 // Where ranks have blocks of the particles (engine/ranks/id_blocks.h) rank 0 writes one after the other, as a piece of
-// the same row: it never has more than one of them. The others have a ShareTeller each.
+// the same row: it never has more than one of them. The others have a BlockSender each.
 
 #include <filesystem>
 #include <memory>
@@ -49,14 +49,14 @@ class TrajectoryWriter : public Observer<D> {
 
 /// Sends the particles of all other ranks to the writer on rank 0.
 template <int D>
-class ShareTeller : public Observer<D> {
+class BlockSender : public Observer<D> {
  public:
   /// `creates`: while the writer creates the file; else it opens one again.
-  ShareTeller(Exchange& ranks, const System<D>& system, bool creates = true);
+  BlockSender(Communicator& ranks, const System<D>& system, bool creates = true);
   void frame(const Snapshot<D>& snapshot) override;
 
  private:
-  Exchange& ranks_;
+  Communicator& ranks_;
 };
 
 }  // namespace carom

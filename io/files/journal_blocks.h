@@ -8,7 +8,7 @@
 #include <optional>
 #include <span>
 
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom::hdf5 {
 

@@ -63,17 +63,17 @@ std::string breakdown_text(std::span<const RankAccount> ranks) {
   return text;
 }
 
-/// What agreement between regions took; nothing where there is one region.
-std::string domains_text(std::span<const RankAccount> ranks) {
-  DomainCounts all;
+/// What agreement between regions took; nothing where there is one rank.
+std::string windows_text(std::span<const RankAccount> ranks) {
+  WindowCounts all;
   std::uint64_t most = 0;
   for (const RankAccount& rank : ranks) {
-    all.windows = rank.domains.windows;  // the same everywhere, like rounds
-    all.rounds = rank.domains.rounds;
-    all.events += rank.domains.events;
-    all.run_events += rank.domains.run_events;
-    all.redone_events += rank.domains.redone_events;
-    most = std::max(most, rank.domains.events);
+    all.windows = rank.windows.windows;  // the same everywhere, like rounds
+    all.rounds = rank.windows.rounds;
+    all.events += rank.windows.events;
+    all.run_events += rank.windows.run_events;
+    all.redone_events += rank.windows.redone_events;
+    most = std::max(most, rank.windows.events);
   }
   if (all.windows == 0) return "";
   const double events = std::max(static_cast<double>(all.events), 1.0);
@@ -150,7 +150,7 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
     text += fmt::format(
         "\nparticles divided among {} ranks {} times, {} steps redone with more ghosts, {} of them with all particles",
         ranks.size(), c.divisions, c.slabs_again, c.slabs_by_all);
-  text += domains_text(ranks) + memory_text(ranks);
+  text += windows_text(ranks) + memory_text(ranks);
   return text + "\n" + breakdown_text(ranks) + "\nfiles in " + deck.output.directory.string();
 }
 

@@ -8,9 +8,9 @@
 
 namespace carom {
 
-std::vector<RankAccount> accounts_of_all(Exchange& at_work, const Statistics& mine) {
+std::vector<RankAccount> accounts_of_all(Communicator& at_work, const Statistics& mine) {
   static_assert(std::is_trivially_copyable_v<RankAccount>);
-  const RankAccount account{mine.counters.seconds, mine.counters.domains, mine.wall_seconds, peak_memory_bytes()};
+  const RankAccount account{mine.counters.seconds, mine.counters.windows, mine.wall_seconds, peak_memory_bytes()};
   Bytes bytes(sizeof account);
   std::memcpy(bytes.data(), &account, sizeof account);
   std::vector<RankAccount> all;

@@ -5,20 +5,20 @@
 #include <span>
 #include <vector>
 
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 #include "engine/run/simulation.h"
 
 namespace carom {
 
 struct RankAccount {
   Counters::Seconds seconds;
-  DomainCounts domains;
+  WindowCounts windows;
   double wall_seconds = 0;
   std::uint64_t peak_memory_bytes = 0;
 };
 
 /// Collective: the accounts of all ranks at work, by rank.
-std::vector<RankAccount> accounts_of_all(Exchange& at_work, const Statistics& mine);
+std::vector<RankAccount> accounts_of_all(Communicator& at_work, const Statistics& mine);
 
 /// Largest resident memory of this process so far [bytes].
 std::uint64_t peak_memory_bytes();

@@ -1,5 +1,5 @@
 // Kills the process at its KILL_AT-th change of a file whose path contains KILL_IN: a write (of which half is done where
-// KILL_HALF=1), a new size, a new name, a removal. Without KILL_AT the number of changes goes to KILL_COUNT, a file.
+// KILL_HALF=1), a new size, a new name, a removal, a sync. Without KILL_AT the number of changes goes to KILL_COUNT, a file.
 //   cc -shared -fPIC -o kill_at_write.so kill_at_write.c
 //   LD_PRELOAD=./kill_at_write.so KILL_IN=runs/k KILL_AT=2584 carom run … -o runs/k
 #define _GNU_SOURCE
@@ -79,6 +79,12 @@ ssize_t write(int file, const void* data, size_t size) {
   }
 RESIZE(ftruncate, off_t)
 RESIZE(ftruncate64, off64_t)
+
+int fsync(int file) {
+  REAL(int, fsync, int);
+  if (due_at(file)) die();
+  return real(file);
+}
 
 #define SET_ASIDE(name, offset)                                  \
   int name(int file, int mode, offset start, offset length) {    \

@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 
 import h5py
@@ -13,6 +14,22 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 CAROM = os.environ.get("CAROM", "")
 needs_carom = pytest.mark.skipif(not CAROM, reason="needs the command: CAROM=build/release/io/carom")
+
+needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler for the library that kills")
+
+# A namespace of its own for mounts, as root or with user namespaces: nothing of it is left behind.
+UNSHARE = ["unshare", "-m"] if os.geteuid() == 0 else ["unshare", "-Urm"]
+can_mount = subprocess.run(UNSHARE + ["mount", "-t", "tmpfs", "none", "/mnt"], capture_output=True).returncode == 0
+needs_mount = pytest.mark.skipif(not can_mount, reason="may not mount here (not root, no user namespaces)")
+
+
+def in_mount(options, target, arguments, keep=None):
+    """Runs a command with a tmpfs on `target`; afterwards copies what is there to `keep`."""
+    script = 'mount -t tmpfs -o "$1" none "$2"; keep="$3"; target="$2"; shift 3; "$@"; code=$?; '
+    script += 'if [ -n "$keep" ]; then cp -r "$target" "$keep"; fi; exit $code'
+    return subprocess.run(UNSHARE + ["sh", "-c", script, "sh", options, str(target), str(keep or ""), *arguments],
+                          capture_output=True, text=True, timeout=120)
+
 
 # Four discs joined by springs between hard walls: smooth forces, pair and wall collisions.
 SPRINGS = """
@@ -77,6 +94,24 @@ def mpi_environment():
     settings = [line.removeprefix("export ").split("=", 1) for line in lines if line.startswith("export ")]
     assert len(settings) == 5
     return os.environ | dict(settings)
+
+
+MPIRUN = ["timeout", "-k", "10", "120", "mpirun", "--timeout", "100", "-n"]
+
+
+def mpirun(ranks, arguments, code=0, **options):
+    done = subprocess.run(MPIRUN + [str(ranks)] + [str(argument) for argument in arguments], env=mpi_environment(),
+                          capture_output=True, text=True, **options)
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def killer_library(directory):
+    """The library that kills at a change of a file (kill_at_write.c), built."""
+    library = directory / "kill_at_write.so"
+    subprocess.run(["cc", "-Wall", "-shared", "-fPIC", "-o", str(library), str(ROOT / "tests" / "cli" / "kill_at_write.c")],
+                   check=True)
+    return library
 
 
 def write_deck(directory, text):

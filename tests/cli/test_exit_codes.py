@@ -5,23 +5,10 @@ import subprocess
 
 import pytest
 
-from runs import (SPHERES, SPRINGS, command, data_sets, frames_are_sound, needs_carom, run, same, summary, thermo,
-                  write_deck)
+from runs import (SPHERES, SPRINGS, command, data_sets, frames_are_sound, in_mount, needs_carom, needs_mount, run, same,
+                  summary, thermo, write_deck)
 
 pytestmark = needs_carom
-
-# A namespace of its own for mounts, as root or with user namespaces: nothing of it is left behind.
-UNSHARE = ["unshare", "-m"] if os.geteuid() == 0 else ["unshare", "-Urm"]
-can_mount = subprocess.run(UNSHARE + ["mount", "-t", "tmpfs", "none", "/mnt"], capture_output=True).returncode == 0
-needs_mount = pytest.mark.skipif(not can_mount, reason="may not mount here (not root, no user namespaces)")
-
-
-def in_mount(options, target, arguments, keep=None):
-    """Runs a command with a tmpfs on `target`; afterwards copies what is there to `keep`."""
-    script = 'mount -t tmpfs -o "$1" none "$2"; keep="$3"; target="$2"; shift 3; "$@"; code=$?; '
-    script += 'if [ -n "$keep" ]; then cp -r "$target" "$keep"; fi; exit $code'
-    return subprocess.run(UNSHARE + ["sh", "-c", script, "sh", options, str(target), str(keep or ""), *arguments],
-                          capture_output=True, text=True, timeout=120)
 
 
 @needs_mount

@@ -12,13 +12,12 @@ import tempfile
 import numpy as np
 import pytest
 
-from runs import CAROM, ROOT, SPHERES, command, data_sets, needs_carom, run, write_deck
+from runs import CAROM, ROOT, SPHERES, command, data_sets, killer_library, needs_carom, needs_compiler, run, write_deck
 
 sys.path.insert(0, str(ROOT / "tools"))
 
 import carom_files
 
-needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler for the library that kills")
 pytestmark = [needs_carom, needs_compiler]
 
 FILES = {"trajectory.h5md": "particles/trajectory/position/step", "events.h5": "events/time"}
@@ -42,10 +41,7 @@ def deck(directory):
 
 @pytest.fixture(scope="module")
 def killer(tmp_path_factory):
-    library = tmp_path_factory.mktemp("library") / "kill_at_write.so"
-    source = ROOT / "tests" / "cli" / "kill_at_write.c"
-    subprocess.run(["cc", "-Wall", "-shared", "-fPIC", "-o", str(library), str(source)], check=True)
-    return library
+    return killer_library(tmp_path_factory.mktemp("library"))
 
 
 def killed_run(killer, directory, at=None, half=False):
@@ -78,7 +74,7 @@ def journal_is_complete(path):
 def test_every_other_write(killer, place):
     changes = killed_run(killer, place)
     assert sorted(path.name for path in (place / "out").iterdir()) == [
-        "deck.toml", "events.h5", "rdf.csv", "run.log", "summary.json", "thermo.csv", "trajectory.h5md"]
+        "checkpoint.h5", "deck.toml", "events.h5", "rdf.csv", "run.log", "summary.json", "thermo.csv", "trajectory.h5md"]
     whole = {name: data_sets(place / "out" / name) for name in FILES}
     rows = (place / "out" / "thermo.csv").read_text()
     assert changes > 150

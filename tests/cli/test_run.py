@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from runs import SPHERES, SPRINGS, command, data_sets, needs_carom, run, same, summary, thermo, write_deck
+from runs import CAROM, SPHERES, SPRINGS, command, data_sets, needs_carom, run, same, summary, thermo, write_deck
 
 pytestmark = needs_carom
 
@@ -33,8 +33,8 @@ def last_records(output):
 def test_files(tmp_path):
     deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
     run(deck, out)
-    assert sorted(p.name for p in out.iterdir()) == ["deck.toml", "run.log", "summary.json", "thermo.csv",
-                                                     "trajectory.h5md"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "checkpoint.h5", "deck.toml", "run.log", "summary.json", "thermo.csv", "trajectory.h5md"]
     s, rows = summary(out), thermo(out)
     for name in PROMISED:
         value = s
@@ -214,7 +214,7 @@ def test_of_two_runs_that_start_at_once_one_runs(tmp_path):
     runs = [subprocess.Popen(command(deck, out, ["run.steps=100000000"], ("--quiet", "--max-wall", "00:00:06")),
                              stderr=subprocess.PIPE) for _ in range(4)]
     assert sorted(child.wait() for child in runs if child.communicate()) == [5, 5, 5, 75]
-    assert summary(out)["status"] == "stopped" and not (out / "backup.1").exists()
+    assert summary(out)["status"] == "interrupted" and not (out / "backup.1").exists()
 
 
 def test_terminal(tmp_path):
@@ -249,9 +249,9 @@ def test_max_wall(tmp_path):
     done = run(deck, out, ["run.steps=100000000", "output.thermo_interval=100.0", "output.frame_interval=0.0"],
                ("--quiet", "--max-wall", "00:00:01"), code=75)
     assert time.monotonic() - start < 60  # it does stop by itself
-    assert "no checkpoint" in done.stderr
+    assert f"stopped by --max-wall; carom run --continue {out} goes on" in done.stderr
     s, last = summary(out), last_records(out)
-    assert s["status"] == "stopped" and 0 < s["steps"] < 100000000
+    assert s["status"] == "interrupted" and 0 < s["steps"] < 100000000
     assert last["time"] == s["end_time"] == thermo(out)["time"][-1]
     assert last["step"] == s["steps"]
     assert s["energy"]["max_abs_error"] <= 1e-10
@@ -268,6 +268,8 @@ def test_a_kill_leaves_readable_files(seed, tmp_path):
     time.sleep(random.Random(seed).uniform(0.05, 0.5))
     child.send_signal(signal.SIGKILL)
     assert child.wait() == -signal.SIGKILL
+    for name in ("trajectory.h5md", "events.h5"):  # completes a flush that the kill has interrupted
+        subprocess.run([CAROM, "info", out / name], check=True, stdout=subprocess.DEVNULL)
     rows, frames, events = thermo(out), data_sets(out / "trajectory.h5md"), data_sets(out / "events.h5")
     written = len(frames["particles/trajectory/position/step"])  # MDAnalysis ends where a step is missing
     assert written > 10

@@ -375,10 +375,10 @@ def test_the_model_of_ranks_takes_from_counts_what_is_in_them(capsys):
         {"windows": 1795, "rounds": 2.02, "twice": 0.275, "redone": 0.002, "imbalance": 0.01})
     with pytest.raises(SystemExit):
         rank_study.counts_of("done at time 50\n")
-    rows = [{"regions": P, "per_region": n, "windows": 30, "events": 0.15 * n, "rounds": 1 + 0.1 * np.log2(P * n ** (2 / 3)),
+    rows = [{"ranks": P, "per_rank": n, "windows": 30, "events": 0.15 * n, "rounds": 1 + 0.1 * np.log2(P * n ** (2 / 3)),
              "twice": (1 + 1.5 * n ** (-1 / 3)) ** 3 - 1, "redone": 0.04 * n ** (-1 / 3),
              "imbalance": 2 * np.sqrt(2 * np.log(P) / (4.5 * n))} for P in (8, 64) for n in (500, 4000)]
-    rows.append(rows[0] | {"regions": 2, "twice": 9.0})  # no neighbours on some sides: not in the fit
+    rows.append(rows[0] | {"ranks": 2, "twice": 9.0})  # no neighbours on some sides: not in the fit
     fitted = rank_study.fit(rows, 3)
     assert fitted == pytest.approx({"dimension": 3, "h": 1.5, "r": 0.04, "a": 1.0, "b": 0.1, "events": 0.15, "imbalance": 2.0})
     options = rank_study.parse_arguments(["--rate", "1e6", "--latency", "1e-5", "--overhead", "1e-6"])
@@ -396,17 +396,17 @@ def test_rank_study(tmp_path, capsys, monkeypatch):
         monkeypatch.setenv(name, value)
     rows = rows_of(rank_study, "ranks", tmp_path, "hard-sphere-fluid", "--ranks", "2,8,16", "--per-rank", "100,400",
                    "--most", "3200", "--rate", "1e6")
-    assert [(int(row["regions"]), int(row["per_region"])) for row in rows] == [
+    assert [(int(row["ranks"]), int(row["per_rank"])) for row in rows] == [
         (2, 100), (8, 100), (16, 100), (2, 400), (8, 400)]
     for row in rows:
         assert int(row["windows"]) > 20 and 1 <= float(row["rounds"]) < 4
-        events = float(row["events"]) * int(row["windows"]) * int(row["regions"])
+        events = float(row["events"]) * int(row["windows"]) * int(row["ranks"])
         assert events == pytest.approx(5 * int(row["particles"]))
         assert 0 < float(row["redone"]) < 0.05
     twice = [float(row["twice"]) for row in rows]
-    assert twice[0] < twice[1] and twice[4] < twice[1]  # more for regions with neighbours on all sides, and for small ones
+    assert twice[0] < twice[1] and twice[4] < twice[1]  # more for ranks with neighbours on all sides, and for small ones
     printed = capsys.readouterr().out
     assert "One core: 1e+06 collisions/s (given)" in printed
     with open(tmp_path / "model.csv", newline="") as file:
-        model = {(int(row["regions"]), int(row["per_region"])): float(row["efficiency"]) for row in csv.DictReader(file)}
+        model = {(int(row["ranks"]), int(row["per_rank"])): float(row["efficiency"]) for row in csv.DictReader(file)}
     assert 0 < model[10000, 10**4] < model[64, 10**4] < model[64, 10**6] < 1

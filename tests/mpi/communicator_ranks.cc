@@ -14,7 +14,7 @@
 //   stopped   rank 1 is stopped
 //   late      rank 1 computes longer than the silence and is given up
 //   suspended all are stopped, for longer than the silence, and go on: nothing has happened
-//   calls     the calls of MpiExchange give what they should
+//   calls     the calls of MpiCommunicator give what they should
 //   latency   microseconds of the calls, beside MPI_Allreduce
 
 #include <unistd.h>
@@ -32,14 +32,14 @@
 #include <thread>
 
 #include "engine/base/error.h"
-#include "parallel/mpi_exchange.h"
+#include "parallel/mpi_communicator.h"
 
 namespace {
 
 using carom::Bytes;
 using carom::Error;
 using carom::Failure;
-using carom::MpiExchange;
+using carom::MpiCommunicator;
 
 void sleep(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
@@ -60,8 +60,8 @@ Bytes filled(std::size_t size, int from, int to) {
   return bytes;
 }
 
-/// Everything an Exchange promises, for messages of all sizes.
-void check_calls(MpiExchange& ranks) {
+/// Everything an Communicator promises, for messages of all sizes.
+void check_calls(MpiCommunicator& ranks) {
   const int rank = ranks.rank(), size = ranks.size();
   for (const std::size_t length : {std::size_t{0}, std::size_t{1}, std::size_t{1000}, std::size_t{3000000}}) {
     // Rank a sends something to b where a + b is not a multiple of 3.
@@ -104,7 +104,7 @@ void check_calls(MpiExchange& ranks) {
   require(counts[0] == static_cast<std::uint64_t>(size) && counts[1] == high, "sum");
 }
 
-void measure(MpiExchange& ranks, MPI_Comm world) {
+void measure(MpiCommunicator& ranks, MPI_Comm world) {
   const auto show = [&](const char* name, const auto& call) {
     std::vector<double> times;
     for (int k = 0; k < 101; ++k) {
@@ -129,7 +129,7 @@ void measure(MpiExchange& ranks, MPI_Comm world) {
   show("swap in pairs, 1000 bytes", [&] { ranks.swap(messages, partners); });
 }
 
-int all(const std::string& what, MpiExchange& ranks, MPI_Comm world) {
+int all(const std::string& what, MpiCommunicator& ranks, MPI_Comm world) {
   const auto meet = [&] {
     double value = 0;
     ranks.largest({&value, 1});
@@ -172,8 +172,8 @@ int all(const std::string& what, MpiExchange& ranks, MPI_Comm world) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "ok";
-  const carom::Communicator ranks(argc > 2 ? std::stod(argv[2]) : 0);
-  MpiExchange exchange(ranks);
+  const carom::World ranks(argc > 2 ? std::stod(argv[2]) : 0);
+  MpiCommunicator exchange(ranks);
   const bool alone = what == "ok" || what == "error" || what == "bug";
   const auto together = [&] {
     try {

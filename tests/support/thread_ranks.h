@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/base/error.h"
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom::test {
 
@@ -19,7 +19,7 @@ class ThreadRanks {
       : messages_(static_cast<std::size_t>(size)), failures_(static_cast<std::size_t>(size)) {}
 
   /// Does this on all ranks. Where it throws on any of them all end, and the first one's exception is thrown.
-  void run(const std::function<void(Exchange&)>& work) {
+  void run(const std::function<void(Communicator&)>& work) {
     std::vector<std::thread> threads;
     for (std::size_t rank = 0; rank < messages_.size(); ++rank)
       threads.emplace_back([&, rank] {
@@ -36,7 +36,7 @@ class ThreadRanks {
   }
 
  private:
-  class Rank final : public Exchange {
+  class Rank final : public Communicator {
    public:
     Rank(ThreadRanks& team, std::size_t rank) : team_(team), rank_(rank) {}
     int rank() const override { return static_cast<int>(rank_); }

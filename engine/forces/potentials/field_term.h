@@ -73,7 +73,7 @@ class FieldTerm final : public Interaction<D> {
     return std::make_unique<FieldTerm>(some, field_.among(some));
   }
   double reach(Positions<D>) const override { return 0; }
-  double reach(const Particles<D>&, Exchange&) const override { return 0; }
+  double reach(const Particles<D>&, Communicator&) const override { return 0; }
 
  private:
   static constexpr double kShare = 0x1p-8;  // so that accelerations of light particles keep their digits

@@ -124,7 +124,7 @@ PairList bonds(std::string_view type, const Parameters& parameters, std::size_t 
   return list;
 }
 
-PairList union_of_all(Exchange& ranks, const PairList& mine) {
+PairList union_of_all(Communicator& ranks, const PairList& mine) {
   const auto bytes = std::as_bytes(std::span(mine));
   PairList all;
   for (const Bytes& received : ranks.gather({bytes.begin(), bytes.end()}))

@@ -46,7 +46,7 @@ void refuse_cut_options(std::string_view type, const Parameters& parameters);
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
 
 /// What ranks have found together, ascending. Collective.
-PairList union_of_all(Exchange& ranks, const PairList& mine);
+PairList union_of_all(Communicator& ranks, const PairList& mine);
 
 /// The bonds that `pairs`, `chain` or `within` describe, by ids, i < j, ascending: all there are, on each rank.
 template <int D>

@@ -73,7 +73,7 @@ class PairTerm final : public Interaction<D> {
       return nullptr;
   }
   double reach(Positions<D> x) const override { return pairs_.reach(x); }
-  double reach(const Particles<D>& block, Exchange& ranks) const override { return pairs_.reach(block, ranks); }
+  double reach(const Particles<D>& block, Communicator& ranks) const override { return pairs_.reach(block, ranks); }
 
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t own = 0;

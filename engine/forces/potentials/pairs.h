@@ -24,7 +24,7 @@
 #include "engine/base/error.h"
 #include "engine/base/interaction.h"
 #include "engine/forces/pair_list.h"
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom {
 
@@ -74,7 +74,7 @@ class Bonds {
     for (const auto& [i, j] : pairs_) longest = std::max(longest, (x[i] - x[j] + shift_of(i, j, x)).norm());
     return longest;
   }
-  double reach(const Particles<D>& block, Exchange& ranks) const {
+  double reach(const Particles<D>& block, Communicator& ranks) const {
     const Id first = block.size() > 0 ? block.id_of(0) : 0;
     const auto here = [&](Id id) { return id >= first && id - first < block.size(); };
     Bytes message;  // the higher partners of bonds, where another rank has the lower one
@@ -170,7 +170,7 @@ class AllPairs {
     return AllPairs(box_, particles_, filter_.among(some));
   }
   double reach(Positions<D>) const { return std::numeric_limits<double>::infinity(); }
-  double reach(const Particles<D>&, Exchange&) const { return std::numeric_limits<double>::infinity(); }
+  double reach(const Particles<D>&, Communicator&) const { return std::numeric_limits<double>::infinity(); }
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
@@ -243,7 +243,7 @@ class PairsWithinCutoff {
     return PairsWithinCutoff(box_, cutoff_, filter_.among(some), &list_);
   }
   double reach(Positions<D>) const { return cutoff_; }
-  double reach(const Particles<D>&, Exchange&) const { return cutoff_; }
+  double reach(const Particles<D>&, Communicator&) const { return cutoff_; }
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,

@@ -29,9 +29,8 @@ std::string wanted_width() {
 std::vector<const PairKernels*> available_pair_kernels() {
   std::vector<const PairKernels*> all = {&kernels::pairs_avx512, &kernels::pairs_avx2, &kernels::pairs_sse2};
   const std::string wanted = wanted_width();
-  std::erase_if(all, [&](const PairKernels* each) {
-    return (!wanted.empty() && wanted != each->name) || !available(*each);
-  });
+  std::erase_if(
+      all, [&](const PairKernels* each) { return (!wanted.empty() && wanted != each->name) || !available(*each); });
   return all;
 }
 

@@ -20,7 +20,7 @@ using State = std::map<std::string, Bytes>;
 /// All that a run shows.
 template <int D>
 struct Account : Observer<D> {
-  explicit Account(Exchange* others) : ranks(others) {}
+  explicit Account(Communicator* others) : ranks(others) {}
   Sampling sampling() const override { return {.interval = 0.05}; }
   void sample(double time, const Particles<D>& state) override { note(time), note(state); }
   void frame(const Snapshot<D>& shot) override {
@@ -46,7 +46,7 @@ struct Account : Observer<D> {
       for (const auto n : p.image[i]) note(n);
     }
   }
-  Exchange* ranks;
+  Communicator* ranks;
   std::vector<double> values, events;
 };
 
@@ -75,7 +75,7 @@ struct Outcome {
 template <int D>
 Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& leave, const State* from = nullptr) {
   Outcome<D> out;
-  test::ThreadRanks(std::max(1, ranks)).run([&](Exchange& exchange) {
+  test::ThreadRanks(std::max(1, ranks)).run([&](Communicator& exchange) {
     auto system = scene.make();
     if (ranks > 0) system->decomposition.join(exchange);
     const bool first = exchange.rank() == 0;
@@ -169,14 +169,14 @@ Plan plan_of(double step, std::int64_t steps) {
   return {.step = step, .steps = steps, .frame_interval = 3 * step, .thermo_interval = 2 * step, .events = true};
 }
 
-Scene<2> springs(const std::string& method, const Given& given = {}) {
-  return {
-      [] {
-        auto system = test::hard_spheres<2>(8, 0.5);
-        test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}});
-        return system;
-      },
-      method, plan_of(0.02, 24), given};
+Scene<2> springs(const std::string& method, const Given& given = {}, double stiffness = 3) {
+  return {[=] {
+            auto system = test::hard_spheres<2>(8, 0.5);
+            test::add_interaction(*system, "harmonic-bond",
+                                  {{"within", 1.4}, {"stiffness", stiffness}, {"rest_length", 1.2}});
+            return system;
+          },
+          method, plan_of(0.02, 24), given};
 }
 Scene<3> yukawa(const std::string& method, const Given& given = {}) {
   return {[] {
@@ -193,6 +193,8 @@ TEST(Continue, SlabMethods) {
     compare<3>(yukawa(method), kRanks, {5});
   }
 }
+/// Sweeps are accelerated once the largest frequency is known, which is part of the state.
+TEST(Continue, StiffForces) { compare<2>(springs("edda", {}, 1000), {{0, 0}, {2, 3}}, {7}); }
 TEST(Continue, MethodsThatCutTheStepOfAll) {
   for (const auto& [method, given] : std::vector<std::pair<std::string, Given>>{{"cva", {}},
                                                                                 {"mcva", {}},
@@ -233,6 +235,10 @@ TEST(Continue, ALaterEnd) {
       const auto begun = run<3>(scene, ranks, plans[0], {.within_epochs = true, .at_last = true});
       ASSERT_FALSE(begun.state.empty());
       expect_continued(whole, run<3>(scene, ranks, plans[1], {.within_epochs = true}, &begun.state));
+      // With the same end it ends as it has ended, if it ended within an epoch.
+      if (!plans[0].collisions) continue;
+      const auto ended = run<3>(scene, 0, plans[0], {.within_epochs = true});
+      expect_same(ended.statistics, run<3>(scene, ranks, plans[0], {.within_epochs = true}, &begun.state).statistics);
     }
 }
 

@@ -18,7 +18,7 @@ using test::Given;
 /// All that a run shows.
 template <int D>
 struct Account : Observer<D> {
-  explicit Account(Exchange* shared_by = nullptr) : ranks(shared_by), rank(ranks ? ranks->rank() : 0) {}
+  explicit Account(Communicator* shared_by = nullptr) : ranks(shared_by), rank(ranks ? ranks->rank() : 0) {}
   void frame(const Snapshot<D>& shot) override {
     frames.push_back(ranks ? gathered(*ranks, *shot.particles) : *shot.particles);
     note(shot);
@@ -35,7 +35,7 @@ struct Account : Observer<D> {
     values.insert(values.end(), {s.time, s.kinetic, s.potential, std::isnan(s.shadow) ? 0 : s.shadow, s.pressure});
     for (int k = 0; k < D; ++k) values.push_back(s.momentum[k]);
   }
-  Exchange* ranks;
+  Communicator* ranks;
   int rank;
   std::vector<Particles<D>> frames;  // on rank 0 only
   std::vector<EventKey<D>> events;
@@ -48,7 +48,7 @@ using Scene = std::function<std::unique_ptr<System<D>>()>;
 
 template <int D>
 Account<D> run(const Scene<D>& scene, const std::string& method, const Plan& plan, const Given& given,
-               Exchange* ranks) {
+               Communicator* ranks) {
   auto system = scene();
   if (ranks) system->decomposition.join(*ranks);
   auto simulation = test::make_run<D>(std::move(system), method, plan, given);
@@ -101,7 +101,7 @@ Statistics compare(const Scene<D>& scene, const std::string& method, double step
   for (const int ranks : {1, 2, 3, 4, 8}) {
     SCOPED_TRACE(ranks);
     std::vector<Account<D>> all(static_cast<std::size_t>(ranks));
-    test::ThreadRanks(ranks).run([&](Exchange& exchange) {
+    test::ThreadRanks(ranks).run([&](Communicator& exchange) {
       all[static_cast<std::size_t>(exchange.rank())] = run<D>(scene, method, plan, given, &exchange);
     });
     for (const Account<D>& account : all) expect_same(alone, account);
@@ -242,7 +242,7 @@ TEST(Decomposition, NoRankHasAllParticles) {
   std::vector<Vec<2>> forces(all.size());
   Counters uncounted;
   evaluate_forces<2>(*whole, all.x, forces, uncounted);
-  test::ThreadRanks(8).run([&](Exchange& exchange) {
+  test::ThreadRanks(8).run([&](Communicator& exchange) {
     auto system = lattice();
     system->decomposition.join(exchange);
     test::add_interaction(*system, "harmonic-bond", bonds);

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "engine/ranks/division.h"
+#include "engine/ranks/bisection.h"
 #include "engine/run/simulation.h"
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/event_cases.h"
@@ -33,14 +33,14 @@ struct Account : Observer<D> {
   std::vector<double> values;
   double overlap = 0;
   std::size_t kept = 0;  // particles here at the end
-  Exchange* ranks = nullptr;
+  Communicator* ranks = nullptr;
 };
 
 template <int D>
 using Scene = std::function<std::unique_ptr<System<D>>()>;
 
 template <int D>
-Account<D> run(const Scene<D>& scene, Exchange* ranks) {
+Account<D> run(const Scene<D>& scene, Communicator* ranks) {
   auto system = scene();
   if (ranks) system->decomposition.join(*ranks);
   auto run =
@@ -66,7 +66,7 @@ void compare(const Scene<D>& scene, std::size_t contacts) {
     SCOPED_TRACE(ranks);
     std::vector<Account<D>> all(static_cast<std::size_t>(ranks));
     test::ThreadRanks(ranks).run(
-        [&](Exchange& exchange) { all[static_cast<std::size_t>(exchange.rank())] = run<D>(scene, &exchange); });
+        [&](Communicator& exchange) { all[static_cast<std::size_t>(exchange.rank())] = run<D>(scene, &exchange); });
     const Account<D>& first = all.front();
     EXPECT_EQ(first.events, alone.events);
     ASSERT_EQ(first.states.size(), alone.states.size());
@@ -141,34 +141,34 @@ TEST(Sizes, AreThoseOfTheSpeciesWhereTheyAreEqual) {
 }
 
 /// Whichever rank has which spheres, and with many at the same coordinates.
-TEST(Division, HasTheSameCutsOnAnyNumberOfRanks) {
+TEST(Bisection, HasTheSameCutsOnAnyNumberOfRanks) {
   for (const bool layers : {false, true}) {
     auto system = random_system<3>(500, {30, 12, 12}, {O, P, W}, 0.3, 0.3, 3);
     auto& x = system->particles.x;
     for (Vec<3>& at : x)
       if (layers) at = at.array().round();
-    Exchange alone;
-    const Division<3> whole(system->box, x, 7, 1.0, alone);
+    Communicator alone;
+    const Bisection<3> whole(system->box, x, 7, 1.0, alone);
     std::vector<std::size_t> spheres(7);
     for (const Vec<3>& at : x) ++spheres[whole.owner(at)];
     for (const std::size_t n : spheres) EXPECT_NEAR(static_cast<double>(n), 500.0 / 7, layers ? 40 : 5);
-    test::ThreadRanks(3).run([&](Exchange& ranks) {
+    test::ThreadRanks(3).run([&](Communicator& ranks) {
       std::vector<Vec<3>> some;  // one rank has none
       for (std::size_t i = 0; i < x.size(); ++i)
         if (static_cast<int>(i % 2) == ranks.rank()) some.push_back(x[i]);
-      const Division<3> division(system->box, some, 7, 1.0, ranks);
+      const Bisection<3> bisection(system->box, some, 7, 1.0, ranks);
       for (std::uint32_t i = 0; i < 5000; ++i) {
         RandomStream random(2, RandomPurpose::probe, i);
         Vec<3> at;
         for (int k = 0; k < 3; ++k) at[k] = random.uniform() * system->box.edges[k];
-        ASSERT_EQ(division.owner(at), whole.owner(at));
+        ASSERT_EQ(bisection.owner(at), whole.owner(at));
       }
     });
   }
 }
 
 /// Spheres in a row of 1000, of which those at the left have three times as much to do.
-TEST(Division, GivesEachTheSameWork) {
+TEST(Bisection, GivesEachTheSameWork) {
   const Box<2> box{{100, 10}, {W, W}};
   std::vector<Vec<2>> x;
   std::vector<std::uint32_t> work;
@@ -176,13 +176,13 @@ TEST(Division, GivesEachTheSameWork) {
     x.push_back({0.1 * i + 0.05, 5});
     work.push_back(i < 500 ? 3 : 1);
   }
-  Exchange alone;
-  const Division<2> division(box, x, 4, 1.0, alone, work);
+  Communicator alone;
+  const Bisection<2> bisection(box, x, 4, 1.0, alone, work);
   std::vector<std::uint32_t> shares(4);
-  for (std::size_t i = 0; i < x.size(); ++i) shares[division.owner(x[i])] += work[i];
+  for (std::size_t i = 0; i < x.size(); ++i) shares[bisection.owner(x[i])] += work[i];
   for (const std::uint32_t share : shares) EXPECT_NEAR(share, 500, 3);
-  EXPECT_EQ(division.owner({16.5, 5}), 0u);
-  EXPECT_EQ(division.owner({16.7, 5}), 1u);
+  EXPECT_EQ(bisection.owner({16.5, 5}), 0u);
+  EXPECT_EQ(bisection.owner({16.7, 5}), 1u);
 }
 
 }  // namespace

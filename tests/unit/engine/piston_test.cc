@@ -120,9 +120,9 @@ TEST(Piston, EnergyAndWorkAddUpUnderForces) {
 
 /// What a run says that throws.
 std::string message(const std::function<void(System<2>&)>& change, const std::string& method,
-                    Exchange* ranks = nullptr) {
+                    Communicator* ranks = nullptr) {
   auto system = one_sphere(10, 1, -0.1);
-  system->ranks = ranks;
+  if (ranks) system->decomposition.join(*ranks);
   change(*system);
   try {
     system->check();
@@ -141,7 +141,7 @@ TEST(Piston, IsRefusedWhereItIsNotKnown) {
   EXPECT_EQ(message(periodic, "psa"),
             "the edge of the box along axis 0 moves at -0.1; only walls can move, at finite speeds: make that boundary "
             "a wall, or its edge_velocity 0");
-  test::ThreadRanks(2).run([&](Exchange& ranks) {
+  test::ThreadRanks(2).run([&](Communicator& ranks) {
     EXPECT_EQ(message(as_it_is, "psa", &ranks),
               "forces and walls that move together need one rank; take one, or free-flight");
     EXPECT_EQ(message(as_it_is, "free-flight", &ranks), "");

@@ -98,7 +98,7 @@ TYPED_TEST(Trajectory, IsReadableAfterEveryFrame) {
 
 /// Another rank that has no particles, and is lost in the middle of the second frame.
 TEST(TrajectoryFile, HasNoPartOfAFrameInWhichARankIsLost) {
-  struct Lost : Exchange {
+  struct Lost : Communicator {
     int calls = 0;
     int size() const override { return 2; }
     std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {

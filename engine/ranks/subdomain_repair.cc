@@ -1,13 +1,13 @@
-// How a region repairs a window where paths of its ghosts are not those that their owners sent.
+// How a subdomain repairs a window where paths of its ghosts are not those that their owners sent.
 
 #include <algorithm>
 
-#include "engine/ranks/region.h"
+#include "engine/ranks/subdomain.h"
 
 namespace carom {
 
 template <int D>
-void Region<D>::repair() {
+void Subdomain<D>::repair() {
   repairs_.clear();
   for (const Slot g : scripts_.slots()) seed(g);
   for (const Slot i : touched_ghosts_)
@@ -44,9 +44,9 @@ void Region<D>::repair() {
 }
 
 /// Where the path of a ghost differs from its script, and not by a contact with own spheres, it is repaired from there.
-/// Contacts with own spheres are decided by this region, not by the owner of the ghost.
+/// Contacts with own spheres are decided by this subdomain, not by the owner of the ghost.
 template <int D>
-void Region<D>::seed(Slot g) {
+void Subdomain<D>::seed(Slot g) {
   if (matches(g)) return;
   const auto seen = path(g), script = script_of(g);
   std::size_t k = 0;
@@ -62,7 +62,7 @@ void Region<D>::seed(Slot g) {
 
 /// Cuts the path of a sphere at `key`; the partners of the events taken back must be checked.
 template <int D>
-typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
+typename Subdomain<D>::Mended& Subdomain<D>::mend(Slot i, const EventKey<D>& key) {
   Nodes& path = rewritten(i).nodes;
   const auto from = std::find_if(path.begin(), path.end(), [&](const Node<D>& n) { return !(n.key < key); });
   mended_of_[i] = static_cast<std::uint32_t>(repairs_.size());
@@ -76,7 +76,7 @@ typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
   if (role_[i] == Role::ghost) {
     const auto script = script_of(i);
     m.script = m.kept;
-    m.strays = m.kept > script.size() || !std::equal(path.begin(), path.end(), script.begin());
+    m.left_script = m.kept > script.size() || !std::equal(path.begin(), path.end(), script.begin());
   }
   for (const Node<D>& node : m.old) {
     const Slot partner = node.key.kind == EventKind::wall ? IdTable::kNowhere : slots_.find(node.partner());
@@ -86,37 +86,37 @@ typename Region<D>::Mended& Region<D>::mend(Slot i, const EventKey<D>& key) {
 }
 
 template <int D>
-void Region<D>::plan_script(Mended& m) {
+void Subdomain<D>::plan_script(Mended& m) {
   const auto script = script_of(m.slot);
-  if (m.strays || m.script >= script.size()) return;
+  if (m.left_script || m.script >= script.size()) return;
   tasks_.push({.kind = Task::Kind::script,
                .key = script[m.script].key,
                .a = m.slot,
                .version_a = static_cast<std::uint32_t>(m.script)});
 }
 
-/// Where a ghost can meet own spheres, which are within a stray of the region, and are known where they come within
-/// another two: between two corners. False: nowhere.
+/// Where a ghost can meet own spheres, which are within `max_displacement` of the subdomain, and are known where they
+/// come within another two: between two corners. False: nowhere.
 template <int D>
-bool Region<D>::meeting_place(const Mended& m, Vec<D>& low, Vec<D>& high) const {
+bool Subdomain<D>::meeting_place(const Mended& m, Vec<D>& low, Vec<D>& high) const {
   const double time = end_ - m.now.t, way = (m.now.v.norm() + 0.5 * time * core_.flights().g().norm()) * time;
-  const Vec<D> at = division_->wrapped(m.now.x);
-  const double close = division_->reach() - stray_ + way;
-  if (division_->squared_distance(number_, at) > close * close) return false;
-  const Vec<D> room = Vec<D>::Constant(division_->reach() + way);
+  const Vec<D> at = bisection_->wrapped(m.now.x);
+  const double close = bisection_->reach() - max_displacement_ + way;
+  if (bisection_->squared_distance(number_, at) > close * close) return false;
+  const Vec<D> room = Vec<D>::Constant(bisection_->reach() + way);
   low = at - room;
   high = at + room;
-  if (!division_->clip(number_, 3 * stray_, low, high)) return false;
+  if (!bisection_->clip(number_, 3 * max_displacement_, low, high)) return false;
   low += m.now.x - at;
   high += m.now.x - at;
   return true;
 }
 
-/// Whether two spheres can come together at all; the other is known where it comes within another two strays.
+/// Whether two spheres can come together at all; the other is known where it comes within twice `max_displacement`.
 template <int D>
-bool Region<D>::may_meet(const Mended& m, Slot j, const Image<D>& image) const {
+bool Subdomain<D>::may_meet(const Mended& m, Slot j, const Image<D>& image) const {
   const double time = end_ - m.now.t, way = (m.now.v.norm() + 0.5 * time * core_.flights().g().norm()) * time;
-  const double close = division_->reach() + way;
+  const double close = bisection_->reach() + way;
   const Record<D>& r = core_.flights()[j];
   const double s = end_ - r.t;
   const Vec<D> d = m.now.x - (r.x + s * r.v + (0.5 * s * s) * core_.flights().g()) + box_.shift(image);
@@ -125,14 +125,14 @@ bool Region<D>::may_meet(const Mended& m, Slot j, const Image<D>& image) const {
 
 /// Whether the next event in the script of a ghost is at this very key.
 template <int D>
-bool Region<D>::follows_at_once(const Mended& m, const EventKey<D>& key) {
+bool Subdomain<D>::follows_at_once(const Mended& m, const EventKey<D>& key) {
   const auto script = script_of(m.slot);
-  return !m.strays && m.script < script.size() && script[m.script].key == key;
+  return !m.left_script && m.script < script.size() && script[m.script].key == key;
 }
 
 /// Plans all contacts that a mended sphere may have from `now` on.
 template <int D>
-void Region<D>::predict(Mended& m, const EventKey<D>& now) {
+void Subdomain<D>::predict(Mended& m, const EventKey<D>& now) {
   const Packing<D>& packing = core_.packing();
   if (role_[m.slot] == Role::ghost) {
     Vec<D> low, high;
@@ -149,7 +149,7 @@ void Region<D>::predict(Mended& m, const EventKey<D>& now) {
 }
 
 template <int D>
-void Region<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>& now) {
+void Subdomain<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>& now) {
   const Flights<D>& flights = core_.flights();
   const Vec<D> shift = box_.shift(image);
   const auto key_at = [&](const Record<D>& other, double t) {
@@ -185,7 +185,7 @@ void Region<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>
 }
 
 template <int D>
-void Region<D>::predict_walls(Mended& m) {
+void Subdomain<D>::predict_walls(Mended& m) {
   for (const Wall<D>& wall : core_.flights().walls()) {
     const double t = core_.flights().wall_contact(m.slot, m.now, wall);
     if (!(t < end_)) continue;
@@ -201,7 +201,7 @@ void Region<D>::predict_walls(Mended& m) {
 }
 
 template <int D>
-void Region<D>::contact(const Task& task) {
+void Subdomain<D>::contact(const Task& task) {
   const EventKey<D>& key = task.key;
   const bool pair = key.kind == EventKind::pair;
   if (version(task.a) != task.version_a || (pair && version(task.b) != task.version_b)) return;
@@ -231,26 +231,26 @@ void Region<D>::contact(const Task& task) {
 
 /// Adds a node to a path. A ghost follows its script as long as the script has the same node.
 template <int D>
-void Region<D>::append(Mended& m, const Node<D>& node) {
+void Subdomain<D>::append(Mended& m, const Node<D>& node) {
   rewritten(m.slot).nodes.push_back(node);
   m.now = node.after;
   mended_fastest_squared_ = std::max(mended_fastest_squared_, node.after.v.squaredNorm());
   ++m.version;
-  if (role_[m.slot] != Role::ghost || m.strays) return;
+  if (role_[m.slot] != Role::ghost || m.left_script) return;
   const auto script = script_of(m.slot);
-  m.strays = m.script >= script.size() || !(script[m.script] == node);
+  m.left_script = m.script >= script.size() || !(script[m.script] == node);
   ++m.script;
   plan_script(m);
 }
 
 /// A ghost follows its script in an event without own spheres.
 template <int D>
-void Region<D>::script(const Task& task) {
+void Subdomain<D>::script(const Task& task) {
   Mended& m = repairs_[mended_of_[task.a]];
-  if (m.strays || m.script != task.version_a) return;
+  if (m.left_script || m.script != task.version_a) return;
   const Node<D>& node = script_of(task.a)[m.script];
-  if (is_own_id(node.partner())) {  // here they did not meet, and this region decides that
-    m.strays = true;
+  if (is_own_id(node.partner())) {  // here they did not meet, and this subdomain decides that
+    m.left_script = true;
     predict(m, task.key);
     return;
   }
@@ -260,14 +260,14 @@ void Region<D>::script(const Task& task) {
 
 /// A sphere that has been mended met this one here, and no longer does.
 template <int D>
-void Region<D>::check(const Task& task) {
+void Subdomain<D>::check(const Task& task) {
   if (mended(task.b) || (role_[task.a] == Role::ghost && role_[task.b] == Role::ghost)) return;
   Mended& m = mend(task.b, task.key);
-  if (role_[task.b] == Role::ghost) m.strays = true;
+  if (role_[task.b] == Role::ghost) m.left_script = true;
   predict(m, task.key);
 }
 
-template void Region<2>::repair();
-template void Region<3>::repair();
+template void Subdomain<2>::repair();
+template void Subdomain<3>::repair();
 
 }  // namespace carom

@@ -20,7 +20,7 @@ struct CellPlace {
 /// The next contact of a sphere, if it was scanned after its partner, and when its surroundings must be looked at
 /// again. One cache line.
 template <int D>
-struct alignas(64) Agenda {
+struct alignas(64) NextEvent {
   double contact = std::numeric_limits<double>::infinity();
   double update = std::numeric_limits<double>::infinity();  ///< it leaves its cell, or the region its list is good for
   union Where {
@@ -39,6 +39,6 @@ struct alignas(64) Agenda {
 
   double due() const { return contact < update ? contact : update; }
 };
-static_assert(sizeof(Agenda<3>) == 64 && sizeof(Agenda<2>) == 64);
+static_assert(sizeof(NextEvent<3>) == 64 && sizeof(NextEvent<2>) == 64);
 
 }  // namespace carom

@@ -1,4 +1,4 @@
-#include "engine/ranks/division.h"
+#include "engine/ranks/bisection.h"
 
 #include <algorithm>
 #include <bit>
@@ -31,7 +31,7 @@ struct OrderStatistic {
 };
 
 /// Finds the wanted elements, digit by digit from the highest, by counting: all ranks find the same.
-void select(std::span<OrderStatistic> wanted, Exchange& ranks) {
+void select(std::span<OrderStatistic> wanted, Communicator& ranks) {
   constexpr int kBits = 8;
   constexpr std::size_t kDigits = std::size_t{1} << kBits;
   std::vector<std::uint64_t> counts(wanted.size() * kDigits);
@@ -53,29 +53,29 @@ void select(std::span<OrderStatistic> wanted, Exchange& ranks) {
 }  // namespace
 
 template <int D>
-struct Division<D>::Sphere {
+struct Bisection<D>::Sphere {
   Vec<D> x;
   std::uint32_t work;
 };
 
-/// What is still to be cut, into so many regions from `first` on.
+/// What is still to be cut, into so many subdomains from `first` on.
 template <int D>
-struct Division<D>::Piece {
+struct Bisection<D>::Piece {
   Part part;
   std::uint32_t first;
-  std::size_t regions;
+  std::size_t subdomains;
   std::span<Sphere> spheres;        // of this rank
   std::int32_t above_cut = kNoCut;  // that it is a side of
   bool upper = false;
 };
 
 template <int D>
-Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t regions, double reach, Exchange& ranks,
-                      std::span<const std::uint32_t> work)
-    : box_(box), reach_(reach), parts_(std::max<std::size_t>(regions, 1)) {
+Bisection<D>::Bisection(const Box<D>& box, std::span<const Vec<D>> x, std::size_t subdomains, double reach,
+                        Communicator& ranks, std::span<const std::uint32_t> work)
+    : box_(box), reach_(reach), parts_(std::max<std::size_t>(subdomains, 1)) {
   std::vector<Sphere> spheres(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) spheres[i] = {wrapped(x[i]), work.empty() ? 1 : work[i]};
-  Piece all{.part = {}, .first = 0, .regions = parts_.size(), .spheres = spheres};
+  Piece all{.part = {}, .first = 0, .subdomains = parts_.size(), .spheres = spheres};
   for (int k = 0; k < D; ++k) {
     all.part.low[k] = box.periodic(k) ? 0 : -kInfinite;
     all.part.high[k] = box.periodic(k) ? box.edges[k] : kInfinite;
@@ -86,19 +86,19 @@ Division<D>::Division(const Box<D>& box, std::span<const Vec<D>> x, std::size_t 
   for (std::uint32_t r = 0; r < parts_.size(); ++r) neighbours_.push_back(neighbours_of(r));
 }
 
-/// Makes a piece known to the cut that it is a side of, and a region where that is all; else it is cut further.
+/// Makes a piece known to the cut that it is a side of, and a subdomain where that is all; else it is cut further.
 template <int D>
-void Division<D>::settle(Piece piece, std::vector<Piece>& pieces) {
-  const bool region = piece.regions == 1;
+void Bisection<D>::settle(Piece piece, std::vector<Piece>& pieces) {
+  const bool subdomain = piece.subdomains == 1;
   // Pieces that are cut further are cut in their order.
   const auto node =
-      region ? ~static_cast<std::int32_t>(piece.first) : static_cast<std::int32_t>(cuts_.size() + pieces.size());
+      subdomain ? ~static_cast<std::int32_t>(piece.first) : static_cast<std::int32_t>(cuts_.size() + pieces.size());
   if (piece.above_cut == kNoCut)
     root_ = node;
   else
     (piece.upper ? cuts_[static_cast<std::size_t>(piece.above_cut)].above
                  : cuts_[static_cast<std::size_t>(piece.above_cut)].below) = node;
-  if (!region) {
+  if (!subdomain) {
     pieces.push_back(std::move(piece));
     return;
   }
@@ -112,7 +112,7 @@ void Division<D>::settle(Piece piece, std::vector<Piece>& pieces) {
 
 /// Cuts pieces across their longest edges, all at once; returns what is to be cut further.
 template <int D>
-auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::vector<Piece> {
+auto Bisection<D>::cut(std::span<const Piece> pieces, Communicator& ranks) -> std::vector<Piece> {
   // Where the spheres of each are, for edges that are not those of the box; and their work.
   std::vector<double> bounds;  // largest of −x, and of x
   std::vector<std::uint64_t> work;
@@ -138,11 +138,11 @@ auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::ve
       high[k] = std::isfinite(piece.part.high[k]) ? piece.part.high[k] : bounds[2 * (p * D + k) + 1];
       if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
     }
-    const std::size_t below = piece.regions / 2;
-    const double share = static_cast<double>(below) / static_cast<double>(piece.regions);
+    const std::size_t below = piece.subdomains / 2;
+    const double share = static_cast<double>(below) / static_cast<double>(piece.subdomains);
     cuts_.push_back({axis, low[axis] + (high[axis] - low[axis]) * share, 0, 0});
     OrderStatistic& split = wanted.emplace_back();
-    split.number = work[p] / piece.regions * below + work[p] % piece.regions * below / piece.regions;
+    split.number = work[p] / piece.subdomains * below + work[p] % piece.subdomains * below / piece.subdomains;
     for (const Sphere& sphere : piece.spheres) split.elements.push_back({ordered(sphere.x[axis]), sphere.work});
   }
   select(wanted, ranks);
@@ -165,11 +165,11 @@ auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::ve
     const auto middle = std::partition(piece.spheres.begin(), piece.spheres.end(),
                                        [&](const Sphere& sphere) { return sphere.x[cut.axis] < cut.at; });
     const auto number = static_cast<std::int32_t>(first + p);
-    const std::size_t below = piece.regions / 2;
+    const std::size_t below = piece.subdomains / 2;
     Piece lower{piece.part, piece.first, below, {piece.spheres.begin(), middle}, number, false};
     Piece upper{piece.part,
                 piece.first + static_cast<std::uint32_t>(below),
-                piece.regions - below,
+                piece.subdomains - below,
                 {middle, piece.spheres.end()},
                 number,
                 true};
@@ -181,7 +181,7 @@ auto Division<D>::cut(std::span<const Piece> pieces, Exchange& ranks) -> std::ve
 }
 
 template <int D>
-std::uint32_t Division<D>::owner(const Vec<D>& at) const {
+std::uint32_t Bisection<D>::owner(const Vec<D>& at) const {
   std::int32_t node = root_;
   while (node >= 0) {
     const Cut& cut = cuts_[static_cast<std::size_t>(node)];
@@ -191,8 +191,8 @@ std::uint32_t Division<D>::owner(const Vec<D>& at) const {
 }
 
 template <int D>
-bool Division<D>::clip(std::uint32_t region, double margin, Vec<D>& low, Vec<D>& high) const {
-  const Part& part = parts_[region];
+bool Bisection<D>::clip(std::uint32_t subdomain, double margin, Vec<D>& low, Vec<D>& high) const {
+  const Part& part = parts_[subdomain];
   for (int k = 0; k < D; ++k) {
     const double edge = box_.edges[k];
     const bool images = box_.periodic(k);
@@ -212,7 +212,7 @@ bool Division<D>::clip(std::uint32_t region, double margin, Vec<D>& low, Vec<D>&
 
 /// Between two stretches of an axis.
 template <int D>
-double Division<D>::gap(int axis, double low, double high, double other_low, double other_high) const {
+double Bisection<D>::gap(int axis, double low, double high, double other_low, double other_high) const {
   const double edge = box_.edges[axis];
   double least = std::max({low - other_high, other_low - high, 0.0});
   if (box_.periodic(axis)) {
@@ -223,21 +223,21 @@ double Division<D>::gap(int axis, double low, double high, double other_low, dou
 }
 
 template <int D>
-std::vector<std::uint32_t> Division<D>::neighbours_of(std::uint32_t region) const {
+std::vector<std::uint32_t> Bisection<D>::neighbours_of(std::uint32_t subdomain) const {
   std::vector<std::uint32_t> near;
   for (std::uint32_t r = 0; r < parts_.size(); ++r) {
-    const Part &a = parts_[std::min(r, region)], &b = parts_[std::max(r, region)];  // the same for both
+    const Part &a = parts_[std::min(r, subdomain)], &b = parts_[std::max(r, subdomain)];  // the same for both
     double sum = 0;
     for (int k = 0; k < D; ++k) {
       const double d = gap(k, a.low[k], a.high[k], b.low[k], b.high[k]);
       sum += d * d;
     }
-    if (r != region && sum <= reach_ * reach_) near.push_back(r);
+    if (r != subdomain && sum <= reach_ * reach_) near.push_back(r);
   }
   return near;
 }
 
-template class Division<2>;
-template class Division<3>;
+template class Bisection<2>;
+template class Bisection<3>;
 
 }  // namespace carom

@@ -1,6 +1,6 @@
-// A system divided among ranks has the bits of one that is not, whatever the regions and the windows.
+// A system divided among ranks has the bits of one that is not, whatever the subdomains and the windows.
 
-#include "engine/ranks/domains.h"
+#include "engine/ranks/windowed_flight.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 /// How a run is divided.
 struct Way {
-  int regions = 1;
+  int subdomains = 1;
   SearchOptions::Method method = SearchOptions::Method::automatic;
   double in_cache = SearchOptions{}.in_cache;
   std::function<double()> window{};
@@ -43,23 +43,23 @@ Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std
 
 template <int D>
 Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr,
-                   DomainCounts* domains_counted = nullptr) {
+                   WindowCounts* windows_counted = nullptr) {
   Outcome<D> out;
-  test::ThreadRanks(way.regions).run([&](Exchange& ranks) {
+  test::ThreadRanks(way.subdomains).run([&](Communicator& ranks) {
     System<D> system;
     system.box = c.system->box;
     system.particles = c.system->particles;
     system.decomposition.join(ranks);
     Particles<D>& p = system.particles;
-    Domains<D> domains(system.box, system.decomposition.sizes(), ranks,
-                       {.method = way.method, .in_cache = way.in_cache}, way.window);
+    WindowedFlight<D> flight(system.box, system.decomposition.sizes(), ranks,
+                             {.method = way.method, .in_cache = way.in_cache}, way.window);
     Counters counters;
     std::vector<Contact<D>> contacts;
     for (int k = 0; k < c.slabs && counters.sphere_sphere < way.limit; ++k) {
-      domains.take(p, c.g, c.slab);
+      flight.take(p, c.g, c.slab);
       const double reached =
-          domains.run(c.slab, {.counters = counters, .contacts = &contacts, .collision_limit = way.limit});
-      domains.give_back(reached, p);
+          flight.run(c.slab, {.counters = counters, .contacts = &contacts, .collision_limit = way.limit});
+      flight.give_back(reached, p);
       system.wrap();
       system.box = system.box.after(reached);
     }
@@ -67,7 +67,7 @@ Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr
     if (ranks.rank() > 0) return;
     out = {std::move(contacts), std::move(all)};
     if (counted) *counted = counters;
-    if (domains_counted) *domains_counted = domains.domain_counts();
+    if (windows_counted) *windows_counted = flight.window_counts();
   });
   return out;
 }
@@ -78,13 +78,13 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
   const auto reference = whole(c, std::numeric_limits<std::uint64_t>::max(), &one);
   ASSERT_GE(reference.contacts.size(), at_least);
   using Method = SearchOptions::Method;
-  for (const int regions : {1, 2, 3, 4, 8})
+  for (const int subdomains : {1, 2, 3, 4, 8})
     for (const Method method : {Method::lists, Method::cells}) {
-      DomainCounts counts;
-      const std::string what = std::to_string(regions) + (method == Method::lists ? " lists" : " cells");
-      const double in_cache = regions % 2 == 0 ? SearchOptions{}.in_cache : 0;  // nothing: fetch all ahead
-      expect_same(reference, divided(c, {.regions = regions, .method = method, .in_cache = in_cache}, &many, &counts),
-                  what);
+      WindowCounts counts;
+      const std::string what = std::to_string(subdomains) + (method == Method::lists ? " lists" : " cells");
+      const double in_cache = subdomains % 2 == 0 ? SearchOptions{}.in_cache : 0;  // nothing: fetch all ahead
+      expect_same(reference,
+                  divided(c, {.subdomains = subdomains, .method = method, .in_cache = in_cache}, &many, &counts), what);
       if (testing::Test::HasFailure()) return;
       EXPECT_EQ(one.sphere_sphere, many.sphere_sphere) << what;
       EXPECT_EQ(one.sphere_wall, many.sphere_wall) << what;
@@ -98,7 +98,7 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
     }
 }
 
-TEST(Domains, Fluids) {
+TEST(WindowedFlight, Fluids) {
   expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.49), .slab = 0.3, .slabs = 2}, 3900);
   expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.3), .slab = 0.8, .slabs = 2}, 2000);
   expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(5, 0.1), .slab = 2, .slabs = 2}, 700);
@@ -106,21 +106,21 @@ TEST(Domains, Fluids) {
   expect_the_same_however_divided<2>({.system = test::hard_spheres<2>(10, 0.1), .slab = 5, .slabs = 2}, 300);
 }
 
-TEST(Domains, Crystals) {
+TEST(WindowedFlight, Crystals) {
   expect_the_same_however_divided<3>({.system = test::hard_spheres<3>(4, 0.7), .slab = 0.04, .slabs = 2}, 1800);
   expect_the_same_however_divided<2>({.system = test::hard_spheres<2>(8, 0.8), .slab = 0.1, .slabs = 2}, 400);
 }
 
-TEST(Domains, ManySizes) {
+TEST(WindowedFlight, ManySizes) {
   expect_the_same_however_divided<3>(
       {.system = random_system<3>(300, {7, 7, 7}, {P, P, P}, 0.1, 1.0, 3), .slab = 0.05, .slabs = 2}, 700);
   expect_the_same_however_divided<2>(
       {.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3, .slabs = 2}, 200);
 }
 
-/// All in one line across the longest edge, at its end or in its middle: regions can have no sphere, or one, before
+/// All in one line across the longest edge, at its end or in its middle: subdomains can have no sphere, or one, before
 /// others come, in the same epoch or in the next.
-TEST(Domains, EmptyRegions) {
+TEST(WindowedFlight, EmptyRegions) {
   for (const double column : {5.0, 100.0}) {
     const int n = 80;
     std::vector<Vec<2>> x, v;
@@ -138,9 +138,9 @@ TEST(Domains, EmptyRegions) {
   }
 }
 
-/// The core of a region has cells near its spheres only, until one comes to where none was expected: here all, out of
-/// one end of a periodic box into all of it.
-TEST(Domains, SpheresFarFromTheirRegion) {
+/// The core of a subdomain has cells near its spheres only, until one comes to where none was expected: here all, out
+/// of one end of a periodic box into all of it.
+TEST(WindowedFlight, SpheresFarFromTheirRegion) {
   for (const double radius : {0.4, 0.2})  // equal ones, and others
     for (const auto method : {SearchOptions::Method::lists, SearchOptions::Method::cells}) {
       auto system = random_system<3>(150, {6, 6, 6}, {P, P, P}, radius, 0.4, 23);
@@ -164,7 +164,7 @@ TEST(Domains, SpheresFarFromTheirRegion) {
     }
 }
 
-TEST(Domains, WallsAndFields) {
+TEST(WindowedFlight, WallsAndFields) {
   expect_the_same_however_divided<3>({.system = random_system<3>(150, {7, 6, 6}, {W, P, W}, 0.5, 0.5, 5), .slab = 1},
                                      1000);
   expect_the_same_however_divided<3>(
@@ -173,7 +173,7 @@ TEST(Domains, WallsAndFields) {
       {.system = random_system<2>(40, {7, 12}, {W, W}, 0.3, 0.5, 8), .g = {0, -0.5}, .slab = 1}, 200);
 }
 
-TEST(Domains, Pistons) {
+TEST(WindowedFlight, Pistons) {
   for (const double speed : {-0.3, 0.7}) {
     Case<3> c{.system = random_system<3>(150, {7, 6, 8}, {W, P, W}, 0.4, 0.5, 25), .slab = 1};
     c.system->box.edge_velocity = {speed, 0, -0.2};
@@ -181,30 +181,30 @@ TEST(Domains, Pistons) {
   }
 }
 
-/// Regions with more events a sphere become smaller: that changes no path.
-TEST(Domains, UnevenWork) {
+/// Subdomains with more events a sphere become smaller: that changes no path.
+TEST(WindowedFlight, UnevenWork) {
   expect_the_same_however_divided<3>(
       {.system = random_system<3>(200, {6, 6, 24}, {P, P, W}, 0.4, 0.4, 17), .g = {0, 0, -2}, .slab = 1.5, .slabs = 5},
       1500);
 }
 
-/// One sphere is so fast that each region would have more neighbours than there are bits for.
-TEST(Domains, MoreRegionsThanTheBoxHasRoomFor) {
+/// One sphere is so fast that each subdomain would have more neighbours than there are bits for.
+TEST(WindowedFlight, MoreRegionsThanTheBoxHasRoomFor) {
   const Case<3> c{.system = test::hard_spheres<3>(6, 0.49), .slab = 0.01, .slabs = 2};
   c.system->particles.v[5] *= 100;
-  DomainCounts counts;
-  expect_same(whole(c), divided(c, {.regions = 72}, nullptr, &counts), "72 regions");
-  EXPECT_GT(counts.regions, 20u);
-  EXPECT_LT(counts.regions, 72u);
+  WindowCounts counts;
+  expect_same(whole(c), divided(c, {.subdomains = 72}, nullptr, &counts), "72 subdomains");
+  EXPECT_GT(counts.subdomains, 20u);
+  EXPECT_LT(counts.subdomains, 72u);
   EXPECT_GT(counts.windows, 0u);
 }
 
-TEST(Domains, OpenSpace) {
+TEST(WindowedFlight, OpenSpace) {
   expect_the_same_however_divided<3>(
       {.system = random_system<3>(200, {8, 8, 8}, {O, O, P}, 0.5, 0.5, 9), .slab = 4, .slabs = 4}, 150);
 }
 
-TEST(Domains, TinyPeriodicBoxes) {  // regions border on themselves, and spheres meet through several images
+TEST(WindowedFlight, TinyPeriodicBoxes) {  // subdomains border on themselves, and spheres meet through several images
   expect_the_same_however_divided<3>(
       {.system = random_system<3>(24, {3.1, 2.9, 3.3}, {P, P, P}, 0.4, 0.4, 10), .slab = 2}, 400);
   expect_the_same_however_divided<2>({.system = random_system<2>(16, {4.2, 5.6}, {P, P}, 0.5, 0.5, 11), .slab = 5},
@@ -213,7 +213,7 @@ TEST(Domains, TinyPeriodicBoxes) {  // regions border on themselves, and spheres
 
 /// Rows and columns of spheres at exact places, at rest or with speeds of −1 and 1 along an axis: many collisions at
 /// one instant, chains of them.
-TEST(Domains, ExactTies) {
+TEST(WindowedFlight, ExactTies) {
   for (const std::size_t variant : {0, 1, 2, 3, 4, 5}) {
     const int n = 6;
     std::vector<Vec<3>> x, v;
@@ -232,14 +232,14 @@ TEST(Domains, ExactTies) {
   }
 }
 
-/// A bullet would cross many regions in a window that suits the others.
-TEST(Domains, OneFastSphere) {
+/// A bullet would cross many subdomains in a window that suits the others.
+TEST(WindowedFlight, OneFastSphere) {
   Case<3> c{.system = random_system<3>(200, {9, 9, 9}, {P, P, P}, 0.4, 0.4, 12), .slab = 1, .slabs = 2};
   c.system->particles.v[17] = {300, 20, 1};
   expect_the_same_however_divided<3>(c, 2000);
 }
 
-TEST(Domains, RandomWindows) {
+TEST(WindowedFlight, RandomWindows) {
   const Case<3> c{.system = test::hard_spheres<3>(5, 0.3), .slab = 0.8, .slabs = 2};
   const auto reference = whole(c);
   for (std::uint64_t seed : {1, 2, 3}) {
@@ -247,17 +247,17 @@ TEST(Domains, RandomWindows) {
       state = state * 6364136223846793005u + 1442695040888963407u;
       return 1e-4 * std::pow(1000.0, static_cast<double>(state >> 33) / 2147483648.0);
     };
-    expect_same(reference, divided(c, {.regions = 4, .window = window}), "seed " + std::to_string(seed));
+    expect_same(reference, divided(c, {.subdomains = 4, .window = window}), "seed " + std::to_string(seed));
   }
 }
 
-TEST(Domains, EndsAtACollision) {
+TEST(WindowedFlight, EndsAtACollision) {
   const Case<3> c{.system = test::hard_spheres<3>(5, 0.3), .slab = 0.8, .slabs = 3};
   for (const std::uint64_t limit : {1, 2, 777, 1500}) {
     const auto reference = whole(c, limit);
     ASSERT_EQ(reference.contacts.size(), limit);
-    for (const int regions : {1, 3, 8})
-      expect_same(reference, divided(c, {.regions = regions, .limit = limit}), std::to_string(limit));
+    for (const int subdomains : {1, 3, 8})
+      expect_same(reference, divided(c, {.subdomains = subdomains, .limit = limit}), std::to_string(limit));
   }
 }
 

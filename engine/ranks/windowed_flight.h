@@ -1,26 +1,27 @@
 #pragma once
-// Free flight of a system divided among ranks, a region each, with the bits of one core.
+// Free flight of a system divided among ranks, a subdomain each, with the bits of one core.
 //
-// Time goes in windows (engine/ranks/region.h). In each no sphere may come farther than `stray` from where it was at
-// its start, so that a region needs to know those only that start within a diameter and two strays of it; where a
-// sphere is faster than expected the window is cut to the time at which it would have mattered. A sphere belongs to the
-// region that it is in at a window's start, which all regions that have it compute alike.
+// Time goes in windows (engine/ranks/subdomain.h). In each no sphere may come farther than `max_displacement` from
+// where it was at its start, so that a subdomain needs to know those only that start within a diameter and twice
+// `max_displacement` of it; where a sphere is faster than expected the window is cut to the time at which it would have
+// mattered. A sphere belongs to the subdomain that it is in at a window's start, which all subdomains that have it
+// compute alike.
 //
-//   Domains<3> domains(box, particles, exchange);
-//   domains.take(particles, g, horizon);
-//   domains.run(end, report);
-//   domains.give_back(end, particles);
+//   WindowedFlight<3> flight(box, particles, ranks);
+//   flight.take(particles, g, horizon);
+//   flight.run(end, report);
+//   flight.give_back(end, particles);
 //
 // All of it is collective. No rank has all particles: between epochs it has a block of them (id_blocks.h), in an epoch
-// those of its region and their ghosts. Where there are too few particles for all ranks, or the box has no room for so
-// many regions, the last ranks have none.
+// those of its subdomain and their ghosts. Where there are too few particles for all ranks, or the box has no room for
+// so many subdomains, the last ranks have none.
 
 #include <optional>
 
-#include "engine/ranks/division.h"
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/bisection.h"
+#include "engine/ranks/communicator.h"
 #include "engine/ranks/id_blocks.h"
-#include "engine/ranks/region.h"
+#include "engine/ranks/subdomain.h"
 
 namespace carom {
 
@@ -32,13 +33,13 @@ struct Instants {
 };
 
 template <int D>
-class Domains {
+class WindowedFlight {
  public:
   using Report = typename EventCore<D>::Report;
 
   /// `window` forces the length of windows [time].
-  Domains(const Box<D>& box, Sizes sizes, Exchange& exchange, const SearchOptions& options = {},
-          std::function<double()> window = {});
+  WindowedFlight(const Box<D>& box, Sizes sizes, Communicator& ranks, const SearchOptions& options = {},
+                 std::function<double()> window = {});
 
   /// As EventCore::take(), load() and so on. Particles are this rank's block; contacts are reported on rank 0.
   void take(Particles<D>& particles, const Vec<D>& g, double horizon) { take(particles, g, horizon, nullptr); }
@@ -54,16 +55,16 @@ class Domains {
   void give_back(double time, Particles<D>& particles);
   double now() const { return now_; }
 
-  /// Of this rank, since the domains were made.
+  /// Of this rank, since the flight were made.
   EventCounts counts() const;
-  DomainCounts domain_counts() const;
+  WindowCounts window_counts() const;
 
  private:
   static constexpr double kFaster = 1.15;  // factor between the largest speed and the one allowed for
 
-  IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(exchange_.size())}; }
+  IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(ranks_.size())}; }
   void take(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants* instants);
-  void make_region(std::size_t regions);
+  void make_subdomain(std::size_t subdomains);
   void measure_work();
   void collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const;
   void reload();
@@ -73,45 +74,45 @@ class Domains {
   double first_pace(const Particles<D>& particles) const;
   void sort_out(bool loaded);
   void agree();
-  std::vector<Bytes> exchange_messages();
+  std::vector<Bytes> swap_messages();
   void send_paths();
   double window_end(double end);
-  double first_astray(double end);
+  double first_beyond(double end);
   double cut_at(double time);
-  ContactTally tally() const { return region_ ? region_->tally() : ContactTally{}; }
+  ContactTally tally() const { return subdomain_ ? subdomain_->tally() : ContactTally{}; }
   void add_contacts(std::vector<Contact<D>>& contacts) const;
   void report_all(const ContactTally& sum, const std::vector<Contact<D>>& contacts, const Report& report);
-  double astray_at(Slot i, double end) const;
+  double beyond_at(Slot i, double end) const;
   std::optional<EventKey<D>> key_of_collision(std::uint64_t number) const;
   Contact<D> contact_of(Slot lo, std::size_t k) const;
 
   const Box<D>& box_;
   Sizes sizes_;
-  Exchange& exchange_;
-  std::size_t regions_ = 0;
+  Communicator& ranks_;
+  std::size_t subdomains_ = 0;
   SearchOptions options_;
   std::function<double()> forced_window_;
-  std::optional<Division<D>> division_;
-  std::unique_ptr<Region<D>> region_;         // of this rank, with its number; null: it has none
+  std::optional<Bisection<D>> bisection_;
+  std::unique_ptr<Subdomain<D>> subdomain_;   // of this rank, with its number; null: it has none
   std::vector<int> partners_;                 // the ranks of its neighbours
   std::vector<Bytes> outgoing_;               // to each of them
   std::vector<std::vector<Bytes>> received_;  // of the window: paths that were sent here
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
-  double diameter_ = 0;       // the largest
-  double stray_ = 0;          // how far a sphere comes in a window at most
-  double fastest_ = 0;        // the largest speed expected
-  double pace_ = 0;           // time in which a sphere collides kCollisions times, about
-  bool sorted_ = false;       // owners and ghosts are those of now_
-  bool cut_ = false;          // the last window was cut, and regions must be loaded again
-  std::uint64_t events_ = 0;  // contacts since take()
-  // How much the region had to do in the epoch, a sphere of it, the mean of all being kUsualWork; and each sphere of
+  double diameter_ = 0;          // the largest
+  double max_displacement_ = 0;  // how far a sphere comes in a window at most
+  double fastest_ = 0;           // the largest speed expected
+  double pace_ = 0;              // time in which a sphere collides kCollisions times, about
+  bool sorted_ = false;          // owners and ghosts are those of now_
+  bool cut_ = false;             // the last window was cut, and subdomains must be loaded again
+  std::uint64_t events_ = 0;     // contacts since take()
+  // How much the subdomain had to do in the epoch, a sphere of it, the mean of all being kUsualWork; and each sphere of
   // this rank's block.
-  std::uint32_t region_work_ = 0;
+  std::uint32_t subdomain_work_ = 0;
   std::vector<std::uint32_t> work_;
   std::uint64_t run_before_ = 0;  // events of first runs, before the epoch
-  EventCounts event_counts_;      // of a region that is no more
-  DomainCounts counts_;
+  EventCounts event_counts_;      // of a subdomain that is no more
+  WindowCounts counts_;
 };
 
 }  // namespace carom

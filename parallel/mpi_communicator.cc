@@ -1,4 +1,4 @@
-#include "parallel/mpi_exchange.h"
+#include "parallel/mpi_communicator.h"
 
 #include <algorithm>
 #include <array>
@@ -26,7 +26,7 @@ void in_pieces(std::size_t size, Start&& start) {
 /// By recursive doubling: log2 P messages, each of which is waited for with an eye on failures. (MPI_Allreduce cannot
 /// be left; MPI_Iallreduce takes thrice as long.) The value of the lower rank comes first, so that all get the same
 /// bits.
-void MpiExchange::combine(std::span<double> most, std::span<std::uint64_t> sums) {
+void MpiCommunicator::combine(std::span<double> most, std::span<std::uint64_t> sums) {
   ranks_.watch().begin_call();
   mine_.assign(sums.begin(), sums.end());
   for (const double value : most) mine_.push_back(std::bit_cast<std::uint64_t>(value));
@@ -68,7 +68,7 @@ void MpiExchange::combine(std::span<double> most, std::span<std::uint64_t> sums)
   for (std::size_t k = 0; k < most.size(); ++k) most[k] = std::bit_cast<double>(mine_[sums.size() + k]);
 }
 
-std::vector<Bytes> MpiExchange::trade(const std::function<const Bytes&(std::size_t)>& outgoing) {
+std::vector<Bytes> MpiCommunicator::trade(const std::function<const Bytes&(std::size_t)>& outgoing) {
   ranks_.watch().begin_call();
   const auto p = static_cast<std::size_t>(size());
   leaving_.resize(p);
@@ -96,7 +96,7 @@ std::vector<Bytes> MpiExchange::trade(const std::function<const Bytes&(std::size
   return std::move(incoming_);
 }
 
-std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing) {
+std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing) {
   outgoing_ = std::move(outgoing);
   auto incoming = trade([this](std::size_t r) -> const Bytes& { return outgoing_[r]; });
   const auto self = static_cast<std::size_t>(rank());
@@ -106,7 +106,7 @@ std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing) {
 }
 
 /// The first message to a neighbour has the length, and as much of the data as fits; few need a second one.
-std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing, std::span<const int> partners) {
+std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<const int> partners) {
   ranks_.watch().begin_call();
   outgoing_ = std::move(outgoing);
   incoming_.assign(partners.size(), {});
@@ -146,7 +146,7 @@ std::vector<Bytes> MpiExchange::swap(std::vector<Bytes> outgoing, std::span<cons
   return std::move(incoming_);
 }
 
-std::vector<Bytes> MpiExchange::gather(const Bytes& mine) {
+std::vector<Bytes> MpiCommunicator::gather(const Bytes& mine) {
   auto incoming = trade([&mine](std::size_t) -> const Bytes& { return mine; });
   incoming[static_cast<std::size_t>(rank())] = mine;
   return incoming;

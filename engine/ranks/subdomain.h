@@ -1,45 +1,45 @@
 #pragma once
-// One region of a system that is divided among several event cores, and what makes it agree with its neighbours.
+// One subdomain of a system that is divided among several event cores, and what makes it agree with its neighbours.
 //
-// A region owns the spheres in it and has copies of those near it, ghosts, which other regions own. Time goes in
-// windows. In each the region runs what it has as if there were no others, and records all paths. Then the owners send
-// the paths of their spheres, which for the others are scripts of their ghosts; where a script differs from what was
-// seen here the window is repaired, from the first difference on and only as far as that reaches, in the order of keys.
-// Paths that have changed are sent again, until nothing changes: then every ghost was seen as its owner has it, and
-// since a contact is a pure function of two records, all is as in a run by one core. (The smallest key at which any
+// A subdomain owns the spheres in it and has copies of those near it, ghosts, which other subdomains own. Time goes in
+// windows. In each the subdomain runs what it has as if there were no others, and records all paths. Then the owners
+// send the paths of their spheres, which for the others are scripts of their ghosts; where a script differs from what
+// was seen here the window is repaired, from the first difference on and only as far as that reaches, in the order of
+// keys. Paths that have changed are sent again, until nothing changes: then every ghost was seen as its owner has it,
+// and since a contact is a pure function of two records, all is as in a run by one core. (The smallest key at which any
 // path is wrong grows with each round.)
 //
-//   region.load(records, division, number, …);
-//   region.run(now, end);
-//   while (…) { region.follow(id, message); …; region.repair(); … region.changed() … }
-//   region.commit();
-//   region.sort_out(now, send); …; region.admit(record, now);
+//   subdomain.load(records, bisection, number, …);
+//   subdomain.run(now, end);
+//   while (…) { subdomain.follow(id, message); …; subdomain.repair(); … subdomain.changed() … }
+//   subdomain.commit();
+//   subdomain.sort_out(now, send); …; subdomain.admit(record, now);
 
 #include <deque>
 #include <queue>
 
 #include "engine/base/contact_tally.h"
 #include "engine/events/event_core.h"
+#include "engine/ranks/bisection.h"
 #include "engine/ranks/by_slot.h"
-#include "engine/ranks/division.h"
-#include "engine/ranks/exchange.h"
+#include "engine/ranks/communicator.h"
 #include "engine/ranks/id_table.h"
 
 namespace carom {
 
 template <int D>
-class Region {
+class Subdomain {
  public:
   using Nodes = std::vector<Node<D>>;
 
-  /// `sizes` has the masses and radii of all spheres, and outlives the region.
-  Region(const Box<D>& box, const Sizes& sizes, const SearchOptions& options)
+  /// `sizes` has the masses and radii of all spheres, and outlives the subdomain.
+  Subdomain(const Box<D>& box, const Sizes& sizes, const SearchOptions& options)
       : box_(box), core_(box, &sizes, options) {}
 
-  /// Starts anew at time `now` as region `number` of a division, with all spheres that concern it. In no window will a
-  /// sphere come farther than `stray`.
-  void load(std::vector<Record<D>> records, const Division<D>& division, std::uint32_t number, const Vec<D>& g,
-            double horizon, double now, double stray);
+  /// Starts anew at time `now` as subdomain `number` of a bisection, with all spheres that concern it. In no window
+  /// will a sphere come farther than `max_displacement`.
+  void load(std::vector<Record<D>> records, const Bisection<D>& bisection, std::uint32_t number, const Vec<D>& g,
+            double horizon, double now, double max_displacement);
 
   // Between windows, at a time `now` that no event precedes any more.
 
@@ -55,9 +55,9 @@ class Region {
 
   // In a window.
 
-  /// Runs from `now` to `end`. Where a sphere comes farther than the stray from its start the window is invalid: cut it
-  /// before that. Returns the end, or the time of the first event for which the log has no room: it is invalid then,
-  /// too.
+  /// Runs from `now` to `end`. Where a sphere comes farther than `max_displacement` from its start the window is
+  /// invalid: cut it before that. Returns the end, or the time of the first event for which the log has no room: it is
+  /// invalid then, too.
   double run(double now, double end);
   /// Appends the path of a sphere to a message.
   void write_path(Slot i, Bytes& to) const;
@@ -125,7 +125,7 @@ class Region {
     Record<D> now;  // at the time that repair has come to
     Slot slot;
     std::uint32_t version = 0;  // grows with every change: what was planned before no longer holds
-    bool strays = false;        // a ghost that no longer follows its script
+    bool left_script = false;   // a ghost that no longer follows its script
     std::size_t script = 0;     // the next node of its script
     std::size_t kept = 0;       // nodes of its old path that stand
     Nodes old;                  // the others
@@ -155,7 +155,7 @@ class Region {
   Path& path_of(Slot i);
   Path& rewritten(Slot i);
   EventKey<D> key_of(const typename Trace<D>::Event& event) const;
-  Node<D> traced(Slot i, std::span<const std::uint32_t> shares, std::size_t k) const;
+  Node<D> traced(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const;
   std::span<const Node<D>> script_of(Slot g);
   bool matches(Slot g);
   bool mended(Slot i) const { return mended_of_[i] != kNone; }
@@ -176,9 +176,9 @@ class Region {
 
   const Box<D>& box_;
   EventCore<D> core_;
-  double end_ = 0, length_ = 0, stray_ = 0;  // of the window
-  double unwatched_ = 0;                     // how far spheres may have come since watch()
-  const Division<D>* division_ = nullptr;
+  double end_ = 0, length_ = 0, max_displacement_ = 0;  // of the window
+  double unwatched_ = 0;                                // how far spheres may have come since watch()
+  const Bisection<D>* bisection_ = nullptr;
   std::uint32_t number_ = 0;
   IdTable slots_;
   std::vector<Role> role_;              // by slot
@@ -205,13 +205,13 @@ class Region {
 
 template <int D>
 template <class Send>
-void Region<D>::sort_out(double now, Send&& send) {
-  if (unwatched_ += stray_; unwatched_ > kSlack * stray_) watch(now);
+void Subdomain<D>::sort_out(double now, Send&& send) {
+  if (unwatched_ += max_displacement_; unwatched_ > kSlack * max_displacement_) watch(now);
   std::size_t stay = 0;
   for (Edge edge : edge_) {
     const Slot i = edge.slot;
     if (edge.speed >= 0 && (trace_.has(i) || disturbed_[i] != 0)) edge.speed = kUnknown;
-    edge.quiet -= edge.speed >= 0 ? edge.speed * length_ : stray_;
+    edge.quiet -= edge.speed >= 0 ? edge.speed * length_ : max_displacement_;
     if (!(edge.quiet > 0)) {
       const std::uint64_t before = holders_[i];
       edge = look_at(i, now);
@@ -227,7 +227,7 @@ void Region<D>::sort_out(double now, Send&& send) {
 
 template <int D>
 template <class Visit>
-void Region<D>::for_each_touched(Visit&& visit) const {
+void Subdomain<D>::for_each_touched(Visit&& visit) const {
   for (const auto& event : trace_.events())
     for (const int which : {0, 1})
       if (event.last[which] == kNone && event.slot[which] != kNone && is_own(event.slot[which]))

@@ -1,7 +1,7 @@
 #pragma once
 // The ranks of a run: MPI started and ended with the life of one object.
 //
-//   Communicator ranks(600);
+//   World ranks(600);
 //   return ranks.on_all([&] { return simulate(deck, exchange); });
 //
 // Works under mpirun and as a single process alike. The engine knows nothing of it.
@@ -15,14 +15,14 @@
 
 namespace carom {
 
-class Communicator {
+class World {
  public:
   /// Starts MPI (MPI_THREAD_FUNNELED) and duplicates the world communicator. One object a process, once. `silence`:
   /// seconds after which ranks that work together give up those that do not answer; 0: never.
-  explicit Communicator(double silence = 0);
-  ~Communicator();
-  Communicator(const Communicator&) = delete;
-  Communicator& operator=(const Communicator&) = delete;
+  explicit World(double silence = 0);
+  ~World();
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
 
   /// Whether a launcher (mpirun, srun) has started this process, perhaps with others.
   static bool launched();

@@ -1,19 +1,19 @@
 #pragma once
-// Exchange among the ranks of a Communicator, by MPI.
+// Communicator among the ranks of a World, by MPI.
 //
 // Waits look for failures of others (parallel/watch.h) and throw RankFailure or SilentRanks; messages may arrive after
-// that, so the object must outlive Communicator::on_all(). They may be of any length: MPI's limit of 2^31 bytes does
+// that, so the object must outlive World::on_all(). They may be of any length: MPI's limit of 2^31 bytes does
 // not show.
 
-#include "engine/ranks/exchange.h"
-#include "parallel/communicator.h"
+#include "engine/ranks/communicator.h"
+#include "parallel/world.h"
 
 namespace carom {
 
-class MpiExchange : public Exchange {
+class MpiCommunicator : public Communicator {
  public:
   /// Keeps a reference. There are several ranks.
-  explicit MpiExchange(const Communicator& ranks) : ranks_(ranks) {}
+  explicit MpiCommunicator(const World& ranks) : ranks_(ranks) {}
 
   int rank() const override { return ranks_.rank(); }
   int size() const override { return ranks_.size(); }
@@ -25,7 +25,7 @@ class MpiExchange : public Exchange {
  private:
   std::vector<Bytes> trade(const std::function<const Bytes&(std::size_t)>& outgoing);
 
-  const Communicator& ranks_;
+  const World& ranks_;
   // Where messages arrive; what leaves in swap().
   std::vector<std::uint64_t> leaving_, coming_;
   std::vector<Bytes> incoming_, outgoing_;

@@ -1,4 +1,4 @@
-#include "parallel/communicator.h"
+#include "parallel/world.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -29,9 +29,9 @@ Outcome outcome_of(const std::function<int()>& work) {
 
 }  // namespace
 
-bool Communicator::launched() { return std::getenv("PMIX_RANK") != nullptr || std::getenv("PMI_RANK") != nullptr; }
+bool World::launched() { return std::getenv("PMIX_RANK") != nullptr || std::getenv("PMI_RANK") != nullptr; }
 
-Communicator::Communicator(double silence) {
+World::World(double silence) {
   // A process started without a launcher needs neither a daemon of Open MPI's beside it nor its directory in /tmp,
   // which may be full, and which other jobs of the same user take away when they end. Only defaults: the user's word
   // counts.
@@ -47,20 +47,20 @@ Communicator::Communicator(double silence) {
   if (size_ > 1) watch_ = std::make_unique<Watch>(world_, silence);
 }
 
-Communicator::~Communicator() {
+World::~World() {
   watch_.reset();
   MPI_Comm_free(&world_);
   MPI_Finalize();
 }
 
-int Communicator::on_all(const std::function<int()>& work) const {
+int World::on_all(const std::function<int()>& work) const {
   const Outcome outcome = outcome_of(work);
   if (watch_) return watch_->settle(outcome, false);
   if (!outcome.failure.empty()) std::fprintf(stderr, "%s\n", outcome.failure.c_str());
   return outcome.code;
 }
 
-int Communicator::on_first(const std::function<int()>& work) const {
+int World::on_first(const std::function<int()>& work) const {
   if (!watch_) return on_all(work);
   return watch_->settle(rank_ == 0 ? outcome_of(work) : Outcome{}, true);
 }

@@ -14,9 +14,9 @@
 
 namespace carom {
 
-class Exchange {
+class Communicator {
  public:
-  virtual ~Exchange() = default;
+  virtual ~Communicator() = default;
   virtual int rank() const { return 0; }
   virtual int size() const { return 1; }
 
@@ -34,7 +34,7 @@ class Exchange {
 };
 
 /// The messages of all ranks, by rank, on rank 0; empty ones elsewhere. Collective.
-inline std::vector<Bytes> gather_on_first(Exchange& ranks, Bytes mine) {
+inline std::vector<Bytes> gather_on_first(Communicator& ranks, Bytes mine) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
   outgoing[0] = std::move(mine);
   return ranks.swap(std::move(outgoing));
@@ -42,7 +42,7 @@ inline std::vector<Bytes> gather_on_first(Exchange& ranks, Bytes mine) {
 
 /// Hands a value from rank to rank, each of which does add(value): the result is that of one rank that does it all.
 template <class Value, class Add>
-Value handed_on(Exchange& ranks, Value value, Add&& add) {
+Value handed_on(Communicator& ranks, Value value, Add&& add) {
   for (int rank = 0; rank < ranks.size(); ++rank) {
     Bytes mine;
     if (rank == ranks.rank()) {
@@ -57,7 +57,7 @@ Value handed_on(Exchange& ranks, Value value, Add&& add) {
 
 /// The sum over all ranks of what has a function add().
 template <class Sums>
-Sums sum_of_all(Exchange& ranks, const Sums& mine) {
+Sums sum_of_all(Communicator& ranks, const Sums& mine) {
   Bytes bytes;
   put(bytes, mine);
   Sums all;
@@ -66,9 +66,9 @@ Sums sum_of_all(Exchange& ranks, const Sums& mine) {
 }
 
 /// Another one, and the time that is spent in it.
-class TimedExchange final : public Exchange {
+class TimedCommunicator final : public Communicator {
  public:
-  explicit TimedExchange(Exchange& ranks) : ranks_(ranks) {}
+  explicit TimedCommunicator(Communicator& ranks) : ranks_(ranks) {}
   int rank() const override { return ranks_.rank(); }
   int size() const override { return ranks_.size(); }
   std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
@@ -90,7 +90,7 @@ class TimedExchange final : public Exchange {
   double seconds() const { return seconds_; }
 
  private:
-  Exchange& ranks_;
+  Communicator& ranks_;
   double seconds_ = 0;
 };
 

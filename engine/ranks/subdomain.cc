@@ -1,4 +1,4 @@
-#include "engine/ranks/region.h"
+#include "engine/ranks/subdomain.h"
 
 #include <algorithm>
 #include <cstring>
@@ -6,7 +6,7 @@
 namespace carom {
 
 template <int D>
-double Region<D>::run(double now, double end) {
+double Subdomain<D>::run(double now, double end) {
   end_ = end;
   length_ = end - now;
   trace_.clear(core_.flights().room());
@@ -25,7 +25,7 @@ double Region<D>::run(double now, double end) {
 
 /// Lists the spheres with events that are ghosts elsewhere, and the ghosts with events.
 template <int D>
-void Region<D>::index() {
+void Subdomain<D>::index() {
   changed_.clear();
   touched_ghosts_.clear();
   ++window_;
@@ -38,42 +38,42 @@ void Region<D>::index() {
     }
 }
 
-/// Node k of a path, as the trace has it, given the shares of the sphere.
+/// Node k of a path, as the trace has it, given the entries of the sphere.
 template <int D>
-Node<D> Region<D>::traced(Slot i, std::span<const std::uint32_t> shares, std::size_t k) const {
-  const auto& event = trace_.event_of(shares[k]);
-  return {.after = k + 1 < shares.size() ? trace_.before(shares[k + 1]) : core_.flights()[i],
+Node<D> Subdomain<D>::traced(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const {
+  const auto& event = trace_.event_of(entries[k]);
+  return {.after = k + 1 < entries.size() ? trace_.before(entries[k + 1]) : core_.flights()[i],
           .key = key_of(event),
           .virial = event.virial,
           .overlap = event.overlap};
 }
 
 template <int D>
-typename Region<D>::Path& Region<D>::path_of(Slot i) {
+typename Subdomain<D>::Path& Subdomain<D>::path_of(Slot i) {
   if (paths_.has(i)) return paths_.at(i);
   Path& path = paths_.add(i);
-  const auto shares = trace_.shares(i);
-  path.start = shares.empty() ? core_.flights()[i] : trace_.before(shares[0]);
+  const auto entries = trace_.entries(i);
+  path.start = entries.empty() ? core_.flights()[i] : trace_.before(entries[0]);
   path.nodes.clear();
-  for (std::size_t k = 0; k < shares.size(); ++k) path.nodes.push_back(traced(i, shares, k));
+  for (std::size_t k = 0; k < entries.size(); ++k) path.nodes.push_back(traced(i, entries, k));
   return path;
 }
 
 template <int D>
-void Region<D>::write_path(Slot i, Bytes& to) const {
+void Subdomain<D>::write_path(Slot i, Bytes& to) const {
   if (paths_.has(i)) {
     const Nodes& nodes = paths_.at(i).nodes;
     put(to, static_cast<std::uint32_t>(nodes.size()));
     for (const Node<D>& node : nodes) put(to, node);
     return;
   }
-  const auto shares = trace_.shares(i);
-  put(to, static_cast<std::uint32_t>(shares.size()));
-  for (std::size_t k = 0; k < shares.size(); ++k) put(to, traced(i, shares, k));
+  const auto entries = trace_.entries(i);
+  put(to, static_cast<std::uint32_t>(entries.size()));
+  for (std::size_t k = 0; k < entries.size(); ++k) put(to, traced(i, entries, k));
 }
 
 template <int D>
-EventKey<D> Region<D>::key_of(const typename Trace<D>::Event& event) const {
+EventKey<D> Subdomain<D>::key_of(const typename Trace<D>::Event& event) const {
   const auto& [lo, hi] = event.id;
   if (event.slot[1] == kNone)
     return {.time = event.time, .generation = event.generation, .kind = EventKind::wall, .lo = lo, .hi = event.partner};
@@ -82,27 +82,27 @@ EventKey<D> Region<D>::key_of(const typename Trace<D>::Event& event) const {
 
 /// A path that is going to be changed.
 template <int D>
-typename Region<D>::Path& Region<D>::rewritten(Slot i) {
+typename Subdomain<D>::Path& Subdomain<D>::rewritten(Slot i) {
   rewritten_[i] = 1;
   agreed_[i] = 0;
   return path_of(i);
 }
 
 template <int D>
-const Record<D>& Region<D>::after(Slot i) const {
+const Record<D>& Subdomain<D>::after(Slot i) const {
   if (!paths_.has(i)) return core_.flights()[i];
   const Path& path = paths_.at(i);
   return path.nodes.empty() ? path.start : path.nodes.back().after;
 }
 
 template <int D>
-bool Region<D>::is_own_id(Id id) const {
+bool Subdomain<D>::is_own_id(Id id) const {
   const Slot i = slots_.find(id);
   return i != IdTable::kNowhere && is_own(i);
 }
 
 template <int D>
-void Region<D>::follow(Id id, Reader& message) {
+void Subdomain<D>::follow(Id id, Reader& message) {
   const Slot g = slots_.find(id);
   Script& script = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
   script.count = message.get<std::uint32_t>();
@@ -112,14 +112,14 @@ void Region<D>::follow(Id id, Reader& message) {
 }
 
 template <int D>
-Node<D> Region<D>::Script::node(std::size_t k) const {
+Node<D> Subdomain<D>::Script::node(std::size_t k) const {
   Node<D> node;
   std::memcpy(static_cast<void*>(&node), bytes + k * sizeof node, sizeof node);
   return node;
 }
 
 template <int D>
-std::span<const Node<D>> Region<D>::script_of(Slot g) {
+std::span<const Node<D>> Subdomain<D>::script_of(Slot g) {
   if (!scripts_.has(g)) return {};
   Script& script = scripts_.at(g);
   while (script.nodes.size() < script.count) script.nodes.push_back(script.node(script.nodes.size()));
@@ -128,7 +128,7 @@ std::span<const Node<D>> Region<D>::script_of(Slot g) {
 
 /// Whether the path of a ghost here is its script.
 template <int D>
-bool Region<D>::matches(Slot g) {
+bool Subdomain<D>::matches(Slot g) {
   if (agreed_[g] == window_) return true;
   const std::size_t count = scripts_.has(g) ? scripts_.at(g).count : 0;
   std::size_t k = 0;
@@ -137,16 +137,16 @@ bool Region<D>::matches(Slot g) {
     if (nodes.size() != count) return false;
     while (k < count && nodes[k] == scripts_.at(g).node(k)) ++k;
   } else {
-    const auto shares = trace_.shares(g);
-    if (shares.size() != count) return false;
-    while (k < count && traced(g, shares, k) == scripts_.at(g).node(k)) ++k;
+    const auto entries = trace_.entries(g);
+    if (entries.size() != count) return false;
+    while (k < count && traced(g, entries, k) == scripts_.at(g).node(k)) ++k;
   }
   if (k == count) agreed_[g] = window_;
   return k == count;
 }
 
 template <int D>
-bool Region<D>::agrees(double end) {
+bool Subdomain<D>::agrees(double end) {
   const auto until = [&](std::span<const Node<D>> nodes) {
     while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
     return nodes;
@@ -161,7 +161,7 @@ bool Region<D>::agrees(double end) {
 }
 
 template <int D>
-ContactTally Region<D>::tally() const {
+ContactTally Subdomain<D>::tally() const {
   ContactTally tally;
   for (const auto& event : trace_.events())
     if (const Slot lo = event.slot[0]; is_own(lo) && rewritten_[lo] == 0)
@@ -175,7 +175,7 @@ ContactTally Region<D>::tally() const {
 }
 
 template <int D>
-void Region<D>::cut(const EventKey<D>& last) {
+void Subdomain<D>::cut(const EventKey<D>& last) {
   std::vector<Slot> touched(paths_.slots().begin(), paths_.slots().end());
   for_each_touched([&](Slot i) { touched.push_back(i); });
   for (const Slot i : touched) {
@@ -185,7 +185,7 @@ void Region<D>::cut(const EventKey<D>& last) {
 }
 
 template <int D>
-void Region<D>::commit() {
+void Subdomain<D>::commit() {
   other_.clear();
   for (const Slot slot : paths_.slots()) {
     if (rewritten_[slot] == 0) continue;
@@ -201,7 +201,7 @@ void Region<D>::commit() {
   changed_.clear();
 }
 
-template class Region<2>;
-template class Region<3>;
+template class Subdomain<2>;
+template class Subdomain<3>;
 
 }  // namespace carom

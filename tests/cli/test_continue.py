@@ -1,0 +1,417 @@
+"""`carom run --continue`: however a run was interrupted, its files in the end are those of an undisturbed one, bit for bit."""
+
+import os
+import pathlib
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import pytest
+
+from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, in_mount, killer_library, mpi_environment, mpirun, needs_carom,
+                  needs_compiler, needs_mount, run, summary, write_deck)
+
+sys.path.insert(0, str(ROOT / "tools"))
+from carom_files import toml_text
+from compare import compare, summary_differences
+
+pytestmark = needs_carom
+
+ALL_OUTPUT = ["output.events=true", "output.rdf_interval=0.07", "output.msd_interval=0.05", "output.profile_interval=0.11"]
+CHECKPOINTS = ["output.checkpoint_wall=\"0\""]  # as many as there are looks at the clock
+INTERRUPTED = 75
+
+
+def box(method, dimension, steps, **more):
+    """64 spheres between walls and periodic borders, under forces that the method knows."""
+    free, points = method == "free-flight", method == "verlet"
+    field = {"type": "uniform-field", "acceleration": [-0.3] + (dimension - 1) * [0.0]}
+    forces = [{"type": "yukawa", "amplitude": 1.0, "kappa": 2.0, "cutoff": 1.9},
+              {"type": "harmonic-bond", "within": 1.35, "stiffness": 30.0, "rest_length": 1.2}]
+    return toml_text({
+        "format": 1, "title": "continued",
+        "system": {"dimension": dimension, "boundary": ["periodic" if points else "wall"] + (dimension - 1) * ["periodic"]},
+        "particles": [{"name": name, "count": 32, "temperature": 1.0, "radius": 0.5, "mass": mass}
+                      for name, mass in (("light", 1.0), ("heavy", 3.0))],
+        "placement": {"type": "square" if dimension == 2 else "simple-cubic", "packing_fraction": 0.5 if dimension == 2 else 0.3, "seed": 5},
+        "interaction": ([] if points else [field]) + ([] if free else forces),
+        "integrator": {"type": method, "step": 0.35 if free else 0.02} | more,
+        "run": {"steps": steps},
+        "output": {"directory": "unused", "frame_interval": 0.13, "thermo_interval": 0.06}})
+
+
+def go_on(output, arguments=(), code=0, ranks=1, environment=None):
+    """Continues the run of a directory."""
+    what = [CAROM, "run", "--continue", str(output), "--quiet", *arguments]
+    if ranks > 1:
+        return mpirun(ranks, what, code)
+    done = subprocess.run(what, capture_output=True, text=True, timeout=120, env=environment)
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def on_ranks(ranks, deck, output, overrides):
+    if ranks > 1:
+        mpirun(ranks, command(deck, output, overrides))
+    else:
+        run(deck, output, overrides)
+
+
+def expect_same(whole, continued):
+    """All files of two runs, but what they say of the machine."""
+    assert compare(whole, continued) + summary_differences(whole, continued) == []
+    of_one = {path.name for path in whole.iterdir()}
+    assert of_one == {path.name for path in continued.iterdir()} - {"checkpoint.previous.h5"} | (of_one & {"checkpoint.previous.h5"})
+    for name in of_one:
+        if name.endswith(".csv"):
+            assert (whole / name).read_bytes() == (continued / name).read_bytes(), name
+
+
+def wait_for_rows(job, output, rows=4):
+    while not (output / "thermo.csv").exists() or (output / "thermo.csv").read_text().count("\n") <= rows:
+        assert job.poll() is None, job.stderr.read()
+        time.sleep(0.005)
+
+
+@pytest.fixture(scope="module")
+def memory():
+    """A directory on a file system in memory, where there is one: syncs take no time there."""
+    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(prefix="carom-continue-", dir=place) as name:
+        yield pathlib.Path(name)
+
+
+@pytest.fixture(scope="module")
+def killer(tmp_path_factory):
+    return killer_library(tmp_path_factory.mktemp("library"))
+
+
+METHODS = [("free-flight", {}), ("verlet", {}), ("psa", {}), ("cva", {}), ("mcva", {}), ("mcva", {"variant": "restart"}),
+           ("cdda", {}), ("cdda", {"order": 4}), ("edda", {})]
+RANKS = [(1, 1), (1, 2), (2, 3), (1, 1), (3, 1)]
+CASES = [(method, more, dimension, *RANKS[(9 * dimension + n) % len(RANKS)])
+         for dimension in (2, 3) for n, (method, more) in enumerate(METHODS)]
+
+
+@pytest.mark.parametrize("method, more, dimension, before, after", CASES)
+def test_twice_half_a_run_is_a_whole_one(method, more, dimension, before, after, tmp_path):
+    steps = 8 if method == "free-flight" else 60
+    deck = write_deck(tmp_path, box(method, dimension, steps, **more))
+    run(deck, tmp_path / "whole", ALL_OUTPUT)
+    on_ranks(before, deck, tmp_path / "halves", [*ALL_OUTPUT, f"run.steps={steps // 2}"])
+    go_on(tmp_path / "halves", ["--set", f"run.steps={steps}"], ranks=after)
+    expect_same(tmp_path / "whole", tmp_path / "halves")
+    assert (tmp_path / "whole" / "deck.toml").read_text().replace(str(tmp_path / "whole"), str(tmp_path / "halves")) == (
+        tmp_path / "halves" / "deck.toml").read_text()
+
+
+@pytest.mark.parametrize("end", ["run.end_time", "run.collisions"])
+@pytest.mark.parametrize("method", ["free-flight", "psa"])
+def test_a_later_end(end, method, tmp_path):
+    ends = {"run.end_time": [0.7301, 1.9], "run.collisions": [150, 400]}[end]
+    text = box(method, 3, 1).replace("[run]\nsteps = 1\n", "[run]\n")
+    deck = write_deck(tmp_path, text)
+    run(deck, tmp_path / "whole", [*ALL_OUTPUT, f"{end}={ends[1]}"])
+    run(deck, tmp_path / "parts", [*ALL_OUTPUT, f"{end}={ends[0]}"])
+    go_on(tmp_path / "parts", ["--set", f"{end}={ends[1]}"])
+    expect_same(tmp_path / "whole", tmp_path / "parts")
+
+
+def test_a_finished_run_ends_at_once(tmp_path):
+    """With the same files, whether it ended within an epoch or between steps."""
+    for n, (text, change) in enumerate([(box("free-flight", 3, 5), []), (box("free-flight", 2, 50), ["run.collisions=200"]),
+                                        (box("edda", 3, 21), []), (box("verlet", 2, 21), ["run.end_time=0.333"])]):
+        deck, whole, again = write_deck(tmp_path, text), tmp_path / f"whole{n}", tmp_path / f"again{n}"
+        run(deck, whole, [*ALL_OUTPUT, *change])
+        shutil.copytree(whole, again)
+        for ranks in (1, 2):
+            go_on(again, ranks=ranks)
+            expect_same(whole, again)
+
+
+def spheres(tmp_path, collisions):
+    """A deck of free flight with long epochs, in which rows come soon."""
+    text = SPHERES.replace("end_time = 3.0", f"collisions = {collisions}").replace('type = "free-flight"', 'type = "free-flight"\nstep = 1000.0')
+    return write_deck(tmp_path, text.replace("thermo_interval = 0.1", "thermo_interval = 20.0").replace("frame_interval = 0.5", "frame_interval = 50.0"))
+
+
+@pytest.mark.parametrize("before, after", [(1, 1), (1, 2), (2, 1)])
+def test_within_an_epoch(before, after, tmp_path):
+    deck, whole, out = spheres(tmp_path, 400000), tmp_path / "whole", tmp_path / "out"
+    run(deck, whole)
+    assert summary(whole)["steps"] == 1
+    launcher = ["mpirun", "-n", str(before)] if before > 1 else []
+    job = subprocess.Popen(launcher + command(deck, out), env=mpi_environment(), stderr=subprocess.PIPE, text=True)
+    wait_for_rows(job, out)
+    job.send_signal(signal.SIGUSR2)
+    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    assert summary(out)["status"] == "interrupted" and summary(out)["steps"] == 0
+    go_on(out, ranks=after)
+    expect_same(whole, out)
+
+
+@pytest.mark.parametrize("number", ["TERM", "INT", "HUP", "USR2", "USR1"])
+def test_signals(number, tmp_path):
+    deck, out = spheres(tmp_path, 600000), tmp_path / "out"
+    job = subprocess.Popen(command(deck, out), stderr=subprocess.PIPE, text=True)
+    wait_for_rows(job, out)
+    assert not (out / "checkpoint.h5").exists()
+    start = time.monotonic()
+    job.send_signal(getattr(signal, "SIG" + number))
+    if number == "USR1":  # a checkpoint, and on it goes
+        while not (out / "checkpoint.h5").exists():
+            assert job.poll() is None
+        assert job.wait(60) == 0
+        assert (out / "checkpoint.previous.h5").exists()  # and one at the end
+        return
+    assert job.wait(60) == INTERRUPTED
+    assert time.monotonic() - start < 10
+    assert (out / "checkpoint.h5").exists() and not (out / "carom.lock").exists()
+    assert f"stopped by SIG{number}; carom run --continue {out} goes on" in (out / "run.log").read_text()
+    assert summary(out)["status"] == "interrupted"
+
+
+@pytest.mark.parametrize("number, code", [("USR2", INTERRUPTED), ("USR1", 0)])
+def test_signals_to_mpirun(number, code, tmp_path):
+    deck, out = spheres(tmp_path, 600000), tmp_path / "out"
+    job = subprocess.Popen(["mpirun", "-n", "2", *command(deck, out)], env=mpi_environment(), stderr=subprocess.PIPE, text=True)
+    wait_for_rows(job, out)
+    job.send_signal(getattr(signal, "SIG" + number))
+    assert job.wait(60) == code, job.stderr.read()
+    assert (out / "checkpoint.h5").exists()
+    assert summary(out)["status"] == {0: "done", INTERRUPTED: "interrupted"}[code]
+
+
+def catches(process, number):
+    """Whether a process has a handler of its own for a signal."""
+    for line in pathlib.Path(f"/proc/{process}/status").read_text().splitlines():
+        if line.startswith("SigCgt:"):
+            return bool(int(line.split()[1], 16) >> (number - 1) & 1)
+
+
+def test_a_second_interrupt_ends_at_once(tmp_path):
+    """While the first one's checkpoint, a large one, is still to be written."""
+    out = tmp_path / "out"
+    job = subprocess.Popen(command(write_deck(tmp_path, SPHERES), out, ["particles.0.count=108000", "run.end_time=100.0"]),
+                           stderr=subprocess.PIPE, text=True)
+    wait_for_rows(job, out, 1)
+    job.send_signal(signal.SIGINT)
+    while catches(job.pid, signal.SIGINT):
+        assert job.poll() is None
+    job.send_signal(signal.SIGINT)
+    assert job.wait(60) == -signal.SIGINT
+
+
+def test_max_wall_again_and_again(tmp_path):
+    """A run that goes on in pieces of the wall clock, on ranks as they come, until exit code 0."""
+    deck, whole, out = write_deck(tmp_path, box("edda", 3, 2000)), tmp_path / "whole", tmp_path / "out"
+    run(deck, whole, ALL_OUTPUT)
+    run(deck, out, ALL_OUTPUT, arguments=("--quiet", "--max-wall", "0.05"), code=INTERRUPTED)
+    pieces = 0
+    for pieces in range(40):
+        ranks = 2 if pieces == 1 else 1
+        wall = ["--max-wall", f"{0.2 * (1 + pieces):.1f}"]  # which starting takes a part of
+        done = subprocess.run((["mpirun", "-n", "2"] if ranks > 1 else []) + [CAROM, "run", "--continue", str(out), "--quiet", *wall],
+                              env=mpi_environment(), capture_output=True, text=True, timeout=60)
+        if done.returncode == 0:
+            break
+        assert done.returncode == INTERRUPTED, done.stderr
+    assert pieces > 1
+    expect_same(whole, out)
+
+
+def test_the_script_for_slurm(tmp_path):
+    """With stand-ins for Slurm and mpirun: it asks to be queued again until the run is done, but not where it was cancelled."""
+    deck, whole, out, queue = spheres(tmp_path, 400000), tmp_path / "whole", tmp_path / "out", tmp_path / "queue"
+    run(deck, whole)
+    for name, text in {"mpirun": 'exec "$@"', "scontrol": f'echo "$@" >>{queue}', "sbatch": f'echo "$@" >>{queue}'}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "SLURM_JOB_ID": "17"}
+    script = ROOT / "tools" / "slurm-run"
+    for number, code, queued in [(signal.SIGUSR2, 0, 1), (signal.SIGTERM, INTERRUPTED, 1), (None, 0, 1)]:
+        before = (out / "run.log").read_text().count("continued") if out.exists() else 0
+        job = subprocess.Popen([script, deck, out], env=environment, stderr=subprocess.PIPE, text=True)
+        if before == 0 and number == signal.SIGUSR2:
+            wait_for_rows(job, out)
+        while number == signal.SIGTERM and (out / "run.log").read_text().count("continued") == before:
+            assert job.poll() is None
+        if number is not None:
+            job.send_signal(number)
+        assert job.wait(60) == code, job.stderr.read()
+        assert queue.read_text().count("requeue 17\n") == queued
+    expect_same(whole, out)
+    subprocess.run([script, "deck", "there", "--nodes=2"], env={k: v for k, v in environment.items() if k != "SLURM_JOB_ID"}, check=True)
+    assert queue.read_text().endswith(f"--nodes=2 {script} deck there\n")
+
+
+def killed(killer, deck, out, at, overrides, go=False, where=""):
+    """Runs and dies at a change of its files; None: counts the changes. True: it has died."""
+    environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": f"{out}/{where}", "KILL_HALF": str((at or 0) % 2)}
+    environment |= {"KILL_AT": str(at)} if at else {"KILL_COUNT": str(out.parent / "count")}
+    what = [CAROM, "run", "--continue", str(out), "--quiet"] if go else command(deck, out, overrides)
+    done = subprocess.run(what, env=environment, capture_output=True, text=True, timeout=60)
+    assert done.returncode in (0, -signal.SIGKILL), done.stderr
+    return done.returncode != 0
+
+
+@needs_compiler
+@pytest.mark.parametrize("method", ["free-flight", "psa"])
+def test_killed_at_its_writes(method, killer, memory):
+    """Also while checkpoints are written, and while a run is being continued. CAROM_KILLS: how many more often."""
+    place = memory / method
+    place.mkdir()
+    dice, kills = random.Random(7), int(os.environ.get("CAROM_KILLS", "12"))
+    deck, whole, out = write_deck(place, box(method, 3, 200 if method == "psa" else 60)), place / "whole", place / "out"
+    run(deck, whole, ALL_OUTPUT)
+    killed(killer, deck, out, None, ALL_OUTPUT + CHECKPOINTS)
+    changes, refused, continued = int((place / "count").read_text()), 0, 0
+    assert changes > 200
+    for n in range(kills):
+        shutil.rmtree(out)
+        checkpoints = n % 2 == 1
+        where, most = ("checkpoint.h5", 40) if checkpoints else ("", changes)
+        if not killed(killer, deck, out, dice.randrange(1, most), ALL_OUTPUT + CHECKPOINTS, where=where):
+            continue
+        if not (out / "checkpoint.h5").exists() and not (out / "checkpoint.previous.h5").exists():
+            # Files may be there, or none yet.
+            assert "there is no checkpoint.h5 to go on from" in go_on(out, code=5).stderr
+            refused += 1
+            continue
+        if n % 3 == 0:
+            killed(killer, deck, out, dice.randrange(1, 60), [], go=True)
+        go_on(out)
+        assert compare(whole, out) + summary_differences(whole, out) == []
+        continued += 1
+    print(f"{kills} kills: {continued} continued, {refused} before the first checkpoint")
+    assert continued > kills / 4
+
+
+def test_killed_ranks(tmp_path):
+    """SIGKILL to mpirun at random instants, each time going on from the last checkpoint."""
+    dice = random.Random(3)
+    deck, whole, out = write_deck(tmp_path, box("edda", 3, 400)), tmp_path / "whole", tmp_path / "out"
+    run(deck, whole, ALL_OUTPUT)
+    what = command(deck, out, ALL_OUTPUT + ["output.checkpoint_wall=\"0.02\""])
+    for _ in range(3):
+        job = subprocess.Popen(["mpirun", "-n", "2", *what], env=mpi_environment(), stderr=subprocess.PIPE, text=True)
+        while not (out / "checkpoint.h5").exists():
+            time.sleep(0.01)
+        time.sleep(dice.uniform(0.05, 0.6))
+        job.kill()
+        job.wait()
+        what = [CAROM, "run", "--continue", str(out), "--quiet"]
+    go_on(out, ranks=3)  # the lock waits for processes that are ending
+    expect_same(whole, out)
+
+
+@needs_mount
+def test_a_full_disk_during_a_checkpoint(tmp_path):
+    """The earlier one remains; with more space the run goes on."""
+    disk, kept, whole = tmp_path / "disk", tmp_path / "kept", tmp_path / "whole"
+    disk.mkdir()
+    deck = write_deck(tmp_path, SPHERES)
+    # Rows are written slowly, checkpoints of 200 kB more and more of them beside them.
+    overrides = ["particles.0.count=4000", "run.end_time=40.0", "output.thermo_interval=0.5", "output.frame_interval=2.0"]
+    run(deck, whole, overrides)
+    done = in_mount("size=2700k", disk, command(deck, disk, overrides + CHECKPOINTS), kept)
+    assert done.returncode == 5 and "No space left" in done.stderr, done.stderr
+    assert (kept / "checkpoint.h5").exists() and summary(kept)["status"] == "failed"
+    assert not list(kept.glob("*.part"))
+    go_on(kept)
+    expect_same(whole, kept)
+
+
+def interrupted(tmp_path):
+    """A run with two checkpoints, and how an undisturbed one ends."""
+    deck, whole, out = write_deck(tmp_path, box("psa", 2, 300)), tmp_path / "whole", tmp_path / "out"
+    run(deck, whole, ALL_OUTPUT)
+    run(deck, out, [*ALL_OUTPUT, "run.steps=100"])
+    go_on(out, ["--set", "run.steps=200"])
+    assert (out / "checkpoint.previous.h5").exists()
+    return whole, out
+
+
+def test_the_other_slot(tmp_path):
+    whole, out = interrupted(tmp_path)
+    last = out / "checkpoint.h5"
+    good = last.read_bytes()
+    damage = {"its checksum is not that of its contents": good[:5000] + bytes([good[5000] ^ 1]) + good[5001:],
+              "damaged or cut off": good[: len(good) // 2],
+              "written by a newer carom": good.replace(b"carom checkpoint 1", b"carom checkpoint 7", 1),
+              "not a checkpoint of carom": b"something else"}
+    for words, contents in damage.items():
+        trial = tmp_path / "trial"
+        shutil.rmtree(trial, ignore_errors=True)
+        shutil.copytree(out, trial)
+        (trial / "checkpoint.h5").write_bytes(contents)
+        done = go_on(trial, ["--set", "run.steps=300"])
+        assert words in done.stderr and "going on from checkpoint.previous.h5" in done.stderr, done.stderr
+        expect_same(whole, trial)
+        shutil.copy(trial / "checkpoint.h5", trial / "checkpoint.previous.h5")
+        for name in ("checkpoint.h5", "checkpoint.previous.h5"):
+            (trial / name).write_bytes(contents)
+        refused = go_on(trial, code=5)
+        assert words in refused.stderr and "checkpoint.previous.h5" in refused.stderr
+    last.unlink()
+    go_on(out, ["--set", "run.steps=300"])
+    expect_same(whole, out)
+
+
+@pytest.mark.parametrize("arguments, code, words", [
+    (["--set", "integrator.step=0.1"], 2, "keeps its deck"),
+    (["--set", "output.events=false"], 2, "keeps its deck"),
+    (["--set", "run.nothing=1"], 2, "nothing"),
+    (["-o", "elsewhere"], 2, "excludes"),
+    (["deck.toml"], 2, "excludes"),
+])
+def test_what_cannot_be_changed(arguments, code, words, tmp_path):
+    out = tmp_path / "out"
+    run(write_deck(tmp_path, SPRINGS), out, ["run.steps=20"])
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    assert words in go_on(out, arguments, code=code).stderr
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_mistakes(tmp_path):
+    assert "DECK, or --continue DIR, is required" in subprocess.run([CAROM, "run"], capture_output=True, text=True).stderr
+    assert "there is no checkpoint.h5 to go on from" in go_on(tmp_path, code=5).stderr
+    assert "there is no checkpoint.h5 to go on from" in go_on(tmp_path / "missing", code=5).stderr
+    assert not (tmp_path / "missing").exists() and not list(tmp_path.iterdir())
+
+
+def test_files_that_are_shorter_than_at_the_checkpoint(tmp_path):
+    """What is missing can't be made up."""
+    out = tmp_path / "out"
+    run(write_deck(tmp_path, SPRINGS), out)
+    (out / "thermo.csv").write_text("time\n")
+    assert "thermo.csv" in go_on(out, ["--set", "run.steps=500"], code=5).stderr
+    (out / "thermo.csv").unlink()
+    assert "thermo.csv" in go_on(out, ["--set", "run.steps=500"], code=5).stderr
+
+
+def test_locks(tmp_path):
+    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
+    run(deck, out)
+    job = subprocess.Popen(["sleep", "60"])
+    ticks = pathlib.Path(f"/proc/{job.pid}/stat").read_text().rsplit(")", 1)[1].split()[19]
+    lock = "host {}\nprocess {}\nstarted then\nticks {}\n"
+    here = pathlib.Path("/proc/sys/kernel/hostname").read_text().strip()
+    try:
+        for arguments in ([], ["--take-over"]):
+            (out / "carom.lock").write_text(lock.format(here, job.pid, ticks))
+            assert "is at work in this directory" in go_on(out, arguments, code=5).stderr
+    finally:
+        job.kill()
+        job.wait()
+    go_on(out)
+    (out / "carom.lock").write_text(lock.format("another", 1, 1))
+    assert "--take-over" in go_on(out, code=5).stderr
+    assert "ended from outside" in go_on(out, ["--take-over"]).stderr
+    assert not (out / "carom.lock").exists()
+    done = subprocess.run([CAROM, "run", str(deck), "--take-over"], capture_output=True, text=True)
+    assert done.returncode == 2 and "--continue" in done.stderr

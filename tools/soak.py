@@ -1,0 +1,284 @@
+#!/usr/bin/python3
+"""Random decks, killed and continued at random instants: is the end that of an undisturbed run, bit for bit?
+
+    tools/soak.py --minutes 30
+    tools/soak.py --count 100 --seed 7 --ranks 1,2,3,4
+    tools/soak.py --only 17 --seed 7 --count 100       # deck 17 of these alone, when something was found
+
+Each deck draws a method, forces, boundaries, a dimension, sizes and outputs. It runs once undisturbed, then again on other
+numbers of ranks, with checkpoints a few hundredths of a second apart, while it is killed (KILL to the process, a rank, or
+mpirun), told to stop (USR2, TERM, INT, HUP, --max-wall), or given a nearer end first. After each it goes on with `carom run
+--continue`, or from the start where there was no checkpoint yet. Compared are all files and the summary. Spheres must not overlap,
+and free-flight, cdda and edda must keep the energy. Exit code 0: nothing found; 1: something; its files are left in --output.
+"""
+
+import argparse
+import os
+import pathlib
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+from carom_files import find_carom, read_summary, toml_text
+from compare import compare, summary_differences
+
+LEAST_DISTANCE = 1e-9  # that spheres may overlap by
+EXACT = {"free-flight": 1e-9, "cdda": 1e-9, "edda": 1e-9}  # largest error of H, over its reference
+PATIENCE = 120  # [s], for one process
+
+
+class Found(Exception):
+    """Something that should not be."""
+
+
+def mpi_environment():
+    """The environment with the settings of mpi-env.sh."""
+    lines = (pathlib.Path(__file__).resolve().parent / "mpi-env.sh").read_text().splitlines()
+    return os.environ | dict(line.removeprefix("export ").split("=", 1) for line in lines if line.startswith("export "))
+
+
+# Decks
+
+def random_forces(dice, method, dimension, boundary, species):
+    """Some terms of V that the box allows."""
+    periodic, terms = "periodic" in boundary, []
+    if dice.random() < 0.3:
+        along = [0.0 if kind == "periodic" else dice.uniform(-0.5, 0.5) for kind in boundary]
+        terms.append({"type": "uniform-field", "acceleration": along})
+    if method == "free-flight":
+        return terms
+    cutoff = dice.uniform(1.5, 2.2)
+    cut = {"cutoff": cutoff, "cut": dice.choice(["switch", "shifted", "force-shifted"])}
+    pairs = [
+        {"type": "yukawa", "amplitude": dice.uniform(-2, 2), "kappa": dice.uniform(1, 3), **cut},
+        {"type": "lennard-jones", "epsilon": dice.uniform(0.2, 1), "sigma": 0.9, **cut},
+        {"type": "wca", "epsilon": dice.uniform(0.2, 1), "sigma": 1.1},
+        {"type": "morse", "depth": 0.5, "alpha": 3.0, "r0": 1.1, **cut},
+        {"type": "inverse-power", "epsilon": dice.uniform(-0.5, 0.5), "sigma": 1.0, "exponent": 4.0, **cut},
+        {"type": "table", "r": [0.5, 0.8, 1.1, 1.5, 2.0], "value": [3.0, 1.0, -0.4, -0.2, 0.0], "cutoff": 1.9},
+    ]
+    if len(species) > 1:
+        pairs.append({"type": "coulomb", "form": "damped-shifted", "damping": 0.8, "cutoff": cutoff})
+        pairs.append({"type": "yukawa", "amplitude": 1.0, "kappa": 1.0, "charges": True, "cutoff": cutoff, "species": species})
+    if not periodic:
+        pairs.append({"type": "gravity", "constant": 0.05})
+        terms.append({"type": "harmonic-trap", "stiffness": dice.uniform(0.1, 0.5)})
+    bonds = [{"type": "harmonic-bond", "within": 1.4, "stiffness": 20.0, "rest_length": 1.15}]
+    if not periodic:
+        bonds.append({"type": "harmonic-bond", "chain": True, "stiffness": 1.0, "rest_length": 1.2})
+    if dice.random() < 0.4:
+        terms.append(dice.choice(bonds))
+    return terms + dice.sample(pairs, dice.choice([1, 1, 2]))
+
+
+def random_deck(dice, seconds):
+    """A deck that takes about so long; many of them can't run."""
+    method = dice.choice(["free-flight", "free-flight", "verlet", "psa", "psa", "cva", "mcva", "cdda", "edda", "edda"])
+    dimension = dice.choice([2, 3])
+    boundary = ["periodic"] * dimension
+    if dice.random() < 0.5:
+        boundary = [dice.choice(["periodic", "open"] if method == "verlet" else ["periodic", "wall", "open"]) for _ in range(dimension)]
+    cuts_all = method in ("cva", "mcva", "cdda")
+    edge = dice.choice([3, 4, 5] if cuts_all else [3, 5, 6, 8])
+    lattice = dice.choice(["square", "random"] if dimension == 2 else ["fcc", "simple-cubic", "random"])
+    count = {"square": edge**2, "fcc": 4 * max(2, edge // 2)**3, "simple-cubic": edge**3, "random": edge**dimension}[lattice]
+    sphere = {"temperature": dice.uniform(0.5, 2.0), "radius": 0.5, "mass": dice.choice([1.0, 0.7])}
+    particles = [{"name": "a", "count": count, **sphere}]
+    if dice.random() < 0.4:
+        ions = {"count": max(1, count // 2)}, {"count": count - max(1, count // 2)}
+        particles = [{"name": "a", **sphere, **ions[0], "charge": 1.0}, {"name": "b", **sphere, **ions[1], "charge": -1.0}]
+        particles[1] |= {"radius": dice.choice([0.5, 0.3]), "mass": dice.choice([1.0, 3.0])}
+    packing = dice.uniform(0.1, 0.25) if lattice == "random" else dice.uniform(0.1, 0.4)
+    step = dice.choice([0.005, 0.01, 0.02, 0.05])
+    integrator = {"type": method, "step": step}
+    if method == "mcva":
+        integrator["variant"] = dice.choice(["grid", "restart"])
+    if method == "cdda":
+        integrator["order"] = dice.choice([2, 2, 4])
+    # Microseconds a particle and step, roughly.
+    cost = {"verlet": 2, "psa": 3, "cva": 10, "mcva": 15, "cdda": 40, "edda": 8, "free-flight": 0}[method] * integrator.get("order", 2)**2 / 4
+    steps = max(20, int(seconds * 1e6 / (cost * count))) if cost else 0
+    run = {"steps": steps}
+    if method == "free-flight":
+        integrator["step"] = dice.choice([0.3, 2.0, 20.0, 1000.0])
+        run = {"collisions": int(seconds * 4e5)}
+    end = run.get("steps", 0) * step or run["collisions"] / count
+    if method != "free-flight" and dice.random() < 0.3:
+        run = {"end_time": end}
+    output = {"directory": "unused", "frame_interval": end / dice.uniform(3, 30), "thermo_interval": end / dice.uniform(3, 60),
+              "checkpoint_wall": f"0:0:{dice.choice([0.0, 0.02, 0.1])}", "events": dice.random() < 0.6}
+    for average in ("rdf", "msd", "profile"):
+        if dice.random() < 0.5:
+            output[average + "_interval"] = end / dice.uniform(5, 50)
+    return {"format": 1, "system": {"dimension": dimension, "boundary": boundary}, "particles": particles,
+            "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
+            "interaction": random_forces(dice, method, dimension, boundary, [each["name"] for each in particles]),
+            "integrator": integrator, "run": run, "output": output}
+
+
+def words(deck):
+    """A deck in a line."""
+    n = sum(species["count"] for species in deck["particles"])
+    forces = "+".join(term["type"] for term in deck["interaction"]) or "no forces"
+    return f"{deck['integrator']['type']} {deck['system']['dimension']}-D {n} {forces} {'/'.join(deck['system']['boundary'])}"
+
+
+# Runs
+
+class Run:
+    """A run in a directory, in one process after the other."""
+
+    def __init__(self, carom, deck, output, dice):
+        self.carom, self.deck, self.output, self.dice = str(carom), deck, output, dice
+        self.begun = self.continued = 0
+
+    def start(self, ranks, arguments):
+        """Goes on where a checkpoint is, else from the start."""
+        launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+        go_on = any((self.output / name).exists() for name in ("checkpoint.h5", "checkpoint.previous.h5"))
+        what = ["--continue", self.output] if go_on else [self.deck, "-o", self.output]
+        self.begun += not go_on
+        self.continued += go_on
+        command = [*launcher, self.carom, "run", *what, "--quiet", *arguments]
+        return subprocess.Popen([str(part) for part in command], env=mpi_environment(), stdout=subprocess.DEVNULL,
+                                stderr=subprocess.PIPE, text=True)
+
+    def processes(self):
+        """Those of the command that are at work here."""
+        found = []
+        for process in pathlib.Path("/proc").glob("[0-9]*"):
+            try:
+                arguments = (process / "cmdline").read_bytes().split(b"\0")
+            except OSError:  # it has just ended
+                continue
+            if str(self.output).encode() in arguments and arguments[0] == self.carom.encode():
+                found.append(int(process.name))
+        return found
+
+    @staticmethod
+    def kill(process, number):
+        try:
+            os.kill(process, number)
+        except ProcessLookupError:  # it has ended
+            pass
+
+    def end(self, job, codes, most=PATIENCE):
+        """Waits for it; its exit code must be one of these."""
+        try:
+            error = job.communicate(timeout=most)[1].strip()
+        except subprocess.TimeoutExpired as expired:
+            for process in [*self.processes(), job.pid]:
+                self.kill(process, signal.SIGKILL)
+            job.communicate()
+            raise Found("it does not end") from expired
+        for _ in range(1000):  # mpirun does not wait for those it kills
+            if not self.processes():
+                break
+            time.sleep(0.01)
+        if job.returncode not in codes:
+            raise Found(f"exit code {job.returncode}: {error}")
+        return job.returncode
+
+    def disturb(self, ranks, seconds):
+        """Starts it, and ends it before its end, perhaps."""
+        how = self.dice.choice(["KILL", "KILL", "KILL", "USR2", "TERM", "INT", "HUP", "--max-wall"])
+        if how == "--max-wall":
+            self.end(self.start(ranks, ["--max-wall", f"{seconds:.3f}"]), (0, 75))
+            return
+        if ranks > 1 and how in ("TERM", "INT", "HUP"):  # mpirun has its own ways with these
+            how = "USR2"
+        job = self.start(ranks, [])
+        time.sleep(seconds)
+        number = getattr(signal, "SIG" + how)
+        at = [job.pid, *self.processes()] if how == "KILL" and ranks > 1 else [job.pid]
+        victim = self.dice.choice(at)
+        self.kill(victim, number)
+        if victim == job.pid and how == "KILL" and ranks > 1:
+            time.sleep(0.5)  # those that mpirun has started end by themselves then, but not within MPI_Init
+            for process in self.processes():
+                self.kill(process, number)
+        # A signal may come before the command, or mpirun, is ready for it, or after it; a killed rank has codes of its own.
+        self.end(job, range(-64, 256) if how == "KILL" else (0, 75, -number, 128 + number))
+
+
+def soak(carom, deck, seconds, where, ranks, dice):
+    """One deck, of which an undisturbed run is there; what happened, in words. Raises Found."""
+    file = where / "deck.toml"
+    summary = read_summary(where / "undisturbed")
+    method = deck["integrator"]["type"]
+    error = summary["energy"]["max_abs_error"] / (summary["energy"]["reference"] or 1)
+    if error > EXACT.get(method, float("inf")):
+        raise Found(f"the energy is wrong by {error:.1e}")
+    if method != "verlet" and summary["max_overlap"] > LEAST_DISTANCE:
+        raise Found(f"spheres overlap by {summary['max_overlap']:.1e}")
+
+    run = Run(carom, file, where / "continued", dice)
+    used = []
+    for _ in range(dice.choice([1, 2, 3, 4])):
+        used.append(dice.choice(ranks))
+        run.disturb(used[-1], dice.uniform(0, 1.1) * seconds)
+    used.append(dice.choice(ranks))
+    run.end(run.start(used[-1], []), (0,))
+    lines = compare(where / "undisturbed", where / "continued") + summary_differences(where / "undisturbed", where / "continued")
+    if lines:
+        raise Found("; ".join(lines))
+    return f"ranks {'-'.join(map(str, used))}, begun {run.begun}, continued {run.continued}", run.continued
+
+
+def draw(carom, dice, seconds, where, ranks):
+    """A deck that can run, and has; and how long that took [s]."""
+    while True:
+        shutil.rmtree(where, ignore_errors=True)
+        where.mkdir(parents=True)
+        deck = random_deck(dice, seconds)
+        (where / "deck.toml").write_text(toml_text(deck))
+        if subprocess.run([str(carom), "validate", str(where / "deck.toml")], capture_output=True).returncode != 0:
+            continue
+        undisturbed, start = Run(carom, where / "deck.toml", where / "undisturbed", dice), time.monotonic()
+        try:  # bonds may break in a small box, steps be too long for a force
+            undisturbed.end(undisturbed.start(dice.choice(ranks), []), (0,), most=20 * seconds + 10)
+        except Found as problem:
+            print(f"      {words(deck)}, not taken: {str(problem)[:150]!r}")
+            continue
+        return deck, time.monotonic() - start
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=10**9, help="decks")
+    parser.add_argument("--minutes", type=float, default=float("inf"))
+    parser.add_argument("--only", type=int, help="this deck alone")
+    parser.add_argument("--ranks", default="1,2,3,4", help="numbers of ranks to choose from")
+    parser.add_argument("--seconds", type=float, default=0.4, help="about what a deck takes")
+    parser.add_argument("--carom", help="the command; default: $CAROM or the build of tools/run")
+    parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("runs/soak"))
+    options = parser.parse_args(arguments)
+    if options.count == 10**9 and options.minutes == float("inf") and options.only is None:
+        parser.error("say --count or --minutes")
+    carom, ranks = find_carom(options.carom), list(map(int, options.ranks.split(",")))
+    end, done, found, continued = time.monotonic() + 60 * options.minutes, 0, 0, 0
+    for number in [options.only] if options.only is not None else range(options.count):
+        if time.monotonic() > end:
+            break
+        where = options.output.resolve() / str(number)
+        dice = random.Random(f"{options.seed} {number}")
+        deck, seconds = draw(carom, dice, options.seconds, where, ranks)
+        try:
+            outcome, times = soak(carom, deck, seconds, where, ranks, dice)
+            continued += times
+            shutil.rmtree(where)
+        except (Found, SystemExit) as problem:
+            outcome = f"FOUND in {where}: {problem}"
+            found += 1
+        done += 1
+        print(f"{number:4d}  {words(deck)}: {outcome}", flush=True)
+    print(f"{done} decks, continued {continued} times, {found} with something found")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
