@@ -26,6 +26,9 @@ struct alignas(64) Record {
 static_assert(sizeof(Record<3>) == 64 && offsetof(Record<3>, v) == 24 && offsetof(Record<3>, t) == 48);
 static_assert(sizeof(Record<2>) == 64 && offsetof(Record<2>, v) == 16 && offsetof(Record<2>, t) == 32);
 
+/// How many records a core makes room for that has so many at first, and may admit more.
+constexpr std::size_t records_room(std::size_t records) { return records + records / 4 + 256; }
+
 /// The error where an image does not fit into the bits of a candidate.
 [[noreturn]] inline void throw_too_far() {
   throw Error(Failure::numerical,

@@ -96,7 +96,7 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   horizon_ = horizon;
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
-  room_ = records.size() + records.size() / 4 + 256;
+  room_ = records_room(records.size());
   records_.clear();
   records_.reserve(room_);
   radius_.clear();

@@ -38,6 +38,9 @@ bool operator==(const Node<D>& a, const Node<D>& b) {
          a.after.id == b.after.id;
 }
 
+/// Thrown before an event for which the log has no room left; all that it has stands.
+struct LogFull {};
+
 template <int D>
 class Trace {
  public:
@@ -65,10 +68,12 @@ class Trace {
     events_.clear();
     before_.clear();
     fastest_squared_ = 0;
+    most_ = kMostEvents + kMostEventsOfASphere * slots;
   }
 
   /// An event is about to happen to the sphere `i`, and to `j` unless that is kNone.
   void begin(Slot i, const Record<D>& a, Slot j, const Record<D>& b, std::uint32_t partner, std::uint32_t generation) {
+    if (events_.size() == most_) throw LogFull{};
     Event& event = events_.emplace_back();
     event.generation = generation;
     event.partner = partner;
@@ -106,6 +111,9 @@ class Trace {
   double fastest_squared() const { return fastest_squared_; }  ///< of all spheres after events
 
  private:
+  // So many fit into a log: a window has 0.3 of a sphere.
+  static constexpr std::size_t kMostEvents = 20'000, kMostEventsOfASphere = 16;
+
   std::uint32_t take_entry(Slot i, std::uint32_t which) {
     const std::uint32_t last = has(i) ? latest_[i] - base_ : kNone;
     latest_[i] = base_ + 2 * static_cast<std::uint32_t>(events_.size() - 1) + which;
@@ -116,6 +124,7 @@ class Trace {
   PageVector<Record<D>> before_;       // by entry
   std::vector<std::uint32_t> latest_;  // by slot: base_ + entry; what is less is of windows before
   std::uint32_t base_ = 1;
+  std::size_t most_ = 0;
   double fastest_squared_ = 0;
   mutable std::vector<std::uint32_t> shares_;
 };

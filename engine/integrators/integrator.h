@@ -72,7 +72,7 @@ struct IntegratorInfo {
   bool hard_cores = true;          ///< spheres collide; false: points
   bool stepping = true;  ///< advances by steps of fixed length and observes at their ends; false: exact at any time
   bool smooth_forces = true;  ///< knows any interaction; false: none but a common acceleration
-  bool exact = false;   ///< keeps the energy to rounding, whatever the step: a jump of it ends the run
+  bool exact = false;         ///< keeps the energy to rounding, whatever the step: a jump of it ends the run
   bool local = false;   ///< on several ranks each can do with its own particles and those near them; else with all
   bool shadow = false;  ///< a Verlet type: report the shadow energy S_h
   std::unique_ptr<Integrator<2>> (*in_2d)(const Parameters&) = nullptr;

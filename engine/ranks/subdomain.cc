@@ -6,15 +6,21 @@
 namespace carom {
 
 template <int D>
-void Subdomain<D>::run(double now, double end) {
+double Subdomain<D>::run(double now, double end) {
   end_ = end;
   length_ = end - now;
   trace_.clear(core_.flights().room());
   mended_fastest_squared_ = 0;
   Counters unused;
-  core_.run(end, {.counters = unused, .trace = &trace_});
+  double reached = end;
+  try {
+    core_.run(end, {.counters = unused, .trace = &trace_});
+  } catch (LogFull) {
+    reached = core_.now();
+  }
   run_events_ += trace_.events().size();
   index();
+  return reached;
 }
 
 /// Lists the spheres with events that are ghosts elsewhere, and the ghosts with events.

@@ -56,8 +56,9 @@ class Subdomain {
   // In a window.
 
   /// Runs from `now` to `end`. Where a sphere comes farther than `max_displacement` from its start the window is
-  /// invalid: cut it before that.
-  void run(double now, double end);
+  /// invalid: cut it before that. Returns the end, or the time of the first event for which the log has no room: it is
+  /// invalid then, too.
+  double run(double now, double end);
   /// Appends the path of a sphere to a message.
   void write_path(Slot i, Bytes& to) const;
   /// Reads the path of a ghost that its owner has sent; the message must stay until the end of the window.

@@ -176,12 +176,21 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   ContactTally sum;
   std::vector<Contact<D>> contacts;
   std::uint64_t collisions = report.counters.sphere_sphere;
-  double reached = end;
+  double reached = end, full = std::numeric_limits<double>::infinity();
   while (now_ < end && reached == end) {
     if (cut_) reload();
     if (!sorted_) sort_out(false);
-    double stop = window_end(end);
-    if (subdomain_) subdomain_->run(now_, stop);
+    double stop = std::min(window_end(end), full);
+    full = -(subdomain_ ? subdomain_->run(now_, stop) : stop);
+    ranks_.largest({&full, 1});
+    full = -full;
+    if (full < stop) {  // too many events for a window: it is taken back, and run again up to there
+      if (!(full > now_)) throw_too_many_contacts(report.max_events);
+      cut_at(now_);
+      sorted_ = false;
+      continue;
+    }
+    full = std::numeric_limits<double>::infinity();
     ++counts_.windows;
     agree();
     if (const double max_displacement = first_beyond(stop); max_displacement < stop) stop = cut_at(max_displacement);
@@ -201,6 +210,9 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     if (report.contacts) add_contacts(contacts);
     sum.add(got);
     counts_.events += got.contacts();
+    std::uint64_t contacts_of_all = got.contacts();
+    ranks_.sum({&contacts_of_all, 1});
+    if (events_ += contacts_of_all; events_ > report.max_events) throw_too_many_contacts(report.max_events);
     collisions += count;
     const double length = stop - now_, n = static_cast<double>(sizes_.spheres);
     now_ = stop;

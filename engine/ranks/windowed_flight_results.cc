@@ -64,7 +64,6 @@ void WindowedFlight<D>::report_all(const ContactTally& sum, const std::vector<Co
   const ContactTally all = sum_of_all(ranks_, sum);
   report.counters.add(all);
   if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, packed<D>(contacts)), *report.contacts);
-  if (events_ += all.contacts(); events_ > report.max_events) throw_too_many_contacts(report.max_events);
 }
 
 /// The contact that node k of a path stands for.

@@ -19,9 +19,9 @@ constexpr std::size_t kShadowAtEveryStep = 100;
 
 /// |H| over its scale at the start. Inexact methods with steps far too long reach 1e4 and come back.
 constexpr double kBlownUp = 1e10;
-/// |H − H of the last slab|, of a method that keeps it to rounding, over K + Σ|V|. Positions are rounded to 1e-16 of the
-/// box, which potentials 10⁴ times steeper than the box is long turn into 1e-12: that leaves six digits before a bound
-/// which is still far below what a method of second order loses.
+/// |H − H of the last slab|, of a method that keeps it to rounding, over K + Σ|V|. Positions are rounded to 1e-16 of
+/// the box, which potentials 10⁴ times steeper than the box is long turn into 1e-12: that leaves six digits before a
+/// bound which is still far below what a method of second order loses.
 constexpr double kMostJump = 1e-6;
 /// Depth over contact distance. The methods leave 1e-12; the box may be 10⁹ diameters long.
 constexpr double kDeepest = 1e-6;
@@ -181,9 +181,9 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
     const double deepest = system_.decomposition.largest(deepest_overlap());
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest);
     if (deepest > kDeepest)
-      throw Error(Failure::numerical, "spheres overlap, by " + short_text(deepest) + " of their contact distance, at step " +
-                                          std::to_string(s.steps) + ", time " + short_text(s.end_time) +
-                                          "; use a smaller integrator.step");
+      throw Error(Failure::numerical, "spheres overlap, by " + short_text(deepest) +
+                                          " of their contact distance, at step " + std::to_string(s.steps) + ", time " +
+                                          short_text(s.end_time) + "; use a smaller integrator.step");
   }
   account_.virial_time += elapsed * account_.virial;
   if (s.end_time > 0) {

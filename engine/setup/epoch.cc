@@ -1,9 +1,12 @@
 #include "engine/setup/epoch.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
+#include <limits>
 #include <numbers>
 
+#include "engine/base/record.h"
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/placement.h"
 
@@ -14,15 +17,17 @@ double default_epoch(const System<D>& system) {
   const auto& p = system.particles;
   const auto n = static_cast<double>(system.size());
   struct Sums {
-    double twice_kinetic = 0, mass = 0, diameter = 0;
+    double twice_kinetic = 0, mass = 0, diameter = 0, fastest = 0, lightest = std::numeric_limits<double>::infinity();
   };
   Communicator alone;
-  const auto [twice_kinetic, mass, diameter] =
+  const auto [twice_kinetic, mass, diameter, fastest, lightest] =
       handed_on(system.decomposition.others() ? *system.decomposition.others() : alone, Sums{}, [&](Sums& sums) {
         for (std::size_t i = 0; i < p.size(); ++i) {
           sums.twice_kinetic += p.mass[i] * p.v[i].squaredNorm();
           sums.mass += p.mass[i] / n;
           sums.diameter += 2 * p.radius[i] / n;
+          sums.fastest = std::max(sums.fastest, p.v[i].norm());
+          sums.lightest = std::min(sums.lightest, p.mass[i]);
         }
       });
   const double filled = packing_fraction<D>(system.box.volume(), p.radius, system.decomposition.others());
@@ -36,7 +41,12 @@ double default_epoch(const System<D>& system) {
   const double cross_section = D == 2 ? 2 * diameter : 4 * diameter * diameter;
   const double rate = density * cross_section * contact_value * std::sqrt(std::numbers::pi) * thermal_speed;
   const double farthest = std::min(300 * diameter, 4 * system.box.edges.minCoeff());
-  const double epoch = std::min(40 / rate, farthest / thermal_speed);
+  double epoch = std::min(40 / rate, farthest / thermal_speed);
+  // So far that the images of the fastest, in equilibrium too, can be written down on any number of ranks.
+  const double speed = std::max(fastest, 5 * std::sqrt(twice_kinetic / (D * n * lightest)));
+  const Packing<D> packing(std::min(records_room(system.size()), std::size_t{1} << 24));
+  for (int k = 0; k < D; ++k)
+    if (system.box.periodic(k)) epoch = std::min(epoch, packing.largest() * system.box.edges[k] / speed);
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), epoch, std::chars_format::scientific, 1).ptr;
   double rounded = epoch;

@@ -7,6 +7,7 @@
 
 #include "engine/setup/placement.h"
 #include "io/deck/deck.h"
+#include "io/deck/memory.h"
 #include "io/deck/schema.h"
 #include "io/deck/validate_state.h"
 #include "io/files/version.h"
@@ -35,15 +36,6 @@ std::string end_text(const Plan& plan) {
   return out.str();
 }
 
-/// Bytes a run of this size takes, roughly, as measured with the decks in inputs/.
-template <int D>
-double estimated_memory(std::size_t particles, bool neighbour_lists) {
-  constexpr double program = 30e6;  // libraries and MPI
-  constexpr double state = (2 * D + 3) * sizeof(double) + D * sizeof(std::int32_t) + sizeof(std::uint16_t);
-  constexpr double events = 300, neighbours = 900;
-  return program + static_cast<double>(particles) * (2 * state + events + (neighbour_lists ? neighbours : 0));
-}
-
 template <int D>
 int describe(Deck& deck) {
   const auto system = build_system<D>(deck);
@@ -62,11 +54,8 @@ int describe(Deck& deck) {
   std::cout << "integrator        " << deck.integrator << ", step " << deck.plan.step << '\n';
   std::cout << "ends at           " << end_text(deck.plan) << '\n';
   std::cout << "output            " << deck.output.directory.string() << '\n';
-  const auto& terms = deck.source->interactions;
-  const bool lists = std::any_of(terms.begin(), terms.end(), [](const InteractionConfig& term) {
-    return term.info->kind == InteractionInfo::Kind::pair;
-  });
-  std::cout << "memory            about " << std::ceil(estimated_memory<D>(p.size(), lists) / 1e6) << " MB\n";
+  const double memory = estimated_memory(*deck.source, &system->box);
+  std::cout << "memory            about " << std::ceil(memory / 1e6) << " MB\n";
   return 0;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <sstream>
 
 #include "io/deck/deck_build.h"
 #include "io/deck/deck_interactions.h"
@@ -12,11 +11,26 @@
 namespace carom {
 
 std::optional<std::string> read_text(const std::filesystem::path& file) {
+  constexpr std::size_t kPiece = 1 << 20, kMost = std::size_t{1} << 30;  // of what is no file and may have no end
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) return {};
+  const bool ends = std::filesystem::is_regular_file(file, ignored);
   std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
-  if (!in || std::filesystem::is_directory(file)) return {};
-  return text.str();
+  if (!in) return {};
+  std::string text;
+  for (bool more = true; more;) {
+    const std::size_t before = text.size();
+    text.resize(before + kPiece);
+    in.read(text.data() + before, kPiece);
+    text.resize(before + static_cast<std::size_t>(in.gcount()));
+    if (in.bad()) return {};
+    if (text.find('\0', before) != std::string::npos)
+      throw Error(Failure::file, file.string() + ": error: this is no text, it has zero bytes; check the path");
+    more = !in.eof();
+    if (more && !ends && text.size() >= kMost)
+      throw Error(Failure::file, file.string() + ": error: there is no end of this input; give a file");
+  }
+  return text;
 }
 
 Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides, const TextReader& reader) {

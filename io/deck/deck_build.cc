@@ -6,6 +6,7 @@
 #include "engine/setup/epoch.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_interactions.h"
+#include "io/deck/memory.h"
 #include "io/deck/validate_state.h"
 
 namespace carom {
@@ -143,6 +144,8 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
   auto system = std::make_unique<System<D>>();
   fill_box(source, *system);
+  const int share = ranks ? ranks->size() : 1;
+  check_memory(source, source.edges.empty() ? nullptr : &system->box, share);
   fill_particles(source, *system, ranks);
   if (given) {
     if (ranks && !system->decomposition.joined()) system->decomposition.join(*ranks);
@@ -150,6 +153,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
     take_bonds(*deck.source, given->bonds);
   } else {
     place_particles(source, *system);
+    check_memory(source, &system->box, share);
     system->wrap();
     give_velocities(source, *system);
   }

@@ -379,3 +379,35 @@ def test_pages(arguments, wanted):
     answer = carom(*arguments)
     assert answer.returncode == 0
     assert wanted in answer.stdout
+
+
+def both(tmp_path, text, code, *parts):
+    """`validate` and `run` refuse this deck alike."""
+    for answer in validate(tmp_path, text), carom("run", "deck.toml", "-o", "out", "--quiet", cwd=tmp_path):
+        assert answer.returncode == code, answer.stderr
+        for part in parts:
+            assert part in answer.stderr
+        assert len(answer.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", DECK_ERRORS)
+def test_run_and_validate_refuse_the_same(name, tmp_path):
+    text = DECK_ERRORS[name][0]
+    answer = validate(tmp_path, text)
+    done = carom("run", "deck.toml", "-o", "out", "--quiet", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (answer.returncode, answer.stderr)
+    assert not (tmp_path / "out").exists()
+
+
+def test_more_than_there_is_memory_for(tmp_path):
+    huge = changed("count = 64", "count = 900000000", changed("[6.0, 6.0, 6.0]", "[6000.0, 6000.0, 6000.0]", FLUID))
+    both(tmp_path, huge, 3, "deck.toml:8:", "error: a run of 900000000 particles needs about ", "GB of memory; ", "GB are free here")
+    both(tmp_path, changed("collisions = 10", "steps = 10", lennard_jones("cutoff = 5.5e12")), 3, "deck.toml:17:", "GB of memory; ", "take a shorter cutoff")
+
+
+def test_inputs_without_end_and_other_than_text(tmp_path):
+    zero = carom("validate", "/dev/zero", cwd=tmp_path)
+    assert (zero.returncode, zero.stderr) == (5, "/dev/zero: error: this is no text, it has zero bytes; check the path\n")
+    places = changed('type = "fcc"', 'type = "file"\nfile = "/dev/zero"', FLUID)
+    both(tmp_path, places, 5, "/dev/zero: error: this is no text")

@@ -70,8 +70,8 @@ def when_it_has_ended(output):
 
 
 def when_it_runs(job, output):
-    """The processes, by rank, once some rows are written."""
-    while not (output / "thermo.csv").exists() or len((output / "thermo.csv").read_text().splitlines()) < 4:
+    """The processes, by rank, once three frames are written: the fourth row comes after the third frame."""
+    while not (output / "thermo.csv").exists() or len((output / "thermo.csv").read_text().splitlines()) < 5:
         assert job.poll() is None, job.stderr.read()
         time.sleep(0.01)
     return running(output)
@@ -360,3 +360,45 @@ def test_fewer_spheres_than_ranks(which, boundary, tmp_path):
         mpirun(ranks, command("input.toml", tmp_path / str(ranks)), cwd=tmp_path)
         assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
         assert filecmp.cmp(tmp_path / "plain" / "msd.csv", tmp_path / str(ranks) / "msd.csv", shallow=False)
+
+
+def light_and_heavy(boundary):
+    """Spheres of which the light ones fly through many boxes while the heavy ones move by a diameter."""
+    deck = tomllib.loads(SPHERES) | {
+        "system": {"dimension": 3, "box": [6.0, 6.0, 6.0], "boundary": ["periodic", boundary, "periodic"]},
+        "particles": [
+            {"name": "heavy", "radius": 0.5, "mass": 1000.0, "temperature": 1.0,
+             "position": [[1.0, 1.0, 1.0], [1.0, 3.0, 3.0], [3.0, 1.0, 5.0], [5.0, 5.0, 5.0], [5.0, 3.0, 1.0]]},
+            {"name": "light", "radius": 0.1, "mass": 0.001, "temperature": 1.0,
+             "position": [[2.0, 2.0, 2.0], [4.0, 4.0, 4.0], [2.5, 4.5, 2.5]]}],
+        "run": {"collisions": 1000}}
+    del deck["placement"]
+    return deck
+
+
+# Heavy discs that fill the height of the box, and a light one between them: any number of collisions in any time.
+WEDGED = {
+    "format": 1, "system": {"dimension": 2, "boundary": ["periodic", "periodic"], "box": [5.141516051556095, 1.7138386838520316]},
+    "particles": [{"name": "disc", "radius": 0.4284596709630079, "temperature": 0.2665408484358747,
+                   "mass": [0.007280965091287921, 208.83535954699647, 0.0020785470182544726],
+                   "position": [[1.2853790128890237, 1.2853790128890237], [0.4284596709630079, 1.2853790128890237],
+                                [0.4284596709630079, 0.4284596709630079]]}],
+    "integrator": {"type": "free-flight"}, "run": {"collisions": 30000},
+    "output": {"directory": "unused", "frame_interval": 0.0, "thermo_interval": 0.0}}
+
+
+@pytest.mark.parametrize("deck", [light_and_heavy("periodic"), light_and_heavy("wall"), WEDGED], ids=["light", "light-walled", "wedged"])
+def test_what_one_rank_can_fly_so_can_several(deck, tmp_path):
+    path = write_deck(tmp_path, toml_text(deck))
+    run(path, tmp_path / "plain")
+    for ranks in 2, 3:
+        mpirun(ranks, command(path, tmp_path / str(ranks)))
+        assert compare.compare(tmp_path / "plain", tmp_path / str(ranks)) == []
+
+
+def test_too_many_collisions_in_a_window(tmp_path):
+    path, limit = write_deck(tmp_path, toml_text(WEDGED)), ["integrator.max_events_per_step=9000"]
+    plain = run(path, tmp_path / "plain", limit, code=4)
+    done = mpirun(2, command(path, tmp_path / "two", limit), code=4)
+    for text in plain.stderr, done.stderr:
+        assert "more than max_events_per_step = 27000 collisions in one step" in text

@@ -203,7 +203,7 @@ TEST(Simulation, ForcesThatAreNotFiniteEndTheRun) {
 std::unique_ptr<System<2>> oscillator(double stiffness) {
   auto system = test::make_system<2>({60, 60}, Boundary::open, {{1, 0}, {40, 0}}, {{0, 0}, {0, 0}});
   test::add_interaction(*system, "harmonic-bond",
-                  {{"pairs", PairList{{0, 1}}}, {"stiffness", stiffness}, {"rest_length", 38.0}});
+                        {{"pairs", PairList{{0, 1}}}, {"stiffness", stiffness}, {"rest_length", 38.0}});
   return system;
 }
 
