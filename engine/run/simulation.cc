@@ -13,6 +13,8 @@ namespace carom {
 namespace {
 /// Output intervals shorter than this share of a step are refused: there would be no end to counting them.
 constexpr double kLeastInterval = 1e-6;
+/// A flight without any pair collision that ends a run in an open box [longest edge].
+constexpr double kFarApart = 1e4;
 
 template <int D>
 void check_spheres(const System<D>& system) {
@@ -94,6 +96,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   }
   Monitor<D> monitor(*system_, info_, plan_, observers_, s);
   system_->fields.add_value("paused", paused_);
+  system_->fields.add_value("quiet since", quiet_since_);
   integrator_->start(*system_, s.counters);
   if (hooks.restore) {
     decomposition.to_blocks();
@@ -156,6 +159,8 @@ void Simulation<D>::run(const Hooks& hooks) {
     s.end_time = report.reached < slab.length ? slab.start + report.reached
                  : slab.length == plan_.step  ? static_cast<double>(s.steps) * plan_.step
                                               : *plan_.end_time;
+    if (s.counters.sphere_sphere > before.sphere_sphere) quiet_since_ = s.end_time;
+    if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
     s.fraction_done = fraction_done();
     take_time();
@@ -165,6 +170,19 @@ void Simulation<D>::run(const Hooks& hooks) {
   if (!paused_) monitor.finish();
   decomposition.to_blocks();
   take_time();
+}
+
+/// Free flight that ends after so many collisions only: throws where spheres have flown apart, for ever.
+template <int D>
+void Simulation<D>::need_collisions() const {
+  if (system_->box.closed()) return;
+  double fastest = 0;
+  for (const Vec<D>& v : system_->particles.v) fastest = std::max(fastest, v.norm());
+  const double flown = (statistics_.end_time - quiet_since_) * system_->decomposition.largest(fastest);
+  if (flown <= kFarApart * system_->box.edges.maxCoeff()) return;
+  throw Error(Failure::numerical, "no two spheres have met for " + short_text(flown) +
+                                      " of the fastest one's flight; they have left through an open boundary, and "
+                                      "there will be no more collisions; give run.end_time, or close the box");
 }
 
 template <int D>

@@ -156,6 +156,7 @@ class Simulation {
 
   Slab next_slab() const;
   bool finished() const;
+  void need_collisions() const;
   double time_slack() const { return 1e-9 * plan_.step; }  ///< ends are met up to this [time]
   double fraction_done() const;
 
@@ -165,7 +166,8 @@ class Simulation {
   Plan plan_;
   std::vector<Observer<D>*> observers_;
   Statistics statistics_;
-  bool paused_ = false;  // within a slab
+  bool paused_ = false;     // within a slab
+  double quiet_since_ = 0;  // the last slab with pair collisions
 };
 
 }  // namespace carom

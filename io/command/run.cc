@@ -105,6 +105,7 @@ Deck deck_of(const Continued& run, const RunOptions& options, Communicator& rank
     return path == file ? run.head.deck : others(path).value_or("");
   });
   set_output_directory(deck, run.directory);
+  deck.warnings = run.head.warnings;
   deck.file = run.head.deck_file;
   return deck;
 }
@@ -175,7 +176,8 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
   else
     log_file.emplace(directory / run_file::log, options.quiet);
   RunLog& log = *log_file;
-  RunOutcome outcome{.status = "done", .warnings = deck.warnings, .particles = simulation.system().size(), .ranks = ranks};
+  RunOutcome outcome{
+      .status = "done", .warnings = deck.warnings, .particles = simulation.system().size(), .ranks = ranks};
   if (continued) {
     log.say(fmt::format("continued at step {} on {} {}", continued->head.step, ranks, ranks == 1 ? "rank" : "ranks"));
     if (!continued->warning.empty()) log.warn("warning: " + continued->warning);
@@ -218,7 +220,8 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
                             .files = files->mark(),
                             .log_bytes = log.size(),
                             .log_rows = table.rows(),
-                            .bonds = bonds};
+                            .bonds = bonds,
+                            .warnings = deck.warnings};
     });
     simulation.run(keeper.hooks(continued));
     progress.end_line();

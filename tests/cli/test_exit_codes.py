@@ -146,3 +146,26 @@ def test_bad_deck(change, code, words, tmp_path):
 def test_missing_deck(tmp_path):
     done = run(tmp_path / "missing.toml", tmp_path / "out", code=5)
     assert "missing.toml" in done.stderr
+
+
+def test_spheres_that_have_flown_apart(tmp_path):
+    """No collision can come any more, and nothing else ends the run."""
+    deck = tmp_path / "apart.toml"
+    deck.write_text("""format = 1
+[system]
+dimension = 2
+box = [6.0, 6.0]
+boundary = ["open", "wall"]
+[[particles]]
+name = "disc"
+radius = 0.5
+position = [[2.0, 2.0], [4.0, 2.0]]
+velocity = [[1.0, 0.0], [-1.0, 0.1]]
+[integrator]
+type = "free-flight"
+[run]
+collisions = 1000
+""")
+    done = run(deck, tmp_path / "out", code=4)
+    assert "no two spheres have met" in done.stderr and "run.end_time" in done.stderr
+    assert summary(tmp_path / "out")["events"]["sphere_sphere"] == 1

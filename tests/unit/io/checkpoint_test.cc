@@ -32,7 +32,8 @@ fs::path written_in(const fs::path& directory) {
                             .step = 7,
                             .time = 0.5,
                             .files = {},
-                            .bonds = {{{0, 1}, {1, 2}}}};
+                            .bonds = {{{0, 1}, {1, 2}}},
+                            .warnings = {"warning: a long step"}};
   write_checkpoint<2>(directory, head, *system);
   return directory / run_file::checkpoint;
 }
