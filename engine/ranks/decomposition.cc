@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "engine/ranks/bisection.h"
 #include "engine/ranks/system.h"
@@ -165,7 +166,7 @@ std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& part
   }
   system_.fields.release_working();
   if (!by_place_) {
-    block_ = std::move(p);
+    block_ = std::exchange(p, {});
     block_interactions_ = std::move(system_.interactions);
     by_place_ = true;
   }

@@ -135,7 +135,7 @@ class Simulation {
   };
   /// Runs to the end of the plan, or until it is stopped. Throws Error.
   void run(const Hooks& hooks);
-  void run(std::function<bool()> should_stop = {}) { run(Hooks{.should_stop = std::move(should_stop)}); }
+  void run(const std::function<bool()>& should_stop = {}) { run(Hooks{.should_stop = should_stop}); }
 
   /// In should_stop(): whether a run with a later end would go on from here as this one has come here, and no longer
   /// after the next slab, which meets the end, or after the end.

@@ -12,9 +12,10 @@
 
 namespace carom {
 
-/// Runs the deck, or goes on with a run; returns the exit code: 0 done, 75 interrupted by a signal or `--max-wall`. Throws Error: bad deck (2),
-/// impossible initial state (3), numerical failure (4), file trouble (5). What was written before stays readable, and
-/// summary.json has the status. Must be called at most once in a process (it starts and ends MPI).
+/// Runs the deck, or goes on with a run; returns the exit code: 0 done, 75 interrupted by a signal or `--max-wall`.
+/// Throws Error: bad deck (2), impossible initial state (3), numerical failure (4), file trouble (5). What was written
+/// before stays readable, and summary.json has the status. Must be called at most once in a process (it starts and ends
+/// MPI).
 int run_command(const RunOptions& options);
 
 }  // namespace carom

@@ -128,7 +128,9 @@ void write_checkpoint(const std::filesystem::path& directory, const CheckpointHe
   std::optional<hdf5::File> file;
   std::optional<hdf5::Handle> particles, run;
   const auto write = [&](const hdf5::Handle& group, const std::string& name, hid_t type, const Bytes& bytes,
-                         std::vector<hsize_t> shape) { file->write_array(group, name, type, bytes.data(), shape); };
+                         const std::vector<hsize_t>& shape) {
+    file->write_array(group, name, type, bytes.data(), shape);
+  };
   const StateWriter writer{
       [&](const Fields::Field& field, const Bytes& bytes) {
         std::vector<hsize_t> shape = {bytes.size() / field.size};

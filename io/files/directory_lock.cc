@@ -1,7 +1,6 @@
 #include "io/files/directory_lock.h"
 
 #include <fcntl.h>
-#include <signal.h>
 #include <spdlog/fmt/chrono.h>
 #include <sys/file.h>
 #include <unistd.h>
@@ -9,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>

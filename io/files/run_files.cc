@@ -21,8 +21,7 @@ RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const FileMarks
   if (deck.plan.events)
     events_ = marks == nullptr ? std::make_unique<EventWriter<D>>(events, deck)
                                : std::make_unique<EventWriter<D>>(events, marks->events);
-  for (std::size_t k = 0; k < chosen.size(); ++k) {
-    const auto& [info, parameters] = chosen[k];
+  for (const auto& [info, parameters] : chosen) {
     const std::filesystem::path path = deck.output.directory / run_file::averages(*info);
     averages_.emplace_back(path, info->template in<D>().make(system, parameters, deck.output.sample_start));
   }

@@ -13,8 +13,8 @@ namespace carom {
 
 /// What the run's statistics do not know.
 struct RunOutcome {
-  std::string status;   ///< "done", "interrupted" (on request; can be continued), "failed"
-  std::string error{};  ///< why it failed; empty otherwise
+  std::string status;                   ///< "done", "interrupted" (on request; can be continued), "failed"
+  std::string error{};                  ///< why it failed; empty otherwise
   std::vector<std::string> warnings{};  ///< of the deck and of the run
   std::size_t particles = 0;
   int ranks = 1;
