@@ -1,10 +1,9 @@
 #include "engine/events/event_core.h"
 
-#include <bit>
 #include <string>
 
 #include "engine/base/error.h"
-#include "engine/events/contact.h"
+#include "engine/events/surroundings.h"
 
 namespace carom {
 template <int D>
@@ -278,87 +277,15 @@ void EventCore<D>::predict_walls(Slot i) {
 template <int D>
 void EventCore<D>::predict_update(Slot i, double now) {
   if (lists_)
-    predict_leaving(i, now);
+    predict_leaving(next_events_[i], flights_[i], flights_, room(i), now);
   else
-    predict_crossing(i, now);
+    predict_crossing(next_events_[i], i, flights_, box_, cells_->grid(), now);
 }
 
-/// How far a sphere may go from the centre of its subdomain.
+/// How far a sphere may go from the centre of its list's region.
 template <int D>
 double EventCore<D>::room(Slot i) const {
   return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
-}
-
-/// When does the sphere leave the subdomain its list is good for? Its contact has been planned.
-template <int D>
-void EventCore<D>::predict_leaving(Slot i, double now) {
-  const Record<D>& r = flights_[i];
-  NextEvent<D>& a = next_events_[i];
-  Vec<D> e;
-  for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
-  const double skin = room(i) * (1 - 1e-6);
-  if (!flights_.field()) {
-    if (a.contact < kNever && (e + (a.contact - r.t) * r.v).squaredNorm() < skin * skin) {
-      a.update = kNever;  // not before its contact: a straight way between two places of a ball stays in it
-      return;
-    }
-    // |e + v s| = skin; the form that cancels is good enough for a bound
-    const double b = e.dot(r.v), v_squared = r.v.squaredNorm(), room = skin * skin - e.squaredNorm();
-    const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
-    a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
-    return;
-  }
-  // At most |v| s + |g| s²/2 farther than at `now`.
-  const double s0 = now - r.t;
-  e += s0 * r.v + (0.5 * s0 * s0) * flights_.g();
-  const double speed = (r.v + s0 * flights_.g()).norm(), room = std::max(skin - e.norm(), 0.0);
-  a.update = std::max(now + 2 * room / (speed + std::sqrt(speed * speed + 2 * flights_.g().norm() * room)), now);
-}
-
-/// When does the sphere leave its cell, and through which face?
-template <int D>
-void EventCore<D>::predict_crossing(Slot i, double now) {
-  if (flights_.field()) return predict_crossing_in_field(i, now);
-  const Record<D>& r = flights_[i];
-  const CellGrid<D>& grid = cells_->grid();
-  NextEvent<D>& a = next_events_[i];
-  // Without a branch, which could not be predicted: times that are not negative are in the order of their bits.
-  std::uint64_t first = std::bit_cast<std::uint64_t>(kNever);
-  unsigned face = 0;
-  for (int k = 0; k < D; ++k) {
-    const unsigned up = static_cast<unsigned>(std::bit_cast<std::uint64_t>(r.v[k]) >> 63) ^ 1;
-    const std::int32_t c = a.where.cell.unwrapped[k] + static_cast<std::int32_t>(up);
-    double s = std::abs(grid.face(k, c) - r.x[k]) / std::abs(r.v[k]);  // 0/0 comes after all
-    if (!box_.periodic(k) && (c <= 0 || c >= grid.count(k))) s = kNever;
-    const std::uint64_t bits = std::bit_cast<std::uint64_t>(s);
-    face = bits < first ? 2 * static_cast<unsigned>(k) + up : face;
-    first = bits < first ? bits : first;
-  }
-  a.update = std::max(r.t + std::bit_cast<double>(first), now);
-  a.face = static_cast<std::uint8_t>(face);
-}
-
-template <int D>
-void EventCore<D>::predict_crossing_in_field(Slot i, double now) {
-  const Record<D> r = flights_.at(i, now);
-  const CellGrid<D>& grid = cells_->grid();
-  NextEvent<D>& a = next_events_[i];
-  a.update = kNever;
-  for (int k = 0; k < D; ++k)
-    for (int side = 0; side < 2; ++side) {
-      const std::int32_t c = a.where.cell.unwrapped[k] + side;
-      if (!box_.periodic(k) && (c <= 0 || c >= grid.count(k))) continue;  // the outermost cells have no outer face
-      const double outward = side == 1 ? 1.0 : -1.0;
-      const double gap = outward * (grid.face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
-      const double s = wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * flights_.g()[k],
-                                         flights_.horizon() - now, false, 0.0);
-      // At least an ulp from now: at the top of its path a particle could cross back and forth in no time.
-      const double t = std::max(now + s, std::nextafter(now, kNever));
-      if (t < a.update) {
-        a.update = t;
-        a.face = static_cast<std::uint8_t>(2 * k + side);
-      }
-    }
 }
 
 template <int D>
@@ -377,7 +304,7 @@ void EventCore<D>::update(Slot i, double now) {
     Vec<D> e;
     for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
     if (e.norm() < 0.7 * room(i)) {
-      predict_leaving(i, now);
+      predict_update(i, now);
       schedule(i);
       return;
     }
@@ -386,7 +313,7 @@ void EventCore<D>::update(Slot i, double now) {
   const std::span<const std::uint32_t> fresh = lists_->renew(i, r.x);
   // The planned contact stands; only those that are new in the list are looked at.
   if (!fresh.empty()) predict_pairs({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
-  predict_leaving(i, now);
+  predict_leaving(next_events_[i], flights_[i], flights_, room(i), now);
   schedule(i);
 }
 
@@ -399,26 +326,26 @@ void EventCore<D>::cross(Slot i, double now) {
   cells_->cross(i, a.where.cell, axis, step);
   cells_->ahead(i, a.where.cell, axis, step, found_);
   if (found_.count > 0) predict_pairs({i, found_.packed.data(), found_.count, found_.same}, false);
-  predict_crossing(i, now);
+  predict_update(i, now);
   schedule(i);
 }
 
 template <int D>
 void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, const Report& report) {
-  NextEvent<D>& next_events = next_events_[i];
-  const Slot j = packing_.slot(next_events.partner);
+  NextEvent<D>& plan = next_events_[i];
+  const Slot j = packing_.slot(plan.partner);
   if (report.trace) {
     if (flights_[i].id < flights_[j].id)
-      report.trace->begin(i, flights_[i], j, flights_[j], next_events.partner, generation);
+      report.trace->begin(i, flights_[i], j, flights_[j], plan.partner, generation);
     else
-      report.trace->begin(j, flights_[j], i, flights_[i], packing_.reversed(i, next_events.partner), generation);
+      report.trace->begin(j, flights_[j], i, flights_[i], packing_.reversed(i, plan.partner), generation);
   }
   EventKey<D> key;
   if (report.contacts) key = key_of(i);
   Vec<D> shift = Vec<D>::Zero();
-  if (packing_.linear(next_events.partner) != 0) shift = box_.shift(packing_.image(next_events.partner));
+  if (packing_.linear(plan.partner) != 0) shift = box_.shift(packing_.image(plan.partner));
   const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
-  ++next_events.version;
+  ++plan.version;
   ++next_events_[j].version;
   const double virial = blow.d.dot(blow.impulse);
   if (report.trace) return report.trace->end(flights_[i], flights_[j], virial, blow.overlap);

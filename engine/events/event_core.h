@@ -147,9 +147,6 @@ class EventCore {
   void predict_walls(Slot i);
   double room(Slot i) const;
   void predict_update(Slot i, double now);
-  void predict_leaving(Slot i, double now);
-  void predict_crossing(Slot i, double now);
-  void predict_crossing_in_field(Slot i, double now);
   void schedule(Slot i);
   void update(Slot i, double now);
   void cross(Slot i, double now);

@@ -243,7 +243,7 @@ void EventCore<D>::set_border(std::span<const Slot> slots, double now) {
     if (lists_->move(i, flights_.at(i, now).x, room(i)))
       predict(i, now), settle();
     else
-      predict_leaving(i, now), schedule(i);
+      predict_update(i, now), schedule(i);
   }
 }
 

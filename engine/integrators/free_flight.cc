@@ -148,7 +148,7 @@ class FreeFlight : public Integrator<D> {
   std::optional<WindowedFlight<D>> windowed_;
   std::optional<WindowedFlight<D>> resumed_;  // one rank: for the rest of an epoch that was left off in another process
   bool within_ = false;                       // an epoch that was left off
-  bool loaded_ = false;                       // whose flights are here
+  bool loaded_ = false;                       // the flights of that epoch are here
   bool at_limit_ = false;                     // of collisions
   Instants instants_;
   Particles<D> copies_;

@@ -100,20 +100,16 @@ Bytes Decomposition<D>::block_of(Fields::Field& field) const {
   const Particles<D>& p = system_.particles;
   const std::byte* data = field.data();
   if (!by_place_) return {data, data + field.entries() * field.size};
-  std::vector<Bytes> outgoing(copied_to_.size());
-  for (Id i = 0; i < p.size(); ++i) {
-    if (!p.owns(i)) continue;
-    Bytes& to = outgoing[static_cast<std::size_t>(blocks().rank_of(p.id_of(i)))];
-    put(to, p.id_of(i));
-    to.insert(to.end(), data + i * field.size, data + (i + 1) * field.size);
-  }
-  const Id first = blocks().first(ranks_->rank()), end = blocks().first(ranks_->rank() + 1);
-  Bytes block((end - first) * field.size);
-  for (const Bytes& bytes : ranks_->swap(std::move(outgoing)))
-    for (Reader reader(bytes); reader.more();) {
-      const auto id = reader.get<Id>();
-      std::memcpy(block.data() + (id - first) * field.size, reader.skip(field.size), field.size);
-    }
+  Bytes block((blocks().first(ranks_->rank() + 1) - blocks().first(ranks_->rank())) * field.size);
+  to_id_blocks(
+      blocks(), *ranks_, field.size,
+      [&](auto&& send) {
+        for (Id i = 0; i < p.size(); ++i)
+          if (p.owns(i)) send(p.id_of(i), data + i * field.size);
+      },
+      [&](std::size_t place, const std::byte* bytes) {
+        std::memcpy(block.data() + place * field.size, bytes, field.size);
+      });
   return block;
 }
 

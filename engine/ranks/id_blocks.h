@@ -22,22 +22,37 @@ struct IdBlocks {
   }
 };
 
-/// Sends values of particles to the ranks of their blocks: for_each(send) calls send(id, value) for each on one of the
-/// ranks, take(place, value) is called for each where it belongs, place: in the block. Collective.
-template <class Value>
-void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, auto&& for_each, auto&& take) {
+/// Sends what there is of particles, `size` bytes each, to the ranks of their blocks: for_each(send) calls
+/// send(id, bytes) for each on one of the ranks, take(place, bytes) is called for each where it belongs, place: in the
+/// block. Collective.
+void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, std::size_t size, auto&& for_each, auto&& take) {
   std::vector<Bytes> outgoing(blocks.ranks);
-  for_each([&](Id id, const Value& value) {
+  for_each([&](Id id, const std::byte* bytes) {
     Bytes& to = outgoing[static_cast<std::size_t>(blocks.rank_of(id))];
     put(to, id);
-    put(to, value);
+    to.insert(to.end(), bytes, bytes + size);
   });
   const Id first = blocks.first(ranks.rank());
   for (const Bytes& bytes : ranks.swap(std::move(outgoing)))
     for (Reader reader(bytes); reader.more();) {
       const auto id = reader.get<Id>();
-      take(id - first, reader.get<Value>());
+      take(id - first, reader.skip(size));
     }
+}
+
+/// The same of values: send(id, value), take(place, value).
+template <class Value>
+void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, auto&& for_each, auto&& take) {
+  to_id_blocks(
+      blocks, ranks, sizeof(Value),
+      [&](auto&& send) {
+        for_each([&](Id id, const Value& value) { send(id, reinterpret_cast<const std::byte*>(&value)); });
+      },
+      [&](std::size_t place, const std::byte* bytes) {
+        Value value;
+        std::memcpy(static_cast<void*>(&value), bytes, sizeof value);
+        take(place, value);
+      });
 }
 
 /// Calls visit(vector) for everything that is kept of each particle, but for its id and owner.

@@ -100,7 +100,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   integrator_->start(*system_, s.counters);
   if (hooks.restore) {
     decomposition.to_blocks();
-    hooks.restore(system_->fields);
+    hooks.restore();
     if (decomposition.ranks().rank() > 0) s.counters.seconds = {}, s.counters.events = {}, s.counters.windows = {};
     if (info_.smooth_forces) divide();
     s.stopped_early = false;

@@ -129,9 +129,9 @@ class Simulation {
     std::function<bool()> should_stop{};
     /// Asked now and then within an epoch of free flight: true has should_stop() asked soon.
     std::function<bool()> pause{};
-    /// Continues a run: sets all fields of the particles of this rank's block (one rank: all), and those of the run.
+    /// Continues a run: sets the state of the system, which is in blocks of ids (engine/run/state.h).
     /// The system has the particles as they were at that state already.
-    std::function<void(Fields&)> restore{};
+    std::function<void()> restore{};
   };
   /// Runs to the end of the plan, or until it is stopped. Throws Error.
   void run(const Hooks& hooks);
@@ -143,6 +143,8 @@ class Simulation {
 
   const Statistics& statistics() const { return statistics_; }
   const System<D>& system() const { return *system_; }
+  /// What hooks save and restore.
+  System<D>& system() { return *system_; }
 
  private:
   struct Prepared {

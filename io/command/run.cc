@@ -137,7 +137,7 @@ class Keeper {
       asked_ = requests_.now(ranks_);
       return asked_.checkpoint;
     };
-    if (continued) hooks.restore = [this, continued](Fields&) { restore_state(system(), continued->reader()); };
+    if (continued) hooks.restore = [this, continued] { restore_state(simulation_.system(), continued->reader()); };
     return hooks;
   }
 
@@ -146,12 +146,11 @@ class Keeper {
     if (!asked_.checkpoint) asked_ = requests_.now_and_then(ranks_);
     const auto [checkpoint, stop] = std::exchange(asked_, {});
     if (checkpoint || simulation_.is_last_on_the_way()) {
-      write_checkpoint(deck_.output.directory, ranks_.rank() == 0 ? head_() : CheckpointHead{}, system());
+      write_checkpoint(deck_.output.directory, ranks_.rank() == 0 ? head_() : CheckpointHead{}, simulation_.system());
       requests_.checkpoint_is_written();
     }
     return stop;
   }
-  System<D>& system() { return const_cast<System<D>&>(simulation_.system()); }
 
   Simulation<D>& simulation_;
   const Deck& deck_;

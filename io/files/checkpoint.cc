@@ -12,8 +12,10 @@
 #include <optional>
 
 #include "engine/base/error.h"
+#include "io/files/descriptor.h"
 #include "io/files/hdf5.h"
 #include "io/files/output_directory.h"
+#include "io/files/text_file.h"
 
 namespace carom {
 namespace {
@@ -26,25 +28,13 @@ constexpr std::string_view kBegin = "carom checkpoint ";
   throw Error(Failure::file, path.string() + ": " + why);
 }
 
-/// A file that is closed in any case.
-class Descriptor {
- public:
-  Descriptor(const std::filesystem::path& path, int flags) : path_(path), number_(::open(path.c_str(), flags)) {
-    if (number_ < 0) fail();
-  }
-  ~Descriptor() { ::close(number_); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int number() const { return number_; }
-  [[noreturn]] void fail() const { refuse(path_, std::strerror(errno)); }
-  void sync() const {
-    if (::fsync(number_) != 0) fail();
-  }
+[[noreturn]] void refuse_with_reason(const std::filesystem::path& path) { refuse(path, std::strerror(errno)); }
 
- private:
-  std::filesystem::path path_;
-  int number_;
-};
+Descriptor open_file(const std::filesystem::path& path, int flags) {
+  Descriptor file(::open(path.c_str(), flags | O_CLOEXEC));
+  if (!file.is_open()) refuse_with_reason(path);
+  return file;
+}
 
 struct Sum {
   std::uint64_t bytes = 0;
@@ -52,12 +42,12 @@ struct Sum {
 };
 
 /// Of all behind the block.
-Sum sum_of(const Descriptor& file) {
+Sum sum_of(const std::filesystem::path& path, const Descriptor& file) {
   Sum sum;
   std::vector<unsigned char> piece(1 << 20);
   for (;;) {
     const ssize_t got = ::pread(file.number(), piece.data(), piece.size(), static_cast<off_t>(kBlock + sum.bytes));
-    if (got < 0) file.fail();
+    if (got < 0) refuse_with_reason(path);
     if (got == 0) return sum;
     sum.crc = static_cast<std::uint32_t>(::crc32(sum.crc, piece.data(), static_cast<uInt>(got)));
     sum.bytes += static_cast<std::uint64_t>(got);
@@ -72,17 +62,17 @@ std::array<char, kBlock> block_of(const Sum& sum) {
 
 /// Throws unless the block is that of what follows it.
 void verify(const std::filesystem::path& path) {
-  const Descriptor file(path, O_RDONLY);
+  const Descriptor file = open_file(path, O_RDONLY);
   std::array<char, kBlock> block{};
   const ssize_t got = ::pread(file.number(), block.data(), kBlock, 0);
-  if (got < 0) file.fail();
+  if (got < 0) refuse_with_reason(path);
   const std::string_view text(block.data(), static_cast<std::size_t>(got));
   if (!text.starts_with(kBegin)) refuse(path, "not a checkpoint of carom");
   int format = 0;
   if (std::sscanf(block.data() + kBegin.size(), "%d", &format) == 1 && format > kFormat)
     refuse(path, fmt::format("a checkpoint of format {}, written by a newer carom; this one reads format {}", format,
                              kFormat));
-  if (static_cast<std::size_t>(got) < kBlock || block != block_of(sum_of(file)))
+  if (static_cast<std::size_t>(got) < kBlock || block != block_of(sum_of(path, file)))
     refuse(path, "the checkpoint is damaged or cut off: its checksum is not that of its contents");
 }
 
@@ -102,28 +92,23 @@ hid_t type_of(Fields::Scalar scalar) {
   return H5T_NATIVE_UINT8;
 }
 
-void sync_directory(const std::filesystem::path& directory) {
-  Descriptor(directory.empty() ? "." : directory, O_RDONLY | O_DIRECTORY).sync();
-}
-
 /// The file is complete: signs it, and puts it in the place of the last one.
 void sign_and_rename(const std::filesystem::path& aside, const std::filesystem::path& directory) {
   {
-    const Descriptor file(aside, O_RDWR);
-    const auto block = block_of(sum_of(file));
-    if (::pwrite(file.number(), block.data(), kBlock, 0) != static_cast<ssize_t>(kBlock)) file.fail();
-    file.sync();
+    const Descriptor file = open_file(aside, O_RDWR);
+    const auto block = block_of(sum_of(aside, file));
+    if (::pwrite(file.number(), block.data(), kBlock, 0) != static_cast<ssize_t>(kBlock) || ::fsync(file.number()) != 0)
+      refuse_with_reason(aside);
   }
   const auto last = directory / run_file::checkpoint;
   if (std::filesystem::exists(last)) std::filesystem::rename(last, directory / run_file::previous_checkpoint);
-  std::filesystem::rename(aside, last);
-  sync_directory(directory);
+  put_in_place(aside, last);
 }
 
 }  // namespace
 
 template <int D>
-void write_checkpoint(const std::filesystem::path& directory, const CheckpointHead& head, System<D>& system) {
+void write_checkpoint(const std::filesystem::path& directory, CheckpointHead head, System<D>& system) {
   const auto aside = directory / (std::string(run_file::checkpoint) + ".part");
   std::optional<hdf5::File> file;
   std::optional<hdf5::Handle> particles, run;
@@ -146,7 +131,7 @@ void write_checkpoint(const std::filesystem::path& directory, const CheckpointHe
       const hdf5::Handle origin = file->group("origin");
       file->write_text(origin, "deck", head.deck);
       Archive archive;
-      const_cast<CheckpointHead&>(head).archive(archive);
+      head.archive(archive);
       write(origin, "head", H5T_NATIVE_UINT8, archive.bytes(), {archive.bytes().size()});
     }
     save_state(system, writer);
@@ -162,8 +147,8 @@ void write_checkpoint(const std::filesystem::path& directory, const CheckpointHe
   }
 }
 
-template void write_checkpoint(const std::filesystem::path&, const CheckpointHead&, System<2>&);
-template void write_checkpoint(const std::filesystem::path&, const CheckpointHead&, System<3>&);
+template void write_checkpoint(const std::filesystem::path&, CheckpointHead, System<2>&);
+template void write_checkpoint(const std::filesystem::path&, CheckpointHead, System<3>&);
 
 Checkpoint::Checkpoint(const std::filesystem::path& file) : path_(file) {
   verify(file);
@@ -202,7 +187,7 @@ Checkpoint last_checkpoint(const std::filesystem::path& directory, std::string& 
 
 bool is_checkpoint(const std::filesystem::path& file) {
   std::array<char, kBegin.size()> begin{};
-  const Descriptor descriptor(file, O_RDONLY);
+  const Descriptor descriptor = open_file(file, O_RDONLY);
   return ::pread(descriptor.number(), begin.data(), begin.size(), 0) == static_cast<ssize_t>(begin.size()) &&
          std::string_view(begin.data(), begin.size()) == kBegin;
 }

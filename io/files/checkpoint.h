@@ -48,7 +48,7 @@ struct CheckpointHead {
 /// Writes the state of the run to the directory; the head of rank 0 counts. To be called in
 /// Simulation::Hooks::should_stop. Throws Error(Failure::file), and the checkpoints that were there stay. Collective.
 template <int D>
-void write_checkpoint(const std::filesystem::path& directory, const CheckpointHead& head, System<D>& system);
+void write_checkpoint(const std::filesystem::path& directory, CheckpointHead head, System<D>& system);
 
 class Checkpoint {
  public:

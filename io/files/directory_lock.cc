@@ -18,6 +18,7 @@
 #include <thread>
 
 #include "engine/base/error.h"
+#include "io/files/descriptor.h"
 #include "io/files/output_directory.h"
 #include "io/files/text_file.h"
 
@@ -33,7 +34,7 @@ std::string contents(const fs::path& path) {
 }
 
 /// When a process began, in clock ticks since the machine did: the 22nd field of Linux's /proc/…/stat. Empty: unknown.
-/// "ended" of one that nobody has waited for yet (the third field is its state).
+/// "ended" of one whose exit status has not been collected yet (the third field is its state).
 std::string began(const std::string& process) {
   const std::string all = contents("/proc/" + process + "/stat");
   const auto name_ends = all.rfind(')');
@@ -86,15 +87,9 @@ DirectoryLock::DirectoryLock(const fs::path& directory, bool take_over) : path_(
   // A launcher that was told to stop may be gone before its processes are.
   for (int tenths = 0; tenths < 20 && at_work_here(read_lock(path_)); ++tenths)
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  const int folder = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder >= 0)
-    ::flock(folder, LOCK_EX);  // where that can't be had, two runs must start at the same instant to fail
-  const struct Close {
-    int descriptor;
-    ~Close() {
-      if (descriptor >= 0) ::close(descriptor);
-    }
-  } unlock{folder};
+  const Descriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder.is_open())
+    ::flock(folder.number(), LOCK_EX);  // where that can't be had, two runs must start at the same instant to fail
 
   if (fs::exists(fs::symlink_status(path_))) {
     auto lock = read_lock(path_);

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "io/files/descriptor.h"
 #include "io/files/journal_blocks.h"
 #include "io/files/text_file.h"
 
@@ -157,7 +158,7 @@ struct Journaled : H5FD_t {
   }
 
   bool open_journal() {
-    constexpr std::uint64_t kRoom = 1 << 18;  // also for the last words of a run whose disk is full
+    constexpr std::uint64_t kRoom = 1 << 18;  // also for the summary and log of a run that has filled its disk
     journal = ::open(journal_of(path).c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     return journal >= 0 && set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kRoom);
   }
@@ -259,14 +260,6 @@ H5FD_class_t driver_class() {
   return driver;
 }
 
-/// A descriptor that closes itself.
-struct Open {
-  int descriptor;
-  ~Open() {
-    if (descriptor >= 0) ::close(descriptor);
-  }
-};
-
 }  // namespace
 
 hid_t journal_driver() {
@@ -280,24 +273,24 @@ void replay_journal(const std::filesystem::path& path) {
   const auto fail = [&](const std::string& why) {
     throw Error(Failure::file, path.string() + ": cannot take over what is in " + beside.string() + ": " + why);
   };
-  Open file{::open(path.c_str(), O_RDWR | O_CLOEXEC)};
-  const int not_writable = file.descriptor < 0 ? errno : 0;
-  if (not_writable != 0) file.descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file.descriptor < 0) return;  // whoever opens the file says why it can't be read
-  if (!lock(file.descriptor, LOCK_SH))
+  Descriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC));
+  const int not_writable = file.is_open() ? 0 : errno;
+  if (not_writable != 0) file = Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file.is_open()) return;  // opening the file itself gives the reason
+  if (!lock(file.number(), LOCK_SH))
     throw Error(Failure::file, path.string() + ": a process is writing this file; wait for its end, or copy the file");
-  const Open journal{::open(beside.c_str(), O_RDONLY | O_CLOEXEC)};
+  const Descriptor journal(::open(beside.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
-  if (journal.descriptor < 0 || ::fstat(journal.descriptor, &status) != 0) return;
+  if (!journal.is_open() || ::fstat(journal.number(), &status) != 0) return;
   Bytes blocks(static_cast<std::size_t>(status.st_size));
-  if (!read_up_to(journal.descriptor, blocks.data(), blocks.size(), 0)) fail(std::strerror(errno));
+  if (!read_up_to(journal.number(), blocks.data(), blocks.size(), 0)) fail(std::strerror(errno));
   if (const auto size = complete_journal(blocks)) {
     if (not_writable != 0) fail(std::strerror(not_writable));
-    if (!lock(file.descriptor, LOCK_EX)) fail("another process is reading the file; wait for its end");
+    if (!lock(file.number(), LOCK_EX)) fail("another process is reading the file; wait for its end");
     const auto write = [&](std::uint64_t address, const std::byte* data, std::size_t length) {
-      return write_all(file.descriptor, data, length, address);
+      return write_all(file.number(), data, length, address);
     };
-    if (!for_each_block(blocks, write) || !resize(file.descriptor, *size) || !sync(file.descriptor))
+    if (!for_each_block(blocks, write) || !resize(file.number(), *size) || !sync(file.number()))
       fail(std::string(std::strerror(errno)) + "; check free space and permissions there");
   }
   ::unlink(beside.c_str());

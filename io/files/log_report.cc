@@ -63,7 +63,7 @@ std::string breakdown_text(std::span<const RankAccount> ranks) {
   return text;
 }
 
-/// What agreement between regions took; nothing where there is one rank.
+/// What agreement between subdomains took; nothing where there is one rank.
 std::string windows_text(std::span<const RankAccount> ranks) {
   WindowCounts all;
   std::uint64_t most = 0;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "io/files/descriptor.h"
 
 namespace carom {
 
@@ -62,10 +63,8 @@ void TextFile::fail(int error_number) const {
 
 void put_in_place(const std::filesystem::path& aside, const std::filesystem::path& path) try {
   std::filesystem::rename(aside, path);
-  const int folder = ::open(path.has_parent_path() ? path.parent_path().c_str() : ".", O_RDONLY | O_CLOEXEC);
-  if (folder < 0) return;  // such a folder can't be synced
-  ::fsync(folder);
-  ::close(folder);
+  const Descriptor folder(::open(path.has_parent_path() ? path.parent_path().c_str() : ".", O_RDONLY | O_CLOEXEC));
+  if (folder.is_open()) ::fsync(folder.number());  // some folders can't be synced
 } catch (const std::filesystem::filesystem_error& e) {
   throw Error(Failure::file, path.string() + ": cannot put the new file in place: " + e.code().message());
 }

@@ -80,7 +80,7 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
     if (ranks > 0) system->decomposition.join(exchange);
     const bool first = exchange.rank() == 0;
     auto simulation = test::make_run<D>(std::move(system), scene.method, plan, scene.given);
-    auto& state_of = const_cast<System<D>&>(simulation->system());
+    System<D>& state_of = simulation->system();
     const auto read = [&](const std::string& name) { return from->at(name); };
     if (from) restore_particles(state_of, read);
     Account<D> account(ranks > 0 ? &exchange : nullptr);
@@ -98,10 +98,9 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
                               [&](const std::string& name, const Bytes& bytes) { out.state[name] = bytes; }});
       return now;
     };
-    simulation->run(
-        {.should_stop = stop,
-         .pause = leave.within_epochs ? std::function<bool()>([] { return true; }) : nullptr,
-         .restore = from ? [&](Fields&) { restore_state(state_of, read); } : std::function<void(Fields&)>()});
+    simulation->run({.should_stop = stop,
+                     .pause = leave.within_epochs ? std::function<bool()>([] { return true; }) : nullptr,
+                     .restore = from ? [&] { restore_state(state_of, read); } : std::function<void()>()});
     if (!first) return;
     out.values = std::move(account.values);
     out.events = std::move(account.events);

@@ -1,0 +1,86 @@
+#pragma once
+// Until when what was found around a sphere holds: it has come to the rim of its list's region, or to a face of its
+// cell. A bound in the first case, which may be too early; never too late.
+
+#include <bit>
+#include <cmath>
+
+#include "engine/base/box.h"
+#include "engine/events/contact.h"
+#include "engine/events/flights.h"
+#include "engine/search/cell_grid.h"
+#include "engine/search/next_event.h"
+
+namespace carom {
+
+/// Sets a.update: when a sphere with this record leaves the region its list is good for, a ball of radius `skin`. Its
+/// contact has been planned.
+template <int D>
+void predict_leaving(NextEvent<D>& a, const Record<D>& r, const Flights<D>& flights, double skin, double now) {
+  Vec<D> e;
+  for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
+  skin *= 1 - 1e-6;
+  if (!flights.field()) {
+    if (a.contact < kNever && (e + (a.contact - r.t) * r.v).squaredNorm() < skin * skin) {
+      a.update = kNever;  // not before its contact: a straight way between two places of a ball stays in it
+      return;
+    }
+    // |e + v s| = skin; the form that cancels is good enough for a bound
+    const double b = e.dot(r.v), v_squared = r.v.squaredNorm(), room = skin * skin - e.squaredNorm();
+    const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
+    a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
+    return;
+  }
+  // At most |v| s + |g| s²/2 farther than at `now`.
+  const double s0 = now - r.t;
+  e += s0 * r.v + (0.5 * s0 * s0) * flights.g();
+  const double speed = (r.v + s0 * flights.g()).norm(), room = std::max(skin - e.norm(), 0.0);
+  a.update = std::max(now + 2 * room / (speed + std::sqrt(speed * speed + 2 * flights.g().norm() * room)), now);
+}
+
+/// predict_crossing() in a field.
+template <int D>
+void predict_crossing_in_field(NextEvent<D>& a, Slot i, const Flights<D>& flights, const Box<D>& box,
+                               const CellGrid<D>& grid, double now) {
+  const Record<D> r = flights.at(i, now);
+  a.update = kNever;
+  for (int k = 0; k < D; ++k)
+    for (int side = 0; side < 2; ++side) {
+      const std::int32_t c = a.where.cell.unwrapped[k] + side;
+      if (!box.periodic(k) && (c <= 0 || c >= grid.count(k))) continue;  // the outermost cells have no outer face
+      const double outward = side == 1 ? 1.0 : -1.0;
+      const double gap = outward * (grid.face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
+      const double s = wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * flights.g()[k],
+                                         flights.horizon() - now, false, 0.0);
+      // At least an ulp from now: at the top of its path a particle could cross back and forth in no time.
+      const double t = std::max(now + s, std::nextafter(now, kNever));
+      if (t < a.update) {
+        a.update = t;
+        a.face = static_cast<std::uint8_t>(2 * k + side);
+      }
+    }
+}
+
+/// Sets a.update and a.face: when sphere i leaves its cell, and through which face.
+template <int D>
+void predict_crossing(NextEvent<D>& a, Slot i, const Flights<D>& flights, const Box<D>& box, const CellGrid<D>& grid,
+                      double now) {
+  if (flights.field()) return predict_crossing_in_field(a, i, flights, box, grid, now);
+  const Record<D>& r = flights[i];
+  // Without a branch, which could not be predicted: times that are not negative are in the order of their bits.
+  std::uint64_t first = std::bit_cast<std::uint64_t>(kNever);
+  unsigned face = 0;
+  for (int k = 0; k < D; ++k) {
+    const unsigned up = static_cast<unsigned>(std::bit_cast<std::uint64_t>(r.v[k]) >> 63) ^ 1;
+    const std::int32_t c = a.where.cell.unwrapped[k] + static_cast<std::int32_t>(up);
+    double s = std::abs(grid.face(k, c) - r.x[k]) / std::abs(r.v[k]);  // 0/0 comes after all
+    if (!box.periodic(k) && (c <= 0 || c >= grid.count(k))) s = kNever;
+    const std::uint64_t bits = std::bit_cast<std::uint64_t>(s);
+    face = bits < first ? 2 * static_cast<unsigned>(k) + up : face;
+    first = bits < first ? bits : first;
+  }
+  a.update = std::max(r.t + std::bit_cast<double>(first), now);
+  a.face = static_cast<std::uint8_t>(face);
+}
+
+}  // namespace carom
