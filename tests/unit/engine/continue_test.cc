@@ -9,6 +9,7 @@
 #include "engine/run/observable.h"
 #include "engine/run/state.h"
 #include "tests/support/experiments.h"
+#include "tests/support/same_statistics.h"
 #include "tests/support/thread_ranks.h"
 
 namespace carom {
@@ -112,24 +113,6 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
   return out;
 }
 
-void expect_same(const Statistics& a, const Statistics& b) {
-  EXPECT_EQ(a.steps, b.steps);
-  EXPECT_EQ(a.end_time, b.end_time);
-  EXPECT_EQ(a.force_passes, b.force_passes);
-  EXPECT_EQ(a.energy_initial, b.energy_initial);
-  EXPECT_EQ(a.energy_final, b.energy_final);
-  EXPECT_EQ(a.max_energy_error, b.max_energy_error);
-  EXPECT_EQ(a.max_momentum_error, b.max_momentum_error);
-  EXPECT_EQ(a.max_shadow_energy_error, b.max_shadow_energy_error);
-  EXPECT_EQ(a.mean_pressure, b.mean_pressure);
-  EXPECT_EQ(a.mean_free_path, b.mean_free_path);
-  EXPECT_EQ(a.counters.sphere_sphere, b.counters.sphere_sphere);
-  EXPECT_EQ(a.counters.sphere_wall, b.counters.sphere_wall);
-  EXPECT_EQ(a.counters.max_overlap, b.counters.max_overlap);
-  EXPECT_EQ(a.counters.sweeps, b.counters.sweeps);
-  EXPECT_EQ(a.counters.folded, b.counters.folded);
-}
-
 /// `rest` is the end of `whole`.
 void expect_tail(const std::vector<double>& whole, const std::vector<double>& rest) {
   ASSERT_LE(rest.size(), whole.size());
@@ -144,7 +127,7 @@ void expect_continued(const Outcome<D>& whole, const Outcome<D>& rest) {
   expect_tail(whole.values, rest.values);
   expect_tail(whole.events, rest.events);
   EXPECT_TRUE(whole.averages == rest.averages);
-  expect_same(whole.statistics, rest.statistics);
+  test::expect_same(whole.statistics, rest.statistics);
 }
 
 template <int D>
@@ -237,7 +220,8 @@ TEST(Continue, ALaterEnd) {
       // With the same end it ends as it has ended, if it ended within an epoch.
       if (!plans[0].collisions) continue;
       const auto ended = run<3>(scene, 0, plans[0], {.within_epochs = true});
-      expect_same(ended.statistics, run<3>(scene, ranks, plans[0], {.within_epochs = true}, &begun.state).statistics);
+      test::expect_same(ended.statistics,
+                        run<3>(scene, ranks, plans[0], {.within_epochs = true}, &begun.state).statistics);
     }
 }
 

@@ -8,6 +8,7 @@
 #include "engine/ranks/id_blocks.h"
 #include "engine/run/simulation.h"
 #include "tests/support/experiments.h"
+#include "tests/support/same_statistics.h"
 #include "tests/support/thread_ranks.h"
 
 namespace carom {
@@ -70,22 +71,7 @@ void expect_same(const Account<D>& one, const Account<D>& other) {
   }
   EXPECT_EQ(one.events, other.events);
   EXPECT_EQ(one.values, other.values);
-  const Statistics &a = one.statistics, &b = other.statistics;
-  EXPECT_EQ(a.max_energy_error, b.max_energy_error);
-  EXPECT_EQ(a.mean_pressure, b.mean_pressure);
-  EXPECT_EQ(a.force_passes, b.force_passes);
-  EXPECT_EQ(a.counters.max_overlap, b.counters.max_overlap);
-  EXPECT_EQ(a.counters.pieces, b.counters.pieces);
-  EXPECT_EQ(a.max_shadow_energy_error, b.max_shadow_energy_error);
-  EXPECT_EQ(a.max_momentum_error, b.max_momentum_error);
-  EXPECT_EQ(a.mean_free_path, b.mean_free_path);
-  EXPECT_EQ(a.counters.sphere_sphere, b.counters.sphere_sphere);
-  EXPECT_EQ(a.counters.sphere_wall, b.counters.sphere_wall);
-  EXPECT_EQ(a.counters.sweeps, b.counters.sweeps);
-  EXPECT_EQ(a.counters.slabs_halved, b.counters.slabs_halved);
-  EXPECT_EQ(a.counters.fallbacks, b.counters.fallbacks);
-  EXPECT_EQ(a.counters.frozen, b.counters.frozen);
-  EXPECT_EQ(a.counters.folded, b.counters.folded);
+  test::expect_same(one.statistics, other.statistics);
 }
 
 /// `contacts`: how many collisions there must be at least for the test to tell anything.

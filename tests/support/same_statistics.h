@@ -1,0 +1,34 @@
+#pragma once
+// Two runs of one system, on other ranks or taken up in between: all of their accounts that says anything of the
+// motion.
+
+#include <gtest/gtest.h>
+
+#include "engine/run/simulation.h"
+
+namespace carom::test {
+
+inline void expect_same(const Statistics& a, const Statistics& b) {
+  EXPECT_EQ(a.steps, b.steps);
+  EXPECT_EQ(a.end_time, b.end_time);
+  EXPECT_EQ(a.force_passes, b.force_passes);
+  EXPECT_EQ(a.energy_initial, b.energy_initial);
+  EXPECT_EQ(a.energy_final, b.energy_final);
+  EXPECT_EQ(a.max_energy_error, b.max_energy_error);
+  EXPECT_EQ(a.max_momentum_error, b.max_momentum_error);
+  EXPECT_EQ(a.max_shadow_energy_error, b.max_shadow_energy_error);
+  EXPECT_EQ(a.mean_pressure, b.mean_pressure);
+  EXPECT_EQ(a.mean_free_path, b.mean_free_path);
+  const Counters &x = a.counters, &y = b.counters;
+  EXPECT_EQ(x.sphere_sphere, y.sphere_sphere);
+  EXPECT_EQ(x.sphere_wall, y.sphere_wall);
+  EXPECT_EQ(x.max_overlap, y.max_overlap);
+  EXPECT_EQ(x.sweeps, y.sweeps);
+  EXPECT_EQ(x.pieces, y.pieces);
+  EXPECT_EQ(x.slabs_halved, y.slabs_halved);
+  EXPECT_EQ(x.fallbacks, y.fallbacks);
+  EXPECT_EQ(x.frozen, y.frozen);
+  EXPECT_EQ(x.folded, y.folded);
+}
+
+}  // namespace carom::test
