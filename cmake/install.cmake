@@ -5,6 +5,12 @@ set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/carom)
 
 if(NOT CAROM_ENGINE_ONLY)
   install(TARGETS carom RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  set(about ${PROJECT_BINARY_DIR}/io/about)
+  install(FILES ${about}/carom.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+  install(FILES ${about}/carom.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME carom)
+  install(FILES ${about}/_carom DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions)
+  install(FILES ${about}/carom.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
+  install(DIRECTORY inputs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/carom/inputs FILES_MATCHING PATTERN "*.toml" PATTERN figures EXCLUDE)
 endif()
 install(TARGETS carom_engine EXPORT carom_targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
                                                   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})

@@ -5,6 +5,10 @@
 """
 
 import contextlib
+import pathlib
+import shlex
+import sys
+import textwrap
 
 import matplotlib
 
@@ -14,7 +18,8 @@ import matplotlib.pyplot as plt
 
 @contextlib.contextmanager
 def panels(file, *labels):
-    """Axes side by side, one for each dictionary of labels; written at the end, with a legend where anything has a label."""
+    """Axes side by side, one for each dictionary of labels; written at the end, with a legend where anything has a label,
+    below the command that draws them."""
     figure, row = plt.subplots(ncols=len(labels), figsize=(6.4 * len(labels), 4.8), squeeze=False)
     yield row[0]
     for axes, named in zip(row[0], labels):
@@ -22,6 +27,10 @@ def panels(file, *labels):
         axes.grid(True, alpha=0.3)
         if axes.get_legend_handles_labels()[0]:
             axes.legend()
+    words = [f"tools/{pathlib.Path(sys.argv[0]).name}", *sys.argv[1:]]
+    # Where it goes is not what it shows.
+    command = shlex.join(word for before, word in zip(["", *words], words) if not {before, word} & {"-o", "--output"})
+    figure.supxlabel(textwrap.fill(command, 110 * len(labels)), fontsize=6, family="monospace", color="grey")
     figure.tight_layout()
     figure.savefig(file, dpi=150 / len(labels))
     plt.close(figure)

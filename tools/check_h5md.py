@@ -6,22 +6,27 @@
 
 Prints every violation and ends with exit code 1 if there is one. Besides the format
 (https://www.nongnu.org/h5md/h5md.html, version 1.1) it checks what keeps the file readable by MDAnalysis and VMD: one group
-of particles, positions in three columns, a time-dependent box that shares step and time with the positions, no units,
-fixed-length strings, an old superblock. Then the contents: finite numbers, times that rise, centres inside the box, and
+of particles, positions in three columns, a time-dependent box that shares step and time with the positions, units of length and
+time where the deck names them (output.units) and no others, fixed-length strings,
+an old superblock. Then the contents: finite numbers, times that rise, centres inside the box, and
 that MDAnalysis reads the same positions.
 """
 
 import argparse
 import pathlib
 import sys
+import tomllib
 import warnings
 
 import h5py
 import numpy as np
 
-from carom_files import TRAJECTORY, as_text, open_hdf5, reading
+from carom_files import TRAJECTORY, as_text, one_line, open_hdf5, reading
 
 PARTICLES = "particles/trajectory"
+# What has a unit where the deck names units, by its place in the group of particles.
+UNITS = {"position/value": "length", "box/edges/value": "length", "radius": "length", "velocity/value": "velocity"}
+UNITS |= {f"{clock}/time": "time" for clock in ("position", "velocity", "image", "box/edges")}
 OVERHANG = 1e-12  # how far a sphere may stand over a wall, relative to the edge
 
 
@@ -31,6 +36,11 @@ class Checker:
     def __init__(self, file):
         self.file = file
         self.violations = []
+        try:
+            deck = tomllib.loads(as_text(file["parameters/deck"][()])) if "parameters/deck" in file else {}
+        except tomllib.TOMLDecodeError:
+            deck = {}  # named below
+        self.units = deck.get("output", {}).get("units", {})
 
     def expect(self, condition, violation):
         if not condition:
@@ -84,9 +94,17 @@ class Checker:
             types = [(f"/{name}", item.dtype)] if isinstance(item, h5py.Dataset) else []
             types += [(f"/{name}, attribute '{key}'", item.attrs.get_id(key).dtype) for key in item.attrs]
             for place, dtype in types:
-                string = h5py.check_string_dtype(dtype)
-                self.expect(string is None or string.length is not None, f"{place}: a string of variable length")
-            self.expect("unit" not in item.attrs, f"/{name}: attribute 'unit', but units are reduced")
+                string, unit = h5py.check_string_dtype(dtype), place.endswith("'unit'")
+                self.expect(string is None or (string.length is None) == unit,
+                            f"{place}: a string of {'fixed' if unit else 'variable'} length")
+            found = item.attrs.get("unit")
+            if self.units:
+                length, time = self.units["length"], self.units["time"]
+                kind = UNITS.get(name.removeprefix(f"{PARTICLES}/")) or ("time" if name.endswith("/time") else None)
+                wanted = {"length": length, "time": time, "velocity": f"{length} {time}-1", None: None}[kind]
+                self.expect(found == wanted, f"/{name}: attribute 'unit' is {found}, by the deck {wanted}")
+            else:
+                self.expect(found is None, f"/{name}: attribute 'unit', but units are reduced")
 
         self.file.visititems(visit)
 
@@ -225,6 +243,7 @@ def violations(path, with_mdanalysis=True):
         return checker.violations
 
 
+@one_line
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=pathlib.Path, help="directory of a run, or its trajectory")

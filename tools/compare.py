@@ -17,7 +17,7 @@ import sys
 import h5py
 import numpy as np
 
-from carom_files import TRAJECTORY, open_hdf5, read_summary, read_table, read_thermo, reading
+from carom_files import TRAJECTORY, one_line, open_hdf5, read_summary, read_table, read_thermo, reading
 
 TABLES = ["rdf.csv", "msd.csv", "profile.csv"]
 # What the summary says of the machine and the place, not of the run.
@@ -95,6 +95,7 @@ def compare(a, b, tolerance=None, last=False):
     return lines
 
 
+@one_line
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("a", type=pathlib.Path, help="directory of a run")

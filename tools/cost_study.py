@@ -20,7 +20,7 @@ import tempfile
 
 import numpy as np
 
-from carom_files import RunFailed, Trajectory
+from carom_files import RunFailed, Trajectory, one_line
 from carom_plot import panels
 from studies import (parse, processor_seconds, read_deck, relative_error, run_deck, study_parser, variant, with_markers,
                      write_table)
@@ -81,6 +81,7 @@ def draw(rows, x, columns, labels, file):
                 axes.loglog([entry[x] for entry in mine], [entry[column] for entry in mine], marker=marker, label=method)
 
 
+@one_line
 def main(arguments=None):
     options = parse_arguments(arguments)
     deck, steps = read_deck(options), options.steps

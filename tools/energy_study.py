@@ -8,19 +8,21 @@
 Every run makes 5000 steps (--count), or, for a clean order, goes to a fixed --end-time, from --starts perturbed copies of
 the deck's initial state (seeded; start 0 is the deck's own). Drawn is the largest |H - H1|, H1 the energy after the first
 step, as a geometric mean over the starts; the CSV also has it relative to E_ref = max(|H1|, K1 + sum |V|). The order is the
-slope over the steps not above --fit-below, at a fixed end time: with a fixed number of steps larger ones also run longer,
-which makes the slope steeper. Errors at rounding level have none. Runs that fail are reported, kept as
+slope over the steps not above --fit-below, at a fixed end time. With a fixed number of steps larger ones also run longer: the
+legend then says how the error grows with the step, which is more than the order where it also grows with time.
+Errors at rounding level have none. Runs that fail are reported, kept as
 rows without an error, and left out of the figure. The decks of all runs are left beside the CSV.
 """
 
 import concurrent.futures
 import os
+import re
 import sys
 import tempfile
 
 import numpy as np
 
-from carom_files import RunFailed
+from carom_files import RunFailed, one_line
 from carom_plot import picture
 from studies import parse, read_deck, relative_error, run_deck, study_parser, variant, with_markers, write_table
 
@@ -95,6 +97,15 @@ def curve(rows, method, column="max_abs_energy_error"):
     return steps, np.array([np.exp(np.mean(np.log(errors[step]))) for step in steps])
 
 
+def spread(rows, method, column="max_abs_energy_error"):
+    """The standard error of that mean over the starts, as a factor, at each step."""
+    errors = {}
+    for row in rows:
+        if row["method"] == method and row[column] not in ("", None) and float(row[column]) > 0:
+            errors.setdefault(float(row["step"]), []).append(np.log(float(row[column])))
+    return np.exp([np.std(errors[step]) / np.sqrt(len(errors[step])) for step in sorted(errors)])
+
+
 def fitted_order(steps, errors, below):
     """Slope of log error against log step over the steps not above `below`; NaN with fewer than two of them."""
     use = steps <= below * (1 + 1e-9)
@@ -108,19 +119,24 @@ def describe(rows, method, options):
     if worst < ROUNDING:
         return rf"{method}: at most {worst:.1e} $E_{{\mathrm{{ref}}}}$"
     order = fitted_order(*curve(rows, method), options.fit_below)
-    word = "order" if options.end_time else "slope"
-    return f"{method}: {word} {order:.2f}" if np.isfinite(order) else method
+    if not np.isfinite(order):
+        return method
+    # With a number of steps the run grows longer with the step, and so does its error.
+    return f"{method}: order {order:.2f}" if options.end_time else f"{method}: error ~ step$^{{{order:.2f}}}$"
 
 
 def draw(rows, options, title, file):
     length = f"to t = {options.end_time:g}" if options.end_time else f"{options.count} steps"
     starts = f", {options.starts} starts" if options.starts > 1 else ""
-    with picture(file, xlabel="step", ylabel=r"largest $|H - H_1|$", title=f"{title}\n{length}{starts}") as axes:
+    with picture(file, xlabel="step [time]", ylabel=r"largest $|H - H_1|$ [energy]", title=f"{title}\n{length}{starts}") as axes:
         for method, marker in with_markers(options.methods):
             steps, errors = curve(rows, method)
             axes.loglog(steps, errors, marker=marker, label=describe(rows, method, options))
+            if options.starts > 1:
+                axes.fill_between(steps, *errors * spread(rows, method) ** [[-1], [1]], alpha=0.2)
 
 
+@one_line
 def main(arguments=None):
     options = parse_arguments(arguments)
     deck = read_deck(options)
@@ -133,7 +149,8 @@ def main(arguments=None):
     write_table(table, COLUMNS, rows)
     draw(rows, options, deck.get("title", options.deck.stem), figure)
     for method in options.methods:
-        print(describe(rows, method, options).replace(r"$E_{\mathrm{ref}}$", "E_ref"))
+        line = describe(rows, method, options).replace(r"$E_{\mathrm{ref}}$", "E_ref")
+        print(re.sub(r"error ~ step\$\^{(.*)}\$", r"error ~ step^\1 after a fixed number of steps, which is no order: give --end-time", line))
     print(f"Results: {table}, {figure}")
 
 

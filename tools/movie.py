@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.collections import EllipseCollection
 
-from carom_files import Trajectory
+from carom_files import Trajectory, one_line
 
 LINE = {"wall": "-", "periodic": "--", "open": ":"}
 
@@ -98,6 +98,7 @@ class Scene:
             self.axes.plot([0, self.edges[0]], np.full(2, end * self.edges[1]), style[1], color="black", linewidth=1.5)
 
 
+@one_line
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=pathlib.Path, help="directory of a run, or its trajectory")

@@ -13,7 +13,7 @@ import pathlib
 
 import numpy as np
 
-from carom_files import read_summary, read_thermo, reading
+from carom_files import one_line, read_summary, read_thermo, reading
 from carom_plot import picture
 
 
@@ -30,8 +30,8 @@ def energy_errors(directory, relative=False):
 
 def draw(directories, relative, logarithmic, file):
     size, what = (np.abs, "$|H - H_1|$") if logarithmic else (np.asarray, "$H - H_1$")
-    unit = r" / $E_{\mathrm{ref}}$" if relative else ""
-    with picture(file, xlabel="time", ylabel=what + unit, yscale="log" if logarithmic else "linear") as axes:
+    unit = r" / $E_{\mathrm{ref}}$" if relative else " [energy]"
+    with picture(file, xlabel="t [time]", ylabel=what + unit, title="Energy error", yscale="log" if logarithmic else "linear") as axes:
         for directory in directories:
             time, error, shadow_error = energy_errors(directory, relative)
             (line,) = axes.plot(time, size(error), label=pathlib.Path(directory).name)
@@ -39,6 +39,7 @@ def draw(directories, relative, logarithmic, file):
                 axes.plot(time, size(shadow_error), "--", color=line.get_color(), alpha=0.7)
 
 
+@one_line
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", nargs="+", type=pathlib.Path, help="directories of runs")

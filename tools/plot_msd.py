@@ -6,8 +6,13 @@
     tools/plot_msd.py runs/hard-discs/msd.csv --dimension 2   # what the run itself has averaged (output.msd_interval)
 
 Averaged over particles and over all time origins, with displacements followed through periodic boundaries. Needs frames
-at equal times. D = slope / (2 d) over --fit (default: the later half of the lags); a CSV with lag, msd stands beside the picture,
-msd-frames.csv by default.
+at equal times. D = slope / (2 d) of a line through the lags of --fit, by default from a twentieth to an eighth of the length of
+the run, each weighted by its error msd sqrt(2 / (d n)), n particles times windows of that lag that follow each other in the run.
+The error of D (one standard deviation) comes from four parts of the run, each fitted alone; of an msd.csv, which has no parts,
+it is the relative error of the msd at the first lag of the fit, were particles independent: neighbours that move together make
+the true one larger, in a fluid about twice. Error bars of the picture are of that kind. Where velocities stay correlated for
+long, the slope still rises with the lag: compare --fit.
+A CSV with lag, msd stands beside the picture, msd-frames.csv by default.
 (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.7.)
 """
 
@@ -16,8 +21,11 @@ import pathlib
 
 import numpy as np
 
-from carom_files import Trajectory, read_table, reading
+from carom_files import TRAJECTORY, Trajectory, one_line, read_table, reading
 from carom_plot import picture
+
+FROM, TO = 20, 8  # the fit goes from this part of the length of the run to that
+BLOCKS = 4        # parts of the run, for the error
 
 
 def regular_frames(times):
@@ -30,7 +38,8 @@ def regular_frames(times):
 
 
 def mean_squared_displacement(trajectory):
-    """Lag times and the mean squared displacement at each, up to half the length of the trajectory."""
+    """Lag times up to half the length of the trajectory, how many windows of each follow one another, the mean squared
+    displacement [lags], and that of the origins in each of so many parts of the run [parts, lags]."""
     frames = regular_frames(trajectory.time)
     if frames < 3:
         raise SystemExit("There are not enough frames at equal times: set output.frame_interval to a multiple of the step.")
@@ -39,18 +48,51 @@ def mean_squared_displacement(trajectory):
     x = np.stack([trajectory.unwrapped(frame) for frame in range(frames)])
     # Up to 100 lags, at equal distances or, for long trajectories, at equal ratios.
     lags = np.unique(np.geomspace(1, frames // 2, 100).astype(int)) if frames > 200 else np.arange(1, frames // 2 + 1)
-    msd = np.array([np.mean(np.sum((x[lag:] - x[:-lag]) ** 2, axis=2)) for lag in lags])
-    return lags * (trajectory.time[1] - trajectory.time[0]), msd
+    of_origins = [np.mean(np.sum((x[lag:] - x[:-lag]) ** 2, axis=2), axis=1) for lag in lags]
+    starts = frames * np.arange(BLOCKS + 1) // BLOCKS
+    of_blocks = np.array([[msd[first:behind].mean() if len(msd) > first else np.nan for msd in of_origins]
+                          for first, behind in zip(starts, starts[1:]) if behind > first])
+    return (lags * (trajectory.time[1] - trajectory.time[0]), (frames - 1) // lags,
+            np.array([msd.mean() for msd in of_origins]), of_blocks)
 
 
-def diffusion_coefficient(lag, msd, dimension, between=None):
-    low, high = between or (lag[-1] / 2, lag[-1])
-    use = (lag >= low) & (lag <= high)
+def relative_errors(windows, particles, dimension):
+    """Of a mean squared displacement whose components are Gaussian."""
+    return np.sqrt(2 / (dimension * particles * windows))
+
+
+def fitted(lag, windows, msd, between=None):
+    """Which lags enter the fit."""
+    length = np.max(lag * windows)
+    low, high = between or (length / FROM, length / TO)
+    return (lag >= low * (1 - 1e-9)) & (lag <= high * (1 + 1e-9)) & (msd > 0)
+
+
+def diffusion_coefficient(lag, windows, msd, dimension, between=None):
+    """D of a line through the lags of the fit, weighted by their errors."""
+    use = fitted(lag, windows, msd, between)
     if use.sum() < 2:
         return np.nan
-    return np.polyfit(lag[use], msd[use], 1)[0] / (2 * dimension)
+    return np.polyfit(lag[use], msd[use], 1, w=np.sqrt(windows[use]) / msd[use])[0] / (2 * dimension)
 
 
+def error_of_blocks(lag, windows, of_blocks, dimension, between=None):
+    """The standard error of D from parts of the run; NaN of fewer than two."""
+    each = [diffusion_coefficient(lag, windows, msd, dimension, between) for msd in of_blocks]
+    each = [value for value in each if np.isfinite(value)]
+    return np.std(each, ddof=1) / np.sqrt(len(each)) if len(each) > 1 else np.nan
+
+
+def particle_numbers(directory):
+    """How many particles the mean squared displacement of each column of a run's msd.csv is of; nothing without a trajectory."""
+    if not (directory / TRAJECTORY).exists():
+        return {}
+    with Trajectory(directory) as trajectory:
+        numbers = np.bincount(trajectory.species, minlength=len(trajectory.species_names))
+        return {"msd": len(trajectory.species)} | {f"msd_{name}": n for name, n in zip(trajectory.species_names, numbers)}
+
+
+@one_line
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=pathlib.Path, help="directory of a run, its trajectory, or its msd.csv")
@@ -64,29 +106,43 @@ def main(arguments=None):
     if options.run.suffix == ".csv":
         columns = read_table(options.run)
         with reading(options.run):
-            lag = columns.pop("time")
-            columns.pop("origins")
-        diffusion = {name: diffusion_coefficient(lag, msd, options.dimension, between) for name, msd in columns.items()}
-        file = options.output or options.run.with_suffix(".png")
-        draw(file, lag, columns, diffusion)
-        print("".join(f"{name}: D = {value:.6g}\n" for name, value in diffusion.items()) + f"Results: {file}")
-        return
-    with Trajectory(options.run) as trajectory:
-        lag, msd = mean_squared_displacement(trajectory)
-        diffusion = diffusion_coefficient(lag, msd, trajectory.dimension, between)
-        title = trajectory.title
-    folder = options.run if options.run.is_dir() else options.run.parent
-    file = options.output or folder / "msd.png"
-    table = file.with_name(file.stem + "-frames.csv")
-    np.savetxt(table, np.stack([lag, msd], axis=1), delimiter=",", header="lag,msd", comments="")
-    draw(file, lag, {"msd": msd}, {"msd": diffusion}, title)
-    print(f"D = {diffusion:.6g}\nResults: {table}, {file}")
+            lag, windows = columns.pop("time"), columns.pop("origins")
+        dimension, file, title, table = options.dimension, options.output or options.run.with_suffix(".png"), "", None
+        numbers = particle_numbers(options.run.parent)
+        spread = {name: relative_errors(windows, numbers.get(name, np.nan), dimension) for name in columns}
+        error = {}
+        for name, msd in columns.items():
+            value = diffusion_coefficient(lag, windows, msd, dimension, between)
+            first = np.argmax(fitted(lag, windows, msd, between))
+            error[name] = value * spread[name][first]
+    else:
+        with Trajectory(options.run) as trajectory:
+            lag, windows, msd, of_blocks = mean_squared_displacement(trajectory)
+            dimension, title = trajectory.dimension, trajectory.title
+        columns = {"msd": msd}
+        spread = {"msd": relative_errors(windows, len(trajectory.species), dimension)}
+        error = {"msd": error_of_blocks(lag, windows, of_blocks, dimension, between)}
+        file = options.output or (options.run if options.run.is_dir() else options.run.parent) / "msd.png"
+        table = file.with_name(file.stem + "-frames.csv")
+        np.savetxt(table, np.stack([lag, msd], axis=1), delimiter=",", header="lag,msd", comments="")
+    results = {name: diffusion_text(diffusion_coefficient(lag, windows, msd, dimension, between), error[name])
+               for name, msd in columns.items()}
+    draw(file, lag, columns, spread, results, title)
+    prefix = (lambda name: f"{name}: ") if table is None else (lambda name: "")
+    print("".join(f"{prefix(name)}D = {text}\n" for name, text in results.items())
+          + "Results: " + (f"{table}, " if table else "") + str(file))
 
 
-def draw(file, lag, curves, diffusion, title=""):
-    with picture(file, xlabel="lag", ylabel="mean squared displacement", title=title) as axes:
+def diffusion_text(value, error):
+    return f"{value:.4g} ± {error:.1g}" if np.isfinite(error) else f"{value:.6g}"
+
+
+def draw(file, lag, curves, spread, results, title=""):
+    with picture(file, xlabel="lag [time]", ylabel="mean squared displacement [length$^2$]",
+                 title=title or "Mean squared displacement", xscale="log", yscale="log") as axes:
         for name, msd in curves.items():
-            axes.loglog(lag, msd, "o-", markersize=3, label=f"{name}: D = {diffusion[name]:.4g}")
+            bars = msd * spread[name] if np.isfinite(spread[name]).all() else None
+            axes.errorbar(lag, msd, bars, fmt="o-", markersize=3, capsize=2, label=f"{name}: D = {results[name]} [length$^2$/time]")
 
 
 if __name__ == "__main__":

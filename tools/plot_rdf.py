@@ -17,7 +17,7 @@ import pathlib
 import numpy as np
 from scipy.spatial import cKDTree
 
-from carom_files import Trajectory, read_table, reading
+from carom_files import Trajectory, one_line, read_table, reading
 from carom_plot import picture
 
 
@@ -97,6 +97,7 @@ def _into(x, edges, periodic):
     return np.where(periodic & (x >= edges), x - edges, x)
 
 
+@one_line
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=pathlib.Path, help="directory of a run, its trajectory, or its rdf.csv")
@@ -129,7 +130,7 @@ def main(arguments=None):
 
 
 def draw(file, r, curves, title=""):
-    with picture(file, xlabel="r", ylabel="g(r)", title=title) as axes:
+    with picture(file, xlabel="r [length]", ylabel="g(r)", title=title or "Radial distribution function") as axes:
         for name, g in curves.items():
             axes.plot(r, g, label=name if len(curves) > 1 else None)
         axes.axhline(1, color="grey", linewidth=0.8)

@@ -26,6 +26,7 @@ import tempfile
 
 import numpy as np
 
+from carom_files import one_line
 from carom_plot import panels
 from studies import processor_seconds, read_deck, run_deck, write_table
 
@@ -153,6 +154,7 @@ def draw(rows, fitted, options, title, file):
             right.plot(sizes, [row["efficiency"] for row in curves], label=f"{ranks} ranks")
 
 
+@one_line
 def main(arguments=None):
     options = parse_arguments(arguments)
     deck = read_deck(options)

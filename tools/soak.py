@@ -4,12 +4,17 @@
     tools/soak.py --minutes 30
     tools/soak.py --count 100 --seed 7 --ranks 1,2,3,4
     tools/soak.py --only 17 --seed 7 --count 100       # deck 17 of these alone, when something was found
+    tools/soak.py --jumps tests/regression/decks/*.toml inputs/*.toml --count 50 --seed 3
 
 Each deck draws a method, forces, boundaries, a dimension, sizes and outputs. It runs once undisturbed, then again on other
 numbers of ranks, with checkpoints a few hundredths of a second apart, while it is killed (KILL to the process, a rank, or
 mpirun), told to stop (USR2, TERM, INT, HUP, --max-wall), or given a nearer end first. After each it goes on with `carom run
 --continue`, or from the start where there was no checkpoint yet. Compared are all files and the summary. Spheres must not overlap,
 and free-flight, cdda and edda must keep the energy. Exit code 0: nothing found; 1: something; its files are left in --output.
+
+--jumps measures instead how far the energy jumps in a slab, at most, of the exact methods, relative to what energy errors are
+relative to: in the decks given, where they are of free-flight with their method, else with cdda and edda, and in the random
+ones. A run that takes long is stopped.
 """
 
 import argparse
@@ -21,8 +26,11 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 
-from carom_files import find_carom, read_summary, toml_text
+import numpy as np
+
+from carom_files import Error, find_carom, one_line, read_summary, read_thermo, toml_text
 from compare import compare, summary_differences
 
 LEAST_DISTANCE = 1e-9  # that spheres may overlap by
@@ -166,14 +174,19 @@ class Run:
             pass
 
     def end(self, job, codes, most=PATIENCE):
-        """Waits for it; its exit code must be one of these."""
-        try:
-            error = job.communicate(timeout=most)[1].strip()
-        except subprocess.TimeoutExpired as expired:
-            for process in [*self.processes(), job.pid]:
-                self.kill(process, signal.SIGKILL)
-            job.communicate()
-            raise Found("it does not end") from expired
+        """Waits for it; its exit code must be one of these. What a killed mpirun leaves in MPI_Init is killed too."""
+        until = time.monotonic() + most
+        while True:
+            try:
+                error = job.communicate(timeout=min(1, most))[1].strip()
+                break
+            except subprocess.TimeoutExpired as expired:
+                left, late = self.processes(), time.monotonic() > until
+                for process in left + [job.pid] * late if late or job.poll() == -signal.SIGKILL else []:
+                    self.kill(process, signal.SIGKILL)
+                if late:
+                    job.communicate()
+                    raise Found(f"it does not end; {len(left)} of its processes are left") from expired
         for _ in range(1000):  # mpirun does not wait for those it kills
             if not self.processes():
                 break
@@ -194,12 +207,7 @@ class Run:
         time.sleep(seconds)
         number = getattr(signal, "SIG" + how)
         at = [job.pid, *self.processes()] if how == "KILL" and ranks > 1 else [job.pid]
-        victim = self.dice.choice(at)
-        self.kill(victim, number)
-        if victim == job.pid and how == "KILL" and ranks > 1:
-            time.sleep(0.5)  # those that mpirun has started end by themselves then, but not within MPI_Init
-            for process in self.processes():
-                self.kill(process, number)
+        self.kill(self.dice.choice(at), number)
         # A signal may come before the command, or mpirun, is ready for it, or after it; a killed rank has codes of its own.
         self.end(job, range(-64, 256) if how == "KILL" else (0, 75, -number, 128 + number))
 
@@ -246,6 +254,59 @@ def draw(carom, dice, seconds, where, ranks):
         return deck, time.monotonic() - start
 
 
+# Jumps of the energy
+
+def largest_jump(carom, file, method, where, seconds):
+    """Of a run with a row each slab: the largest |H − H of the row before|, relative; None: it does not run."""
+    shutil.rmtree(where, ignore_errors=True)
+    deck = tomllib.loads(file.read_text())
+    interval = deck.get("output", {}).get("thermo_interval", 1.0) if method == "free-flight" else deck["integrator"]["step"]
+    sets = [f"integrator={{type=\"{method}\", step={interval}}}"] if method != deck["integrator"]["type"] else []
+    sets += [f"output.thermo_interval={interval}", "output.frame_interval=0.0"]
+    command = [carom, "run", file, "-o", where, "--quiet", "--max-wall", seconds, *(part for each in sets for part in ("--set", each))]
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+    if done.returncode not in (0, 75):
+        print(f"      {file} with {method}, not taken: {done.stderr.strip()[:150]!r}")
+        return None
+    energies = read_thermo(where)["total"]
+    if len(energies) < 2:
+        print(f"      {file} with {method}, not taken: no slab is done in {seconds:g} s")
+        return None
+    return np.abs(np.diff(energies)).max() / (read_summary(where)["energy"]["reference"] or 1)
+
+
+def jumps(carom, decks, options):
+    """The largest jump by method, in words."""
+    where, most, runs = options.output.resolve() / "jump", {}, {}
+
+    def measure(file, method, name):
+        jump = largest_jump(carom, file, method, where, options.seconds)
+        if jump is None:
+            return
+        runs[method] = runs.get(method, 0) + 1
+        most[method] = max(most.get(method, (0, "")), (jump, name))
+        print(f"{jump:9.1e}  {method:12} {name}", flush=True)
+
+    for file in decks:
+        free = tomllib.loads(file.read_text())["integrator"]["type"] == "free-flight"
+        for method in ["free-flight"] if free else ["cdda", "edda"]:
+            measure(file, method, file)
+    dice, taken = random.Random(options.seed), 0
+    while taken < (options.count if options.count < 10**9 else 0):
+        deck = random_deck(dice, options.seconds)
+        method = deck["integrator"]["type"]
+        file = options.output.resolve() / "jump.toml"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(toml_text(deck))
+        if method not in EXACT or subprocess.run([str(carom), "validate", str(file)], capture_output=True).returncode != 0:
+            continue
+        taken += 1
+        measure(file, method, words(deck))
+    for method, (jump, name) in most.items():
+        print(f"{method}: the largest jump of {runs[method]} runs is {jump:.1e}, in {name}")
+
+
+@one_line
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
@@ -254,12 +315,16 @@ def main(arguments=None):
     parser.add_argument("--only", type=int, help="this deck alone")
     parser.add_argument("--ranks", default="1,2,3,4", help="numbers of ranks to choose from")
     parser.add_argument("--seconds", type=float, default=0.4, help="about what a deck takes")
+    parser.add_argument("--jumps", type=pathlib.Path, nargs="*", metavar="DECK", help="measure the largest jump of the energy in a slab")
     parser.add_argument("--carom", help="the command; default: $CAROM or the build of tools/run")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("runs/soak"))
     options = parser.parse_args(arguments)
+    carom, ranks = find_carom(options.carom), list(map(int, options.ranks.split(",")))
+    if options.jumps is not None:
+        jumps(carom, options.jumps, options)
+        return 0
     if options.count == 10**9 and options.minutes == float("inf") and options.only is None:
         parser.error("say --count or --minutes")
-    carom, ranks = find_carom(options.carom), list(map(int, options.ranks.split(",")))
     end, done, found, continued = time.monotonic() + 60 * options.minutes, 0, 0, 0
     for number in [options.only] if options.only is not None else range(options.count):
         if time.monotonic() > end:
@@ -271,7 +336,7 @@ def main(arguments=None):
             outcome, times = soak(carom, deck, seconds, where, ranks, dice)
             continued += times
             shutil.rmtree(where)
-        except (Found, SystemExit) as problem:
+        except (Found, Error) as problem:
             outcome = f"FOUND in {where}: {problem}"
             found += 1
         done += 1

@@ -93,7 +93,7 @@ template <class T>
   const T within = hi < 710.0 ? (hi > -746.0 ? hi : all<T>(-746)) : all<T>(0);
   const Scaled<T> e = exp_scaled(within, lo);
   const T result = scale(e.mantissa.hi + e.mantissa.lo, e.k);
-  const T beyond = hi > 0.0 ? all<T>(kInfinity) : hi + lo;  // or no number
+  const T beyond = hi > 0.0 ? all<T>(kInfinity) : hi + lo;  // or NaN
   return hi < 710.0 ? (hi < -746.0 ? all<T>(0) : result) : beyond;
 }
 
@@ -197,7 +197,7 @@ template <class T>
   const Sum<T> shifted = two_sum(1 - one, e.hi);
   const T lost = k > 53.0 ? -one : all<T>(0);  // of 1 − 2^-k
   const T result = scale(shifted.hi + (shifted.lo + e.lo + lost), k);
-  const T beyond = x > 0.0 ? all<T>(kInfinity) : x;  // or no number
+  const T beyond = x > 0.0 ? all<T>(kInfinity) : x;  // or NaN
   return x < 710.0 ? (x < -40.0 ? all<T>(-1) : x == 0.0 ? x : result) : beyond;
 }
 

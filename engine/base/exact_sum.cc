@@ -15,7 +15,7 @@ __extension__ void ExactSum::add(__int128 multiple, double power_of_two) {
     const auto low = static_cast<std::int64_t>(multiple & 0xffffffffffff);
     add(static_cast<double>(low) * unit);
     multiple >>= 48;
-    if (multiple == -1) {  // a negative number: its upper part is −1 for ever
+    if (multiple == -1) {  // a negative number: all its higher digits are −1
       add(-unit * 0x1p48);
       break;
     }

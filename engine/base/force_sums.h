@@ -57,7 +57,7 @@ class ForceSums {
     return high_.data();
   }
 
-  /// Adds a force on one particle, for which there is room. False where it is too large or no number.
+  /// Adds a force on one particle, for which there is room. False where it is too large or NaN.
   bool add(Id i, const Vec<D>& force, const ForceLimits& limits) {
     for (int k = 0; k < D; ++k) {
       const double quanta = force[k] / quantum_;
@@ -72,7 +72,7 @@ class ForceSums {
     }
     return true;
   }
-  /// Some force could not be added: all values are no numbers until reset().
+  /// Some force could not be added: all values are NaN until reset().
   void spoil() { spoiled_ = true; }
 
   /// The force on a particle, rounded once.

@@ -144,7 +144,7 @@ template <class T>
 CAROM_INLINE T abs(T x) {
   return __builtin_bit_cast(T, __builtin_bit_cast(BitsOf<T>, x) & 0x7fffffffffffffffULL);
 }
-/// The lesser and the greater of two numbers; the second where one is no number.
+/// The lesser and the greater of two numbers; the second where one is NaN.
 template <class T>
 CAROM_INLINE T min(T a, T b) {
 #if defined(__AVX512F__)

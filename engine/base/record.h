@@ -10,7 +10,7 @@
 
 namespace carom {
 
-/// A particle's place in the core's arrays. Ids are for ever; slots change whenever the core sorts its particles.
+/// A particle's place in the core's arrays. Ids never change; slots do whenever the core sorts its particles.
 using Slot = std::uint32_t;
 
 /// The state of a sphere right after its last event. One cache line; the kernels of scan.h rely on the layout.

@@ -11,7 +11,7 @@ namespace carom {
 template <int D>
 using Vec = Eigen::Matrix<double, D, 1>;
 
-/// A particle's number, given by its place in the deck, for ever.
+/// A particle's number, given by its place in the deck; it never changes.
 using Id = std::uint32_t;
 
 /// How many times a particle or a pair has been carried round each periodic axis.

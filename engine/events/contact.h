@@ -10,7 +10,7 @@
 //   const double s = contact_time(d, v, a, sigma, rest, slack);   // parabolas, sought in [0, rest)
 //
 // Approach slower than `slack` (rounding of the velocities, see approach_slack) does not count for pairs that touch:
-// no impulse could change it, and a contact that changes nothing would come again for ever.
+// no impulse could change it, and a contact that changes nothing would repeat without end.
 
 #include <cmath>
 

@@ -3,115 +3,113 @@
 #include <string>
 
 #include "engine/base/error.h"
-#include "engine/events/surroundings.h"
+#include "engine/events/contact.h"
+#include "engine/search/curve.h"
 
 namespace carom {
+
 template <int D>
 EventCore<D>::EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options)
     : box_(box),
       sizes_(sizes),
+      sort_interval_(options.sort_interval),
       flights_(box),
-      options_(options),
-      kernels_(scan_kernels()),
-      walled_(!box.walls().empty()),
-      tuning_(options) {}
+      queue_(flights_),
+      search_(box, flights_, queue_, sizes, options) {}
 
 template <int D>
-EventCore<D>::~EventCore() = default;
-
-template <int D>
-bool EventCore<D>::stale(const NextEvent<D>& a) const {
-  return a.kind == EventKind::pair && next_events_[packing_.slot(a.partner)].version != a.partner_version;
-}
-
-/// Of the contact that is planned.
-template <int D>
-std::uint32_t EventCore<D>::generation_of(Slot i) const {
-  const NextEvent<D>& a = next_events_[i];
-  const std::uint32_t own = flights_.generation_at(i, a.contact);
-  if (a.kind == EventKind::wall) return own;
-  return std::max(own, flights_.generation_at(packing_.slot(a.partner), a.contact));
+EventCounts EventCore<D>::counts() const {
+  EventCounts all = search_.counts();
+  all += queue_.counts();
+  all.stale += stale_;
+  return all;
 }
 
 template <int D>
-EventKey<D> EventCore<D>::key_of(Slot i) const {
-  const NextEvent<D>& a = next_events_[i];
-  const Record<D>& r = flights_[i];
-  if (a.kind == EventKind::wall)
-    return {.time = a.contact, .generation = generation_of(i), .kind = a.kind, .lo = r.id, .hi = a.partner};
-  const Id other = flights_[packing_.slot(a.partner)].id;
-  return pair_key<D>(a.contact, generation_of(i), r.id, other, packing_.image(a.partner));
+void EventCore<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  read(particles, g, horizon, growth);
+  search_.start(0, 0);
 }
 
 template <int D>
-typename EventCore<D>::Tied EventCore<D>::tie(Slot i) const {
-  const NextEvent<D>& a = next_events_[i];
-  if (a.update < a.contact) return {Tied::Rank::update, EventKey<D>{.lo = flights_[i].id}, i};
-  return {stale(a) ? Tied::Rank::stale : Tied::Rank::contact, key_of(i), i};
+void EventCore<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  read(particles, g, horizon, growth);
+  std::vector<Vec<D>>().swap(particles.x);
+  std::vector<Vec<D>>().swap(particles.v);
+  search_.start(0, 0);
 }
 
-/// Whether two spheres plan the same contact, and it still holds.
 template <int D>
-bool EventCore<D>::mirrored(Slot i, Slot j) const {
-  const NextEvent<D>&a = next_events_[i], &b = next_events_[j];
-  return a.kind == EventKind::pair && b.kind == EventKind::pair && b.contact == a.contact && a.contact <= a.update &&
-         b.contact <= b.update && packing_.slot(a.partner) == j && b.partner == packing_.reversed(i, a.partner) &&
-         !stale(a) && !stale(b);
+void EventCore<D>::give_back(double time, Particles<D>& particles) {
+  queue_.empty();  // makes room
+  fly_to(time, particles);
 }
 
-/// The next event before `end`: the smallest time, and of equal times the smallest key.
+/// Takes over the records, sorted in space anew where that is due.
 template <int D>
-bool EventCore<D>::next_event(double end, Slot& slot, double& time) {
-  const auto holds = [&](const CalendarEntry& entry) { return next_events_[entry.slot].due() == entry.time; };
-  for (;;) {
-    if (tied_.empty()) {
-      const CalendarEntry* const top = calendar_.top(holds);
-      if (!top || top->time >= end) return false;
-      const CalendarEntry entry = *top;
-      calendar_.pop();
-      if (!holds(entry)) {
-        ++counts_.dropped;
-        continue;
-      }
-      slot = entry.slot;
-      time = entry.time;
-      if (!calendar_.more_at(time)) return true;
-      settle();  // from here on it matters which plans are stale
-      // Often it is the same contact, planned by both partners: the other's plan falls with this one.
-      Slot other = slot;
-      if (const CalendarEntry* const next = calendar_.top(holds); mirrored(slot, next->slot)) {
-        other = next->slot;
-        calendar_.pop();
-        if (!calendar_.more_at(time)) return true;
-      }
-      tied_.push(tie(slot));
-      if (other != slot) tied_.push(tie(other));
-      tied_time_ = time;
-    }
-    settle();
-    time = tied_time_;
-    while (calendar_.more_at(time)) {
-      const CalendarEntry* const top = calendar_.top(holds);
-      if (holds(*top)) tied_.push(tie(top->slot));
-      calendar_.pop();
-    }
-    const Tied first = tied_.top();
-    tied_.pop();
-    slot = first.slot;
-    if (next_events_[slot].due() != time) continue;  // its plans have changed, and its new ones are in the calendar
-    const Tied now = tie(slot);
-    if (now == first) return true;
-    tied_.push(now);  // what it plans has another place among these: its partner has collided
+void EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
+  const std::size_t n = particles.size();
+  events_ = 0;
+  now_ = 0;
+  if (flights_.size() != n || static_cast<double>(since_sort_) > sort_interval_ * static_cast<double>(n)) {
+    search_.clear();
+    flights_.assign(along_curve<D>(n, [&](std::size_t i) -> const Vec<D>& { return particles.x[i]; }));
+    since_sort_ = 0;
   }
+  flights_.load(particles, g, horizon, growth);
 }
 
-/// A contact holds while its partner's version is the one it was planned with. Versions are read an event after the
-/// plans were made, because they come from memory.
 template <int D>
-void EventCore<D>::settle() {
-  for (; planned_ > 0; --planned_) {
-    NextEvent<D>& a = next_events_[just_planned_[planned_ - 1]];
-    if (a.kind == EventKind::pair) a.partner_version = next_events_[packing_.slot(a.partner)].version;
+void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now,
+                        double max_displacement) {
+  const auto order = along_curve<D>(records.size(), [&](std::size_t i) -> const Vec<D>& { return records[i].x; });
+  std::vector<Record<D>> sorted(records.size());
+  for (std::size_t i = 0; i < records.size(); ++i) sorted[i] = records[order[i]];
+  std::vector<Record<D>>().swap(records);
+  events_ = since_sort_ = 0;
+  now_ = now;
+  free_.clear();
+  search_.clear();
+  flights_.load(sorted, *sizes_, g, horizon);
+  search_.start(now, max_displacement);
+}
+
+template <int D>
+bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
+  if (!free_.empty()) {
+    slot = free_.back();
+    free_.pop_back();
+  } else {
+    if (flights_.size() == flights_.room()) return false;
+    slot = static_cast<Slot>(flights_.size());
+  }
+  const double radius = sizes_->radius_of(r);
+  flights_.admit(slot, r, radius, sizes_->mass_of(r));
+  queue_.admit(slot);
+  search_.admit(slot, radius, now);
+  queue_.settle();
+  return true;
+}
+
+template <int D>
+void EventCore<D>::dismiss(Slot i) {
+  NextEvent<D>& a = queue_[i];
+  ++a.version;  // contacts planned with it are stale
+  a.contact = a.update = kNever;
+  search_.dismiss(i);
+  free_.push_back(i);
+}
+
+template <int D>
+void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, double now) {
+  for (const auto& [i, r] : records) {
+    flights_.set(i, r);
+    ++queue_[i].version;
+  }
+  for (const auto& [i, r] : records) search_.move(i, now);
+  for (const auto& [i, r] : records) {
+    search_.plan(i, now);
+    queue_.settle();
   }
 }
 
@@ -119,40 +117,40 @@ template <int D>
 double EventCore<D>::run(double end, const Report& report) {
   Slot i;
   double now;
-  while (next_event(end, i, now)) {
+  while (queue_.next(end, i, now)) {
     now_ = now;
-    if (!small_) prefetch_upcoming();
-    settle();
-    NextEvent<D>& a = next_events_[i];
+    search_.prefetch();
+    queue_.settle();
+    NextEvent<D>& a = queue_[i];
     if (a.update < a.contact) {
-      update(i, now);
+      search_.look_again(i, now);
       continue;
     }
-    if (stale(a)) {
-      ++counts_.stale;
-      predict(i, now);
+    if (queue_.stale(a)) {
+      ++stale_;
+      search_.plan(i, now);
       continue;
     }
     ++since_sort_;
-    const std::uint32_t generation = generation_of(i);
+    const std::uint32_t generation = queue_.generation_of(i);
     if (generation > std::numeric_limits<std::uint16_t>::max())
-      throw Error(Failure::numerical,
-                  partners(key_of(i)) + " collide without end at one instant; separate the spheres that touch there");
-    if (++events_ > report.max_events) throw_too_many_contacts(report.max_events, partners(key_of(i)));
+      throw Error(Failure::numerical, partners(queue_.key_of(i)) +
+                                          " collide without end at one instant; separate the spheres that touch there");
+    if (++events_ > report.max_events) throw_too_many_contacts(report.max_events, partners(queue_.key_of(i)));
     if (a.kind == EventKind::wall) {
       collide_wall(i, now, generation, report);
-      predict(i, now);
+      search_.plan(i, now);
       continue;
     }
-    const Slot j = packing_.slot(a.partner);
+    const Slot j = flights_.packing().slot(a.partner);
     collide_pair(i, now, generation, report);
-    predict_two(i, j, now);
+    search_.plan_two(i, j, now);
     if (report.counters.sphere_sphere >= report.collision_limit) {
-      settle();
-      return now;
+      end = now;
+      break;
     }
   }
-  settle();
+  queue_.settle();
   return end;
 }
 
@@ -167,199 +165,37 @@ void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
   }
 }
 
-/// Finds the next contact of a sphere after a change of its record, or its partner's, and puts it into the calendar.
-template <int D>
-void EventCore<D>::predict(Slot i, double now) {
-  foresee(i, now);
-  schedule(i);
-}
-
-template <int D>
-void EventCore<D>::foresee(Slot i, double now) {
-  ++counts_.predictions;
-  NextEvent<D>& a = next_events_[i];
-  a.contact = kNever;
-  if (lists_) {
-    predict_pairs({i, lists_->candidates(a), a.count, a.same}, flights_[i].t == now);
-  } else {
-    cells_->around(i, a.where.cell, found_);
-    predict_pairs({i, found_.packed.data(), found_.count, found_.same}, flights_[i].t == now);
-  }
-  if (walled_) predict_walls(i);
-  predict_update(i, now);
-}
-
-/// The same for two spheres that have just collided.
-template <int D>
-void EventCore<D>::predict_two(Slot i, Slot j, double now) {
-  counts_.predictions += 2;
-  NextEvent<D>&a = next_events_[i], &b = next_events_[j];
-  ScanTask task[2];
-  if (lists_) {
-    task[0] = {i, lists_->candidates(a), a.count, a.same};
-    task[1] = {j, lists_->candidates(b), b.count, b.same};
-  } else {
-    cells_->around(i, a.where.cell, found_);
-    cells_->around(j, b.where.cell, others_);
-    task[0] = {i, found_.packed.data(), found_.count, found_.same};
-    task[1] = {j, others_.packed.data(), others_.count, others_.same};
-  }
-  counts_.candidates += task[0].n + task[1].n;
-  ScanResult first[2];
-  kernels_.scan_two[D - 2](setting_, task, first);
-  a.contact = b.contact = kNever;
-  for (const int k : {0, 1}) {
-    const Slot one = task[k].self;
-    take(task[k], first[k]);
-    if (walled_) predict_walls(one);
-    predict_update(one, now);
-    schedule(one);
-  }
-}
-
-/// Plans the first contact with the candidates where it comes before the one that is planned. `latest`: no record is of
-/// a later time than the sphere's own.
-template <int D>
-void EventCore<D>::predict_pairs(const ScanTask& task, bool latest) {
-  counts_.candidates += task.n;
-  take(task, kernels_.scan[D - 2](setting_, task, latest));
-}
-
-template <int D>
-void EventCore<D>::take(const ScanTask& task, const ScanResult& first) {
-  NextEvent<D>& a = next_events_[task.self];
-  if (first.time > a.contact || first.time == kNever) return;
-  if (first.tied || first.time == a.contact || first.time == -kNever) return predict_pairs_one_by_one(task);
-  a.contact = first.time;
-  a.kind = EventKind::pair;
-  a.partner = task.candidates[first.which];
-  prefetch_line(&next_events_[packing_.slot(a.partner)]);
-  just_planned_[planned_++] = task.self;
-}
-
-template <int D>
-void EventCore<D>::predict_pairs_one_by_one(const ScanTask& task) {
-  const Slot i = task.self;
-  NextEvent<D>& a = next_events_[i];
-  for (unsigned q = 0; q < task.n; ++q) {
-    const std::uint32_t candidate = task.candidates[q];
-    const Slot j = packing_.slot(candidate);
-    if (j == i) continue;
-    const double time = flights_.pair_contact(i, j, box_.shift(packing_.image(candidate)));
-    if (time > a.contact || time == kNever) continue;
-    const NextEvent<D> before = a;
-    const bool first = before.contact == kNever;
-    const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
-    a.contact = time;
-    a.kind = EventKind::pair;
-    a.partner = candidate;
-    a.partner_version = next_events_[j].version;
-    if (!first && !(key_of(i) < rival)) a = before;
-  }
-}
-
-template <int D>
-void EventCore<D>::predict_walls(Slot i) {
-  NextEvent<D>& a = next_events_[i];
-  for (const Wall<D>& wall : flights_.walls()) {
-    const double time = flights_.wall_contact(i, wall);
-    if (time > a.contact || time == kNever) continue;
-    const NextEvent<D> before = a;
-    const bool first = before.contact == kNever;
-    const EventKey<D> rival = first ? EventKey<D>{} : key_of(i);
-    a.contact = time;
-    a.kind = EventKind::wall;
-    a.partner = wall.number();
-    if (!first && !(key_of(i) < rival)) a = before;
-  }
-}
-
-template <int D>
-void EventCore<D>::predict_update(Slot i, double now) {
-  if (lists_)
-    predict_leaving(next_events_[i], flights_[i], flights_, room(i), now);
-  else
-    predict_crossing(next_events_[i], i, flights_, box_, cells_->grid(), now);
-}
-
-/// How far a sphere may go from the centre of its list's region.
-template <int D>
-double EventCore<D>::room(Slot i) const {
-  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
-}
-
-template <int D>
-void EventCore<D>::schedule(Slot i) {
-  calendar_.push(next_events_[i].due(), i);
-  ++counts_.scheduled;
-}
-
-/// The surroundings of a sphere must be looked at again.
-template <int D>
-void EventCore<D>::update(Slot i, double now) {
-  if (!lists_) return cross(i, now);
-  const Record<D> r = flights_.at(i, now);
-  NextEvent<D>& a = next_events_[i];
-  if (flights_.field()) {  // it may still be far from where its list ends
-    Vec<D> e;
-    for (int k = 0; k < D; ++k) e[k] = r.x[k] - a.where.centre[k];
-    if (e.norm() < 0.7 * room(i)) {
-      predict_update(i, now);
-      schedule(i);
-      return;
-    }
-  }
-  ++counts_.rebuilds;
-  const std::span<const std::uint32_t> fresh = lists_->renew(i, r.x);
-  // The planned contact stands; only those that are new in the list are looked at.
-  if (!fresh.empty()) predict_pairs({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
-  predict_leaving(next_events_[i], flights_[i], flights_, room(i), now);
-  schedule(i);
-}
-
-/// Moves a sphere into the next cell. Its contact stands; only the cells that have come into view are searched.
-template <int D>
-void EventCore<D>::cross(Slot i, double now) {
-  ++counts_.crossings;
-  NextEvent<D>& a = next_events_[i];
-  const int axis = a.face / 2, step = a.face % 2 == 1 ? 1 : -1;
-  cells_->cross(i, a.where.cell, axis, step);
-  cells_->ahead(i, a.where.cell, axis, step, found_);
-  if (found_.count > 0) predict_pairs({i, found_.packed.data(), found_.count, found_.same}, false);
-  predict_update(i, now);
-  schedule(i);
-}
-
 template <int D>
 void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, const Report& report) {
-  NextEvent<D>& plan = next_events_[i];
-  const Slot j = packing_.slot(plan.partner);
+  const Packing<D>& packing = flights_.packing();
+  const std::uint32_t partner = queue_[i].partner;
+  const Slot j = packing.slot(partner);
   if (report.trace) {
     if (flights_[i].id < flights_[j].id)
-      report.trace->begin(i, flights_[i], j, flights_[j], plan.partner, generation);
+      report.trace->begin(i, flights_[i], j, flights_[j], partner, generation);
     else
-      report.trace->begin(j, flights_[j], i, flights_[i], packing_.reversed(i, plan.partner), generation);
+      report.trace->begin(j, flights_[j], i, flights_[i], packing.reversed(i, partner), generation);
   }
-  EventKey<D> key;
-  if (report.contacts) key = key_of(i);
   Vec<D> shift = Vec<D>::Zero();
-  if (packing_.linear(plan.partner) != 0) shift = box_.shift(packing_.image(plan.partner));
+  if (packing.linear(partner) != 0) shift = box_.shift(packing.image(partner));
   const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
-  ++plan.version;
-  ++next_events_[j].version;
+  ++queue_[i].version;
+  ++queue_[j].version;
   const double virial = blow.d.dot(blow.impulse);
   if (report.trace) return report.trace->end(flights_[i], flights_[j], virial, blow.overlap);
   report.counters.add(EventKind::pair, virial, blow.overlap);
-  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, blow));
+  if (!report.contacts) return;
+  const EventKey<D> key = pair_key<D>(time, generation, flights_[i].id, flights_[j].id, packing.image(partner));
+  report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, blow));
 }
 
 template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
-  const EventKey<D> key = key_of(i);
+  const EventKey<D> key = queue_.key_of(i);
   if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
   const Wall<D> wall = box_.wall(key.hi);
   const Blow<D> blow = flights_.bounce(i, wall, time, generation);
-  ++next_events_[i].version;
+  ++queue_[i].version;
   const double work = wall.work(blow.impulse);
   if (report.trace) return report.trace->end(flights_[i], flights_[i], work, blow.overlap);
   report.counters.add(EventKind::wall, work, blow.overlap);

@@ -16,24 +16,9 @@
 //   core.run(end, report);                        // events with time < end
 //   core.fly_to(end, particles);                  // copies at `end`
 
-#include <limits>
-#include <memory>
-#include <queue>
-#include <vector>
-
-#include "engine/base/box.h"
-#include "engine/base/contact_log.h"
 #include "engine/base/counters.h"
-#include "engine/base/event_counts.h"
-#include "engine/base/particles.h"
-#include "engine/base/prefetch.h"
-#include "engine/events/calendar.h"
-#include "engine/events/flights.h"
+#include "engine/events/event_search.h"
 #include "engine/events/trace.h"
-#include "engine/search/linked_cells.h"
-#include "engine/search/next_event.h"
-#include "engine/search/search_tuning.h"
-#include "engine/search/skin_lists.h"
 
 namespace carom {
 
@@ -55,7 +40,6 @@ class EventCore {
   /// For a core that runs a part of a larger system; `sizes` has the masses and radii of all of it, and outlives the
   /// core.
   EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options);
-  ~EventCore();
   EventCore(const EventCore&) = delete;
   EventCore& operator=(const EventCore&) = delete;
 
@@ -82,7 +66,7 @@ class EventCore {
   void fly_to(double time, Particles<D>& copies) const;
 
   /// Since the core was made.
-  const EventCounts& counts() const { return counts_; }
+  EventCounts counts() const;
 
   // For a core that runs a part of a larger system (engine/ranks/subdomain.h). All of this happens at a time `now` that
   // no event precedes any more.
@@ -90,7 +74,6 @@ class EventCore {
   /// Starts with these spheres only; no record is of a later time than `now`. find_near() will use `max_displacement`.
   void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double max_displacement);
   const Flights<D>& flights() const { return flights_; }
-  const Packing<D>& packing() const { return packing_; }
   /// Takes a sphere in; false: there is no room left, load anew.
   bool admit(const Record<D>& r, double now, Slot& slot);
   /// Removes a sphere; its slot will be given to another one.
@@ -99,88 +82,29 @@ class EventCore {
   void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
   /// Sets the spheres at the border of a subdomain: their lists are good for each other wherever they come in a window,
   /// and need not be searched for.
-  void set_border(std::span<const Slot> slots, double now);
+  void set_border(std::span<const Slot> slots, double now) { search_.set_border(slots, now); }
   /// Candidates for contacts of a sphere: all that may touch it where each of the two has come up to `max_displacement`
   /// (load) from where the core knows it to be. Good until the next call.
-  std::span<const std::uint32_t> find_near(Slot i);
+  std::span<const std::uint32_t> find_near(Slot i) { return search_.find_near(i); }
   /// The same for one at the border, where only others matter that are at the border and between two corners.
-  std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high);
+  std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high) {
+    return search_.find_near_at_border(i, low, high);
+  }
 
  private:
-  /// An event among several at one time, with what it was when it was found there.
-  struct Tied {
-    enum class Rank : std::uint8_t { stale, contact, update } rank;
-    EventKey<D> key;
-    Slot slot;
-    bool operator<(const Tied& other) const {  // std::priority_queue keeps the largest on top
-      return rank != other.rank ? rank > other.rank : other.key < key;
-    }
-    bool operator==(const Tied& other) const { return rank == other.rank && key == other.key; }
-  };
-
-  bool read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
-  void plan(bool anew, double now);
-  void choose_search(double now);
-  void prefetch_upcoming();
-  void prefetch_lists() const;
-  void prefetch_few_cells() const;
-  void prefetch_cells();
-  void prefetch(Slot i) const {
-    prefetch_line(&next_events_[i]);
-    prefetch_line(&flights_[i]);
-  }
-  static bool meets(const NextEvent<D>& a) { return a.contact < a.update && a.kind == EventKind::pair; }
-  void settle();
-  bool mirrored(Slot i, Slot j) const;
-  bool next_event(double end, Slot& slot, double& time);
-  bool stale(const NextEvent<D>& a) const;
-  std::uint32_t generation_of(Slot i) const;
-  EventKey<D> key_of(Slot i) const;
-  Tied tie(Slot i) const;
-
-  void predict(Slot i, double now);
-  void foresee(Slot i, double now);
-  void predict_two(Slot i, Slot j, double now);
-  void take(const ScanTask& task, const ScanResult& first);
-  void predict_pairs(const ScanTask& task, bool latest);
-  void predict_pairs_one_by_one(const ScanTask& task);
-  void predict_walls(Slot i);
-  double room(Slot i) const;
-  void predict_update(Slot i, double now);
-  void schedule(Slot i);
-  void update(Slot i, double now);
-  void cross(Slot i, double now);
-
+  void read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
   void collide_pair(Slot i, double time, std::uint32_t generation, const Report& report);
   void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
 
   const Box<D>& box_;
   const Sizes* sizes_;  // of the larger system; null: there is none
+  double sort_interval_;
   Flights<D> flights_;
-  SearchOptions options_;
-  const ScanKernels& kernels_;
-  bool walled_ = false;
-  PageVector<NextEvent<D>> next_events_;
-  std::vector<std::uint32_t> near_;
-  double max_displacement_ = 0, largest_ = 0;  // how far spheres may be from where the core has them; largest radius
-  std::vector<std::uint8_t> at_border_;        // by slot; empty: no sphere is
-  std::vector<Slot> free_;                     // slots of dismissed spheres
-  std::vector<double> radii_;                  // that lists or cells are made for; one where all are equal
-  Packing<D> packing_;
-  ScanSetting setting_;
-  Calendar calendar_;
-  std::priority_queue<Tied> tied_;  // events at one and the same time, in the order of their keys
-  double tied_time_ = 0, now_ = 0;
-
-  std::unique_ptr<SkinLists<D>> lists_;  // one of the two
-  std::unique_ptr<LinkedCells<D>> cells_;
-  Candidates found_, others_;
-  bool small_ = true, large_ = false;  // few enough for a fast cache; too many for any
-  Slot just_planned_[2]{};             // in the last event: their partners' versions are still to be read
-  unsigned planned_ = 0;               // how many
-
-  SearchTuning tuning_;
-  EventCounts counts_;
+  EventQueue<D> queue_;
+  EventSearch<D> search_;
+  std::vector<Slot> free_;  // slots of dismissed spheres
+  double now_ = 0;
+  std::uint64_t stale_ = 0;       // contacts that came up since the core was made
   std::uint64_t events_ = 0;      // contacts since load()
   std::uint64_t since_sort_ = 0;  // contacts
 };

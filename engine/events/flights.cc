@@ -23,6 +23,7 @@ void Flights<D>::assign(std::span<const Id> order) {
   records_.resize(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) records_[i].id = order[i];
   room_ = order.size();
+  packing_ = Packing<D>(room_);
 }
 
 template <int D>
@@ -58,14 +59,14 @@ Extent<D> Flights<D>::extent() const {
 }
 
 template <int D>
-ScanSetting Flights<D>::setting(const Packing<D>& packing) const {
+ScanSetting Flights<D>::setting() const {
   ScanSetting setting{.records = reinterpret_cast<const double*>(records_.data()),
                       .radius = radius_.empty() ? nullptr : radius_.data(),
                       .diameter = common_radius_ + common_radius_,
                       .growth = growth_,
-                      .slot_mask = packing.slot_mask,
-                      .slot_bits = packing.slot_bits,
-                      .field_bits = packing.field_bits,
+                      .slot_mask = packing_.slot_mask,
+                      .slot_bits = packing_.slot_bits,
+                      .field_bits = packing_.field_bits,
                       .plain = radius_.empty() && !field_ && growth_ == 0};
   for (int k = 0; k < D; ++k) {
     setting.edges[k] = box_.edges[k];
@@ -97,6 +98,7 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
   room_ = records_room(records.size());
+  packing_ = Packing<D>(room_);
   records_.clear();
   records_.reserve(room_);
   radius_.clear();

@@ -1,6 +1,6 @@
 #pragma once
 // The spheres of one core and all that may happen to them: flight, contact, collision. The physics is here;
-// event_core.h decides for which pairs contacts are computed, and when.
+// event_search.h decides for which pairs contacts are computed, event_core.h when.
 //
 // Between contacts every sphere flies on x + v s + g s²/2 from its record. All radii may grow by a common factor
 // 1 + growth·t. A contact is a pure function of two records: neither the time of its computation nor a list is in it.
@@ -42,6 +42,7 @@ class Flights {
 
   std::size_t size() const { return records_.size(); }
   std::size_t room() const { return room_; }
+  const Packing<D>& packing() const { return packing_; }
   const Record<D>& operator[](Slot i) const { return records_[i]; }
   std::span<const Record<D>> records() const { return records_; }
   const Vec<D>& g() const { return g_; }
@@ -60,7 +61,7 @@ class Flights {
   /// Of the places at the records.
   Extent<D> extent() const;
   /// What the kernels of scan.h are to know.
-  ScanSetting setting(const Packing<D>& packing) const;
+  ScanSetting setting() const;
 
   /// The record as it is at time t.
   Record<D> at(Slot i, double t) const { return at(records_[i], t); }
@@ -126,6 +127,7 @@ class Flights {
   GapTolerance gap_tolerance_;
   PageVector<Record<D>> records_;      // by slot
   std::size_t room_ = 0;               // that there may be
+  Packing<D> packing_;                 // of their slots
   std::vector<double> radius_, mass_;  // by slot; empty where all are equal
   double common_radius_ = 0, common_mass_ = 0;
 };

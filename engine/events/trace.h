@@ -2,7 +2,7 @@
 // The log of a window that the event core writes: enough to take any event back, and to read the path of any sphere.
 //
 // The log is in the order of keys and costs an event three cache lines, one after the other. Paths are read from it
-// where they are wanted, which is for the few spheres near the border of a subdomain (engine/ranks/subdomain.h).
+// where they are wanted, which is for the few spheres near the border of a subdomain (engine/ranks/window_paths.h).
 
 #include <algorithm>
 #include <limits>

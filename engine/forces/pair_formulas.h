@@ -68,7 +68,7 @@ template <int W, class P, Wanted wanted, bool wide>
         }
       }
     }
-    fits &= below(squared, all<V>(limit * limit));  // not where one is no number
+    fits &= below(squared, all<V>(limit * limit));  // false where one is NaN
     for (int axis = 0; axis < 3; ++axis) {
       if constexpr (wide) {
         const V upper = elementary::nearest_integer(force[axis] * 0x1p-40);

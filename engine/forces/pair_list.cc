@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMostPairs = 100'000'000, kMostPartners = 5000;  // a particle; more are a step gone wild
 
-/// The larger of two squared distances; a step to where there is no number does not count, its force will tell.
+/// The larger of two squared distances; NaN does not count: the force there is an error of its own.
 template <int D>
 double farther(double squared, const Vec<D>& way) {
   const double other = way.squaredNorm();

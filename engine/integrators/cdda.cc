@@ -36,7 +36,9 @@ class CollisionDiscreteDerivative : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
-    scan_->begin_slab(report.counters, report.contacts, piece_->a(), slab.length);
+    watch_ = report.watch;
+    scan_->begin_slab(report.counters, report.contacts, piece_->a(), slab.length, watch_);
+    if (watch_) watch_->cut();  // a solve changes the accelerations that the next one starts from
     auto& p = system.particles;
     auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, p); };
     double done = 0, longest = slab.length;
@@ -111,6 +113,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   }
 
   PieceEnd<D> solve(const Particles<D>& p, double tau) {
+    if (watch_) watch_->look();
     {
       const Stopwatch watch(counters_->seconds.sweep);
       if (!piece_->solve(p.x, p.v, tau, scan_->resting(), *counters_)) return {.converged = false};
@@ -125,6 +128,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   std::optional<DiscreteGradient<D>> piece_;
   std::optional<ChordContacts<D>> contacts_;
   Counters* counters_ = nullptr;
+  SlabWatch* watch_ = nullptr;
 };
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace carom::integrator {
 
 class Chebyshev {
  public:
-  /// Plain sweeps for small λ, and for one that is no number.
+  /// Plain sweeps for small λ, and for NaN.
   explicit Chebyshev(double lambda = 0) : middle_(1 + lambda / 2), half_(lambda >= kSmall ? lambda / 2 : 0) {}
 
   /// Gives memory() and gain() for the next sweep.

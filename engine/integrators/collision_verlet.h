@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "engine/integrators/integrator.h"
 #include "engine/integrators/kicks.h"
 #include "engine/slabs/contact_scan.h"
 
@@ -18,9 +19,10 @@ class VerletPieces {
 
   void start(Counters& counters) { accelerations_.start(system_, counters); }
 
-  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, double length) {
-    counters_ = &counters;
-    scan_.begin_slab(counters, contacts, accelerations_.a, length);
+  void begin_slab(SlabReport<D>& report, double length) {
+    counters_ = &report.counters;
+    watch_ = report.watch;
+    scan_.begin_slab(report.counters, report.contacts, accelerations_.a, length, watch_);
   }
 
   /// Applies the impulse to whatever touches and approaches; see ContactScan::resolve.
@@ -33,7 +35,9 @@ class VerletPieces {
   double next_contact(double rest) {
     flight_ = accelerations_.a;
     if (!scan_.resting().empty()) scan_.hold(system_.particles.v, flight_, rest);
-    return std::min(rest, scan_.earliest(system_.particles.x, system_.particles.v, flight_, rest).key.time);
+    const double contact = scan_.earliest(system_.particles.x, system_.particles.v, flight_, rest).key.time;
+    if (contact < rest && watch_) watch_->cut();
+    return std::min(rest, contact);
   }
 
   /// K(τ/2) D(τ) K(τ/2). Call next_contact() before.
@@ -60,6 +64,7 @@ class VerletPieces {
   Accelerations<D> accelerations_;
   std::vector<Vec<D>> flight_;
   Counters* counters_ = nullptr;
+  SlabWatch* watch_ = nullptr;
 };
 
 }  // namespace carom::integrator

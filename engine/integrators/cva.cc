@@ -23,7 +23,7 @@ class CollisionVerlet : public Integrator<D> {
   Positions<D> accelerations() const override { return pieces_->a(); }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
-    pieces_->begin_slab(report.counters, report.contacts, slab.length);
+    pieces_->begin_slab(report, slab.length);
     double done = 0;
     for (bool contact = true; contact;) {
       pieces_->collide(done, [&](const Touch<D>& touch) { collide_elastically(touch, system.particles); });

@@ -91,7 +91,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     slab_ = slab.index;
-    core_->begin_step(report.counters, report.contacts, past_.last(), slab.length);
+    watch_ = report.watch;
+    core_->begin_step(report.counters, report.contacts, past_.last(), slab.length, watch_);
     found_ = kept_;  // of a step that is done again nothing is known
     advance(system, slab);
     kept_ = found_;
@@ -123,6 +124,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       const double rest = slab.length - done, piece = std::min(longest, rest);
       if (solve(system, piece, resolved) && (!any_freezes_ || can_fold(system, piece))) {
         core_->commit(done);
+        if (piece < rest && watch_) watch_->cut();
         finish(system, piece);
         if (found_.touching) scan.slide(p.x, p.v);
         ++counters_->pieces;
@@ -166,6 +168,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
     std::array<double, kMostSweeps + 1> residual{};                                  // by sweep
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
+      if (watch_) watch_->look();
       end_ = core_->fly(a_);
       if (!end_.complete) return false;
       const auto [squared, swaps] = evaluate(system, h, sweep == 1);
@@ -247,11 +250,18 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// on, and where it still swaps, so do its partners.
   void freeze() {
     any_freezes_ = true;
-    for (const Id i : core_->swapped())
-      if (++swaps_[i] > 2 * kSwaps)
+    std::vector<std::pair<Id, Id>> met;  // partners in the last flight, once they matter
+    for (const Id i : core_->swapped()) {
+      if (++swaps_[i] <= 2 * kSwaps) continue;
+      if (met.empty()) {
         for (const Contact<D>& contact : core_->contacts())
-          if (const auto& key = contact.key; key.kind == EventKind::pair && (key.lo == i || key.hi == i))
-            for (const Id j : {key.lo, key.hi}) swaps_[j] += frozen(j) ? 0 : 1;
+          if (const EventKey<D>& key = contact.key; key.kind == EventKind::pair)
+            met.insert(met.end(), {{key.lo, key.hi}, {key.hi, key.lo}});
+        std::ranges::sort(met);
+      }
+      for (auto at = std::ranges::lower_bound(met, std::pair<Id, Id>{i, 0}); at != met.end() && at->first == i; ++at)
+        swaps_[at->second] += frozen(at->second) ? 0 : 1;
+    }
   }
 
   /// Adds the reactions λ(d + d′) of resting contacts, which do no work because they hold |d′| = |d|, to mean_.
@@ -329,6 +339,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::int64_t slab_ = 0;
   std::vector<Vec<D>> move_;  // of a_ by the last sweep
   Counters* counters_ = nullptr;
+  SlabWatch* watch_ = nullptr;
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
 #pragma once
-// What the mean accelerations of past slabs let expect of the next: where the sweeps of edda start.
+// Mean accelerations of the next slab, extrapolated from those of past slabs: where the sweeps of edda start.
 
 #include <algorithm>
 #include <array>

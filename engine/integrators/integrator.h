@@ -12,6 +12,7 @@
 #include "engine/base/counters.h"
 #include "engine/base/parameters.h"
 #include "engine/ranks/system.h"
+#include "engine/slabs/slab_watch.h"
 
 namespace carom {
 
@@ -33,6 +34,7 @@ struct SlabReport {
   std::function<void(double, const Particles<D>&)> observer{};  ///< given copies flown to each of these times
   /// Asked now and then within an epoch of free flight: true, and the integrator leaves off with `paused`. Collective.
   std::function<bool()> pause{};
+  SlabWatch* watch = nullptr;  ///< lets stepping methods leave a slab that takes long; null: it is ended
   double reached =
       0;  ///< set by the integrator: the time within the slab it came to; less than its length only at collision_limit
   bool paused = false;  ///< the slab is not done: slab() is to be called again with the same slab, which goes on in it

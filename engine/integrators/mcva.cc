@@ -45,7 +45,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
-    pieces_->begin_slab(report.counters, report.contacts, slab.length);
+    pieces_->begin_slab(report, slab.length);
+    if (restart_ && report.watch) report.watch->cut();
     if (restart_)
       restart_slab(system, slab.length);
     else

@@ -55,7 +55,7 @@ class WindowedFlight {
   void give_back(double time, Particles<D>& particles);
   double now() const { return now_; }
 
-  /// Of this rank, since the flight were made.
+  /// Of this rank, since the flight was made.
   EventCounts counts() const;
   WindowCounts window_counts() const;
 

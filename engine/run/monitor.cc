@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -76,12 +77,15 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
 }
 
 template <int D>
-void Monitor<D>::start(const Integrator<D>& integrator) {
-  shot_ = measure(0, system_.particles, &integrator, info_.shadow);
+void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
+  const double time = statistics_.start_time;
+  for (Schedule* schedule : {&frames_, &rows_}) schedule->pass(time - time_slack());
+  for (Sampler& sampler : samplers_) sampler.due.pass(time - time_slack());
+  shot_ = measure(time, system_.particles, &integrator, info_.shadow, fresh);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   std::copy_n(shot_.momentum.begin(), D, account_.first_momentum.begin());
   count_from(shot_);
-  sample(0, system_.particles);
+  sample(time, system_.particles);
   show(shot_, true);
 }
 
@@ -165,11 +169,12 @@ template <int D>
 void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bool last) {
   Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
-  const bool with_shadow = info_.shadow && (due || s.steps == 1 || system_.size() <= kShadowAtEveryStep);
+  const bool first = s.steps == s.start_steps + 1;
+  const bool with_shadow = info_.shadow && (due || first || system_.size() <= kShadowAtEveryStep);
   const double speed = account_.speed, energy = account_.energy, magnitude = account_.magnitude;
   shot_ = measure(s.end_time, system_.particles, &integrator, with_shadow);
   s.energy_final = shot_.total();
-  if (s.steps == 1 && info_.stepping) count_from(shot_);
+  if (first && info_.stepping) count_from(shot_);
   s.max_energy_error = std::max(s.max_energy_error, std::abs(account_.energy - account_.first_energy));
   if (with_shadow)
     s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - account_.first_shadow));
@@ -178,25 +183,32 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
     s.max_momentum_error =
         std::max(*s.max_momentum_error, (shot_.momentum - Vec<D>(account_.first_momentum.data())).norm());
   if (info_.hard_cores) {
-    const double deepest = system_.decomposition.largest(deepest_overlap());
+    const Overlap own = deepest_overlap();
+    const double deepest = system_.decomposition.largest(own.depth);
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest);
-    if (deepest > kDeepest)
-      throw Error(Failure::numerical, "spheres overlap, by " + short_text(deepest) +
+    if (deepest > kDeepest) {
+      // Of pairs that overlap alike, and of ranks that see them, the one with the lowest ids.
+      constexpr double kNone = -std::numeric_limits<double>::infinity();
+      const double lo = -system_.decomposition.largest(own.depth == deepest ? -static_cast<double>(own.lo) : kNone);
+      const bool here = own.depth == deepest && static_cast<double>(own.lo) == lo;
+      const double hi = -system_.decomposition.largest(here ? -static_cast<double>(own.hi) : kNone);
+      throw Error(Failure::numerical, "particles " + short_text(lo, 10) + " and " + short_text(hi, 10) +
+                                          " overlap, by " + short_text(deepest) +
                                           " of their contact distance, at step " + std::to_string(s.steps) + ", time " +
                                           short_text(s.end_time) + "; use a smaller integrator.step");
+    }
   }
   account_.virial_time += elapsed * account_.virial;
-  if (s.end_time > 0) {
+  if (const double time = s.end_time - s.start_time; time > 0) {
     if (system_.box.pistons()) account_.virial_time = std::numeric_limits<double>::quiet_NaN();  // no one volume
-    s.mean_pressure =
-        (account_.virial_time + s.counters.collision_virial.value()) / (s.end_time * D * system_.box.volume());
+    s.mean_pressure = (account_.virial_time + s.counters.collision_virial.value()) / (time * D * system_.box.volume());
     s.collision_rate =
-        2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * s.end_time);
+        2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * time);
   }
   account_.path += elapsed * 0.5 * (speed + account_.speed);
   if (s.collision_rate > 0) {
     s.mean_free_time = 1 / s.collision_rate;
-    s.mean_free_path = account_.path / s.end_time / s.collision_rate;
+    s.mean_free_path = account_.path / (s.end_time - s.start_time) / s.collision_rate;
   }
   sample(s.end_time, system_.particles);
   show(shot_, false);
@@ -205,7 +217,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
 /// `integrator`: null where the particles are not its own.
 template <int D>
 Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Integrator<D>* integrator,
-                                bool with_shadow) {
+                                bool with_shadow, bool fresh) {
   const Stopwatch watch(statistics_.counters.seconds.output);
   Snapshot<D> shot;
   shot.time = time;
@@ -214,7 +226,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   shot.particles = &state;
   const Particles<D>* elsewhere = integrator ? integrator->energy_state() : nullptr;
   const Particles<D>& nodes = elsewhere ? *elsewhere : state;
-  const PotentialSums* potential = integrator ? integrator->potential() : nullptr;
+  const PotentialSums* potential = integrator && fresh ? integrator->potential() : nullptr;
   const PotentialSums sums = potential ? system_.decomposition.sum(*potential) : evaluate_energy<D>(system_, nodes.x);
   const auto total = static_cast<double>(system_.size());
   const MotionSums<D> motion = evaluate_motion(system_, state, nodes);
@@ -267,16 +279,20 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
   }
 }
 
-/// The deepest overlap of any two spheres, relative to their contact distance: an independent check that no contact was
-/// missed. 0 where none overlap.
+/// The deepest overlap of any two spheres that this rank sees: an independent check that no contact was missed. Depth 0
+/// where none overlap; of pairs that overlap alike the one with the lowest ids.
 template <int D>
-double Monitor<D>::deepest_overlap() {
-  double deepest = 0;
-  const auto look = [&](NeighbourList<D>& list, const auto& p) {
+auto Monitor<D>::deepest_overlap() -> Overlap {
+  Overlap deepest;
+  const auto look = [&](NeighbourList<D>& list, const auto& p, auto&& id_of) {
     for (const auto& pair : list.cover(p.x)) {
       const double sigma = p.radius[pair.i] + p.radius[pair.j];
       const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
-      if (squared < sigma * sigma) deepest = std::max(deepest, 1 - std::sqrt(squared) / sigma);
+      if (squared >= sigma * sigma) continue;
+      const auto [lo, hi] = std::minmax({id_of(pair.i), id_of(pair.j)});
+      const Overlap found{1 - std::sqrt(squared) / sigma, lo, hi};
+      const auto order = [](const Overlap& o) { return std::tuple(-o.depth, o.lo, o.hi); };
+      if (order(found) < order(deepest)) deepest = found;
     }
   };
   const Particles<D>& p = system_.particles;
@@ -284,9 +300,9 @@ double Monitor<D>::deepest_overlap() {
   if (ranks.joined() && !ranks.by_place()) {
     const Halo<D> halo = halo_of(system_.box, 2 * ranks.sizes().largest_radius(), ranks.ranks(), p);
     NeighbourList<D> touching(system_.box, halo.radius, halo.ghost);
-    look(touching, halo);
+    look(touching, halo, [&](Id i) { return halo.id[i]; });
   } else {
-    look(*touching_, p);
+    look(*touching_, p, [&](Id i) { return p.id_of(i); });
   }
   return deepest;
 }

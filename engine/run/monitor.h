@@ -43,8 +43,8 @@ class Monitor {
   Monitor& operator=(const Monitor&) = delete;
 
   /// Measures and shows the state at the start, of a run that is not continued; energies at the integrator's energy
-  /// state.
-  void start(const Integrator<D>& integrator);
+  /// state. `fresh`: its last force pass was there.
+  void start(const Integrator<D>& integrator, bool fresh);
 
   /// Due times inside a slab, for integrators that are exact at any time: since the slab's start, ascending.
   std::vector<double> due_within(const Slab& slab) const;
@@ -53,7 +53,7 @@ class Monitor {
   void observe(double time, const Particles<D>& copies);
 
   /// Measures the state at the end of a slab, updates the statistics, shows it where it is due or `last`.
-  /// statistics.steps and end_time already tell of the slab, which advanced the time by `elapsed`.
+  /// statistics.steps and end_time already include the slab, which advanced the time by `elapsed`.
   void end_of_slab(double elapsed, const Integrator<D>& integrator, bool last);
 
   /// Shows the last state, unless it has been shown.
@@ -72,13 +72,20 @@ class Monitor {
     Schedule due;
   };
 
+  /// Of two spheres, relative to their contact distance; ids.
+  struct Overlap {
+    double depth = 0;
+    Id lo = 0, hi = 0;
+  };
+
   void sample(double time, const Particles<D>& state);
-  Snapshot<D> measure(double time, const Particles<D>& state, const Integrator<D>* integrator, bool with_shadow);
+  Snapshot<D> measure(double time, const Particles<D>& state, const Integrator<D>* integrator, bool with_shadow,
+                      bool fresh = true);
   void show(Snapshot<D> shot, bool last);
   void count_from(const Snapshot<D>& shot);
   void guard(double energy_before, double magnitude_before);
   std::string fastest(const Particles<D>& state) const;
-  double deepest_overlap();
+  Overlap deepest_overlap();
   const Particles<D>& all_particles(const Particles<D>& state);
 
   System<D>& system_;

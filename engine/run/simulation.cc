@@ -35,6 +35,12 @@ void check_spheres(const System<D>& system) {
                                             short_text(overlaps.distance) + "; move them apart");
 }
 
+/// How long the slab that starts then is: to the end, where that is nearer than a step.
+double length_from(double start, const Plan& plan, double slack) {
+  const bool last = plan.end_time && start + plan.step > *plan.end_time - slack;
+  return last ? *plan.end_time - start : plan.step;
+}
+
 void check_interval(double interval, double step) {
   if (interval > 0 && interval < kLeastInterval * step)
     throw Error(Failure::deck,
@@ -94,9 +100,16 @@ void Simulation<D>::run(const Hooks& hooks) {
     system_->quanta = quanta(*system_);
     s.counters.divisions += divide();
   }
-  Monitor<D> monitor(*system_, info_, plan_, observers_, s);
-  system_->fields.add_value("paused", paused_);
-  system_->fields.add_value("quiet since", quiet_since_);
+  std::optional<Monitor<D>> monitor;
+  const auto make_monitor = [&] {
+    monitor.emplace(*system_, info_, plan_, observers_, s);
+    system_->fields.add_value("paused", paused_);
+    system_->fields.add_value("quiet since", quiet_since_);
+    system_->fields.add_value("step count", count_);
+  };
+  // A branch restores what is registered before, the state of the integrator, and measures anew.
+  if (!hooks.branch) make_monitor();
+  SlabWatch watch(system_->fields, system_->fields.of_run().size(), hooks.leave, hooks.leave_here);
   integrator_->start(*system_, s.counters);
   if (hooks.restore) {
     decomposition.to_blocks();
@@ -104,9 +117,15 @@ void Simulation<D>::run(const Hooks& hooks) {
     if (decomposition.ranks().rank() > 0) s.counters.seconds = {}, s.counters.events = {}, s.counters.windows = {};
     if (info_.smooth_forces) divide();
     s.stopped_early = false;
-  } else {
-    monitor.start(*integrator_);
   }
+  if (hooks.branch) {
+    count_ = hooks.branch->from;
+    s.start_steps = s.steps = hooks.branch->start.steps;
+    s.start_time = s.end_time = quiet_since_ = hooks.branch->start.time;
+    make_monitor();
+    for (auto* observer : observers_) observer->progress(s);
+  }
+  if (hooks.branch || !hooks.restore) monitor->start(*integrator_, !hooks.restore);
 
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
@@ -114,6 +133,12 @@ void Simulation<D>::run(const Hooks& hooks) {
     s.wall_seconds = seconds_before + std::chrono::duration<double>(life).count();
   };
   std::vector<Contact<D>> contacts;
+  const auto show_contacts = [&](double start) {
+    if (!plan_.events) return;
+    const Stopwatch stopwatch(s.counters.seconds.output);
+    for (auto* observer : observers_) observer->contacts(start, contacts);
+    contacts.clear();
+  };
   for (;;) {
     const bool done = finished() && !paused_;
     take_time();
@@ -124,16 +149,22 @@ void Simulation<D>::run(const Hooks& hooks) {
     if (done) break;
     const Slab slab = next_slab();
     s.counters.divisions += decomposition.divide_if_due(slab.index, slab.length);
-    const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor.due_within(slab);
+    const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor->due_within(slab);
     contacts.clear();
-    SlabReport<D> report{
-        .counters = s.counters,
-        .contacts = plan_.events ? &contacts : nullptr,
-        .observe = due,
-        .observer = [&](double offset, const Particles<D>& copies) { monitor.observe(slab.start + offset, copies); },
-        .pause = hooks.pause};
+    SlabReport<D> report{.counters = s.counters,
+                         .contacts = plan_.events ? &contacts : nullptr,
+                         .observe = due,
+                         .observer =
+                             [&](double offset, const Particles<D>& copies) {
+                               show_contacts(slab.start);  // rows and events are written together
+                               monitor->observe(slab.start + offset, copies);
+                             },
+                         .pause = hooks.pause,
+                         .watch = &watch};
     Counters before = s.counters;
+    bool left = false;
     for (bool complete = false; !complete;) try {
+        watch.begin();
         integrator_->slab(*system_, slab, report);
         complete = true;
       } catch (HaloTooSmall) {
@@ -142,37 +173,42 @@ void Simulation<D>::run(const Hooks& hooks) {
         before.slabs_by_all += decomposition.knows_all() ? 1 : 0;
         s.counters = before;
         contacts.clear();
+      } catch (SlabLeft) {
+        watch.restore();
+        s.counters = before;
+        complete = left = true;
       } catch (const Error& e) {
         if (e.failure() != Failure::numerical) throw;
         throw Error(Failure::numerical, std::string(e.what()) + " (in step " + std::to_string(slab.index + 1) +
                                             ", from time " + short_text(slab.start) + ")");
       }
-    if (plan_.events) {
-      const Stopwatch watch(s.counters.seconds.output);
-      for (auto* observer : observers_) observer->contacts(slab.start, contacts);
+    if (left) {
+      if (hooks.pause) hooks.pause();
+      continue;
     }
+    show_contacts(slab.start);
     s.counters.seconds.communicate = decomposition.seconds_waited();
     if (paused_ = report.paused; paused_) continue;
 
     ++s.steps;
     // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
     s.end_time = report.reached < slab.length ? slab.start + report.reached
-                 : slab.length == plan_.step  ? static_cast<double>(s.steps) * plan_.step
+                 : slab.length == plan_.step  ? time_of(s.steps)
                                               : *plan_.end_time;
     if (s.counters.sphere_sphere > before.sphere_sphere) quiet_since_ = s.end_time;
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
     s.fraction_done = fraction_done();
     take_time();
-    monitor.end_of_slab(report.reached, *integrator_, finished());
+    monitor->end_of_slab(report.reached, *integrator_, finished());
     for (auto* observer : observers_) observer->progress(s);
   }
-  if (!paused_) monitor.finish();
+  if (!paused_) monitor->finish();
   decomposition.to_blocks();
   take_time();
 }
 
-/// Free flight that ends after so many collisions only: throws where spheres have flown apart, for ever.
+/// Free flight that ends after so many collisions only: throws where spheres have flown apart and will not meet again.
 template <int D>
 void Simulation<D>::need_collisions() const {
   if (system_->box.closed()) return;
@@ -188,7 +224,10 @@ void Simulation<D>::need_collisions() const {
 template <int D>
 bool Simulation<D>::is_last_on_the_way() const {
   if (paused_) return finished();
-  const bool whole = statistics_.end_time == static_cast<double>(statistics_.steps) * plan_.step;
+  const Statistics& s = statistics_;
+  // A slab that meets an end may be shorter or longer than a step by rounding alone.
+  const bool whole = s.end_time == time_of(s.steps) &&
+                     (s.steps == s.start_steps || length_from(time_of(s.steps - 1), plan_, time_slack()) == plan_.step);
   return whole && (finished() || next_slab().length != plan_.step);
 }
 
@@ -196,9 +235,8 @@ template <int D>
 Slab Simulation<D>::next_slab() const {
   Slab slab;
   slab.index = statistics_.steps;
-  slab.start = static_cast<double>(slab.index) * plan_.step;
-  const bool shortened = plan_.end_time && slab.start + plan_.step > *plan_.end_time - time_slack();
-  slab.length = shortened ? *plan_.end_time - slab.start : plan_.step;
+  slab.start = time_of(slab.index);
+  slab.length = length_from(slab.start, plan_, time_slack());
   if (plan_.collisions && !info_.stepping) slab.collision_limit = *plan_.collisions;
   return slab;
 }
@@ -214,8 +252,10 @@ template <int D>
 double Simulation<D>::fraction_done() const {
   const Statistics& s = statistics_;
   double done = 0;
-  if (plan_.steps) done = std::max(done, static_cast<double>(s.steps) / static_cast<double>(*plan_.steps));
-  if (plan_.end_time) done = std::max(done, s.end_time / *plan_.end_time);
+  if (plan_.steps)
+    done = std::max(done,
+                    static_cast<double>(s.steps - s.start_steps) / static_cast<double>(*plan_.steps - s.start_steps));
+  if (plan_.end_time) done = std::max(done, (s.end_time - s.start_time) / (*plan_.end_time - s.start_time));
   if (plan_.collisions)
     done = std::max(done, static_cast<double>(s.counters.sphere_sphere) / static_cast<double>(*plan_.collisions));
   return done;

@@ -67,8 +67,8 @@ class Observer {
   virtual void add_state(Fields& /*fields*/, const std::string& /*name*/) {}
   virtual void frame(const Snapshot<D>&) {}
   virtual void thermo(const Snapshot<D>&) {}
-  /// Executed contacts of one slab, in key order; key.time is relative to `slab_start`. Of several ranks on rank
-  /// 0 only.
+  /// Executed contacts of one slab, in key order, of an epoch in pieces; key.time is relative to `slab_start`. Of
+  /// several ranks on rank 0 only.
   virtual void contacts(double /*slab_start*/, std::span<const Contact<D>>) {}
   /// After every slab: how far the run has come. Cheap; called often.
   virtual void progress(const struct Statistics&) {}
@@ -79,6 +79,9 @@ struct Statistics {
   std::int64_t steps = 0;
   double end_time = 0;       ///< simulated time reached
   double fraction_done = 0;  ///< of the plan, 0…1
+  /// Of a branch: those of the state from which it started. Sums, means and extremes are of what came after it.
+  std::int64_t start_steps = 0;
+  double start_time = 0;
   Counters counters;
   double force_passes = 0;  ///< pair evaluations / interacting pairs
 
@@ -101,6 +104,12 @@ struct Statistics {
   std::optional<double> mean_free_time, mean_free_path;
   double wall_seconds = 0;     ///< of the run's loop
   bool stopped_early = false;  ///< by should_stop
+};
+
+/// Steps are counted from here on: step n ends at time + (n − steps) · the plan's step.
+struct StepCount {
+  std::int64_t steps = 0;
+  double time = 0;
 };
 
 template <int D>
@@ -129,9 +138,19 @@ class Simulation {
     std::function<bool()> should_stop{};
     /// Asked now and then within an epoch of free flight: true has should_stop() asked soon.
     std::function<bool()> pause{};
+    /// Asked now and then within a step that takes long: true has it left, with the state it started from, and
+    /// should_stop() asked. `leave_here` is asked by each rank for itself, and followed by pause().
+    std::function<bool()> leave{}, leave_here{};
     /// Continues a run: sets the state of the system, which is in blocks of ids (engine/run/state.h).
     /// The system has the particles as they were at that state already.
     std::function<void()> restore{};
+    /// Starts a branch, a new run from the particles of another at this step and time. restore() then sets what the
+    /// integrator has kept of the steps before, and is empty where that does not fit.
+    struct Branch {
+      StepCount start{};
+      StepCount from{};  ///< where the end of `start` is not exactly there by this count, `start` itself
+    };
+    std::optional<Branch> branch{};
   };
   /// Runs to the end of the plan, or until it is stopped. Throws Error.
   void run(const Hooks& hooks);
@@ -156,6 +175,9 @@ class Simulation {
   static Prepared prepare(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan);
   explicit Simulation(Prepared p) : Simulation(std::move(p.system), p.info, std::move(p.integrator), p.plan) {}
 
+  double time_of(std::int64_t step) const {
+    return count_.time + static_cast<double>(step - count_.steps) * plan_.step;
+  }
   Slab next_slab() const;
   bool finished() const;
   void need_collisions() const;
@@ -168,6 +190,7 @@ class Simulation {
   Plan plan_;
   std::vector<Observer<D>*> observers_;
   Statistics statistics_;
+  StepCount count_;
   bool paused_ = false;     // within a slab
   double quiet_since_ = 0;  // the last slab with pair collisions
 };

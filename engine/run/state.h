@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <string>
 
 #include "engine/base/error.h"
@@ -16,15 +17,21 @@ struct StateWriter {
   std::function<void(const std::string& name, const Bytes&)> of_run;
 };
 
+/// Keeps a state in memory, by names.
+inline StateWriter into(std::map<std::string, Bytes>& state) {
+  return {[&state](const Fields::Field& field, const Bytes& bytes) { state[field.name] = bytes; },
+          [&state](const std::string& name, const Bytes& bytes) { state[name] = bytes; }};
+}
+
 /// Gives rank 0's writer the state of a run: in Simulation::Hooks::should_stop all that it needs to go on. Collective.
 template <int D>
 void save_state(System<D>& system, const StateWriter& writer) {
   Communicator& ranks = system.decomposition.ranks();
   for (const auto& field : system.fields.of_particles()) {
     if (field->kind == Fields::Kind::constant) continue;
-    Bytes all;
-    for (const Bytes& block : gather_on_first(ranks, system.decomposition.block_of(*field)))
-      all.insert(all.end(), block.begin(), block.end());
+    std::vector<Bytes> blocks = gather_on_first(ranks, system.decomposition.block_of(*field));
+    Bytes all = std::move(blocks[0]);
+    for (std::size_t n = 1; n < blocks.size(); ++n) all.insert(all.end(), blocks[n].begin(), blocks[n].end());
     if (ranks.rank() == 0) writer.field(*field, all);
   }
   if (ranks.rank() > 0) return;

@@ -23,7 +23,7 @@ namespace carom {
 template <int D>
 class SkinLists {
  public:
-  /// `radius` by slot, the largest one they will have; where all are `equal`, for ever, of the first one alone. Spheres
+  /// `radius` by slot, the largest one they will have; where all are and stay `equal`, of the first one alone. Spheres
   /// admitted later are not larger than `largest`.
   SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> radius,
             bool equal, double largest, double skin, PageVector<NextEvent<D>>& next_events);

@@ -83,7 +83,7 @@ class Compressor {
     const double growth = options_.growth_rate / (diameter * result_.reduced_pressure);
     const double to_the_end = (kFull / result_.factor - 1) / growth;
     const double length = std::min(diameter * std::min(kShare / options_.growth_rate, kLongest), to_the_end);
-    // What the last rate lets expect, ten times over: more come where the spheres jam on the way.
+    // Ten times what the last rate predicts: more come where the spheres jam on the way.
     const double expected = 100 + 10 * collision_rate_ * length;
     const double most = n * std::min(expected, 1 + options_.max_collisions - result_.collisions);
     Counters counters;

@@ -21,9 +21,11 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
       max_events_(max_events) {}
 
 template <int D>
-void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length) {
+void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length,
+                                SlabWatch* watch) {
   counters_ = &counters;
   contacts_ = contacts;
+  watch_ = watch;
   events_ = 0;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
   std::array<double, 2> most{};  // squared speed and acceleration
@@ -101,6 +103,7 @@ void ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
       if (!(normal_speed(touch, v) < -resting_speed_)) continue;  // an earlier impulse of this round has parted them
       touch.key.generation = generation;
       count_event(touch.key);
+      if (watch_) watch_->cut();
       const Id lo = touch.key.lo, hi = touch.key.hi;
       const Vec<D> v_before = v[lo];
       impulse(touch);
@@ -116,7 +119,9 @@ void ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
     }
     collect(time, x, v);
   }
-  if (!resting_.empty()) stop_approach(x, v);
+  if (resting_.empty()) return;
+  if (watch_) watch_->cut();
+  stop_approach(x, v);
 }
 
 template <int D>

@@ -14,6 +14,7 @@
 #include "engine/ranks/system.h"
 #include "engine/search/neighbour_list.h"
 #include "engine/slabs/resting.h"
+#include "engine/slabs/slab_watch.h"
 
 namespace carom {
 
@@ -32,8 +33,10 @@ class ContactScan {
   ContactScan(const System<D>& system, std::uint64_t max_events);
 
   /// Starts a slab of this length: counts from zero, logs to `contacts` (may be null), and takes what speeds are
-  /// rounding from the velocities and accelerations (length × acceleration) of the whole system.
-  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length);
+  /// rounding from the velocities and accelerations (length × acceleration) of the whole system. `watch` (may be null):
+  /// called before each impulse of resolve().
+  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length,
+                  SlabWatch* watch = nullptr);
 
   /// Applies `impulse` to every contact that touches and approaches at x, in key order, again until none approaches,
   /// and notes which contacts are left at rest. `impulse` changes the velocities in `v`. Throws
@@ -112,6 +115,7 @@ class ContactScan {
   std::uint64_t events_ = 0, events_at_last_cut_ = 0;
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* contacts_ = nullptr;
+  SlabWatch* watch_ = nullptr;
   double resting_speed_ = 0;
   std::vector<Touch<D>> approaching_;
   std::vector<RestingContact<D>> resting_;

@@ -12,8 +12,9 @@
 namespace carom {
 
 namespace {
-constexpr double kRoom = 1.25;  // for paths under other accelerations, in parts of the first ones
-constexpr double kWild = 4;     // mean distances of ½ h² a
+constexpr double kRoom = 1.25;               // for paths under other accelerations, in parts of the first ones
+constexpr double kWild = 4;                  // mean distances of ½ h² a
+constexpr std::size_t kBetweenLooks = 1024;  // events, planned anew or not
 }  // namespace
 
 template <int D>
@@ -96,18 +97,18 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     queue_.clear();
     contacts_.clear();
     longest_path_ = std::isfinite(margin_) ? 0 : kNever;
-    crowded_ = false;
+    crowded_ = left_ = false;
     plain_ends();
     if (longest_path_ == 0) {
       const Stopwatch watch(counters_->seconds.queue);
       predict_first();
       end = serve();
     }
-    if (longest_path_ > 0 && std::isfinite(longest_path_)) {
+    if (!left_ && longest_path_ > 0 && std::isfinite(longest_path_)) {
       margin_ = kRoom * longest_path_;
       find_near();
     }
-  } while (longest_path_ > 0 && std::isfinite(longest_path_));
+  } while (!left_ && longest_path_ > 0 && std::isfinite(longest_path_));
   for (const Flight& each : flights_) {
     const double rest = length_ - each.t;
     const Vec<D> a_i = acceleration(each.id);
@@ -120,6 +121,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     moved_[i] = x_[i] != last_x_[i];
     if (!shared || particles_.owns(i)) all_moved_ += moved_[i];
   }
+  if (!shared && (system_.decomposition.joined() ? system_.decomposition.any(left_) : left_)) throw SlabLeft{};
   if (shared)
     agree(!end.complete || crowded_ || longest_path_ > 0);
   else if (crowded_)
@@ -175,7 +177,11 @@ void SlabCore<D>::plain_ends() {
 /// Serves the queue until it is empty.
 template <int D>
 FlightEnd<D> SlabCore<D>::serve() {
-  while (!queue_.empty() && longest_path_ == 0) {
+  for (std::size_t served = 1; !queue_.empty() && longest_path_ == 0; ++served) {
+    if (served % kBetweenLooks == 0 && watch_ && watch_->asked_here()) {
+      left_ = true;
+      return {.complete = false};
+    }
     std::pop_heap(queue_.begin(), queue_.end());
     const Planned event = queue_.back();
     queue_.pop_back();
@@ -337,8 +343,9 @@ void SlabCore<D>::compare_sequences() {
     if (swapped_.empty() || swapped_.back() != each.id) swapped_.push_back(each.id);
 }
 
-/// Throws HaloTooSmall on all ranks where a flight failed on one of them, a copy that matters went another way than the
-/// particle at its owner, or a path was longer than what is known allows. Collective.
+/// Throws SlabLeft on all ranks where one of them has been asked to stop, HaloTooSmall where a flight failed on one of
+/// them, a copy that matters went another way than the particle at its owner, or a path was longer than what is known
+/// allows. Collective.
 template <int D>
 void SlabCore<D>::agree(bool failed) {
   Decomposition<D>& decomposition = system_.decomposition;
@@ -349,14 +356,15 @@ void SlabCore<D>::agree(bool failed) {
   bool agreed = true;
   for (Id i = 0; i < at_owners.size(); ++i)
     if (at_owners[i] != events.words()[i] && decomposition.matters(i)) agreed = false;
-  std::array<double, 3> most = {failed ? 1.0 : 0.0, agreed ? 0.0 : 1.0, own_reach_};
-  auto& [any_failed, any_wrong, farthest] = most;
+  std::array<double, 4> most = {failed ? 1.0 : 0.0, agreed ? 0.0 : 1.0, own_reach_, left_ ? 1.0 : 0.0};
+  auto& [any_failed, any_wrong, farthest, any_left] = most;
   for (const Id i : beyond_)
     if (particles_.owns(i)) farthest = std::max(farthest, path(start_v_[i], a_[i], length_));
   for (const Flight& f : flights_)
     if (particles_.owns(f.id))
       farthest = std::max(farthest, (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t));
   decomposition.ranks().combine(most, {&all_moved_, 1});
+  if (any_left > 0) throw SlabLeft{};
   if (any_failed > 0) throw HaloTooSmall{};
   if (any_wrong > 0) decomposition.need_deeper_halo();
   decomposition.need_paths(farthest);

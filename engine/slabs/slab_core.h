@@ -26,7 +26,7 @@ namespace carom {
 template <int D>
 struct FlightEnd {
   bool complete = true;
-  bool wild = false;  ///< where it is not: an acceleration is far too strong for the slab, or no number
+  bool wild = false;  ///< where it is not: an acceleration is far too strong for the slab, or NaN
   double time = 0;    ///< else the slab must end here, because a contact came to rest or a resting one was hit
   EventKey<D> key{};  ///< by this event
 };
@@ -40,18 +40,20 @@ class SlabCore {
   SlabCore(const SlabCore&) = delete;
   SlabCore& operator=(const SlabCore&) = delete;
 
-  /// Starts a step; see ContactScan::begin_slab.
-  void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length) {
+  /// Starts a step; see ContactScan::begin_slab. `watch` is asked within fly() too.
+  void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length,
+                  SlabWatch* watch = nullptr) {
     counters_ = &counters;
     log_ = contacts;
-    scan_->begin_slab(counters, contacts, a, length);
+    watch_ = watch;
+    scan_->begin_slab(counters, contacts, a, length, watch);
   }
 
   /// Finds the pairs that may meet in a slab of this length [time] from the system's positions with velocities v, under
   /// accelerations a or others not much larger. `resolved`: ContactScan::resolve() has seen to what touches now.
   void begin(Positions<D> v, Positions<D> a, double length, bool resolved = false);
 
-  /// Flies from the start of the slab to its end. Empty `a`: straight.
+  /// Flies from the start of the slab to its end. Empty `a`: straight. Throws SlabLeft where the run is to stop.
   FlightEnd<D> fly(Positions<D> a);
 
   const std::vector<Vec<D>>& x() const { return x_; }            ///< positions at the slab's end, not wrapped [length]
@@ -137,9 +139,11 @@ class SlabCore {
   double wild_;  // path that an acceleration may bend in a slab [length]
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
+  SlabWatch* watch_ = nullptr;
   double length_ = 0, margin_ = 0, own_reach_ = 0;
   double longest_path_ = 0;  // > 0: how far a particle came, beyond margin_, in this flight
   bool crowded_ = false, resolved_ = false;
+  bool left_ = false;         // this rank has been asked to stop, in this flight
   Positions<D> start_v_, a_;  // of the slab
   std::span<const NeighbourPair<D>> pairs_;
   std::vector<std::uint32_t> near_;  // among the pairs: those that first flights may bring together

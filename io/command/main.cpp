@@ -1,7 +1,10 @@
 // The `carom` command.
 //
 //   carom run inputs/five-springs.toml --set integrator.step=0.02 -o runs/trial
+//   carom branch runs/trial --set integrator.step=0.01 --set run.steps=9000 -o runs/finer
 //   carom validate DECK     carom schema --markdown     carom methods     carom info FILE     carom --version
+//   carom convert RUN --to extxyz
+//   carom view RUN     carom demo
 //   carom bench --n 10000 --packing-fraction 0.49
 //
 // Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75
@@ -10,14 +13,18 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <iostream>
+#include <optional>
 
 #include "engine/base/error.h"
 #include "io/command/bench.h"
 #include "io/command/bench_forces.h"
 #include "io/command/command.h"
+#include "io/command/convert.h"
+#include "io/command/manual.h"
 #include "io/command/run.h"
 #include "io/deck/options.h"
 #include "io/files/info.h"
+#include "io/view/view.h"
 #include "parallel/world.h"
 
 namespace {
@@ -76,6 +83,43 @@ void add_bench(CLI::App& app, carom::BenchOptions& options) {
       ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
 }
 
+int print(const std::string& page) {
+  std::cout << page;
+  return 0;
+}
+
+void add_page(CLI::App& command, std::uint16_t& port, bool& browser, CLI::Option* needs = nullptr) {
+  auto* at = command.add_option("--port", port, "Of the page: this port of 127.0.0.1, instead of any free one");
+  at->type_name("PORT")->check(CLI::Range(0, 65535));
+  auto* none = command.add_flag("!--no-browser", browser, "Of the page: say its address, open no browser");
+  if (needs != nullptr) at->needs(needs), none->needs(needs);
+}
+
+/// `carom view`, `carom demo`.
+struct Views {
+  CLI::App *view, *demo;
+  carom::ViewOptions options;
+  std::optional<std::filesystem::path> directory;
+
+  explicit Views(CLI::App& app)
+      : view(app.add_subcommand("view",
+                                "A page in the browser with the spheres and curves of runs, also while they go on")),
+        demo(app.add_subcommand("demo", "Two methods from one start, seen side by side")) {
+    view->add_option("run", options.runs, "Directories of runs, shown side by side")->required()->type_name("RUN");
+    auto* to = view->add_option("--export", options.export_to, "Write a page that needs no server to this file");
+    to->type_name("FILE");
+    view->add_option("--max-size", options.most_megabytes, "Of --export: with as many frames as fit into so many MB")
+        ->needs(to)
+        ->capture_default_str()
+        ->type_name("MB")
+        ->check(CLI::Range(1, 4000));
+    view->add_flag("--led", options.led, "The run is about to begin; end with standard input")->group("");
+    add_page(*view, options.port, options.browser);
+    demo->add_option("directory", directory, "Where the runs are left, instead of nowhere")->type_name("DIR");
+    add_page(*demo, options.port, options.browser);
+  }
+};
+
 /// One process does it, however many a launcher has started.
 int once(const std::function<int()>& work) {
   if (!carom::World::launched()) return work();
@@ -97,23 +141,34 @@ int carom_main(int argc, char** argv) {
   run.add_flag("--take-over", options.take_over,
                "Of --continue: the process that had the directory on another host has ended")
       ->needs(go_on);
-  add_set(run, options.set);
   run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")
       ->type_name("DIR")
       ->excludes(go_on);
+  CLI::App& branch = *app.add_subcommand("branch", "Start a new run from a checkpoint, with a changed deck");
+  branch.add_option("from", options.branch, "The checkpoint, or the directory of a run: its last one")
+      ->required()
+      ->type_name("CHECKPOINT");
+  branch.add_option("-o,--output", options.output, "Directory of the new run")->type_name("DIR")->required();
   const auto wall_time = [&](const std::string& text) {
     options.max_wall_seconds = carom::wall_seconds(text);
     if (!options.max_wall_seconds) throw CLI::ValidationError("--max-wall", "'" + text + "' is not hh:mm:ss");
   };
-  run.add_option_function<std::string>("--max-wall", wall_time,
-                                       "Stop after this wall time with a checkpoint and exit code 75")
-      ->type_name("HH:MM:SS");
-  run.add_option("--silence", options.silence,
-                 "Of several ranks: give up after so many seconds without a word from one; 0: never")
-      ->capture_default_str()
-      ->type_name("SECONDS")
-      ->check(CLI::NonNegativeNumber);
-  run.add_flag("--quiet", options.quiet, "No banner and no progress line");
+  for (CLI::App* command : {&run, &branch}) {
+    add_set(*command, options.set);
+    command
+        ->add_option_function<std::string>("--max-wall", wall_time,
+                                           "Stop after this wall time with a checkpoint and exit code 75")
+        ->type_name("HH:MM:SS");
+    command
+        ->add_option("--silence", options.silence,
+                     "Of several ranks: give up after so many seconds without a word from one; 0: never")
+        ->capture_default_str()
+        ->type_name("SECONDS")
+        ->check(CLI::NonNegativeNumber);
+    command->add_flag("--quiet", options.quiet, "No banner and no progress line");
+  }
+  auto* const seen = run.add_flag("--view", options.view, "Show the run on a page in the browser while it goes on");
+  add_page(run, options.port, options.browser, seen);
 
   std::filesystem::path deck, file;
   std::vector<std::string> set;
@@ -129,8 +184,25 @@ int carom_main(int argc, char** argv) {
   CLI::App& info = *app.add_subcommand("info", "What is in a trajectory, a file of events or a checkpoint");
   info.add_option("file", file, "The file")->required()->type_name("FILE");
 
+  carom::ConvertOptions to;
+  CLI::App& convert = *app.add_subcommand("convert", "Frames of a run in a format of other programs");
+  convert.add_option("run", to.run, "The directory of a run, or a trajectory")->required()->type_name("RUN");
+  convert.add_option("--to", to.format, "The format")->required()->check(CLI::IsMember(carom::format_names()));
+  convert.add_option("-o,--output", to.output, "The file; beside the trajectory")->type_name("FILE");
+  convert.add_option("--frames", to.frames, "One, as 7 or -1, or a slice, as 0:100:10; all, lammps-data: the last")
+      ->type_name("FRAMES");
+  Views views(app);
+
   carom::BenchOptions bench;
   add_bench(app, bench);
+
+  app.add_subcommand("manual", "The manual page, for man(1)");
+  std::string shell;
+  app.add_subcommand("completion", "A script that completes commands and options in a shell")
+      ->add_option("shell", shell, "bash, zsh or fish")
+      ->required()
+      ->type_name("SHELL")
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
 
   // 2. The command.
   try {
@@ -143,12 +215,17 @@ int carom_main(int argc, char** argv) {
     return once([&] { return app.exit(CLI::RequiredError("DECK, or --continue DIR,")) == 0 ? 0 : usage_error; });
 
   // 3. Do it.
-  if (run.parsed()) return carom::run_command(options);
+  if (run.parsed() || branch.parsed()) return carom::run_command(options);
   return once([&] {
     if (validate.parsed()) return carom::validate_command(deck, set);
     if (schema.parsed()) return carom::schema_command(markdown);
     if (methods.parsed()) return carom::methods_command();
     if (info.parsed()) return carom::info_command(file);
+    if (app.got_subcommand("manual")) return print(carom::manual_page(app));
+    if (app.got_subcommand("completion")) return print(carom::completion_script(app, shell));
+    if (convert.parsed()) return carom::convert_command(to);
+    if (views.view->parsed()) return carom::view_command(views.options);
+    if (views.demo->parsed()) return carom::demo_command(views.directory, views.options);
     return carom::bench_command(bench);
   });
 }

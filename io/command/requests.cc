@@ -37,22 +37,24 @@ Requests::Requests(std::optional<double> most) : most_(most) {
 
 Requests::Asked Requests::now(Communicator& ranks) {
   const bool first = ranks.rank() == 0;
-  const bool over = first && most_ && seconds_since(start_) >= *most_;
   const bool due = first && interval_ && seconds_since(last_checkpoint_) >= *interval_;
-  const double calls = static_cast<double>(skip_ + 1), life = seconds_since(last_look_);
-  std::array<double, 3> asked = {stop_signal != 0 || over ? 1.0 : 0.0, keep_signal != 0 || due ? 1.0 : 0.0,
+  const double calls = static_cast<double>(std::max(calls_, std::uint64_t{1})), life = seconds_since(last_look_);
+  std::array<double, 3> asked = {stop_here(ranks) ? 1.0 : 0.0, keep_signal != 0 || due ? 1.0 : 0.0,
                                  first ? std::clamp(calls * kBetweenLooks / life, 1.0, kMostCalls) : 0.0};
   ranks.largest(asked);
-  skip_ = static_cast<std::uint64_t>(asked[2]) - 1;
-  left_ = skip_;
+  between_ = static_cast<std::uint64_t>(asked[2]);
+  calls_ = 0;
   last_look_ = Clock::now();
   return {asked[0] + asked[1] > 0, asked[0] > 0};
 }
 
-Requests::Asked Requests::now_and_then(Communicator& ranks) {
-  if (left_ == 0) return now(ranks);
-  --left_;
+Requests::Asked Requests::now_and_then(Communicator& ranks, std::uint64_t most) {
+  if (++calls_ >= std::min(between_, most)) return now(ranks);
   return {};
+}
+
+bool Requests::stop_here(const Communicator& ranks) const {
+  return stop_signal != 0 || (ranks.rank() == 0 && most_ && seconds_since(start_) >= *most_);
 }
 
 void Requests::checkpoint_is_written() {

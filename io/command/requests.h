@@ -5,9 +5,11 @@
 //   USR1             write a checkpoint and go on
 //   USR2             write a checkpoint and stop (mpirun passes USR1 and USR2 on to its ranks)
 //
-// Handlers only set a flag. All ranks look at it together: whichever of them has been told, all do it.
+// Handlers only set a flag. All ranks look at it together: a signal to any of them counts for all.
 
 #include <chrono>
+#include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "engine/ranks/communicator.h"
@@ -27,8 +29,10 @@ class Requests {
   };
   /// What has been asked by now, on any rank; rank 0's clock counts. Collective.
   Asked now(Communicator& ranks);
-  /// The same, looked at only now and then where calls come fast.
-  Asked now_and_then(Communicator& ranks);
+  /// The same, looked at only now and then where calls come fast, but at every `most`-th call at least. Collective.
+  Asked now_and_then(Communicator& ranks, std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
+  /// Whether this rank knows that the run is to stop.
+  bool stop_here(const Communicator& ranks) const;
   /// A checkpoint has been written.
   void checkpoint_is_written();
   /// Why the run was stopped, for people: the signal's name, or --max-wall.
@@ -41,7 +45,7 @@ class Requests {
   }
   std::optional<double> most_, interval_;
   Clock::time_point start_ = Clock::now(), last_checkpoint_ = start_, last_look_ = start_;
-  std::uint64_t skip_ = 0, left_ = 0;  // calls of now_and_then() between looks; until the next
+  std::uint64_t calls_ = 0, between_ = 1;  // of now_and_then(): since the last look; from look to look
 };
 
 }  // namespace carom

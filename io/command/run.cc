@@ -13,6 +13,7 @@
 
 #include "engine/base/error.h"
 #include "io/command/requests.h"
+#include "io/command/resume.h"
 #include "io/deck/deck.h"
 #include "io/files/checkpoint.h"
 #include "io/files/directory_lock.h"
@@ -25,6 +26,7 @@
 #include "io/files/summary.h"
 #include "io/files/text_file.h"
 #include "io/files/version.h"
+#include "io/view/view.h"
 #include "parallel/mpi_communicator.h"
 
 namespace carom {
@@ -36,6 +38,9 @@ constexpr int kDone = 0, kStoppedEarly = 75;
 /// Forces on fewer particles than these cost less than sending them.
 constexpr std::size_t kFewestToShare = 64;
 
+/// From look to look within a step: of pieces, sweeps or contacts, as long as many particles make them.
+constexpr std::uint64_t kCallsWithinSteps = 32;
+
 /// Does something that may fail while another failure is being reported: only the first one counts.
 template <class Action>
 void at_best(Action&& action) {
@@ -43,81 +48,6 @@ void at_best(Action&& action) {
     action();
   } catch (const std::exception&) {
   }
-}
-
-/// Reads a file on rank 0, for all: the others may not see it.
-TextReader reader_for(Communicator& ranks) {
-  return [&ranks](const std::filesystem::path& file) -> std::optional<std::string> {
-    auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
-    if (text) text->push_back('.');  // it can be read, and may be empty
-    const auto bytes = std::as_bytes(std::span(text ? std::string_view(*text) : std::string_view()));
-    const Bytes received = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
-    if (received.empty()) return {};
-    return std::string(reinterpret_cast<const char*>(received.data()), received.size() - 1);
-  };
-}
-
-/// A run to be continued: its checkpoint on rank 0, and what all ranks know of it.
-struct Continued {
-  std::filesystem::path directory;
-  mutable std::unique_ptr<DirectoryLock>
-      lock;  // goes to the run; taken before the checkpoint is read: a process that is ending may write another
-  std::optional<Checkpoint> checkpoint;
-  CheckpointHead head;
-  std::string warning;
-
-  StateReader reader() const {
-    return [this](const std::string& name) { return checkpoint->read(name); };
-  }
-};
-
-/// Reads the last checkpoint on rank 0, for all.
-Continued find_checkpoint(const std::filesystem::path& directory, bool take_over, Communicator& ranks) {
-  Continued found{.directory = directory, .lock = {}, .checkpoint = {}, .head = {}, .warning = {}};
-  Archive out;
-  if (ranks.rank() == 0) {
-    if (std::filesystem::is_directory(directory)) found.lock = std::make_unique<DirectoryLock>(directory, take_over);
-    found.checkpoint.emplace(last_checkpoint(directory, found.warning));
-    // The next checkpoint takes the place of one that is damaged, not of the one that is good.
-    if (const auto last = directory / run_file::checkpoint; found.checkpoint->file() != last)
-      std::filesystem::rename(found.checkpoint->file(), last);
-    found.head = found.checkpoint->head();
-    found.head.archive(out);
-    out(found.head.deck);
-  }
-  Archive in(std::move(ranks.gather(out.bytes())[0]));
-  found.head.archive(in);
-  in(found.head.deck);
-  return found;
-}
-
-/// The deck of a run that is continued, where only the end may be another.
-Deck deck_of(const Continued& run, const RunOptions& options, Communicator& ranks) {
-  for (const std::string& set : options.set)
-    if (!set.starts_with("run."))
-      throw Error(Failure::deck, "--set " + set +
-                                     ": a run that is continued keeps its deck; only its end may be set "
-                                     "anew (run.steps, run.end_time, run.collisions); start a new run for the rest");
-  const auto file = run.directory / run_file::deck;
-  const TextReader others = reader_for(ranks);
-  Deck deck = read_deck(file, options.set, [&](const std::filesystem::path& path) {
-    // Positions are in the checkpoint: their file may be gone.
-    return path == file ? run.head.deck : others(path).value_or("");
-  });
-  set_output_directory(deck, run.directory);
-  deck.warnings = run.head.warnings;
-  deck.file = run.head.deck_file;
-  return deck;
-}
-
-template <int D>
-Simulation<D> simulation_of(Deck& deck, Communicator& ranks, const Continued* continued) {
-  const IntegratorInfo& info = find_integrator(deck.integrator);
-  std::optional<GivenState> given;
-  if (continued) given = {continued->reader(), continued->head.bonds};
-  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, given ? &*given : nullptr);
-  auto integrator = info.make<D>(deck.integrator_parameters);
-  return Simulation<D>(std::move(system), info, std::move(integrator), deck.plan);
 }
 
 /// What the ranks do alike while a run goes on: stop or write checkpoints when they are asked to.
@@ -130,14 +60,20 @@ class Keeper {
       : simulation_(simulation), deck_(deck), ranks_(ranks), requests_(requests), head_(std::move(head)) {
     requests_.set_interval(deck.output.checkpoint_wall);
   }
-  typename Simulation<D>::Hooks hooks(const Continued* continued) {
+  typename Simulation<D>::Hooks hooks(const Resumed* from) {
     typename Simulation<D>::Hooks hooks;
     hooks.should_stop = [this] { return should_stop(); };
     hooks.pause = [this] {
       asked_ = requests_.now(ranks_);
       return asked_.checkpoint;
     };
-    if (continued) hooks.restore = [this, continued] { restore_state(simulation_.system(), continued->reader()); };
+    hooks.leave = [this] {
+      const Requests::Asked now = requests_.now_and_then(ranks_, kCallsWithinSteps);
+      if (now.checkpoint) asked_ = now;  // where it need not stop it is written at the step's end
+      return now.stop;
+    };
+    hooks.leave_here = [this] { return requests_.stop_here(ranks_); };
+    if (from) set_hooks(*from, deck_, simulation_, hooks);
     return hooks;
   }
 
@@ -163,34 +99,39 @@ class Keeper {
 /// Runs a deck in D dimensions and writes its files. `at_work`: the ranks that share the work, of all that there are.
 template <int D>
 int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
-             const Continued* continued) {
+             Resumed* from) {
   const auto& directory = deck.output.directory;
-  auto simulation = simulation_of<D>(deck, at_work, continued);
+  auto simulation = simulation_of<D>(deck, at_work, from);
+  Resumed* const continued = from && from->is_continued() ? from : nullptr;
   const Statistics& statistics = simulation.statistics();
   const auto lock = continued ? std::move(continued->lock) : std::make_unique<DirectoryLock>(directory);
   const auto backup = continued ? std::nullopt : prepare_output_directory(directory);
-  std::optional<RunLog> log_file;
-  if (continued)
-    log_file.emplace(directory / run_file::log, options.quiet, continued->head.log_bytes);
-  else
-    log_file.emplace(directory / run_file::log, options.quiet);
-  RunLog& log = *log_file;
+  RunLog log(directory / run_file::log, options.quiet,
+             continued ? std::optional(continued->head.log_bytes) : std::nullopt);
   RunOutcome outcome{
       .status = "done", .warnings = deck.warnings, .particles = simulation.system().size(), .ranks = ranks};
+  if (from) outcome.branched_from = from->head.branched_from;
   if (continued) {
     log.say(fmt::format("continued at step {} on {} {}", continued->head.step, ranks, ranks == 1 ? "rank" : "ranks"));
-    if (!continued->warning.empty()) log.warn("warning: " + continued->warning);
   } else {
     log.say(banner_text(deck, outcome.particles, ranks));
+    if (from)
+      log.say(fmt::format("branched from {} at step {}, time {:g}", from->head.branched_from, from->head.step,
+                          from->head.time));
     for (const std::string& warning : deck.warnings) log.warn(warning);
   }
+  if (from && !from->warning.empty()) log.warn("warning: " + from->warning);
   if (at_work.size() < ranks)
     log.warn(
         fmt::format("warning: {} particles under forces are too few to be shared; one rank works, the other {} wait",
                     outcome.particles, ranks - 1));
   if (!lock->warning().empty()) log.warn(lock->warning());
   if (backup) log.warn("warning: the files of an earlier run in this directory are now in " + backup->string());
-  write_file_atomically(directory / run_file::deck, deck.toml_text);
+  const std::string origin =
+      outcome.branched_from.empty()
+          ? ""
+          : fmt::format("# A branch of {}: it started from the particles there.\n", outcome.branched_from);
+  write_file_atomically(directory / run_file::deck, origin + deck.toml_text);
 
   const auto summary = [&] {
     write_file_atomically(directory / run_file::summary, summary_text(deck, outcome, statistics));
@@ -199,14 +140,11 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
   ThermoTable<D> table(log, continued ? continued->head.log_rows : 0);
   Progress<D> progress(stdout, isatty(STDOUT_FILENO) == 1);
   try {
-    if (continued)
-      files.emplace(deck, simulation.system(), continued->head.files);
-    else
-      files.emplace(deck, simulation.system());
+    files.emplace(deck, simulation.system(), continued ? std::optional(continued->head.files) : std::nullopt);
     files->add_to(simulation);
     simulation.add(table);
     if (!options.quiet) simulation.add(progress);
-    const auto bonds = continued ? continued->head.bonds : found_bonds(deck, simulation.system());
+    const auto bonds = from ? from->head.bonds : found_bonds(deck, simulation.system());
     Keeper<D> keeper(simulation, deck, at_work, requests, [&] {
       return CheckpointHead{.deck = deck.toml_text,
                             .deck_file = deck.file.string(),
@@ -220,9 +158,10 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
                             .log_bytes = log.size(),
                             .log_rows = table.rows(),
                             .bonds = bonds,
-                            .warnings = deck.warnings};
+                            .warnings = deck.warnings,
+                            .branched_from = outcome.branched_from};
     });
-    simulation.run(keeper.hooks(continued));
+    simulation.run(keeper.hooks(from));
     progress.end_line();
     table.finish();
     const auto accounts = accounts_of_all(at_work, statistics);
@@ -261,25 +200,25 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
 
 /// The same run on a rank other than 0, which shows nothing of it.
 template <int D>
-int run_beside(Deck& deck, Communicator& at_work, Requests& requests, const Continued* continued) {
-  auto simulation = simulation_of<D>(deck, at_work, continued);
+int run_beside(Deck& deck, Communicator& at_work, Requests& requests, Resumed* from) {
+  auto simulation = simulation_of<D>(deck, at_work, from);
   std::vector<Onlooker<D>> onlookers;
   for (const auto& [info, parameters] : deck.output.observables)
     onlookers.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
   for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
-  BlockSender<D> sender(at_work, simulation.system(), continued == nullptr);
+  BlockSender<D> sender(at_work, simulation.system(), from == nullptr || from->is_branch());
   simulation.add(sender);
   Keeper<D> keeper(simulation, deck, at_work, requests, {});
-  simulation.run(keeper.hooks(continued));
+  simulation.run(keeper.hooks(from));
   accounts_of_all(at_work, simulation.statistics());
   return simulation.statistics().stopped_early ? kStoppedEarly : kDone;
 }
 
 template <int D>
 int run_on_rank(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
-                const Continued* continued) {
-  return at_work.rank() == 0 ? run_deck<D>(deck, options, at_work, ranks, requests, continued)
-                             : run_beside<D>(deck, at_work, requests, continued);
+                Resumed* from) {
+  return at_work.rank() == 0 ? run_deck<D>(deck, options, at_work, ranks, requests, from)
+                             : run_beside<D>(deck, at_work, requests, from);
 }
 
 }  // namespace
@@ -297,26 +236,30 @@ int run_command(const RunOptions& options) {
   Communicator& all = team ? *team : alone;
 
   Deck deck;
-  std::optional<Continued> continued;
+  std::optional<Resumed> from;
+  std::optional<RunView> view;
   const int failure = ranks.on_all([&] {
-    if (options.go_on) {
-      continued.emplace(find_checkpoint(*options.go_on, options.take_over, all));
-      deck = deck_of(*continued, options, all);
+    if (options.go_on || options.branch) {
+      from.emplace(options.go_on ? find_run(*options.go_on, options.take_over, all)
+                                 : find_state(*options.branch, *options.output, all));
+      deck = deck_of(*from, options, all);
     } else {
       deck = read_deck(options.deck, options.set, reader_for(all));
       if (options.output) set_output_directory(deck, *options.output);
     }
+    if (options.view && ranks.rank() == 0) view.emplace(deck.output.directory, options.port, options.browser);
     return 0;
   });
   if (failure != 0) return failure;
   const auto run = [&](Communicator& at_work) {
-    const Continued* from = continued ? &*continued : nullptr;
-    return deck.dimension == 2 ? run_on_rank<2>(deck, options, at_work, ranks.size(), requests, from)
-                               : run_on_rank<3>(deck, options, at_work, ranks.size(), requests, from);
+    Resumed* const resumed = from ? &*from : nullptr;
+    return deck.dimension == 2 ? run_on_rank<2>(deck, options, at_work, ranks.size(), requests, resumed)
+                               : run_on_rank<3>(deck, options, at_work, ranks.size(), requests, resumed);
   };
   const bool few = find_integrator(deck.integrator).smooth_forces && particle_count(deck) < kFewestToShare;
-  if (few) return ranks.on_first([&] { return run(alone); });
-  return ranks.on_all([&] { return run(all); });
+  const int code = few ? ranks.on_first([&] { return run(alone); }) : ranks.on_all([&] { return run(all); });
+  if (view && code == kDone) view->stay();
+  return code;
 }
 
 }  // namespace carom

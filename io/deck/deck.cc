@@ -33,12 +33,14 @@ std::optional<std::string> read_text(const std::filesystem::path& file) {
   return text;
 }
 
-Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides, const TextReader& reader) {
+Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides, const TextReader& reader,
+               bool replace) {
   const auto text = reader(file);
   if (!text)
     throw Error(Failure::file, file.string() + ": error: cannot read this deck; check the path and its permissions");
   Problems problems;
-  const DeckToml toml = parse_deck(file, *text, overrides, problems);
+  DeckToml toml = parse_deck(file, *text, overrides, problems);
+  if (replace) drop_replaced(toml);
   Deck deck;
   deck.file = file;
   DeckValues values = read_values(toml, problems);

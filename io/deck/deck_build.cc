@@ -161,7 +161,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   Problems problems;
   make_interactions(source, {}, *system, true, problems);
   problems.throw_errors(Failure::deck);
-  if (given) return system;
+  if (given && !given->branch) return system;
   complete_values(deck, *system, problems);
   problems.throw_errors(Failure::deck);
   check_state(deck, *system, problems);

@@ -191,6 +191,8 @@ class Interpreter {
       if (parameters.has("interval") && parameters.real("interval") > 0)
         deck_.output.observables.push_back({&info, std::move(parameters)});
     }
+    if (const auto* units = table->find<std::map<std::string, std::string>>("units"))
+      deck_.output.units = {units->at("length"), units->at("time")};
     if (const auto* events = table->find<bool>("events")) deck_.plan.events = *events;
     if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {
       deck_.output.checkpoint_wall = wall_seconds(*wall);

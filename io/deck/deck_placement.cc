@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/compression.h"
@@ -13,22 +14,43 @@
 namespace carom {
 namespace {
 
-/// The numbers of one line; nothing if there is anything else in it.
-std::optional<std::vector<double>> numbers(std::string line) {
+/// The words of one line up to the first that is no finite number.
+struct Words {
+  std::vector<double> numbers;
+  std::string_view wrong;  // that word; empty: there is none
+  std::size_t column = 1;  // of it, from 1
+  bool a_number = false;   // it is one, but not finite
+};
+
+Words words_of(std::string_view line) {
   line = line.substr(0, line.find('#'));
-  std::vector<double> found;
+  Words words;
   std::size_t at = 0;
   constexpr const char* separators = ",; \t\r";
-  while ((at = line.find_first_not_of(separators, at)) != std::string::npos) {
+  while ((at = line.find_first_not_of(separators, at)) != std::string_view::npos) {
     const std::size_t end = std::min(line.find_first_of(separators, at), line.size());
     const char* first = line.data() + at + (line[at] == '+' ? 1 : 0);
     double value = 0;
     const auto [stop, failed] = std::from_chars(first, line.data() + end, value);
-    if (failed != std::errc{} || stop != line.data() + end) return {};
-    found.push_back(value);
+    if (failed != std::errc{} || stop != line.data() + end || !std::isfinite(value)) {
+      words.wrong = line.substr(at, end - at);
+      words.column = at + 1;
+      words.a_number = failed == std::errc{} && stop == line.data() + end;
+      return words;
+    }
+    words.numbers.push_back(value);
     at = end;
   }
-  return found;
+  return words;
+}
+
+/// A word for people, of whatever bytes it is.
+std::string shown(std::string_view word) {
+  constexpr std::size_t kMost = 20;
+  std::string text(word.substr(0, kMost));
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
+  return "'" + text + (word.size() > kMost ? "…'" : "'");
 }
 
 template <int D>
@@ -132,19 +154,24 @@ std::vector<std::vector<double>> rows_in(const std::string& text, const std::fil
   std::vector<std::vector<double>> rows;
   Problems problems;
   std::string line;
-  bool heading = true;
-  for (int number = 1; std::getline(in, line); ++number) {
-    const auto row = numbers(line);
-    const bool first = heading;
-    if (!row || !row->empty()) heading = false;
-    if ((row && row->empty()) || (!row && first)) continue;
-    const bool good = row && row->size() == columns &&
-                      std::all_of(row->begin(), row->end(), [](double x) { return std::isfinite(x); });
-    if (!good)
-      problems.error({file.string(), number, 1}, not_what,
-                     "give " + std::to_string(columns) + " finite numbers, separated by commas or blanks");
-    else
-      rows.push_back(*row);
+  constexpr std::size_t kMostErrors = 10;  // reported of one file
+  bool begins = true;
+  for (int number = 1; problems.errors() < kMostErrors && std::getline(in, line); ++number) {
+    const Words words = words_of(line);
+    const std::size_t found = words.numbers.size();
+    if (found == 0 && words.wrong.empty()) continue;
+    const bool first = std::exchange(begins, false);
+    if (first && found == 0 && !words.a_number) continue;  // a heading
+    if (words.wrong.empty() && found == columns) {
+      rows.push_back(words.numbers);
+      continue;
+    }
+    const std::string what = !words.wrong.empty() ? shown(words.wrong) + " is no finite number"
+                             : found == 1         ? "there is 1 number"
+                                                  : "there are " + std::to_string(found) + " numbers";
+    problems.error({file.string(), number, static_cast<int>(words.column)},
+                   std::string(not_what).append(": ").append(what),
+                   "give " + std::to_string(columns) + " finite numbers, separated by commas or blanks");
   }
   problems.throw_errors(Failure::deck);
   return rows;

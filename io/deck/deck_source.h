@@ -1,5 +1,6 @@
 #pragma once
-// What a checked deck says, in the words of a simulation: known to io/deck*.cc and io/validate*.cc only.
+// What a checked deck says, in the words of a simulation: known to io/deck, and to io/python, which takes the
+// interactions.
 
 #include <optional>
 

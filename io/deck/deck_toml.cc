@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include "io/deck/schema.h"
+
 namespace carom {
 namespace {
 
@@ -115,6 +117,32 @@ DeckToml parse_deck(const std::filesystem::path& file, std::string_view text, st
   }
   for (const std::string& override_text : overrides) apply(deck, override_text, problems);
   return deck;
+}
+
+void drop_replaced(DeckToml& deck) {
+  const auto drop = [&](toml::node& node, const TableSchema& schema) {
+    toml::table* const table = node.as_table();
+    const toml::node* const type = table != nullptr ? table->get("type") : nullptr;
+    if (type == nullptr || !type->is_string() || !deck.set.contains(type)) return;
+    const Variant* const chosen = schema.variant(type->as_string()->get());
+    if (chosen == nullptr) return;
+    std::vector<std::string> foreign;
+    for (const auto& [key, value] : *table) {
+      const auto is_it = [name = key.str()](const Key& known) { return known.name == name; };
+      if (!deck.set.contains(&value) && std::ranges::none_of(schema.keys, is_it) &&
+          std::ranges::none_of(chosen->keys, is_it))
+        foreign.emplace_back(key.str());
+    }
+    for (const std::string& key : foreign) table->erase(key);
+  };
+  for (const TableSchema& schema : deck_schema()) {
+    toml::node* const node = schema.name.empty() ? nullptr : deck.root.get(schema.name);
+    if (node == nullptr || schema.variants.empty()) continue;
+    if (toml::array* const list = node->as_array())
+      for (toml::node& item : *list) drop(item, schema);
+    else
+      drop(*node, schema);
+  }
 }
 
 }  // namespace carom

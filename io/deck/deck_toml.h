@@ -28,4 +28,7 @@ struct DeckToml {
 DeckToml parse_deck(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
                     Problems& problems);
 
+/// Where an override gives a table another type, takes the keys out that this does not know and no override gives.
+void drop_replaced(DeckToml& deck);
+
 }  // namespace carom

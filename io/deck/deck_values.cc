@@ -39,6 +39,8 @@ class NodeReader {
       case real_or_list:
         if (!node.is_array()) return wrap(read_real(node));
         return wrap(read_list<double>(node, [this](const toml::node& n) { return read_real(n); }));
+      case text_table:
+        return wrap(read_texts(node));
     }
     return {};
   }
@@ -131,6 +133,27 @@ class NodeReader {
       ids[k] = static_cast<std::uint32_t>(id->get());
     }
     return ids;
+  }
+
+  std::optional<std::map<std::string, std::string>> read_texts(const toml::node& node) {
+    const toml::table* table = node.as_table();
+    if (table == nullptr) return wrong_type(node, "a table");
+    std::map<std::string, std::string> texts;
+    std::vector<std::string> known;
+    for (const Key& key : key_.keys) {
+      known.push_back(key.name);
+      const toml::node* item = table->get(key.name);
+      if (item == nullptr)
+        complain(node, "has no '" + key.name + "'", "add it, one of: " + join(key.choices));
+      else if (auto text = NodeReader(key, deck_, problems_).read_text(*item))
+        texts.emplace(key.name, std::move(*text));
+    }
+    for (const auto& [name, item] : *table)
+      if (std::ranges::find(known, name.str()) == known.end())
+        problems_.error(deck_.place(name, item), "unknown key '" + std::string(name.str()) + "' in '" + key_.name + "'",
+                        suggestion(std::string(name.str()), known));
+    if (texts.size() != known.size() || table->size() != known.size()) return {};
+    return texts;
   }
 
   template <class T, class ReadItem>

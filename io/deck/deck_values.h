@@ -17,7 +17,7 @@ namespace carom {
 struct DeckToml;
 
 using Value = std::variant<bool, std::int64_t, double, std::vector<double>, std::string, std::vector<std::string>,
-                           PairList, std::vector<std::vector<double>>>;
+                           PairList, std::vector<std::vector<double>>, std::map<std::string, std::string>>;
 
 /// One table of the deck, read.
 struct ValueTable {

@@ -57,6 +57,12 @@ std::string literal(const std::array<Item, N>& items) {
   return bracketed(items);
 }
 
+std::string literal(const std::map<std::string, std::string>& table) {
+  std::string text;
+  for (const auto& [name, value] : table) text += (text.empty() ? "" : ", ") + name + " = " + literal(value);
+  return "{ " + text + " }";
+}
+
 }  // namespace
 
 std::string write_deck(const DeckValues& values) {

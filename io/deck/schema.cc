@@ -66,6 +66,17 @@ std::string averages_of_all() {
   return files;
 }
 
+Key units_key() {
+  const std::vector<std::string> lengths = {"Angstrom", "fm", "pm", "nm", "um", "mm", "m"},
+                                 times = {"fs", "ps", "ns", "us", "ms", "s"};
+  Key units = {"units", text_table, "none", "-",
+               "what the trajectory says its lengths and times are in, as { length = \"Angstrom\", time = \"ps\" }, "
+               "for programs that want to know; numbers are written as they are; none: reduced units"};
+  units.keys = {{"length", text, "", "-", "the unit of length", Range::any, lengths},
+                {"time", text, "", "-", "the unit of time", Range::any, times}};
+  return units;
+}
+
 std::vector<Key> output_keys() {
   std::vector<Key> keys = {
       {"directory", text, "none", "-",
@@ -85,6 +96,7 @@ std::vector<Key> output_keys() {
        Range::non_negative});
   keys.push_back({"checkpoint_wall", text, "\"00:05:00\"", "-",
                   "wall time between checkpoints, hh:mm:ss; empty: only when the run ends or is stopped"});
+  keys.push_back(units_key());
   keys.push_back({"events", boolean, "false", "-", "write every collision to events.h5"});
   return keys;
 }
@@ -229,6 +241,11 @@ std::string type_name(const Key& key) {
       return "list of vectors";
     case real_or_list:
       return range + "number, or a list with one for each particle";
+    case text_table: {
+      std::string names;
+      for (const Key& each : key.keys) names += (names.empty() ? "" : " and ") + each.name;
+      return "table of the texts " + names;
+    }
   }
   throw std::logic_error("unknown key type");
 }

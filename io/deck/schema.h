@@ -27,6 +27,7 @@ struct Key {
     pair_list,
     vector_list,   ///< one vector of system.dimension numbers for each particle
     real_or_list,  ///< one number for all, or one for each particle
+    text_table,    ///< an inline table of texts: `keys`
   };
   std::string name;
   Type type = Type::real;
@@ -37,6 +38,7 @@ struct Key {
   std::vector<std::string> choices{};
   std::vector<std::array<std::string_view, 2>> former{};  ///< as in Parameter
   double most = std::numeric_limits<double>::infinity();  ///< as in Parameter
+  std::vector<Key> keys{};                                ///< of a text_table, each of them needed
 
   bool required() const { return fallback.empty(); }
   bool has_default() const { return !required() && fallback != "none"; }

@@ -1,9 +1,9 @@
 #include "io/files/checkpoint.h"
 
 #include <fcntl.h>
+#include <libdeflate.h>
 #include <spdlog/fmt/fmt.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <array>
 #include <cerrno>
@@ -21,7 +21,7 @@ namespace carom {
 namespace {
 
 constexpr std::size_t kBlock = 512;  // before HDF5's own bytes
-constexpr int kFormat = 1;
+constexpr int kFormat = 2;
 constexpr std::string_view kBegin = "carom checkpoint ";
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
@@ -44,12 +44,12 @@ struct Sum {
 /// Of all behind the block.
 Sum sum_of(const std::filesystem::path& path, const Descriptor& file) {
   Sum sum;
-  std::vector<unsigned char> piece(1 << 20);
+  std::vector<unsigned char> piece(1 << 16);
   for (;;) {
     const ssize_t got = ::pread(file.number(), piece.data(), piece.size(), static_cast<off_t>(kBlock + sum.bytes));
     if (got < 0) refuse_with_reason(path);
     if (got == 0) return sum;
-    sum.crc = static_cast<std::uint32_t>(::crc32(sum.crc, piece.data(), static_cast<uInt>(got)));
+    sum.crc = libdeflate_crc32(sum.crc, piece.data(), static_cast<std::size_t>(got));
     sum.bytes += static_cast<std::uint64_t>(got);
   }
 }
@@ -69,9 +69,9 @@ void verify(const std::filesystem::path& path) {
   const std::string_view text(block.data(), static_cast<std::size_t>(got));
   if (!text.starts_with(kBegin)) refuse(path, "not a checkpoint of carom");
   int format = 0;
-  if (std::sscanf(block.data() + kBegin.size(), "%d", &format) == 1 && format > kFormat)
-    refuse(path, fmt::format("a checkpoint of format {}, written by a newer carom; this one reads format {}", format,
-                             kFormat));
+  if (std::sscanf(block.data() + kBegin.size(), "%d", &format) == 1 && format != kFormat)
+    refuse(path, fmt::format("a checkpoint of format {}, written by {} carom; this one reads format {}", format,
+                             format > kFormat ? "a newer" : "an older", kFormat));
   if (static_cast<std::size_t>(got) < kBlock || block != block_of(sum_of(path, file)))
     refuse(path, "the checkpoint is damaged or cut off: its checksum is not that of its contents");
 }
@@ -96,6 +96,7 @@ hid_t type_of(Fields::Scalar scalar) {
 void sign_and_rename(const std::filesystem::path& aside, const std::filesystem::path& directory) {
   {
     const Descriptor file = open_file(aside, O_RDWR);
+    ::sync_file_range(file.number(), 0, 0, SYNC_FILE_RANGE_WRITE);  // the disk writes while the sum is taken
     const auto block = block_of(sum_of(aside, file));
     if (::pwrite(file.number(), block.data(), kBlock, 0) != static_cast<ssize_t>(kBlock) || ::fsync(file.number()) != 0)
       refuse_with_reason(aside);

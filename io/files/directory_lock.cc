@@ -82,9 +82,14 @@ std::string host_name() {
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown host";
 }
 
+bool run_is_at_work(const fs::path& directory) {
+  const auto lock = read_lock(directory / run_file::lock);
+  return elsewhere(lock) || at_work_here(lock);
+}
+
 DirectoryLock::DirectoryLock(const fs::path& directory, bool take_over) : path_(directory / run_file::lock) {
   make_output_directory(directory);
-  // A launcher that was told to stop may be gone before its processes are.
+  // A launcher that was stopped may be gone before its processes are.
   for (int tenths = 0; tenths < 20 && at_work_here(read_lock(path_)); ++tenths)
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   const Descriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));

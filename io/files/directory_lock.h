@@ -12,6 +12,9 @@ namespace carom {
 /// The name of this machine.
 std::string host_name();
 
+/// Whether a run is at work in a directory, as its lock says; one that stands there for another host counts.
+bool run_is_at_work(const std::filesystem::path& directory);
+
 class DirectoryLock {
  public:
   /// Makes the directory where it is missing. Throws Error(Failure::file) if another run is at work there, or one on

@@ -84,16 +84,14 @@ struct EventWriter<D>::Contents {
 };
 
 template <int D>
-EventWriter<D>::EventWriter(const std::filesystem::path& path, const Deck& deck)
-    : contents_(std::make_unique<Contents>(hdf5::File::create(path))) {
-  contents_->create(deck);
-}
-
-template <int D>
-EventWriter<D>::EventWriter(const std::filesystem::path& path, const EventMark& mark)
-    : contents_(std::make_unique<Contents>(hdf5::File::append(path))) {
-  contents_->each([&](auto& column) { column.written.cut(mark.rows); });
-  contents_->slabs_done = mark.slabs;
+EventWriter<D>::EventWriter(const std::filesystem::path& path, const Deck& deck, const std::optional<EventMark>& mark)
+    : contents_(std::make_unique<Contents>(mark ? hdf5::File::append(path) : hdf5::File::create(path))) {
+  if (!mark) {
+    contents_->create(deck);
+    return;
+  }
+  contents_->each([&](auto& column) { column.written.cut(mark->rows); });
+  contents_->slabs_done = mark->slabs;
 }
 
 template <int D>

@@ -16,6 +16,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "engine/run/simulation.h"
 #include "io/deck/deck.h"
@@ -31,10 +32,8 @@ struct EventMark {
 template <int D>
 class EventWriter : public Observer<D> {
  public:
-  /// Creates the file. Throws Error(Failure::file).
-  EventWriter(const std::filesystem::path& path, const Deck& deck);
-  /// Opens it again to go on from there. Throws Error(Failure::file).
-  EventWriter(const std::filesystem::path& path, const EventMark& mark);
+  /// Creates the file, or opens it again to go on from the mark. Throws Error(Failure::file).
+  EventWriter(const std::filesystem::path& path, const Deck& deck, const std::optional<EventMark>& mark = {});
   ~EventWriter() override;
 
   void contacts(double slab_start, std::span<const Contact<D>> contacts) override;

@@ -3,6 +3,7 @@
 #include <pwd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <numeric>
@@ -69,6 +70,75 @@ void write_parameters(File& file, const Deck& deck, const System<D>& system) {
   file.write_texts(group, "species", system.species);
 }
 
+/// The radius of a species: the mean of its particles, exactly their own where all have the same.
+struct SpeciesRadius {
+  double first = 0, excess = 0;
+  std::size_t particles = 0;
+  void add(double radius) {
+    if (particles++ == 0) first = radius;
+    excess += radius - first;
+  }
+  double mean() const { return first + excess / static_cast<double>(particles); }
+};
+
+void write_species(File& file, const std::vector<std::string>& names, const std::vector<SpeciesRadius>& radii) {
+  constexpr std::size_t kMost = 15;  // characters of a name in VMD
+  const Handle group = file.group(vmd_structure::group);
+  std::vector<std::int32_t> index;
+  std::vector<std::string> name;
+  std::vector<double> radius;
+  for (std::size_t s = 0; s < names.size(); ++s) {
+    if (radii[s].particles == 0) continue;
+    index.push_back(static_cast<std::int32_t>(s));
+    name.push_back(names[s].substr(0, kMost));
+    radius.push_back(radii[s].mean());
+  }
+  file.write_array(group, "indexOfSpecies", hdf5::native_type<std::int32_t>(), index.data(), {index.size()});
+  file.write_texts(group, "name", name);
+  file.write_texts(group, "type", name);
+  file.write_array(group, "radius", hdf5::native_type<double>(), radius.data(), {radius.size()});
+}
+
+/// Each pair that any term joins, once.
+template <int D>
+void write_bonds(File& file, const System<D>& system) {
+  PairList bonds;
+  for (const auto& term : system.interactions)
+    if (const PairList* some = term->bonds(); some != nullptr)
+      for (const auto& [i, j] : *some) bonds.push_back({std::min(i, j), std::max(i, j)});
+  if (bonds.empty()) return;
+  std::ranges::sort(bonds);
+  bonds.erase(std::unique(bonds.begin(), bonds.end()), bonds.end());
+  std::vector<std::int32_t> from, to;
+  for (const auto& [i, j] : bonds) {
+    from.push_back(static_cast<std::int32_t>(i + 1));
+    to.push_back(static_cast<std::int32_t>(j + 1));
+  }
+  const Handle group = file.group(vmd_structure::group);
+  for (const auto& [name, ends] : {std::pair("bond_from", &from), std::pair("bond_to", &to)})
+    file.write_array(group, name, hdf5::native_type<std::int32_t>(), ends->data(), {ends->size()});
+}
+
+/// As the H5MD module `units` says, by texts of variable length.
+void write_units(File& file, const Units& units) {
+  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose), scalar(H5Screate(H5S_SCALAR), H5Sclose);
+  H5Tset_size(type.id(), H5T_VARIABLE);
+  const auto write = [&](const std::string& name, const std::string& unit) {
+    const Handle attribute(file.check(H5Acreate_by_name(file.id(), name.c_str(), "unit", type.id(), scalar.id(),
+                                                        H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                                      "create the unit of " + name),
+                           H5Aclose);
+    const char* text = unit.c_str();
+    file.check(H5Awrite(attribute.id(), type.id(), &text), "write the unit of " + name);
+  };
+  const std::string particles = "particles/trajectory/";
+  write(particles + "position/value", units.length);
+  write(particles + "box/edges/value", units.length);
+  write(particles + "radius", units.length);
+  write(particles + "velocity/value", units.length + " " + units.time + "-1");
+  write(particles + "position/time", units.time);
+}
+
 /// A time-dependent element of H5MD: value, step and time.
 template <class T>
 struct Element {
@@ -114,6 +184,8 @@ struct TrajectoryWriter<D>::Contents {
     write_parameters(file, deck, system);
     write_box(system.box);
     write_fixed(system);
+    write_bonds(file, system);
+    if (deck.output.units) write_units(file, *deck.output.units);
     file.flush();
   }
 
@@ -141,6 +213,7 @@ struct TrajectoryWriter<D>::Contents {
     const hdf5::Array<double> mass(file, group, "mass", n), radius(file, group, "radius", n),
         charge(file, group, "charge", n);
     std::size_t first = 0;
+    std::vector<SpeciesRadius> species_radii(system.species.size());
     const auto write = [&](std::span<const std::uint16_t> kinds, std::span<const double> masses,
                            std::span<const double> radii, std::span<const double> charges) {
       std::vector<std::uint32_t> ids(kinds.size());
@@ -150,19 +223,23 @@ struct TrajectoryWriter<D>::Contents {
       mass.write(first, masses);
       radius.write(first, radii);
       charge.write(first, charges);
+      for (std::size_t i = 0; i < kinds.size(); ++i) species_radii[kinds[i]].add(radii[i]);
       first += kinds.size();
     };
     const Particles<D>& p = system.particles;
-    if (!system.decomposition.joined()) return write(p.species, p.mass, p.radius, p.charge);
-    one_after_the_other(
-        ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); },
-        [&](int /*rank*/, const Bytes& message) {
-          const std::size_t here = message.size() / (3 * sizeof(double) + sizeof(std::uint16_t));
-          Reader reader(message);
-          const auto masses = next<double>(reader, here), radii = next<double>(reader, here),
-                     charges = next<double>(reader, here);
-          write(next<std::uint16_t>(reader, here), masses, radii, charges);
-        });
+    if (!system.decomposition.joined())
+      write(p.species, p.mass, p.radius, p.charge);
+    else
+      one_after_the_other(
+          ranks, [&] { return packed(p.mass, p.radius, p.charge, p.species); },
+          [&](int /*rank*/, const Bytes& message) {
+            const std::size_t here = message.size() / (3 * sizeof(double) + sizeof(std::uint16_t));
+            Reader reader(message);
+            const auto masses = next<double>(reader, here), radii = next<double>(reader, here),
+                       charges = next<double>(reader, here);
+            write(next<std::uint16_t>(reader, here), masses, radii, charges);
+          });
+    write_species(file, system.species, species_radii);
   }
 
   /// Writes what changes of the particles: a row of all that there are, from one state or from the blocks of all ranks.
@@ -211,15 +288,13 @@ struct TrajectoryWriter<D>::Contents {
 };
 
 template <int D>
-TrajectoryWriter<D>::TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system)
-    : contents_(std::make_unique<Contents>(File::create(path), system)) {
-  contents_->create(deck, system);
-}
-
-template <int D>
-TrajectoryWriter<D>::TrajectoryWriter(const std::filesystem::path& path, const System<D>& system, std::uint64_t frames)
-    : contents_(std::make_unique<Contents>(File::append(path), system)) {
-  contents_->cut(frames);
+TrajectoryWriter<D>::TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system,
+                                      std::optional<std::uint64_t> frames)
+    : contents_(std::make_unique<Contents>(frames ? File::append(path) : File::create(path), system)) {
+  if (frames)
+    contents_->cut(*frames);
+  else
+    contents_->create(deck, system);
 }
 
 template <int D>

@@ -5,18 +5,24 @@
 //   /particles/trajectory   position, velocity, image (value, step, time); id, species, mass, radius, charge; box
 //   /observables            kinetic_energy, …: one value a frame
 //   /parameters             deck, title, integrator, dimension, boundary, species
+//   /parameters/vmd_structure   what VMD's plugin (github.com/h5md/VMD-h5mdplugin) takes besides: of each species that
+//                           occurs indexOfSpecies, name, type, radius (the mean of its particles); bonds by the
+//                           numbers of their particles, which count from 1, as bond_from and bond_to
 //
 // Written so that MDAnalysis 2.4 can read it: three columns also in two dimensions (z = 0, a box edge of 1 and no
 // boundary along z; the true dimension and boundaries stand in /parameters), box edges at every frame, every `step` and
 // `time` explicit and shared by hard links, texts of fixed length, observables without subgroups. Units are reduced:
-// there are no `unit` attributes, so readers must be set not to convert. Positions are wrapped; unwrapped position =
-// position + image · edge. Every frame is flushed: it survives the end of the process (journal.h).
+// there are no `unit` attributes, so readers must be set not to convert; `output.units` names those of length and time.
+// Positions are wrapped; unwrapped position = position + image · edge. Every frame is flushed: it survives the end of
+// the process (journal.h).
 //
 // Where ranks have blocks of the particles (engine/ranks/id_blocks.h) rank 0 writes one after the other, as a piece of
 // the same row: it never has more than one of them. The others have a BlockSender each.
 
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "engine/ranks/id_blocks.h"
 #include "engine/run/simulation.h"
@@ -24,14 +30,18 @@
 
 namespace carom {
 
+namespace vmd_structure {
+inline const std::string group = "parameters/vmd_structure", bond_from = group + "/bond_from",
+                         bond_to = group + "/bond_to";
+}  // namespace vmd_structure
+
 template <int D>
 class TrajectoryWriter : public Observer<D> {
  public:
-  /// Creates the file. `system` is read for what does not change: box, masses, radii, charges, species; and for the
-  /// ranks. Throws Error(Failure::file).
-  TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system);
-  /// Opens the file of the same run again to go on behind its first so many frames. Throws Error(Failure::file).
-  TrajectoryWriter(const std::filesystem::path& path, const System<D>& system, std::uint64_t frames);
+  /// Creates the file, or opens that of the same run again to go on behind its first so many frames. `system` is read
+  /// for what does not change: box, masses, radii, charges, species; and for the ranks. Throws Error(Failure::file).
+  TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system,
+                   std::optional<std::uint64_t> frames = {});
   ~TrajectoryWriter() override;
 
   /// Appends a frame and flushes. Throws Error(Failure::file).

@@ -74,6 +74,10 @@ hid_t native_type<double>() {
   return H5T_NATIVE_DOUBLE;
 }
 template <>
+hid_t native_type<float>() {
+  return H5T_NATIVE_FLOAT;
+}
+template <>
 hid_t native_type<std::uint8_t>() {
   return H5T_NATIVE_UINT8;
 }
@@ -128,6 +132,15 @@ File File::open(const std::filesystem::path& path) {
   start_library();
   replay_journal(path);
   const hid_t id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  if (id < 0) throw Error(Failure::file, path.string() + ": cannot read it as an HDF5 file: " + reason());
+  return {path, id, false};
+}
+
+File File::open_unlocked(const std::filesystem::path& path) {
+  start_library();
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_file_locking(access.id(), 0, 1);
+  const hid_t id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id());
   if (id < 0) throw Error(Failure::file, path.string() + ": cannot read it as an HDF5 file: " + reason());
   return {path, id, false};
 }

@@ -66,6 +66,8 @@ class File {
   static File append(const std::filesystem::path& path);
   /// An existing file, to be read.
   static File open(const std::filesystem::path& path);
+  /// The same without locks, while another process may be writing it: through read_between_flushes (journal.h).
+  static File open_unlocked(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const { return path_; }
   hid_t id() const { return file_.id(); }
@@ -182,18 +184,28 @@ class Array : public ArrayBase {
   }
 };
 
-/// Reading, for `carom info`; throws Error(Failure::file) where the name is missing or of another kind.
+/// Reading; throws Error(Failure::file) where the name is missing, of another kind, or claims more than the file can
+/// hold.
 bool exists(const File& file, const std::string& path);
 std::vector<hsize_t> shape(const File& file, const std::string& dataset);
+std::vector<hsize_t> shape(const File& file, const std::string& dataset, std::size_t axes);
 /// Element `index` of a data set with one axis (of a scalar one: 0), as a double.
 double number_at(const File& file, const std::string& dataset, hsize_t index);
 /// Element [row][k][k] of a data set with three axes.
 double diagonal_at(const File& file, const std::string& dataset, hsize_t row, int k);
 std::string text(const File& file, const std::string& dataset);
+/// All numbers of a data set, the last axis fastest.
+template <class T>
+std::vector<T> numbers(const File& file, const std::string& dataset);
+/// So many rows of a data set, from `first` on, the last axis fastest.
+template <class T>
+std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first, hsize_t count);
 /// A data set as it is stored.
 std::vector<std::byte> bytes(const File& file, const std::string& dataset);
 std::vector<std::string> texts(const File& file, const std::string& dataset);
 std::vector<std::string> attribute_texts(const File& file, const std::string& object, const std::string& name);
-std::vector<std::int32_t> attribute_numbers(const File& file, const std::string& object, const std::string& name);
+/// So many numbers, or more.
+std::vector<std::int32_t> attribute_numbers(const File& file, const std::string& object, const std::string& name,
+                                            std::size_t count);
 
 }  // namespace carom::hdf5

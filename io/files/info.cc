@@ -32,23 +32,25 @@ std::string optional_text(const hdf5::File& file, const std::string& dataset) {
 
 std::string describe_trajectory(const hdf5::File& file) {
   const std::string particles = "/particles/trajectory";
-  const auto shape = hdf5::shape(file, particles + "/position/value");
-  const hsize_t frames = hdf5::shape(file, particles + "/position/step").at(0);
-  const int dimension = hdf5::exists(file, "/parameters/dimension")
-                            ? static_cast<int>(hdf5::number_at(file, "/parameters/dimension", 0))
-                            : static_cast<int>(shape.at(2));
+  const auto shape = hdf5::shape(file, particles + "/position/value", 3);
+  const hsize_t frames = hdf5::shape(file, particles + "/position/step", 1)[0];
+  const double axes = hdf5::exists(file, "/parameters/dimension") ? hdf5::number_at(file, "/parameters/dimension", 0)
+                                                                  : static_cast<double>(shape[2]);
+  if (!(axes >= 1 && axes <= 3))
+    throw Error(Failure::file, file.path().string() + fmt::format(": a trajectory in {:g} dimensions", axes));
+  const int dimension = static_cast<int>(axes);
   const auto boundary = hdf5::attribute_texts(file, particles + "/box", "boundary");
   std::vector<std::string> edges;
   if (frames > 0)
     for (int k = 0; k < dimension; ++k)
       edges.push_back(fmt::format("{:g}", hdf5::diagonal_at(file, particles + "/box/edges/value", frames - 1, k)));
-  const auto version = hdf5::attribute_numbers(file, "/h5md", "version");
-  return line("kind", fmt::format("H5MD {}.{} trajectory", version.at(0), version.at(1))) +
+  const auto version = hdf5::attribute_numbers(file, "/h5md", "version", 2);
+  return line("kind", fmt::format("H5MD {}.{} trajectory", version[0], version[1])) +
          line("written by", joined(hdf5::attribute_texts(file, "/h5md/creator", "name")) + " " +
                                 joined(hdf5::attribute_texts(file, "/h5md/creator", "version"))) +
          line("title", optional_text(file, "/parameters/title")) +
          line("integrator", optional_text(file, "/parameters/integrator")) +
-         line("dimension", std::to_string(dimension)) + line("particles", std::to_string(shape.at(1))) +
+         line("dimension", std::to_string(dimension)) + line("particles", std::to_string(shape[1])) +
          line("box", joined(edges)) +
          line("boundary", hdf5::exists(file, "/parameters/boundary") ? joined(hdf5::texts(file, "/parameters/boundary"))
                                                                      : joined(boundary)) +
@@ -57,13 +59,13 @@ std::string describe_trajectory(const hdf5::File& file) {
 }
 
 std::string describe_events(const hdf5::File& file) {
-  const hsize_t events = hdf5::shape(file, "/events/time").at(0);
-  const auto version = hdf5::attribute_numbers(file, "/events", "version");
-  return line("kind", fmt::format("events, format {}.{}", version.at(0), version.at(1))) +
+  const hsize_t events = hdf5::shape(file, "/events/time", 1)[0];
+  const auto version = hdf5::attribute_numbers(file, "/events", "version", 2);
+  return line("kind", fmt::format("events, format {}.{}", version[0], version[1])) +
          line("written by", joined(hdf5::attribute_texts(file, "/events", "creator"))) +
          line("title", optional_text(file, "/parameters/title")) +
          line("integrator", optional_text(file, "/parameters/integrator")) +
-         line("dimension", std::to_string(hdf5::attribute_numbers(file, "/events", "dimension").at(0))) +
+         line("dimension", std::to_string(hdf5::attribute_numbers(file, "/events", "dimension", 1)[0])) +
          line("collisions", std::to_string(events)) + line("times", range_of(file, "/events/time", events));
 }
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
@@ -13,6 +14,7 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -294,6 +296,40 @@ void replay_journal(const std::filesystem::path& path) {
       fail(std::string(std::strerror(errno)) + "; check free space and permissions there");
   }
   ::unlink(beside.c_str());
+}
+
+void read_between_flushes(const std::filesystem::path& path, const std::function<void()>& read) {
+  // The head of the journal changes with each flush, and begins with zeros but while there is one.
+  using Head = std::array<std::byte, kJournalHead>;
+  const auto head = [&] {
+    Head bytes{};
+    if (const Descriptor journal(::open(journal_of(path).c_str(), O_RDONLY | O_CLOEXEC)); journal.is_open())
+      static_cast<void>(read_up_to(journal.number(), bytes.data(), bytes.size(), 0));
+    return bytes;
+  };
+  const auto within_a_flush = [](const Head& bytes) { return bytes[0] != std::byte{0}; };
+  const auto last_try = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (true) {
+    const bool last = std::chrono::steady_clock::now() > last_try;
+    const Head before = head();
+    if (within_a_flush(before)) {
+      try {
+        replay_journal(path);
+      } catch (const Error&) {
+        if (last) throw;
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      }
+      continue;
+    }
+    try {
+      read();
+      if (head() == before) return;
+    } catch (const std::exception&) {
+      if (head() == before) throw;
+    }
+    if (last)
+      throw Error(Failure::file, path.string() + ": flushes come faster than it can be read; write fewer frames");
+  }
 }
 
 }  // namespace carom::hdf5

@@ -19,6 +19,7 @@
 #include <hdf5.h>
 
 #include <filesystem>
+#include <functional>
 
 namespace carom::hdf5 {
 
@@ -28,5 +29,11 @@ hid_t journal_driver();
 /// Writes what a complete journal beside the file holds to the file, and removes the journal. Throws
 /// Error(Failure::file) where a process is writing the file at this time, or the file cannot be changed.
 void replay_journal(const std::filesystem::path& file);
+
+/// Calls `read`, which opens the file, reads and closes it, until no flush has come between its begin and its end: what
+/// it then has read is the state of one flush, though another process is writing the file. Takes no lock, except to
+/// complete the flush of a process that was killed. Throws what `read` throws, or Error(Failure::file) where that takes
+/// longer than ten seconds.
+void read_between_flushes(const std::filesystem::path& file, const std::function<void()>& read);
 
 }  // namespace carom::hdf5

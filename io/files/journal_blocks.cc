@@ -1,6 +1,6 @@
 #include "io/files/journal_blocks.h"
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 #include <bit>
@@ -21,7 +21,20 @@ constexpr char kMagic[] = "CAROMJ01";
 
 std::uint64_t checksum(const Bytes& journal) {
   constexpr std::size_t kFrom = offsetof(Head, length);
-  return crc32_z(0, reinterpret_cast<const unsigned char*>(journal.data() + kFrom), journal.size() - kFrom);
+  return libdeflate_crc32(0, journal.data() + kFrom, journal.size() - kFrom);
+}
+
+/// Whether the last block ends where the journal does.
+bool blocks_fit(const Bytes& journal) {
+  std::size_t at = kJournalHead;
+  while (journal.size() - at >= sizeof(BlockHead)) {
+    BlockHead block;
+    std::memcpy(&block, journal.data() + at, sizeof block);
+    at += sizeof block;
+    if (block.length > journal.size() - at) return false;
+    at += block.length;
+  }
+  return at == journal.size();
 }
 
 /// Calls take(first, last) for the stretches of `data` that differ from as many others, in steps of a cache line.
@@ -103,7 +116,7 @@ std::optional<std::uint64_t> complete_journal(Bytes& bytes) {
       head.length > bytes.size())
     return {};
   bytes.resize(head.length);
-  if (checksum(bytes) != head.checksum) return {};
+  if (checksum(bytes) != head.checksum || !blocks_fit(bytes)) return {};
   return head.file_size;
 }
 

@@ -15,8 +15,7 @@ namespace carom {
 /// spdlog swallows what a sink throws; this one keeps it for RunLog to throw again.
 class RunLog::FileSink : public spdlog::sinks::base_sink<std::mutex> {
  public:
-  template <class... Size>
-  explicit FileSink(const std::filesystem::path& path, Size... size) : file_(path, size...) {}
+  FileSink(const std::filesystem::path& path, std::optional<std::uint64_t> size) : file_(path, size) {}
   std::uint64_t size() const { return file_.size(); }
   void rethrow_failure() {
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
@@ -39,12 +38,8 @@ class RunLog::FileSink : public spdlog::sinks::base_sink<std::mutex> {
   std::exception_ptr failure_;
 };
 
-RunLog::RunLog(const std::filesystem::path& path, bool quiet) : RunLog(std::make_shared<FileSink>(path), quiet) {}
-
-RunLog::RunLog(const std::filesystem::path& path, bool quiet, std::uint64_t size)
-    : RunLog(std::make_shared<FileSink>(path, size), quiet) {}
-
-RunLog::RunLog(std::shared_ptr<FileSink> sink, bool quiet) : sink_(std::move(sink)) {
+RunLog::RunLog(const std::filesystem::path& path, bool quiet, std::optional<std::uint64_t> size)
+    : sink_(std::make_shared<FileSink>(path, size)) {
   auto to_stdout = std::make_shared<spdlog::sinks::stdout_sink_mt>();
   auto to_stderr = std::make_shared<spdlog::sinks::stderr_sink_mt>();
   if (quiet) to_stdout->set_level(spdlog::level::off);

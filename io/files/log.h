@@ -9,16 +9,16 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 namespace carom {
 
 class RunLog {
  public:
-  /// Creates the file. `quiet`: nothing but warnings and errors goes to the terminal.
-  RunLog(const std::filesystem::path& path, bool quiet);
-  /// Opens it again to go on behind its first so many bytes.
-  RunLog(const std::filesystem::path& path, bool quiet, std::uint64_t size);
+  /// Creates the file, or opens it again to go on behind its first `size` bytes. `quiet`: nothing but warnings and
+  /// errors goes to the terminal.
+  RunLog(const std::filesystem::path& path, bool quiet, std::optional<std::uint64_t> size = {});
   ~RunLog();
 
   void note(std::string_view text);   ///< to the file
@@ -32,7 +32,6 @@ class RunLog {
 
  private:
   class FileSink;
-  RunLog(std::shared_ptr<FileSink> sink, bool quiet);
   void log(spdlog::logger& to, spdlog::level::level_enum level, std::string_view text);
 
   std::shared_ptr<FileSink> sink_;

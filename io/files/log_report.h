@@ -15,7 +15,7 @@ namespace carom {
 /// Version, libraries, host, deck and method of a run. `particles`: their number; `ranks`: of MPI.
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 
-/// What a run says of itself whose energy has lost its meaning, because of a step far too long; else nothing.
+/// The warning of a run with energy errors beyond the energy itself, from a step far too long; else nothing.
 std::optional<std::string> energy_warning(const Statistics& statistics);
 
 /// How the run ended, what it found and where the time of the ranks went: of several, least, mean and most.

@@ -8,20 +8,24 @@
 #include "io/files/output_directory.h"
 
 namespace carom {
+namespace {
+
+/// One of the marks, where there are any.
+template <class Mark>
+std::optional<Mark> mark_of(const std::optional<FileMarks>& marks, Mark FileMarks::*which) {
+  return marks ? std::optional(*marks.*which) : std::nullopt;
+}
+
+}  // namespace
 
 template <int D>
-RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const FileMarks* marks)
-    : trajectory_(marks == nullptr
-                      ? TrajectoryWriter<D>(deck.output.directory / run_file::trajectory, deck, system)
-                      : TrajectoryWriter<D>(deck.output.directory / run_file::trajectory, system, marks->frames)),
-      thermo_(marks == nullptr ? ThermoWriter<D>(deck.output.directory / run_file::thermo)
-                               : ThermoWriter<D>(deck.output.directory / run_file::thermo, marks->thermo_bytes)) {
-  const auto& chosen = deck.output.observables;
-  const std::filesystem::path events = deck.output.directory / run_file::events;
+RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const std::optional<FileMarks>& marks)
+    : trajectory_(deck.output.directory / run_file::trajectory, deck, system, mark_of(marks, &FileMarks::frames)),
+      thermo_(deck.output.directory / run_file::thermo, mark_of(marks, &FileMarks::thermo_bytes)) {
   if (deck.plan.events)
-    events_ = marks == nullptr ? std::make_unique<EventWriter<D>>(events, deck)
-                               : std::make_unique<EventWriter<D>>(events, marks->events);
-  for (const auto& [info, parameters] : chosen) {
+    events_ = std::make_unique<EventWriter<D>>(deck.output.directory / run_file::events, deck,
+                                               mark_of(marks, &FileMarks::events));
+  for (const auto& [info, parameters] : deck.output.observables) {
     const std::filesystem::path path = deck.output.directory / run_file::averages(*info);
     averages_.emplace_back(path, info->template in<D>().make(system, parameters, deck.output.sample_start));
   }

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "engine/run/simulation.h"
@@ -35,10 +36,9 @@ struct FileMarks {
 template <int D>
 class RunFiles {
  public:
-  /// Creates them in deck.output.directory. Throws Error(Failure::file).
-  RunFiles(const Deck& deck, const System<D>& system) : RunFiles(deck, system, nullptr) {}
-  /// Opens those of the same run again and cuts off what is behind the marks. Throws Error(Failure::file).
-  RunFiles(const Deck& deck, const System<D>& system, const FileMarks& marks) : RunFiles(deck, system, &marks) {}
+  /// Creates them in deck.output.directory, or opens those of the same run again and cuts off what is behind the marks.
+  /// Throws Error(Failure::file).
+  RunFiles(const Deck& deck, const System<D>& system, const std::optional<FileMarks>& marks = {});
 
   /// Writes what waits; the files then hold what has been shown to them, and survive the end of the process. Throws
   /// Error(Failure::file).
@@ -57,8 +57,6 @@ class RunFiles {
   std::vector<SpeciesValue> species_values() const;
 
  private:
-  RunFiles(const Deck& deck, const System<D>& system, const FileMarks* marks);
-
   TrajectoryWriter<D> trajectory_;
   ThermoWriter<D> thermo_;
   std::unique_ptr<EventWriter<D>> events_;  // null where the deck does not want it

@@ -56,6 +56,8 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"collisions_per_second", rate},
       {"peak_memory_bytes", std::max(outcome.peak_memory_bytes, peak_memory_bytes())},
   };
+  if (!outcome.branched_from.empty())
+    json["branched_from"] = {{"checkpoint", outcome.branched_from}, {"step", s.start_steps}, {"time", s.start_time}};
   for (const SpeciesValue& value : outcome.species_values)
     json[value.name].push_back({{"species", value.species}, {value.symbol, value.value}});
   json["warnings"] = outcome.warnings;

@@ -16,6 +16,7 @@ struct RunOutcome {
   std::string status;                   ///< "done", "interrupted" (on request; can be continued), "failed"
   std::string error{};                  ///< why it failed; empty otherwise
   std::vector<std::string> warnings{};  ///< of the deck and of the run
+  std::string branched_from{};          ///< the checkpoint that a branch started from; else empty
   std::size_t particles = 0;
   int ranks = 1;
   std::vector<SpeciesValue> species_values{};  ///< of the averages

@@ -13,21 +13,16 @@
 
 namespace carom {
 
-TextFile::TextFile(std::filesystem::path path)
-    : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+TextFile::TextFile(std::filesystem::path path, std::optional<std::uint64_t> size)
+    : path_(std::move(path)),
+      descriptor_(::open(path_.c_str(), O_WRONLY | O_CLOEXEC | (size ? 0 : O_CREAT | O_TRUNC), 0666)),
+      size_(size.value_or(0)) {
   if (descriptor_ < 0) fail(errno);
-}
-
-TextFile::TextFile(std::filesystem::path path, std::uint64_t size)
-    : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_WRONLY | O_CLOEXEC)), size_(size) {
-  if (descriptor_ < 0) fail(errno);
-  const off_t there = ::lseek(descriptor_, 0, SEEK_END);
-  if (there < static_cast<off_t>(size))
-    throw Error(Failure::file, path_.string() + ": has " + std::to_string(there) + " bytes of " + std::to_string(size) +
+  const off_t there = size ? ::lseek(descriptor_, 0, SEEK_END) : 0, end = static_cast<off_t>(size_);
+  if (there < end)
+    throw Error(Failure::file, path_.string() + ": has " + std::to_string(there) + " bytes of " + std::to_string(end) +
                                    ": it was cut or exchanged since that number was taken");
-  if (::ftruncate(descriptor_, static_cast<off_t>(size)) != 0 ||
-      ::lseek(descriptor_, static_cast<off_t>(size), SEEK_SET) < 0)
-    fail(errno);
+  if (size && (::ftruncate(descriptor_, end) != 0 || ::lseek(descriptor_, end, SEEK_SET) < 0)) fail(errno);
 }
 
 TextFile::~TextFile() {

@@ -6,16 +6,15 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
 namespace carom {
 
 class TextFile {
  public:
-  /// A new, empty file.
-  explicit TextFile(std::filesystem::path path);
-  /// One that is there, to go on behind its first `size` bytes.
-  TextFile(std::filesystem::path path, std::uint64_t size);
+  /// A new, empty file, or one that is there, to go on behind its first `size` bytes.
+  explicit TextFile(std::filesystem::path path, std::optional<std::uint64_t> size = {});
   ~TextFile();
   TextFile(const TextFile&) = delete;
   TextFile& operator=(const TextFile&) = delete;

@@ -7,7 +7,9 @@
 namespace carom {
 
 template <int D>
-ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path) : file_(path) {
+ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path, std::optional<std::uint64_t> size)
+    : file_(path, size) {
+  if (size) return;
   file_.append(
       std::string("time,step,collisions,kinetic,potential,total,shadow,max_energy_error,momentum_x,momentum_y") +
       (D == 3 ? ",momentum_z" : "") + ",temperature,pressure\n");

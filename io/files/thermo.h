@@ -6,6 +6,7 @@
 // method has no shadow energy.
 
 #include <filesystem>
+#include <optional>
 
 #include "engine/run/simulation.h"
 #include "io/files/text_file.h"
@@ -15,10 +16,9 @@ namespace carom {
 template <int D>
 class ThermoWriter : public Observer<D> {
  public:
-  /// Creates the file with its header. Throws Error(Failure::file).
-  explicit ThermoWriter(const std::filesystem::path& path);
-  /// Opens it again to go on behind its first so many bytes. Throws Error(Failure::file).
-  ThermoWriter(const std::filesystem::path& path, std::uint64_t size) : file_(path, size) {}
+  /// Creates the file with its header, or opens it again to go on behind its first so many bytes. Throws
+  /// Error(Failure::file).
+  explicit ThermoWriter(const std::filesystem::path& path, std::optional<std::uint64_t> size = {});
 
   /// Appends a row. Throws Error(Failure::file).
   void thermo(const Snapshot<D>& snapshot) override;

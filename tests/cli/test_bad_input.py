@@ -135,6 +135,9 @@ DECK_ERRORS = {
     "unknown boundary": (
         changed('["wall", "wall"]', '["wall", "periodical"]'),
         7, ["'boundary' cannot be 'periodical'", "did you mean 'periodic'?"]),
+    "box that is full": (
+        changed("box = [6.0, 6.0, 6.0]\n", "", changed('"fcc"', '"fcc"\npacking_fraction = 1', FLUID)),
+        15, ["'packing_fraction' must be below 1"]),
     "unknown order": (changed("step = 0.01", "step = 0.01\norder = 3"), 25, ["'order' cannot be '3'"]),
     "boundary for too few axes": (
         changed('["wall", "wall"]', '["wall"]'),
@@ -308,6 +311,7 @@ SET_ERRORS = {
     "unknown key": ("integrator.stp=1", "--set integrator.stp: error: unknown key 'stp' in [integrator]; did you mean 'step'?"),
     "negative radius by index": ("particles.0.radius=-1", "--set particles.0.radius: error: 'radius' must be positive"),
     "no such table": ("particles.3.radius=1", "--set particles.3.radius: error: there is no such table; "),
+    "no index in a list of several": ("interaction.stiffness=2", "--set interaction.stiffness: error: there is no such table; count the tables"),
     "no value": ("integrator.step", "--set integrator.step: error: no value; "),
     "malformed value": ("system.box=[1, 2", "--set system.box: error: cannot read the value"),
 }
@@ -316,7 +320,8 @@ SET_ERRORS = {
 @pytest.mark.parametrize("name", SET_ERRORS)
 def test_set_error(tmp_path, name):
     override, message = SET_ERRORS[name]
-    answer = validate(tmp_path, GOOD, "--set", override)
+    two_terms = GOOD.replace("[integrator]", '[[interaction]]\ntype = "harmonic-trap"\nstiffness = 1.0\n[integrator]')
+    answer = validate(tmp_path, two_terms, "--set", override)
     assert answer.stderr.startswith(message)
     assert answer.returncode == 2
 
@@ -328,13 +333,35 @@ def test_positions_file(tmp_path):
     (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n2.5 1 oops\n")
     answer = validate(tmp_path, deck)
     assert answer.returncode == 2
-    assert "places.csv:3:1: error: not a position; give 3 finite numbers" in answer.stderr
+    assert "places.csv:3:7: error: not a position: 'oops' is no finite number; give 3 finite numbers" in answer.stderr
     (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n")
     answer = validate(tmp_path, deck)
     assert answer.returncode == 2
     assert "1 positions for 2 particles" in answer.stderr
-    (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n2.5 1 +1  # on the floor\n")
-    assert validate(tmp_path, deck).returncode == 0
+    for good in (b"x,y,z\n1,1,1\n2.5 1 +1  # on the floor\n", b"x,y,z\r\n1,1,1\r\n2.5,1,1\r\n", b"\n# places\n\"x\" \"y\" \"z\"\n1;1;1\n2.5;1;1"):
+        (tmp_path / "places.csv").write_bytes(good)
+        assert validate(tmp_path, deck).returncode == 0
+
+
+@pytest.mark.parametrize("contents, words", [
+    (b"", "0 positions for 2 particles"),
+    (b"nan 1 1\n2 2 2\n", "places.csv:1:1: error: not a position: 'nan' is no finite number"),
+    (b"1 1 1\n2 -inf 2\n", "places.csv:2:3: error: not a position: '-inf' is no finite number"),
+    (b"1 1 1\n2 2 1e999\n", "places.csv:2:5: error: not a position: '1e999' is no finite number"),
+    (b"1 1 1.o\n2 2 2\n", "places.csv:1:5: error: not a position: '1.o' is no finite number"),
+    (b"x y z\nin nm\n1 1 1\n2 2 2\n", "places.csv:2:1: error: not a position: 'in' is no finite number"),
+    (b"1 1\n2 2\n", "places.csv:1:1: error: not a position: there are 2 numbers"),
+    (b"1 1 1 1\n2 2 2 2\n", "places.csv:1:1: error: not a position: there are 4 numbers"),
+    (b"1 1 1\n" + 1000000 * b"\x80\xff", "places.csv:2:1: error: not a position: '" + 20 * "?" + "…' is no finite number"),
+    (b"1 1 1\n" + 1000000 * b"1 ", "places.csv:2:1: error: not a position: there are 1000000 numbers"),
+    (b"1 1 1\n" + 100000 * b"2 2\n", "places.csv:11:1: error: not a position: there are 2 numbers"),
+], ids=[str(n) for n in range(11)])  # contents are too long for names
+def test_odd_positions_files(contents, words, tmp_path):
+    deck = changed('type = "fcc"', 'type = "file"\nfile = "places.csv"', FLUID).replace("count = 64", "count = 2")
+    (tmp_path / "places.csv").write_bytes(contents)
+    answer = validate(tmp_path, deck)
+    assert answer.returncode == 2 and words in answer.stderr, answer.stderr[:500]
+    assert len(answer.stderr) < 3000  # not one line for each of a file that is something else
 
 
 def test_potential_from_a_file(tmp_path):
@@ -344,7 +371,7 @@ def test_potential_from_a_file(tmp_path):
     (tmp_path / "potential.csv").write_text("r,V\n0.9,1\n1.2\n")
     answer = validate(tmp_path, deck)
     assert answer.returncode == 2
-    assert "potential.csv:3:1: error: not a point of a potential; give 2 finite numbers" in answer.stderr
+    assert "potential.csv:3:1: error: not a point of a potential: there is 1 number; give 2 finite numbers" in answer.stderr
     (tmp_path / "potential.csv").write_text("r,V\n0.9,1\n1.2,0.5\n1.2,0\n")
     answer = validate(tmp_path, deck)
     assert answer.returncode == 2
@@ -411,3 +438,4 @@ def test_inputs_without_end_and_other_than_text(tmp_path):
     assert (zero.returncode, zero.stderr) == (5, "/dev/zero: error: this is no text, it has zero bytes; check the path\n")
     places = changed('type = "fcc"', 'type = "file"\nfile = "/dev/zero"', FLUID)
     both(tmp_path, places, 5, "/dev/zero: error: this is no text")
+    both(tmp_path, changed("collisions = 10", "steps = 10", table('file = "/dev/zero"')), 5, "/dev/zero: error: this is no text")

@@ -3,27 +3,23 @@
 import os
 import pathlib
 import random
+import re
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 
 import pytest
 
+from going_on import INTERRUPTED, compare, expect_same, go_on, summary_differences, toml_text, wait_for_rows
 from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, in_mount, killer_library, mpi_environment, mpirun, needs_carom,
                   needs_compiler, needs_mount, run, summary, write_deck)
-
-sys.path.insert(0, str(ROOT / "tools"))
-from carom_files import toml_text
-from compare import compare, summary_differences
 
 pytestmark = needs_carom
 
 ALL_OUTPUT = ["output.events=true", "output.rdf_interval=0.07", "output.msd_interval=0.05", "output.profile_interval=0.11"]
 CHECKPOINTS = ["output.checkpoint_wall=\"0\""]  # as many as there are looks at the clock
-INTERRUPTED = 75
 
 
 def box(method, dimension, steps, **more):
@@ -44,37 +40,11 @@ def box(method, dimension, steps, **more):
         "output": {"directory": "unused", "frame_interval": 0.13, "thermo_interval": 0.06}})
 
 
-def go_on(output, arguments=(), code=0, ranks=1, environment=None):
-    """Continues the run of a directory."""
-    what = [CAROM, "run", "--continue", str(output), "--quiet", *arguments]
-    if ranks > 1:
-        return mpirun(ranks, what, code)
-    done = subprocess.run(what, capture_output=True, text=True, timeout=120, env=environment)
-    assert done.returncode == code, done.stderr
-    return done
-
-
 def on_ranks(ranks, deck, output, overrides):
     if ranks > 1:
         mpirun(ranks, command(deck, output, overrides))
     else:
         run(deck, output, overrides)
-
-
-def expect_same(whole, continued):
-    """All files of two runs, but what they say of the machine."""
-    assert compare(whole, continued) + summary_differences(whole, continued) == []
-    of_one = {path.name for path in whole.iterdir()}
-    assert of_one == {path.name for path in continued.iterdir()} - {"checkpoint.previous.h5"} | (of_one & {"checkpoint.previous.h5"})
-    for name in of_one:
-        if name.endswith(".csv"):
-            assert (whole / name).read_bytes() == (continued / name).read_bytes(), name
-
-
-def wait_for_rows(job, output, rows=4):
-    while not (output / "thermo.csv").exists() or (output / "thermo.csv").read_text().count("\n") <= rows:
-        assert job.poll() is None, job.stderr.read()
-        time.sleep(0.005)
 
 
 @pytest.fixture(scope="module")
@@ -103,10 +73,41 @@ def test_twice_half_a_run_is_a_whole_one(method, more, dimension, before, after,
     deck = write_deck(tmp_path, box(method, dimension, steps, **more))
     run(deck, tmp_path / "whole", ALL_OUTPUT)
     on_ranks(before, deck, tmp_path / "halves", [*ALL_OUTPUT, f"run.steps={steps // 2}"])
+    half = summary(tmp_path / "halves")
     go_on(tmp_path / "halves", ["--set", f"run.steps={steps}"], ranks=after)
     expect_same(tmp_path / "whole", tmp_path / "halves")
+    assert summary(tmp_path / "halves")["deck"] == half["deck"] == str(deck)
+    assert (tmp_path / "halves" / "run.log").read_text().count("max |ΔE|") == 1  # the head of the table
     assert (tmp_path / "whole" / "deck.toml").read_text().replace(str(tmp_path / "whole"), str(tmp_path / "halves")) == (
         tmp_path / "halves" / "deck.toml").read_text()
+
+
+def test_the_time_of_both_parts_counts(tmp_path):
+    deck = write_deck(tmp_path, box("psa", 3, 200))
+    run(deck, tmp_path / "parts", ["run.steps=199"])
+    first = summary(tmp_path / "parts")
+    go_on(tmp_path / "parts", ["--set", "run.steps=200"])
+    assert summary(tmp_path / "parts")["wall_seconds"] > 0.5 * first["wall_seconds"]
+
+
+def test_warnings_and_the_last_collision_are_kept(tmp_path):
+    """Of a stiff spring; and of spheres that fly apart, which ends the run so long after they have met."""
+    stiff = write_deck(tmp_path, SPRINGS.replace("stiffness = 1.0", "stiffness = 1e4"))
+    run(stiff, tmp_path / "whole", ["run.steps=20"])
+    run(stiff, tmp_path / "halves", ["run.steps=10"])
+    go_on(tmp_path / "halves", ["--set", "run.steps=20"])
+    expect_same(tmp_path / "whole", tmp_path / "halves")
+    assert "is long for the shortest period" in summary(tmp_path / "halves")["warnings"][0]
+    apart, out = write_deck(tmp_path, toml_text({
+        "format": 1, "system": {"dimension": 2, "box": [60.0, 12.0], "boundary": ["open", "wall"]},
+        "particles": [{"name": "disc", "radius": 0.5, "position": [[20.0, 2.0], [40.0, 2.0], [50.0, 8.0]],
+                       "velocity": [[0.005, 0.0], [-0.005, 0.0], [10.0, 0.0]]}],
+        "integrator": {"type": "free-flight", "step": 100.0}, "run": {"collisions": 1000}, "output": {"directory": "unused"}})), tmp_path / "apart"
+    assert "no two spheres have met for" in run(apart, out, CHECKPOINTS, code=4).stderr
+    steps = summary(out)["steps"]
+    go_on(out, code=4)
+    assert summary(out)["steps"] == steps
+    assert int(re.search(r"continued at step (\d+)", (out / "run.log").read_text())[1]) > 20  # they have met in step 19
 
 
 @pytest.mark.parametrize("end", ["run.end_time", "run.collisions"])
@@ -342,7 +343,7 @@ def test_the_other_slot(tmp_path):
     good = last.read_bytes()
     damage = {"its checksum is not that of its contents": good[:5000] + bytes([good[5000] ^ 1]) + good[5001:],
               "damaged or cut off": good[: len(good) // 2],
-              "written by a newer carom": good.replace(b"carom checkpoint 1", b"carom checkpoint 7", 1),
+              "written by a newer carom": good.replace(b"carom checkpoint 2", b"carom checkpoint 7", 1),
               "not a checkpoint of carom": b"something else"}
     for words, contents in damage.items():
         trial = tmp_path / "trial"

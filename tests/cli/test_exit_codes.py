@@ -1,11 +1,13 @@
 """Trouble at run time: exit code, message, and what is left to read."""
 
 import os
+import shutil
 import subprocess
+import time
 
 import pytest
 
-from runs import (SPHERES, SPRINGS, command, data_sets, frames_are_sound, in_mount, needs_carom, needs_mount, run, same,
+from runs import (MPIRUN, SPHERES, SPRINGS, command, data_sets, frames_are_sound, in_mount, mpi_environment, needs_carom, needs_mount, run, same,
                   summary, thermo, write_deck)
 
 pytestmark = needs_carom
@@ -169,3 +171,23 @@ collisions = 1000
     done = run(deck, tmp_path / "out", code=4)
     assert "no two spheres have met" in done.stderr and "run.end_time" in done.stderr
     assert summary(tmp_path / "out")["events"]["sphere_sphere"] == 1
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("checkpoints", ["\"0.05\"", "\"\""])
+def test_a_directory_that_is_removed(checkpoints, ranks, tmp_path):
+    """While the run is at work, also before its first checkpoint."""
+    deck, out = write_deck(tmp_path, SPHERES), tmp_path / "out"
+    launcher = [*MPIRUN, str(ranks)] if ranks > 1 else []
+    overrides = ["particles.0.count=4000", "run.end_time=20.0", f"output.checkpoint_wall={checkpoints}", "output.events=true"]
+    job = subprocess.Popen(launcher + command(deck, out, overrides), env=mpi_environment(), stderr=subprocess.PIPE, text=True)
+    wanted = "checkpoint.h5" if checkpoints != "\"\"" else "thermo.csv"
+    while not (out / wanted).exists():
+        assert job.poll() is None, job.stderr.read()
+        time.sleep(0.01)
+    while out.exists():
+        shutil.rmtree(out, ignore_errors=True)  # files may come meanwhile
+    error = job.communicate(timeout=60)[1]
+    assert job.returncode == 5, error
+    assert str(out) in error and "No such file or directory" in error
+    assert not out.exists()

@@ -1,5 +1,6 @@
 """`carom run`: the files it leaves, that observing changes nothing, early stops and kills."""
 
+import csv
 import os
 import pty
 import random
@@ -95,6 +96,15 @@ radius = 0.3
     assert (out / "backup.1" / "rdf.csv").exists() and not (out / "rdf.csv").exists()
 
 
+def test_names_with_commas_and_quotes(tmp_path):
+    names = ["a, b", 'say "c"']
+    two = SPHERES.replace('name = "sphere"\ncount = 108', "name = 'say \"c\"'\ncount = 54")
+    two = two.replace("[[particles]]", '[[particles]]\nname = "a, b"\ncount = 54\ntemperature = 1.0\nradius = 0.5\n[[particles]]')
+    run(write_deck(tmp_path, two), tmp_path / "out", ["run.end_time=0.2", "output.rdf_interval=0.1"])
+    with open(tmp_path / "out" / "rdf.csv", newline="") as file:
+        assert next(csv.reader(file)) == ["r", "g", *(f"g_{a}_{b}" for a, b in ((names[0], names[0]), (names[0], names[1]), (names[1], names[1])))]
+
+
 def test_profile(tmp_path):
     out = tmp_path / "out"
     run(write_deck(tmp_path, SPHERES), out, ["output.profile_interval=0.1", "output.profile_bins=6", "output.profile_axis=2"])
@@ -105,6 +115,14 @@ def test_profile(tmp_path):
     assert profile["density"].mean() == pytest.approx(108 / np.prod(edges))
     # 2K/(D N) of all, which free flight keeps
     assert np.average(profile["temperature"], weights=profile["density"]) == pytest.approx(1)
+
+
+def test_without_a_seed_it_is_1(tmp_path):
+    assert "| `seed` | non-negative integer |  | `1` |" in subprocess.run([CAROM, "schema", "--markdown"], capture_output=True, text=True).stdout
+    for name, seed in (("none", ""), ("one", "seed = 1\n"), ("two", "seed = 2\n")):
+        run(write_deck(tmp_path, SPHERES.replace("seed = 7\n", seed)), tmp_path / name, ["run.end_time=0.1"])
+    none, one, two = (last_records(tmp_path / name) for name in ("none", "one", "two"))
+    assert same(none, one) and not same(one, two)
 
 
 @pytest.mark.parametrize("text", [SPRINGS, SPHERES], ids=["springs", "spheres"])
@@ -144,7 +162,7 @@ def test_observing_changes_nothing(method, tmp_path):
 @pytest.mark.parametrize("text", [SPRINGS, SPHERES], ids=["springs", "spheres"])
 def test_events_are_exact(text, tmp_path):
     deck, out = write_deck(tmp_path, text), tmp_path / "out"
-    run(deck, out, ["output.events=true"])
+    run(deck, out, ["output.events=true"] + (["system.box=[9.0, 3.6]"] if text is SPRINGS else []))
     events = {name.removeprefix("events/"): value for name, value in data_sets(out / "events.h5").items()
               if name.startswith("events/")}
     s, pairs = summary(out)["events"], events["kind"] == 0
@@ -154,6 +172,7 @@ def test_events_are_exact(text, tmp_path):
     assert (events["lo"][pairs] < events["hi"][pairs]).all()
     gap = np.linalg.norm(events["x_lo"] - events["x_hi"], axis=1) - np.where(pairs, 1.0, 0.5)
     assert np.abs(gap).max() <= 1e-12
+    assert text is SPHERES or {2, 3} <= set(events["hi"][~pairs])  # the walls of the short axis
     if text is SPHERES:  # nothing but collisions changes a velocity: the impulses add up to the change
         with h5py.File(out / "trajectory.h5md") as file:
             v = file["particles/trajectory/velocity/value"][()]

@@ -239,11 +239,12 @@ def test_g_of_r_finds_a_lattice(tmp_path):
 def test_msd_of_straight_flight(tmp_path):
     run = make_run(tmp_path / "run", dimension=3, frames=30)
     with Trajectory(run) as trajectory:
-        lag, msd = plot_msd.mean_squared_displacement(trajectory)
+        lag, windows, msd, of_blocks = plot_msd.mean_squared_displacement(trajectory)
         v2 = np.mean(np.sum(trajectory.velocity(0) ** 2, axis=1))
     assert len(lag) == 15
     assert msd == pytest.approx(v2 * lag**2)
-    assert plot_msd.diffusion_coefficient(lag, 6 * lag, 3) == pytest.approx(1.0)
+    assert of_blocks.shape == (4, 15) and of_blocks[0] == pytest.approx(msd)
+    assert plot_msd.diffusion_coefficient(lag, windows, 6 * lag, 3) == pytest.approx(1.0)
 
 
 def test_tables_of_a_run_are_drawn(tmp_path, capsys):

@@ -8,9 +8,12 @@ A case is a deck in decks/ and a file of the same name in results/ that holds
   platform   compiler and architecture of the stored run;
   sha256     of the final positions, then velocities, in the order of ids, as little-endian doubles;
   values     counts of events, energies, the largest energy error;
+  summary    all that summary.json says of the run, not of the machine;
+  thermo     the last row of thermo.csv;
   state      the final positions and velocities.
-On the stored platform the hash decides. Elsewhere, where another compiler may round otherwise, counts must agree and all
-else within a tolerance; the decks are short enough for chaos not to blow rounding up to it.
+On the stored platform the hash decides, and summary and thermo are equal. Elsewhere, where another compiler may round
+otherwise, counts must agree and all else within a tolerance, but for what rounding alone decides (ROUNDED); the decks are
+short enough for chaos not to blow rounding up to it.
 """
 
 import argparse
@@ -28,11 +31,14 @@ import numpy as np
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1] / "tools"))
 
-from carom_files import Trajectory, find_carom, run_carom
+from carom_files import Trajectory, find_carom, read_thermo, run_carom
+from compare import OF_THE_MACHINE
 
 STATE_TOLERANCE = 1e-8  # absolute, of positions, velocities and the end time; changes of 1e-15 in the start come to 3e-11
 ENERGY_TOLERANCE = 1e-8  # relative to E_ref
 ROUNDING = 1e-12  # energy errors below this, relative to E_ref, count as equal
+MEAN_TOLERANCE = 1e-8  # relative, or absolute below 1, of pressures, rates and the like
+ROUNDED = re.compile("max_overlap|_error$|folded|force_passes|sweeps|pieces|slabs_halved|frozen|fallbacks|momentum")
 
 
 def this_platform(carom):
@@ -44,10 +50,23 @@ def this_platform(carom):
     return f"{compiler.group()}, {platform.machine()}"
 
 
+def flat(entries, prefix=""):
+    """Nested dictionaries as one, with names like energy.final."""
+    found = {}
+    for name, value in entries.items():
+        found |= flat(value, f"{prefix}{name}.") if isinstance(value, dict) else {prefix + name: value}
+    return found
+
+
+def number_or_null(value):
+    return None if np.isnan(value) else float(value)
+
+
 def run_case(carom, name):
     """Runs a case and returns what its results file should hold."""
     with tempfile.TemporaryDirectory() as directory:
         summary = run_carom(carom, HERE / "decks" / f"{name}.toml", directory)
+        thermo = {name: number_or_null(column[-1]) for name, column in read_thermo(directory).items()}
         with Trajectory(directory) as trajectory:
             x, v = trajectory.position(-1), trajectory.velocity(-1)
     raw = x.astype("<f8").tobytes() + v.astype("<f8").tobytes()
@@ -61,6 +80,8 @@ def run_case(carom, name):
             "energy_final": energy["final"], "energy_reference": energy["reference"],
             "energy_error": energy["max_abs_error"], "shadow_energy_error": summary["shadow_energy"]["max_abs_error"],
         },
+        "summary": flat({name: value for name, value in summary.items() if name not in OF_THE_MACHINE}),
+        "thermo": thermo,
         "state": {"x": x.tolist(), "v": v.tolist()},
     }
 
@@ -85,9 +106,25 @@ def value_differences(stored, new):
     return lines
 
 
+def account_differences(stored, new, exact):
+    """One line for each stored entry of a summary or a row that changed: at all, or by more than rounding can do."""
+    lines = [f"{name}: is no more" for name in sorted(stored.keys() - new.keys())]
+    for name in sorted(stored.keys() & new.keys()):
+        old, value = stored[name], new[name]
+        same = old == value
+        if not exact and not same:
+            same = bool(ROUNDED.search(name)) or (isinstance(old, float) and isinstance(value, float)
+                                                  and abs(old - value) <= MEAN_TOLERANCE * max(1, abs(old)))
+        if not same:
+            lines.append(f"{name}: stored {old}, now {value}")
+    return lines
+
+
 def differences(stored, new):
     """What a check objects to, one line each."""
     lines = value_differences(stored["values"], new["values"])
+    for part in ("summary", "thermo"):
+        lines += account_differences(stored.get(part, {}), new[part], stored["platform"] == new["platform"])
     for part in ("x", "v"):
         old, value = np.array(stored["state"][part]), np.array(new["state"][part])
         if old.shape != value.shape:

@@ -14,6 +14,8 @@ STORED = {
     "platform": "g++ 12.2.0, x86_64", "sha256": "ab",
     "values": {"steps": 10, "end_time": 1.0, "sphere_sphere": 3, "energy_final": 2.0, "energy_reference": 2.0,
                "energy_error": 1e-3, "shadow_energy_error": None},
+    "summary": {"pressure": 0.5, "sweeps": 7, "momentum.max_abs_error": None, "status": "done"},
+    "thermo": {"temperature": 1.5, "shadow": None},
     "state": {"x": [[0.0, 1.0], [2.0, 3.0]], "v": [[0.5, 0.5], [0.1, 0.2]]},
 }
 
@@ -25,7 +27,7 @@ def changed(**changes):
         if name == "x":
             new["state"]["x"][1][0] += value
         else:
-            (new if name in new else new["values"])[name] = value
+            next(part for part in (new, new["values"], new["summary"], new["thermo"]) if name in part)[name] = value
     return new
 
 
@@ -35,14 +37,24 @@ def test_the_same_is_the_same():
 
 @pytest.mark.parametrize("deviation", [
     {"sha256": "cd"}, {"x": 1e-7}, {"steps": 11}, {"sphere_sphere": 4}, {"end_time": 1.0 + 1e-7},
-    {"energy_final": 2.0 + 1e-7}, {"energy_error": 1.01e-3}, {"shadow_energy_error": 1e-3}])
+    {"energy_final": 2.0 + 1e-7}, {"energy_error": 1.01e-3}, {"shadow_energy_error": 1e-3},
+    {"pressure": 0.5 + 1e-15}, {"sweeps": 8}, {"momentum.max_abs_error": 0.0}, {"status": "failed"}, {"temperature": 1.6}, {"shadow": 1.0}])
 def test_a_deviation_is_noticed(deviation):
     assert len(regression.differences(STORED, changed(**deviation))) == 1
 
 
-def test_another_platform_may_round_otherwise():
-    new = changed(platform="clang 19, aarch64", sha256="cd", x=1e-12, end_time=1.0 + 1e-12, energy_error=1.0000001e-3)
+def test_a_new_entry_is_no_deviation_but_a_lost_one_is():
+    new = changed()
+    new["summary"]["colour"] = 1
     assert regression.differences(STORED, new) == []
+    assert regression.differences(new, STORED) == ["colour: is no more"]
+
+
+def test_another_platform_may_round_otherwise():
+    new = changed(platform="clang 19, aarch64", sha256="cd", x=1e-12, end_time=1.0 + 1e-12, energy_error=1.0000001e-3,
+                  pressure=0.5 + 1e-15, sweeps=8)
+    assert regression.differences(STORED, new) == []
+    assert len(regression.differences(STORED, changed(platform="clang 19, aarch64", pressure=0.5001, status="failed"))) == 2
     assert regression.differences(STORED, changed(platform="clang 19, aarch64", sha256="cd", x=1e-7)) != []
 
 

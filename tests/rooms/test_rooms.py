@@ -18,7 +18,8 @@ engine/carom.h engine/examples
 parallel
 io/deck
 io/files
-io/command
+io/view
+io/command io/python
 """
 FLOOR = {room: n for n, line in enumerate(FLOORS.split("\n")) for room in line.split()}
 

@@ -169,7 +169,7 @@ class PairTerm final : public Interaction<D> {
     return own;
   }
 
-  /// Names the pair of the batch with the largest force, or one that is no number.
+  /// Names the pair of the batch with the largest force, or one that is NaN.
   [[noreturn]] void refuse() const {
     unsigned worst = 0;
     double largest = -1, apart = 0;

@@ -55,7 +55,7 @@ inline double smallest(Double<W> x) {
 constexpr unsigned kBlock = 64;  // candidates per block: their times are kept until the first is known
 
 /// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: never, if it
-/// is infinite or no number; −infinite where the two overlap and approach. Returns the least in each lane.
+/// is infinite or NaN; −infinite where the two overlap and approach. Returns the least in each lane.
 template <int D, int W, bool latest, bool plain>
 inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting& s, std::uint32_t self,
                                                               const std::uint32_t* candidates, unsigned n,
@@ -117,7 +117,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       const V discriminant = v_squared * sigma * sigma - cross;
       time = now + c / (elementary::sqrt(discriminant) - b);
       const IntegerOf<V> parting = b >= 0.0;
-      time = (V)((IntegerOf<V>)time | parting | (discriminant <= 0.0));  // all bits set: no number
+      time = (V)((IntegerOf<V>)time | parting | (discriminant <= 0.0));  // all bits set: NaN
       time = (c <= 0.0) & ~parting ? all<V>(-kNever) : time;
     } else {
       if (s.radius)

@@ -63,7 +63,9 @@ struct Scene {
 struct Leave {
   int at = std::numeric_limits<int>::max();
   bool within_epochs = false;
-  bool at_last = false;  ///< where the state is the last on the way of a longer run
+  bool at_last = false;  ///< to its end, with the state that is the last on the way of a longer run
+  int within_step = std::numeric_limits<int>::max();  ///< at the n-th look from within steps
+  int alone = std::numeric_limits<int>::max();        ///< at the n-th look of the last rank for itself
 };
 
 template <int D>
@@ -71,6 +73,7 @@ struct Outcome {
   std::vector<double> values, events, averages;
   Statistics statistics;
   State state;
+  int looks = 0, looks_alone = 0;  ///< of the last rank
 };
 
 template <int D>
@@ -91,17 +94,27 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
       averages.push_back(make_observable<D>(info.name, simulation->system(), {{"interval", 1.5 * plan.step}}));
       simulation->add(*averages.back());
     }
-    int asked = 0;
+    int asked = 0, looks = 0, looks_alone = 0;
+    bool left = false, left_here = false;
     const auto stop = [&] {
-      const bool now = asked++ == leave.at || (leave.at_last && simulation->is_last_on_the_way());
-      if (now)
-        save_state(state_of, {[&](const Fields::Field& field, const Bytes& bytes) { out.state[field.name] = bytes; },
-                              [&](const std::string& name, const Bytes& bytes) { out.state[name] = bytes; }});
-      return now;
+      const bool now = asked++ == leave.at || left || (leave.at_last && simulation->is_last_on_the_way());
+      if (now) save_state(state_of, into(out.state));
+      return now && !leave.at_last;
     };
     simulation->run({.should_stop = stop,
-                     .pause = leave.within_epochs ? std::function<bool()>([] { return true; }) : nullptr,
+                     .pause =
+                         [&] {
+                           left = left || state_of.decomposition.any(left_here);
+                           return leave.within_epochs;
+                         },
+                     .leave = [&] { return left = looks++ == leave.within_step; },
+                     .leave_here =
+                         [&] {
+                           const bool last = exchange.rank() == exchange.size() - 1;
+                           return left_here = last && looks_alone++ == leave.alone;
+                         },
                      .restore = from ? [&] { restore_state(state_of, read); } : std::function<void()>()});
+    if (exchange.rank() == exchange.size() - 1) out.looks = looks, out.looks_alone = looks_alone;
     if (!first) return;
     out.values = std::move(account.values);
     out.events = std::move(account.events);
@@ -193,6 +206,38 @@ Scene<3> fluid() {
 TEST(Continue, FreeFlightBetweenEpochs) { compare<3>(fluid(), kRanks, {1, 3}); }
 TEST(Continue, FreeFlightWithinEpochs) { compare<3>(fluid(), kRanks, {1, 3, 5}, true); }
 
+/// Left at one look after the other of those from within its steps: it goes on from the step's start.
+template <int D>
+void compare_within_steps(const Scene<D>& scene, std::vector<std::array<int, 2>> ranks, int leaves) {
+  SCOPED_TRACE(scene.method);
+  const Outcome<D> whole = run<D>(scene, 0, scene.plan, {});
+  ASSERT_GT(whole.looks, 2 * leaves);
+  for (const auto& [before, after] : ranks)
+    for (int n = 1; n <= leaves; ++n) {
+      const int at = n * whole.looks / (leaves + 1);
+      SCOPED_TRACE(testing::Message() << "left at look " << at << " on " << before << " ranks, taken up by " << after);
+      const Outcome<D> begun = run<D>(scene, before, scene.plan, {.within_step = at});
+      ASSERT_TRUE(begun.statistics.stopped_early);
+      expect_continued(whole, run<D>(scene, after, scene.plan, {}, &begun.state));
+      if (::testing::Test::HasFailure()) return;
+    }
+}
+TEST(Continue, WithinStepsThatAreCut) {
+  for (const auto& [method, given] : std::vector<std::pair<std::string, Given>>{
+           {"cva", {}}, {"mcva", {}}, {"mcva", {{"variant", "restart"}}}, {"cdda", {}}, {"edda", {}}})
+    compare_within_steps<2>(springs(method, given), {{0, 0}, {2, 3}}, 3);
+}
+/// One rank leaves a flight of many contacts, and all leave the step.
+TEST(Continue, WithinAFlight) {
+  const Scene<3> scene{[] { return test::hard_spheres<3>(6, 0.3); }, "psa", plan_of(0.3, 2)};
+  const Outcome<3> whole = run<3>(scene, 0, scene.plan, {});
+  for (const int ranks : {0, 2}) {
+    const Outcome<3> begun = run<3>(scene, ranks, scene.plan, {.alone = ranks == 0 ? whole.looks_alone - 1 : 0});
+    ASSERT_TRUE(begun.statistics.stopped_early);
+    expect_continued(whole, run<3>(scene, 2 - ranks, scene.plan, {}, &begun.state));
+  }
+}
+
 /// A run with a later end goes on as if it had had that end from the start.
 TEST(Continue, ALaterEnd) {
   std::vector<std::pair<Scene<3>, std::array<Plan, 2>>> cases;
@@ -208,6 +253,9 @@ TEST(Continue, ALaterEnd) {
     cases.push_back({scene, ends(scene.plan, [](Plan& p, bool short_) { p.steps = short_ ? 2 : 5; })});
     cases.push_back(
         {scene, ends(scene.plan, [](Plan& p, bool short_) { p.end_time = (short_ ? 2.5 : 5.1) * p.step; })});
+    EXPECT_NE(3 * scene.plan.step - 2 * scene.plan.step, scene.plan.step);  // the last slab is no step, by rounding
+    cases.push_back(
+        {scene, ends(scene.plan, [](Plan& p, bool short_) { p.end_time = (short_ ? 3.0 : 5.1) * p.step; })});
   }
   cases.push_back({fluid(), ends(fluid().plan, [](Plan& p, bool short_) { p.collisions = short_ ? 500 : 1500; })});
   for (const auto& [scene, plans] : cases)

@@ -262,6 +262,51 @@ TEST(Decomposition, StepsThatTakeAllParticles) {
 TEST(Decomposition, WithoutCores) {
   for (const auto& scene : {yukawa(0.1), yukawa(0.3)}) compare<3>(scene, "verlet", 0.01, 150, 0);
 }
+/// What a run of free discs ends with on every one of so many ranks; 0: alone.
+std::string failure_of(const System<2>& start, const IntegratorInfo& info, const Given& given, int ranks) {
+  std::vector<std::string> all(static_cast<std::size_t>(std::max(ranks, 1)));
+  test::ThreadRanks(std::max(ranks, 1)).run([&](Communicator& exchange) {
+    auto system = std::make_unique<System<2>>();
+    system->box = start.box;
+    system->particles = start.particles;
+    if (ranks > 0) system->decomposition.join(exchange);
+    try {
+      Simulation<2>(std::move(system), info, given, {.steps = 1}).run();
+    } catch (const Error& e) {
+      all[static_cast<std::size_t>(exchange.rank())] = e.what();
+    }
+  });
+  for (const std::string& each : all) EXPECT_EQ(each, all[0]);
+  return all[0];
+}
+TEST(Decomposition, TheOutermostSphereIsNamedByItsId) {
+  auto system = test::hard_spheres<2>(4, 0.3);
+  system->box.boundary = {Boundary::wall, Boundary::periodic};
+  for (Vec<2>& x : system->particles.x) x[0] = std::clamp(x[0], 0.5, system->box.edges[0] - 0.5);
+  const Id last = static_cast<Id>(system->size()) - 2;
+  system->particles.x[3][0] = 0.4;
+  system->particles.x[last][0] = 0.2;
+  for (const int ranks : {0, 2, 3}) {
+    const std::string message = failure_of(*system, find_integrator("free-flight"), {{"step", 1.0}}, ranks);
+    EXPECT_TRUE(message.starts_with("particle " + std::to_string(last) + " is not inside the walls of axis 0"))
+        << message;
+  }
+}
+/// Two discs fly into each other, as no method has them do; between them lies the narrow subdomain of three others.
+TEST(Decomposition, TheDeepestOverlapIsFoundAcrossRanks) {
+  const Vec<2> rest = {0, 0};
+  const auto system =
+      test::make_system<2>({60, 12}, Boundary::periodic,
+                           {{8, 1}, {10, 1}, {14.3, 1}, {15, 3}, {15, 6}, {15, 9}, {15.7, 1}, {20, 1}, {22, 1}},
+                           {rest, rest, {0.25, 0}, rest, rest, rest, {-0.25, 0}, rest, rest});
+  IntegratorInfo info = find_integrator("verlet");
+  info.hard_cores = true, info.smooth_forces = false;
+  for (const int ranks : {0, 1, 2, 3, 4}) {
+    const std::string message = failure_of(*system, info, {{"step", 1.0}}, ranks);
+    EXPECT_TRUE(message.starts_with("particles 2 and 6 overlap, by 0.1 of their contact distance"))
+        << ranks << ": " << message;
+  }
+}
 /// Discs joined to their neighbours by springs so stiff that sweeps are accelerated.
 Scene<2> stiff(int cells, double packing_fraction) {
   return [=] {

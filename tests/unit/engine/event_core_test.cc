@@ -123,6 +123,11 @@ void expect_same_events(const System<D>& system, const Vec<D>& g, double end, st
     EXPECT_EQ(key.kind, obvious[k].kind) << "event " << k;
     EXPECT_EQ(key.lo, obvious[k].lo) << "event " << k;
     EXPECT_EQ(key.hi, obvious[k].hi) << "event " << k;
+    if (key.kind != EventKind::wall) continue;
+    Vec<D> foot = contacts[k].x_lo;
+    const int axis = wall_axis(key.hi);
+    foot[axis] = key.hi % 2 == 0 ? 0 : system.box.edges[axis] + system.box.edge_velocity[axis] * key.time;
+    EXPECT_EQ(contacts[k].x_hi, foot) << "event " << k;
   }
 }
 
@@ -135,6 +140,15 @@ TEST(EventCore, FindsTheEventsThatTryingEverythingFinds) {
   expect_same_events<2>(*random_spheres<2>(9, 4, {O, P}, 4), Vec<2>::Zero(), 6, 3);
   expect_same_events<3>(*random_spheres<3>(10, 2.6, {P, P, P}, 5), Vec<3>::Zero(), 4, 20);
   expect_same_events<3>(*random_spheres<3>(10, 3, {P, W, P}, 6), Vec<3>::Zero(), 4, 20);
+  const auto oblong = random_spheres<2>(9, 4, {W, W}, 3);
+  oblong->box.edges = {4, 4.5};
+  expect_same_events<2>(*oblong, Vec<2>::Zero(), 6, 20);
+}
+
+TEST(EventCore, FindsThemForEqualMassesOfAnySize) {
+  const auto system = random_spheres<2>(8, 4, {W, P}, 2);
+  system->particles.mass.assign(8, 2.5);
+  expect_same_events<2>(*system, Vec<2>::Zero(), 6, 20);
 }
 
 TEST(EventCore, FindsThemInAUniformField) {

@@ -100,6 +100,11 @@ TEST(ExactSum, RoundsHalfwayCasesToEven) {
 TEST(ExactSum, IsNotANumberWhenATermIsNot) {
   EXPECT_TRUE(std::isnan(sum_of({1.0, std::numeric_limits<double>::infinity()})));
   EXPECT_TRUE(std::isnan(sum_of({std::nan(""), 1.0})));
+  ExactSum part, all;
+  part.add(std::nan(""));
+  all.add(1.0);
+  all.add(part);
+  EXPECT_TRUE(std::isnan(all.value()));
 }
 
 }  // namespace

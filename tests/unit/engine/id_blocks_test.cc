@@ -129,7 +129,7 @@ TEST(IdBlocks, OverlapsAreFound) {
     return std::string();
   };
   const std::string alone = refused(nullptr);
-  EXPECT_NE(alone.find("spheres overlap, by 0.01"), std::string::npos) << alone;
+  EXPECT_NE(alone.find("particles 0 and 1 overlap, by 0.01"), std::string::npos) << alone;
   for (const int ranks : {2, 3, 5})
     test::ThreadRanks(ranks).run([&](Communicator& each) { EXPECT_EQ(refused(&each), alone); });
 }

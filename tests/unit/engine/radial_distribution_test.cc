@@ -87,6 +87,18 @@ TEST(RadialDistribution, CountsWhatBruteForceCounts) {
   expect_brute_force<2>({3.0, 4.0}, {kWall, kPeriodic}, 1.9);
 }
 
+TEST(RadialDistribution, HasAContactValueWhereAllRadiiAreOne) {
+  for (const double other : {0.5, 0.45}) {
+    auto run = test::make_run<3>(test::hard_spheres<3>(4, 0.3), "free-flight", {.step = 1, .end_time = 3});
+    run->run();
+    Particles<3>& p = run->system().particles;
+    p.radius[7] = other;
+    RadialDistribution<3> rdf(run->system(), {.sampling = {}, .range = 2, .bins = 40});
+    rdf.sample(0, p);
+    EXPECT_EQ(rdf.contact_value(0, 0).has_value(), other == 0.5);
+  }
+}
+
 /// g averaged over many samples of an ideal gas: 1 at every r, also along walls.
 template <int D>
 void expect_ideal_gas(const Vec<D>& edges, std::array<Boundary, D> boundary, double range) {

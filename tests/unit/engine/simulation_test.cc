@@ -107,6 +107,32 @@ TEST(Simulation, MeasuresTheMeanFreeFlight) {
   EXPECT_FALSE(none->statistics().mean_free_path);
 }
 
+/// Two discs that meet at 1, 3, 5 …, each time with a virial d·Δp of 3; 2K = 5. Frames in between change nothing.
+/// Two discs that fall one after the other, and meet once: |v| grows alike and evenly, to a mean of ½ + ½ g T.
+TEST(Simulation, TheMeanSpeedIsThatOfTheWholeSlab) {
+  auto system = test::make_system<2>({100, 4}, Boundary::open, {{5, 2}, {2, 2}}, {{0, 0}, {1, 0}});
+  test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{1.0, 0.0}}});
+  const auto run = test::run_until<2>(std::move(system), "psa", 0.5, 4);
+  const Statistics& s = run->statistics();
+  EXPECT_EQ(s.counters.sphere_sphere, 1u);
+  EXPECT_NEAR(*s.mean_free_path / *s.mean_free_time, 2.5, 1e-12);
+}
+
+TEST(Simulation, ThePressureOfARowIsThatSinceTheRowBefore) {
+  for (const double frames : {0.0, 0.8}) {
+    auto run = test::make_run<2>(test::make_system<2>({8, 4}, Boundary::periodic, {{1, 1}, {5, 1}}, {{2, 0}, {-1, 0}}),
+                                 "free-flight",
+                                 {.step = 4, .end_time = 10, .frame_interval = frames, .thermo_interval = 2.75});
+    Notebook<2> notes;
+    run->add(notes);
+    run->run();
+    const std::vector<double> collisions = {0, 1 / 2.75, 2 / 2.75, 1 / 2.75, 1 / 1.75};  // in a unit of time
+    ASSERT_EQ(notes.pressure.size(), collisions.size());
+    for (std::size_t k = 0; k < collisions.size(); ++k)
+      EXPECT_NEAR(notes.pressure[k], (5 + 3 * collisions[k]) / (2 * 32), 1e-13) << "row " << k;
+  }
+}
+
 TEST(Simulation, ShortensTheLastStepToMeetTheEnd) {
   const auto run = test::run_until<2>(test::five_springs(), "cdda", 0.04, 0.1);
   EXPECT_EQ(run->statistics().steps, 3);

@@ -261,5 +261,38 @@ TEST(WindowedFlight, EndsAtACollision) {
   }
 }
 
+/// Windows so short that each has one collision at most: the last one wanted is the last of its window.
+TEST(WindowedFlight, EndsAtTheLastCollisionOfAWindow) {
+  const Case<2> c{.system = test::hard_spheres<2>(5, 0.5), .slab = 0.2, .slabs = 2};
+  for (const std::uint64_t limit : {1, 2, 3, 20}) {
+    const auto reference = whole(c, limit);
+    ASSERT_EQ(reference.contacts.size(), limit);
+    WindowCounts counts;
+    const Way way{.subdomains = 2, .window = [] { return 1e-4; }, .limit = limit};
+    expect_same(reference, divided(c, way, nullptr, &counts), std::to_string(limit));
+    EXPECT_GT(counts.windows, 5 * limit);
+  }
+}
+
+/// Pairs that meet in the first window, one of each close to the end of the box, where a subdomain ends, and the other
+/// up to a diameter and nearly twice the largest displacement away from it.
+TEST(WindowedFlight, GhostsFromAsFarAsTwoSpheresCanCome) {
+  const int rows = 40;
+  std::vector<Vec<2>> x, v;
+  for (int k = 0; k < rows; ++k) {
+    const double away = 2.7 - 0.05 * k;  // of the one beyond the end
+    x.push_back({0.01, 2.0 * k + 1});
+    x.push_back({200 - away, 2.0 * k + 1});
+    v.push_back({-1 + 1e-3 * k, 0});
+    v.push_back({1, 0});
+  }
+  const Case<2> c{.system = test::make_system<2>({200, 2.0 * rows}, P, x, v, std::vector<double>(2 * rows, 0.5),
+                                                 std::vector<double>(2 * rows, 1.0)),
+                  .slab = 2};
+  const auto reference = whole(c);
+  ASSERT_GE(reference.contacts.size(), static_cast<std::size_t>(rows));
+  for (const int subdomains : {2, 4}) expect_same(reference, divided(c, {.subdomains = subdomains}), "pairs");
+}
+
 }  // namespace
 }  // namespace carom

@@ -33,7 +33,8 @@ fs::path written_in(const fs::path& directory) {
                             .time = 0.5,
                             .files = {},
                             .bonds = {{{0, 1}, {1, 2}}},
-                            .warnings = {"warning: a long step"}};
+                            .warnings = {"warning: a long step"},
+                            .branched_from = {}};
   write_checkpoint<2>(directory, head, *system);
   return directory / run_file::checkpoint;
 }
@@ -103,14 +104,16 @@ TEST(Checkpoint, TheOneBeforeIsTakenWhereTheLastIsDamaged) {
   write(last, good.substr(0, good.size() / 2));
   EXPECT_EQ(last_checkpoint(directory, warning).file(), before);
   EXPECT_NE(warning.find("checkpoint.h5: the checkpoint is damaged or cut off"), std::string::npos) << warning;
-  write(before, "carom checkpoint 2\n");
-  try {
-    last_checkpoint(directory, warning);
-    FAIL();
-  } catch (const Error& e) {
-    const std::string text = e.what();
-    EXPECT_NE(text.find("damaged or cut off"), std::string::npos) << text;
-    EXPECT_NE(text.find("written by a newer carom; this one reads format 1"), std::string::npos) << text;
+  for (const auto& [format, age] : {std::pair{"1", "an older"}, {"3", "a newer"}}) {
+    write(before, std::string("carom checkpoint ") + format + "\n");
+    try {
+      last_checkpoint(directory, warning);
+      FAIL();
+    } catch (const Error& e) {
+      const std::string text = e.what();
+      EXPECT_NE(text.find("damaged or cut off"), std::string::npos) << text;
+      EXPECT_NE(text.find(std::string(age) + " carom; this one reads format 2"), std::string::npos) << text;
+    }
   }
 }
 

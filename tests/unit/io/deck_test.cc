@@ -1,6 +1,7 @@
 #include "io/deck/deck.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <fstream>
 #include <numbers>
@@ -8,6 +9,7 @@
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_source.h"
+#include "io/deck/memory.h"
 #include "io/deck/validate_state.h"
 #include "tests/support/thread_ranks.h"
 
@@ -304,6 +306,30 @@ TEST_F(DeckTest, ShortestPeriodOfOneBondIsThatOfItsOscillator) {
   Deck deck = read(springs, {"interaction.0.pairs=[[1, 2]]"});
   const auto system = build_system<2>(deck);
   EXPECT_NEAR(shortest_period(*system), 2 * std::numbers::pi / std::sqrt(3 * (1 + 0.5)), 1e-12);
+}
+
+TEST_F(DeckTest, MemoryIsThatOfAllRanksWithinTheLimitOfTheProcess) {
+  rlimit before{};
+  getrlimit(RLIMIT_AS, &before);
+  rlimit limit = before;
+  limit.rlim_cur = 1'000'000'000;
+  Deck deck = read(springs);
+  SpeciesConfig& species = deck.source->species[0];
+  species.count = 1000;
+  const double few = estimated_memory<3>(*deck.source, nullptr);
+  species.count = 2'000'000;
+  const double many = estimated_memory<3>(*deck.source, nullptr);
+  species.count = static_cast<std::size_t>(2e6 * 1.5e9 / (many - few));
+  setrlimit(RLIMIT_AS, &limit);
+  std::string said;
+  try {
+    check_memory<3>(*deck.source, nullptr, 1);
+  } catch (const Error& e) {
+    said = e.what();
+  }
+  EXPECT_NO_THROW(check_memory<3>(*deck.source, nullptr, 2));
+  setrlimit(RLIMIT_AS, &before);
+  EXPECT_NE(said.find("GB of memory; 1 GB are free here"), std::string::npos) << said;
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include "io/files/journal.h"
 
+#include <libdeflate.h>
+
 #include <fstream>
 #include <random>
 
@@ -65,6 +67,29 @@ TEST(Journal, BlocksAreThoseOfAnArray) {
       EXPECT_FALSE(hdf5::complete_journal(flipped)) << k;
     }
   }
+}
+
+// A checksum that fits what is damaged makes no journal of it.
+TEST(Journal, BlocksThatDoNotFitAreNotReplayed) {
+  hdf5::Blocks blocks;
+  blocks.put(10, Bytes(100));
+  const Bytes good = blocks.journal(kSize, {});
+  const auto with = [&](std::uint64_t length_of_block, std::size_t bytes) {
+    Bytes journal = good;
+    std::memcpy(journal.data() + hdf5::kJournalHead + 8, &length_of_block, 8);
+    journal.resize(bytes);
+    const std::uint64_t length = bytes;
+    std::memcpy(journal.data() + 16, &length, 8);
+    const std::uint64_t sum = libdeflate_crc32(0, journal.data() + 16, bytes - 16);
+    std::memcpy(journal.data() + 8, &sum, 8);
+    return hdf5::complete_journal(journal).has_value();
+  };
+  EXPECT_TRUE(with(100, good.size()));
+  EXPECT_FALSE(with(101, good.size()));
+  EXPECT_FALSE(with(~std::uint64_t{0}, good.size()));
+  EXPECT_FALSE(with(100, good.size() + 15));  // a part of a second block's head
+  EXPECT_FALSE(with(100, good.size() - 1));
+  EXPECT_FALSE(with(100, hdf5::kJournalHead + 8));
 }
 
 // A file that is opened again: cut, appended to, and left in the middle of a flush, is made whole by the next to open

@@ -156,13 +156,13 @@ TEST(MarksOfFiles, FilesThatHaveLessAreErrors) {
   };
   TrajectoryWriter<2>(directory / "t.h5md", test::sample_deck(2), *system)
       .frame(test::sample_snapshot<2>(system->particles, 0, 0));
-  fails([&] { TrajectoryWriter<2>(directory / "t.h5md", *system, 2); });
+  fails([&] { TrajectoryWriter<2>(directory / "t.h5md", test::sample_deck(2), *system, 2); });
   EventWriter<2>(directory / "events.h5", test::sample_deck(2)).close();
-  fails([&] { EventWriter<2>(directory / "events.h5", EventMark{1, 0}); });
+  fails([&] { EventWriter<2>(directory / "events.h5", test::sample_deck(2), EventMark{1, 0}); });
   const auto size = ThermoWriter<2>(directory / "thermo.csv").size();
   fails([&] { ThermoWriter<2>(directory / "thermo.csv", size + 1); });
   const auto larger = test::hard_spheres<2>(3, 0.3);
-  EXPECT_THROW(TrajectoryWriter<2>(directory / "t.h5md", *larger, 1), Error);
+  EXPECT_THROW(TrajectoryWriter<2>(directory / "t.h5md", test::sample_deck(2), *larger, 1), Error);
 }
 
 }  // namespace

@@ -1,66 +1,52 @@
-// The spheres in a subdomain, and those at its border.
+#include "engine/ranks/ownership.h"
 
-#include "engine/ranks/subdomain.h"
+#include <cmath>
 
 namespace carom {
 
 template <int D>
-void Subdomain<D>::load(std::vector<Record<D>> records, const Bisection<D>& bisection, std::uint32_t number,
-                        const Vec<D>& g, double horizon, double now, double max_displacement) {
+void Ownership<D>::load(const Bisection<D>& bisection, std::uint32_t number, double max_displacement) {
   bisection_ = &bisection;
   number_ = number;
   max_displacement_ = max_displacement;
-  paths_.clear();
-  scripts_.clear();
-  changed_.clear();
-  role_.clear();
-  edge_.clear();
-  core_.load(std::move(records), g, horizon, now, 2 * max_displacement);
+  unwatched_ = std::numeric_limits<double>::infinity();
   const std::size_t room = core_.flights().room();
   slots_.clear(room);
-  trace_.clear(room);
-  paths_.resize(room);
-  scripts_.resize(room);
+  edge_.clear();
   holders_.assign(room, 0);
-  rewritten_.assign(room, 0);
-  agreed_.assign(room, 0);
-  disturbed_.assign(room, 0);
-  other_.clear();
-  mended_of_.assign(room, kNone);
   role_.assign(room, Role::none);
-  for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, core_.flights()[i].id, Role::own);
-  unwatched_ = std::numeric_limits<double>::infinity();
+  for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, Role::own);
 }
 
 template <int D>
-void Subdomain<D>::enlist(Slot i, Id id, Role role) {
-  slots_.add(id, i);
+void Ownership<D>::enlist(Slot i, Role role) {
+  slots_.add(core_.flights()[i].id, i);
   role_[i] = role;
 }
 
 template <int D>
-void Subdomain<D>::forget(Slot i) {
+void Ownership<D>::forget(Slot i) {
   role_[i] = Role::none;
   slots_.remove(core_.flights()[i].id);
   core_.dismiss(i);
 }
 
 template <int D>
-std::vector<Slot> Subdomain<D>::own() const {
+std::vector<Slot> Ownership<D>::own() const {
   std::vector<Slot> own;
   for (Slot i = 0; i < core_.flights().size(); ++i)
-    if (is_own(i)) own.push_back(i);
+    if (owns(i)) own.push_back(i);
   return own;
 }
 
 /// Finds out anew which own spheres may come to the border before this is called again.
 template <int D>
-void Subdomain<D>::watch(double now) {
+void Ownership<D>::watch(double now) {
   unwatched_ = 0;
   const double reach = bisection_->reach() + (kSlack + 1) * max_displacement_;
   std::erase_if(edge_, [&](const Edge& edge) { return role_[edge.slot] != Role::ghost; });
   for (Slot i = 0; i < core_.flights().size(); ++i)
-    if (is_own(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)
+    if (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)
       edge_.push_back({i, 0});
   std::vector<Slot> slots;
   for (const Edge& edge : edge_) slots.push_back(edge.slot);
@@ -70,7 +56,7 @@ void Subdomain<D>::watch(double now) {
 /// Finds the owner of a sphere and the subdomains in which it is a ghost, from its position now, and how far it may
 /// come until one of these changes; other subdomains that have it find the same.
 template <int D>
-typename Subdomain<D>::Edge Subdomain<D>::look_at(Slot i, double now) {
+typename Ownership<D>::Edge Ownership<D>::look_at(Slot i, double now) {
   const Flights<D>& flights = core_.flights();
   const Vec<D> at = bisection_->wrapped(flights.at(i, now).x);
   const double speed = flights[i].v.norm() + flights.g().norm() * flights.horizon();
@@ -104,28 +90,40 @@ typename Subdomain<D>::Edge Subdomain<D>::look_at(Slot i, double now) {
 }
 
 template <int D>
-bool Subdomain<D>::admit(const Record<D>& r, double now) {
+bool Ownership<D>::admit(const Record<D>& r, double now) {
   if (slots_.find(r.id) != IdTable::kNowhere) return true;
   Slot slot = 0;
   if (!core_.admit(r, now, slot)) return false;
-  enlist(slot, r.id, Role::ghost);
+  enlist(slot, Role::ghost);
   edge_.push_back({slot, 0});
   return true;
 }
 
-template void Subdomain<2>::load(std::vector<Record<2>>, const Bisection<2>&, std::uint32_t, const Vec<2>&, double,
-                                 double, double);
-template void Subdomain<2>::forget(Slot);
-template std::vector<Slot> Subdomain<2>::own() const;
-template void Subdomain<2>::watch(double);
-template typename Subdomain<2>::Edge Subdomain<2>::look_at(Slot, double);
-template bool Subdomain<2>::admit(const Record<2>&, double);
-template void Subdomain<3>::load(std::vector<Record<3>>, const Bisection<3>&, std::uint32_t, const Vec<3>&, double,
-                                 double, double);
-template void Subdomain<3>::forget(Slot);
-template std::vector<Slot> Subdomain<3>::own() const;
-template void Subdomain<3>::watch(double);
-template typename Subdomain<3>::Edge Subdomain<3>::look_at(Slot, double);
-template bool Subdomain<3>::admit(const Record<3>&, double);
+template <int D>
+bool Ownership<D>::meeting_place(const Record<D>& r, double end, Vec<D>& low, Vec<D>& high) const {
+  const double far = way(r, end);
+  const Vec<D> at = bisection_->wrapped(r.x);
+  const double close = bisection_->reach() - max_displacement_ + far;
+  if (bisection_->squared_distance(number_, at) > close * close) return false;
+  const Vec<D> room = Vec<D>::Constant(bisection_->reach() + far);
+  low = at - room;
+  high = at + room;
+  if (!bisection_->clip(number_, 3 * max_displacement_, low, high)) return false;
+  low += r.x - at;
+  high += r.x - at;
+  return true;
+}
+
+template <int D>
+bool Ownership<D>::may_meet(const Record<D>& r, Slot j, const Vec<D>& shift, double end) const {
+  const double close = bisection_->reach() + way(r, end);
+  const Record<D>& other = core_.flights()[j];
+  const double s = end - other.t;
+  const Vec<D> d = r.x - (other.x + s * other.v + (0.5 * s * s) * core_.flights().g()) + shift;
+  return d.squaredNorm() <= close * close;
+}
+
+template class Ownership<2>;
+template class Ownership<3>;
 
 }  // namespace carom

@@ -1,0 +1,118 @@
+#include "engine/events/event_queue.h"
+
+#include "engine/events/contact.h"
+
+namespace carom {
+
+template <int D>
+void EventQueue<D>::clear() {
+  next_events_.clear();
+  next_events_.reserve(flights_.room());
+  next_events_.assign(flights_.size(), NextEvent<D>{});
+}
+
+template <int D>
+void EventQueue<D>::admit(Slot i) {
+  if (i == next_events_.size()) next_events_.emplace_back();
+  ++next_events_[i].version;
+}
+
+template <int D>
+void EventQueue<D>::fill(double now, double horizon, double entries_per_bin) {
+  constexpr std::size_t kSample = 8192;
+  const std::size_t n = next_events_.size();
+  std::vector<double> some;
+  for (std::size_t i = 0; i < n; i += n / kSample + 1) some.push_back(next_events_[i].due());
+  tied_ = {};
+  calendar_.reset(horizon, n, entries_per_bin, std::move(some), now);
+  for (std::size_t i = 0; i < n; ++i) schedule(static_cast<Slot>(i));
+}
+
+template <int D>
+EventKey<D> EventQueue<D>::key_of(Slot i) const {
+  const NextEvent<D>& a = next_events_[i];
+  const Record<D>& r = flights_[i];
+  if (a.kind == EventKind::wall)
+    return {.time = a.contact, .generation = generation_of(i), .kind = a.kind, .lo = r.id, .hi = a.partner};
+  const Id other = flights_[slot_of(a.partner)].id;
+  return pair_key<D>(a.contact, generation_of(i), r.id, other, flights_.packing().image(a.partner));
+}
+
+template <int D>
+void EventQueue<D>::offer(Slot i, double time, EventKind kind, std::uint32_t partner) {
+  NextEvent<D>& a = next_events_[i];
+  if (time > a.contact || time == kNever) return;
+  const NextEvent<D> before = a;
+  const EventKey<D> rival = time == a.contact ? key_of(i) : EventKey<D>{};
+  a.contact = time;
+  a.kind = kind;
+  a.partner = partner;
+  if (kind == EventKind::pair) a.partner_version = next_events_[slot_of(partner)].version;
+  if (time == before.contact && !(key_of(i) < rival)) a = before;
+}
+
+template <int D>
+typename EventQueue<D>::Tied EventQueue<D>::tie(Slot i) const {
+  const NextEvent<D>& a = next_events_[i];
+  if (a.update < a.contact) return {Tied::Rank::update, EventKey<D>{.lo = flights_[i].id}, i};
+  return {stale(a) ? Tied::Rank::stale : Tied::Rank::contact, key_of(i), i};
+}
+
+/// Whether two spheres plan the same contact, and it still holds.
+template <int D>
+bool EventQueue<D>::mirrored(Slot i, Slot j) const {
+  const NextEvent<D>&a = next_events_[i], &b = next_events_[j];
+  return a.kind == EventKind::pair && b.kind == EventKind::pair && b.contact == a.contact && a.contact <= a.update &&
+         b.contact <= b.update && slot_of(a.partner) == j && b.partner == flights_.packing().reversed(i, a.partner) &&
+         !stale(a) && !stale(b);
+}
+
+template <int D>
+bool EventQueue<D>::next(double end, Slot& slot, double& time) {
+  const auto holds = [&](const CalendarEntry& entry) { return next_events_[entry.slot].due() == entry.time; };
+  for (;;) {
+    if (tied_.empty()) {
+      const CalendarEntry* const top = calendar_.top(holds);
+      if (!top || top->time >= end) return false;
+      const CalendarEntry entry = *top;
+      calendar_.pop();
+      if (!holds(entry)) {
+        ++counts_.dropped;
+        continue;
+      }
+      slot = entry.slot;
+      time = entry.time;
+      if (!calendar_.more_at(time)) return true;
+      settle();  // from here on it matters which plans are stale
+      // Often it is the same contact, planned by both partners: the other's plan falls with this one.
+      Slot other = slot;
+      if (const CalendarEntry* const next = calendar_.top(holds); mirrored(slot, next->slot)) {
+        other = next->slot;
+        calendar_.pop();
+        if (!calendar_.more_at(time)) return true;
+      }
+      tied_.push(tie(slot));
+      if (other != slot) tied_.push(tie(other));
+      tied_time_ = time;
+    }
+    settle();
+    time = tied_time_;
+    while (calendar_.more_at(time)) {
+      const CalendarEntry* const top = calendar_.top(holds);
+      if (holds(*top)) tied_.push(tie(top->slot));
+      calendar_.pop();
+    }
+    const Tied first = tied_.top();
+    tied_.pop();
+    slot = first.slot;
+    if (next_events_[slot].due() != time) continue;  // its plans have changed, and its new ones are in the calendar
+    const Tied now = tie(slot);
+    if (now == first) return true;
+    tied_.push(now);  // what it plans has another place among these: its partner has collided
+  }
+}
+
+template class EventQueue<2>;
+template class EventQueue<3>;
+
+}  // namespace carom

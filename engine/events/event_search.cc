@@ -1,0 +1,265 @@
+#include "engine/events/event_search.h"
+
+#include "engine/events/event_prefetch.h"
+#include "engine/events/surroundings.h"
+
+namespace carom {
+
+template <int D>
+void EventSearch<D>::clear() {
+  lists_.reset();
+  cells_.reset();
+}
+
+template <int D>
+void EventSearch<D>::start(double now, double max_displacement) {
+  max_displacement_ = max_displacement;
+  setting_ = flights_.setting();
+  std::vector<double> radii = flights_.radii(flights_.horizon());
+  if (lists_ && radii_ == radii) {  // lists outlive a slab while they are good for its radii
+    lists_->follow(flights_.records());
+  } else {
+    clear();
+    queue_.clear();
+    radii_ = std::move(radii);
+    choose(now);
+  }
+  for (Slot i = 0; i < flights_.size(); ++i) {
+    foresee(i, now);
+    queue_.settle();
+  }
+  queue_.fill(now, flights_.horizon(), options_.entries_per_bin);
+}
+
+template <int D>
+void EventSearch<D>::choose(double now) {
+  small_ = 8 * static_cast<double>(flights_.room()) <= options_.in_cache;
+  large_ = static_cast<double>(flights_.room()) > options_.in_cache;
+  at_border_.clear();
+  // The density is that of the whole system: a subdomain has a part of it, or no spheres yet; larger ones may come.
+  const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : radii_;
+  if (counts_.predictions == 0) tuning_ = SearchTuning(options_);
+  Extent<D> extent = flights_.extent();
+  if (sizes_) {
+    largest_ = sizes_->largest_radius();
+    extent.particles = sizes_->spheres;
+  } else {
+    largest_ = *std::max_element(radii.begin(), radii.end());
+  }
+  SearchSituation situation = situation_of<D>(box_, radii, extent);
+  situation.largest = 2 * largest_;
+  tuning_.choose(situation, counts_);
+  if (!tuning_.lists()) {
+    cells_ =
+        std::make_unique<LinkedCells<D>>(box_, flights_.packing(), kernels_, tuning_.cell(), extent, flights_.size());
+    if (flights_.size() < extent.particles) cells_->confine(flights_.places(now));
+    for (Slot i = 0; i < flights_.size(); ++i) {
+      queue_[i].where.cell = cells_->place(flights_.at(i, now).x);
+      cells_->insert(i, queue_[i].where.cell);
+    }
+    return;
+  }
+  double skin = tuning_.skin();
+  for (int k = 0; k < D; ++k)
+    if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
+  lists_ = std::make_unique<SkinLists<D>>(box_, flights_.packing(), kernels_, radii_, flights_.equal(), largest_, skin,
+                                          queue_.plans());
+  lists_->build(
+      flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, max_displacement_);
+}
+
+/// What the kernels look at for the contacts of a sphere; `found` is room for it.
+template <int D>
+ScanTask EventSearch<D>::around(Slot i, Candidates& found) {
+  const NextEvent<D>& a = queue_[i];
+  if (lists_) return {i, lists_->candidates(a), a.count, a.same};
+  cells_->around(i, a.where.cell, found);
+  return {i, found.packed.data(), found.count, found.same};
+}
+
+template <int D>
+void EventSearch<D>::plan(Slot i, double now) {
+  foresee(i, now);
+  queue_.schedule(i);
+}
+
+template <int D>
+void EventSearch<D>::foresee(Slot i, double now) {
+  ++counts_.predictions;
+  queue_[i].contact = kNever;
+  scan(around(i, found_), flights_[i].t == now);
+  if (!flights_.walls().empty()) foresee_walls(i);
+  foresee_update(i, now);
+}
+
+template <int D>
+void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
+  counts_.predictions += 2;
+  const ScanTask task[2] = {around(i, found_), around(j, others_)};
+  counts_.candidates += task[0].n + task[1].n;
+  ScanResult first[2];
+  kernels_.scan_two[D - 2](setting_, task, first);
+  queue_[i].contact = queue_[j].contact = kNever;
+  for (const int k : {0, 1}) {
+    const Slot one = task[k].self;
+    plan_first(task[k], first[k]);
+    if (!flights_.walls().empty()) foresee_walls(one);
+    foresee_update(one, now);
+    queue_.schedule(one);
+  }
+}
+
+/// Plans the first contact with the candidates where it comes before the one that is planned. `latest`: no record is of
+/// a later time than the sphere's own.
+template <int D>
+void EventSearch<D>::scan(const ScanTask& task, bool latest) {
+  counts_.candidates += task.n;
+  plan_first(task, kernels_.scan[D - 2](setting_, task, latest));
+}
+
+template <int D>
+void EventSearch<D>::plan_first(const ScanTask& task, const ScanResult& first) {
+  const double planned = queue_[task.self].contact;
+  if (first.time > planned || first.time == kNever) return;
+  if (!first.tied && first.time != planned && first.time != -kNever)
+    return queue_.plan_pair(task.self, first.time, task.candidates[first.which]);
+  offer_all(task);
+}
+
+/// Plans the first contact with the candidates, one by one.
+template <int D>
+void EventSearch<D>::offer_all(const ScanTask& task) {
+  for (unsigned q = 0; q < task.n; ++q) {
+    const std::uint32_t candidate = task.candidates[q];
+    const Slot j = flights_.packing().slot(candidate);
+    if (j == task.self) continue;
+    const double time = flights_.pair_contact(task.self, j, box_.shift(flights_.packing().image(candidate)));
+    queue_.offer(task.self, time, EventKind::pair, candidate);
+  }
+}
+
+template <int D>
+void EventSearch<D>::foresee_walls(Slot i) {
+  for (const Wall<D>& wall : flights_.walls())
+    queue_.offer(i, flights_.wall_contact(i, wall), EventKind::wall, wall.number());
+}
+
+template <int D>
+void EventSearch<D>::foresee_update(Slot i, double now) {
+  if (lists_)
+    predict_leaving(queue_[i], flights_[i], flights_, room(i), now);
+  else
+    predict_crossing(queue_[i], i, flights_, box_, cells_->grid(), now);
+}
+
+/// How far a sphere may go from the centre of its list's region.
+template <int D>
+double EventSearch<D>::room(Slot i) const {
+  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
+}
+
+template <int D>
+void EventSearch<D>::look_again(Slot i, double now) {
+  NextEvent<D>& a = queue_[i];
+  const auto way = [&](const Vec<D>& x) {  // from the centre of its list's region
+    return (x - Eigen::Map<const Vec<D>>(a.where.centre)).norm();
+  };
+  if (cells_) {
+    ++counts_.crossings;
+    const int axis = a.face / 2, step = a.face % 2 == 1 ? 1 : -1;
+    cells_->cross(i, a.where.cell, axis, step);
+    cells_->ahead(i, a.where.cell, axis, step, found_);
+    if (found_.count > 0) scan({i, found_.packed.data(), found_.count, found_.same}, false);
+  } else if (const Vec<D> x = flights_.at(i, now).x; !flights_.field() || way(x) >= 0.7 * room(i)) {
+    ++counts_.rebuilds;
+    const std::span<const std::uint32_t> fresh = lists_->renew(i, x);
+    if (!fresh.empty()) scan({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
+  }  // else it is still far from where its list ends
+  foresee_update(i, now);
+  queue_.schedule(i);
+}
+
+template <int D>
+void EventSearch<D>::admit(Slot i, double radius, double now) {
+  if (!flights_.equal()) {
+    radii_.resize(std::max<std::size_t>(radii_.size(), i + 1));
+    radii_[i] = radius;
+  }
+  setting_ = flights_.setting();
+  if (!at_border_.empty()) at_border_[i] = border_fits() ? 1 : 0;
+  const Vec<D> x = flights_.at(i, now).x;
+  if (lists_) {
+    lists_->admit(i, x, radii_);
+  } else {
+    queue_[i].where.cell = cells_->place(x);
+    cells_->admit(i, queue_[i].where.cell);
+  }
+  plan(i, now);
+}
+
+template <int D>
+void EventSearch<D>::dismiss(Slot i) {
+  if (lists_)
+    lists_->dismiss(i);
+  else
+    cells_->remove(i, queue_[i].where.cell);
+}
+
+template <int D>
+void EventSearch<D>::move(Slot i, double now) {
+  const Vec<D> x = flights_.at(i, now).x;
+  if (lists_) {
+    lists_->move(i, x, room(i));
+  } else {
+    CellPlace<D>& cell = queue_[i].where.cell;
+    cells_->remove(i, cell);
+    cell = cells_->place(x);
+    cells_->admit(i, cell);
+  }
+}
+
+template <int D>
+void EventSearch<D>::set_border(std::span<const Slot> slots, double now) {
+  at_border_.assign(flights_.room(), 0);
+  if (!border_fits()) return;
+  for (const Slot i : slots) {
+    at_border_[i] = 1;
+    if (lists_->move(i, flights_.at(i, now).x, room(i))) {
+      plan(i, now);
+      queue_.settle();
+    } else {
+      foresee_update(i, now);
+      queue_.schedule(i);
+    }
+  }
+}
+
+template <int D>
+std::span<const std::uint32_t> EventSearch<D>::find_near(Slot i) {
+  if (lists_) return lists_->find_near(i, max_displacement_);
+  cells_->find_near(queue_[i].where.cell, 2 * (largest_ + max_displacement_), near_);
+  return near_;
+}
+
+template <int D>
+std::span<const std::uint32_t> EventSearch<D>::find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high) {
+  if (!lists_) {
+    cells_->find_between(low, high, near_);
+    return near_;
+  }
+  if (room(i) == lists_->skin()) return find_near(i);
+  return {lists_->candidates(queue_[i]), queue_[i].count};
+}
+
+template <int D>
+void EventSearch<D>::prefetch_next() {
+  if (lists_)
+    prefetch_upcoming(queue_, flights_, *lists_, large_);
+  else
+    prefetch_upcoming(queue_, flights_, *cells_, found_, large_);
+}
+
+template class EventSearch<2>;
+template class EventSearch<3>;
+
+}  // namespace carom

@@ -1,0 +1,175 @@
+#include "engine/ranks/window_paths.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace carom {
+
+template <int D>
+void WindowPaths<D>::load(std::size_t slots) {
+  trace_.clear(slots);
+  paths_.clear();
+  paths_.resize(slots);
+  scripts_.clear();
+  scripts_.resize(slots);
+  rewritten_.assign(slots, 0);
+  agreed_.assign(slots, 0);
+}
+
+template <int D>
+Trace<D>& WindowPaths<D>::start() {
+  trace_.clear(flights_.room());
+  return trace_;
+}
+
+template <int D>
+std::vector<Slot> WindowPaths<D>::end() {
+  std::vector<Slot> seen;
+  touched_ghosts_.clear();
+  ++window_;
+  for (const auto& event : trace_.events())
+    for (const int which : {0, 1}) {
+      const Slot i = event.slot[which];
+      if (i == kNone || event.last[which] != kNone) continue;
+      if (ownership_.is_seen(i)) seen.push_back(i);
+      if (ownership_.is_ghost(i)) touched_ghosts_.push_back(i);
+    }
+  return seen;
+}
+
+template <int D>
+std::vector<std::pair<Slot, Record<D>>> WindowPaths<D>::finish() {
+  std::vector<std::pair<Slot, Record<D>>> other;
+  for (const Slot slot : paths_.slots()) {
+    if (rewritten_[slot] == 0) continue;
+    rewritten_[slot] = 0;
+    const Record<D>&now = after(slot), &known = flights_[slot];
+    if (now.t != known.t || now.x != known.x || now.v != known.v || now.generation != known.generation)
+      other.emplace_back(slot, now);
+  }
+  paths_.clear();
+  scripts_.clear();
+  return other;
+}
+
+/// Node k of a path, as the log has it, given the entries of the sphere.
+template <int D>
+Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const {
+  const auto& event = trace_.event_of(entries[k]);
+  const auto& [lo, hi] = event.id;
+  return {.after = k + 1 < entries.size() ? trace_.before(entries[k + 1]) : flights_[i],
+          .key = event.slot[1] == kNone
+                     ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
+                     : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner)),
+          .virial = event.virial,
+          .overlap = event.overlap};
+}
+
+template <int D>
+typename WindowPaths<D>::Path& WindowPaths<D>::path_of(Slot i) {
+  if (paths_.has(i)) return paths_.at(i);
+  const View logged = view(i);
+  Path& path = paths_.add(i);
+  path.start = logged.entries.empty() ? flights_[i] : trace_.before(logged.entries[0]);
+  path.nodes.clear();
+  for (std::size_t k = 0; k < logged.size(); ++k) path.nodes.push_back(logged.node(k));
+  return path;
+}
+
+template <int D>
+const Record<D>& WindowPaths<D>::after(Slot i) const {
+  if (!paths_.has(i)) return flights_[i];
+  const Path& path = paths_.at(i);
+  return path.nodes.empty() ? path.start : path.nodes.back().after;
+}
+
+template <int D>
+typename WindowPaths<D>::Nodes& WindowPaths<D>::rewrite(Slot i) {
+  rewritten_[i] = 1;
+  agreed_[i] = 0;
+  return path_of(i).nodes;
+}
+
+template <int D>
+void WindowPaths<D>::cut(const EventKey<D>& last) {
+  std::vector<Slot> touched(paths_.slots().begin(), paths_.slots().end());
+  for_each_own([&](Slot i) { touched.push_back(i); });
+  for (const Slot i : touched) std::erase_if(rewrite(i), [&](const Node<D>& node) { return last < node.key; });
+}
+
+template <int D>
+void WindowPaths<D>::write(Slot i, Bytes& to) const {
+  const View path = view(i);
+  put(to, path.size());
+  for (std::size_t k = 0; k < path.size(); ++k) put(to, path.node(k));
+}
+
+template <int D>
+void WindowPaths<D>::read_script(Slot g, Reader& message) {
+  Script& script = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
+  script.count = message.get<std::uint32_t>();
+  script.bytes = message.skip(script.count * sizeof(Node<D>));
+  script.nodes.clear();
+  agreed_[g] = 0;
+}
+
+template <int D>
+Node<D> WindowPaths<D>::Script::node(std::size_t k) const {
+  Node<D> node;
+  std::memcpy(static_cast<void*>(&node), bytes + k * sizeof node, sizeof node);
+  return node;
+}
+
+template <int D>
+std::span<const Node<D>> WindowPaths<D>::script(Slot g) {
+  if (!scripts_.has(g)) return {};
+  Script& script = scripts_.at(g);
+  while (script.nodes.size() < script.count) script.nodes.push_back(script.node(script.nodes.size()));
+  return script.nodes;
+}
+
+template <int D>
+bool WindowPaths<D>::matches(Slot g) {
+  if (agreed_[g] == window_) return true;
+  const View path = view(g);
+  const std::size_t count = scripts_.has(g) ? scripts_.at(g).count : 0;
+  if (path.size() != count) return false;
+  for (std::size_t k = 0; k < count; ++k)
+    if (!(path.node(k) == scripts_.at(g).node(k))) return false;
+  agreed_[g] = window_;
+  return true;
+}
+
+template <int D>
+bool WindowPaths<D>::agree(double end) {
+  const auto until = [&](std::span<const Node<D>> nodes) {
+    while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
+    return nodes;
+  };
+  bool all = true;
+  for_each_ghost([&](Slot g) {
+    if (!all || agreed_[g] == window_) return;
+    const auto seen = until(path(g)), sent = until(script(g));
+    all = std::equal(seen.begin(), seen.end(), sent.begin(), sent.end());
+  });
+  return all;
+}
+
+template <int D>
+ContactTally WindowPaths<D>::tally() const {
+  ContactTally tally;
+  for (const auto& event : trace_.events())
+    if (const Slot lo = event.slot[0]; ownership_.owns(lo) && rewritten_[lo] == 0)
+      tally.add(event.slot[1] != kNone ? EventKind::pair : EventKind::wall, event.virial, event.overlap);
+  for (const Slot i : paths_.slots()) {
+    if (!ownership_.owns(i) || rewritten_[i] == 0) continue;
+    for (const Node<D>& node : paths_.at(i).nodes)
+      if (node.key.lo == node.after.id) tally.add(node.key.kind, node.virial, node.overlap);
+  }
+  return tally;
+}
+
+template class WindowPaths<2>;
+template class WindowPaths<3>;
+
+}  // namespace carom

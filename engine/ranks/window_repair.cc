@@ -1,0 +1,222 @@
+#include "engine/ranks/window_repair.h"
+
+#include <algorithm>
+
+namespace carom {
+
+template <int D>
+std::vector<Slot> WindowRepair<D>::run() {
+  repairs_.clear();
+  paths_.for_each_ghost([&](Slot g) { seed(g); });
+  while (!tasks_.empty()) {
+    const Task task = tasks_.top();
+    tasks_.pop();
+    switch (task.kind) {
+      case Task::Kind::contact:
+        contact(task);
+        break;
+      case Task::Kind::script:
+        script(task);
+        break;
+      case Task::Kind::check:
+        check(task);
+        break;
+      case Task::Kind::seed:
+        if (mended(task.a)) break;
+        Mended& m = mend(task.a, task.key);
+        plan_script(m);
+        if (const Node<D>* next = next_of_script(m); !next || next->key != task.key) predict(m, task.key);
+    }
+  }
+  std::vector<Slot> changed;
+  for (const Mended& m : repairs_) {
+    mended_of_[m.slot] = kNone;
+    if (!ownership_.owns(m.slot)) continue;
+    const auto now = paths_.path(m.slot).subspan(m.kept);
+    if (!std::equal(now.begin(), now.end(), m.old.begin(), m.old.end())) changed.push_back(m.slot);
+  }
+  return changed;
+}
+
+/// Where the path of a ghost differs from its script, and not by a contact with own spheres, it is repaired from there.
+template <int D>
+void WindowRepair<D>::seed(Slot g) {
+  if (paths_.matches(g)) return;
+  const auto seen = paths_.path(g), script = paths_.script(g);
+  const auto [here, there] = std::mismatch(seen.begin(), seen.end(), script.begin(), script.end());
+  const bool sees = here != seen.end() && !ownership_.owns_id(here->partner());
+  if (there != script.end() && (here == seen.end() || there->key <= here->key)) {
+    if (ownership_.owns_id(there->partner()) && !sees) return;
+    tasks_.push({.kind = Task::Kind::seed, .key = there->key, .a = g});
+  } else if (sees) {
+    tasks_.push({.kind = Task::Kind::seed, .key = here->key, .a = g});
+  }
+}
+
+/// Cuts the path of a sphere at `key`; the partners of the events taken back must be checked.
+template <int D>
+typename WindowRepair<D>::Mended& WindowRepair<D>::mend(Slot i, const EventKey<D>& key) {
+  auto& path = paths_.rewrite(i);
+  const auto from = std::find_if(path.begin(), path.end(), [&](const Node<D>& n) { return !(n.key < key); });
+  mended_of_[i] = static_cast<std::uint32_t>(repairs_.size());
+  Mended& m = repairs_.emplace_back();
+  m.slot = i;
+  m.version = 1;
+  m.kept = static_cast<std::size_t>(from - path.begin());
+  m.old.assign(from, path.end());
+  path.erase(from, path.end());
+  m.now = paths_.before(i, m.kept);
+  if (ownership_.is_ghost(i)) {
+    const auto script = paths_.script(i);
+    m.script = m.kept;
+    m.left_script = m.kept > script.size() || !std::equal(path.begin(), path.end(), script.begin());
+  }
+  for (const Node<D>& node : m.old) {
+    if (node.key.kind == EventKind::wall) continue;
+    const Slot partner = ownership_.slot_of(node.partner());
+    if (partner != IdTable::kNowhere) tasks_.push({.kind = Task::Kind::check, .key = node.key, .a = i, .b = partner});
+  }
+  return m;
+}
+
+/// The next node that a ghost has in its script; null: there is none, or it no longer follows it.
+template <int D>
+const Node<D>* WindowRepair<D>::next_of_script(const Mended& m) {
+  const auto script = paths_.script(m.slot);
+  return m.left_script || m.script >= script.size() ? nullptr : &script[m.script];
+}
+
+template <int D>
+void WindowRepair<D>::plan_script(Mended& m) {
+  if (const Node<D>* next = next_of_script(m))
+    tasks_.push(
+        {.kind = Task::Kind::script, .key = next->key, .a = m.slot, .version_a = static_cast<std::uint32_t>(m.script)});
+}
+
+/// Plans all contacts that a mended sphere may have from `now` on.
+template <int D>
+void WindowRepair<D>::predict(Mended& m, const EventKey<D>& now) {
+  const bool ghost = ownership_.is_ghost(m.slot);
+  Vec<D> low, high;
+  if (ghost && !ownership_.meeting_place(m.now, end_, low, high)) return;
+  for (const std::uint32_t candidate : ghost ? core_.find_near_at_border(m.slot, low, high) : core_.find_near(m.slot)) {
+    const Slot j = flights_.packing().slot(candidate);
+    const Image<D> image = flights_.packing().image(candidate);
+    if (j != m.slot && (!ghost || ownership_.owns(j)) && ownership_.may_meet(m.now, j, box_.shift(image), end_))
+      meet(m, j, image, now);
+  }
+  for (const Wall<D>& wall : flights_.walls()) {
+    const double t = flights_.wall_contact(m.slot, m.now, wall);
+    if (!(t < end_)) continue;
+    const std::uint32_t generation = Flights<D>::generation_at(m.now, t);
+    tasks_.push({.kind = Task::Kind::contact,
+                 .key = {t, generation, EventKind::wall, m.now.id, wall.number()},
+                 .a = m.slot,
+                 .version_a = m.version});
+  }
+}
+
+/// Plans the contact of a mended sphere with another one.
+template <int D>
+void WindowRepair<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>& now) {
+  const Vec<D> shift = box_.shift(image);
+  // The contact with a record of the other one; false: none in the window.
+  EventKey<D> key;
+  const auto meets = [&](const Record<D>& other) {
+    const double t = flights_.pair_contact(m.slot, m.now, j, other, shift);
+    if (!(t < end_)) return false;
+    const auto generation = std::max(Flights<D>::generation_at(m.now, t), Flights<D>::generation_at(other, t));
+    key = pair_key<D>(t, generation, m.now.id, other.id, image);
+    return true;
+  };
+  bool found = false;
+  if (mended(j)) {
+    found = meets(repairs_[mended_of_[j]].now);
+  } else if (paths_.has_no_events(j)) {
+    found = meets(paths_.after(j));
+  } else {  // along its path: a contact counts only before the path turns
+    const auto path = paths_.path(j);
+    std::size_t k = 0;
+    while (k < path.size() && path[k].key < now) ++k;
+    for (; !found && k <= path.size(); ++k)
+      found = meets(paths_.before(j, k)) && (k == path.size() || key <= path[k].key);
+  }
+  if (found)
+    tasks_.push({.kind = Task::Kind::contact,
+                 .key = key,
+                 .a = m.slot,
+                 .b = j,
+                 .version_a = m.version,
+                 .version_b = version(j),
+                 .image = image});
+}
+
+template <int D>
+void WindowRepair<D>::contact(const Task& task) {
+  const EventKey<D>& key = task.key;
+  const bool pair = key.kind == EventKind::pair;
+  if (version(task.a) != task.version_a || (pair && version(task.b) != task.version_b)) return;
+  ++events_;
+  Mended& a = mended_at(task.a, key);
+  Node<D> of_a{a.now, key};
+  if (!pair) {
+    const Wall<D> wall = box_.wall(key.hi);
+    const Blow<D> blow = flights_.bounce(a.slot, of_a.after, wall, key.time, key.generation);
+    of_a.virial = wall.work(blow.impulse);
+    of_a.overlap = blow.overlap;
+    append(a, of_a);
+    return predict(a, key);
+  }
+  Mended& b = mended_at(task.b, key);
+  Node<D> of_b{b.now, key};
+  const Blow<D> blow =
+      flights_.collide(a.slot, of_a.after, b.slot, of_b.after, box_.shift(task.image), key.time, key.generation);
+  of_a.virial = of_b.virial = blow.d.dot(blow.impulse);
+  of_a.overlap = of_b.overlap = blow.overlap;
+  append(a, of_a);
+  append(b, of_b);
+  predict(a, key);
+  predict(b, key);
+}
+
+/// Adds a node to a path. A ghost follows its script as long as the script has the same node.
+template <int D>
+void WindowRepair<D>::append(Mended& m, const Node<D>& node) {
+  paths_.rewrite(m.slot).push_back(node);
+  m.now = node.after;
+  fastest_squared_ = std::max(fastest_squared_, node.after.v.squaredNorm());
+  ++m.version;
+  if (!ownership_.is_ghost(m.slot) || m.left_script) return;
+  const Node<D>* const next = next_of_script(m);
+  m.left_script = !next || !(*next == node);
+  ++m.script;
+  plan_script(m);
+}
+
+/// A ghost follows its script in an event without own spheres.
+template <int D>
+void WindowRepair<D>::script(const Task& task) {
+  Mended& m = repairs_[mended_of_[task.a]];
+  if (m.left_script || m.script != task.version_a) return;
+  const Node<D>& node = *next_of_script(m);
+  if (ownership_.owns_id(node.partner()))
+    m.left_script = true;  // here they did not meet, and this subdomain decides that
+  else
+    append(m, node);
+  predict(m, task.key);
+}
+
+/// A sphere that has been mended met this one here, and no longer does.
+template <int D>
+void WindowRepair<D>::check(const Task& task) {
+  const bool ghost = ownership_.is_ghost(task.b);
+  if (mended(task.b) || (ownership_.is_ghost(task.a) && ghost)) return;
+  Mended& m = mend(task.b, task.key);
+  m.left_script = m.left_script || ghost;
+  predict(m, task.key);
+}
+
+template class WindowRepair<2>;
+template class WindowRepair<3>;
+
+}  // namespace carom

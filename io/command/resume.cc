@@ -1,0 +1,191 @@
+#include "io/command/resume.h"
+
+#include <algorithm>
+
+#include "engine/base/error.h"
+#include "io/files/output_directory.h"
+
+namespace carom {
+namespace {
+
+/// A word as a shell takes it.
+std::string quoted(const std::string& word) {
+  const auto plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+           std::string_view("_-+=./:,%@").find(c) != std::string_view::npos;
+  };
+  if (!word.empty() && std::ranges::all_of(word, plain)) return word;
+  std::string all = "'";
+  for (const char c : word) all += c == '\'' ? "'\\''" : std::string(1, c);
+  return all + "'";
+}
+
+/// Gives what rank 0 has read of its checkpoint to all.
+void share_head(Resumed& from, Communicator& ranks) {
+  const auto archive = [&](Archive& all) {
+    from.head.archive(all);
+    all(from.head.deck, from.count, from.in_epoch);
+  };
+  Archive out;
+  if (ranks.rank() == 0) {
+    from.head = from.checkpoint->head();
+    Archive(from.checkpoint->read("step count"))(from.count);
+    Archive(from.checkpoint->read("paused"))(from.in_epoch);
+    archive(out);
+  }
+  Archive in(std::move(ranks.gather(out.bytes())[0]));
+  archive(in);
+}
+
+/// Flies a state within an epoch to its end, where all particles are at one time.
+template <int D>
+void end_epoch(Resumed& from, Communicator& ranks) {
+  Deck deck = *from.of;
+  deck.plan = {.step = deck.plan.step, .steps = from.head.step + 1};
+  GivenState given{from.reader(), from.head.bonds};
+  const IntegratorInfo& info = find_integrator(deck.integrator);
+  Simulation<D> simulation(build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, &given), info,
+                           info.make<D>(deck.integrator_parameters), deck.plan);
+  const Statistics& statistics = simulation.statistics();
+  const auto save_at_end = [&] {
+    if (statistics.steps > from.head.step) save_state(simulation.system(), into(from.at_the_end));
+    return false;
+  };
+  simulation.run({.should_stop = save_at_end, .restore = [&] { restore_state(simulation.system(), given.read); }});
+  from.head.step = statistics.steps;
+  from.head.time = statistics.end_time;
+  from.in_epoch = false;
+}
+
+/// Throws where a branch has nothing to do.
+void check_end(const Deck& deck, const CheckpointHead& head) {
+  const auto refuse = [&](const std::string& key, const std::string& is) {
+    throw Error(Failure::deck, "run." + key + " = " + is + ": the branch starts at step " + std::to_string(head.step) +
+                                   ", time " + short_text(head.time) +
+                                   ", and would end at once; give a later end, --set run." + key + "=…");
+  };
+  if (deck.plan.steps && *deck.plan.steps <= head.step) refuse("steps", std::to_string(*deck.plan.steps));
+  if (deck.plan.end_time && *deck.plan.end_time <= head.time) refuse("end_time", short_text(*deck.plan.end_time));
+}
+
+}  // namespace
+
+TextReader reader_for(Communicator& ranks) {
+  return [&ranks](const std::filesystem::path& file) -> std::optional<std::string> {
+    auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
+    if (text) text->push_back('.');  // it can be read, and may be empty
+    const auto bytes = std::as_bytes(std::span(text ? std::string_view(*text) : std::string_view()));
+    const Bytes received = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
+    if (received.empty()) return {};
+    return std::string(reinterpret_cast<const char*>(received.data()), received.size() - 1);
+  };
+}
+
+StateReader Resumed::reader() const {
+  return [this](const std::string& name) {
+    const auto later = at_the_end.find(name);
+    return later == at_the_end.end() ? checkpoint->read(name) : later->second;
+  };
+}
+
+Resumed find_run(const std::filesystem::path& directory, bool take_over, Communicator& ranks) {
+  Resumed found;
+  found.directory = directory;
+  if (ranks.rank() == 0) {
+    if (std::filesystem::is_directory(directory)) found.lock = std::make_unique<DirectoryLock>(directory, take_over);
+    found.checkpoint.emplace(last_checkpoint(directory, found.warning));
+    // The next checkpoint takes the place of one that is damaged, not of the one that is good.
+    if (const auto last = directory / run_file::checkpoint; found.checkpoint->file() != last)
+      std::filesystem::rename(found.checkpoint->file(), last);
+  }
+  share_head(found, ranks);
+  return found;
+}
+
+Resumed find_state(const std::filesystem::path& checkpoint, const std::filesystem::path& output, Communicator& ranks) {
+  namespace fs = std::filesystem;
+  Resumed found;
+  std::string file;
+  if (ranks.rank() == 0) {
+    if (fs::is_directory(checkpoint))
+      found.checkpoint.emplace(last_checkpoint(checkpoint, found.warning));
+    else
+      found.checkpoint.emplace(checkpoint);
+    const fs::path place = fs::absolute(found.checkpoint->file()).lexically_normal();
+    std::error_code ignored;
+    if (fs::equivalent(place.parent_path(), output, ignored))
+      throw Error(
+          Failure::deck,
+          "-o " + output.string() + ": this is the directory of the run to branch off; give the branch one of its own");
+    file = place.string();
+  }
+  share_head(found, ranks);
+  Archive out;
+  out(file);
+  Archive(std::move(ranks.gather(out.bytes())[0]))(file);
+  found.head.branched_from = file;
+  found.directory = fs::path(file).parent_path();
+  return found;
+}
+
+Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks) {
+  const auto file = from.directory / run_file::deck;
+  const TextReader others = reader_for(ranks);
+  const TextReader reader = [&](const std::filesystem::path& path) {
+    // Positions are in the checkpoint: their file may be gone.
+    return path == file ? from.head.deck : others(path).value_or("");
+  };
+  Deck deck;
+  if (options.branch) {
+    from.of = read_deck(file, {}, reader);
+    deck = read_branch(*from.of, options.set, reader, from.same_motion);
+    set_output_directory(deck, *options.output);
+  } else {
+    const auto other = std::ranges::find_if_not(options.set, [](const auto& set) { return set.starts_with("run."); });
+    if (other != options.set.end()) {
+      std::string branch = "carom branch " + quoted(from.directory.string());
+      for (const std::string& set : options.set) branch += " --set " + quoted(set);
+      throw Error(Failure::deck, "--set " + *other +
+                                     ": a run that is continued keeps its deck; only its end may be set anew "
+                                     "(run.steps, run.end_time, run.collisions); to start a new run from its last "
+                                     "checkpoint with another deck: " +
+                                     branch + " -o " + quoted(from.directory.lexically_normal().string() + "-branch"));
+    }
+    deck = read_deck(file, options.set, reader);
+    set_output_directory(deck, from.directory);
+    deck.warnings = from.head.warnings;
+  }
+  deck.file = from.head.deck_file;
+  return deck;
+}
+
+template <int D>
+Simulation<D> simulation_of(Deck& deck, Communicator& ranks, Resumed* from) {
+  std::optional<GivenState> given;
+  if (from) {
+    if (from->is_branch() && from->in_epoch) end_epoch<D>(*from, ranks);
+    if (from->is_branch()) check_end(deck, from->head);
+    given = {from->reader(), from->head.bonds, from->is_branch()};
+  }
+  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, given ? &*given : nullptr);
+  const IntegratorInfo& info = find_integrator(deck.integrator);
+  return Simulation<D>(std::move(system), info, info.make<D>(deck.integrator_parameters), deck.plan);
+}
+
+template <int D>
+void set_hooks(const Resumed& from, const Deck& deck, Simulation<D>& simulation, typename Simulation<D>::Hooks& hooks) {
+  if (from.is_continued() || from.same_motion)
+    hooks.restore = [&from, &simulation] { restore_state(simulation.system(), from.reader()); };
+  if (from.is_continued()) return;
+  const StepCount start{from.head.step, from.head.time}, &count = from.count;
+  const bool counted = deck.plan.step == from.of->plan.step &&
+                       start.time == count.time + static_cast<double>(start.steps - count.steps) * deck.plan.step;
+  hooks.branch = {start, counted ? count : start};
+}
+
+template Simulation<2> simulation_of(Deck&, Communicator&, Resumed*);
+template Simulation<3> simulation_of(Deck&, Communicator&, Resumed*);
+template void set_hooks(const Resumed&, const Deck&, Simulation<2>&, Simulation<2>::Hooks&);
+template void set_hooks(const Resumed&, const Deck&, Simulation<3>&, Simulation<3>::Hooks&);
+
+}  // namespace carom

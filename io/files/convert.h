@@ -1,0 +1,40 @@
+#pragma once
+// Frames of a trajectory in the formats of other programs.
+//
+// In each of them numbers are those of the trajectory, in the fewest digits that give them back; GSD has single
+// precision and its origin in the middle of the box.
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/files/text_file.h"
+#include "io/files/trajectory_reader.h"
+
+namespace carom {
+
+struct ExportFormat {
+  std::string_view name;       ///< as the command takes it
+  std::string_view extension;  ///< of the file
+  bool one_frame;              ///< holds a single frame only
+  /// Writes the frames (indices, at least one) to `out`, which will have the name `file`; returns what to say about it,
+  /// or nothing. Throws Error(Failure::file).
+  std::string (*write)(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
+                       const std::filesystem::path& file);
+};
+
+/// All formats.
+std::span<const ExportFormat> export_formats();
+
+std::string write_extxyz(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
+                         const std::filesystem::path& file);
+std::string write_gsd(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
+                      const std::filesystem::path& file);
+std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
+                              const std::filesystem::path& file);
+std::string write_xdmf(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
+                       const std::filesystem::path& file);
+
+}  // namespace carom

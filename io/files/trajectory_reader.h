@@ -1,0 +1,52 @@
+#pragma once
+// A trajectory (h5md.h), read frame by frame.
+//
+//   TrajectoryReader trajectory("runs/five-springs");
+//   for (std::uint64_t f = 0; f < trajectory.frames(); ++f) use(trajectory.frame(f).position);
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "io/files/hdf5.h"
+
+namespace carom {
+
+/// Vectors have three columns in any dimension, particle by particle in the order of ids.
+struct TrajectoryFrame {
+  double time = 0;
+  std::int64_t step = 0;
+  std::array<double, 3> edges{};           ///< in two dimensions 1 along z
+  std::vector<double> position, velocity;  ///< positions wrapped into the box
+  std::vector<std::int32_t> image;
+};
+
+class TrajectoryReader {
+ public:
+  /// `path`: the file, or the directory of its run. Throws Error(Failure::file) for anything else than a trajectory.
+  explicit TrajectoryReader(const std::filesystem::path& path);
+
+  const std::filesystem::path& path() const { return file_.path(); }
+  std::size_t particles() const { return species.size(); }
+  std::uint64_t frames() const { return frames_; }
+  double time(std::uint64_t index) const;
+  /// Throws Error(Failure::file).
+  TrajectoryFrame frame(std::uint64_t index) const;
+
+  int dimension = 3;
+  std::string title;
+  std::vector<std::string> boundary;       ///< for each of `dimension` axes: wall, periodic or open
+  std::vector<std::string> species_names;  ///< at least one
+  std::vector<std::int32_t> species;       ///< of each particle: index of its name
+  std::vector<double> mass, radius, charge;
+  std::vector<std::array<std::uint32_t, 2>> bonds;  ///< ids, which count from 0
+
+ private:
+  [[noreturn]] void damaged(const std::string& what) const;
+  hdf5::File file_;
+  std::uint64_t frames_ = 0;
+};
+
+}  // namespace carom

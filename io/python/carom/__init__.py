@@ -1,0 +1,31 @@
+"""Carom from Python: event-driven molecular dynamics of hard spheres with smooth forces.
+
+    import carom
+    sim = carom.Simulation(box=[12, 6], boundary="wall")
+    sim.add_particles(position=x, velocity=v, radius=0.5)      # numpy arrays of shape (N, D)
+    sim.add_force("harmonic-bond", pairs=[[0, 1], [1, 2]], stiffness=1.0, rest_length=2.0)
+    sim.integrator("edda", step=0.01)
+    sim.run(time=50, every=0.1, callback=lambda s: print(s.time, s.energy_error))
+    run = carom.open("runs/five-springs")                      # what `carom run` has left
+
+Names, defaults and units are those of decks: carom.describe("edda"). Units are your own, k_B = 1. What goes wrong raises
+carom.Error, with a message that says what to do. `Simulation` and `describe` need the compiled part, `open` does not.
+"""
+
+from carom.errors import Error, FileError, InitialStateError, NumericalError, UsageError
+from carom.files import Run, open
+
+__all__ = ["Error", "FileError", "InitialStateError", "NumericalError", "Run", "Simulation", "UsageError", "describe",
+           "open", "version"]
+
+
+def __getattr__(name):
+    """The compiled part is loaded when it is first used."""
+    if name not in ("Simulation", "describe", "version"):
+        raise AttributeError(f"module 'carom' has no attribute '{name}'")
+    from carom import simulation
+    return getattr(simulation, name)
+
+
+def __dir__():
+    return __all__

@@ -1,0 +1,62 @@
+"""Decks as text."""
+
+import json
+import pathlib
+
+import numpy as np
+
+from carom.errors import FileError, UsageError
+
+
+def toml_text(deck):
+    """A deck given as a dictionary (as tomllib reads it) in TOML."""
+    lines = [f"{key} = {toml_value(value)}" for key, value in deck.items() if not _is_table(value)]
+    for key, value in deck.items():
+        if not _is_table(value):
+            continue
+        header = f"[[{key}]]" if isinstance(value, list) else f"[{key}]"
+        for table in value if isinstance(value, list) else [value]:
+            lines += ["", header] + [f"{name} = {toml_value(entry)}" for name, entry in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+def toml_value(value):
+    """One value; the digits of a number give it back."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + "}"
+    if isinstance(value, (bool, str)):
+        return json.dumps(value, ensure_ascii=False)  # a JSON string or boolean is one of TOML
+    return repr(value)
+
+
+def _is_table(value):
+    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
+
+
+def write_deck(sim, file, ends, every):
+    """The deck of Simulation.write_deck()."""
+    if not sim._session.method:
+        raise UsageError("write_deck: there is no integrator; call integrator(name, step=…) first")
+    if all(end is None for end in ends.values()):
+        raise UsageError("write_deck: the deck has no end; give time or steps")
+    kinds = sim.species
+    if np.any(np.diff(kinds.astype(int)) < 0):
+        raise UsageError("write_deck: the particles of a species do not follow one another, which a deck needs; add species "
+                         "after species")
+    columns = {name: getattr(sim, name) for name in ("position", "velocity", "radius", "mass", "charge")}
+    deck = {"format": 1, "title": sim.title, "system": {"dimension": len(sim.box), "box": sim.box, "boundary": sim.boundary},
+            "particles": [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
+                          for kind, name in enumerate(sim.species_names)]}
+    if sim._session.forces:
+        deck["interaction"] = [{"type": name} | given for name, given in sim._session.forces]
+    deck["integrator"] = {"type": sim._session.method} | sim._session.method_parameters
+    deck["run"] = {name: end for name, end in ends.items() if end is not None}
+    deck["output"] = {"frame_interval": float(every), "thermo_interval": float(every)}
+    try:
+        pathlib.Path(file).write_text(toml_text(deck))
+    except OSError as error:
+        raise FileError(f"{file}: cannot write the deck: {error.strerror}; check the path") from error

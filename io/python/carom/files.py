@@ -1,0 +1,276 @@
+"""What a run leaves in its directory, as arrays: thermo.csv, trajectory.h5md, events.h5, summary.json, deck.toml.
+
+Needs Debian's python3-h5py and python3-numpy, not the compiled part of the package. Everything is in the units of the deck.
+"""
+
+import builtins
+import collections.abc
+import contextlib
+import csv
+import fcntl
+import functools
+import json
+import os
+import pathlib
+import struct
+import tomllib
+import zlib
+
+import numpy as np
+
+from carom.errors import FileError
+
+TRAJECTORY = "trajectory.h5md"
+AVERAGES = ("rdf", "msd", "profile")
+
+
+@contextlib.contextmanager
+def reading(path):
+    """What goes wrong while a file is read becomes a FileError that names the file."""
+    try:
+        yield
+    except FileError:
+        raise
+    except BlockingIOError as error:
+        raise FileError(f"{path}: a process is writing this file; wait for its end, or copy the file") from error
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is not a text file") from error
+    except OSError as error:
+        raise FileError(f"{path}: {os.strerror(error.errno) if error.errno else error}") from error
+    except (KeyError, ValueError, IndexError, TypeError, RuntimeError, AttributeError) as error:
+        raise FileError(f"{path}: is not a file that Carom left there, or damaged: {error}") from error
+
+
+def open_hdf5(path):
+    """A file of HDF5, opened for reading; a flush that a kill has interrupted is completed first."""
+    import h5py
+
+    complete_flush(path)
+    return h5py.File(path, "r")
+
+
+def complete_flush(path):
+    """Writes what a complete journal beside the file holds to the file, and removes the journal (io/files/journal.h)."""
+    journal = pathlib.Path(f"{path}.journal")
+    if not journal.exists():
+        return
+    with builtins.open(path, "r+b") as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        data = journal.read_bytes()
+        magic, checksum, length, size = struct.unpack_from("<8sQQQ", data.ljust(32, b"\0"))
+        if magic == b"CAROMJ01" and 32 <= length <= len(data) and zlib.crc32(data[16:length]) == checksum:
+            at = 32
+            while at < length:
+                address, n = struct.unpack_from("<QQ", data, at)
+                file.seek(address)
+                file.write(data[at + 16:at + 16 + n])
+                at += 16 + n
+            file.truncate(size)
+            file.flush()
+            os.fsync(file.fileno())
+    journal.unlink()
+
+
+def read_summary(directory):
+    """summary.json as nested dictionaries: read_summary(d)["energy"]["final"]."""
+    path = pathlib.Path(directory) / "summary.json"
+    with reading(path):
+        return json.loads(path.read_text())
+
+
+def read_thermo(directory):
+    """thermo.csv as a dictionary of columns; an empty cell becomes NaN."""
+    return read_table(pathlib.Path(directory) / "thermo.csv")
+
+
+def read_table(path):
+    """A CSV file of a run (thermo.csv, rdf.csv, msd.csv) as a dictionary of columns; an empty cell becomes NaN."""
+    with reading(path), builtins.open(path, newline="") as file:
+        rows = list(csv.reader(line for line in file if line.endswith("\n")))  # a kill may have left a part of a row
+        values = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows[1:]])
+        values = values.reshape(len(rows) - 1, len(rows[0]))
+        return {name: values[:, column] for column, name in enumerate(rows[0])}
+
+
+def as_text(value):
+    """The text of a string of HDF5."""
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+class Trajectory:
+    """A trajectory.h5md, opened for reading; takes the file or the directory of its run.
+
+    Frames are numbered from 0; -1 is the last. Arrays have as many columns as the run had dimensions.
+    """
+
+    def __init__(self, path):
+        path = pathlib.Path(path)
+        self.path = path / TRAJECTORY if path.is_dir() else path
+        with reading(self.path):
+            self._open()
+
+    def _open(self):
+        self._file = open_hdf5(self.path)
+        self._group = self._file["particles/trajectory"]
+        self.dimension = int(self._file["parameters/dimension"][()])
+        self.step = self._group["position/step"][:]
+        self.time = self._group["position/time"][:]
+        self.radius = self._group["radius"][:]
+        self.mass = self._group["mass"][:]
+        self.species = self._group["species"][:]  # indices into species_names
+        self.title = as_text(self._file["parameters/title"][()])
+        self.species_names = [as_text(name) for name in self._file["parameters/species"][:]]
+        # Per axis: "wall", "periodic" or "open".
+        self.boundary = [as_text(rule) for rule in self._file["parameters/boundary"][:]]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._file.close()
+
+    def __len__(self):
+        return len(self.time)
+
+    @property
+    def charge(self):
+        with reading(self.path):
+            return self._group["charge"][:]
+
+    @property
+    def periodic(self):
+        return np.array([rule == "periodic" for rule in self.boundary])
+
+    def position(self, frame):
+        """Centres, wrapped into the box along its periodic axes [length]."""
+        return self._read("position", frame)
+
+    def velocity(self, frame):
+        return self._read("velocity", frame)
+
+    def image(self, frame):
+        """How many times each particle has been carried round each periodic axis."""
+        return self._read("image", frame)
+
+    def unwrapped(self, frame):
+        """Centres, followed through the periodic boundaries [length]."""
+        return self.position(frame) + self._read("image", frame) * self.edges(frame)
+
+    def edges(self, frame=0):
+        """Edge lengths of the box [length]."""
+        with reading(self.path):
+            return np.diag(self._group["box/edges/value"][frame])[: self.dimension].copy()
+
+    def _read(self, name, frame):
+        with reading(self.path):
+            return self._group[name]["value"][frame][:, : self.dimension]
+
+
+class Frame:
+    """One frame of a trajectory; each array of shape (N, D) is read when it is asked for."""
+
+    def __init__(self, trajectory, number):
+        self._trajectory, self._number = trajectory, number
+        self.time, self.step = float(trajectory.time[number]), int(trajectory.step[number])
+
+    position = property(lambda self: self._trajectory.position(self._number), doc="Wrapped centres [length].")
+    velocity = property(lambda self: self._trajectory.velocity(self._number), doc="[length/time]")
+    image = property(lambda self: self._trajectory.image(self._number), doc="Turns round each periodic axis.")
+    unwrapped = property(lambda self: self._trajectory.unwrapped(self._number), doc="Centres, images undone [length].")
+    edges = property(lambda self: self._trajectory.edges(self._number), doc="Of the box [length].")
+
+    def __repr__(self):
+        return f"<frame {self._number} at time {self.time:.6g}>"
+
+
+class Frames(collections.abc.Sequence):
+    """The frames of a trajectory: frames[-1].position, frames[::10]."""
+
+    def __init__(self, trajectory):
+        self._trajectory = trajectory
+
+    def __len__(self):
+        return len(self._trajectory)
+
+    def __getitem__(self, number):
+        numbers = range(len(self))[number]  # IndexError beyond the last
+        if isinstance(number, slice):
+            return [Frame(self._trajectory, each) for each in numbers]
+        return Frame(self._trajectory, numbers)
+
+
+class Run:
+    """The directory of a run. Everything is read when it is first asked for, and kept, but for the frames."""
+
+    def __init__(self, directory):
+        self.directory = pathlib.Path(directory)
+        if not self.directory.is_dir():
+            raise FileError(f"{directory}: is not the directory of a run; check the path")
+        if not (self.directory / "deck.toml").exists():
+            raise FileError(f"{directory}: has no deck.toml; give the directory in which a run left its files")
+
+    def __repr__(self):
+        return f"<run in {self.directory}>"
+
+    @functools.cached_property
+    def summary(self):
+        """summary.json: the account of the run, nested dictionaries; ["energy"]["max_abs_error"]."""
+        return read_summary(self.directory)
+
+    @functools.cached_property
+    def deck(self):
+        """The resolved deck, nested dictionaries; ["integrator"]["step"]."""
+        path = self.directory / "deck.toml"
+        with reading(path):
+            return tomllib.loads(path.read_text())
+
+    @functools.cached_property
+    def thermo(self):
+        """thermo.csv, one array a column: time, step, collisions, kinetic, potential, total, …"""
+        return read_thermo(self.directory)
+
+    @functools.cached_property
+    def averages(self):
+        """The tables of averages that the run took, by name: ["rdf"]["r"]."""
+        files = {name: self.directory / f"{name}.csv" for name in AVERAGES}
+        return {name: read_table(path) for name, path in files.items() if path.exists()}
+
+    @functools.cached_property
+    def events(self):
+        """Every collision, one array a column (time, kind, lo, hi, …; io/files/events.h); None where it kept none."""
+        path = self.directory / "events.h5"
+        if not path.exists():
+            return None
+        with reading(path), open_hdf5(path) as file:
+            return {name: values[:] for name, values in file["events"].items() if hasattr(values, "shape")}
+
+    @functools.cached_property
+    def trajectory(self):
+        """The trajectory, open: mass, radius, charge, species, time of all frames, boundary."""
+        return Trajectory(self.directory)
+
+    @property
+    def frames(self):
+        """Its frames: frames[-1].position."""
+        return Frames(self.trajectory)
+
+    def universe(self):
+        """The trajectory as an MDAnalysis Universe, in the units of the deck, with masses, charges, radii, and species as
+        names and types. Two-dimensional runs have z = 0."""
+        import MDAnalysis
+
+        trajectory = self.trajectory
+        n = len(trajectory.mass)
+        universe = MDAnalysis.Universe.empty(n, trajectory=True)
+        names = [trajectory.species_names[kind - min(trajectory.species)] for kind in trajectory.species]
+        for name, values in (("names", names), ("types", names), ("masses", trajectory.mass),
+                             ("charges", trajectory.charge), ("radii", trajectory.radius)):
+            universe.add_TopologyAttr(name, values)
+        with reading(trajectory.path):
+            universe.load_new(str(trajectory.path), format="H5MD", convert_units=False)
+        return universe
+
+
+def open(directory):
+    """What a run has left in a directory: .thermo, .frames, .events, .summary, .deck, .averages, .universe()."""
+    return Run(directory)

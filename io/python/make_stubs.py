@@ -1,0 +1,111 @@
+"""Writes carom/__init__.pyi: the hints of the Python files, and a signature of add_force() and integrator() for each name.
+
+    PYTHONPATH=build/release/io/python python3 -P make_stubs.py __init__.pyi
+"""
+
+import inspect
+import pathlib
+import sys
+
+from carom import _carom, simulation
+
+HEAD = '''# Generated from the declarations of the engine by io/python/make_stubs.py.
+import os
+from typing import Any, Callable, Literal, Mapping, Sequence, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from carom.errors import Error as Error, FileError as FileError, InitialStateError as InitialStateError
+from carom.errors import NumericalError as NumericalError, UsageError as UsageError
+from carom.files import Run as Run, open as open
+
+version: str
+def describe(name: str | None = None) -> str: ...
+
+'''
+PATHS = "str | os.PathLike[str]"
+ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]", "position": "npt.ArrayLike",
+             "velocity": "npt.ArrayLike | None", "radius": "npt.ArrayLike", "mass": "npt.ArrayLike",
+             "charge": "npt.ArrayLike", "species": "str", "deck": PATHS, "file": PATHS, "set": "Mapping[str, Any] | None",
+             "time": "float | None", "steps": "int | None", "collisions": "int | None", "every": "float | None",
+             "callback": "Callable[[Simulation], object] | None", "progress": "bool | None"}
+RESULTS = {"__init__": "None", "from_deck": "Simulation", "add_particles": "range", "run": "None", "write_deck": "None", "__len__": "int",
+           "__repr__": "str"}
+PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np.float64]",
+              "image": "npt.NDArray[np.int32]", "unwrapped": "npt.NDArray[np.float64]", "mass": "npt.NDArray[np.float64]",
+              "radius": "npt.NDArray[np.float64]", "charge": "npt.NDArray[np.float64]",
+              "species": "npt.NDArray[np.uint16]", "momentum": "npt.NDArray[np.float64]", "species_names": "list[str]",
+              "box": "list[float]", "boundary": "list[str]", "step": "int", "collisions": "int"}
+VALUES = {"list[float]": "npt.ArrayLike", "list[str]": "Sequence[str]", "list[tuple[int, int]]": "npt.ArrayLike"}
+
+
+def text_of(doc, indent):
+    lines = inspect.cleandoc(doc or "").replace("\\", "\\\\").split("\n")
+    return [f'{indent}"""{lines[0]}'] + [indent + line if line else "" for line in lines[1:]] + [f'{indent}"""']
+
+
+def argument(parameter):
+    kind = " | ".join(f'"{choice}"' for choice in parameter["choices"])
+    kind = f"Literal[{kind.replace(' | ', ', ')}]" if kind and parameter["type"] == "str" else \
+        VALUES.get(parameter["type"], parameter["type"])
+    name = parameter["name"]
+    if parameter["default"] == "":
+        return f"{name}: {kind}"
+    if parameter["default"] == "none":
+        return f"{name}: {kind} | None = None"
+    return f"{name}: {kind} = {parameter['default'].replace('true', 'True').replace('false', 'False')}"
+
+
+def overloads(method, declared):
+    for one in declared:
+        parameters = sorted(one["parameters"], key=lambda each: each["default"] != "")
+        keywords = "".join(", " + argument(each) for each in parameters)
+        yield "    @overload"
+        yield f"    def {method}(self, type: Literal[\"{one['name']}\"]{', *' if keywords else ''}{keywords}) -> None:"
+        yield from text_of(simulation.describe(one["name"]), "        ")
+
+
+def signature(name, member):
+    parts = []
+    for each in inspect.signature(member).parameters.values():
+        part = each.name + (f": {ARGUMENTS[each.name]}" if each.name not in ("self", "cls") else "")
+        parts.append(part if each.default is each.empty else f"{part} = {each.default!r}")
+    return f"    def {name}({', '.join(parts)}) -> {RESULTS[name]}:"
+
+
+def lines():
+    declared = _carom.descriptors()
+    names = ", ".join(f'"{one["name"]}"' for one in declared["boundaries"])
+    yield f"Boundary = Literal[{names}]"
+    yield ""
+    yield "class Simulation:"
+    yield from text_of(simulation.Simulation.__doc__, "    ")
+    yield "    title: str"
+    yield "    warnings: list[str]"
+    for name, member in vars(simulation.Simulation).items():
+        if isinstance(member, property):
+            kind = PROPERTIES.get(name, "float")
+            yield "    @property"
+            yield f"    def {name}(self) -> {kind}:"
+            yield from text_of(member.__doc__, "        ")
+            if member.fset:
+                yield f"    @{name}.setter"
+                yield f"    def {name}(self, values: npt.ArrayLike) -> None: ..."
+        elif name in ("add_force", "integrator"):
+            yield from overloads(name, declared["forces" if name == "add_force" else "integrators"])
+        elif name in RESULTS:
+            if isinstance(member, classmethod):
+                yield "    @classmethod"
+                yield signature(name, member.__func__)
+            else:
+                yield signature(name, member)
+            yield from text_of(inspect.unwrap(member).__doc__ if member.__doc__ else "", "        ")
+
+
+def main():
+    pathlib.Path(sys.argv[1]).write_text(HEAD + "\n".join(lines()) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,252 @@
+// carom._carom: sessions of two and three dimensions, and the declarations of what they can be given. The package in
+// carom/ makes the interface of it.
+
+#include <pybind11/functional.h>
+#include <pybind11/stl.h>
+
+#include <chrono>
+
+#include "engine/base/boundary.h"
+#include "io/files/version.h"
+#include "io/python/session.h"
+#include "io/python/values.h"
+
+namespace carom::python {
+namespace {
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+std::span<const double> span_of(const Array& array) { return {array.data(), static_cast<std::size_t>(array.size())}; }
+
+/// A view of numbers that `owner` keeps, read-only: of so many columns, or 0 for one axis.
+template <class T>
+py::array view(const void* data, std::size_t rows, int columns, const py::object& owner) {
+  std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(rows)};
+  if (columns > 0) shape.push_back(columns);
+  py::array array(py::dtype::of<T>(), shape, data, owner);
+  array.attr("setflags")(py::arg("write") = false);
+  return array;
+}
+
+Plan plan_of(const py::dict& ends, double every) {
+  using enum Parameter::Type;
+  using enum Parameter::Range;
+  static const std::vector<Parameter> declared = {
+      {"time", real, "none", "time", "simulated time at which the run ends", positive},
+      {"steps", integer, "none", "-", "number of steps after which the run ends", positive},
+      {"collisions", integer, "none", "-", "number of pair collisions after which the run ends", positive},
+      {"every", real, "none", "time", "time between two calls of the callback", positive}};
+  const Parameters given = completed("run", declared, parameters_of("run", declared, ends));
+  Plan plan{.frame_interval = every, .thermo_interval = every};
+  if (given.has("time")) plan.end_time = given.real("time");
+  if (given.has("steps")) plan.steps = given.integer("steps");
+  if (given.has("collisions")) plan.collisions = static_cast<std::uint64_t>(given.integer("collisions"));
+  if (given.has("every")) plan.frame_interval = plan.thermo_interval = given.real("every");
+  return plan;
+}
+
+/// A run for Python: its signals and callbacks. A callback that raises ends the run at the end of the step.
+template <int D>
+void run(Session<D>& session, const Plan& plan, const py::object& callback, const py::object& progress) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::milliseconds kBetweenLooks(50);
+  std::optional<py::error_already_set> raised;
+  const auto in_python = [&](auto&& action) {
+    const py::gil_scoped_acquire gil;
+    try {
+      if (!raised) action();
+    } catch (py::error_already_set& error) {
+      raised.emplace(error);
+    }
+  };
+  auto last_look = Clock::now();
+  RunHooks hooks;
+  hooks.stop = [&](const Statistics& statistics) {
+    if (raised) return true;
+    if (const auto now = Clock::now(); now - last_look >= kBetweenLooks) {
+      last_look = now;
+      in_python([&] {
+        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+        if (!progress.is_none()) progress(statistics.fraction_done, statistics.end_time);
+      });
+    }
+    return raised.has_value();
+  };
+  if (!callback.is_none()) hooks.show = [&] { in_python([&] { callback(); }); };
+  {
+    const py::gil_scoped_release release;
+    session.run(plan, hooks);
+  }
+  if (raised) throw std::move(*raised);
+}
+
+template <int D>
+void bind(py::module_& module, const char* name) {
+  using S = Session<D>;
+  const auto number = [](double (*get)(S&)) { return [get](S& session) { return get(session); }; };
+  py::class_<S>(module, name)
+      .def(py::init([](const std::vector<double>& edges, const std::vector<std::string>& boundary) {
+        return std::make_unique<S>(edges, boundary);
+      }))
+      .def("add_particles",
+           [](S& session, const Array& x, const Array& v, const Array& radius, const Array& mass, const Array& charge,
+              const std::string& species) {
+             session.add_particles({.x = span_of(x),
+                                    .v = span_of(v),
+                                    .radius = span_of(radius),
+                                    .mass = span_of(mass),
+                                    .charge = span_of(charge),
+                                    .species = species});
+           })
+      .def("set_position", [](S& session, const Array& x) { session.set_position(span_of(x)); })
+      .def("set_velocity", [](S& session, const Array& v) { session.set_velocity(span_of(v)); })
+      .def("add_force",
+           [](S& session, const std::string& type, const py::dict& given) {
+             const InteractionInfo& info = find_interaction(type);
+             session.add_force(type, parameters_of(info.name, info.parameters, given));
+           })
+      .def("set_integrator",
+           [](S& session, const std::string& type, const py::dict& given) {
+             const IntegratorInfo& info = find_integrator(type);
+             session.set_integrator(type, parameters_of(info.name, info.parameters, given));
+           })
+      .def("run",
+           [](S& session, const py::dict& ends, const py::object& callback, const py::object& progress) {
+             Plan plan = plan_of(ends, session.plan().thermo_interval);
+             if (!plan.end_time && !plan.steps && !plan.collisions) {
+               plan.end_time = session.plan().end_time;
+               plan.steps = session.plan().steps;
+               plan.collisions = session.plan().collisions;
+             }
+             run(session, plan, callback, progress);
+           })
+      .def("position",
+           [](const py::object& self) {
+             const auto x = self.cast<S&>().position();
+             return view<double>(x.data(), x.size(), D, self);
+           })
+      .def("velocity",
+           [](const py::object& self) {
+             const auto v = self.cast<S&>().velocity();
+             return view<double>(v.data(), v.size(), D, self);
+           })
+      .def("image",
+           [](const py::object& self) {
+             const auto image = self.cast<S&>().image();
+             return view<std::int32_t>(image.data(), image.size(), D, self);
+           })
+      .def("constant",
+           [](const py::object& self, const std::string& which) -> py::array {
+             const Particles<D>& p = self.cast<S&>().constants();
+             const std::size_t n = p.mass.size();
+             if (which == "species") return view<std::uint16_t>(p.species.data(), n, 0, self);
+             const auto& values = which == "mass" ? p.mass : which == "radius" ? p.radius : p.charge;
+             return view<double>(values.data(), n, 0, self);
+           })
+      .def_property_readonly("time", number([](S& s) { return s.shot().time; }))
+      .def_property_readonly("kinetic", number([](S& s) { return s.shot().kinetic; }))
+      .def_property_readonly("potential", number([](S& s) { return s.shot().potential; }))
+      .def_property_readonly("energy", number([](S& s) { return s.shot().total(); }))
+      .def_property_readonly("shadow", number([](S& s) { return s.shot().shadow; }))
+      .def_property_readonly("temperature", number([](S& s) { return s.shot().temperature; }))
+      .def_property_readonly("pressure", number([](S& s) { return s.shot().pressure; }))
+      .def_property_readonly("energy_error", number([](S& s) {
+                               const double scale = s.statistics().energy_reference;
+                               return scale > 0 ? s.shot().max_energy_error / scale : 0.0;
+                             }))
+      .def_property_readonly("momentum",
+                             [](S& s) {
+                               const Vec<D>& p = s.shot().momentum;
+                               return std::vector<double>(p.begin(), p.end());
+                             })
+      .def_property_readonly("step", [](S& s) { return s.shot().step; })
+      .def_property_readonly("collisions", [](S& s) { return s.shot().collisions; })
+      .def_property_readonly("force_passes", number([](S& s) { return s.statistics().force_passes; }))
+      .def_property_readonly("wall_seconds", number([](S& s) { return s.statistics().wall_seconds; }))
+      .def_property_readonly("interval", [](const S& s) { return s.plan().thermo_interval; })
+      .def_property_readonly("size", &S::size)
+      .def_property_readonly("species", &S::species)
+      .def_property_readonly("method",
+                             [](const S& s) { return std::string(s.integrator() ? s.integrator()->name : ""); })
+      .def_property_readonly("method_parameters", [](const S& s) { return values_of(s.integrator_parameters()); })
+      .def_property_readonly("forces",
+                             [](const S& s) {
+                               py::list all;
+                               for (const Force& force : s.forces())
+                                 all.append(py::make_tuple(force.info->name, values_of(force.parameters)));
+                               return all;
+                             })
+      .def_property_readonly("box",
+                             [](const S& s) {
+                               const Vec<D>& edges = s.box().edges;
+                               return std::vector<double>(edges.begin(), edges.end());
+                             })
+      .def_property_readonly("boundary", [](const S& s) {
+        std::vector<std::string> names;
+        for (const Boundary each : s.box().boundary) names.emplace_back(find_boundary(each).name);
+        return names;
+      });
+}
+
+/// The deck's simulation, and its warnings.
+py::tuple from_deck(const std::string& file, const std::vector<std::string>& set) {
+  Deck deck = read_deck(file, set);
+  py::object session;
+  if (deck.dimension == 2)
+    session = py::cast(std::make_unique<Session<2>>(deck));
+  else
+    session = py::cast(std::make_unique<Session<3>>(deck));
+  return py::make_tuple(session, deck.warnings, deck.title);
+}
+
+py::dict descriptors() {
+  py::list methods, terms, rules;
+  for (const IntegratorInfo& info : integrators()) {
+    py::dict one;
+    one["name"] = info.name, one["title"] = info.title, one["documentation"] = info.documentation;
+    one["order"] = info.order, one["conserves"] = info.conserves, one["source"] = info.source;
+    one["parameters"] = described(info.parameters);
+    methods.append(one);
+  }
+  for (const InteractionInfo& info : interactions()) {
+    py::dict one;
+    one["name"] = info.name, one["formula"] = info.formula, one["documentation"] = info.documentation;
+    one["source"] = info.source, one["parameters"] = described(info.parameters);
+    terms.append(one);
+  }
+  for (const BoundaryInfo& info : boundaries()) {
+    py::dict one;
+    one["name"] = info.name, one["meaning"] = info.meaning;
+    rules.append(one);
+  }
+  py::dict all;
+  all["integrators"] = methods, all["forces"] = terms, all["boundaries"] = rules;
+  return all;
+}
+
+/// Raises the class of carom.errors that belongs to the failure, with the same text.
+void raise(const Error& error) {
+  const py::object errors = py::module_::import("carom.errors");
+  const py::object type = errors.attr("of_exit_code")(error.exit_code());
+  PyErr_SetObject(type.ptr(), py::str(error.what()).ptr());
+}
+
+}  // namespace
+}  // namespace carom::python
+
+PYBIND11_MODULE(_carom, module) {
+  using namespace carom::python;
+  // pybind11 wants it by value. NOLINTNEXTLINE(performance-unnecessary-value-param)
+  py::register_exception_translator([](std::exception_ptr pointer) {
+    try {
+      if (pointer) std::rethrow_exception(pointer);
+    } catch (const carom::Error& error) {
+      raise(error);
+    }
+  });
+  bind<2>(module, "Session2");
+  bind<3>(module, "Session3");
+  module.def("from_deck", from_deck);
+  module.def("descriptors", descriptors);
+  module.attr("version") = carom::version_string();
+}

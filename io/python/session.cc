@@ -1,0 +1,392 @@
+#include "io/python/session.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/forces/add_interaction.h"
+#include "engine/forces/forces.h"
+#include "engine/run/state.h"
+#include "engine/setup/epoch.h"
+#include "io/deck/deck_source.h"
+
+namespace carom::python {
+namespace {
+
+[[noreturn]] void refuse(const std::string& what_and_remedy) { throw Error(Failure::deck, what_and_remedy); }
+
+/// One value for all, or one each.
+double value_of(std::span<const double> values, std::size_t i, double fallback) {
+  return values.empty() ? fallback : values[values.size() == 1 ? 0 : i];
+}
+
+template <int D>
+Vec<D> vector_at(std::span<const double> values, std::size_t i) {
+  return Eigen::Map<const Vec<D>>(values.data() + i * D);
+}
+
+/// Gives a term the bonds that it has found, to be the same whenever it is made again.
+template <int D>
+void take_found_bonds(Force& force, const Interaction<D>& term) {
+  if (!force.parameters.has("within") || term.bonds() == nullptr) return;
+  force.parameters.erase("within");
+  force.parameters.set("pairs", *term.bonds());
+}
+
+}  // namespace
+
+/// Shows the session what the run shows.
+template <int D>
+class Session<D>::Shown : public Observer<D> {
+ public:
+  Shown(Session& session, const RunHooks& hooks) : session_(session), hooks_(hooks) {}
+  void thermo(const Snapshot<D>& shot) override { session_.show(shot, hooks_); }
+
+ private:
+  Session& session_;
+  const RunHooks& hooks_;
+};
+
+template <int D>
+Session<D>::Session(std::span<const double> edges, const std::vector<std::string>& boundary) {
+  for (int k = 0; k < D; ++k) box_.edges[k] = edges[k];
+  for (int k = 0; k < D; ++k) box_.boundary[k] = find_boundary(boundary[boundary.size() == 1 ? 0 : k]).boundary;
+  system_->species.clear();
+  system_->box = box_;
+  system_->check();
+}
+
+template <int D>
+Session<D>::Session(Deck& deck) {
+  system_ = build_system<D>(deck);
+  plan_ = deck.plan;
+  box_ = system_->box;
+  species_ = system_->species;
+  size_ = system_->size();
+  integrator_ = &find_integrator(deck.integrator);
+  parameters_ = deck.integrator_parameters;
+  std::size_t found = 0;
+  const auto bonds = found_bonds(deck, *system_);
+  for (const InteractionConfig& config : deck.source->interactions) {
+    forces_.push_back({config.info, config.parameters});
+    if (!config.parameters.has("within")) continue;
+    forces_.back().parameters.erase("within");
+    forces_.back().parameters.set("pairs", bonds[found++]);
+  }
+}
+
+/// To be called before anything is changed.
+template <int D>
+void Session<D>::change(const char* what) {
+  if (running_) refuse("a run is going on; " + std::string(what) + " before it or after it");
+  state_.clear();
+  failure_.clear();
+  shot_.reset();
+  statistics_ = {};
+  shown_until_ = -1;
+}
+
+template <int D>
+void Session<D>::add_particles(const Columns& columns) {
+  change("add particles");
+  Particles<D>& all = system_->particles;
+  const std::size_t before = size_, added = columns.x.size() / D, kinds = species_.size();
+  const auto at = std::ranges::find(species_, columns.species);
+  const auto kind = static_cast<std::uint16_t>(at - species_.begin());
+  if (kind == kinds) species_.push_back(columns.species);
+  system_->species = species_;
+  bool viewed = std::exchange(constants_viewed_, false);
+  each_moving([&](auto, auto& kept) { viewed = std::exchange(kept.viewed, false) || viewed; });
+  if (viewed) {  // views go on to show what they showed
+    Particles<D> old = all;
+    std::swap(old, all);
+    retired_.push_back(std::move(old));
+  }
+  const auto resize = [&](std::size_t n) {
+    all.x.resize(n), all.v.resize(n), all.image.resize(n);
+    all.mass.resize(n), all.radius.resize(n), all.charge.resize(n), all.species.resize(n);
+    size_ = n;
+  };
+  try {
+    resize(before + added);
+    const Particle<D> fallback{.x = Vec<D>::Zero()};
+    for (std::size_t i = 0; i < added; ++i) {
+      const std::size_t id = before + i;
+      all.x[id] = vector_at<D>(columns.x, i);
+      all.v[id] = columns.v.empty() ? fallback.v : vector_at<D>(columns.v, i);
+      all.image[id] = {};
+      all.mass[id] = value_of(columns.mass, i, fallback.mass);
+      all.radius[id] = value_of(columns.radius, i, fallback.radius);
+      all.charge[id] = value_of(columns.charge, i, fallback.charge);
+      all.species[id] = kind;
+    }
+    system_->check();
+    system_->wrap();
+    make_forces(*system_);
+    forces_made_ = true;
+  } catch (...) {
+    resize(before);
+    species_.resize(kinds);
+    system_->species = species_;
+    forces_made_ = false;
+    throw;
+  }
+}
+
+template <int D>
+void Session<D>::set_position(std::span<const double> x) {
+  set(&Particles<D>::x, x, "positions");
+  std::ranges::fill(system_->particles.image, Image<D>{});
+  system_->wrap();
+}
+
+template <int D>
+void Session<D>::set_velocity(std::span<const double> v) {
+  set(&Particles<D>::v, v, "velocities");
+}
+
+template <int D>
+void Session<D>::set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what) {
+  change(("set " + std::string(what)).c_str());
+  for (std::size_t i = 0; i < size_; ++i)
+    if (!vector_at<D>(values, i).allFinite())
+      throw Error(Failure::initial_state, std::string(what) + ": those of particle " + std::to_string(i) +
+                                              " are not finite; give finite numbers");
+  for (std::size_t i = 0; i < size_; ++i) (system_->particles.*member)[i] = vector_at<D>(values, i);
+}
+
+/// Makes the terms of V for the particles there are: bonds first, which other terms may leave out.
+template <int D>
+void Session<D>::make_forces(System<D>& system) {
+  system.interactions.clear();
+  system.quanta = {};
+  for (const bool bonded : {true, false})
+    for (Force& force : forces_) {
+      if ((force.info->kind == InteractionInfo::Kind::bonded) != bonded) continue;
+      add_interaction(system, *force.info, force.parameters);
+      take_found_bonds(force, *system.interactions.back());
+    }
+}
+
+template <int D>
+void Session<D>::add_force(std::string_view type, Parameters given) {
+  const InteractionInfo& info = find_interaction(type);
+  Parameters complete = completed(info.name, info.parameters, std::move(given));
+  if (size_ == 0) refuse(std::string(type) + ": there are no particles yet; call add_particles() first");
+  change("add forces");
+  forces_.push_back({&info, std::move(complete)});
+  try {
+    make_forces(*system_);
+    forces_made_ = true;
+  } catch (...) {
+    forces_.pop_back();
+    forces_made_ = false;
+    throw;
+  }
+}
+
+template <int D>
+void Session<D>::set_integrator(std::string_view name, Parameters given) {
+  const IntegratorInfo& info = find_integrator(name);
+  Parameters complete = completed(info.name, info.parameters, std::move(given));
+  change("choose the integrator");
+  integrator_ = &info;
+  parameters_ = std::move(complete);
+}
+
+/// Whether the state that a run would go on from is at this end already.
+template <int D>
+bool Session<D>::reached(const Plan& plan) const {
+  const Statistics& s = statistics_;
+  return (plan.steps && s.steps >= *plan.steps) || (plan.end_time && s.end_time >= *plan.end_time - 1e-9 * step_) ||
+         (plan.collisions && s.counters.sphere_sphere >= *plan.collisions);
+}
+
+/// A part of the saved state, with what is due next where the interval is another than before.
+template <int D>
+Bytes Session<D>::saved(const std::string& name, double interval) const {
+  if ((name != "next frame" && name != "next row") || interval == interval_ || interval == 0) return state_.at(name);
+  auto next = static_cast<std::int64_t>(std::floor((state_time_ + 1e-9 * step_) / interval)) + 1;
+  Archive out;
+  out(next);
+  return out.bytes();
+}
+
+/// Throws what a run would that begins with this state. Done on a copy: where a constructor of runs throws, its system
+/// goes, and views of it would hang in the air.
+template <int D>
+void Session<D>::try_out(const Parameters& parameters, const Plan& plan) {
+  auto copy = std::make_unique<System<D>>();
+  copy->box = box_;
+  copy->species = species_;
+  copy->particles = system_->particles;
+  make_forces(*copy);
+  Simulation<D>(std::move(copy), *integrator_, parameters, plan);
+}
+
+template <int D>
+void Session<D>::run(Plan plan, const RunHooks& hooks) {
+  if (running_) refuse("a run is going on; wait for its end");
+  if (integrator_ == nullptr) refuse("there is no integrator; call integrator(name, step=…) first");
+  if (size_ == 0) refuse("there are no particles; call add_particles() first");
+  if (!failure_.empty())
+    refuse("the last run has failed (" + failure_ + "); give positions, velocities or an integrator to start anew");
+  const bool begun = shown_until_ >= 0;
+  if (begun && reached(plan))
+    refuse("the run is at time " + short_text(statistics_.end_time) + ", step " + std::to_string(statistics_.steps) +
+           " already; give a later end, or change something to start anew");
+  if (begun && state_.empty())
+    refuse("a run that a number of collisions has ended within an epoch cannot go on; give a time instead");
+  if (!forces_made_) make_forces(*system_);
+  forces_made_ = true;
+  Parameters parameters = parameters_;
+  if (!begun) step_ = parameters.has("step") ? parameters.real("step") : default_epoch(*system_);
+  parameters.set("step", step_);
+  const double interval = plan.thermo_interval;
+
+  if (!begun) try_out(parameters, plan);
+  parameters = completed(integrator_->name, integrator_->parameters, std::move(parameters));
+  plan.step = step_;
+  Simulation<D> run(std::move(system_), *integrator_, integrator_->make<D>(parameters), plan);
+  Shown shown(*this, hooks);
+  run.add(shown);
+  at_work_ = &run.system();
+  live_ = &run.statistics();
+  each_moving([&](auto of, auto& kept) {
+    if (!kept.viewed) return;
+    kept.values = at_work_->particles.*of;
+    kept.values.swap(at_work_->particles.*of);
+  });
+  running_ = true;
+  std::map<std::string, Bytes> state;
+  typename Simulation<D>::Hooks inner;
+  inner.should_stop = [&] {
+    const bool stop = hooks.stop && hooks.stop(run.statistics());
+    if (stop || run.is_last_on_the_way()) {
+      state.clear();
+      save_state(*at_work_, into(state));
+      state_time_ = run.statistics().end_time;
+    }
+    return stop;
+  };
+  if (begun)
+    inner.restore = [&] {
+      restore_state(*at_work_, [&](const std::string& name) { return saved(name, interval); });
+      state_.clear();
+    };
+  const auto end = [&] {
+    statistics_ = *std::exchange(live_, nullptr);
+    shown_until_ = std::max(shown_until_, statistics_.end_time);
+    if (shot_) shot_->particles = nullptr;
+    rest(std::move(at_work_->particles));
+  };
+  try {
+    run.run(inner);
+  } catch (const std::exception& e) {
+    failure_ = e.what();
+    end();
+    throw;
+  }
+  end();
+  state_ = std::move(state);
+  interval_ = interval;
+}
+
+/// The system as it is between runs.
+template <int D>
+void Session<D>::rest(Particles<D> particles) {
+  for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // where free flight has failed
+  each_moving([&](auto of, auto& kept) {                                                // views come home
+    if (kept.values.empty()) return;
+    kept.values = particles.*of;
+    kept.values.swap(particles.*of);
+    kept.values = {};
+  });
+  at_work_ = nullptr;
+  system_ = std::make_unique<System<D>>();
+  system_->box = box_;
+  system_->species = species_;
+  system_->particles = std::move(particles);
+  forces_made_ = forces_.empty();
+  running_ = false;
+}
+
+/// Calls action(member of Particles, Kept) for each array that a run changes.
+template <int D>
+void Session<D>::each_moving(auto&& action) {
+  action(&Particles<D>::x, kept_.x);
+  action(&Particles<D>::v, kept_.v);
+  action(&Particles<D>::image, kept_.image);
+}
+
+template <int D>
+void Session<D>::show(const Snapshot<D>& shot, const RunHooks& hooks) {
+  shot_ = shot;
+  each_moving([&](auto of, auto& kept) {
+    if (kept.viewed) kept.values = shot.particles->*of;
+  });
+  if (hooks.show && shot.time > shown_until_) hooks.show();
+  shot_->particles = nullptr;
+}
+
+/// An array of the particles as shown last.
+template <int D>
+template <class T>
+std::span<const T> Session<D>::moving(std::vector<T> Particles<D>::*of, Kept<T>& kept) {
+  if (running_ && kept.values.empty()) {
+    if (!shot_ || shot_->particles == nullptr)
+      refuse("a run is going on; look at the particles in its callback, or after it");
+    kept.values = shot_->particles->*of;
+  }
+  kept.viewed = true;
+  return running_ ? kept.values : system_->particles.*of;
+}
+
+template <int D>
+std::span<const Vec<D>> Session<D>::position() {
+  return moving(&Particles<D>::x, kept_.x);
+}
+
+template <int D>
+std::span<const Vec<D>> Session<D>::velocity() {
+  return moving(&Particles<D>::v, kept_.v);
+}
+
+template <int D>
+std::span<const Image<D>> Session<D>::image() {
+  return moving(&Particles<D>::image, kept_.image);
+}
+
+template <int D>
+const Particles<D>& Session<D>::constants() {
+  constants_viewed_ = true;
+  return running_ ? at_work_->particles : system_->particles;
+}
+
+template <int D>
+const Snapshot<D>& Session<D>::shot() {
+  if (shot_) return *shot_;
+  if (running_) refuse("a run is just beginning; look at it in its callback, or after it");
+  if (!forces_made_) make_forces(*system_);
+  forces_made_ = true;
+  System<D>& system = *system_;
+  system.quanta = quanta(system);
+  PotentialSums potential = evaluate_energy<D>(system, system.particles.x);
+  const MotionSums<D> motion = evaluate_motion(system, system.particles, system.particles);
+  Snapshot<D> shot;
+  shot.kinetic = motion.kinetic.value();
+  shot.potential = potential.energy.value();
+  double virial = 2 * shot.kinetic + potential.virial.value();
+  for (const auto& term : system.interactions) {
+    shot.potential += term->tail().energy;
+    virial += term->tail().virial;
+  }
+  for (int k = 0; k < D; ++k) shot.momentum[k] = motion.momentum[k].value();
+  if (size_ > 0) shot.temperature = 2 * shot.kinetic / (D * static_cast<double>(size_));
+  shot.pressure = virial / (D * box_.volume());
+  return shot_.emplace(shot);
+}
+
+template class Session<2>;
+template class Session<3>;
+
+}  // namespace carom::python

@@ -1,0 +1,205 @@
+#include "io/view/run_source.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <fstream>
+#include <span>
+
+#include "engine/base/error.h"
+#include "io/deck/deck.h"
+#include "io/files/directory_lock.h"
+#include "io/files/hdf5.h"
+#include "io/files/journal.h"
+#include "io/files/output_directory.h"
+
+namespace carom {
+
+namespace {
+
+using Json = nlohmann::json;
+
+static_assert(std::endian::native == std::endian::little);
+constexpr const char* kBinary = "application/octet-stream";
+constexpr const char* kText = "text/plain; charset=utf-8";
+const std::string kParticles = "/particles/trajectory";
+
+struct FileStatus {
+  bool exists = false;
+  std::string identity, version;  // which file; which state of it
+  std::uint64_t size = 0;
+};
+
+FileStatus status_of(const std::filesystem::path& path) {
+  struct stat s {};
+  if (::stat(path.c_str(), &s) != 0) return {};
+  const std::string identity = fmt::format("{}:{}", s.st_dev, s.st_ino);
+  return {true, identity, fmt::format("{}:{}:{}.{:09}", identity, s.st_size, s.st_mtim.tv_sec, s.st_mtim.tv_nsec),
+          static_cast<std::uint64_t>(s.st_size)};
+}
+
+template <class T>
+void append(std::string& bytes, std::span<const T> values) {
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+}
+
+std::optional<std::uint64_t> number_behind(std::string_view question, std::string_view prefix) {
+  std::uint64_t number = 0;
+  if (!question.starts_with(prefix)) return {};
+  question.remove_prefix(prefix.size());
+  const auto [end, error] = std::from_chars(question.data(), question.data() + question.size(), number);
+  if (question.empty() || error != std::errc{} || end != question.data() + question.size()) return {};
+  return number;
+}
+
+/// The whole rows of a table from a byte of it on.
+std::string rows_from(const std::filesystem::path& path, std::uint64_t first) {
+  constexpr std::size_t kMost = 4 << 20;
+  std::ifstream in(path, std::ios::binary);
+  std::string text(kMost, '\0');
+  in.seekg(static_cast<std::streamoff>(first));
+  in.read(text.data(), kMost);
+  text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount())));
+  text.resize(text.rfind('\n') + 1);
+  return text;
+}
+
+}  // namespace
+
+RunSource::RunSource(std::filesystem::path directory, bool awaited)
+    : directory_(std::move(directory)), trajectory_(directory_ / run_file::trajectory), awaited_(awaited) {
+  if (!awaited_ && !std::filesystem::exists(trajectory_))
+    throw Error(Failure::file, fmt::format("{}: has no {}; name the directory that `carom run` has written",
+                                           directory_.string(), run_file::trajectory));
+  if (!awaited_) look();
+}
+
+void RunSource::look() {
+  const FileStatus now = status_of(trajectory_);
+  if (!now.exists || now.version == seen_) return;
+  hdf5::read_between_flushes(trajectory_, [&] {
+    const auto file = hdf5::File::open_unlocked(trajectory_);
+    if (!hdf5::exists(file, kParticles + "/position/value") || !hdf5::exists(file, "/parameters/dimension"))
+      throw Error(Failure::file, trajectory_.string() + ": an HDF5 file, but no trajectory of carom");
+    frames_ = hdf5::shape(file, kParticles + "/position/step").at(0);
+    if (now.identity == identity_) return;
+    particles_ = hdf5::shape(file, kParticles + "/position/value").at(1);
+    head_ = {{"id", now.identity},
+             {"title", hdf5::text(file, "/parameters/title")},
+             {"integrator", hdf5::text(file, "/parameters/integrator")},
+             {"dimension", static_cast<int>(hdf5::number_at(file, "/parameters/dimension", 0))},
+             {"boundary", hdf5::texts(file, "/parameters/boundary")},
+             {"species", hdf5::texts(file, "/parameters/species")},
+             {"particles", particles_}};
+    counts_.clear();
+  });
+  seen_ = now.version;
+  identity_ = now.identity;
+}
+
+Json RunSource::state() {
+  // First whether it is at work: what a run has written before it ended is then seen, too.
+  const bool at_work = run_is_at_work(directory_);
+  look();
+  Json state = head_;
+  std::string status = at_work ? "running" : frames_ == 0 ? "awaited" : "ended";
+  if (const auto text = at_work ? std::nullopt : read_text(directory_ / run_file::summary)) {
+    const Json summary = Json::parse(*text, nullptr, false);
+    if (summary.is_object()) status = summary.value("status", status);
+  }
+  state["name"] = directory_.lexically_normal().string();
+  state["status"] = status;
+  state["frames"] = frames_;
+  state["thermo"] = status_of(directory_ / run_file::thermo).size;
+  state["rdf"] = status_of(directory_ / "rdf.csv").version;
+  return state;
+}
+
+std::optional<Answer> RunSource::answer(std::string_view question) {
+  if (question == "state") return Answer{"application/json", state().dump()};
+  if (question == "rdf") {
+    auto text = read_text(directory_ / "rdf.csv");
+    if (!text) return {};
+    return Answer{kText, std::move(*text)};
+  }
+  if (const auto first = number_behind(question, "thermo/"))
+    return Answer{kText, rows_from(directory_ / run_file::thermo, *first)};
+  look();
+  if (frames_ == 0) return {};
+  if (question == "particles") return Answer{kBinary, fixed_values()};
+  if (const auto number = number_behind(question, "frame/"); number && *number < frames_)
+    return Answer{kBinary, frame(*number)};
+  return {};
+}
+
+std::string RunSource::fixed_values() const {
+  std::string bytes;
+  hdf5::read_between_flushes(trajectory_, [&] {
+    const auto file = hdf5::File::open_unlocked(trajectory_);
+    bytes.clear();
+    for (const char* name : {"/radius", "/species"})
+      append<float>(bytes, hdf5::rows<float>(file, kParticles + name, 0, particles_));
+  });
+  return bytes;
+}
+
+std::string RunSource::frame(std::uint64_t number) {
+  std::vector<float> x, v;
+  double head[8] = {};
+  hdf5::read_between_flushes(trajectory_, [&] {
+    const auto file = hdf5::File::open_unlocked(trajectory_);
+    head[0] = hdf5::number_at(file, kParticles + "/position/time", number);
+    head[1] = hdf5::number_at(file, kParticles + "/position/step", number);
+    head[2] = hdf5::number_at(file, "/observables/collisions/value", number);
+    for (int k = 0; k < 3; ++k) head[3 + k] = hdf5::diagonal_at(file, kParticles + "/box/edges/value", number, k);
+    x = hdf5::rows<float>(file, kParticles + "/position/value", number, 1);
+    v = hdf5::rows<float>(file, kParticles + "/velocity/value", number, 1);
+  });
+  count_collisions(head[0]);
+  head[6] = counts_.empty() ? 0 : 1;
+  std::string bytes;
+  bytes.reserve(sizeof head + 5 * sizeof(float) * particles_);
+  append<double>(bytes, head);
+  append<float>(bytes, x);
+  for (std::size_t i = 0; i < particles_; ++i) v[i] = std::hypot(v[3 * i], v[3 * i + 1], v[3 * i + 2]);
+  append<float>(bytes, std::span(v).first(particles_));
+  append<float>(bytes, std::vector<float>(counts_.begin(), counts_.end()));
+  return bytes;
+}
+
+void RunSource::count_collisions(double until) {
+  const auto events = directory_ / run_file::events;
+  if (!std::filesystem::exists(events)) return counts_.clear();
+  if (counts_.size() != particles_ || until < counted_until_) {
+    counts_.assign(particles_, 0);
+    counted_ = 0;
+  }
+  counted_until_ = until;
+  constexpr std::uint64_t kBatch = 1 << 16;
+  bool more = true;
+  while (more) {
+    std::vector<double> time;
+    std::vector<std::uint32_t> kind, lo, hi;
+    hdf5::read_between_flushes(events, [&] {
+      const auto file = hdf5::File::open_unlocked(events);
+      const std::uint64_t all = hdf5::shape(file, "/events/time").at(0);
+      const std::uint64_t n = counted_ < all ? std::min(kBatch, all - counted_) : 0;
+      time = hdf5::rows<double>(file, "/events/time", counted_, n);
+      kind = hdf5::rows<std::uint32_t>(file, "/events/kind", counted_, n);
+      lo = hdf5::rows<std::uint32_t>(file, "/events/lo", counted_, n);
+      hi = hdf5::rows<std::uint32_t>(file, "/events/hi", counted_, n);
+    });
+    const auto now = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), until) - time.begin());
+    for (std::size_t k = 0; k < now; ++k) {
+      ++counts_.at(lo[k]);
+      if (kind[k] == 0) ++counts_.at(hi[k]);
+    }
+    counted_ += now;
+    more = now == kBatch;
+  }
+}
+
+}  // namespace carom

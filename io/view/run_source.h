@@ -1,0 +1,55 @@
+#pragma once
+// What the page asks of a run, answered from the run's files, which may be growing.
+//
+//   state         JSON: what the run is, how many frames there are, whether it goes on
+//   particles     32-bit floats, little-endian: the radii [length], then the species
+//   frame/K       eight doubles (time, step, collisions, the three edges of the box, whether counts follow, 0), then
+//                 floats: N positions of three columns [length], N speeds [velocity], N numbers of collisions so far
+//   thermo/B      thermo.csv from its byte B on, whole rows, at most 4 MiB
+//   rdf           rdf.csv
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace carom {
+
+struct Answer {
+  const char* type;  ///< a MIME type
+  std::string body;
+};
+
+class RunSource {
+ public:
+  /// `awaited`: the run is about to start, its files may be missing. Else throws Error(Failure::file) where the
+  /// directory holds no trajectory that can be read.
+  RunSource(std::filesystem::path directory, bool awaited);
+
+  /// The answer, or nothing where there is no such thing. Throws Error(Failure::file).
+  std::optional<Answer> answer(std::string_view question);
+
+  /// The answer to `state`.
+  nlohmann::json state();
+  std::uint64_t particles() const { return particles_; }
+
+ private:
+  void look();
+  std::string fixed_values() const;
+  std::string frame(std::uint64_t number);
+  void count_collisions(double until);
+
+  std::filesystem::path directory_, trajectory_;
+  bool awaited_;
+  nlohmann::json head_;          // what does not change while the trajectory is the same file
+  std::string seen_, identity_;  // of the trajectory: when it was looked at last; which file it is
+  std::uint64_t particles_ = 0, frames_ = 0;
+  std::vector<std::uint32_t> counts_;  // collisions of each particle among the first `counted_` events
+  std::uint64_t counted_ = 0;
+  double counted_until_ = 0;
+};
+
+}  // namespace carom

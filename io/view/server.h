@@ -1,0 +1,40 @@
+#pragma once
+// A page on this machine alone: HTTP on a port of 127.0.0.1, behind a random token that is the first part of its
+// address. Only GET; one thread.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "io/view/run_source.h"
+
+namespace carom {
+
+class PageServer {
+ public:
+  /// The answer to a path behind the token, or nothing where there is no such thing. May throw: the page is shown why.
+  using Answers = std::function<std::optional<Answer>(std::string_view path)>;
+
+  /// Listens from now on; `port` 0: any free one. Throws Error(Failure::deck) where the port is taken.
+  PageServer(std::uint16_t port, Answers answers);
+  ~PageServer();
+  PageServer(const PageServer&) = delete;
+  PageServer& operator=(const PageServer&) = delete;
+
+  /// `http://127.0.0.1:PORT/TOKEN/`
+  const std::string& address() const { return address_; }
+
+  /// Answers until SIGINT or SIGTERM; `led`: until SIGTERM, or standard input ends, as it does with the process that
+  /// has the other end of it, while SIGINT and SIGHUP are left to that.
+  void serve(bool led);
+
+ private:
+  struct Sockets;
+  std::unique_ptr<Sockets> sockets_;
+  std::string address_;
+};
+
+}  // namespace carom

@@ -1,0 +1,250 @@
+"""`carom view`: which requests get an answer, and which. The page itself in a browser: test_view_page.py."""
+
+import contextlib
+import http.client
+import json
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from runs import CAROM, SPHERES, SPRINGS, mpi_environment, needs_carom, run, same, data_sets, write_deck
+
+pytestmark = needs_carom
+
+
+@contextlib.contextmanager
+def page(*arguments):
+    """`carom` with these arguments; its address as (process, port, path)."""
+    process = subprocess.Popen([CAROM, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
+    try:
+        address = next(line for line in process.stdout if "http" in line)
+        port, path = re.search(r"http://127\.0\.0\.1:(\d+)(/[0-9a-f]{32}/)", address).groups()
+        yield process, int(port), path
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def get(port, path, method="GET"):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    connection.request(method, path)  # as it stands: urllib would tidy the path
+    answer = connection.getresponse()
+    return answer.status, answer.read()
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished")
+    run(write_deck(folder, SPHERES), folder / "run",
+        ["output.events=true", "output.rdf_interval=0.5"])
+    return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def shown(finished):
+    with page("view", finished) as (_, port, path):
+        yield port, path
+
+
+def test_the_page_is_given_to_its_token_only(shown):
+    port, path = shown
+    status, body = get(port, path)
+    assert status == 200 and b"<title>Carom</title>" in body
+    wrong = path[:-2] + ("0" if path[-2] != "0" else "1") + "/"
+    for other in ("/", "/runs", wrong, wrong + "runs", path[:-1], "//" + path, "/../" + path):
+        status, body = get(port, other)
+        assert status == 403 and b"carom" in body and len(body) < 100, other
+
+
+@pytest.mark.parametrize("path", ["../../etc/passwd", "0/../deck.toml", "0/deck.toml", "%2e%2e/run.log", "0/frame/../../x", "1/state", "0",
+                                  "-1/state", "0/frame/-1", "0/frame/99", "0/frame/1x", "0/thermo/", "0/frame/99999999999999999999"])
+def test_no_other_file_is_given_away(shown, path):
+    assert get(shown[0], shown[1] + path)[0] == 404
+
+
+def test_nothing_can_be_changed(shown):
+    port, path = shown
+    for method in ("POST", "PUT", "DELETE", "HEAD"):
+        assert get(port, path + "runs", method)[0] == 405
+
+
+def test_only_this_machine_is_listened_to(shown):
+    sockets = subprocess.run(["ss", "-Hltn", f"sport = :{shown[0]}"], capture_output=True, text=True, check=True).stdout.split("\n")
+    assert [line.split()[3] for line in sockets if line] == [f"127.0.0.1:{shown[0]}"]
+
+
+def test_frames_are_those_of_the_trajectory(shown, finished):
+    port, path = shown
+    state = json.loads(get(port, path + "runs")[1])[0]
+    file = h5py.File(finished / "trajectory.h5md")
+    group, events = file["particles/trajectory"], h5py.File(finished / "events.h5")["events"]
+    assert (state["frames"], state["particles"], state["status"], state["dimension"]) == (7, 108, "done", 3)
+    fixed = np.frombuffer(get(port, path + "0/particles")[1], "<f4").reshape(2, 108)
+    assert np.array_equal(fixed[0], group["radius"][:].astype("f4")) and np.array_equal(fixed[1], group["species"][:])
+    for frame in (3, 6, 1):  # forwards and backwards: counts of collisions too
+        body = get(port, path + f"0/frame/{frame}")[1]
+        time_, _, collisions, *edges, counted, _ = struct.unpack("<8d", body[:64])
+        assert (time_, collisions) == (group["position/time"][frame], file["observables/collisions/value"][frame])
+        assert np.array_equal(edges, np.diag(group["box/edges/value"][frame])) and counted == 1
+        values = np.frombuffer(body[64:], "<f4")
+        assert np.array_equal(values[:324].reshape(-1, 3), group["position/value"][frame].astype("f4"))
+        assert np.allclose(values[324:432], np.linalg.norm(group["velocity/value"][frame], axis=1), rtol=1e-6)
+        so_far = events["time"][:] <= time_
+        pairs = np.concatenate([events["lo"][so_far], events["hi"][so_far]])
+        assert np.array_equal(values[432:], np.bincount(pairs, minlength=108))
+    thermo = (finished / "thermo.csv").read_bytes()
+    assert get(port, path + "0/thermo/0")[1] == thermo and get(port, path + "0/thermo/100")[1] == thermo[100:]
+    assert get(port, path + "0/rdf")[1] == (finished / "rdf.csv").read_bytes()
+
+
+def test_a_run_that_is_shown_while_it_goes_on_is_the_same_run(tmp_path):
+    """Frames are whole at whatever instant they are asked for, and the run keeps its bits."""
+    overrides = ["run.end_time=12", "output.frame_interval=0.02", "particles.0.count=500"]
+    deck = write_deck(tmp_path, SPHERES)
+    run(deck, tmp_path / "alone", overrides)
+    sets = [part for override in overrides for part in ("--set", override)]
+    seen = {}
+    with page("run", deck, "-o", tmp_path / "shown", "--view", "--quiet", *sets) as (process, port, path):
+        while process.poll() is None:
+            with contextlib.suppress(OSError, http.client.HTTPException):
+                state = json.loads(get(port, path + "runs")[1])[0]
+                if state["frames"] and (status := get(port, path + f"0/frame/{state['frames'] - 1}")):
+                    assert status[0] == 200, status[1]
+                    seen[state["frames"] - 1] = status[1]
+        assert process.returncode == 0
+    alone, shown = (data_sets(tmp_path / name / "trajectory.h5md") for name in ("alone", "shown"))
+    del alone["parameters/deck"], shown["parameters/deck"]  # it names the directory
+    assert same(alone, shown)
+    with h5py.File(tmp_path / "alone" / "trajectory.h5md") as file:
+        for frame, body in seen.items():
+            there = file["particles/trajectory/position/value"][frame].astype("<f4").tobytes()
+            assert body[64:64 + len(there)] == there
+    assert len(seen) > 1
+    time.sleep(0.2)
+    assert not open_at(port), "the page outlives its run, where there is no terminal"
+
+
+def open_at(port):
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def test_the_page_ends_with_a_run_that_is_killed(tmp_path):
+    with page("run", write_deck(tmp_path, SPHERES), "-o", tmp_path / "run", "--view", "--quiet", "--set", "run.end_time=1e5") as (
+            process, port, _):
+        assert open_at(port)
+        process.kill()
+        deadline = time.monotonic() + 10
+        while open_at(port) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not open_at(port)
+
+
+def test_one_rank_of_several_serves_the_page(tmp_path):
+    overrides = ["--set", "run.end_time=1e5", "--set", "particles.0.count=2048"]
+    process = subprocess.Popen(["mpirun", "-n", "2", CAROM, "run", write_deck(tmp_path, SPHERES), "-o", tmp_path / "run", "--view",
+                                "--quiet", *overrides], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=mpi_environment())
+    port, path = re.search(r"127\.0\.0\.1:(\d+)(/\w+/)", process.stdout.readline()).groups()
+    deadline = time.monotonic() + 30
+    while json.loads(get(int(port), path + "runs")[1])[0]["frames"] < 2:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    process.send_signal(signal.SIGUSR2)
+    out, errors = process.communicate(timeout=60)
+    assert process.returncode == 75 and "http" not in out, errors
+    assert not open_at(int(port))
+
+
+def refused(code, *arguments):
+    done = subprocess.run([CAROM, *map(str, arguments)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == code, done.stderr
+    return done.stderr
+
+
+def test_what_cannot_be_shown(finished, tmp_path):
+    assert "has no trajectory.h5md; name the directory" in refused(5, "view", tmp_path)
+    assert "has no trajectory.h5md" in refused(5, "view", tmp_path / "nowhere")
+    for damage in (b"no HDF5", (finished / "trajectory.h5md").read_bytes()[:3000]):
+        (tmp_path / "trajectory.h5md").write_bytes(damage)
+        assert f"{tmp_path}/trajectory.h5md: " in refused(5, "view", tmp_path)
+    with h5py.File(tmp_path / "trajectory.h5md", "w") as file:
+        file["x"] = 1
+    assert "no trajectory of carom" in refused(5, "view", tmp_path)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert f"--port {port}: cannot listen there" in refused(2, "view", finished, "--port", port)
+        deck = write_deck(tmp_path, SPRINGS)
+        assert "cannot listen there" in refused(2, "run", deck, "-o", tmp_path / "run", "--view", "--port", port)
+    assert not (tmp_path / "run").exists()
+    assert "run is required" in refused(2, "view")
+    assert "--view" in refused(2, "run", deck, "--port", "8000")
+
+
+def test_a_flush_that_a_kill_has_cut_short_is_completed(finished, tmp_path):
+    """The journal of such a flush, made here by hand, holds the block of the last step."""
+    import zlib
+    folder = tmp_path / "killed"
+    folder.mkdir()
+    data = bytearray((finished / "trajectory.h5md").read_bytes())
+    block = struct.pack("<QQ", 0, 512) + bytes(data[:512])
+    rest = struct.pack("<QQ", 32 + len(block), len(data)) + block
+    data[:512] = bytes(512)  # half of it reached the file
+    (folder / "trajectory.h5md").write_bytes(data)
+    (folder / "trajectory.h5md.journal").write_bytes(b"CAROMJ01" + struct.pack("<Q", zlib.crc32(rest)) + rest)
+    with page("view", folder) as (_, port, path):
+        assert json.loads(get(port, path + "runs")[1])[0]["frames"] == 7
+
+
+def test_an_export_takes_the_frames_that_fit(finished, tmp_path):
+    target = tmp_path / "page.html"
+    export = [CAROM, "view", str(finished), str(finished), "--export", str(target)]
+    assert "7 of 7 frames" in subprocess.run(export, capture_output=True, text=True, check=True).stdout
+    text = target.read_text()
+    stored = json.loads(re.search(r'id="stored" type="application/json">(.*?)</script>', text, re.S)[1])
+    assert len(json.loads(stored["runs"])) == 2 and "0/frame/6" in stored and "1/rdf" in stored
+    assert "http:" not in text and "https:" not in text
+    done = subprocess.run(export[:3] + export[4:] + ["--max-size", "1"], capture_output=True, text=True, check=True)
+    assert "7 of 7" in done.stdout
+
+
+def test_an_export_of_too_much(tmp_path):
+    run(write_deck(tmp_path, SPHERES), tmp_path / "run", ["particles.0.count=16384", "run.end_time=0.04", "output.frame_interval=0.01"])
+    target = tmp_path / "page.html"
+    done = subprocess.run([CAROM, "view", str(tmp_path / "run"), "--export", str(target), "--max-size", "2"],
+                          capture_output=True, text=True, check=True)
+    assert "4 of 5 frames, what --max-size takes" in done.stdout and target.stat().st_size < 2e6
+    assert "not one frame of 16384 particles fits into a page of 1 MB" in refused(
+        2, "view", tmp_path / "run", tmp_path / "run", "--export", tmp_path / "no.html", "--max-size", "1")
+    assert not (tmp_path / "no.html").exists()
+
+
+def test_the_demo_shows_psa_beside_edda(tmp_path):
+    start = time.monotonic()
+    with page("demo", tmp_path, "--no-browser") as (process, port, path):
+        while True:
+            states = json.loads(get(port, path + "runs")[1])
+            if all(state["frames"] >= 3 for state in states):
+                break
+            assert time.monotonic() < start + 60
+            time.sleep(0.05)
+        assert [state["integrator"] for state in states] == ["psa", "edda"]
+        first = [get(port, path + f"{k}/frame/0")[1] for k in (0, 1)]
+        assert first[0][64:] == first[1][64:]
+        error = [float(get(port, path + f"{k}/thermo/0")[1].split(b"\n")[-2].split(b",")[7]) for k in (0, 1)]
+        assert error[0] > 1e6 * error[1]
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 0
+    children = subprocess.run(["pgrep", "-f", str(tmp_path / "demo.toml")], capture_output=True, text=True).stdout
+    assert not children
+    assert json.loads((tmp_path / "edda" / "summary.json").read_text())["status"] == "interrupted"
+    assert os.path.exists(tmp_path / "psa" / "trajectory.h5md")

@@ -1,0 +1,16 @@
+// `carom info` on the bytes of a trajectory or a file of events: it ends with a text or with an Error.
+
+#include "engine/base/error.h"
+#include "io/files/info.h"
+#include "tests/fuzz/memory_file.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const carom::fuzz::MemoryFile file;
+  file.set({data, size});
+  try {
+    carom::describe_file(file.path());
+  } catch (const carom::Error& e) {
+    if (e.failure() != carom::Failure::file) std::abort();
+  }
+  return 0;
+}

@@ -1,0 +1,41 @@
+"""Ctrl-C: a real signal to a real process."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+SCRIPT = """
+import json, sys
+import numpy as np
+sys.path.insert(0, {here!r})
+from scenes import five_springs, gas, same_state
+sim = {make}
+print("ready", flush=True)
+try:
+    sim.run(time=1e7{more})
+except KeyboardInterrupt:
+    at = sim.time
+    whole = {make}
+    end = at + {ahead}
+    sim.run(time=end)
+    whole.run(time=end)
+    print(json.dumps({{"time": at, "same": same_state(sim, whole), "finite": bool(np.isfinite(sim.position).all())}}))
+"""
+
+
+@pytest.mark.parametrize("make, ahead, more", [
+    ("five_springs()", 1.005, ""), ("gas()", 10.0, ""), ("five_springs()", 1.0, ", every=0.05, callback=lambda s: s.energy")])
+def test_ctrl_c_ends_the_step_and_the_run_goes_on(make, ahead, more):
+    import pathlib
+    script = SCRIPT.format(here=str(pathlib.Path(__file__).parent), make=make, more=more, ahead=ahead)
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        said = json.loads(process.stdout.readline())
+        assert process.wait(60) == 0
+    assert said["time"] > 0 and said["same"] and said["finite"]

@@ -1,0 +1,31 @@
+"""Pages with code that is run: what the blocks print is what stands in the page."""
+
+import pathlib
+import subprocess
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PAGES = sorted((ROOT / "inputs" / "tutorials").glob("[0-9]*.md")) + [ROOT / "tools" / "site" / "gallery.md"]
+
+
+def run_page(page):
+    return subprocess.run(["/usr/bin/python3", ROOT / "tools" / "run_page.py", page], capture_output=True, text=True, timeout=300)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_page_prints_what_it_says(page):
+    done = run_page(page)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_another_output_or_a_failing_block_is_noticed(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("```sh\ncarom --version | head -1 | cut -c1-5\n```\n\n```text\ncarom\n```\n")
+    assert run_page(page).returncode == 0
+    page.write_text(page.read_text().replace("\ncarom\n`", "\ncaron\n`"))
+    done = run_page(page)
+    assert done.returncode == 1 and "caron" in done.stdout
+    page.write_text("```python\nimport carom\ncarom.open('nothing')\n```\n")
+    done = run_page(page)
+    assert done.returncode == 1 and "is not the directory of a run" in done.stderr

@@ -1,0 +1,152 @@
+"""Simulations from Python against the command, and against themselves."""
+
+import time as clock
+
+import numpy as np
+import pytest
+
+import carom
+from scenes import ROOT, five_springs, gas, run_command, same_state
+
+THESIS = ["inputs/five-springs.toml", "inputs/nine-gravity.toml"]
+
+
+@pytest.mark.parametrize("deck", THESIS)
+@pytest.mark.parametrize("method", ["cdda", "psa"])
+def test_a_deck_has_the_bits_of_the_command(tmp_path, deck, method):
+    run = run_command(ROOT / deck, tmp_path / "run", "--set", f"integrator.type={method}", "--set", "run.steps=500",
+                      "--set", "output.frame_interval=0.5", "--set", "output.thermo_interval=0.5")
+    sim = carom.Simulation.from_deck(ROOT / deck, set={"integrator.type": method, "run.steps": 500})
+    seen, rows = [], []
+
+    def look(s):
+        seen.append((s.position.copy(), s.velocity.copy()))
+        rows.append([s.time, s.step, s.collisions, s.kinetic, s.potential, s.energy, s.temperature, s.pressure])
+
+    sim.run(every=0.5, callback=look)
+    assert len(seen) == len(run.frames) == 11
+    for (x, v), frame in zip(seen, run.frames):
+        assert np.array_equal(x, frame.position) and np.array_equal(v, frame.velocity)
+    names = ["time", "step", "collisions", "kinetic", "potential", "total", "temperature", "pressure"]
+    assert np.array_equal(np.array(rows).T, [run.thermo[name] for name in names])
+    energy = run.summary["energy"]
+    assert sim.energy_error == energy["max_abs_error"] / energy["reference"]
+    assert sim.collisions == run.summary["events"]["sphere_sphere"] > 0
+
+
+def test_the_first_experiment_by_hand_has_the_bits_of_the_deck():
+    deck = carom.Simulation.from_deck(ROOT / THESIS[0], set={"integrator.type": "edda"})
+    hand = five_springs()
+    for sim in (deck, hand):
+        sim.run(steps=1000)
+    assert same_state(deck, hand) and hand.time == 10 and hand.collisions > 0
+    assert 0 < hand.energy_error < 1e-13
+
+
+def test_free_flight_calls_back_at_the_exact_times_with_the_bits_of_the_command(tmp_path):
+    deck = ROOT / "inputs/hard-sphere-fluid.toml"
+    change = {"particles.0.count": 108, "run.end_time": 1.0, "output.frame_interval": 0.2}
+    run = run_command(deck, tmp_path / "run", *[part for key, value in change.items() for part in ("--set", f"{key}={value}")])
+    sim, seen = carom.Simulation.from_deck(deck, set=change), []
+    sim.run(every=0.2, callback=lambda s: seen.append((s.time, s.position.copy(), s.image.copy())))
+    assert [time for time, *_ in seen] == list(run.trajectory.time)
+    for (_, x, image), frame in zip(seen, run.frames):
+        assert np.array_equal(x, frame.position) and np.array_equal(image, frame.image)
+    assert np.array_equal(sim.unwrapped, run.frames[-1].unwrapped) and run.frames[-1].image.any()
+
+
+@pytest.mark.parametrize("make, first, last", [
+    (five_springs, 2.0, 4.0), (five_springs, 2.005, 4.0), (five_springs, 2.005, 4.001), (gas, 0.7, 3.0), (gas, 30.0, 60.0)])
+def test_a_later_end_goes_on_with_the_bits_of_one_run(make, first, last):
+    one, two, times = make(), make(), {}
+    for sim, ends in ((one, [last]), (two, [first, last])):
+        for end in ends:
+            sim.run(time=end, every=0.1, callback=lambda s: times.setdefault(id(s), []).append(s.time))
+            assert sim.time == end
+    assert same_state(one, two)
+    assert sorted(set(times[id(one)]) | {first}) == times[id(two)]
+
+
+def test_another_interval_counts_from_where_the_run_is():
+    sim, times = five_springs(), []
+    sim.run(time=2, every=0.1, callback=lambda s: None)
+    sim.run(time=5, every=1, callback=lambda s: times.append(round(s.time, 9)))
+    assert times == [3, 4, 5]
+
+
+def test_a_change_begins_a_new_run():
+    sim = five_springs()
+    sim.run(time=1)
+    sim.velocity = 2 * sim.velocity
+    assert sim.time == 0 and sim.step == 0 and sim.collisions == 0
+    kinetic = sim.kinetic
+    sim.integrator("psa", step=0.01)
+    sim.run(steps=1)
+    assert sim.step == 1 and sim.kinetic != kinetic and sim.kinetic == pytest.approx(kinetic, rel=0.1)
+
+
+def test_energies_are_known_before_the_run():
+    sim = five_springs()
+    before = sim.kinetic, sim.potential, sim.energy, sim.temperature, sim.pressure
+    assert before[0] == pytest.approx(0.5 * (1.1**2 + 0.4**2 + 0.7**2 + 0.9**2)) and before[1] == 0
+    first = []
+    sim.run(steps=1, every=1, callback=lambda s: first.append((s.kinetic, s.potential, s.energy, s.temperature, s.pressure)))
+    assert first[0] == before
+
+
+def test_species_and_arrays_of_each_particle():
+    sim = carom.Simulation(box=[10, 10, 10], boundary=["periodic", "wall", "open"])
+    ions = sim.add_particles([[2, 2, 2], [4, 4, 4]], charge=[1, -1], species="ion", mass=[2, 3])
+    solvent = sim.add_particles(np.array([[6, 6, 6]], dtype="f4"), radius=0.25)
+    assert (ions, solvent, len(sim)) == (range(2), range(2, 3), 3)
+    assert sim.species_names == ["ion", "particle"] and sim.species.tolist() == [0, 0, 1]
+    assert sim.mass.tolist() == [2, 3, 1] and sim.radius.tolist() == [0.5, 0.5, 0.25] and sim.charge.tolist() == [1, -1, 0]
+    sim.add_force("coulomb", constant=1.0, species=["ion", "ion"], form="damped-shifted", cutoff=4.0,
+                  damping=0.2)
+    assert sim.potential < 0
+    assert sim.boundary == ["periodic", "wall", "open"]
+
+
+def test_bonds_within_a_distance_are_found_once():
+    sim = five_springs()
+    sim.add_force("harmonic-bond", within=2.5, stiffness=0.1, rest_length=2.0)
+    before = sim.potential
+    sim.position = sim.position * [0.9, 1] + [1, 0]
+    stretched = 0.5 * 1.1 * 4 * (1.8 - 2) ** 2
+    assert before == 0 and sim.potential == pytest.approx(stretched)
+
+
+@pytest.mark.parametrize("make", [five_springs, gas])
+def test_a_simulation_becomes_a_deck(tmp_path, make):
+    sim = make()
+    sim.run(time=1)
+    sim.write_deck(tmp_path / "deck.toml", time=2, every=0.5)
+    sim.velocity = sim.velocity  # a new run
+    sim.run(time=2, every=0.5)
+    run = run_command(tmp_path / "deck.toml", tmp_path / "run")
+    assert np.array_equal(run.frames[-1].position, sim.position) and np.array_equal(run.frames[-1].velocity, sim.velocity)
+    assert run.summary["status"] == "done" and len(run.frames) == 5
+    again = carom.Simulation.from_deck(tmp_path / "deck.toml")
+    again.run()
+    assert np.array_equal(again.position, sim.position)
+
+
+def test_a_callback_that_raises_ends_the_run_which_then_goes_on():
+    sim, undisturbed = five_springs(), five_springs()
+    with pytest.raises(ZeroDivisionError):
+        sim.run(time=3, every=0.5, callback=lambda s: 1 / (s.time < 1))
+    assert sim.time == 1
+    sim.run(time=3)
+    undisturbed.run(time=3)
+    assert same_state(sim, undisturbed)
+
+
+def test_progress_is_a_line_that_goes_away(capsys, monkeypatch):
+    monkeypatch.setattr(carom.progress, "QUIET", 0)
+    sim = gas(512)
+    sim.integrator("psa", step=0.001)
+    sim.run(steps=500, every=0.1, callback=lambda _: clock.sleep(0.06), progress=True)
+    line = capsys.readouterr().err
+    assert "%" in line and line.endswith("\r") and "\n" not in line
+    sim.run(steps=600, progress=False)
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,202 @@
+#include "engine/ranks/subdomain.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/ranks/communicator.h"
+#include "tests/unit/engine/event_cases.h"
+
+namespace carom {
+namespace {
+
+constexpr double kEnd = 0.12, kDisplacement = 0.5;  // of a window
+
+/// What a subdomain is made of.
+struct Parts {
+  Parts(const Box<3>& box, const Sizes& sizes)
+      : core(box, &sizes, {}), ownership(core), paths(core.flights(), ownership), repair(box, core, ownership, paths) {}
+  EventCore<3> core;
+  Ownership<3> ownership;
+  WindowPaths<3> paths;
+  WindowRepair<3> repair;
+  std::vector<Slot> changed;
+};
+
+/// A system in two subdomains, each with all spheres that concern it; and one core with all of them.
+struct Divided {
+  explicit Divided(std::unique_ptr<System<3>> spheres = random_system<3>(320, {14, 6, 6}, {P, P, P}, 0.5, 0.5, 11))
+      : system(std::move(spheres)),
+        sizes(system->particles),
+        bisection(system->box, system->particles.x, 2, 1 + 2 * kDisplacement, alone),
+        whole(system->box, &sizes, {}) {
+    const Particles<3>& p = system->particles;
+    std::vector<Record<3>> records;
+    for (Id i = 0; i < p.size(); ++i) records.push_back({p.x[i], p.v[i], 0.0, i, 0, p.species[i]});
+    whole.load(records, Vec<3>::Zero(), kEnd, 0, 2 * kDisplacement);
+    for (std::uint32_t number : {0u, 1u}) {
+      Parts& part = *parts.emplace_back(std::make_unique<Parts>(system->box, sizes));
+      part.core.load(records, Vec<3>::Zero(), kEnd, 0, 2 * kDisplacement);
+      part.ownership.load(bisection, number, kDisplacement);
+      part.paths.load(part.core.flights().room());
+      part.repair.load(part.core.flights().room());
+      part.ownership.sort_out(
+          0, 0, [](Slot) { return false; }, [](std::size_t, const Record<3>&) {});
+    }
+  }
+  /// The first run of a window.
+  void run() {
+    Counters unused;
+    whole.run(kEnd, {.counters = unused});
+    for (const auto& part : parts) {
+      part->repair.start(kEnd);
+      part->core.run(kEnd, {.counters = unused, .trace = &part->paths.start()});
+      part->changed = part->paths.end();
+    }
+  }
+  /// Sends the changed paths; the number of them.
+  std::size_t send_paths() {
+    std::size_t sent = 0;
+    for (const int from : {0, 1})
+      for (const Slot i : parts[from]->changed) {
+        EXPECT_EQ(parts[from]->ownership.holders(i), 1u);  // the other one is the only neighbour
+        Parts& to = *parts[1 - from];
+        Bytes& bytes = messages.emplace_back();
+        parts[from]->paths.write(i, bytes);
+        Reader reader(bytes);
+        to.paths.read_script(to.ownership.slot_of(parts[from]->core.flights()[i].id), reader);
+        EXPECT_FALSE(reader.more());
+        ++sent;
+      }
+    return sent;
+  }
+  /// How many own spheres are not as the whole has them.
+  std::size_t wrong() const {
+    std::vector<Record<3>> right(system->size());
+    for (const Record<3>& r : whole.flights().records()) right[r.id] = r;
+    std::size_t wrong = 0, own = 0;
+    for (const auto& part : parts)
+      for (const Slot i : part->ownership.own()) {
+        const Record<3>& r = part->paths.after(i);
+        wrong += r.x == right[r.id].x && r.v == right[r.id].v && r.t == right[r.id].t ? 0 : 1;
+        ++own;
+      }
+    EXPECT_EQ(own, system->size());
+    return wrong;
+  }
+
+  Communicator alone;
+  std::unique_ptr<System<3>> system;
+  Sizes sizes;
+  Bisection<3> bisection;
+  EventCore<3> whole;
+  std::vector<std::unique_ptr<Parts>> parts;
+  std::deque<Bytes> messages;
+};
+
+TEST(Ownership, EverySphereHasOneOwnerWhichKnowsWhereItIsAGhost) {
+  Divided d;
+  std::size_t ghosts = 0;
+  for (Id id = 0; id < d.system->size(); ++id) {
+    int owners = 0;
+    for (const int k : {0, 1}) {
+      const Ownership<3>&here = d.parts[k]->ownership, &there = d.parts[1 - k]->ownership;
+      if (!here.owns_id(id)) continue;
+      ++owners;
+      const Slot other = there.slot_of(id);
+      const bool ghost = other != IdTable::kNowhere && there.is_ghost(other);
+      EXPECT_EQ(here.holders(here.slot_of(id)) != 0, ghost) << id;
+      EXPECT_EQ(here.is_seen(here.slot_of(id)), ghost) << id;
+      const Vec<3>& x = d.system->particles.x[id];
+      EXPECT_EQ(d.bisection.owner(x), static_cast<std::uint32_t>(k));
+      EXPECT_EQ(d.bisection.near(static_cast<std::uint32_t>(1 - k), x), ghost);
+      ghosts += ghost ? 1 : 0;
+    }
+    EXPECT_EQ(owners, 1) << id;
+  }
+  EXPECT_GT(ghosts, 50u);
+  EXPECT_LT(ghosts, 280u);
+}
+
+TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
+  Divided d;
+  d.run();
+  WindowPaths<3>& paths = d.parts[0]->paths;
+  const Ownership<3>& ownership = d.parts[0]->ownership;
+  int compared = 0;
+  paths.for_each_ghost([&](Slot g) {
+    EXPECT_FALSE(paths.matches(g));  // a path with events, and no script
+    Bytes& own = d.messages.emplace_back();
+    paths.write(g, own);
+    Reader reader(own);
+    paths.read_script(g, reader);
+    EXPECT_TRUE(paths.matches(g));
+    EXPECT_TRUE(ownership.is_ghost(g));
+    ++compared;
+    EXPECT_EQ(paths.script(g).size(), paths.path(g).size());
+  });
+  EXPECT_GT(compared, 10);
+  EXPECT_TRUE(paths.agree(kEnd));
+  Slot last = 0;
+  paths.for_each_ghost([&](Slot g) { last = g; });
+  Node<3>& node = paths.rewrite(last).back();
+  node.after.v[1] = std::nextafter(node.after.v[1], 2.0);
+  const double time = node.key.time;
+  EXPECT_FALSE(paths.matches(last));
+  EXPECT_FALSE(paths.agree(kEnd));
+  EXPECT_TRUE(paths.agree(time));  // it counts only before
+}
+
+TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
+  Divided d;
+  d.run();
+  WindowPaths<3>& paths = d.parts[0]->paths;
+  const std::uint64_t all = paths.tally().contacts();
+  EventKey<3> middle{.time = kEnd / 2};
+  std::uint64_t before = 0;
+  std::vector<Slot> later;
+  paths.for_each_own([&](Slot i) {
+    for (const Node<3>& node : paths.path(i)) {
+      before += node.key.lo == node.after.id && node.key <= middle ? 1 : 0;
+      if (middle < node.key && (later.empty() || later.back() != i)) later.push_back(i);
+    }
+  });
+  paths.cut(middle);
+  EXPECT_EQ(paths.tally().contacts(), before);
+  EXPECT_GT(before, 5u);
+  EXPECT_LT(before, all);
+  std::vector<Slot> other;
+  for (const auto& [slot, record] : paths.finish()) {
+    EXPECT_LE(record.t, kEnd / 2);
+    if (d.parts[0]->ownership.owns(slot)) other.push_back(slot);
+  }
+  std::ranges::sort(other);
+  std::ranges::sort(later);
+  EXPECT_EQ(other, later);
+}
+
+TEST(WindowRepair, MendsUntilAllOwnSpheresAreAsInOneCore) {
+  // A blow passes from one subdomain through a row of spheres into the other, which did not see it come.
+  std::vector<Vec<3>> x, v(16, Vec<3>::Zero());
+  for (int i = 0; i < 16; ++i) x.push_back({2.0 + 1.001 * i, 3, 3});
+  v[0][0] = 3;
+  Divided d(test::make_system<3>({20, 6, 6}, P, x, v));
+  d.run();
+  EXPECT_GT(d.wrong(), 0u);
+  int rounds = 0;
+  for (; d.send_paths() > 0; ++rounds)
+    for (const auto& part : d.parts) {
+      part->changed = part->repair.run();
+      std::erase_if(part->changed, [&](Slot i) { return !part->ownership.is_seen(i); });
+    }
+  EXPECT_GT(rounds, 0);
+  EXPECT_EQ(d.wrong(), 0u);
+  std::uint64_t redone = 0;
+  for (const auto& part : d.parts) {
+    EXPECT_TRUE(part->paths.agree(kEnd));
+    redone += part->repair.events();
+  }
+  EXPECT_GT(redone, 0u);
+  EXPECT_LT(redone, 100u);
+}
+
+}  // namespace
+}  // namespace carom

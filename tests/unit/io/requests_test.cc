@@ -1,0 +1,50 @@
+// What signals and the clock ask of a run.
+
+#include "io/command/requests.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+namespace carom {
+namespace {
+
+TEST(Requests, ASignalAsksForOneCheckpoint) {
+  Communicator alone;
+  Requests requests({});
+  EXPECT_FALSE(requests.now(alone).checkpoint);
+  std::raise(SIGUSR1);
+  for (int look = 0; look < 2; ++look) {
+    const auto asked = requests.now(alone);
+    EXPECT_TRUE(asked.checkpoint);
+    EXPECT_FALSE(asked.stop);
+  }
+  requests.checkpoint_is_written();
+  EXPECT_FALSE(requests.now(alone).checkpoint);
+}
+
+TEST(Requests, CheckpointsAreAnIntervalApart) {
+  Communicator alone;
+  Requests requests({});
+  requests.set_interval(1.0);
+  while (!requests.now(alone).checkpoint) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_TRUE(requests.now(alone).checkpoint);
+  requests.checkpoint_is_written();
+  EXPECT_FALSE(requests.now(alone).checkpoint);
+}
+
+TEST(Requests, ASignalThatIsIgnoredStaysIgnored) {  // as nohup has it
+  Communicator alone;
+  std::signal(SIGHUP, SIG_IGN);
+  Requests requests({});
+  std::raise(SIGHUP);
+  EXPECT_FALSE(requests.now(alone).stop);
+  std::raise(SIGTERM);
+  EXPECT_TRUE(requests.now(alone).stop);
+  EXPECT_EQ(requests.reason(), "SIGTERM");
+}
+
+}  // namespace
+}  // namespace carom
