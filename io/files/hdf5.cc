@@ -44,9 +44,11 @@ Handle fixed_text_type(std::size_t length) {
   return type;
 }
 
-Handle space_of(const std::vector<hsize_t>& shape) {
+/// `limit`: up to which shape it grows; empty: not at all.
+Handle space_of(const std::vector<hsize_t>& shape, const std::vector<hsize_t>& limit = {}) {
   if (shape.empty()) return Handle(H5Screate(H5S_SCALAR), H5Sclose);
-  return Handle(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose);
+  const hsize_t* most = limit.empty() ? nullptr : limit.data();
+  return Handle(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), most), H5Sclose);
 }
 
 /// Texts one after the other, padded with zeros to the longest.
@@ -171,12 +173,24 @@ void File::close() {
   check(H5Fclose(file_.release()), "close the file");
 }
 
+Handle File::create_data_set(const Handle& where, const std::string& name, hid_t type,
+                             const std::vector<hsize_t>& shape, const std::vector<hsize_t>& chunk) const {
+  std::vector<hsize_t> limit;
+  const Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_obj_track_times(creation.id(), false);
+  if (!chunk.empty()) {
+    limit = shape;
+    limit[0] = H5S_UNLIMITED;
+    H5Pset_chunk(creation.id(), static_cast<int>(chunk.size()), chunk.data());
+  }
+  const Handle space = space_of(shape, limit);
+  const hid_t id = H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT);
+  return {check(id, "create data set " + name), H5Dclose};
+}
+
 void File::write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
                        const std::vector<hsize_t>& shape) {
-  const Handle space = space_of(shape);
-  const Handle set(check(H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                         "create data set " + name),
-                   H5Dclose);
+  const Handle set = create_data_set(where, name, type, shape);
   check(H5Dwrite(set.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), "write data set " + name);
 }
 

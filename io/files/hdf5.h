@@ -99,6 +99,10 @@ class File {
   }
   void write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
                    const std::vector<hsize_t>& shape);
+  /// A new data set: of this shape, or, where `chunk` says in which parts it is stored, with a first axis that grows.
+  /// The time of its creation is not kept, so that equal runs write equal bytes.
+  Handle create_data_set(const Handle& where, const std::string& name, hid_t type, const std::vector<hsize_t>& shape,
+                         const std::vector<hsize_t>& chunk = {}) const;
   /// Makes `alias` a second name of the data set `name`, unless there is one.
   void link(const Handle& from, const std::string& name, const Handle& to, const std::string& alias);
 

@@ -36,25 +36,12 @@ SeriesBase::SeriesBase(const File& file, const Handle& where, const std::string&
     rows_ = there[0];
     return;
   }
-  std::vector<hsize_t> limit = shape_;
-  limit[0] = H5S_UNLIMITED;
-  const Handle space(H5Screate_simple(rank, shape_.data(), limit.data()), H5Sclose);
-  const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  H5Pset_chunk(layout.id(), rank, chunk_of(shape_, row_elements_ * H5Tget_size(type)).data());
-  dataset_ =
-      Handle(file.check(H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, layout.id(), H5P_DEFAULT),
-                        "create data set " + name),
-             H5Dclose);
+  dataset_ = file.create_data_set(where, name, type, shape_, chunk_of(shape_, row_elements_ * H5Tget_size(type)));
 }
 
 ArrayBase::ArrayBase(const File& file, const Handle& where, const std::string& name, hid_t type, std::size_t size)
     : label_("write to data set " + name), file_(&file) {
-  const hsize_t n = size;
-  const Handle space(H5Screate_simple(1, &n, nullptr), H5Sclose);
-  dataset_ =
-      Handle(file.check(H5Dcreate2(where.id(), name.c_str(), type, space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                        "create data set " + name),
-             H5Dclose);
+  dataset_ = file.create_data_set(where, name, type, {size});
 }
 
 void ArrayBase::write(hid_t type, const void* data, std::size_t first, std::size_t elements) const {
