@@ -32,7 +32,8 @@ template <int W, class P, Wanted wanted, bool wide>
   std::conditional_t<std::is_trivially_copyable_v<P>, const P, const P&> potential =
       *static_cast<const P*>(any_potential);
   constexpr int kWords = wide ? 2 : 1;
-  I sum[3][kWords] = {};  // energy, magnitude, virial
+  using U = BitsOf<V>;
+  U sum[3][kWords] = {};  // energy, magnitude, virial; modulo 2^64
   I fits = ~I{};
   constexpr double kFactor = wanted == Wanted::mean_forces ? -1 : wanted == Wanted::hessian_product ? 1 : -2;
   const double limit = wide ? units.limits.high * 0x1p40 : units.limits.low;
@@ -63,8 +64,8 @@ template <int W, class P, Wanted wanted, bool wide>
         fits &= below(magnitude + elementary::abs(virial), all<V>(wide ? 0x1p90 : 0x1p50));
         for (int s = 0; s < 3; ++s) {
           const V upper = wide ? elementary::nearest_integer(terms[s] * 0x1p-40) : V{};
-          sum[s][0] += (I)((wide ? terms[s] - upper * 0x1p40 : terms[s]) + kToInteger);
-          if constexpr (wide) sum[s][1] += integers(upper);
+          sum[s][0] += (U)((wide ? terms[s] - upper * 0x1p40 : terms[s]) + kToInteger);
+          if constexpr (wide) sum[s][1] += (U)integers(upper);
         }
       }
     }
@@ -85,7 +86,7 @@ template <int W, class P, Wanted wanted, bool wide>
       std::uint64_t low = 0;
       for (int l = 0; l < W; ++l) {
         low += sum[s][0][l];
-        if constexpr (wide) *totals_of[s] += static_cast<PairTotals::Whole>(sum[s][1][l]) << 40;
+        if constexpr (wide) *totals_of[s] += PairTotals::Whole{static_cast<std::int64_t>(sum[s][1][l])} << 40;
       }
       low -= (std::uint64_t{batch.n} + W - 1) / W * W * __builtin_bit_cast(std::uint64_t, kToInteger);
       *totals_of[s] += static_cast<std::int64_t>(low);

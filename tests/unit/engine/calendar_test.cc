@@ -23,7 +23,7 @@ TEST(Calendar, ServesInOrderWhateverIsScheduledMeanwhile) {
     for (int k = 0; k < 3000; ++k) push(3 * uniform(random));  // a third of them beyond the horizon
     double now = 0;
     while (const CalendarEntry* entry = calendar.top(always)) {
-      ASSERT_GE(entry->time, now);
+      ASSERT_GE(double{entry->time}, now);
       now = entry->time;
       calendar.pop();
       if (++served % 2 == 0) push(now + (served % 10 == 0 ? 0 : 0.3 * uniform(random)));  // into the present, too
@@ -42,7 +42,7 @@ TEST(Calendar, LeavesOutWhatNoLongerHolds) {
   double before = -1;
   while (const CalendarEntry* entry = calendar.top(even)) {
     EXPECT_TRUE(even(*entry));
-    EXPECT_LT(before, entry->time);
+    EXPECT_LT(before, double{entry->time});  // a copy: entries are packed
     before = entry->time;
     calendar.pop();
     ++served;
@@ -62,7 +62,7 @@ TEST(Calendar, TakesVeryUnevenTimes) {  // bins adapt; entries at one time and f
   double now = 0;
   std::size_t served = 0;
   while (const CalendarEntry* entry = calendar.top(always)) {
-    ASSERT_GE(entry->time, now);
+    ASSERT_GE(double{entry->time}, now);
     now = entry->time;
     calendar.pop();
     if (++served % 3 == 0 && served < 3000) push(now + (served % 2 == 0 ? 1e-6 : 2e5));
