@@ -6,7 +6,6 @@ import random
 import shutil
 import signal
 import subprocess
-import tempfile
 import time
 
 import pytest
@@ -16,14 +15,6 @@ from runs import (CAROM, SPHERES, SPRINGS, command, in_mount, killer_library, mp
                   needs_mount, run, summary, write_deck)
 
 pytestmark = needs_carom
-
-
-@pytest.fixture(scope="module")
-def memory():
-    """A directory on a file system in memory, where there is one: syncs take no time there."""
-    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-    with tempfile.TemporaryDirectory(prefix="carom-continue-", dir=place) as name:
-        yield pathlib.Path(name)
 
 
 @pytest.fixture(scope="module")
@@ -43,15 +34,13 @@ def killed(killer, deck, out, at, overrides, go=False, where=""):
 
 @needs_compiler
 @pytest.mark.parametrize("method", ["free-flight", "psa"])
-def test_killed_at_its_writes(method, killer, memory):
+def test_killed_at_its_writes(method, killer, tmp_path):
     """Also while checkpoints are written, and while a run is being continued. CAROM_KILLS: how many more often."""
-    place = memory / method
-    place.mkdir()
     dice, kills = random.Random(7), int(os.environ.get("CAROM_KILLS", "12"))
-    deck, whole, out = write_deck(place, box(method, 3, 200 if method == "psa" else 60)), place / "whole", place / "out"
+    deck, whole, out = write_deck(tmp_path, box(method, 3, 200 if method == "psa" else 60)), tmp_path / "whole", tmp_path / "out"
     run(deck, whole, ALL_OUTPUT)
     killed(killer, deck, out, None, ALL_OUTPUT + CHECKPOINTS)
-    changes, refused, continued = int((place / "count").read_text()), 0, 0
+    changes, refused, continued = int((tmp_path / "count").read_text()), 0, 0
     assert changes > 200
     for n in range(kills):
         shutil.rmtree(out)
@@ -145,12 +134,11 @@ def test_the_other_slot(tmp_path):
 
 
 @needs_compiler
-def test_a_damaged_slot_and_kills(killer, memory):
+def test_a_damaged_slot_and_kills(killer, tmp_path):
     """A run that goes on from the earlier checkpoint keeps that until there is another good one."""
-    (memory / "slots").mkdir()
-    whole, out = interrupted(memory / "slots")
+    whole, out = interrupted(tmp_path)
     (out / "checkpoint.h5").write_bytes(b"damaged")
-    trial, at, deaths = memory / "slots" / "trial", 0, 0
+    trial, at, deaths = tmp_path / "trial", 0, 0
     while True:
         at += 1
         shutil.rmtree(trial, ignore_errors=True)
