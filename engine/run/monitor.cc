@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/forces/forces.h"
 #include "engine/ranks/halo.h"
+#include "engine/run/measurement.h"
 
 namespace carom {
 
@@ -38,13 +38,10 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       observers_(observers),
       statistics_(statistics),
       frames_(plan.frame_interval),
-      rows_(plan.thermo_interval) {
-  for (const auto& term : system.interactions) {
-    tail_.energy += term->tail().energy;
-    tail_.virial += term->tail().virial;
-  }
+      rows_(plan.thermo_interval),
+      tail_(tail_of(system)) {
   statistics.tail_energy = tail_.energy;
-  statistics.tail_pressure = tail_.virial / (D * system.box.volume());
+  statistics.tail_pressure = pressure_of(tail_.virial, system.box);
   if (system.keeps_momentum()) statistics.max_momentum_error = 0;
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
@@ -219,32 +216,25 @@ template <int D>
 Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Integrator<D>* integrator,
                                 bool with_shadow, bool fresh) {
   const Stopwatch watch(statistics_.counters.seconds.output);
-  Snapshot<D> shot;
-  shot.time = time;
-  shot.step = statistics_.steps;
-  shot.collisions = statistics_.counters.sphere_sphere;
-  shot.particles = &state;
   const Particles<D>* elsewhere = integrator ? integrator->energy_state() : nullptr;
   const Particles<D>& nodes = elsewhere ? *elsewhere : state;
   const PotentialSums* potential = integrator && fresh ? integrator->potential() : nullptr;
   const PotentialSums sums = potential ? system_.decomposition.sum(*potential) : evaluate_energy<D>(system_, nodes.x);
-  const auto total = static_cast<double>(system_.size());
-  const MotionSums<D> motion = evaluate_motion(system_, state, nodes);
-  shot.kinetic = motion.kinetic.value();
+  const Measurement<D> found = carom::measure(system_, state, nodes, sums, tail_);
+  Snapshot<D> shot = found.shot;
+  shot.time = time;
+  shot.step = statistics_.steps;
+  shot.collisions = statistics_.counters.sphere_sphere;
+  shot.particles = &state;
   // Of the spheres and of the walls that move: these have lost what work they did.
   account_.energy = shot.kinetic + sums.energy.value() - statistics_.counters.wall_work.value();
-  shot.potential = sums.energy.value() + tail_.energy;
-  account_.magnitude = shot.kinetic + sums.magnitude.value();
-  account_.virial = 2 * shot.kinetic + sums.virial.value() + tail_.virial;
+  account_.magnitude = found.magnitude;
+  account_.virial = found.virial;
+  account_.speed = found.speed;
   if (with_shadow) {
     Counters uncounted;
     const double g = shadow_term<D>(system_, nodes, integrator->accelerations(), scratch_, uncounted);
     shot.shadow = shot.total() + plan_.step * plan_.step * g;
-  }
-  for (int k = 0; k < D; ++k) shot.momentum[k] = motion.momentum[k].value();
-  if (total > 0) {
-    shot.temperature = 2 * shot.kinetic / (D * total);
-    account_.speed = motion.speed.value() / total;
   }
   if (!std::isfinite(shot.total()))
     throw Error(Failure::numerical, "the energy is not finite at step " + std::to_string(shot.step) + ", time " +
@@ -263,7 +253,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
   const double collisions = account_.last_row >= 0 && shot.time > account_.last_row
                                 ? (collision_virial - account_.last_row_virial) / (shot.time - account_.last_row)
                                 : 0;  // nothing has collided before the start
-  shot.pressure = (account_.virial + collisions) / (D * system_.box.volume());
+  shot.pressure = pressure_of(account_.virial + collisions, system_.box);
   shot.max_energy_error = statistics_.max_energy_error;
   if (row) {
     for (auto* observer : observers_) observer->thermo(shot);

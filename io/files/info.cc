@@ -7,6 +7,7 @@
 #include "engine/base/error.h"
 #include "io/files/checkpoint.h"
 #include "io/files/hdf5.h"
+#include "io/files/trajectory_reader.h"
 
 namespace carom {
 
@@ -84,10 +85,9 @@ std::string describe_file(const std::filesystem::path& path) {
   const std::string head = line("file", path.string());
   if (is_checkpoint(path)) return head + describe_checkpoint(path);
   const hdf5::File file = hdf5::File::open(path);
-  if (hdf5::exists(file, "/h5md") && hdf5::exists(file, "/particles/trajectory/position/value"))
-    return head + describe_trajectory(file);
   if (hdf5::exists(file, "/events/time_in_slab")) return head + describe_events(file);
-  throw Error(Failure::file, path.string() + ": an HDF5 file, but neither a trajectory nor events of carom");
+  need_trajectory(file);
+  return head + describe_trajectory(file);
 }
 
 int info_command(const std::filesystem::path& file) {

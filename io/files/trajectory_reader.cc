@@ -15,12 +15,16 @@ const std::string kParticles = "particles/trajectory/";
 hdf5::File open_trajectory(const std::filesystem::path& path) {
   const bool directory = std::filesystem::is_directory(path);
   hdf5::File file = hdf5::File::open(directory ? path / run_file::trajectory : path);
-  if (!hdf5::exists(file, "/h5md") || !hdf5::exists(file, kParticles + "position/value"))
-    throw Error(Failure::file, file.path().string() + ": an HDF5 file, but no trajectory of carom");
+  need_trajectory(file);
   return file;
 }
 
 }  // namespace
+
+void need_trajectory(const hdf5::File& file) {
+  if (!hdf5::exists(file, "/h5md") || !hdf5::exists(file, kParticles + "position/value"))
+    throw Error(Failure::file, file.path().string() + ": an HDF5 file, but no trajectory of carom");
+}
 
 TrajectoryReader::TrajectoryReader(const std::filesystem::path& path) : file_(open_trajectory(path)) {
   const auto shape = hdf5::shape(file_, kParticles + "position/value");

@@ -23,6 +23,9 @@ struct TrajectoryFrame {
   std::vector<std::int32_t> image;
 };
 
+/// Throws Error(Failure::file) where an HDF5 file is something else than a trajectory.
+void need_trajectory(const hdf5::File& file);
+
 class TrajectoryReader {
  public:
   /// `path`: the file, or the directory of its run. Throws Error(Failure::file) for anything else than a trajectory.

@@ -137,11 +137,10 @@ void bind(py::module_& module, const char* name) {
            })
       .def("constant",
            [](const py::object& self, const std::string& which) -> py::array {
-             const Particles<D>& p = self.cast<S&>().constants();
-             const std::size_t n = p.mass.size();
-             if (which == "species") return view<std::uint16_t>(p.species.data(), n, 0, self);
-             const auto& values = which == "mass" ? p.mass : which == "radius" ? p.radius : p.charge;
-             return view<double>(values.data(), n, 0, self);
+             const Constants all = self.cast<S&>().constants();
+             if (which == "species") return view<std::uint16_t>(all.species.data(), all.species.size(), 0, self);
+             const auto values = which == "mass" ? all.mass : which == "radius" ? all.radius : all.charge;
+             return view<double>(values.data(), values.size(), 0, self);
            })
       .def_property_readonly("time", number([](S& s) { return s.shot().time; }))
       .def_property_readonly("kinetic", number([](S& s) { return s.shot().kinetic; }))

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/forces/add_interaction.h"
-#include "engine/forces/forces.h"
+#include "engine/run/measurement.h"
 #include "engine/run/state.h"
 #include "engine/setup/epoch.h"
-#include "io/deck/deck_source.h"
 
 namespace carom::python {
 namespace {
@@ -22,14 +20,6 @@ double value_of(std::span<const double> values, std::size_t i, double fallback) 
 template <int D>
 Vec<D> vector_at(std::span<const double> values, std::size_t i) {
   return Eigen::Map<const Vec<D>>(values.data() + i * D);
-}
-
-/// Gives a term the bonds that it has found, to be the same whenever it is made again.
-template <int D>
-void take_found_bonds(Force& force, const Interaction<D>& term) {
-  if (!force.parameters.has("within") || term.bonds() == nullptr) return;
-  force.parameters.erase("within");
-  force.parameters.set("pairs", *term.bonds());
 }
 
 }  // namespace
@@ -53,6 +43,7 @@ Session<D>::Session(std::span<const double> edges, const std::vector<std::string
   system_->species.clear();
   system_->box = box_;
   system_->check();
+  views_.rest(system_->particles);
 }
 
 template <int D>
@@ -64,14 +55,8 @@ Session<D>::Session(Deck& deck) {
   size_ = system_->size();
   integrator_ = &find_integrator(deck.integrator);
   parameters_ = deck.integrator_parameters;
-  std::size_t found = 0;
-  const auto bonds = found_bonds(deck, *system_);
-  for (const InteractionConfig& config : deck.source->interactions) {
-    forces_.push_back({config.info, config.parameters});
-    if (!config.parameters.has("within")) continue;
-    forces_.back().parameters.erase("within");
-    forces_.back().parameters.set("pairs", bonds[found++]);
-  }
+  terms_ = Terms<D>(deck, *system_);
+  views_.rest(system_->particles);
 }
 
 /// To be called before anything is changed.
@@ -94,13 +79,7 @@ void Session<D>::add_particles(const Columns& columns) {
   const auto kind = static_cast<std::uint16_t>(at - species_.begin());
   if (kind == kinds) species_.push_back(columns.species);
   system_->species = species_;
-  bool viewed = std::exchange(constants_viewed_, false);
-  each_moving([&](auto, auto& kept) { viewed = std::exchange(kept.viewed, false) || viewed; });
-  if (viewed) {  // views go on to show what they showed
-    Particles<D> old = all;
-    std::swap(old, all);
-    retired_.push_back(std::move(old));
-  }
+  views_.detach(all);
   const auto resize = [&](std::size_t n) {
     all.x.resize(n), all.v.resize(n), all.image.resize(n);
     all.mass.resize(n), all.radius.resize(n), all.charge.resize(n), all.species.resize(n);
@@ -121,13 +100,12 @@ void Session<D>::add_particles(const Columns& columns) {
     }
     system_->check();
     system_->wrap();
-    make_forces(*system_);
-    forces_made_ = true;
+    terms_.make(*system_);
   } catch (...) {
     resize(before);
     species_.resize(kinds);
     system_->species = species_;
-    forces_made_ = false;
+    system_->interactions.clear();
     throw;
   }
 }
@@ -154,34 +132,13 @@ void Session<D>::set(std::vector<Vec<D>> Particles<D>::*member, std::span<const 
   for (std::size_t i = 0; i < size_; ++i) (system_->particles.*member)[i] = vector_at<D>(values, i);
 }
 
-/// Makes the terms of V for the particles there are: bonds first, which other terms may leave out.
-template <int D>
-void Session<D>::make_forces(System<D>& system) {
-  system.interactions.clear();
-  system.quanta = {};
-  for (const bool bonded : {true, false})
-    for (Force& force : forces_) {
-      if ((force.info->kind == InteractionInfo::Kind::bonded) != bonded) continue;
-      add_interaction(system, *force.info, force.parameters);
-      take_found_bonds(force, *system.interactions.back());
-    }
-}
-
 template <int D>
 void Session<D>::add_force(std::string_view type, Parameters given) {
   const InteractionInfo& info = find_interaction(type);
   Parameters complete = completed(info.name, info.parameters, std::move(given));
   if (size_ == 0) refuse(std::string(type) + ": there are no particles yet; call add_particles() first");
   change("add forces");
-  forces_.push_back({&info, std::move(complete)});
-  try {
-    make_forces(*system_);
-    forces_made_ = true;
-  } catch (...) {
-    forces_.pop_back();
-    forces_made_ = false;
-    throw;
-  }
+  terms_.add(info, std::move(complete), *system_);
 }
 
 template <int D>
@@ -219,7 +176,7 @@ void Session<D>::try_out(const Parameters& parameters, const Plan& plan) {
   copy->box = box_;
   copy->species = species_;
   copy->particles = system_->particles;
-  make_forces(*copy);
+  terms_.make(*copy);
   Simulation<D>(std::move(copy), *integrator_, parameters, plan);
 }
 
@@ -236,8 +193,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
            " already; give a later end, or change something to start anew");
   if (begun && state_.empty())
     refuse("a run that a number of collisions has ended within an epoch cannot go on; give a time instead");
-  if (!forces_made_) make_forces(*system_);
-  forces_made_ = true;
+  terms_.complete(*system_);
   Parameters parameters = parameters_;
   if (!begun) step_ = parameters.has("step") ? parameters.real("step") : default_epoch(*system_);
   parameters.set("step", step_);
@@ -251,11 +207,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   run.add(shown);
   at_work_ = &run.system();
   live_ = &run.statistics();
-  each_moving([&](auto of, auto& kept) {
-    if (!kept.viewed) return;
-    kept.values = at_work_->particles.*of;
-    kept.values.swap(at_work_->particles.*of);
-  });
+  views_.lend(at_work_->particles);
   running_ = true;
   std::map<std::string, Bytes> state;
   typename Simulation<D>::Hooks inner;
@@ -276,8 +228,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   const auto end = [&] {
     statistics_ = *std::exchange(live_, nullptr);
     shown_until_ = std::max(shown_until_, statistics_.end_time);
-    if (shot_) shot_->particles = nullptr;
-    rest(std::move(at_work_->particles));
+    rest(at_work_->particles);
   };
   try {
     run.run(inner);
@@ -293,97 +244,37 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
 
 /// The system as it is between runs.
 template <int D>
-void Session<D>::rest(Particles<D> particles) {
+void Session<D>::rest(Particles<D>& particles) {
   for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // where free flight has failed
-  each_moving([&](auto of, auto& kept) {                                                // views come home
-    if (kept.values.empty()) return;
-    kept.values = particles.*of;
-    kept.values.swap(particles.*of);
-    kept.values = {};
-  });
-  at_work_ = nullptr;
   system_ = std::make_unique<System<D>>();
   system_->box = box_;
   system_->species = species_;
-  system_->particles = std::move(particles);
-  forces_made_ = forces_.empty();
+  views_.rest(std::move(particles), system_->particles);
+  at_work_ = nullptr;
   running_ = false;
-}
-
-/// Calls action(member of Particles, Kept) for each array that a run changes.
-template <int D>
-void Session<D>::each_moving(auto&& action) {
-  action(&Particles<D>::x, kept_.x);
-  action(&Particles<D>::v, kept_.v);
-  action(&Particles<D>::image, kept_.image);
 }
 
 template <int D>
 void Session<D>::show(const Snapshot<D>& shot, const RunHooks& hooks) {
   shot_ = shot;
-  each_moving([&](auto of, auto& kept) {
-    if (kept.viewed) kept.values = shot.particles->*of;
-  });
-  if (hooks.show && shot.time > shown_until_) hooks.show();
   shot_->particles = nullptr;
-}
-
-/// An array of the particles as shown last.
-template <int D>
-template <class T>
-std::span<const T> Session<D>::moving(std::vector<T> Particles<D>::*of, Kept<T>& kept) {
-  if (running_ && kept.values.empty()) {
-    if (!shot_ || shot_->particles == nullptr)
-      refuse("a run is going on; look at the particles in its callback, or after it");
-    kept.values = shot_->particles->*of;
-  }
-  kept.viewed = true;
-  return running_ ? kept.values : system_->particles.*of;
-}
-
-template <int D>
-std::span<const Vec<D>> Session<D>::position() {
-  return moving(&Particles<D>::x, kept_.x);
-}
-
-template <int D>
-std::span<const Vec<D>> Session<D>::velocity() {
-  return moving(&Particles<D>::v, kept_.v);
-}
-
-template <int D>
-std::span<const Image<D>> Session<D>::image() {
-  return moving(&Particles<D>::image, kept_.image);
-}
-
-template <int D>
-const Particles<D>& Session<D>::constants() {
-  constants_viewed_ = true;
-  return running_ ? at_work_->particles : system_->particles;
+  views_.show(*shot.particles);
+  if (hooks.show && shot.time > shown_until_) hooks.show();
+  views_.hide();
 }
 
 template <int D>
 const Snapshot<D>& Session<D>::shot() {
   if (shot_) return *shot_;
   if (running_) refuse("a run is just beginning; look at it in its callback, or after it");
-  if (!forces_made_) make_forces(*system_);
-  forces_made_ = true;
+  terms_.complete(*system_);
   System<D>& system = *system_;
   system.quanta = quanta(system);
-  PotentialSums potential = evaluate_energy<D>(system, system.particles.x);
-  const MotionSums<D> motion = evaluate_motion(system, system.particles, system.particles);
-  Snapshot<D> shot;
-  shot.kinetic = motion.kinetic.value();
-  shot.potential = potential.energy.value();
-  double virial = 2 * shot.kinetic + potential.virial.value();
-  for (const auto& term : system.interactions) {
-    shot.potential += term->tail().energy;
-    virial += term->tail().virial;
-  }
-  for (int k = 0; k < D; ++k) shot.momentum[k] = motion.momentum[k].value();
-  if (size_ > 0) shot.temperature = 2 * shot.kinetic / (D * static_cast<double>(size_));
-  shot.pressure = virial / (D * box_.volume());
-  return shot_.emplace(shot);
+  const Measurement<D> now = measure(system, system.particles, system.particles,
+                                     evaluate_energy<D>(system, system.particles.x), tail_of(system));
+  shot_ = now.shot;
+  shot_->pressure = pressure_of(now.virial, box_);
+  return *shot_;
 }
 
 template class Session<2>;

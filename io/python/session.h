@@ -4,13 +4,9 @@
 // Between runs the session has a system at rest; Simulation::run() advances it to an end, and saves the state from
 // which a later run() goes on with the bits of one undisturbed run (engine/run/state.h). A change of particles, forces
 // or integrator drops that state: then a new run begins at time 0.
-//
-// The arrays of the particles that have been viewed keep their addresses while the session lives, and hold what it was
-// asked to show last.
 
 #include <atomic>
 #include <functional>
-#include <list>
 #include <map>
 #include <optional>
 #include <string>
@@ -18,6 +14,8 @@
 
 #include "engine/run/simulation.h"
 #include "io/deck/deck.h"
+#include "io/python/terms.h"
+#include "io/python/views.h"
 
 namespace carom::python {
 
@@ -25,12 +23,6 @@ namespace carom::python {
 struct Columns {
   std::span<const double> x, v, radius, mass, charge;
   std::string species;
-};
-
-/// A term of V.
-struct Force {
-  const InteractionInfo* info;
-  Parameters parameters;  ///< complete; bonds that were found within a distance stand as `pairs`
 };
 
 /// What the caller of run() does meanwhile.
@@ -60,49 +52,34 @@ class Session {
   // What there is now: in RunHooks::show at the time shown, else at the end of the last run.
   const Snapshot<D>& shot();
   const Statistics& statistics() const { return live_ ? *live_ : statistics_; }
-  /// Views of all particles; the addresses stay good.
-  std::span<const Vec<D>> position();
-  std::span<const Vec<D>> velocity();
-  std::span<const Image<D>> image();
-  const Particles<D>& constants();  ///< mass, radius, charge, species
+  /// Views of all particles; they stay good while the session lives.
+  std::span<const Vec<D>> position() { return views_.position(); }
+  std::span<const Vec<D>> velocity() { return views_.velocity(); }
+  std::span<const Image<D>> image() { return views_.image(); }
+  Constants constants() { return views_.constants(); }
   const Box<D>& box() const { return box_; }
   const std::vector<std::string>& species() const { return species_; }
   std::size_t size() const { return size_; }
   bool running() const { return running_; }
   const IntegratorInfo* integrator() const { return integrator_; }
   const Parameters& integrator_parameters() const { return parameters_; }
-  const std::vector<Force>& forces() const { return forces_; }
+  const std::vector<Force>& forces() const { return terms_.all(); }
   /// The plan of the deck; without one there is no end in it.
   const Plan& plan() const { return plan_; }
 
  private:
-  /// An array that a run changes. Runs swap and free their own; what has been viewed is kept here meanwhile.
-  template <class T>
-  struct Kept {
-    std::vector<T> values;  ///< while a run goes on: as shown last
-    bool viewed = false;
-  };
-  struct Moving {
-    Kept<Vec<D>> x, v;
-    Kept<Image<D>> image;
-  };
   class Shown;
   void change(const char* what);
   void set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what);
-  void make_forces(System<D>& system);
   void try_out(const Parameters& parameters, const Plan& plan);
-  void append(const Columns& columns);
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
-  void rest(Particles<D> particles);
-  void each_moving(auto&& action);
+  void rest(Particles<D>& particles);
   void show(const Snapshot<D>& shot, const RunHooks& hooks);
-  template <class T>
-  std::span<const T> moving(std::vector<T> Particles<D>::*of, Kept<T>& kept);
 
   Box<D> box_;
   std::vector<std::string> species_;
-  std::vector<Force> forces_;
+  Terms<D> terms_;
   const IntegratorInfo* integrator_ = nullptr;
   Parameters parameters_;
   Plan plan_;
@@ -110,10 +87,8 @@ class Session {
   std::unique_ptr<System<D>> system_ = std::make_unique<System<D>>();  // at rest; null while running
   System<D>* at_work_ = nullptr;
   std::size_t size_ = 0;
-  bool forces_made_ = true, constants_viewed_ = false;
   std::atomic<bool> running_ = false;
-  std::list<Particles<D>> retired_;  // of which there are views
-  Moving kept_;
+  ParticleViews<D> views_;
   std::string failure_;  // of the last run
 
   std::optional<Snapshot<D>> shot_;

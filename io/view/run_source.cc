@@ -15,6 +15,7 @@
 #include "io/files/hdf5.h"
 #include "io/files/journal.h"
 #include "io/files/output_directory.h"
+#include "io/files/trajectory_reader.h"
 
 namespace carom {
 
@@ -82,8 +83,7 @@ void RunSource::look() {
   if (!now.exists || now.version == seen_) return;
   hdf5::read_between_flushes(trajectory_, [&] {
     const auto file = hdf5::File::open_unlocked(trajectory_);
-    if (!hdf5::exists(file, kParticles + "/position/value") || !hdf5::exists(file, "/parameters/dimension"))
-      throw Error(Failure::file, trajectory_.string() + ": an HDF5 file, but no trajectory of carom");
+    need_trajectory(file);
     frames_ = hdf5::shape(file, kParticles + "/position/step").at(0);
     if (now.identity == identity_) return;
     particles_ = hdf5::shape(file, kParticles + "/position/value").at(1);

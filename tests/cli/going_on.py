@@ -1,4 +1,4 @@
-"""What the tests of going on share: to take a run up again, and to compare it with an undisturbed one."""
+"""What the tests of going on share: a run, to take it up again, and to compare it with an undisturbed one."""
 
 import subprocess
 import sys
@@ -7,10 +7,12 @@ import time
 from runs import CAROM, ROOT, mpirun
 
 sys.path.insert(0, str(ROOT / "tools"))
-from carom_files import toml_text  # noqa: F401
+from carom_files import toml_text
 from compare import compare, summary_differences
 
 INTERRUPTED = 75
+ALL_OUTPUT = ["output.events=true", "output.rdf_interval=0.07", "output.msd_interval=0.05", "output.profile_interval=0.11"]
+CHECKPOINTS = ["output.checkpoint_wall=\"0\""]  # as many as there are looks at the clock
 
 
 def go_on(output, arguments=(), code=0, ranks=1, environment=None):
@@ -37,3 +39,21 @@ def wait_for_rows(job, output, rows=4):
     while not (output / "thermo.csv").exists() or (output / "thermo.csv").read_text().count("\n") <= rows:
         assert job.poll() is None, job.stderr.read()
         time.sleep(0.005)
+
+
+def box(method, dimension, steps, **more):
+    """64 spheres between walls and periodic borders, under forces that the method knows."""
+    free, points = method == "free-flight", method == "verlet"
+    field = {"type": "uniform-field", "acceleration": [-0.3] + (dimension - 1) * [0.0]}
+    forces = [{"type": "yukawa", "amplitude": 1.0, "kappa": 2.0, "cutoff": 1.9},
+              {"type": "harmonic-bond", "within": 1.35, "stiffness": 30.0, "rest_length": 1.2}]
+    return toml_text({
+        "format": 1, "title": "continued",
+        "system": {"dimension": dimension, "boundary": ["periodic" if points else "wall"] + (dimension - 1) * ["periodic"]},
+        "particles": [{"name": name, "count": 32, "temperature": 1.0, "radius": 0.5, "mass": mass}
+                      for name, mass in (("light", 1.0), ("heavy", 3.0))],
+        "placement": {"type": "square" if dimension == 2 else "simple-cubic", "packing_fraction": 0.5 if dimension == 2 else 0.3, "seed": 5},
+        "interaction": ([] if points else [field]) + ([] if free else forces),
+        "integrator": {"type": method, "step": 0.35 if free else 0.02} | more,
+        "run": {"steps": steps},
+        "output": {"directory": "unused", "frame_interval": 0.13, "thermo_interval": 0.06}})

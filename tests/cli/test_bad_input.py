@@ -1,90 +1,11 @@
 """Runs the real command on bad decks: each problem has its exit code, its place and its remedy."""
 
-import subprocess
-
 import pytest
 
-from runs import CAROM, needs_carom
+from decks import FLUID, GOOD, carom, changed, lennard_jones, table, validate
+from runs import needs_carom
 
 pytestmark = needs_carom
-
-GOOD = """\
-format = 1
-title = "two discs"
-
-[system]
-dimension = 2
-box = [10.0, 10.0]
-boundary = ["wall", "wall"]
-
-[[particles]]
-name = "disc"
-position = [[2.0, 5.0], [5.0, 5.0]]
-velocity = [[1.0, 0.0], [0.0, 0.0]]
-radius = 0.5
-mass = 1.0
-
-[[interaction]]
-type = "harmonic-bond"
-pairs = [[0, 1]]
-stiffness = 1.0
-rest_length = 2.0
-
-[integrator]
-type = "cdda"
-step = 0.01
-
-[run]
-steps = 10
-"""
-
-FLUID = """\
-format = 1
-
-[system]
-dimension = 3
-box = [6.0, 6.0, 6.0]
-boundary = ["periodic", "periodic", "periodic"]
-
-[[particles]]
-name = "sphere"
-count = 64
-temperature = 1.0
-radius = 0.5
-
-[placement]
-type = "fcc"
-
-[integrator]
-type = "free-flight"
-
-[run]
-collisions = 10
-"""
-
-
-def carom(*arguments, cwd=None):
-    return subprocess.run([CAROM, *arguments], capture_output=True, text=True, timeout=60, cwd=cwd)
-
-
-def validate(tmp_path, text, *arguments):
-    (tmp_path / "deck.toml").write_text(text)
-    return carom("validate", "deck.toml", *arguments, cwd=tmp_path)
-
-
-def changed(old, new, deck=GOOD):
-    assert deck.count(old) == 1, f"{old!r} stands {deck.count(old)} times in the deck"
-    return deck.replace(old, new)
-
-
-def lennard_jones(more):
-    return changed("[integrator]\ntype = \"free-flight\"",
-                   f'[[interaction]]\ntype = "lennard-jones"\nepsilon = 1\nsigma = 1\n{more}\n[integrator]\ntype = "verlet"\nstep = 0.1',
-                   FLUID)
-
-
-def table(more):
-    return lennard_jones(more).replace('"lennard-jones"\nepsilon = 1\nsigma = 1', '"table"')
 
 
 def test_good_decks_are_valid(tmp_path):
@@ -326,71 +247,6 @@ def test_set_error(tmp_path, name):
     assert answer.returncode == 2
 
 
-def test_positions_file(tmp_path):
-    deck = changed('type = "fcc"', 'type = "file"\nfile = "places.csv"', FLUID).replace("count = 64", "count = 2")
-    answer = validate(tmp_path, deck)
-    assert (answer.returncode, "places.csv" in answer.stderr) == (5, True)
-    (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n2.5 1 oops\n")
-    answer = validate(tmp_path, deck)
-    assert answer.returncode == 2
-    assert "places.csv:3:7: error: not a position: 'oops' is no finite number; give 3 finite numbers" in answer.stderr
-    (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n")
-    answer = validate(tmp_path, deck)
-    assert answer.returncode == 2
-    assert "1 positions for 2 particles" in answer.stderr
-    for good in (b"x,y,z\n1,1,1\n2.5 1 +1  # on the floor\n", b"x,y,z\r\n1,1,1\r\n2.5,1,1\r\n", b"\n# places\n\"x\" \"y\" \"z\"\n1;1;1\n2.5;1;1"):
-        (tmp_path / "places.csv").write_bytes(good)
-        assert validate(tmp_path, deck).returncode == 0
-
-
-@pytest.mark.parametrize("contents, words", [
-    (b"", "0 positions for 2 particles"),
-    (b"nan 1 1\n2 2 2\n", "places.csv:1:1: error: not a position: 'nan' is no finite number"),
-    (b"1 1 1\n2 -inf 2\n", "places.csv:2:3: error: not a position: '-inf' is no finite number"),
-    (b"1 1 1\n2 2 1e999\n", "places.csv:2:5: error: not a position: '1e999' is no finite number"),
-    (b"1 1 1.o\n2 2 2\n", "places.csv:1:5: error: not a position: '1.o' is no finite number"),
-    (b"x y z\nin nm\n1 1 1\n2 2 2\n", "places.csv:2:1: error: not a position: 'in' is no finite number"),
-    (b"1 1\n2 2\n", "places.csv:1:1: error: not a position: there are 2 numbers"),
-    (b"1 1 1 1\n2 2 2 2\n", "places.csv:1:1: error: not a position: there are 4 numbers"),
-    (b"1 1 1\n" + 1000000 * b"\x80\xff", "places.csv:2:1: error: not a position: '" + 20 * "?" + "…' is no finite number"),
-    (b"1 1 1\n" + 1000000 * b"1 ", "places.csv:2:1: error: not a position: there are 1000000 numbers"),
-    (b"1 1 1\n" + 100000 * b"2 2\n", "places.csv:11:1: error: not a position: there are 2 numbers"),
-], ids=[str(n) for n in range(11)])  # contents are too long for names
-def test_odd_positions_files(contents, words, tmp_path):
-    deck = changed('type = "fcc"', 'type = "file"\nfile = "places.csv"', FLUID).replace("count = 64", "count = 2")
-    (tmp_path / "places.csv").write_bytes(contents)
-    answer = validate(tmp_path, deck)
-    assert answer.returncode == 2 and words in answer.stderr, answer.stderr[:500]
-    assert len(answer.stderr) < 3000  # not one line for each of a file that is something else
-
-
-def test_potential_from_a_file(tmp_path):
-    deck = changed("collisions = 10", "steps = 10", table('file = "potential.csv"'))
-    answer = validate(tmp_path, deck)
-    assert (answer.returncode, "potential.csv" in answer.stderr) == (5, True)
-    (tmp_path / "potential.csv").write_text("r,V\n0.9,1\n1.2\n")
-    answer = validate(tmp_path, deck)
-    assert answer.returncode == 2
-    assert "potential.csv:3:1: error: not a point of a potential: there is 1 number; give 2 finite numbers" in answer.stderr
-    (tmp_path / "potential.csv").write_text("r,V\n0.9,1\n1.2,0.5\n1.2,0\n")
-    answer = validate(tmp_path, deck)
-    assert answer.returncode == 2
-    assert "deck.toml:17:1: error: table: the distances do not ascend" in answer.stderr
-    (tmp_path / "potential.csv").write_text("r,V\n0.9 1\n1.2 0.5 # there\n1.5 0\n")
-    assert validate(tmp_path, deck).returncode == 0
-    run = carom("run", "deck.toml", "-o", "one", "--quiet", cwd=tmp_path)
-    assert run.returncode == 0, run.stderr
-    resolved = (tmp_path / "one" / "deck.toml").read_text()
-    assert "r = [0.9, 1.2, 1.5]\nvalue = [1.0, 0.5, 0.0]" in resolved and "cutoff = 1.5" in resolved and "file = " not in resolved
-
-
-def test_unreadable_deck(tmp_path):
-    for path in ("nowhere.toml", "."):
-        answer = carom("validate", path, cwd=tmp_path)
-        assert answer.returncode == 5
-        assert "cannot read this deck" in answer.stderr
-
-
 @pytest.mark.parametrize("arguments", [[], ["frobnicate"], ["run"], ["validate"], ["validate", "a", "--bogus"], ["run", "a", "--max-wall", "soon"]])
 def test_usage(arguments):
     answer = carom(*arguments)
@@ -408,16 +264,6 @@ def test_pages(arguments, wanted):
     assert wanted in answer.stdout
 
 
-def both(tmp_path, text, code, *parts):
-    """`validate` and `run` refuse this deck alike."""
-    for answer in validate(tmp_path, text), carom("run", "deck.toml", "-o", "out", "--quiet", cwd=tmp_path):
-        assert answer.returncode == code, answer.stderr
-        for part in parts:
-            assert part in answer.stderr
-        assert len(answer.stderr.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.parametrize("name", DECK_ERRORS)
 def test_run_and_validate_refuse_the_same(name, tmp_path):
     text = DECK_ERRORS[name][0]
@@ -425,17 +271,3 @@ def test_run_and_validate_refuse_the_same(name, tmp_path):
     done = carom("run", "deck.toml", "-o", "out", "--quiet", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (answer.returncode, answer.stderr)
     assert not (tmp_path / "out").exists()
-
-
-def test_more_than_there_is_memory_for(tmp_path):
-    huge = changed("count = 64", "count = 900000000", changed("[6.0, 6.0, 6.0]", "[6000.0, 6000.0, 6000.0]", FLUID))
-    both(tmp_path, huge, 3, "deck.toml:8:", "error: a run of 900000000 particles needs about ", "GB of memory; ", "GB are free here")
-    both(tmp_path, changed("collisions = 10", "steps = 10", lennard_jones("cutoff = 5.5e12")), 3, "deck.toml:17:", "GB of memory; ", "take a shorter cutoff")
-
-
-def test_inputs_without_end_and_other_than_text(tmp_path):
-    zero = carom("validate", "/dev/zero", cwd=tmp_path)
-    assert (zero.returncode, zero.stderr) == (5, "/dev/zero: error: this is no text, it has zero bytes; check the path\n")
-    places = changed('type = "fcc"', 'type = "file"\nfile = "/dev/zero"', FLUID)
-    both(tmp_path, places, 5, "/dev/zero: error: this is no text")
-    both(tmp_path, changed("collisions = 10", "steps = 10", table('file = "/dev/zero"')), 5, "/dev/zero: error: this is no text")

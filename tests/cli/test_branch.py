@@ -8,8 +8,9 @@ import subprocess
 import numpy as np
 import pytest
 
+from going_on import INTERRUPTED, box, expect_same, go_on, wait_for_rows
 from runs import CAROM, command, data_sets, mpi_environment, mpirun, needs_carom, run, summary, thermo, write_deck
-from test_continue import CASES, INTERRUPTED, box, expect_same, go_on, spheres, wait_for_rows
+from test_continue import CASES, spheres
 
 pytestmark = needs_carom
 

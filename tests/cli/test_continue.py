@@ -2,42 +2,19 @@
 
 import os
 import pathlib
-import random
 import re
 import shutil
 import signal
 import subprocess
-import tempfile
 import time
 
 import pytest
 
-from going_on import INTERRUPTED, compare, expect_same, go_on, summary_differences, toml_text, wait_for_rows
-from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, in_mount, killer_library, mpi_environment, mpirun, needs_carom,
-                  needs_compiler, needs_mount, run, summary, write_deck)
+from going_on import ALL_OUTPUT, CHECKPOINTS, INTERRUPTED, box, expect_same, go_on, toml_text, wait_for_rows
+from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, mpi_environment, mpirun, needs_carom, run, summary,
+                  write_deck)
 
 pytestmark = needs_carom
-
-ALL_OUTPUT = ["output.events=true", "output.rdf_interval=0.07", "output.msd_interval=0.05", "output.profile_interval=0.11"]
-CHECKPOINTS = ["output.checkpoint_wall=\"0\""]  # as many as there are looks at the clock
-
-
-def box(method, dimension, steps, **more):
-    """64 spheres between walls and periodic borders, under forces that the method knows."""
-    free, points = method == "free-flight", method == "verlet"
-    field = {"type": "uniform-field", "acceleration": [-0.3] + (dimension - 1) * [0.0]}
-    forces = [{"type": "yukawa", "amplitude": 1.0, "kappa": 2.0, "cutoff": 1.9},
-              {"type": "harmonic-bond", "within": 1.35, "stiffness": 30.0, "rest_length": 1.2}]
-    return toml_text({
-        "format": 1, "title": "continued",
-        "system": {"dimension": dimension, "boundary": ["periodic" if points else "wall"] + (dimension - 1) * ["periodic"]},
-        "particles": [{"name": name, "count": 32, "temperature": 1.0, "radius": 0.5, "mass": mass}
-                      for name, mass in (("light", 1.0), ("heavy", 3.0))],
-        "placement": {"type": "square" if dimension == 2 else "simple-cubic", "packing_fraction": 0.5 if dimension == 2 else 0.3, "seed": 5},
-        "interaction": ([] if points else [field]) + ([] if free else forces),
-        "integrator": {"type": method, "step": 0.35 if free else 0.02} | more,
-        "run": {"steps": steps},
-        "output": {"directory": "unused", "frame_interval": 0.13, "thermo_interval": 0.06}})
 
 
 def on_ranks(ranks, deck, output, overrides):
@@ -45,19 +22,6 @@ def on_ranks(ranks, deck, output, overrides):
         mpirun(ranks, command(deck, output, overrides))
     else:
         run(deck, output, overrides)
-
-
-@pytest.fixture(scope="module")
-def memory():
-    """A directory on a file system in memory, where there is one: syncs take no time there."""
-    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-    with tempfile.TemporaryDirectory(prefix="carom-continue-", dir=place) as name:
-        yield pathlib.Path(name)
-
-
-@pytest.fixture(scope="module")
-def killer(tmp_path_factory):
-    return killer_library(tmp_path_factory.mktemp("library"))
 
 
 METHODS = [("free-flight", {}), ("verlet", {}), ("psa", {}), ("cva", {}), ("mcva", {}), ("mcva", {"variant": "restart"}),
@@ -250,162 +214,6 @@ def test_the_script_for_slurm(tmp_path):
     assert queue.read_text().endswith(f"--nodes=2 {script} deck there\n")
 
 
-def killed(killer, deck, out, at, overrides, go=False, where=""):
-    """Runs and dies at a change of its files; None: counts the changes. True: it has died."""
-    environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": f"{out}/{where}", "KILL_HALF": str((at or 0) % 2)}
-    environment |= {"KILL_AT": str(at)} if at else {"KILL_COUNT": str(out.parent / "count")}
-    what = [CAROM, "run", "--continue", str(out), "--quiet"] if go else command(deck, out, overrides)
-    done = subprocess.run(what, env=environment, capture_output=True, text=True, timeout=60)
-    assert done.returncode in (0, -signal.SIGKILL), done.stderr
-    return done.returncode != 0
-
-
-@needs_compiler
-@pytest.mark.parametrize("method", ["free-flight", "psa"])
-def test_killed_at_its_writes(method, killer, memory):
-    """Also while checkpoints are written, and while a run is being continued. CAROM_KILLS: how many more often."""
-    place = memory / method
-    place.mkdir()
-    dice, kills = random.Random(7), int(os.environ.get("CAROM_KILLS", "12"))
-    deck, whole, out = write_deck(place, box(method, 3, 200 if method == "psa" else 60)), place / "whole", place / "out"
-    run(deck, whole, ALL_OUTPUT)
-    killed(killer, deck, out, None, ALL_OUTPUT + CHECKPOINTS)
-    changes, refused, continued = int((place / "count").read_text()), 0, 0
-    assert changes > 200
-    for n in range(kills):
-        shutil.rmtree(out)
-        checkpoints = n % 2 == 1
-        where, most = ("checkpoint.h5", 40) if checkpoints else ("", changes)
-        if not killed(killer, deck, out, dice.randrange(1, most), ALL_OUTPUT + CHECKPOINTS, where=where):
-            continue
-        if not (out / "checkpoint.h5").exists() and not (out / "checkpoint.previous.h5").exists():
-            # Files may be there, or none yet.
-            assert "there is no checkpoint.h5 to go on from" in go_on(out, code=5).stderr
-            refused += 1
-            continue
-        if n % 3 == 0:
-            killed(killer, deck, out, dice.randrange(1, 60), [], go=True)
-        go_on(out)
-        assert compare(whole, out) + summary_differences(whole, out) == []
-        continued += 1
-    print(f"{kills} kills: {continued} continued, {refused} before the first checkpoint")
-    assert continued > kills / 4
-
-
-def test_killed_ranks(tmp_path):
-    """SIGKILL to mpirun at random instants, each time going on from the last checkpoint."""
-    dice = random.Random(3)
-    deck, whole, out = write_deck(tmp_path, box("edda", 3, 400)), tmp_path / "whole", tmp_path / "out"
-    run(deck, whole, ALL_OUTPUT)
-    what = command(deck, out, ALL_OUTPUT + ["output.checkpoint_wall=\"0.02\""])
-    for _ in range(3):
-        job = subprocess.Popen(["mpirun", "-n", "2", *what], env=mpi_environment(), stderr=subprocess.PIPE, text=True)
-        while not (out / "checkpoint.h5").exists():
-            time.sleep(0.01)
-        time.sleep(dice.uniform(0.05, 0.6))
-        job.kill()
-        job.wait()
-        what = [CAROM, "run", "--continue", str(out), "--quiet"]
-    go_on(out, ranks=3)  # the lock waits for processes that are ending
-    expect_same(whole, out)
-
-
-@needs_mount
-def test_a_full_disk_during_a_checkpoint(tmp_path):
-    """The earlier one remains; with more space the run goes on."""
-    disk, kept, whole = tmp_path / "disk", tmp_path / "kept", tmp_path / "whole"
-    disk.mkdir()
-    deck = write_deck(tmp_path, SPHERES)
-    # Rows are written slowly, checkpoints of 200 kB more and more of them beside them.
-    overrides = ["particles.0.count=4000", "run.end_time=40.0", "output.thermo_interval=0.5", "output.frame_interval=2.0"]
-    run(deck, whole, overrides)
-    done = in_mount("size=2700k", disk, command(deck, disk, overrides + CHECKPOINTS), kept)
-    assert done.returncode == 5 and "No space left" in done.stderr, done.stderr
-    assert (kept / "checkpoint.h5").exists() and summary(kept)["status"] == "failed"
-    assert not list(kept.glob("*.part"))
-    go_on(kept)
-    expect_same(whole, kept)
-
-
-def interrupted(tmp_path):
-    """A run with two checkpoints, and how an undisturbed one ends."""
-    deck, whole, out = write_deck(tmp_path, box("psa", 2, 300)), tmp_path / "whole", tmp_path / "out"
-    run(deck, whole, ALL_OUTPUT)
-    run(deck, out, [*ALL_OUTPUT, "run.steps=100"])
-    go_on(out, ["--set", "run.steps=200"])
-    assert (out / "checkpoint.previous.h5").exists()
-    return whole, out
-
-
-def test_the_other_slot(tmp_path):
-    whole, out = interrupted(tmp_path)
-    last = out / "checkpoint.h5"
-    good = last.read_bytes()
-    damage = {"its checksum is not that of its contents": good[:5000] + bytes([good[5000] ^ 1]) + good[5001:],
-              "damaged or cut off": good[: len(good) // 2],
-              "written by a newer carom": good.replace(b"carom checkpoint 2", b"carom checkpoint 7", 1),
-              "not a checkpoint of carom": b"something else"}
-    for words, contents in damage.items():
-        trial = tmp_path / "trial"
-        shutil.rmtree(trial, ignore_errors=True)
-        shutil.copytree(out, trial)
-        (trial / "checkpoint.h5").write_bytes(contents)
-        done = go_on(trial, ["--set", "run.steps=300"])
-        assert words in done.stderr and "going on from checkpoint.previous.h5" in done.stderr, done.stderr
-        expect_same(whole, trial)
-        shutil.copy(trial / "checkpoint.h5", trial / "checkpoint.previous.h5")
-        for name in ("checkpoint.h5", "checkpoint.previous.h5"):
-            (trial / name).write_bytes(contents)
-        refused = go_on(trial, code=5)
-        assert words in refused.stderr and "checkpoint.previous.h5" in refused.stderr
-    last.unlink()
-    go_on(out, ["--set", "run.steps=300"])
-    expect_same(whole, out)
-
-
-@needs_compiler
-def test_a_damaged_slot_and_kills(killer, memory):
-    """A run that goes on from the earlier checkpoint keeps that until there is another good one."""
-    (memory / "slots").mkdir()
-    whole, out = interrupted(memory / "slots")
-    (out / "checkpoint.h5").write_bytes(b"damaged")
-    trial, at, deaths = memory / "slots" / "trial", 0, 0
-    while True:
-        at += 1
-        shutil.rmtree(trial, ignore_errors=True)
-        shutil.copytree(out, trial)
-        if not killed(killer, None, trial, at, [], go=True, where="checkpoint"):
-            break
-        deaths += 1
-        go_on(trial)
-    assert deaths > 4
-
-
-def test_the_checkpoint_is_read_when_the_directory_is_free(tmp_path):
-    """A process that is ending may write another meanwhile."""
-    whole, out = interrupted(tmp_path)
-    earlier = tmp_path / "earlier"
-    run(tmp_path / "input.toml", earlier, [*ALL_OUTPUT, "run.steps=100"])
-    late = (out / "checkpoint.h5").read_bytes()
-    (out / "checkpoint.h5").write_bytes((earlier / "checkpoint.h5").read_bytes())
-    owner = subprocess.Popen(["sleep", "60"])
-    lock_of(out, owner.pid)
-    job = subprocess.Popen([CAROM, "run", "--continue", str(out), "--set", "run.steps=300"], stdout=subprocess.PIPE, text=True)
-    time.sleep(0.7)  # it waits up to two seconds for a process to end
-    (out / "checkpoint.h5").write_bytes(late)
-    owner.kill()
-    owner.wait()
-    assert "continued at step 200" in job.communicate()[0] and job.returncode == 0
-    expect_same(whole, out)
-
-
-def lock_of(out, process, host=None):
-    """Leaves the lock of a process."""
-    ticks = pathlib.Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[19]
-    host = host or pathlib.Path("/proc/sys/kernel/hostname").read_text().strip()
-    (out / "carom.lock").write_text(f"host {host}\nprocess {process}\nstarted then\nticks {ticks}\n")
-
-
 @pytest.mark.parametrize("arguments, code, words", [
     (["--set", "integrator.step=0.1"], 2, "keeps its deck"),
     (["--set", "output.events=false"], 2, "keeps its deck"),
@@ -426,33 +234,3 @@ def test_mistakes(tmp_path):
     assert "there is no checkpoint.h5 to go on from" in go_on(tmp_path, code=5).stderr
     assert "there is no checkpoint.h5 to go on from" in go_on(tmp_path / "missing", code=5).stderr
     assert not (tmp_path / "missing").exists() and not list(tmp_path.iterdir())
-
-
-def test_files_that_are_shorter_than_at_the_checkpoint(tmp_path):
-    """What is missing can't be made up."""
-    out = tmp_path / "out"
-    run(write_deck(tmp_path, SPRINGS), out)
-    (out / "thermo.csv").write_text("time\n")
-    assert "thermo.csv" in go_on(out, ["--set", "run.steps=500"], code=5).stderr
-    (out / "thermo.csv").unlink()
-    assert "thermo.csv" in go_on(out, ["--set", "run.steps=500"], code=5).stderr
-
-
-def test_locks(tmp_path):
-    deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
-    run(deck, out)
-    job = subprocess.Popen(["sleep", "60"])
-    try:
-        for arguments in ([], ["--take-over"]):
-            lock_of(out, job.pid)
-            assert "is at work in this directory" in go_on(out, arguments, code=5).stderr
-    finally:
-        job.kill()
-        job.wait()
-    go_on(out)
-    lock_of(out, os.getpid(), "another")
-    assert "--take-over" in go_on(out, code=5).stderr
-    assert "ended from outside" in go_on(out, ["--take-over"]).stderr
-    assert not (out / "carom.lock").exists()
-    done = subprocess.run([CAROM, "run", str(deck), "--take-over"], capture_output=True, text=True)
-    assert done.returncode == 2 and "--continue" in done.stderr

@@ -102,7 +102,7 @@ def test_info_of_other_files(tmp_path):
     with h5py.File(tmp_path / "strange.h5md", "w") as file:  # looks like a trajectory, but is not whole
         file["particles/trajectory/position/value"] = np.zeros((1, 2, 3))
         file.create_group("h5md")
-    for name, words in (("text", "HDF5"), ("other.h5", "neither"), ("strange.h5md", "cannot read"), ("missing", "No such")):
+    for name, words in (("text", "HDF5"), ("other.h5", "no trajectory of carom"), ("strange.h5md", "cannot read"), ("missing", "No such")):
         done = info(tmp_path / name)
         assert done.returncode == 5, name
         assert str(tmp_path / name) in done.stderr and words in done.stderr, done.stderr

@@ -1,9 +1,11 @@
 """Views of the particles: no copies, and never of memory that is gone."""
 
 import gc
+import signal
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -50,13 +52,16 @@ def test_views_outlive_names_and_runs():
 
 
 def test_views_of_before_more_particles_keep_what_they_showed():
-    sim = five_springs()
-    x, mass = sim.position, sim.mass
-    copy = x.copy()
-    for k in range(200):
-        sim.add_particles([[0.6, 1.5 + 0.01 * k]])
-    assert np.array_equal(x, copy) and mass.shape == (5,) and sim.position.shape == (205, 2)
-    assert np.array_equal(sim.position[:5], copy)
+    for names in (["position", "velocity", "image", "mass", "radius", "charge", "species"], ["image"], ["mass"]):
+        sim = five_springs()
+        views = {name: getattr(sim, name) for name in names}
+        copies = {name: view.copy() for name, view in views.items()}
+        for k in range(200):
+            sim.add_particles([[0.6, 1.5 + 0.01 * k]], velocity=[[1, 1]], mass=3, species="light")
+        np.full(100000, np.nan)
+        for name, view in views.items():
+            assert np.array_equal(view, copies[name]) and np.array_equal(getattr(sim, name)[:5], copies[name])
+        assert sim.position.shape == (205, 2) and sim.mass.tolist() == 5 * [1] + 200 * [3]
 
 
 def test_changing_the_method_keeps_the_address():
@@ -102,6 +107,29 @@ def test_other_threads_may_look_while_a_run_goes_on():
     go_on.set()
     worker.join()
     assert sim.step == 2000 and not np.array_equal(x, start) and np.array_equal(x, sim.position)
+
+
+def test_what_was_not_viewed_before_is_there_in_callbacks_only():
+    sim, begun, told = gas(512), threading.Event(), []
+    sim.integrator("psa", step=0.001)
+
+    def look():
+        assert begun.wait(60)
+        try:
+            time.sleep(0.05)  # the callback has returned
+            sim.velocity
+        except carom.UsageError as error:
+            told.append(str(error))
+        finally:
+            signal.raise_signal(signal.SIGINT)  # to the main thread, which runs
+
+    worker = threading.Thread(target=look)
+    worker.start()
+    with pytest.raises(KeyboardInterrupt):
+        sim.run(time=1e6, every=1e6, callback=lambda s: (s.position, begun.set()))
+    worker.join()
+    assert told == ["a run is going on; look at the particles in its callback, or after it"]
+    assert not np.array_equal(sim.velocity, gas(512).velocity)
 
 
 MEMORY = """

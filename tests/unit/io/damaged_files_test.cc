@@ -8,6 +8,9 @@
 #include "io/files/h5md.h"
 #include "io/files/hdf5.h"
 #include "io/files/info.h"
+#include "io/files/output_directory.h"
+#include "io/files/trajectory_reader.h"
+#include "io/view/run_source.h"
 #include "sample_run.h"
 
 namespace carom {
@@ -119,6 +122,26 @@ TEST(DamagedFiles, ADataSetIsReadAsBytesOnlyWhereItHasThem) {
   const hdf5::File file = hdf5::File::open(path);
   EXPECT_THROW(hdf5::bytes(file, "/parameters/title"), Error);  // pointers
   EXPECT_THROW(hdf5::bytes(file, "/parameters/dimension"), Error);
+}
+
+TEST(DamagedFiles, WhatIsNoTrajectoryIsRefusedInOneWay) {
+  for (const char* missing : {"/h5md", "/particles/trajectory/position/value", "/particles"}) {
+    const fs::path path = written_trajectory(), run = path.parent_path();
+    fs::rename(path, run / run_file::trajectory);
+    const std::string why = (run / run_file::trajectory).string() + ": an HDF5 file, but no trajectory of carom";
+    EXPECT_EQ(refusal(run / run_file::trajectory, [&](hid_t file) { H5Ldelete(file, missing, H5P_DEFAULT); }), why);
+    const auto refused = [&](auto&& open) {
+      try {
+        open();
+        return std::string("not refused");
+      } catch (const Error& e) {
+        EXPECT_EQ(e.failure(), Failure::file);
+        return std::string(e.what());
+      }
+    };
+    EXPECT_EQ(refused([&] { TrajectoryReader reader(run); }), why) << missing;
+    EXPECT_EQ(refused([&] { RunSource(run, false); }), why) << missing;
+  }
 }
 
 }  // namespace

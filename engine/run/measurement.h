@@ -1,0 +1,53 @@
+#pragma once
+// What is measured of one state of a system.
+
+#include "engine/forces/forces.h"
+#include "engine/run/simulation.h"
+
+namespace carom {
+
+template <int D>
+struct Measurement {
+  Snapshot<D> shot;      ///< its energies, momentum and temperature
+  double magnitude = 0;  ///< K + Σ|V| [energy]
+  double virial = 0;     ///< 2K + Σ d·F, with its long-range corrections [energy]
+  double speed = 0;      ///< mean |v| [length/time]
+};
+
+/// The long-range corrections of all terms of V.
+template <int D>
+Tail tail_of(const System<D>& system) {
+  Tail sum;
+  for (const auto& term : system.interactions) {
+    sum.energy += term->tail().energy;
+    sum.virial += term->tail().virial;
+  }
+  return sum;
+}
+
+/// The momentum is that of `state`, the rest that of `at`, of which `sums` are, too. Collective.
+template <int D>
+Measurement<D> measure(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
+                       const PotentialSums& sums, const Tail& tail) {
+  const MotionSums<D> motion = evaluate_motion(system, state, at);
+  const double kinetic = motion.kinetic.value();
+  Measurement<D> found;
+  found.magnitude = kinetic + sums.magnitude.value();
+  found.virial = 2 * kinetic + sums.virial.value() + tail.virial;
+  found.shot.kinetic = kinetic;
+  found.shot.potential = sums.energy.value() + tail.energy;
+  for (int k = 0; k < D; ++k) found.shot.momentum[k] = motion.momentum[k].value();
+  if (const auto total = static_cast<double>(system.size()); total > 0) {
+    found.shot.temperature = 2 * kinetic / (D * total);
+    found.speed = motion.speed.value() / total;
+  }
+  return found;
+}
+
+/// Of a virial [energy].
+template <int D>
+double pressure_of(double virial, const Box<D>& box) {
+  return virial / (D * box.volume());
+}
+
+}  // namespace carom

@@ -1,0 +1,93 @@
+"""What the tests of bad input share: two decks, changes of them, and what the command says to them."""
+
+import subprocess
+
+from runs import CAROM
+
+GOOD = """\
+format = 1
+title = "two discs"
+
+[system]
+dimension = 2
+box = [10.0, 10.0]
+boundary = ["wall", "wall"]
+
+[[particles]]
+name = "disc"
+position = [[2.0, 5.0], [5.0, 5.0]]
+velocity = [[1.0, 0.0], [0.0, 0.0]]
+radius = 0.5
+mass = 1.0
+
+[[interaction]]
+type = "harmonic-bond"
+pairs = [[0, 1]]
+stiffness = 1.0
+rest_length = 2.0
+
+[integrator]
+type = "cdda"
+step = 0.01
+
+[run]
+steps = 10
+"""
+
+FLUID = """\
+format = 1
+
+[system]
+dimension = 3
+box = [6.0, 6.0, 6.0]
+boundary = ["periodic", "periodic", "periodic"]
+
+[[particles]]
+name = "sphere"
+count = 64
+temperature = 1.0
+radius = 0.5
+
+[placement]
+type = "fcc"
+
+[integrator]
+type = "free-flight"
+
+[run]
+collisions = 10
+"""
+
+
+def carom(*arguments, cwd=None):
+    return subprocess.run([CAROM, *arguments], capture_output=True, text=True, timeout=60, cwd=cwd)
+
+
+def validate(tmp_path, text, *arguments):
+    (tmp_path / "deck.toml").write_text(text)
+    return carom("validate", "deck.toml", *arguments, cwd=tmp_path)
+
+
+def changed(old, new, deck=GOOD):
+    assert deck.count(old) == 1, f"{old!r} stands {deck.count(old)} times in the deck"
+    return deck.replace(old, new)
+
+
+def lennard_jones(more):
+    return changed("[integrator]\ntype = \"free-flight\"",
+                   f'[[interaction]]\ntype = "lennard-jones"\nepsilon = 1\nsigma = 1\n{more}\n[integrator]\ntype = "verlet"\nstep = 0.1',
+                   FLUID)
+
+
+def table(more):
+    return lennard_jones(more).replace('"lennard-jones"\nepsilon = 1\nsigma = 1', '"table"')
+
+
+def both(tmp_path, text, code, *parts):
+    """`validate` and `run` refuse this deck alike."""
+    for answer in validate(tmp_path, text), carom("run", "deck.toml", "-o", "out", "--quiet", cwd=tmp_path):
+        assert answer.returncode == code, answer.stderr
+        for part in parts:
+            assert part in answer.stderr
+        assert len(answer.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()

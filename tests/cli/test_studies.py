@@ -1,0 +1,118 @@
+"""The studies of tools/: of errors, of costs and of many ranks, by the command itself ($CAROM)."""
+
+import csv
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+
+from runs import ROOT, mpi_environment, needs_carom
+
+sys.path.insert(0, str(ROOT / "tools"))
+
+import cost_study
+import energy_study
+import rank_study
+import studies
+
+
+def test_orders_are_slopes():
+    rows = [{"method": "m", "step": step, "max_abs_energy_error": 3 * step**2 * factor, "relative_energy_error": 1.0}
+            for step in (0.3, 0.1, 0.01, 0.001) for factor in (0.1, 10)]
+    steps, errors = energy_study.curve(rows, "m")
+    assert errors == pytest.approx(3 * steps**2)
+    assert energy_study.fitted_order(steps, errors * np.where(steps > 0.1, 1e6, 1), 0.1) == pytest.approx(2.0)
+    options = energy_study.parse_arguments(["deck.toml", "--end-time", "6"])
+    assert energy_study.describe(rows, "m", options) == "m: order 2.00"
+
+
+def test_perturbed_starts_are_seeded_and_bounded():
+    deck = tomllib.loads((ROOT / "inputs" / "five-springs.toml").read_text())
+    moved = [energy_study.perturbed(deck, start, 0.01, 1)["particles"][0]["position"] for start in (0, 1, 1, 2)]
+    assert moved[0] == deck["particles"][0]["position"]
+    assert moved[1] == moved[2] != moved[3]
+    assert 0.005 < np.max(np.abs(np.subtract(moved[0], moved[1]))) <= 0.01
+
+
+def test_integrator_tables():
+    assert studies.integrator_table("cdda:order=4", 0.1) == {"type": "cdda", "step": 0.1, "order": 4}
+    assert studies.integrator_table("mcva:variant=restart", 1.0)["variant"] == "restart"
+
+
+def rows_of(study, table, directory, deck, *options):
+    """What a study of a deck of inputs/ writes, drawn too."""
+    study.main([str(ROOT / "inputs" / f"{deck}.toml"), *options, "-o", str(directory)])
+    assert (directory / f"{table}.png").stat().st_size > 1000
+    with open(directory / f"{table}.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@needs_carom
+def test_energy_study(tmp_path, capsys):
+    rows = rows_of(energy_study, "energy", tmp_path, "five-springs", "--methods", "psa,cva,cdda",
+                   "--steps", "0.1,0.05,0.025", "--end-time", "6", "--starts", "4")
+    assert len(rows) == 3 * 3 * 4 and {row["status"] for row in rows} == {"done"}
+    orders = {method: energy_study.fitted_order(*energy_study.curve(rows, method), 0.1) for method in ("psa", "cva")}
+    assert orders["psa"] == pytest.approx(1.0, abs=0.5)
+    assert orders["cva"] == pytest.approx(2.0, abs=0.5)
+    assert max(float(row["relative_energy_error"]) for row in rows if row["method"] == "cdda") < 1e-12
+
+
+@needs_carom
+def test_cost_study(tmp_path, capsys):
+    rows = rows_of(cost_study, "work", tmp_path, "five-springs", "--methods", "cva,cdda,edda",
+                   "--steps", "0.02,0.01", "--end-time", "3", "--repeats", "1")
+    assert len(rows) == 3 * 2
+    for coarse, fine in zip(rows[::2], rows[1::2]):
+        assert float(coarse["position_error"]) / float(fine["position_error"]) == pytest.approx(4, rel=0.5)
+        assert float(fine["energy_error"]) < (1e-12 if fine["method"].endswith("dda") else 1e-3)
+    rows = rows_of(cost_study, "cost", tmp_path, "spring-lattice", "--methods", "cdda,edda", "--counts", "16,144",
+                   "--end-time", "1", "--repeats", "1")
+    passes = [float(row["passes_per_step"]) for row in rows]
+    assert passes[1] > 3 * passes[0]  # each collision cuts the step of all particles
+    assert passes[3] == pytest.approx(passes[2], rel=0.3)
+
+
+def test_the_model_of_ranks_takes_from_counts_what_is_in_them(capsys):
+    log = ("pressure 2.28\n1795 windows, 2.02 rounds each; events at borders run twice 27.5%, redone 0.20%, "
+           "imbalance 1.0%\npart  seconds")
+    assert rank_study.counts_of(log) == pytest.approx(
+        {"windows": 1795, "rounds": 2.02, "twice": 0.275, "redone": 0.002, "imbalance": 0.01})
+    with pytest.raises(SystemExit):
+        rank_study.counts_of("done at time 50\n")
+    rows = [{"ranks": P, "per_rank": n, "windows": 30, "events": 0.15 * n, "rounds": 1 + 0.1 * np.log2(P * n ** (2 / 3)),
+             "twice": (1 + 1.5 * n ** (-1 / 3)) ** 3 - 1, "redone": 0.04 * n ** (-1 / 3),
+             "imbalance": 2 * np.sqrt(2 * np.log(P) / (4.5 * n))} for P in (8, 64) for n in (500, 4000)]
+    rows.append(rows[0] | {"ranks": 2, "twice": 9.0})  # no neighbours on some sides: not in the fit
+    fitted = rank_study.fit(rows, 3)
+    assert fitted == pytest.approx({"dimension": 3, "h": 1.5, "r": 0.04, "a": 1.0, "b": 0.1, "events": 0.15, "imbalance": 2.0})
+    options = rank_study.parse_arguments(["--rate", "1e6", "--latency", "1e-5", "--overhead", "1e-6"])
+    row = rank_study.modelled(fitted, options, 1024, 10**6)
+    assert row["rounds"] == pytest.approx(1 + 0.1 * (10 + 2 / 3 * 6 * np.log2(10)))
+    messages = (row["rounds"] + 1 + 10 * (row["rounds"] + 3)) * 1e-5 + (row["rounds"] + 1) * 27e-6
+    assert row["messages"] == pytest.approx(messages / 0.15)
+    assert row["efficiency"] == pytest.approx(
+        1 / (1.015**3 + 0.0004 + 2 * np.sqrt(2 * np.log(1024) / 0.15e6) + messages / 0.15))
+
+
+@needs_carom
+def test_rank_study(tmp_path, capsys, monkeypatch):
+    for name, value in mpi_environment().items():
+        monkeypatch.setenv(name, value)
+    rows = rows_of(rank_study, "ranks", tmp_path, "hard-sphere-fluid", "--ranks", "2,8,16", "--per-rank", "100,400",
+                   "--most", "3200", "--rate", "1e6")
+    assert [(int(row["ranks"]), int(row["per_rank"])) for row in rows] == [
+        (2, 100), (8, 100), (16, 100), (2, 400), (8, 400)]
+    for row in rows:
+        assert int(row["windows"]) > 20 and 1 <= float(row["rounds"]) < 4
+        events = float(row["events"]) * int(row["windows"]) * int(row["ranks"])
+        assert events == pytest.approx(5 * int(row["particles"]))
+        assert 0 < float(row["redone"]) < 0.05
+    twice = [float(row["twice"]) for row in rows]
+    assert twice[0] < twice[1] and twice[4] < twice[1]  # more for ranks with neighbours on all sides, and for small ones
+    printed = capsys.readouterr().out
+    assert "One core: 1e+06 collisions/s (given)" in printed
+    with open(tmp_path / "model.csv", newline="") as file:
+        model = {(int(row["ranks"]), int(row["per_rank"])): float(row["efficiency"]) for row in csv.DictReader(file)}
+    assert 0 < model[10000, 10**4] < model[64, 10**4] < model[64, 10**6] < 1

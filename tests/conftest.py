@@ -1,0 +1,17 @@
+"""Where the tests in Python have their directories: in memory, where there is room, since syncs take no time there."""
+
+import os
+import shutil
+import tempfile
+
+MEMORY = "/dev/shm"
+ROOM = 4 << 30  # bytes; what is written stays there while the tests of a file run
+
+if "TMPDIR" not in os.environ and os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM:
+    tempfile.tempdir = MEMORY
+
+
+def pytest_sessionfinish(session, exitstatus):
+    """What is left in memory is there no longer, but for that of tests that have failed."""
+    if exitstatus == 0 and tempfile.tempdir == MEMORY:
+        shutil.rmtree(session.config._tmp_path_factory.getbasetemp(), ignore_errors=True)

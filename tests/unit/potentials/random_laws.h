@@ -1,0 +1,55 @@
+#pragma once
+// Random pair potentials over many orders of magnitude, by formulas of their own in long double.
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "tests/support/experiments.h"
+
+namespace carom::test {
+
+using Real = long double;
+
+/// A number, and the sum of the magnitudes of the terms that it was made from, times how much more than ε their own
+/// rounding may be: errors are relative to this.
+struct Sized {
+  Real v, size;
+  Sized(Real value) : v(value), size(std::abs(value)) {}
+  Sized(Real value, Real magnitude) : v(value), size(magnitude) {}
+  friend Sized operator+(Sized a, Sized b) { return {a.v + b.v, a.size + b.size}; }
+  friend Sized operator-(Sized a, Sized b) { return {a.v - b.v, a.size + b.size}; }
+  friend Sized operator*(Sized a, Sized b) { return {a.v * b.v, a.size * b.size}; }
+  friend Sized operator/(Sized a, Real b) { return {a.v / b, a.size / std::abs(b)}; }
+};
+
+using Function = std::function<Sized(Real)>;  // of ρ
+
+struct Dice {
+  std::mt19937_64 random;
+  double uniform(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random); }
+  double decades(double from, double to) { return std::pow(10, uniform(from, to)); }
+  std::size_t below(std::size_t n) { return random() % n; }
+  bool one_in(std::size_t n) { return below(n) == 0; }
+};
+
+/// One term of V.
+struct Law {
+  std::string type;
+  Given given = {};
+  Function value = {}, slope = {};  // V and dV/dρ
+  std::vector<double> breaks = {};  // of higher derivatives, ascending [ρ]
+  double cutoff2 = std::numeric_limits<double>::infinity();
+  enum { one, masses, charges } weight = one;
+  PairList bonds = {};
+
+  /// The divided difference: the mean of the slope, by three Gauss points in each smooth part where the step is short.
+  Sized quotient(Real a, Real b) const;
+  /// Ends at the cutoff.
+  void cut(double cutoff, const std::string& kind, Real curvature = 0);
+};
+
+/// For so many particles in a box of this edge.
+Law random_law(Dice& dice, std::size_t particles, double edge, bool periodic);
+
+}  // namespace carom::test
