@@ -68,21 +68,23 @@ void RegionCells<D>::clear() {
 }
 
 template <int D>
-Cell<D> RegionCells<D>::locate(const Vec<D>& x, Place& place) const {
-  const Cell<D> cell = grid_.cell(x);
+const typename RegionCells<D>::Located& RegionCells<D>::locate(const Vec<D>& x) {
+  if (x == located_.x) return located_;
+  located_.x = x;
+  const Cell<D> cell = located_.cell = grid_.cell(x);
+  located_.boxes = grid_.boxes(cell);
   for (int k = 0; k < D; ++k) {
     const double within = (x[k] - grid_.face(k, cell[k])) * grid_.inverse_edge(k);
-    place[k] = static_cast<std::int32_t>(std::clamp(within * kPlaces, 0.0, kPlaces - 1));
+    located_.place[k] = static_cast<std::int32_t>(std::clamp(within * kPlaces, 0.0, kPlaces - 1));
   }
-  return cell;
+  return located_;
 }
 
 template <int D>
 bool RegionCells<D>::insert(Slot i, const Vec<D>& x, Image<D>& boxes) {
-  Place place;
-  const Cell<D> cell = locate(x, place);
+  const auto& [at, cell, own_boxes, place] = locate(x);
   if (!grid_.holds(cell)) return false;
-  boxes = grid_.boxes(cell);
+  boxes = own_boxes;
   std::uint32_t code = 0;
   for (int k = 0; k < D; ++k) code |= static_cast<std::uint32_t>(place[k]) << (10 * k);
   std::uint32_t line = static_cast<std::uint32_t>(grid_.index(cell));
@@ -132,9 +134,7 @@ void RegionCells<D>::remove(Slot i, const Vec<D>& x) {
 template <int D>
 typename RegionCells<D>::Found RegionCells<D>::find(const Vec<D>& x, double reach) {
   static constexpr CellView kHere{};
-  Place place;
-  const Cell<D> cell = locate(x, place);
-  const Image<D> boxes = grid_.boxes(cell);
+  const auto& [at, cell, boxes, place] = locate(x);
   NearTask task{};
   task.lines = lines_.data();
   task.next = next_.data();

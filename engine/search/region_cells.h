@@ -5,6 +5,7 @@
 // A cell has a cache line for eight spheres, with their places in ten bits an axis, and further lines where it holds
 // more. Places are rounded down, so that all spheres within a distance are found, and some that are a little farther.
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -45,11 +46,16 @@ class RegionCells {
   Found find(const Vec<D>& x, double reach);
 
  private:
-  using Place = std::array<std::int32_t, D>;  // in 1024ths of a cell
+  struct Located {
+    Vec<D> x = Vec<D>::Constant(std::numeric_limits<double>::quiet_NaN());
+    Cell<D> cell{};
+    Image<D> boxes{};
+    std::array<std::int32_t, D> place{};  // in 1024ths of a cell
+  };
 
   static double edge(const Box<D>& box, const Extent<D>& extent, double spheres, double reach);
   static double rounded(double reach);
-  Cell<D> locate(const Vec<D>& x, Place& place) const;
+  const Located& locate(const Vec<D>& x);
 
   Packing<D> packing_;
   const ScanKernels& kernels_;
@@ -60,6 +66,7 @@ class RegionCells {
   std::int32_t margin_ = 1;                     // cells that the farthest reach extends beyond one's own
   std::array<std::vector<CellStep>, D> steps_;  // by axis: to the cells −margin … count + margin
   std::int32_t widest_ = 0;
+  Located located_;  // the last place: a sphere is inserted, and what is near it found
 
   std::array<std::vector<CellView>, D> views_;
   std::vector<Slot> slots_;

@@ -85,7 +85,8 @@ void SkinLists<D>::insert(Slot i, const Vec<D>& x) {
     cells.insert(i, x, boxes);
   }
   boxes_[i] = packing_.linear(boxes);
-  for (const std::int32_t b : boxes) widen(std::abs(b));
+  for (const std::int32_t b : boxes)
+    if (std::abs(b) > widest_) widen(std::abs(b));
 }
 
 /// The candidates of a sphere at x; good until the next call.
