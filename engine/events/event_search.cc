@@ -1,6 +1,5 @@
 #include "engine/events/event_search.h"
 
-#include "engine/events/event_prefetch.h"
 #include "engine/events/surroundings.h"
 
 namespace carom {
@@ -249,14 +248,6 @@ std::span<const std::uint32_t> EventSearch<D>::find_near_at_border(Slot i, const
   }
   if (room(i) == lists_->skin()) return find_near(i);
   return {lists_->candidates(queue_[i]), queue_[i].count};
-}
-
-template <int D>
-void EventSearch<D>::prefetch_next() {
-  if (lists_)
-    prefetch_upcoming(queue_, flights_, *lists_, large_);
-  else
-    prefetch_upcoming(queue_, flights_, *cells_, found_, large_);
 }
 
 template class EventSearch<2>;

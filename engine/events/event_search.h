@@ -8,10 +8,8 @@
 
 #include "engine/base/event_counts.h"
 #include "engine/base/sizes.h"
-#include "engine/events/event_queue.h"
-#include "engine/search/linked_cells.h"
+#include "engine/events/event_prefetch.h"
 #include "engine/search/search_tuning.h"
-#include "engine/search/skin_lists.h"
 
 namespace carom {
 
@@ -55,14 +53,17 @@ class EventSearch {
 
   /// Starts to fetch what the next events will need.
   void prefetch() {
-    if (!small_) prefetch_next();
+    if (small_) return;
+    if (lists_)
+      prefetch_upcoming(queue_, flights_, *lists_, large_);
+    else
+      prefetch_upcoming(queue_, flights_, *cells_, found_, large_);
   }
 
   const EventCounts& counts() const { return counts_; }
 
  private:
   void choose(double now);
-  void prefetch_next();
   void foresee(Slot i, double now);
   [[gnu::noinline]] void foresee_walls(Slot i);
   void foresee_update(Slot i, double now);

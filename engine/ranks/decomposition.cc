@@ -7,23 +7,14 @@
 #include <utility>
 
 #include "engine/ranks/bisection.h"
+#include "engine/ranks/migration.h"
 #include "engine/ranks/system.h"
 
 namespace carom {
 namespace {
 
-constexpr double kLeastSlack = 0.5, kMostSlack = 2;  // that a particle comes between divisions [largest diameter]
-constexpr double kSlabsApart = 16;                   // divisions, about
-constexpr double kFaster = 2;                        // factor between the largest speed and the one allowed for
-constexpr double kRoom = 1.25;                       // for a path that was too long
-constexpr std::int64_t kSlabs = 64;                  // between divisions while all are known
-constexpr double kLeastDepth = 3;                    // of copies that do not matter [largest diameter]
-constexpr double kMost = 0.9;                        // of all particles; a rank that would know more knows all
-
-template <int D>
-Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
-  return p.x[i] + box.shift(p.image[i]);
-}
+constexpr std::int64_t kSlabs = 64;  // between divisions while all are known
+constexpr double kMost = 0.9;        // of all particles; a rank that would know more knows all
 
 }  // namespace
 
@@ -57,8 +48,7 @@ template <int D>
 bool Decomposition<D>::divide(bool local, double slab_length, bool cores) {
   if (!joined()) return false;
   local_ = local;
-  copied_to_.resize(static_cast<std::size_t>(ranks_->size()));
-  least_depth_ = depth_ = cores ? kLeastDepth : 0;
+  width_.start(cores);
   migrate(!local, slab_length);
   next_ = kSlabs;
   return true;
@@ -115,11 +105,12 @@ Bytes Decomposition<D>::block_of(Fields::Field& field) const {
 
 template <int D>
 bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
-  if (!by_place_ || (all_known_ ? slab < next_ : !outdated())) return false;
+  if (!by_place_) return false;
+  const auto farthest = [&] { return std::sqrt(largest(halo_.squared_farthest(system_.box, system_.particles))); };
+  if (all_known_ ? slab < next_ : !width_.outdated(farthest)) return false;
   if (!all_known_) {  // all has gone well since the last time
     patience_ = std::max<std::int64_t>(patience_ / 2, 1);
-    depth_ = std::max(0.75 * depth_, least_depth_);
-    wanted_path_ *= 0.75;
+    width_.relax();
   }
   migrate(!local_, slab_length);
   next_ = slab + kSlabs;
@@ -128,7 +119,7 @@ bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
 
 template <int D>
 void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
-  if (std::exchange(more_, false) && migrate_to_those_near(slab_length)) return;
+  if (width_.asked() && migrate_to_those_near(slab_length)) return;
   migrate_to_all();
   next_ = slab + patience_;
   patience_ = std::min(2 * patience_, kSlabs);
@@ -143,23 +134,11 @@ void Decomposition<D>::migrate(bool all, double slab_length) {
     migrate_to_all();
 }
 
-/// This rank's own particles with their fields, put into the messages that for_each_receiver(place, visit) visits;
-/// `particles`: in each of them. No particle is known any more after that.
+/// The messages of pack_own(). No particle is known any more after that.
 template <int D>
 std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver) {
   Particles<D>& p = system_.particles;
-  std::vector<Bytes> messages(particles.size());
-  Bytes packed(sizeof(Id) + system_.fields.bytes());
-  for (Id i = 0; i < p.size(); ++i) {
-    if (!p.owns(i)) continue;
-    const Id id = p.id_of(i);
-    std::memcpy(packed.data(), &id, sizeof id);
-    system_.fields.pack(i, packed.data() + sizeof id);
-    for_each_receiver(p.x[i], [&](std::size_t message) {
-      if (messages[message].empty()) messages[message].reserve(particles[message] * packed.size());
-      messages[message].insert(messages[message].end(), packed.begin(), packed.end());
-    });
-  }
+  std::vector<Bytes> messages = pack_own(system_.fields, p, particles, for_each_receiver);
   system_.fields.release_working();
   if (!by_place_) {
     block_ = std::exchange(p, {});
@@ -187,13 +166,10 @@ bool Decomposition<D>::migrate_to_those_near(double slab_length) {
     own.push_back(p.x[i]);
   }
   ranks_->largest(most);
-  const double diameter = 2 * sizes_->largest_radius();
-  const double path = std::max(kFaster * speed * slab_length, wanted_path_);
-  const double slack = std::clamp(kSlabsApart * speed * slab_length, kLeastSlack * diameter, kMostSlack * diameter);
-  const double near = std::max(reach, diameter) + 2 * path + 2 * slack, far = near + depth_ * diameter;
-  if (!std::isfinite(far)) return false;
-  const Bisection<D> bisection(system_.box, own, copied_to_.size(), far, *ranks_);
-  std::vector<std::uint64_t> known(copied_to_.size());
+  width_.fit(reach, speed * slab_length, 2 * sizes_->largest_radius());
+  if (!std::isfinite(width_.far())) return false;
+  const Bisection<D> bisection(system_.box, own, blocks().ranks, width_.far(), *ranks_);
+  std::vector<std::uint64_t> known(blocks().ranks);
   for (const Vec<D>& x : own) bisection.for_each_near(bisection.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
   const std::vector<std::uint64_t> mine = known;
   ranks_->sum(known);
@@ -202,10 +178,8 @@ bool Decomposition<D>::migrate_to_those_near(double slab_length) {
   const auto messages = ranks_->swap(
       pack(mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); }));
   all_known_ = false;
-  take_in(arrivals(messages));
-  assign(bisection, near);
-  path_ = path;
-  slack_ = slack;
+  take_in(system_.fields, system_.particles, messages, total());
+  assign(bisection, width_.near());
   system_.fields.prepare_working();
   return true;
 }
@@ -213,33 +187,10 @@ bool Decomposition<D>::migrate_to_those_near(double slab_length) {
 template <int D>
 void Decomposition<D>::migrate_to_all() {
   const auto messages =
-      ranks_->gather(pack({total() / copied_to_.size()}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
+      ranks_->gather(pack({total() / blocks().ranks}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
   all_known_ = true;
-  take_in(arrivals(messages));
+  take_in(system_.fields, system_.particles, messages, total());
   own_anew();
-}
-
-/// The particles of messages by id.
-template <int D>
-std::vector<typename Decomposition<D>::Arrival> Decomposition<D>::arrivals(const std::vector<Bytes>& messages) const {
-  std::vector<Arrival> all;
-  for (const Bytes& message : messages)
-    for (Reader from(message); from.more();) {
-      const Id id = from.template get<Id>();
-      all.push_back({id, from.skip(system_.fields.bytes())});
-    }
-  std::ranges::sort(all, {}, &Arrival::id);
-  return all;
-}
-
-template <int D>
-void Decomposition<D>::take_in(const std::vector<Arrival>& arrivals) {
-  Particles<D>& p = system_.particles;
-  system_.fields.resize(arrivals.size());
-  for (Id i = 0; i < arrivals.size(); ++i) system_.fields.unpack(i, arrivals[i].at);
-  if (arrivals.size() < total())
-    for (const Arrival& arrival : arrivals) p.id.push_back(arrival.id);
-  p.ghost.assign(p.size(), 0);
 }
 
 /// All are known: sets anew which rank owns each.
@@ -247,38 +198,17 @@ template <int D>
 void Decomposition<D>::own_anew() {
   constexpr double kAll = std::numeric_limits<double>::infinity();
   Communicator alone;
-  assign(Bisection<D>(system_.box, system_.particles.x, copied_to_.size(), kAll, alone), kAll);
+  assign(Bisection<D>(system_.box, system_.particles.x, blocks().ranks, kAll, alone), kAll);
   system_.fields.release_working();
   system_.fields.prepare_working();
 }
 
-/// Sets the owners of those known, and which ranks know this rank's own; copies nearer than `near` matter. Makes what
-/// acts on those known, where it is not there.
+/// Sets the owners of those known; copies nearer than `near` matter. Makes what acts on those known, where it is not
+/// there.
 template <int D>
 void Decomposition<D>::assign(const Bisection<D>& bisection, double near) {
   Particles<D>& p = system_.particles;
-  copied_to_.assign(copied_to_.size(), {});
-  copies_of_ = copied_to_;
-  matters_.clear();
-  at_.clear();
-  safe_slabs_ = 0;
-  const auto me = static_cast<std::uint32_t>(ranks_->rank());
-  for (Id i = 0; i < p.size(); ++i) {
-    const Vec<D> x = bisection.wrapped(p.x[i]);
-    const std::uint32_t owner = bisection.owner(x);
-    p.ghost[i] = owner != me;
-    matters_.push_back(owner != me && bisection.squared_distance(me, x) <= near * near);
-    at_.push_back(unwrapped(system_.box, p, i));
-    if (owner != me)
-      copies_of_[owner].push_back(i);
-    else
-      bisection.for_each_near(x, [&](std::uint32_t rank) {
-        if (rank != me) copied_to_[rank].push_back(i);
-      });
-  }
-  neighbours_.clear();
-  for (std::size_t rank = 0; rank < copied_to_.size(); ++rank)
-    if (!copied_to_[rank].empty() || !copies_of_[rank].empty()) neighbours_.push_back(static_cast<int>(rank));
+  halo_.assign(bisection, system_.box, p, ranks_->rank(), near);
   if (!system_.interactions.empty()) return;
   for (const auto& term : block_interactions_) {
     system_.interactions.push_back(term->among(p));
@@ -288,9 +218,8 @@ void Decomposition<D>::assign(const Bisection<D>& bisection, double near) {
 
 template <int D>
 void Decomposition<D>::need_paths(double path) {
-  if (knows_all() || path <= path_) return;
-  more_ = std::isfinite(path);
-  if (more_) wanted_path_ = kRoom * path;
+  if (knows_all() || width_.allows(path)) return;
+  width_.ask_for_path(path);
   throw HaloTooSmall{};
 }
 
@@ -306,30 +235,13 @@ void Decomposition<D>::need_step(std::span<const Vec<D>> a, double length) {
 
 template <int D>
 void Decomposition<D>::need_deeper_halo() {
-  depth_ *= 2;
-  more_ = true;
+  width_.ask_for_depth();
   throw HaloTooSmall{};
 }
 
 template <int D>
 void Decomposition<D>::update_halo() {
   if (!knows_all()) update(std::span(system_.particles.x), std::span(system_.particles.v));
-}
-
-/// Whether a particle has come so far that all are to be divided anew. Looks only where one may have.
-template <int D>
-bool Decomposition<D>::outdated() {
-  if (safe_slabs_ >= 1) {
-    --safe_slabs_;
-    return false;
-  }
-  const Particles<D>& p = system_.particles;
-  double farthest = 0;
-  for (Id i = 0; i < p.size(); ++i)
-    if (p.owns(i)) farthest = std::max(farthest, (unwrapped(system_.box, p, i) - at_[i]).squaredNorm());
-  const double left = 0.8 * slack_ - std::sqrt(largest(farthest));
-  safe_slabs_ = left / path_;
-  return left < 0;
 }
 
 template class Decomposition<2>;

@@ -12,8 +12,9 @@
 //
 // A rank flies its copies like its own particles; those at the rim of the halo may go wrong, for they miss partners, so
 // it is checked that those near enough to matter did what they did at their owners (engine/slabs/slab_core.h). If they
-// did not, the slab is done again with a larger halo, in the end with all particles known. Particles migrate before one
-// has come too far: each goes from its owner to the ranks that know it from then on, with its fields.
+// did not, the slab is done again with a larger halo (halo_width.h), in the end with all particles known. Particles
+// migrate before one has come too far: each goes from its owner to the ranks that know it from then on, with its fields
+// (migration.h).
 
 #include <memory>
 #include <optional>
@@ -25,12 +26,12 @@
 #include "engine/base/particles.h"
 #include "engine/base/sizes.h"
 #include "engine/ranks/communicator.h"
+#include "engine/ranks/halo_exchange.h"
+#include "engine/ranks/halo_width.h"
 #include "engine/ranks/id_blocks.h"
 
 namespace carom {
 
-template <int D>
-class Bisection;
 template <int D>
 struct System;
 
@@ -108,43 +109,23 @@ class Decomposition {
   /// Copies went wrong that matter: throws HaloTooSmall; the halo is to be deeper.
   [[noreturn]] void need_deeper_halo();
   /// Whether what a copy does matters to own particles.
-  bool matters(Id i) const { return matters_[i] != 0; }
+  bool matters(Id i) const { return halo_.matters(i); }
 
   /// Copies get the values of their owners; each vector has an entry for each particle known.
   template <class... T>
   void update(std::span<T>... values) const {
-    if (!by_place_) return;
-    std::vector<Bytes> outgoing(neighbours_.size());
-    for (std::size_t k = 0; k < neighbours_.size(); ++k) {
-      const auto& mine = copied_to_[static_cast<std::size_t>(neighbours_[k])];
-      outgoing[k].reserve(mine.size() * (sizeof(T) + ...));
-      for (const Id i : mine) (put(outgoing[k], values[i]), ...);
-    }
-    const std::vector<Bytes> incoming = ranks_->swap(std::move(outgoing), neighbours_);
-    for (std::size_t k = 0; k < neighbours_.size(); ++k) {
-      Reader from(incoming[k]);
-      for (const Id i : copies_of_[static_cast<std::size_t>(neighbours_[k])])
-        ((values[i] = from.template get<T>()), ...);
-    }
+    if (by_place_) halo_.update(*ranks_, values...);
   }
   /// Positions and velocities of copies, which may have gone wrong at the rim. All particles known: none have.
   void update_halo();
 
  private:
-  /// Where in the messages of all ranks a particle is.
-  struct Arrival {
-    Id id;
-    const std::byte* at;
-  };
   void migrate(bool all, double slab_length);
   bool migrate_to_those_near(double slab_length);
   void migrate_to_all();
   void own_anew();
   std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver);
-  std::vector<Arrival> arrivals(const std::vector<Bytes>& messages) const;
-  void take_in(const std::vector<Arrival>& arrivals);
   void assign(const Bisection<D>& bisection, double near);
-  bool outdated();
 
   System<D>& system_;
   Communicator alone_;
@@ -155,16 +136,9 @@ class Decomposition {
   Particles<D> block_;                                               // by_place_: what does not change is up to date
   std::vector<std::unique_ptr<Interaction<D>>> block_interactions_;  // by_place_: made for the block
   bool local_ = false, all_known_ = false;
-  std::vector<std::vector<Id>> copied_to_, copies_of_;  // by rank: own particles that it knows, copies of its own
-  std::vector<int> neighbours_;                         // the ranks of which there are any
-  std::vector<char> matters_;
-  std::vector<Vec<D>> at_;  // where those known were at the last bisection, images undone
-  double path_ = 0, slack_ = 0;
-  double safe_slabs_ = 0;               // until a particle may have come too far
-  double wanted_path_ = 0;              // at least that, since one was too long not long ago
-  bool more_ = false;                   // a larger halo would have been enough for the slab
-  double least_depth_ = 0, depth_ = 0;  // of copies that do not matter [largest diameter]
-  std::int64_t next_ = 0;               // while all are known: the slab before which to divide
+  HaloWidth width_;
+  HaloExchange<D> halo_;
+  std::int64_t next_ = 0;  // while all are known: the slab before which to divide
   std::int64_t patience_ = 1;
 };
 

@@ -1,17 +1,16 @@
 #include "engine/ranks/windowed_flight.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "engine/base/error.h"
 #include "engine/ranks/halo.h"
+#include "engine/ranks/shared_contacts.h"
+#include "engine/ranks/window_contacts.h"
 
 namespace carom {
 namespace {
 
-constexpr double kCollisions = 0.3;                                   // of a sphere in a window, about
-constexpr double kMostDisplacement = 1.0, kLeastDisplacement = 0.02;  // in diameters
-constexpr std::size_t kFewest = 8;                                    // spheres a subdomain
+constexpr std::size_t kFewest = 8;                      // spheres a subdomain
 constexpr std::size_t kMostNeighbours = 64;             // of a subdomain: the bits of Subdomain::holders()
 constexpr double kUsualWork = 64, kMostWork = 64 * 64;  // in whole numbers
 constexpr double kUneven = 0.1;                         // what differs less from the usual counts as usual
@@ -21,8 +20,12 @@ constexpr double kUneven = 0.1;                         // what differs less fro
 template <int D>
 WindowedFlight<D>::WindowedFlight(const Box<D>& box, Sizes sizes, Communicator& ranks, const SearchOptions& options,
                                   std::function<double()> window)
-    : box_(box), sizes_(std::move(sizes)), ranks_(ranks), options_(options), forced_window_(std::move(window)) {
-  diameter_ = 2 * sizes_.largest_radius();
+    : box_(box),
+      sizes_(std::move(sizes)),
+      ranks_(ranks),
+      options_(options),
+      exchange_(ranks),
+      length_(2 * sizes_.largest_radius(), std::move(window)) {
   make_subdomain(std::clamp<std::size_t>(sizes_.spheres / kFewest, 1, static_cast<std::size_t>(ranks_.size())));
 }
 
@@ -42,13 +45,7 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   g_ = g;
   horizon_ = horizon;
   events_ = 0;
-  fastest_ = 0;
-  for (const Vec<D>& v : particles.v) fastest_ = std::max(fastest_, v.norm());
-  ranks_.largest({&fastest_, 1});
-  if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(particles);
-  fastest_ = kFaster * fastest_ + g_.norm() * horizon_;
-  max_displacement_ =
-      std::clamp(1.05 * pace_ * fastest_, kLeastDisplacement * diameter_, kMostDisplacement * diameter_);
+  length_.start(box_, sizes_, ranks_, particles, g, horizon);
   const auto record = [&](Id i) {
     Record<D> r{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]};
     if (instants) r.t = instants->t[i], r.generation = instants->generation[i];
@@ -61,8 +58,8 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
     box_.wrap(places.emplace_back(particles.x[i] + s * particles.v[i] + (0.5 * s * s) * g_), image);
   }
   const auto divide = [&](std::size_t subdomains) {
-    bisection_.emplace(box_, instants ? places : particles.x, subdomains, diameter_ + 2 * max_displacement_, ranks_,
-                       work_);
+    bisection_.emplace(box_, instants ? places : particles.x, subdomains,
+                       2 * (sizes_.largest_radius() + length_.max_displacement()), ranks_, work_);
     for (std::uint32_t r = 0; r < subdomains; ++r)
       if (bisection_->neighbours(r).size() > kMostNeighbours) return false;
     return true;
@@ -70,45 +67,13 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   std::size_t subdomains = subdomains_;
   while (!divide(subdomains)) subdomains -= (subdomains + 7) / 8;  // the box is too small for so many
   if (subdomains < subdomains_) make_subdomain(subdomains);
-  partners_.clear();
-  if (subdomain_)
-    for (const std::uint32_t r : bisection_->neighbours(static_cast<std::uint32_t>(ranks_.rank())))
-      partners_.push_back(static_cast<int>(r));
-  outgoing_.assign(partners_.size(), {});
+  exchange_.start(*bisection_);
   load(instants ? instants->now : 0, [&](auto&& add) {
     for (Id i = 0; i < particles.size(); ++i) add(record(i));
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
   run_before_ = subdomain_ ? subdomain_->run_events() : 0;
-}
-
-/// The time in which a sphere collides kCollisions times, by Enskog's theory.
-template <int D>
-double WindowedFlight<D>::first_pace(const Particles<D>& particles) const {
-  ExactSum squares;  // the same for any number of ranks
-  Extent<D> extent;
-  for (const Vec<D>& v : particles.v) squares.add(v.squaredNorm());
-  for (const Vec<D>& x : particles.x) extent.add(x);
-  std::vector<double> bounds;
-  for (int k = 0; k < D; ++k) {
-    bounds.push_back(extent.particles > 0 ? -extent.low[k] : -std::numeric_limits<double>::infinity());
-    bounds.push_back(extent.particles > 0 ? extent.high[k] : -std::numeric_limits<double>::infinity());
-  }
-  ranks_.largest(bounds);
-  for (int k = 0; k < D; ++k)
-    extent.low[k] = -bounds[std::size_t{2} * k], extent.high[k] = bounds[std::size_t{2} * k + 1];
-  extent.particles = sizes_.spheres;
-  const double thermal = std::sqrt(sum_of_all(ranks_, squares).value() / static_cast<double>(D * sizes_.spheres));
-  return kCollisions / (contacts_a_length(situation_of<D>(box_, sizes_.radius, extent, sizes_.number)) * thermal);
-}
-
-/// Sends all messages to neighbours; returns those that have come from them.
-template <int D>
-std::vector<Bytes> WindowedFlight<D>::swap_messages() {
-  std::vector<Bytes> received = ranks_.swap(std::move(outgoing_), partners_);
-  outgoing_.assign(partners_.size(), {});
-  return received;
 }
 
 /// Where a sphere is, as Flights has it, bit for bit.
@@ -128,7 +93,7 @@ void WindowedFlight<D>::load(double now, Spheres&& spheres) {
       *bisection_, ranks_, [&](auto&& send) { spheres([&](const Record<D>& r) { send(place(r, now), r); }); });
   if (subdomain_)
     subdomain_->load(std::move(near), *bisection_, static_cast<std::uint32_t>(ranks_.rank()), g_, horizon_, now,
-                     max_displacement_);
+                     length_.max_displacement());
   now_ = now;
   cut_ = false;
   sort_out(true);
@@ -150,25 +115,15 @@ void WindowedFlight<D>::sort_out(bool loaded) {
   sorted_ = true;
   if (subdomain_)
     subdomain_->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
-      if (!loaded) put(outgoing_[neighbour], record);
+      if (!loaded) exchange_.add(neighbour, record);
     });
   if (loaded) return;
   double full = 0;
-  for (const Bytes& bytes : swap_messages())
+  for (const Bytes& bytes : exchange_.swap())
     for (Reader reader(bytes); reader.more();)
       if (!subdomain_->admit(reader.get<Record<D>>(), now_)) full = 1;
   ranks_.largest({&full, 1});
   if (full > 0) reload();
-}
-
-/// The end of the next window on the way to `end`.
-template <int D>
-double WindowedFlight<D>::window_end(double end) {
-  double length = fastest_ > 0 ? max_displacement_ / fastest_ : end - now_;
-  if (pace_ > 0) length = std::min(length, pace_);
-  if (forced_window_) length = std::min(length, forced_window_());
-  const double windows = std::ceil((end - now_) / length * (1 - 1e-9));
-  return windows <= 1 ? end : now_ + (end - now_) / windows;
 }
 
 template <int D>
@@ -180,7 +135,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   while (now_ < end && reached == end) {
     if (cut_) reload();
     if (!sorted_) sort_out(false);
-    double stop = std::min(window_end(end), full);
+    double stop = std::min(length_.window_end(now_, end), full);
     full = -(subdomain_ ? subdomain_->run(now_, stop) : stop);
     ranks_.largest({&full, 1});
     full = -full;
@@ -192,72 +147,51 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     }
     full = std::numeric_limits<double>::infinity();
     ++counts_.windows;
-    agree();
-    if (const double max_displacement = first_beyond(stop); max_displacement < stop) stop = cut_at(max_displacement);
+    counts_.rounds += exchange_.agree(subdomain_.get());
+    if (const double beyond = length_.first_beyond(subdomain_.get(), now_, stop, ranks_); beyond < stop)
+      stop = cut_at(beyond);
     if (subdomain_ && !subdomain_->agrees(stop))
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
+    const WindowContacts<D> found(box_, subdomain_.get());
     ContactTally got = tally();
     std::uint64_t count = got.sphere_sphere;
     ranks_.sum({&count, 1});
     if (collisions + count >= report.collision_limit) {  // there are enough
       count = report.collision_limit - collisions;
-      const EventKey<D> last = *key_of_collision(count);
+      const EventKey<D> last = *found.key_of_collision(count, ranks_);
       if (subdomain_) subdomain_->cut(last);
       cut_ = true;
       got = tally();
       reached = stop = last.time;
     }
-    if (report.contacts) add_contacts(contacts);
+    if (report.contacts) found.append_to(contacts);
     sum.add(got);
     counts_.events += got.contacts();
     std::uint64_t contacts_of_all = got.contacts();
     ranks_.sum({&contacts_of_all, 1});
     if (events_ += contacts_of_all; events_ > report.max_events) throw_too_many_contacts(report.max_events);
     collisions += count;
-    const double length = stop - now_, n = static_cast<double>(sizes_.spheres);
+    const double length = stop - now_;
     now_ = stop;
     sorted_ = false;
     if (cut_) continue;
     if (subdomain_) subdomain_->commit();
-    if (count > 0) {
-      const double pace = length * kCollisions * n / (2 * static_cast<double>(count));
-      pace_ = pace_ > 0 ? 0.9 * pace_ + 0.1 * pace : pace;
-    }
+    length_.note(length, count, sizes_.spheres);
   }
-  report_all(sum, contacts, report);
+  report.counters.add(sum_of_all(ranks_, sum));
+  if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, packed<D>(contacts)), *report.contacts);
   return reached;
 }
 
-/// Sends paths and mends them until nothing changes.
+/// Removes the events from a time on, and returns it.
 template <int D>
-void WindowedFlight<D>::agree() {
-  received_.clear();
-  for (double more = 1; more > 0;) {
-    ++counts_.rounds;
-    send_paths();
-    for (const Bytes& bytes : received_.emplace_back(swap_messages()))
-      for (Reader reader(bytes); reader.more();) {
-        const auto id = reader.get<Id>();
-        subdomain_->follow(id, reader);
-      }
-    more = 0;
-    if (subdomain_) {
-      subdomain_->repair();
-      for (const Slot i : subdomain_->changed()) more = subdomain_->holders(i) != 0 ? 1 : more;
-    }
-    ranks_.largest({&more, 1});
-  }
-}
-
-template <int D>
-void WindowedFlight<D>::send_paths() {
-  if (!subdomain_) return;
-  for (const Slot i : subdomain_->changed())
-    for (std::uint64_t holders = subdomain_->holders(i); holders != 0; holders &= holders - 1) {
-      Bytes& bytes = outgoing_[static_cast<std::size_t>(std::countr_zero(holders))];
-      put(bytes, subdomain_->flights()[i].id);
-      subdomain_->write_path(i, bytes);
-    }
+double WindowedFlight<D>::cut_at(double time) {
+  ++counts_.cut;
+  cut_ = true;
+  EventKey<D> last{.time = time};
+  for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
+  if (subdomain_) subdomain_->cut(last);
+  return time;
 }
 
 template <int D>

@@ -18,10 +18,9 @@
 
 #include <optional>
 
-#include "engine/ranks/bisection.h"
-#include "engine/ranks/communicator.h"
 #include "engine/ranks/id_blocks.h"
-#include "engine/ranks/subdomain.h"
+#include "engine/ranks/path_exchange.h"
+#include "engine/ranks/window_length.h"
 
 namespace carom {
 
@@ -60,8 +59,6 @@ class WindowedFlight {
   WindowCounts window_counts() const;
 
  private:
-  static constexpr double kFaster = 1.15;  // factor between the largest speed and the one allowed for
-
   IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(ranks_.size())}; }
   void take(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants* instants);
   void make_subdomain(std::size_t subdomains);
@@ -71,41 +68,24 @@ class WindowedFlight {
   template <class Spheres>
   void load(double now, Spheres&& spheres);
   Vec<D> place(const Record<D>& r, double now) const;
-  double first_pace(const Particles<D>& particles) const;
   void sort_out(bool loaded);
-  void agree();
-  std::vector<Bytes> swap_messages();
-  void send_paths();
-  double window_end(double end);
-  double first_beyond(double end);
   double cut_at(double time);
   ContactTally tally() const { return subdomain_ ? subdomain_->tally() : ContactTally{}; }
-  void add_contacts(std::vector<Contact<D>>& contacts) const;
-  void report_all(const ContactTally& sum, const std::vector<Contact<D>>& contacts, const Report& report);
-  double beyond_at(Slot i, double end) const;
-  std::optional<EventKey<D>> key_of_collision(std::uint64_t number) const;
-  Contact<D> contact_of(Slot lo, std::size_t k) const;
 
   const Box<D>& box_;
   Sizes sizes_;
   Communicator& ranks_;
   std::size_t subdomains_ = 0;
   SearchOptions options_;
-  std::function<double()> forced_window_;
   std::optional<Bisection<D>> bisection_;
-  std::unique_ptr<Subdomain<D>> subdomain_;   // of this rank, with its number; null: it has none
-  std::vector<int> partners_;                 // the ranks of its neighbours
-  std::vector<Bytes> outgoing_;               // to each of them
-  std::vector<std::vector<Bytes>> received_;  // of the window: paths that were sent here
+  std::unique_ptr<Subdomain<D>> subdomain_;  // of this rank, with its number; null: it has none
+  PathExchange<D> exchange_;
+  WindowLength<D> length_;
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
-  double diameter_ = 0;          // the largest
-  double max_displacement_ = 0;  // how far a sphere comes in a window at most
-  double fastest_ = 0;           // the largest speed expected
-  double pace_ = 0;              // time in which a sphere collides kCollisions times, about
-  bool sorted_ = false;          // owners and ghosts are those of now_
-  bool cut_ = false;             // the last window was cut, and subdomains must be loaded again
-  std::uint64_t events_ = 0;     // contacts since take()
+  bool sorted_ = false;       // owners and ghosts are those of now_
+  bool cut_ = false;          // the last window was cut, and subdomains must be loaded again
+  std::uint64_t events_ = 0;  // contacts since take()
   // How much the subdomain had to do in the epoch, a sphere of it, the mean of all being kUsualWork; and each sphere of
   // this rank's block.
   std::uint32_t subdomain_work_ = 0;

@@ -3,10 +3,10 @@
 // they were when their lists were made. A sphere that leaves that region gets a new list, and those of its neighbours
 // are updated.
 //
-// The centres of the regions stand in cells, eight to a cache line with their places in ten bits an axis; spheres of
-// very different sizes have cells of their own, a factor of two in radius each, so that a small sphere does not look
-// through cells as large as the largest one. Lists are symmetric. (Verlet, Phys. Rev. 159 (1967) 98; event-driven:
-// Donev, Torquato, Stillinger, J. Comput. Phys. 202 (2005) 737.)
+// The centres of the regions stand in cells (region_cells.h); spheres of very different sizes have cells of their own,
+// a factor of two in radius each, so that a small sphere does not look through cells as large as the largest one. Lists
+// are symmetric. (Verlet, Phys. Rev. 159 (1967) 98; event-driven: Donev, Torquato, Stillinger, J. Comput. Phys. 202
+// (2005) 737.)
 
 #include <functional>
 #include <span>
@@ -14,9 +14,8 @@
 
 #include "engine/base/prefetch.h"
 #include "engine/search/candidate_lists.h"
-#include "engine/search/cell_grid.h"
 #include "engine/search/next_event.h"
-#include "engine/search/simd/scan.h"
+#include "engine/search/region_cells.h"
 
 namespace carom {
 
@@ -59,27 +58,23 @@ class SkinLists {
 
  private:
   struct Level {  // spheres of similar size
-    CellGrid<D> grid;
     double largest_radius;
-    PageVector<CellLine> lines;
-    std::vector<std::uint32_t> next;  // by line
-    std::uint32_t free = kEmpty;
-    std::int32_t margin = 1;                     // cells that the largest reach extends beyond one's own
-    std::array<std::vector<CellStep>, D> steps;  // by axis: to the cells −margin … count + margin
+    RegionCells<D> cells;
   };
-  using Place = std::array<std::int32_t, D>;  // in 1024ths of a cell
 
   static std::uint8_t octave(double largest, double radius);
   std::size_t level_of(Slot i) const { return equal_ ? 0 : level_[i]; }
+  Vec<D> centre(Slot i) const {
+    Vec<D> c;
+    for (int k = 0; k < D; ++k) c[k] = next_events_[i].where.centre[k];
+    return c;
+  }
   double radius(Slot i) const { return radius_[equal_ ? 0 : i]; }
-  void lay_out(Level& level, double max_displacement);
-  void spread(Level& level);
-  double most_places(double radius, const Level& level, double max_displacement) const;
-  Cell<D> locate(const Level& level, const Vec<D>& x, Place& place) const;
   void insert(Slot i, const Vec<D>& x);
-  void remove(Slot i, const Vec<D>& x);
+  void remove(Slot i) { levels_[level_of(i)].cells.remove(i, centre(i)); }
+  void widen(std::int32_t boxes);
   std::span<const std::uint32_t> surround(Slot i, const Vec<D>& x, double max_displacement = 0);
-  void look_into(const Level& level, Slot i, const Vec<D>& x, double max_displacement, unsigned& found);
+  void look_into(Level& level, Slot i, const Vec<D>& x, double max_displacement, unsigned& found);
   void shift(Slot i, const Image<D>& boxes);
 
   Box<D> box_;
@@ -87,16 +82,14 @@ class SkinLists {
   const ScanKernels& kernels_;
   std::span<const double> radius_;
   bool equal_;
-  double largest_, skin_, max_displacement_ = 0;
+  double largest_, skin_;
   PageVector<NextEvent<D>>& next_events_;
   CandidateLists<D> lists_;
   std::vector<Level> levels_;
   std::vector<std::uint8_t> level_;  // by slot; empty where all are equal
   PageVector<std::int32_t> boxes_;   // by slot: the box of the region's centre, as a linear image
 
-  std::array<std::vector<CellView>, D> views_;
-  std::vector<std::uint32_t> slots_, found_, fresh_;
-  std::vector<std::int32_t> away_;
+  std::vector<std::uint32_t> found_, fresh_;
   std::vector<std::uint64_t> kept_;
   std::int32_t widest_ = 0;  // boxes: the farthest that a sphere has come, or can see
   bool exact_ = false;       // rounded places do not suffice: distances are computed

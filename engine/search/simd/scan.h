@@ -2,8 +2,8 @@
 // The innermost loops, compiled several times for different vector widths and chosen when a core is made.
 //
 // `scan` finds the first contact of one sphere among its candidates, several at a time and without branches; `near`
-// finds the spheres around a place in the cells of skin_lists.h. All widths give the same bits: the same operations in
-// the same order in every lane. The environment variable CAROM_SIMD (sse2, avx2 or avx512) forces a width.
+// finds the spheres around a place in the cells of region_cells.h. All widths give the same bits: the same operations
+// in the same order in every lane. The environment variable CAROM_SIMD (sse2, avx2 or avx512) forces a width.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,0 +1,51 @@
+#include "engine/ranks/halo_exchange.h"
+
+#include "engine/ranks/bisection.h"
+
+namespace carom {
+namespace {
+
+template <int D>
+Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
+  return p.x[i] + box.shift(p.image[i]);
+}
+
+}  // namespace
+
+template <int D>
+void HaloExchange<D>::assign(const Bisection<D>& bisection, const Box<D>& box, Particles<D>& p, int me, double near) {
+  const auto own = static_cast<std::uint32_t>(me);
+  copied_to_.assign(bisection.subdomains(), {});
+  copies_of_ = copied_to_;
+  matters_.clear();
+  at_.clear();
+  for (Id i = 0; i < p.size(); ++i) {
+    const Vec<D> x = bisection.wrapped(p.x[i]);
+    const std::uint32_t owner = bisection.owner(x);
+    p.ghost[i] = owner != own;
+    matters_.push_back(owner != own && bisection.squared_distance(own, x) <= near * near);
+    at_.push_back(unwrapped(box, p, i));
+    if (owner != own)
+      copies_of_[owner].push_back(i);
+    else
+      bisection.for_each_near(x, [&](std::uint32_t rank) {
+        if (rank != own) copied_to_[rank].push_back(i);
+      });
+  }
+  neighbours_.clear();
+  for (std::size_t rank = 0; rank < copied_to_.size(); ++rank)
+    if (!copied_to_[rank].empty() || !copies_of_[rank].empty()) neighbours_.push_back(static_cast<int>(rank));
+}
+
+template <int D>
+double HaloExchange<D>::squared_farthest(const Box<D>& box, const Particles<D>& p) const {
+  double farthest = 0;
+  for (Id i = 0; i < p.size(); ++i)
+    if (p.owns(i)) farthest = std::max(farthest, (unwrapped(box, p, i) - at_[i]).squaredNorm());
+  return farthest;
+}
+
+template class HaloExchange<2>;
+template class HaloExchange<3>;
+
+}  // namespace carom

@@ -1,0 +1,56 @@
+#pragma once
+// Particles with all their fields (fields.h), on the way from their owners to the ranks that know them from then on.
+
+#include <algorithm>
+#include <vector>
+
+#include "engine/base/bytes.h"
+#include "engine/base/fields.h"
+#include "engine/base/particles.h"
+
+namespace carom {
+
+/// This rank's own particles, put into the messages that for_each_receiver(place, visit) visits; `particles`: in each
+/// of them.
+template <int D>
+std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const std::vector<std::uint64_t>& particles,
+                            auto&& for_each_receiver) {
+  std::vector<Bytes> messages(particles.size());
+  Bytes packed(sizeof(Id) + fields.bytes());
+  for (Id i = 0; i < p.size(); ++i) {
+    if (!p.owns(i)) continue;
+    const Id id = p.id_of(i);
+    std::memcpy(packed.data(), &id, sizeof id);
+    fields.pack(i, packed.data() + sizeof id);
+    for_each_receiver(p.x[i], [&](std::size_t message) {
+      if (messages[message].empty()) messages[message].reserve(particles[message] * packed.size());
+      messages[message].insert(messages[message].end(), packed.begin(), packed.end());
+    });
+  }
+  return messages;
+}
+
+/// The particles of messages, of which no two have the same, become those that are known, by id, and no ghosts yet;
+/// `total`: so many there are on all ranks.
+template <int D>
+void take_in(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total) {
+  struct Arrival {
+    Id id;
+    const std::byte* at;
+  };
+  std::vector<Arrival> arrivals;
+  for (const Bytes& message : messages)
+    for (Reader from(message); from.more();) {
+      const Id id = from.template get<Id>();
+      arrivals.push_back({id, from.skip(fields.bytes())});
+    }
+  std::ranges::sort(arrivals, {}, &Arrival::id);
+  fields.resize(arrivals.size());
+  for (Id i = 0; i < arrivals.size(); ++i) fields.unpack(i, arrivals[i].at);
+  p.id.clear();
+  if (arrivals.size() < total)
+    for (const Arrival& arrival : arrivals) p.id.push_back(arrival.id);
+  p.ghost.assign(p.size(), 0);
+}
+
+}  // namespace carom

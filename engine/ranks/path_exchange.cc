@@ -1,0 +1,56 @@
+#include "engine/ranks/path_exchange.h"
+
+#include <bit>
+
+namespace carom {
+
+template <int D>
+void PathExchange<D>::start(const Bisection<D>& bisection) {
+  partners_.clear();
+  if (const auto me = static_cast<std::uint32_t>(ranks_.rank()); me < bisection.subdomains())
+    for (const std::uint32_t r : bisection.neighbours(me)) partners_.push_back(static_cast<int>(r));
+  outgoing_.assign(partners_.size(), {});
+}
+
+template <int D>
+std::vector<Bytes> PathExchange<D>::swap() {
+  std::vector<Bytes> received = ranks_.swap(std::move(outgoing_), partners_);
+  outgoing_.assign(partners_.size(), {});
+  return received;
+}
+
+template <int D>
+std::uint64_t PathExchange<D>::agree(Subdomain<D>* subdomain) {
+  received_.clear();
+  std::uint64_t rounds = 0;
+  for (double more = 1; more > 0; ++rounds) {
+    if (subdomain) add_paths(*subdomain);
+    for (const Bytes& bytes : received_.emplace_back(swap()))
+      for (Reader reader(bytes); reader.more();) {
+        const auto id = reader.get<Id>();
+        subdomain->follow(id, reader);
+      }
+    more = 0;
+    if (subdomain) {
+      subdomain->repair();
+      for (const Slot i : subdomain->changed()) more = subdomain->holders(i) != 0 ? 1 : more;
+    }
+    ranks_.largest({&more, 1});
+  }
+  return rounds;
+}
+
+template <int D>
+void PathExchange<D>::add_paths(Subdomain<D>& subdomain) {
+  for (const Slot i : subdomain.changed())
+    for (std::uint64_t holders = subdomain.holders(i); holders != 0; holders &= holders - 1) {
+      Bytes& bytes = outgoing_[static_cast<std::size_t>(std::countr_zero(holders))];
+      put(bytes, subdomain.flights()[i].id);
+      subdomain.write_path(i, bytes);
+    }
+}
+
+template class PathExchange<2>;
+template class PathExchange<3>;
+
+}  // namespace carom

@@ -1,0 +1,96 @@
+// Of random particles that ranks know by a bisection: owners, copies that matter, and values that owners send.
+
+#include "engine/ranks/halo_exchange.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "engine/ranks/bisection.h"
+#include "tests/support/thread_ranks.h"
+
+namespace carom {
+namespace {
+
+constexpr double kNear = 1.0, kFar = 1.8;
+const Box<2> kBox{{12, 9}, {Boundary::periodic, Boundary::wall}};
+
+std::vector<Vec<2>> random_places() {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<Vec<2>> x;
+  for (int i = 0; i < 300; ++i) x.emplace_back(kBox.edges[0] * uniform(random), kBox.edges[1] * uniform(random));
+  return x;
+}
+
+/// What one of four ranks knows of all.
+struct Known {
+  explicit Known(int me) : bisection(kBox, random_places(), 4, kFar, alone) {
+    const std::vector<Vec<2>> all = random_places();
+    for (Id i = 0; i < all.size(); ++i)
+      bisection.for_each_near(all[i], [&](std::uint32_t rank) {
+        if (rank != static_cast<std::uint32_t>(me)) return;
+        p.id.push_back(i);
+        p.x.push_back(all[i]);
+        owner.push_back(static_cast<int>(bisection.owner(all[i])));
+      });
+    p.image.resize(p.size());
+    p.ghost.resize(p.size());
+    halo.assign(bisection, kBox, p, me, kNear);
+  }
+  Communicator alone;
+  Bisection<2> bisection;
+  Particles<2> p;
+  std::vector<int> owner;
+  HaloExchange<2> halo;
+};
+
+TEST(HaloExchange, CopiesNearOwnParticlesMatter) {
+  for (const int me : {0, 1, 2, 3}) {
+    const Known known(me);
+    std::size_t mattering = 0;
+    for (Id g = 0; g < known.p.size(); ++g) {
+      EXPECT_EQ(known.p.owns(g), known.owner[g] == me);
+      if (known.p.owns(g)) {
+        EXPECT_FALSE(known.halo.matters(g));
+        continue;
+      }
+      mattering += known.halo.matters(g) ? 1 : 0;
+      for (Id i = 0; i < known.p.size(); ++i) {
+        Vec<2> d = known.p.x[g] - known.p.x[i];
+        d[0] -= kBox.edges[0] * std::round(d[0] / kBox.edges[0]);
+        EXPECT_TRUE(known.halo.matters(g) || !known.p.owns(i) || d.norm() > kNear);
+      }
+    }
+    EXPECT_GT(mattering, 20u);
+    EXPECT_LT(mattering, known.p.size() - 80);
+  }
+}
+
+TEST(HaloExchange, CopiesGetTheValuesOfTheirOwners) {
+  test::ThreadRanks(4).run([](Communicator& ranks) {
+    const Known known(ranks.rank());
+    std::vector<double> one(known.p.size(), -1);
+    std::vector<Vec<2>> other(known.p.size(), {-1, -1});
+    for (Id i = 0; i < known.p.size(); ++i)
+      if (known.p.owns(i)) one[i] = 2.0 * known.p.id[i], other[i] = {1.0 * known.p.id[i], 5};
+    known.halo.update(ranks, std::span(one), std::span(other));
+    for (Id i = 0; i < known.p.size(); ++i) {
+      EXPECT_EQ(one[i], 2.0 * known.p.id[i]);
+      EXPECT_EQ(other[i], Vec<2>(known.p.id[i], 5));
+    }
+  });
+}
+
+TEST(HaloExchange, KnowsHowFarOwnParticlesHaveCome) {
+  Known known(0);
+  for (Id i = 0; i < known.p.size(); ++i) {
+    known.p.x[i][1] += known.p.owns(i) ? 0.25 : 7;
+    known.p.x[i][0] -= kBox.edges[0];
+    known.p.image[i][0] += 1;
+  }
+  EXPECT_NEAR(known.halo.squared_farthest(kBox, known.p), 0.0625, 1e-12);
+}
+
+}  // namespace
+}  // namespace carom

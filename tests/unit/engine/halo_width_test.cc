@@ -1,0 +1,80 @@
+// A halo is as wide as paths and collisions ask for, and a division ends before a particle has left what it allows for.
+
+#include "engine/ranks/halo_width.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace carom {
+namespace {
+
+constexpr double kReach = 2.5, kPath = 0.01, kDiameter = 1;
+
+HaloWidth fitted(bool cores) {
+  HaloWidth width;
+  width.start(cores);
+  width.fit(kReach, kPath, kDiameter);
+  return width;
+}
+
+TEST(HaloWidth, IsDeeperWhereParticlesCollide) {
+  EXPECT_EQ(fitted(false).far(), fitted(false).near());
+  EXPECT_GE(fitted(true).far(), fitted(true).near() + 2 * kDiameter);
+  EXPECT_EQ(fitted(true).near(), fitted(false).near());
+}
+
+TEST(HaloWidth, AllowsForPathsThatWereTooLongUntilThatIsLongAgo) {
+  HaloWidth width = fitted(true);
+  const double first = width.near();
+  EXPECT_TRUE(width.allows(1.5 * kPath));
+  EXPECT_FALSE(width.allows(5 * kPath));
+  EXPECT_FALSE(width.asked());
+  width.ask_for_path(5 * kPath);
+  EXPECT_TRUE(width.asked());
+  EXPECT_FALSE(width.asked());
+  width.fit(kReach, kPath, kDiameter);
+  EXPECT_TRUE(width.allows(5 * kPath));
+  EXPECT_GT(width.near(), first);
+  for (int k = 0; k < 10; ++k) width.relax();
+  width.fit(kReach, kPath, kDiameter);
+  EXPECT_EQ(width.near(), first);
+  width.ask_for_path(std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(width.asked());  // none is wide enough
+}
+
+TEST(HaloWidth, GrowsDeeperWhereCopiesWentWrong) {
+  HaloWidth width = fitted(true);
+  const double depth = width.far() - width.near();
+  width.ask_for_depth();
+  EXPECT_TRUE(width.asked());
+  width.fit(kReach, kPath, kDiameter);
+  EXPECT_DOUBLE_EQ(width.far() - width.near(), 2 * depth);
+  for (int k = 0; k < 10; ++k) width.relax();
+  width.fit(kReach, kPath, kDiameter);
+  EXPECT_DOUBLE_EQ(width.far() - width.near(), depth);
+}
+
+/// Two particles may each have come so far, and go on through one slab, while they can touch or feel each other.
+TEST(HaloWidth, IsOutdatedBeforeAParticleHasComeTooFar) {
+  for (const double path : {0.001, 0.01, 0.1, 1.0}) {
+    HaloWidth width = fitted(true);
+    width.fit(kReach, path, kDiameter);
+    double come = 0;
+    int slabs = 0, looks = 0;
+    while (!width.outdated([&] { return ++looks, come; })) {
+      ASSERT_TRUE(width.allows(2 * path));
+      come += 2 * path;
+      EXPECT_LE(kReach + 2 * come, width.near()) << path;
+      ++slabs;
+    }
+    EXPECT_GE(slabs, 1) << path;
+    EXPECT_LE(looks, 10) << path;
+    width.fit(kReach, path, kDiameter);
+    EXPECT_FALSE(width.outdated([] { return 0.0; }));
+  }
+}
+
+}  // namespace
+}  // namespace carom

@@ -1,0 +1,75 @@
+// Subdomains on two ranks that exchange paths agree, and have what one core has.
+
+#include "engine/ranks/path_exchange.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/thread_ranks.h"
+#include "tests/unit/engine/window_cases.h"
+
+namespace carom {
+namespace {
+
+constexpr double kEnd = 0.12;
+
+/// A blow passes from one subdomain through a row of spheres into the other, which did not see it come.
+TEST(PathExchange, MakesSubdomainsAgreeAboutAWindow) {
+  std::vector<Vec<3>> x, v(16, Vec<3>::Zero());
+  for (int i = 0; i < 16; ++i) x.push_back({2.0 + 1.001 * i, 3, 3});
+  v[0][0] = 3;
+  const auto system = test::make_system<3>({20, 6, 6}, P, x, v);
+  const Sizes sizes(system->particles);
+  EventCore<3> core(system->box, &sizes, {});
+  core.load(records_of(system->particles), Vec<3>::Zero(), kEnd, 0, 2 * kDisplacement);
+  Counters counters;
+  core.run(kEnd, {.counters = counters});
+  std::vector<Record<3>> right(system->size());
+  for (const Record<3>& r : core.flights().records()) right[r.id] = r;
+
+  std::size_t own = 0;
+  std::mutex mutex;
+  test::ThreadRanks(3).run([&](Communicator& ranks) {  // the last one has no subdomain
+    Communicator alone;
+    const Bisection<3> bisection(system->box, system->particles.x, 2, 1 + 2 * kDisplacement, alone);
+    const auto me = static_cast<std::uint32_t>(ranks.rank());
+    const auto subdomain = me < 2 ? subdomain_of(*system, sizes, bisection, me, kEnd) : nullptr;
+    if (subdomain) subdomain->run(0, kEnd);
+    PathExchange<3> exchange(ranks);
+    exchange.start(bisection);
+    EXPECT_GE(exchange.agree(subdomain.get()), 2u);
+    EXPECT_EQ(exchange.agree(subdomain.get()), 1u);  // nothing is left to send
+    if (!subdomain) return;
+    EXPECT_TRUE(subdomain->agrees(kEnd));
+    const std::lock_guard lock(mutex);
+    for (const Slot i : subdomain->own()) {
+      const Record<3>& r = subdomain->after(i);
+      EXPECT_EQ(r.x, right[r.id].x) << r.id;
+      EXPECT_EQ(r.v, right[r.id].v) << r.id;
+      ++own;
+    }
+  });
+  EXPECT_EQ(own, system->size());
+}
+
+TEST(PathExchange, BringsValuesToNeighbours) {
+  test::ThreadRanks(4).run([](Communicator& ranks) {
+    Communicator alone;
+    std::vector<Vec<2>> x;
+    for (int i = 0; i < 40; ++i) x.emplace_back(i + 0.5, 0.5);
+    const Bisection<2> bisection({{40, 1}, {W, W}}, x, 3, 2, alone);
+    PathExchange<2> exchange(ranks);
+    exchange.start(bisection);
+    const auto me = static_cast<std::uint32_t>(ranks.rank());
+    std::size_t neighbours = 0;
+    if (me < 3) neighbours = bisection.neighbours(me).size();
+    for (std::size_t k = 0; k < neighbours; ++k) exchange.add(k, 100 * me + bisection.neighbours(me)[k]);
+    const std::vector<Bytes> received = exchange.swap();
+    ASSERT_EQ(received.size(), neighbours);
+    for (std::size_t k = 0; k < neighbours; ++k)
+      EXPECT_EQ(Reader(received[k]).get<std::uint32_t>(), 100 * bisection.neighbours(me)[k] + me);
+    for (const Bytes& bytes : exchange.swap()) EXPECT_TRUE(bytes.empty());
+  });
+}
+
+}  // namespace
+}  // namespace carom

@@ -1,0 +1,121 @@
+// What cells find near a place is what trying all spheres in all images finds.
+
+#include "engine/search/region_cells.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <set>
+
+namespace carom {
+namespace {
+
+constexpr double kReach = 1.2;
+
+template <int D>
+struct Centres {
+  Centres(const Box<D>& box_, std::size_t n, unsigned seed)
+      : box(box_), packing(n), x(n), boxes(n), cells(box, packing, scan_kernels(), extent(n), double(n), 1, kReach) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (std::size_t i = 0; i < n; ++i)
+      for (int k = 0; k < D; ++k) {
+        const double at = uniform(random);
+        x[i][k] = i % 3 == 0 ? 0.3 * at : at * box.edges[k];  // one in three is in a corner: more than a line holds
+        if (box.periodic(k)) x[i][k] += box.edges[k] * (static_cast<int>(random() % 3) - 1);
+      }
+  }
+  Extent<D> extent(std::size_t n) const {
+    Extent<D> all;
+    all.particles = n;
+    all.high = box.edges;
+    return all;
+  }
+  bool insert(Slot i) {
+    Image<D> image;
+    if (!cells.insert(i, x[i], image)) return false;
+    boxes[i] = packing.linear(image);
+    return inside.insert(i).second;
+  }
+  void remove(Slot i) {
+    cells.remove(i, x[i]);
+    inside.erase(i);
+  }
+  void expect_found(const Vec<D>& at) {
+    const auto found = cells.find(at, kReach);
+    std::set<std::uint32_t> candidates;
+    for (std::size_t q = 0; q < found.slots.size(); ++q) {
+      const Slot j = found.slots[q];
+      const std::uint32_t candidate = packing.pack(j, boxes[j] - found.away[q] - found.boxes);
+      EXPECT_TRUE(candidates.insert(candidate).second) << "found twice: " << j;
+      EXPECT_TRUE(inside.contains(j)) << j;
+      EXPECT_LT((at - x[j] + box.shift(packing.image(candidate))).norm(), kReach + 0.05) << j;
+    }
+    for (const Slot j : inside)
+      for (int code = 0; code < std::pow(7, D); ++code) {
+        Image<D> image;
+        bool there = true;
+        for (int k = 0, digits = code; k < D; ++k, digits /= 7) {
+          image[k] = digits % 7 - 3;
+          there = there && (image[k] == 0 || box.periodic(k));
+        }
+        if (!there || (at - x[j] + box.shift(image)).norm() > kReach) continue;
+        EXPECT_TRUE(candidates.contains(packing.pack(j, packing.linear(image)))) << j;
+        ++expected;
+      }
+  }
+
+  Box<D> box;
+  Packing<D> packing;
+  std::vector<Vec<D>> x;
+  std::vector<std::int32_t> boxes;
+  RegionCells<D> cells;
+  std::set<Slot> inside;
+  std::size_t expected = 0;
+};
+
+template <int D>
+void expect_found_as_they_come_and_go(const Box<D>& box, unsigned seed) {
+  Centres<D> c(box, 120, seed);
+  c.cells.clear();
+  for (const unsigned period : {1, 4, 3, 2, 1}) {  // the first time all come
+    for (Slot i = 0; i < c.x.size(); ++i) {
+      if (i % period != 0) continue;
+      if (c.inside.contains(i))
+        c.remove(i);
+      else
+        EXPECT_TRUE(c.insert(i));
+    }
+    for (Slot i = 0; i < c.x.size(); i += 3) c.expect_found(c.x[i]);
+  }
+  EXPECT_GT(c.expected, 1000u);
+}
+
+constexpr Boundary W = Boundary::wall, P = Boundary::periodic, O = Boundary::open;
+
+TEST(RegionCells, FindSpheresThatComeAndGo) {
+  expect_found_as_they_come_and_go<2>({{9, 7}, {P, P}}, 1);
+  expect_found_as_they_come_and_go<2>({{9, 1.5}, {W, P}}, 2);
+  expect_found_as_they_come_and_go<3>({{5, 6, 4}, {P, P, P}}, 3);
+  expect_found_as_they_come_and_go<3>({{5, 1.3, 4}, {O, P, W}}, 4);
+}
+
+TEST(RegionCells, AreStoredAroundGivenPlacesOnly) {
+  Centres<3> c({{30, 30, 4}, {P, W, P}}, 300, 5);
+  c.cells.confine(std::vector<Vec<3>>{{1, 1, 1}, {2, 2, 3}});
+  c.cells.clear();
+  std::vector<Slot> beyond;
+  for (Slot i = 0; i < c.x.size(); ++i)
+    if (!c.insert(i)) beyond.push_back(i);
+  EXPECT_GT(c.inside.size(), 100u);
+  ASSERT_GT(beyond.size(), 100u);
+  c.expect_found({0.5, 0.5, 0.5});
+  const std::vector<Slot> members = c.cells.spread();
+  EXPECT_EQ(std::set<Slot>(members.begin(), members.end()), std::exchange(c.inside, {}));
+  for (Slot i = 0; i < c.x.size(); ++i) EXPECT_TRUE(c.insert(i));
+  for (const Slot i : beyond) c.expect_found(c.x[i]);
+  EXPECT_GT(c.expected, 200u);
+}
+
+}  // namespace
+}  // namespace carom

@@ -1,0 +1,30 @@
+#pragma once
+// Subdomains of a system for tests of one window.
+
+#include "engine/ranks/subdomain.h"
+#include "tests/unit/engine/event_cases.h"
+
+namespace carom {
+
+inline constexpr double kDisplacement = 0.5;  // that a sphere comes in a window
+
+template <int D>
+std::vector<Record<D>> records_of(const Particles<D>& p) {
+  std::vector<Record<D>> records;
+  for (Id i = 0; i < p.size(); ++i) records.push_back({p.x[i], p.v[i], 0.0, i, 0, p.species[i]});
+  return records;
+}
+
+/// A subdomain of a bisection with all spheres that concern it, at time 0.
+template <int D>
+std::unique_ptr<Subdomain<D>> subdomain_of(const System<D>& system, const Sizes& sizes, const Bisection<D>& bisection,
+                                           std::uint32_t number, double end) {
+  auto subdomain = std::make_unique<Subdomain<D>>(system.box, sizes, SearchOptions{});
+  std::vector<Record<D>> records = records_of(system.particles);
+  std::erase_if(records, [&](const Record<D>& r) { return !bisection.near(number, bisection.wrapped(r.x)); });
+  subdomain->load(std::move(records), bisection, number, Vec<D>::Zero(), end, 0, kDisplacement);
+  subdomain->sort_out(0, [](std::size_t, const Record<D>&) {});
+  return subdomain;
+}
+
+}  // namespace carom
