@@ -32,13 +32,7 @@ Outcome outcome_of(const std::function<int()>& work) {
 bool World::launched() { return std::getenv("PMIX_RANK") != nullptr || std::getenv("PMI_RANK") != nullptr; }
 
 World::World(double silence) {
-  // A process started without a launcher needs neither a daemon of Open MPI's beside it nor its directory in /tmp,
-  // which may be full, and which other jobs of the same user take away when they end. Only defaults: the user's word
-  // counts.
-  if (!launched()) {
-    setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
-    setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
-  }
+  if (!launched()) return;
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
   MPI_Comm_dup(MPI_COMM_WORLD, &world_);
@@ -48,6 +42,7 @@ World::World(double silence) {
 }
 
 World::~World() {
+  if (world_ == MPI_COMM_NULL) return;
   watch_.reset();
   MPI_Comm_free(&world_);
   MPI_Finalize();

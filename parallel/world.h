@@ -4,7 +4,8 @@
 //   World ranks(600);
 //   return ranks.on_all([&] { return simulate(deck, exchange); });
 //
-// Works under mpirun and as a single process alike. The engine knows nothing of it.
+// Works under mpirun and as a single process alike: one that no launcher has started is the only rank and starts no MPI,
+// which would take longer than a small run. The engine knows nothing of it.
 
 #include <mpi.h>
 
@@ -17,8 +18,8 @@ namespace carom {
 
 class World {
  public:
-  /// Starts MPI (MPI_THREAD_FUNNELED) and duplicates the world communicator. One object a process, once. `silence`:
-  /// seconds after which ranks that work together give up those that do not answer; 0: never.
+  /// Where launched(), starts MPI (MPI_THREAD_FUNNELED) and duplicates the world communicator. One object a process,
+  /// once. `silence`: seconds after which ranks that work together give up those that do not answer; 0: never.
   explicit World(double silence = 0);
   ~World();
   World(const World&) = delete;
