@@ -4,8 +4,8 @@
 //   World ranks(600);
 //   return ranks.on_all([&] { return simulate(deck, exchange); });
 //
-// Works under mpirun and as a single process alike: one that no launcher has started is the only rank and starts no MPI,
-// which would take longer than a small run. The engine knows nothing of it.
+// Works under mpirun and as a single process alike: one that no launcher has started is the only rank and starts no
+// MPI, which would take longer than a small run. The engine knows nothing of it.
 
 #include <mpi.h>
 
