@@ -27,9 +27,10 @@ Outcome outcome_of(const std::function<int()>& work) {
   }
 }
 
-}  // namespace
+/// Whether a launcher has started this process, perhaps with others.
+bool launched() { return std::getenv("PMIX_RANK") != nullptr || std::getenv("PMI_RANK") != nullptr; }
 
-bool World::launched() { return std::getenv("PMIX_RANK") != nullptr || std::getenv("PMI_RANK") != nullptr; }
+}  // namespace
 
 World::World(double silence) {
   if (!launched()) return;

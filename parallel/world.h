@@ -18,15 +18,13 @@ namespace carom {
 
 class World {
  public:
-  /// Where launched(), starts MPI (MPI_THREAD_FUNNELED) and duplicates the world communicator. One object a process,
-  /// once. `silence`: seconds after which ranks that work together give up those that do not answer; 0: never.
+  /// Where a launcher (mpirun, srun) has started this process, starts MPI (MPI_THREAD_FUNNELED) and duplicates the
+  /// world communicator. One object a process, once. `silence`: seconds after which ranks that work together give up
+  /// those that do not answer; 0: never.
   explicit World(double silence = 0);
   ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
-
-  /// Whether a launcher (mpirun, srun) has started this process, perhaps with others.
-  static bool launched();
 
   int rank() const { return rank_; }
   int size() const { return size_; }

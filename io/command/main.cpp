@@ -121,10 +121,7 @@ struct Views {
 };
 
 /// One process does it, however many a launcher has started.
-int once(const std::function<int()>& work) {
-  if (!carom::World::launched()) return work();
-  return carom::World().on_first(work);
-}
+int once(const std::function<int()>& work) { return carom::World().on_first(work); }
 
 int carom_main(int argc, char** argv) {
   // 1. The options.
