@@ -7,8 +7,10 @@ import tempfile
 MEMORY = "/dev/shm"
 ROOM = 4 << 30  # bytes; what is written stays there while the tests of a file run
 
-if "TMPDIR" not in os.environ and os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM:
-    tempfile.tempdir = MEMORY
+if "TMPDIR" not in os.environ and os.access(MEMORY, os.W_OK):
+    there = os.statvfs(MEMORY)
+    if there.f_bavail * there.f_frsize > ROOM and not there.f_flag & os.ST_NOEXEC:  # libraries are built there too
+        tempfile.tempdir = MEMORY
 
 
 def pytest_sessionfinish(session, exitstatus):
