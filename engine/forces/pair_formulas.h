@@ -18,7 +18,7 @@ constexpr double kToInteger = 0x1.8p52;  // the bits of |x| < 2^51 plus this are
 /// x as integers, |x| < 2^51: to nearest, the even one of two.
 template <class V>
 CAROM_INLINE IntegerOf<V> integers(V x) {
-  return (IntegerOf<V>)(x + kToInteger) - (IntegerOf<V>)all<V>(kToInteger);
+  return (IntegerOf<V>)((BitsOf<V>)(x + kToInteger) - (BitsOf<V>)all<V>(kToInteger));
 }
 
 enum class Wanted { forces, forces_and_sums, mean_forces, hessian_product };
