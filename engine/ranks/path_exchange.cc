@@ -26,7 +26,7 @@ std::uint64_t PathExchange<D>::agree(Subdomain<D>* subdomain) {
   for (double more = 1; more > 0; ++rounds) {
     if (subdomain) add_paths(*subdomain);
     for (const Bytes& bytes : received_.emplace_back(swap()))
-      for (Reader reader(bytes); reader.more();) {
+      for (Reader reader(bytes); subdomain && reader.more();) {
         const auto id = reader.get<Id>();
         subdomain->follow(id, reader);
       }

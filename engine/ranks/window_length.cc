@@ -58,7 +58,7 @@ template <int D>
 double WindowLength<D>::first_beyond(Subdomain<D>* subdomain, double now, double end, Communicator& ranks) {
   double speed = 0, first = std::numeric_limits<double>::infinity();
   if (subdomain) speed = subdomain->fastest() + field_;
-  if (speed > fastest_)
+  if (subdomain && speed > fastest_)
     subdomain->for_each_touched([&](Slot i) { first = std::min(first, beyond_at(*subdomain, i, now, end)); });
   std::array<double, 2> worst{speed, -first};
   ranks.largest(worst);
