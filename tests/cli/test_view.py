@@ -107,7 +107,7 @@ def test_frames_are_those_of_the_trajectory(shown, finished):
 
 def test_a_run_that_is_shown_while_it_goes_on_is_the_same_run(tmp_path):
     """Frames are whole at whatever instant they are asked for, and the run keeps its bits."""
-    overrides = ["run.end_time=12", "output.frame_interval=0.02", "particles.0.count=500"]
+    overrides = ["run.end_time=120", "output.frame_interval=0.2", "output.thermo_interval=0.2", "particles.0.count=500"]
     deck = write_deck(tmp_path, SPHERES)
     run(deck, tmp_path / "alone", overrides)
     sets = [part for override in overrides for part in ("--set", override)]
