@@ -7,22 +7,23 @@ from runs import needs_carom
 
 pytestmark = needs_carom
 
+PLACES = changed('type = "fcc"', 'type = "file"\nfile = "places.csv"', FLUID).replace("count = 64", "count = 2")
+
 
 def test_positions_file(tmp_path):
-    deck = changed('type = "fcc"', 'type = "file"\nfile = "places.csv"', FLUID).replace("count = 64", "count = 2")
-    answer = validate(tmp_path, deck)
+    answer = validate(tmp_path, PLACES)
     assert (answer.returncode, "places.csv" in answer.stderr) == (5, True)
     (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n2.5 1 oops\n")
-    answer = validate(tmp_path, deck)
+    answer = validate(tmp_path, PLACES)
     assert answer.returncode == 2
     assert "places.csv:3:7: error: not a position: 'oops' is no finite number; give 3 finite numbers" in answer.stderr
     (tmp_path / "places.csv").write_text("x,y,z\n1,1,1\n")
-    answer = validate(tmp_path, deck)
+    answer = validate(tmp_path, PLACES)
     assert answer.returncode == 2
     assert "1 positions for 2 particles" in answer.stderr
     for good in (b"x,y,z\n1,1,1\n2.5 1 +1  # on the floor\n", b"x,y,z\r\n1,1,1\r\n2.5,1,1\r\n", b"\n# places\n\"x\" \"y\" \"z\"\n1;1;1\n2.5;1;1"):
         (tmp_path / "places.csv").write_bytes(good)
-        assert validate(tmp_path, deck).returncode == 0
+        assert validate(tmp_path, PLACES).returncode == 0
 
 
 @pytest.mark.parametrize("contents, words", [
@@ -39,9 +40,8 @@ def test_positions_file(tmp_path):
     (b"1 1 1\n" + 100000 * b"2 2\n", "places.csv:11:1: error: not a position: there are 2 numbers"),
 ], ids=[str(n) for n in range(11)])  # contents are too long for names
 def test_odd_positions_files(contents, words, tmp_path):
-    deck = changed('type = "fcc"', 'type = "file"\nfile = "places.csv"', FLUID).replace("count = 64", "count = 2")
     (tmp_path / "places.csv").write_bytes(contents)
-    answer = validate(tmp_path, deck)
+    answer = validate(tmp_path, PLACES)
     assert answer.returncode == 2 and words in answer.stderr, answer.stderr[:500]
     assert len(answer.stderr) < 3000  # not one line for each of a file that is something else
 

@@ -28,15 +28,8 @@ TEST(PathExchange, MakesSubdomainsAgreeAboutAWindow) {
 
   std::size_t own = 0;
   std::mutex mutex;
-  test::ThreadRanks(3).run([&](Communicator& ranks) {  // the last one has no subdomain
-    Communicator alone;
-    const Bisection<3> bisection(system->box, system->particles.x, 2, 1 + 2 * kDisplacement, alone);
-    const auto me = static_cast<std::uint32_t>(ranks.rank());
-    const auto subdomain = me < 2 ? subdomain_of(*system, sizes, bisection, me, kEnd) : nullptr;
-    if (subdomain) subdomain->run(0, kEnd);
-    PathExchange<3> exchange(ranks);
-    exchange.start(bisection);
-    EXPECT_GE(exchange.agree(subdomain.get()), 2u);
+  in_a_window(*system, sizes, kEnd, [&](Communicator&, Subdomain<3>* subdomain, std::uint64_t rounds) {
+    EXPECT_GE(rounds, 2u);
     if (!subdomain) return;
     EXPECT_TRUE(subdomain->agrees(kEnd));
     const std::lock_guard lock(mutex);

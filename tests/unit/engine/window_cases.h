@@ -1,7 +1,8 @@
 #pragma once
 // Subdomains of a system for tests of one window.
 
-#include "engine/ranks/subdomain.h"
+#include "engine/ranks/path_exchange.h"
+#include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/event_cases.h"
 
 namespace carom {
@@ -25,6 +26,23 @@ std::unique_ptr<Subdomain<D>> subdomain_of(const System<D>& system, const Sizes&
   subdomain->load(std::move(records), bisection, number, Vec<D>::Zero(), end, 0, kDisplacement);
   subdomain->sort_out(0, [](std::size_t, const Record<D>&) {});
   return subdomain;
+}
+
+/// Three ranks, of which the last has no subdomain, advance a system up to `end` and agree about that window: then
+/// check(ranks, subdomain, rounds of the exchange) on each.
+template <int D>
+void in_a_window(const System<D>& system, const Sizes& sizes, double end, auto&& check) {
+  test::ThreadRanks(3).run([&](Communicator& ranks) {
+    Communicator alone;
+    const Bisection<D> bisection(system.box, system.particles.x, 2, 1 + 2 * kDisplacement, alone);
+    const auto me = static_cast<std::uint32_t>(ranks.rank());
+    const auto subdomain = me < 2 ? subdomain_of(system, sizes, bisection, me, end) : nullptr;
+    if (subdomain) subdomain->run(0, end);
+    PathExchange<D> exchange(ranks);
+    exchange.start(bisection);
+    const std::uint64_t rounds = exchange.agree(subdomain.get());
+    check(ranks, subdomain.get(), rounds);
+  });
 }
 
 }  // namespace carom

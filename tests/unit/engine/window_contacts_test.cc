@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "engine/ranks/path_exchange.h"
-#include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/window_cases.h"
 
 namespace carom {
@@ -28,17 +26,9 @@ TEST(WindowContacts, AreThoseOfOneCore) {
   ASSERT_GT(whole.size(), collisions.size() + 10);
 
   std::vector<std::vector<Contact<3>>> parts(3);
-  test::ThreadRanks(3).run([&](Communicator& ranks) {  // the last one has no subdomain
-    Communicator alone;
-    const Bisection<3> bisection(system->box, system->particles.x, 2, 1 + 2 * kDisplacement, alone);
-    const auto me = static_cast<std::uint32_t>(ranks.rank());
-    const auto subdomain = me < 2 ? subdomain_of(*system, sizes, bisection, me, kEnd) : nullptr;
-    if (subdomain) subdomain->run(0, kEnd);
-    PathExchange<3> exchange(ranks);
-    exchange.start(bisection);
-    exchange.agree(subdomain.get());
-    const WindowContacts<3> contacts(system->box, subdomain.get());
-    contacts.append_to(parts[me]);
+  in_a_window(*system, sizes, kEnd, [&](Communicator& ranks, Subdomain<3>* subdomain, std::uint64_t) {
+    const WindowContacts<3> contacts(system->box, subdomain);
+    contacts.append_to(parts[static_cast<std::size_t>(ranks.rank())]);
     for (const std::size_t n : {std::size_t{1}, std::size_t{7}, collisions.size()})
       EXPECT_TRUE(contacts.key_of_collision(n, ranks) == collisions[n - 1]) << n;
     EXPECT_FALSE(contacts.key_of_collision(0, ranks));
