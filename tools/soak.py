@@ -36,6 +36,7 @@ from compare import compare, summary_differences
 LEAST_DISTANCE = 1e-9  # that spheres may overlap by
 EXACT = {"free-flight": 1e-9, "cdda": 1e-9, "edda": 1e-9}  # largest error of H, over its reference
 PATIENCE = 120  # [s], for one process
+ALONE = 10  # [s] that mpirun may go on after its ranks
 
 
 class Found(Exception):
@@ -174,23 +175,29 @@ class Run:
             pass
 
     def end(self, job, codes, most=PATIENCE):
-        """Waits for it; its exit code must be one of these. What a killed mpirun leaves in MPI_Init is killed too."""
-        until = time.monotonic() + most
+        """Waits for it; its exit code must be one of these. What a killed mpirun leaves in MPI_Init is killed too, and an mpirun
+        that goes on alone: when a rank was killed, Open MPI 4.1.4 with PMIx 4.2.2 may wait for a mutex in memory that it has freed."""
+        until = alone = time.monotonic() + most
+        late = False
         while True:
             try:
-                error = job.communicate(timeout=min(1, most))[1].strip()
+                error = job.communicate(timeout=None if late else min(1, most))[1].strip()
                 break
-            except subprocess.TimeoutExpired as expired:
-                left, late = self.processes(), time.monotonic() > until
-                for process in left + [job.pid] * late if late or job.poll() == -signal.SIGKILL else []:
-                    self.kill(process, signal.SIGKILL)
-                if late:
-                    job.communicate()
-                    raise Found(f"it does not end; {len(left)} of its processes are left") from expired
+            except subprocess.TimeoutExpired:
+                now, left = time.monotonic(), self.processes()
+                late = now > until
+                alone = now + ALONE if left else min(alone, now + ALONE)
+                if late or job.poll() == -signal.SIGKILL:
+                    for process in left:
+                        self.kill(process, signal.SIGKILL)
+                if late or now > alone:
+                    job.kill()
         for _ in range(1000):  # mpirun does not wait for those it kills
             if not self.processes():
                 break
             time.sleep(0.01)
+        if late:
+            raise Found(f"it does not end in {most:.0f} s; {len(left)} of its processes were left: {error}")
         if job.returncode not in codes:
             raise Found(f"exit code {job.returncode}: {error}")
         return job.returncode
