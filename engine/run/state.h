@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <span>
 #include <string>
 
 #include "engine/base/error.h"
@@ -13,13 +14,15 @@ namespace carom {
 
 /// Where a state goes: fields of particles, whole and in the order of ids, and what there is one of a run.
 struct StateWriter {
-  std::function<void(const Fields::Field&, const Bytes&)> field;
+  std::function<void(const Fields::Field&, std::span<const std::byte>)> field;
   std::function<void(const std::string& name, const Bytes&)> of_run;
 };
 
 /// Keeps a state in memory, by names.
 inline StateWriter into(std::map<std::string, Bytes>& state) {
-  return {[&state](const Fields::Field& field, const Bytes& bytes) { state[field.name] = bytes; },
+  return {[&state](const Fields::Field& field, auto bytes) {
+            state[field.name] = {bytes.begin(), bytes.end()};
+          },
           [&state](const std::string& name, const Bytes& bytes) { state[name] = bytes; }};
 }
 
@@ -29,6 +32,10 @@ void save_state(System<D>& system, const StateWriter& writer) {
   Communicator& ranks = system.decomposition.ranks();
   for (const auto& field : system.fields.of_particles()) {
     if (field->kind == Fields::Kind::constant) continue;
+    if (ranks.size() == 1 && !system.decomposition.by_place()) {
+      writer.field(*field, {field->data(), field->entries() * field->size});
+      continue;
+    }
     std::vector<Bytes> blocks = gather_on_first(ranks, system.decomposition.block_of(*field));
     Bytes all = std::move(blocks[0]);
     for (std::size_t n = 1; n < blocks.size(); ++n) all.insert(all.end(), blocks[n].begin(), blocks[n].end());

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <optional>
+#include <span>
 
 #include "engine/base/error.h"
 #include "io/files/descriptor.h"
@@ -113,12 +114,12 @@ void write_checkpoint(const std::filesystem::path& directory, CheckpointHead hea
   const auto aside = directory / (std::string(run_file::checkpoint) + ".part");
   std::optional<hdf5::File> file;
   std::optional<hdf5::Handle> particles, run;
-  const auto write = [&](const hdf5::Handle& group, const std::string& name, hid_t type, const Bytes& bytes,
-                         const std::vector<hsize_t>& shape) {
+  const auto write = [&](const hdf5::Handle& group, const std::string& name, hid_t type,
+                         std::span<const std::byte> bytes, const std::vector<hsize_t>& shape) {
     file->write_array(group, name, type, bytes.data(), shape);
   };
   const StateWriter writer{
-      [&](const Fields::Field& field, const Bytes& bytes) {
+      [&](const Fields::Field& field, std::span<const std::byte> bytes) {
         std::vector<hsize_t> shape = {bytes.size() / field.size};
         if (field.columns > 1) shape.push_back(field.columns);
         write(*particles, field.name, type_of(field.scalar), bytes, shape);

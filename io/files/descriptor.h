@@ -3,9 +3,14 @@
 
 #include <unistd.h>
 
+#include <cstddef>
 #include <utility>
 
 namespace carom {
+
+/// Bytes to give to the system at once. A larger write to a new file can be slow: 24 MB take ten times as long in one
+/// with ext4 of Linux 6.18.
+constexpr std::size_t kLargestWrite = 1 << 20;
 
 class Descriptor {
  public:

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "engine/base/error.h"
+#include "io/files/descriptor.h"
 #include "io/files/journal.h"
 
 namespace carom::hdf5 {
@@ -191,7 +192,25 @@ Handle File::create_data_set(const Handle& where, const std::string& name, hid_t
 void File::write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
                        const std::vector<hsize_t>& shape) {
   const Handle set = create_data_set(where, name, type, shape);
-  check(H5Dwrite(set.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), "write data set " + name);
+  const std::string action = "write data set " + name;
+  if (shape.empty()) {
+    check(H5Dwrite(set.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), action);
+    return;
+  }
+  const hsize_t row = std::accumulate(shape.begin() + 1, shape.end(), H5Tget_size(type), std::multiplies<>());
+  const hsize_t most = std::max<hsize_t>(kLargestWrite / std::max<hsize_t>(row, 1), 1);
+  std::vector<hsize_t> start(shape.size(), 0), count = shape;
+  for (; start[0] < shape[0]; start[0] += most) {
+    count[0] = std::min(most, shape[0] - start[0]);
+    write_part(set, type, static_cast<const std::byte*>(data) + start[0] * row, start, count, action);
+  }
+}
+
+void File::write_part(const Handle& set, hid_t type, const void* data, const std::vector<hsize_t>& start,
+                      const std::vector<hsize_t>& count, const std::string& action) const {
+  const Handle in_file(H5Dget_space(set.id()), H5Sclose), in_memory = space_of(count);
+  H5Sselect_hyperslab(in_file.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+  check(H5Dwrite(set.id(), type, in_memory.id(), in_file.id(), H5P_DEFAULT, data), action);
 }
 
 void File::write_attribute(const Handle& where, const std::string& name, hid_t type, const void* data,

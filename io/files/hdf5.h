@@ -99,6 +99,9 @@ class File {
   }
   void write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
                    const std::vector<hsize_t>& shape);
+  /// Writes `count` entries along each axis, from `start` on, of a data set that is there.
+  void write_part(const Handle& set, hid_t type, const void* data, const std::vector<hsize_t>& start,
+                  const std::vector<hsize_t>& count, const std::string& action) const;
   /// A new data set: of this shape, or, where `chunk` says in which parts it is stored, with a first axis that grows.
   /// The time of its creation is not kept, so that equal runs write equal bytes.
   Handle create_data_set(const Handle& where, const std::string& name, hid_t type, const std::vector<hsize_t>& shape,

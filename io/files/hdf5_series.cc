@@ -46,11 +46,7 @@ ArrayBase::ArrayBase(const File& file, const Handle& where, const std::string& n
 
 void ArrayBase::write(hid_t type, const void* data, std::size_t first, std::size_t elements) const {
   if (elements == 0) return;
-  const hsize_t start = first, count = elements;
-  const Handle in_file(H5Dget_space(dataset_.id()), H5Sclose);
-  const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
-  H5Sselect_hyperslab(in_file.id(), H5S_SELECT_SET, &start, nullptr, &count, nullptr);
-  file_->check(H5Dwrite(dataset_.id(), type, in_memory.id(), in_file.id(), H5P_DEFAULT, data), label_);
+  file_->write_part(dataset_, type, data, {first}, {elements}, label_);
 }
 
 void SeriesBase::append(hid_t type, const void* data, std::size_t elements) {
@@ -94,10 +90,7 @@ void SeriesBase::extend(std::uint64_t rows) {
 
 void SeriesBase::write(hid_t type, const void* data, const std::vector<hsize_t>& start,
                        const std::vector<hsize_t>& count) {
-  const Handle in_file(H5Dget_space(dataset_.id()), H5Sclose);
-  const Handle in_memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
-  H5Sselect_hyperslab(in_file.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
-  file_->check(H5Dwrite(dataset_.id(), type, in_memory.id(), in_file.id(), H5P_DEFAULT, data), label_);
+  file_->write_part(dataset_, type, data, start, count, label_);
 }
 
 }  // namespace carom::hdf5

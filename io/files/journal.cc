@@ -39,7 +39,8 @@ auto uninterrupted(Call call) {
 /// Whether all could be written; else errno says why.
 bool write_all(int descriptor, const std::byte* data, std::size_t size, std::uint64_t at) {
   while (size > 0) {
-    const ssize_t n = uninterrupted([&] { return ::pwrite(descriptor, data, size, static_cast<off_t>(at)); });
+    const ssize_t n = uninterrupted(
+        [&] { return ::pwrite(descriptor, data, std::min(size, kLargestWrite), static_cast<off_t>(at)); });
     if (n == 0) errno = ENOSPC;
     if (n <= 0) return false;
     data += n;
