@@ -1,6 +1,7 @@
 #include "io/files/h5md.h"
 
 #include <cstdint>
+#include <numeric>
 
 #include "engine/base/error.h"
 #include "io/files/hdf5.h"
@@ -133,6 +134,19 @@ TEST(TrajectoryFile, NamesTheFileThatCannotBeCreated) {
     EXPECT_EQ(e.exit_code(), 5);
     EXPECT_NE(std::string(e.what()).find(path.string()), std::string::npos) << e.what();
     EXPECT_NE(std::string(e.what()).find("No such file"), std::string::npos) << e.what();
+  }
+}
+
+TEST(Hdf5File, AnArrayOfManyPiecesIsReadAsWritten) {
+  const auto folder = fresh_directory();
+  std::vector<double> values(3 * 100001);  // 2.4 MB, no whole number of pieces
+  std::iota(values.begin(), values.end(), 0.5);
+  for (const bool plain : {false, true}) {
+    const auto path = folder / (plain ? "plain.h5" : "journaled.h5");
+    hdf5::File written = plain ? hdf5::File::create_plain(path, 512) : hdf5::File::create(path);
+    written.write_array(written.group("here"), "values", H5T_NATIVE_DOUBLE, values.data(), {100001, 3});
+    written.close();
+    EXPECT_EQ(all_numbers(hdf5::File::open(path), "here/values"), values);
   }
 }
 
