@@ -52,14 +52,16 @@ void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, co
 }
 
 template <int D>
-void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
-                       Candidates& found, bool large) {
+void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells) {
   const View<D> view(queue, flights);
-  if (!large) {  // only what takes longest
-    if (const CalendarEntry* const later = queue.upcoming(3)) view.fetch_sphere(later->slot);
-    if (const CalendarEntry* const next = queue.upcoming(1)) cells.prefetch(view.plans[next->slot].where.cell, 0, 0);
-    return;
-  }
+  if (const CalendarEntry* const later = queue.upcoming(3)) view.fetch_sphere(later->slot);
+  if (const CalendarEntry* const next = queue.upcoming(1)) cells.prefetch(view.plans[next->slot].where.cell, 0, 0);
+}
+
+template <int D>
+void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
+                       Candidates& found) {
+  const View<D> view(queue, flights);
   // To look at the cells twice costs less than to wait for the spheres in them.
   const auto fetch = [&](Slot j) { view.fetch(j); };
   const auto step = [](const NextEvent<D>& a) { return a.contact <= a.update ? 0 : a.face % 2 == 1 ? 1 : -1; };
@@ -84,7 +86,9 @@ void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, co
 
 template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const SkinLists<2>&, bool);
 template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const SkinLists<3>&, bool);
-template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const LinkedCells<2>&, Candidates&, bool);
-template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const LinkedCells<3>&, Candidates&, bool);
+template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const LinkedCells<2>&);
+template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const LinkedCells<2>&, Candidates&);
+template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const LinkedCells<3>&);
+template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const LinkedCells<3>&, Candidates&);
 
 }  // namespace carom

@@ -14,9 +14,13 @@ namespace carom {
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const SkinLists<D>& lists, bool large);
 
-/// The same where there are cells; `found` is room to work in.
+/// The same where there are cells and the core stands in a cache.
+template <int D>
+void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells);
+
+/// The same where it does not; `found` is room to work in.
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
-                       Candidates& found, bool large);
+                       Candidates& found);
 
 }  // namespace carom

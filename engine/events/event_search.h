@@ -56,8 +56,10 @@ class EventSearch {
     if (small_) return;
     if (lists_)
       prefetch_upcoming(queue_, flights_, *lists_, large_);
+    else if (large_)
+      prefetch_upcoming(queue_, flights_, *cells_, found_);
     else
-      prefetch_upcoming(queue_, flights_, *cells_, found_, large_);
+      prefetch_upcoming(queue_, flights_, *cells_);
   }
 
   const EventCounts& counts() const { return counts_; }
