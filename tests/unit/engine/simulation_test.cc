@@ -182,9 +182,8 @@ TEST(Simulation, FreeFlightEndsAtTheNthCollision) {
 
 /// However far they have flown: two discs that meet every 4 between walls, in a box that is open elsewhere.
 TEST(Simulation, SpheresThatMeetAgainAndAgainHaveNotFlownApart) {
-  const auto run = test::make_run<2>(
-      test::make_system<2>({6, 6}, Boundary::wall, {{2, 3}, {4, 3}}, {{1, 0}, {-1, 0}}), "free-flight",
-      {.step = 1000, .collisions = 25000});
+  const auto run = test::make_run<2>(test::make_system<2>({6, 6}, Boundary::wall, {{2, 3}, {4, 3}}, {{1, 0}, {-1, 0}}),
+                                     "free-flight", {.step = 1000, .collisions = 25000});
   run->system().box.boundary[1] = Boundary::open;
   EXPECT_NO_THROW(run->run());
   EXPECT_GT(run->statistics().end_time, 1e4 * 6);
@@ -230,6 +229,24 @@ TEST(Simulation, WallsAreTouchedWhereTheyStand) {
     }
     EXPECT_GT(*std::ranges::min_element(hits), 1) << method;
   }
+}
+
+/// A disc hits one that rests on the floor, which ends a piece of a step; high above another bounces from wall to wall.
+TEST(Simulation, ContactsInPiecesOfAStepHaveTheirTimes) {
+  auto system =
+      test::make_system<2>({6, 8}, Boundary::wall, {{3, 0.5}, {3.2, 1.8}, {3, 6}}, {{0, 0}, {0, -1}, {20, 0}});
+  test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0.0, -0.1}}});
+  auto run = test::make_run<2>(std::move(system), "edda", {.step = 0.5, .steps = 2, .events = true});
+  Notebook<2> notes;
+  run->add(notes);
+  run->run();
+  EXPECT_GT(run->statistics().counters.pieces, 2u);
+  std::size_t bounces = 0;
+  for (std::size_t k = 0; k < notes.times.size(); ++k)
+    if (notes.touched[k].key.lo == 2) {
+      EXPECT_NEAR(notes.times[k], 0.125 + 0.25 * static_cast<double>(bounces++), 1e-9);
+    }
+  EXPECT_EQ(bounces, 4u);
 }
 
 TEST(Simulation, ObservingChangesNoBit) {
