@@ -74,6 +74,7 @@ struct Outcome {
   Statistics statistics;
   State state;
   int looks = 0, looks_alone = 0;  ///< of the last rank
+  bool knew_all = false;           ///< the last rank, where it left alone
 };
 
 template <int D>
@@ -111,7 +112,9 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
                      .leave_here =
                          [&] {
                            const bool last = exchange.rank() == exchange.size() - 1;
-                           return left_here = last && looks_alone++ == leave.alone;
+                           left_here = last && looks_alone++ == leave.alone;
+                           if (left_here) out.knew_all = state_of.decomposition.knows_all();
+                           return left_here;
                          },
                      .restore = from ? [&] { restore_state(state_of, read); } : std::function<void()>()});
     if (exchange.rank() == exchange.size() - 1) out.looks = looks, out.looks_alone = looks_alone;
@@ -228,14 +231,20 @@ TEST(Continue, WithinStepsThatAreCut) {
     compare_within_steps<2>(springs(method, given), {{0, 0}, {2, 3}}, 3);
 }
 /// One rank leaves a flight of many contacts, and all leave the step.
-TEST(Continue, WithinAFlight) {
-  const Scene<3> scene{[] { return test::hard_spheres<3>(6, 0.3); }, "psa", plan_of(0.3, 2)};
-  const Outcome<3> whole = run<3>(scene, 0, scene.plan, {});
+template <int D>
+void compare_within_a_flight(const Scene<D>& scene, bool knows_all) {
+  const Outcome<D> whole = run<D>(scene, 0, scene.plan, {});
   for (const int ranks : {0, 2}) {
-    const Outcome<3> begun = run<3>(scene, ranks, scene.plan, {.alone = ranks == 0 ? whole.looks_alone - 1 : 0});
+    const Outcome<D> begun = run<D>(scene, ranks, scene.plan, {.alone = ranks == 0 ? whole.looks_alone - 1 : 0});
     ASSERT_TRUE(begun.statistics.stopped_early);
-    expect_continued(whole, run<3>(scene, 2 - ranks, scene.plan, {}, &begun.state));
+    EXPECT_EQ(begun.knew_all, knows_all || ranks == 0);
+    EXPECT_EQ(begun.statistics.counters.slabs_again, 0u);
+    expect_continued(whole, run<D>(scene, 2 - ranks, scene.plan, {}, &begun.state));
   }
+}
+TEST(Continue, WithinAFlight) {
+  compare_within_a_flight<3>({[] { return test::hard_spheres<3>(6, 0.3); }, "psa", plan_of(0.3, 2)}, true);
+  compare_within_a_flight<2>({[] { return test::hard_spheres<2>(60, 0.7); }, "psa", plan_of(0.05, 2)}, false);
 }
 
 /// A run with a later end goes on as if it had had that end from the start.

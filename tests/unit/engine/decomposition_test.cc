@@ -307,6 +307,30 @@ TEST(Decomposition, TheDeepestOverlapIsFoundAcrossRanks) {
         << ranks << ": " << message;
   }
 }
+/// Two pairs, each on a rank of its own where there are several.
+TEST(Decomposition, OfOverlapsAlikeTheOneWithTheLowestIdsIsNamed) {
+  const Vec<2> rest = {0, 0}, right = {0.25, 0}, left = {-0.25, 0};
+  const auto system = test::make_system<2>(
+      {64, 12}, Boundary::periodic,
+      {{8, 1}, {10, 1}, {14.3125, 4}, {46.3125, 4}, {30, 6}, {47.6875, 4}, {15.6875, 4}, {50, 1}, {52, 1}},
+      {rest, rest, right, right, rest, left, left, rest, rest});
+  IntegratorInfo info = find_integrator("verlet");
+  info.hard_cores = true, info.smooth_forces = false;
+  for (const int ranks : {0, 1, 2, 3}) {
+    const std::string message = failure_of(*system, info, {{"step", 1.0}}, ranks);
+    EXPECT_TRUE(message.starts_with("particles 2 and 6 overlap, by 0.125 of their contact distance"))
+        << ranks << ": " << message;
+  }
+}
+TEST(Decomposition, TheFastestSphereIsNamedByItsId) {
+  const auto system = test::hard_spheres<2>(4, 0.3);
+  const Id last = static_cast<Id>(system->size()) - 2;
+  system->particles.v[last] = {1e200, 0};
+  for (const int ranks : {0, 2, 3}) {
+    const std::string message = failure_of(*system, find_integrator("free-flight"), {{"step", 1.0}}, ranks);
+    EXPECT_NE(message.find("particle " + std::to_string(last) + " is the fastest"), std::string::npos) << message;
+  }
+}
 /// Discs joined to their neighbours by springs so stiff that sweeps are accelerated.
 Scene<2> stiff(int cells, double packing_fraction) {
   return [=] {

@@ -11,7 +11,7 @@ namespace {
 /// A search of its own, without a core.
 template <int D>
 struct Searched {
-  Searched(std::unique_ptr<System<D>> spheres, const Vec<D>& g, SearchOptions::Method method)
+  Searched(std::unique_ptr<System<D>> spheres, const Vec<D>& g, SearchOptions::Method method, double displacement = 0.1)
       : system(std::move(spheres)),
         sizes(system->particles),
         flights(system->box),
@@ -19,9 +19,12 @@ struct Searched {
         search(system->box, flights, queue, &sizes, {.method = method}) {
     std::vector<Record<D>> records;
     const Particles<D>& p = system->particles;
-    for (Id i = 0; i < p.size(); ++i) records.push_back({p.x[i], p.v[i], 0.0, i, 0, p.species[i]});
+    for (Id i = 0; i < p.size(); ++i) {
+      const double s = system->box.walls().empty() ? 0.1 * (i % 3) : 0;  // since its record; no wall may lie between
+      records.push_back({p.x[i] - s * p.v[i] + (0.5 * s * s) * g, p.v[i] - s * g, kStart - s, i, 0, p.species[i]});
+    }
     flights.load(records, sizes, g, kEnd);
-    search.start(0, kDisplacement);
+    search.start(kStart, displacement);
   }
 
   /// Calls visit(j, image) for all images near the box of the other spheres.
@@ -51,11 +54,24 @@ struct Searched {
     });
     EXPECT_GE(queue[i].contact, first) << i;
     EXPECT_LE(queue[i].contact, seen) << i;
+    EXPECT_GE(queue[i].update, kStart) << i;
     planned += seen < kEnd ? 1 : 0;
     return first;
   }
 
-  static constexpr double kEnd = 1, kDisplacement = 0.1;
+  /// By trying everything.
+  double first_contact() const {
+    double first = kNever;
+    for (Slot i = 0; i < flights.size(); ++i) {
+      for (const Wall<D>& wall : flights.walls()) first = std::min(first, flights.wall_contact(i, wall));
+      for_all_others(i, [&](Slot j, const Image<D>& image) {
+        if (i < j) first = std::min(first, flights.pair_contact(i, j, system->box.shift(image)));
+      });
+    }
+    return first;
+  }
+
+  static constexpr double kStart = 2, kEnd = 3;
   std::unique_ptr<System<D>> system;
   Sizes sizes;
   Flights<D> flights;
@@ -73,7 +89,7 @@ void expect_nothing_missed(Searched<D>& s) {
   double first = kNever;
   for (Slot i = 0; i < s.flights.size(); ++i) first = std::min(first, s.expect_planned(i));
   Slot i = 0;
-  double now = 0;
+  double now = Searched<D>::kStart;
   while (s.queue.next(Searched<D>::kEnd, i, now) && s.queue[i].update < s.queue[i].contact) {
     s.search.look_again(i, now);
     s.queue.settle();
@@ -93,50 +109,97 @@ TEST(EventSearch, PlansTheContactsThatTryingEverythingFinds) {
   }
 }
 
+/// Serves the queue, as EventCore does: each contact is the first that trying everything finds.
+template <int D>
+void expect_contacts(Searched<D>& s, int contacts) {
+  Slot i = 0;
+  double now = 0;
+  for (int events = 0; events < 10000 && contacts > 0 && s.queue.next(Searched<D>::kEnd, i, now); ++events) {
+    s.queue.settle();
+    const NextEvent<D> a = s.queue[i];
+    if (a.update < a.contact) {
+      s.search.look_again(i, now);
+    } else if (s.queue.stale(a)) {
+      s.search.plan(i, now);
+    } else {
+      ASSERT_EQ(now, s.first_contact()) << contacts;
+      --contacts;
+      ++s.queue[i].version;
+      if (a.kind == EventKind::wall) {
+        s.flights.bounce(i, s.system->box.wall(a.partner), now, 0);
+        s.search.plan(i, now);
+      } else {
+        const Slot j = s.flights.packing().slot(a.partner);
+        s.flights.collide(i, j, s.system->box.shift(s.flights.packing().image(a.partner)), now, 0);
+        ++s.queue[j].version;
+        s.search.plan_two(i, j, now);
+      }
+    }
+  }
+  EXPECT_EQ(contacts, 0);
+}
+
+TEST(EventSearch, PlansAnewAfterContacts) {
+  for (const auto method : kMethods) {
+    Searched<2> flat(random_system<2>(30, {9, 7}, {P, P}, 0.3, 0.5, 6), Vec<2>::Zero(), method);
+    expect_contacts(flat, 30);
+    Searched<2> equal(random_system<2>(30, {9, 7}, {P, P}, 0.4, 0.4, 7), Vec<2>::Zero(), method);
+    expect_contacts(equal, 30);
+    Searched<3> walled(random_system<3>(30, {5, 4, 4}, {P, W, W}, 0.3, 0.5, 8), Vec<3>::Zero(), method);
+    expect_contacts(walled, 30);
+    Searched<2> field(random_system<2>(30, {7, 9}, {P, W}, 0.3, 0.5, 9), Vec<2>(0, -1), method);
+    expect_contacts(field, 30);
+  }
+}
+
 TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
   for (const auto method : kMethods) {
     Searched<3> s(random_system<3>(80, {6, 6, 6}, {P, P, P}, 0.5, 0.5, 4), Vec<3>::Zero(), method);
+    const double now = s.kStart;
     const auto plan_all = [&] {
       for (Slot i = 0; i < s.flights.size(); ++i) {
-        if (i != s.dismissed) s.search.plan(i, 0);
+        if (i != s.dismissed) s.search.plan(i, now);
         s.queue.settle();
       }
       for (Slot i = 0; i < s.flights.size(); ++i)
         if (i != s.dismissed) s.expect_planned(i);
     };
-    Record<3> moved = s.flights[3];
-    moved.v *= -2.0;
-    s.flights.set(3, moved);
-    s.search.move(3, 0);
+    const Vec<3> x = s.flights.at(3, now).x, other = s.flights.at(40, now).x;
+    for (const auto& [i, at] : {std::pair<Slot, Vec<3>>{3, other}, {40, x}}) {  // they change places
+      s.flights.set(i, {at, -2.0 * s.flights[i].v, now, s.flights[i].id, 0, s.flights[i].species});
+      s.search.move(i, now);
+    }
     plan_all();
     s.search.dismiss(7);
     s.dismissed = 7;
     plan_all();
     s.dismissed = kEmpty;
     s.queue.admit(7);
-    s.search.admit(7, 0.5, 0);
+    s.search.admit(7, 0.5, now);
     s.expect_planned(7);
     plan_all();
     EXPECT_GT(s.planned, 40);
+    expect_contacts(s, 60);
   }
 }
 
 TEST(EventSearch, FindsAllThatASphereMayTouchInAWindow) {
-  for (const auto method : kMethods) {
-    Searched<3> s(random_system<3>(120, {7, 6, 5}, {P, P, W}, 0.3, 0.5, 5), Vec<3>::Zero(), method);
-    std::size_t found = 0;
-    for (Slot i = 0; i < s.flights.size(); ++i) {
-      const auto near = s.search.find_near(i);
-      s.for_all_others(i, [&](Slot j, const Image<3>& image) {
-        const double reach = s.flights.radii(0)[i] + s.flights.radii(0)[j] + 2 * Searched<3>::kDisplacement;
-        if ((s.flights[i].x - s.flights[j].x + s.system->box.shift(image)).norm() > reach) return;
-        const auto& packing = s.flights.packing();
-        EXPECT_TRUE(std::ranges::count(near, packing.pack(j, packing.linear(image))) == 1) << i << ' ' << j;
-        ++found;
-      });
+  for (const auto method : kMethods)
+    for (const double displacement : {0.1, 1.0}) {
+      Searched<3> s(random_system<3>(120, {7, 6, 5}, {P, P, W}, 0.3, 0.5, 5), Vec<3>::Zero(), method, displacement);
+      std::size_t found = 0;
+      for (Slot i = 0; i < s.flights.size(); ++i) {
+        const auto near = s.search.find_near(i);
+        s.for_all_others(i, [&](Slot j, const Image<3>& image) {
+          const double reach = s.flights.radii(0)[i] + s.flights.radii(0)[j] + 2 * displacement;
+          if ((s.flights[i].x - s.flights[j].x + s.system->box.shift(image)).norm() > reach) return;
+          const auto& packing = s.flights.packing();
+          EXPECT_TRUE(std::ranges::count(near, packing.pack(j, packing.linear(image))) == 1) << i << ' ' << j;
+          ++found;
+        });
+      }
+      EXPECT_GT(found, s.flights.size());
     }
-    EXPECT_GT(found, s.flights.size());
-  }
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ struct Notebook : Observer<D> {
     for (const auto& contact : all) {
       if (contact.key.kind == EventKind::pair) ++pairs;
       times.push_back(start + contact.key.time);
+      touched.push_back(contact);
     }
   }
   void progress(const Statistics& s) override { fraction = s.fraction_done; }
@@ -32,6 +33,7 @@ struct Notebook : Observer<D> {
   std::vector<std::vector<Vec<D>>> sampled;
   std::vector<double> frames, rows, pressure, times;
   std::vector<std::vector<Vec<D>>> x;
+  std::vector<Contact<D>> touched;
   std::uint64_t pairs = 0;
   double fraction = 0;
 };
@@ -50,6 +52,16 @@ TEST(Simulation, ShowsSlabEndsAtOrAfterTheirDueTimes) {
   EXPECT_DOUBLE_EQ(notes.rows[1], 0.12);
   EXPECT_DOUBLE_EQ(notes.rows.back(), 1.2);
   EXPECT_DOUBLE_EQ(notes.fraction, 1.0);
+}
+
+TEST(Simulation, TheLastStateIsShownOnceWhereItIsDue) {
+  auto run = test::make_run<2>(test::five_springs(), "cva",
+                               {.step = 0.25, .steps = 4, .frame_interval = 0.5, .thermo_interval = 0.25});
+  Notebook<2> notes;
+  run->add(notes);
+  run->run();
+  EXPECT_EQ(notes.frames, (std::vector<double>{0, 0.5, 1}));
+  EXPECT_EQ(notes.rows, (std::vector<double>{0, 0.25, 0.5, 0.75, 1}));
 }
 
 TEST(Simulation, FreeFlightIsShownExactlyAtTheDueTimes) {
@@ -107,7 +119,6 @@ TEST(Simulation, MeasuresTheMeanFreeFlight) {
   EXPECT_FALSE(none->statistics().mean_free_path);
 }
 
-/// Two discs that meet at 1, 3, 5 …, each time with a virial d·Δp of 3; 2K = 5. Frames in between change nothing.
 /// Two discs that fall one after the other, and meet once: |v| grows alike and evenly, to a mean of ½ + ½ g T.
 TEST(Simulation, TheMeanSpeedIsThatOfTheWholeSlab) {
   auto system = test::make_system<2>({100, 4}, Boundary::open, {{5, 2}, {2, 2}}, {{0, 0}, {1, 0}});
@@ -118,6 +129,7 @@ TEST(Simulation, TheMeanSpeedIsThatOfTheWholeSlab) {
   EXPECT_NEAR(*s.mean_free_path / *s.mean_free_time, 2.5, 1e-12);
 }
 
+/// Two discs that meet at 1, 3, 5 …, each time with a virial d·Δp of 3; 2K = 5. Frames in between change nothing.
 TEST(Simulation, ThePressureOfARowIsThatSinceTheRowBefore) {
   for (const double frames : {0.0, 0.8}) {
     auto run = test::make_run<2>(test::make_system<2>({8, 4}, Boundary::periodic, {{1, 1}, {5, 1}}, {{2, 0}, {-1, 0}}),
@@ -168,6 +180,15 @@ TEST(Simulation, FreeFlightEndsAtTheNthCollision) {
   EXPECT_DOUBLE_EQ(run->statistics().end_time, notes.times.back());
 }
 
+/// However far they have flown: two discs that meet every 4 between walls, in a box that is open elsewhere.
+TEST(Simulation, SpheresThatMeetAgainAndAgainHaveNotFlownApart) {
+  const auto run = test::make_run<2>(test::make_system<2>({6, 6}, Boundary::wall, {{2, 3}, {4, 3}}, {{1, 0}, {-1, 0}}),
+                                     "free-flight", {.step = 1000, .collisions = 25000});
+  run->system().box.boundary[1] = Boundary::open;
+  EXPECT_NO_THROW(run->run());
+  EXPECT_GT(run->statistics().end_time, 1e4 * 6);
+}
+
 TEST(Simulation, StopsWhenAsked) {
   auto run = test::make_run<2>(test::five_springs(), "cva", {.step = 0.01, .steps = 1000});
   int asked = 0;
@@ -188,6 +209,44 @@ TEST(Simulation, ReportsEveryContactInOrder) {
     EXPECT_EQ(notes.times.size(), counters.sphere_sphere + counters.sphere_wall) << method;
     EXPECT_TRUE(std::ranges::is_sorted(notes.times)) << method;
   }
+}
+
+TEST(Simulation, WallsAreTouchedWhereTheyStand) {
+  for (const char* method : {"free-flight", "psa", "cva", "mcva", "cdda", "edda"}) {
+    auto run = test::make_run<2>(test::make_system<2>({4, 7}, Boundary::wall, {{2, 3}}, {{1.3, 1.7}}), method,
+                                 {.step = 0.05, .steps = 300, .events = true});
+    Notebook<2> notes;
+    run->add(notes);
+    run->run();
+    std::array<int, 4> hits{};
+    for (const Contact<2>& contact : notes.touched) {
+      const int axis = wall_axis(contact.key.hi);
+      Vec<2> foot = contact.x_lo;
+      foot[axis] = contact.key.hi % 2 == 0 ? 0 : run->system().box.edges[axis];
+      EXPECT_EQ(contact.x_hi, foot) << method;
+      EXPECT_NEAR((contact.x_lo - foot).norm(), 0.5, 1e-12) << method;
+      ++hits[contact.key.hi];
+    }
+    EXPECT_GT(*std::ranges::min_element(hits), 1) << method;
+  }
+}
+
+/// A disc hits one that rests on the floor, which ends a piece of a step; high above another bounces from wall to wall.
+TEST(Simulation, ContactsInPiecesOfAStepHaveTheirTimes) {
+  auto system =
+      test::make_system<2>({6, 8}, Boundary::wall, {{3, 0.5}, {3.2, 1.8}, {3, 6}}, {{0, 0}, {0, -1}, {20, 0}});
+  test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0.0, -0.1}}});
+  auto run = test::make_run<2>(std::move(system), "edda", {.step = 0.5, .steps = 2, .events = true});
+  Notebook<2> notes;
+  run->add(notes);
+  run->run();
+  EXPECT_GT(run->statistics().counters.pieces, 2u);
+  std::size_t bounces = 0;
+  for (std::size_t k = 0; k < notes.times.size(); ++k)
+    if (notes.touched[k].key.lo == 2) {
+      EXPECT_NEAR(notes.times[k], 0.125 + 0.25 * static_cast<double>(bounces++), 1e-9);
+    }
+  EXPECT_EQ(bounces, 4u);
 }
 
 TEST(Simulation, ObservingChangesNoBit) {

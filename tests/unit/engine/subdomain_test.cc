@@ -116,6 +116,37 @@ TEST(Ownership, EverySphereHasOneOwnerWhichKnowsWhereItIsAGhost) {
   EXPECT_LT(ghosts, 280u);
 }
 
+TEST(Ownership, AGhostMeetsWhatIsAsNearAsBothCanCome) {
+  Divided d;
+  const Ownership<3>& here = d.parts[0]->ownership;
+  const double reach = d.bisection.reach(), end = 0.3;
+  std::size_t somewhere = 0, nowhere = 0;
+  for (Id id = 0; id < d.system->size(); ++id) {
+    const Record<3> r{d.system->particles.x[id], d.system->particles.v[id], 0.0, id, 0, 0};
+    const double way = r.v.norm() * end, away = std::sqrt(d.bisection.squared_distance(0, r.x));
+    Vec<3> low, high;
+    const bool meets = here.meeting_place(r, end, low, high);
+    EXPECT_EQ(meets, away <= reach - kDisplacement + way) << id;
+    ++(meets ? somewhere : nowhere);
+    for (const Vec<3>& place : d.system->particles.x) {  // of those that may meet it
+      Vec<3> x = place - r.x;
+      x = r.x + x + d.system->box.shift(d.system->box.nearest_image(x));
+      const double from_here = std::sqrt(d.bisection.squared_distance(0, place));
+      if (!meets || (x - r.x).norm() > reach + way || from_here > 3 * kDisplacement) continue;
+      EXPECT_TRUE((low.array() <= x.array()).all() && (x.array() <= high.array()).all()) << id;
+    }
+    const Slot j = here.own()[0];
+    const Record<3>& other = d.parts[0]->core.flights()[j];
+    for (const double part : {1 - 1e-9, 1 + 1e-9}) {
+      Record<3> ghost = r;
+      ghost.x = other.x + (end - other.t) * other.v + part * (reach + way) * Vec<3>(0.6, 0, 0.8);
+      EXPECT_EQ(here.may_meet(ghost, j, Vec<3>::Zero(), end), part < 1) << id;
+    }
+  }
+  EXPECT_GT(somewhere, 50u);
+  EXPECT_GT(nowhere, 0u);
+}
+
 TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
   Divided d;
   d.run();

@@ -232,6 +232,20 @@ TEST_F(DeckTest, PackingFractionAndTemperatureAreMet) {
   EXPECT_NE(build_system<3>(other)->particles.v, system->particles.v);
 }
 
+TEST_F(DeckTest, VelocitiesOfGivenPositionsAreDrawnWithSeed1) {
+  const auto velocities = [&](const std::vector<std::string>& placement) {
+    std::vector<std::string> set{"particles.1.position=[[8, 5], [7, 7]]", "particles.1.temperature=1"};
+    set.insert(set.end(), placement.begin(), placement.end());
+    Deck deck = read(springs, set);
+    return build_system<2>(deck)->particles.v;
+  };
+  const auto without = velocities({});
+  EXPECT_GT(without[3].norm(), 0);
+  EXPECT_EQ(without, velocities({"placement.type=random"}));
+  EXPECT_EQ(without, velocities({"placement.type=random", "placement.seed=1"}));
+  EXPECT_NE(without, velocities({"placement.type=random", "placement.seed=2"}));
+}
+
 TEST_F(DeckTest, EpochIsAboutFortyMeanFreeTimes) {
   // Equal spheres of diameter and temperature 1 at packing fraction 0.3: Enskog's rate is 10.1 collisions a unit time.
   Deck deck = read(fluid, {"particles.0.radius=0.5", "particles.1.mass=1.0", "particles.0.temperature=1",

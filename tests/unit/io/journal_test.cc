@@ -92,6 +92,20 @@ TEST(Journal, BlocksThatDoNotFitAreNotReplayed) {
   EXPECT_FALSE(with(100, hdf5::kJournalHead + 8));
 }
 
+TEST(Journal, AReplayedFileHasItsBlocksAndItsSize) {
+  const fs::path path = test::fresh_directory() / "a.h5", beside = path.string() + ".journal";
+  std::ofstream(path, std::ios::binary) << std::string(kSize + 300, 'x');  // some behind its end
+  hdf5::Blocks blocks;
+  blocks.put(kSize - 10, Bytes(10, std::byte{'y'}));
+  const Bytes journal = blocks.journal(kSize, {});
+  std::ofstream(beside, std::ios::binary).write(reinterpret_cast<const char*>(journal.data()), std::ssize(journal));
+  hdf5::replay_journal(path);
+  std::ifstream in(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_EQ(bytes, std::string(kSize - 10, 'x') + std::string(10, 'y'));
+  EXPECT_FALSE(fs::exists(beside));
+}
+
 // A file that is opened again: cut, appended to, and left in the middle of a flush, is made whole by the next to open
 // it.
 TEST(Journal, AFileOpenedAgainIsWholeAfterEveryFlush) {
@@ -114,6 +128,7 @@ TEST(Journal, AFileOpenedAgainIsWholeAfterEveryFlush) {
       series.append(std::vector<double>(100, row + 1000 * times));
       if (row % 7 != 0) continue;
       file.flush();
+      EXPECT_EQ(std::ifstream(path.string() + ".journal", std::ios::binary).get(), 0);  // a flush has ended
       fs::copy_file(path, copy, fs::copy_options::overwrite_existing);
       const hdf5::File seen = hdf5::File::open(copy);
       EXPECT_EQ(hdf5::shape(seen, "/g/x").at(0), static_cast<hsize_t>(row + 1));
