@@ -10,8 +10,8 @@ largest difference of a coordinate from --reference at a fifth of the smallest s
 --counts: time and force passes of a step against the number of particles of the deck's only species, at the largest of
 --steps. Times are the processor's, of the run's loop with its measuring: at most what the clock says of the loop and what the
 system says of the command, so the lesser of both is taken, and the least of --repeats runs one after the other (of fewer where
-they take long), with bars up to the largest of them. The table goes to the terminal and, with the figure, to the output directory; runs that fail are reported and
-left out.
+they take long), with bars up to the largest of them. The table goes to the terminal and, with the figure, to the output
+directory; runs that fail are reported and left out.
 """
 
 import pathlib

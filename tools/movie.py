@@ -52,7 +52,7 @@ class Scene:
         self.colour = plt.get_cmap("tab10")(species % 10)
         self.low, self.high = self._window()
         size = 6.0 * (self.high - self.low) / max(self.high - self.low)
-        self.figure, self.axes = plt.subplots(figsize=np.maximum(size, 3.0) + [0.6, 1.2], layout="constrained")
+        self.figure, self.axes = plt.subplots(figsize=np.maximum(size, 3.0) + [0.6, 1.2])
         self.discs = None
 
     def _window(self):
@@ -85,7 +85,7 @@ class Scene:
         self.discs = self.axes.add_collection(EllipseCollection(
             diameter, diameter, np.zeros(len(index)), units="xy", offsets=centres, transOffset=self.axes.transData,
             facecolors=colour[order][index], edgecolors="black", linewidths=0.5))
-        self.axes.set_title(f"{self.trajectory.title}\nt = {self.trajectory.time[frame]:.4g} [time]".strip(), fontsize=10, wrap=True)
+        self.axes.set_title(f"{self.trajectory.title}\nt = {self.trajectory.time[frame]:.4g} [time]".strip(), fontsize=10)
         return [self.discs]
 
     def _draw_box(self):
@@ -97,7 +97,9 @@ class Scene:
         for axis in (self.axes.xaxis, self.axes.yaxis):
             axis.set_major_formatter("{x:.4g}")
         self.axes.set_frame_on(False)
+        self.axes.set_title("title\ntime", fontsize=10)
         caption(self.figure, 80)
+        self.figure.tight_layout()  # once: frames must not move
         style = [LINE[self.trajectory.boundary[axis]] for axis in self.plane]
         for end in (0.0, 1.0):
             self.axes.plot(np.full(2, end * self.edges[0]), [0, self.edges[1]], style[0], color="black", linewidth=1.5)

@@ -154,7 +154,8 @@ void Session<D>::set_integrator(std::string_view name, Parameters given) {
 template <int D>
 bool Session<D>::reached(const Plan& plan) const {
   const Statistics& s = statistics_;
-  return (plan.steps && state_steps_ >= *plan.steps) || (plan.end_time && s.end_time >= *plan.end_time - 1e-9 * step_) ||
+  return (plan.steps && state_steps_ >= *plan.steps) ||
+         (plan.end_time && s.end_time >= *plan.end_time - 1e-9 * step_) ||
          (plan.collisions && s.counters.sphere_sphere >= *plan.collisions);
 }
 

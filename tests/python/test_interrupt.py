@@ -28,7 +28,8 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.parametrize("make, ahead, more", [
-    ("five_springs()", 1.005, ""), ("gas()", 10.0, ""), ("gas(4096, step=1000)", 10.0, ""), ("five_springs()", 1.0, ", every=0.05, callback=lambda s: s.energy")])
+    ("five_springs()", 1.005, ""), ("gas()", 10.0, ""), ("gas(4096, step=1000)", 10.0, ""),
+    ("five_springs()", 1.0, ", every=0.05, callback=lambda s: s.energy")])
 def test_ctrl_c_ends_the_step_and_the_run_goes_on(make, ahead, more):
     import pathlib
     script = SCRIPT.format(here=str(pathlib.Path(__file__).parent), make=make, more=more, ahead=ahead)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import carom
-from scenes import ROOT, five_springs, gas
+from scenes import ROOT, five_springs
 
 NAN = float("nan")
 HERE = [[2.0, 3.0]]
