@@ -34,20 +34,24 @@ class RunFailed(Exception):
 
 
 def one_line(main):
-    """A main() that what goes wrong with a file ends with one line that names the file, and exit code 1."""
+    """A main() that what goes wrong with a file, or a run of the command, ends with one line that names it, and exit code 1."""
     @functools.wraps(main)
     def ending(*arguments):
         try:
             return main(*arguments)
-        except Error as error:
+        except (Error, RunFailed) as error:
             raise SystemExit(str(error)) from error
+        except OSError as error:
+            raise SystemExit(f"{error.filename}: {error.strerror}") from error
     return ending
 
 
 def find_carom(given=None):
     """The carom command: the one given, $CAROM, the build of tools/run, or what is on the PATH."""
-    if given or os.environ.get("CAROM"):
-        return pathlib.Path(given or os.environ["CAROM"]).resolve()
+    if given := given or os.environ.get("CAROM"):
+        if not pathlib.Path(given).exists():
+            raise SystemExit(f"{given}: there is no such command.")
+        return pathlib.Path(given).resolve()
     built = pathlib.Path(__file__).resolve().parent.parent / "build" / "release" / "io" / "carom"
     if built.exists():
         return built

@@ -16,6 +16,14 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 
+def caption(figure, columns):
+    """The command that draws the figure, below it, in so many columns of text."""
+    words = [f"tools/{pathlib.Path(sys.argv[0]).name}", *sys.argv[1:]]
+    # Where it goes is not what it shows.
+    command = shlex.join(word for before, word in zip(["", *words], words) if not {before, word} & {"-o", "--output"})
+    figure.supxlabel(textwrap.fill(command, columns), fontsize=6, family="monospace", color="grey")
+
+
 @contextlib.contextmanager
 def panels(file, *labels):
     """Axes side by side, one for each dictionary of labels; written at the end, with a legend where anything has a label,
@@ -27,12 +35,12 @@ def panels(file, *labels):
         axes.grid(True, alpha=0.3)
         if axes.get_legend_handles_labels()[0]:
             axes.legend()
-    words = [f"tools/{pathlib.Path(sys.argv[0]).name}", *sys.argv[1:]]
-    # Where it goes is not what it shows.
-    command = shlex.join(word for before, word in zip(["", *words], words) if not {before, word} & {"-o", "--output"})
-    figure.supxlabel(textwrap.fill(command, 110 * len(labels)), fontsize=6, family="monospace", color="grey")
+    caption(figure, 110 * len(labels))
     figure.tight_layout()
-    figure.savefig(file, dpi=150 / len(labels))
+    try:
+        figure.savefig(file, dpi=150 / len(labels))
+    except ValueError as error:  # a format that is not known
+        raise SystemExit(f"{file}: {error}") from error
     plt.close(figure)
 
 

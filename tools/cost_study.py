@@ -10,8 +10,8 @@ largest difference of a coordinate from --reference at a fifth of the smallest s
 --counts: time and force passes of a step against the number of particles of the deck's only species, at the largest of
 --steps. Times are the processor's, of the run's loop with its measuring: at most what the clock says of the loop and what the
 system says of the command, so the lesser of both is taken, and the least of --repeats runs one after the other (of fewer where
-they take long). The table goes to the terminal and, with the figure, to the output directory; runs that fail are reported and
-left out.
+they take long), with bars up to the largest of them. The table goes to the terminal and, with the figure, to the output
+directory; runs that fail are reported and left out.
 """
 
 import pathlib
@@ -25,7 +25,7 @@ from carom_plot import panels
 from studies import (parse, processor_seconds, read_deck, relative_error, run_deck, study_parser, variant, with_markers,
                      write_table)
 
-COLUMNS = ["method", "particles", "step", "steps", "collisions", "passes_per_step", "seconds", "seconds_per_step",
+COLUMNS = ["method", "particles", "step", "steps", "collisions", "passes_per_step", "seconds", "seconds_most", "seconds_per_step",
            "energy_error", "position_error"]
 LONG = 20.0  # [s] what has taken so much is not repeated
 
@@ -64,7 +64,7 @@ def measure(options, deck, method, step, exact=None, overrides=()):
         print(f"{method}, step {step:g}: {failure}", file=sys.stderr)
         return None
     row = {"method": method, "particles": summary["particles"], "step": step, "steps": summary["steps"],
-           "collisions": summary["events"]["sphere_sphere"], "seconds": min(times),
+           "collisions": summary["events"]["sphere_sphere"], "seconds": min(times), "seconds_most": max(times),
            "passes_per_step": summary["force_passes"] / summary["steps"], "seconds_per_step": min(times) / summary["steps"],
            "energy_error": relative_error(summary),
            "position_error": np.nan if exact is None else np.abs(positions - exact).max()}
@@ -78,7 +78,12 @@ def draw(rows, x, columns, labels, file):
         for axes, column in zip(row, columns):
             for method, marker in with_markers(list(dict.fromkeys(entry["method"] for entry in rows))):
                 mine = [entry for entry in rows if entry["method"] == method]
-                axes.loglog([entry[x] for entry in mine], [entry[column] for entry in mine], marker=marker, label=method)
+                # Of each number that is a time: how far above it the slowest run was.
+                late = {"seconds": [[0 for _ in mine], [entry["seconds_most"] - entry["seconds"] for entry in mine]]}
+                late["seconds_per_step"] = late["seconds"] / np.array([entry["steps"] for entry in mine])
+                axes.errorbar([entry[x] for entry in mine], [entry[column] for entry in mine], late.get(column), late.get(x),
+                              marker=marker, capsize=2, label=method)
+                axes.set(xscale="log", yscale="log")
 
 
 @one_line
@@ -98,17 +103,17 @@ def main(arguments=None):
     name = "cost" if options.counts else "work"
     table, figure = options.output / f"{name}.csv", options.output / f"{name}.png"
     write_table(table, COLUMNS, rows)
-    what = [*options.set, f"step {steps[0]:g}" if options.counts else f"to t = {options.end_time:g}"]
-    title = f"{deck.get('title', options.deck.stem)}\n{', '.join(what)}"
+    what = [f"cost of a step of {steps[0]:g} against size" if options.counts else f"error against cost, to t = {options.end_time:g}"]
+    title = f"{deck.get('title', options.deck.stem)}\n{', '.join(what + options.set)}"
     if options.counts:
         draw(rows, "particles", ["passes_per_step", "seconds_per_step"],
-             [{"title": title, "xlabel": "particles", "ylabel": what} for what in ("force passes a step", "seconds a step")],
+             [{"title": title, "xlabel": "particles", "ylabel": what} for what in ("force passes a step", "processor time a step [s]")],
              figure)
     else:
         errors = {"energy_error": r"largest $|H - H_1|$ / $E_{\mathrm{ref}}$"}
         if known:
-            errors["position_error"] = "largest error of a coordinate"
-        labels = [{"title": title, "xlabel": "seconds", "ylabel": what} for what in errors.values()]
+            errors["position_error"] = "largest error of a coordinate [length]"
+        labels = [{"title": title, "xlabel": "processor time [s]", "ylabel": what} for what in errors.values()]
         draw(rows, "seconds", list(errors), labels, figure)
     print(f"Results: {table}, {figure}")
 

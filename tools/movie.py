@@ -6,7 +6,7 @@
     tools/movie.py runs/bound-cluster-3d --along y
 
 Writes a GIF, or an MP4 where the name ends so and ffmpeg is installed. Walls are drawn solid, periodic edges dashed, open
-ones dotted; a disc that reaches over a periodic edge is drawn on both sides. Spheres farther away are paler.
+ones dotted, with their lengths at the axes; a disc that reaches over a periodic edge is drawn on both sides. Spheres farther away are paler.
 """
 
 import argparse
@@ -21,6 +21,7 @@ from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.collections import EllipseCollection
 
 from carom_files import Trajectory, one_line
+from carom_plot import caption
 
 LINE = {"wall": "-", "periodic": "--", "open": ":"}
 
@@ -51,7 +52,7 @@ class Scene:
         self.colour = plt.get_cmap("tab10")(species % 10)
         self.low, self.high = self._window()
         size = 6.0 * (self.high - self.low) / max(self.high - self.low)
-        self.figure, self.axes = plt.subplots(figsize=np.maximum(size, 1.5) + [0, 0.3])
+        self.figure, self.axes = plt.subplots(figsize=np.maximum(size, 3.0) + [0.6, 1.2])
         self.discs = None
 
     def _window(self):
@@ -84,14 +85,21 @@ class Scene:
         self.discs = self.axes.add_collection(EllipseCollection(
             diameter, diameter, np.zeros(len(index)), units="xy", offsets=centres, transOffset=self.axes.transData,
             facecolors=colour[order][index], edgecolors="black", linewidths=0.5))
-        self.axes.set_title(f"t = {self.trajectory.time[frame]:.4g}", fontsize=10)
+        self.axes.set_title(f"{self.trajectory.title}\nt = {self.trajectory.time[frame]:.4g} [time]".strip(), fontsize=10)
         return [self.discs]
 
     def _draw_box(self):
         margin = 0.01 * max(self.high - self.low)
         self.axes.set(xlim=(self.low[0] - margin, self.high[0] + margin),
-                      ylim=(self.low[1] - margin, self.high[1] + margin), xticks=[], yticks=[], aspect="equal")
+                      ylim=(self.low[1] - margin, self.high[1] + margin), aspect="equal",
+                      xticks=[0, self.edges[0]], xlabel=f"{'xyz'[self.plane[0]]} [length]",
+                      yticks=[0, self.edges[1]], ylabel=f"{'xyz'[self.plane[1]]} [length]")
+        for axis in (self.axes.xaxis, self.axes.yaxis):
+            axis.set_major_formatter("{x:.4g}")
         self.axes.set_frame_on(False)
+        self.axes.set_title("title\ntime", fontsize=10)
+        caption(self.figure, 80)
+        self.figure.tight_layout()  # once: frames must not move
         style = [LINE[self.trajectory.boundary[axis]] for axis in self.plane]
         for end in (0.0, 1.0):
             self.axes.plot(np.full(2, end * self.edges[0]), [0, self.edges[1]], style[0], color="black", linewidth=1.5)
@@ -111,6 +119,8 @@ def main(arguments=None):
         parser.error("--every must be at least 1")
     folder = options.run if options.run.is_dir() else options.run.parent
     file = options.output or folder / "movie.gif"
+    if file.suffix not in (".gif", ".mp4"):
+        parser.error(f"{file}: give a name that ends with .gif or .mp4")
     writer = FFMpegWriter if file.suffix == ".mp4" else PillowWriter
     if not writer.isAvailable():
         parser.error("an MP4 needs ffmpeg (apt-get install ffmpeg); a GIF doesn't")

@@ -31,12 +31,13 @@ def energy_errors(directory, relative=False):
 def draw(directories, relative, logarithmic, file):
     size, what = (np.abs, "$|H - H_1|$") if logarithmic else (np.asarray, "$H - H_1$")
     unit = r" / $E_{\mathrm{ref}}$" if relative else " [energy]"
-    with picture(file, xlabel="t [time]", ylabel=what + unit, title="Energy error", yscale="log" if logarithmic else "linear") as axes:
+    with picture(file, xlabel="t [time]", ylabel=what + unit, title="Energy error over time", yscale="log" if logarithmic else "linear") as axes:
         for directory in directories:
             time, error, shadow_error = energy_errors(directory, relative)
-            (line,) = axes.plot(time, size(error), label=pathlib.Path(directory).name)
+            name = pathlib.Path(directory).name
+            (line,) = axes.plot(time, size(error), label=name)
             if shadow_error is not None:
-                axes.plot(time, size(shadow_error), "--", color=line.get_color(), alpha=0.7)
+                axes.plot(time, size(shadow_error), "--", color=line.get_color(), alpha=0.7, label=f"{name}, of $S_h$")
 
 
 @one_line

@@ -7,8 +7,9 @@
 
 Periodic axes use the nearest image, so r ends at half the shortest periodic edge. Along walls the count expected of an
 ideal gas is the exact one of the region the centres can reach (the average over directions u of the product over the
-walled axes of 1 - r |u_k| / L_k), so that g = 1 without correlations up to the walls (for unequal radii: nearly). A CSV
-with r, g stands beside the picture, rdf-frames.csv by default. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
+walled axes of 1 - r |u_k| / L_k), so that g = 1 without correlations up to the walls (for unequal radii: nearly). The band
+is one standard error, from four parts of the run, each averaged alone; the run's own rdf.csv, which has no parts, is drawn without.
+A CSV with r, g, error stands beside the picture, rdf-frames.csv by default. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
 """
 
 import argparse
@@ -19,6 +20,8 @@ from scipy.spatial import cKDTree
 
 from carom_files import Trajectory, one_line, read_table, reading
 from carom_plot import picture
+
+BLOCKS = 4  # parts of the run, for the error
 
 
 def directions(dimension):
@@ -52,7 +55,7 @@ def pair_counts(a, b, radii, edges, periodic):
 
 
 def radial_distribution(trajectory, bins=150, largest=None, species=None, first_frame=0):
-    """Middles of the shells, and g there, averaged over the frames from first_frame on."""
+    """Middles of the shells, g there, averaged over the frames from first_frame on, and its standard error."""
     if "open" in trajectory.boundary:
         raise SystemExit("g(r) needs a density: there is none in a box with an open boundary.")
     if unknown := set(species or []) - set(trajectory.species_names):
@@ -69,13 +72,21 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
         raise SystemExit("r can't go beyond half the shortest periodic edge.")
     radii = np.linspace(0, largest, bins + 1)
     frames = range(first_frame, len(trajectory))
-    counts = sum(pair_counts(*(_into(trajectory.position(frame)[ids] - margin, edges, trajectory.periodic)
-                               for ids in chosen), radii, edges, trajectory.periodic) for frame in frames)
+    counts = np.array([pair_counts(*(_into(trajectory.position(frame)[ids] - margin, edges, trajectory.periodic)
+                                     for ids in chosen), radii, edges, trajectory.periodic) for frame in frames])
     pairs = len(chosen[0]) * len(chosen[1]) - len(np.intersect1d(*chosen))
     if pairs == 0:
         raise SystemExit("g(r) needs two particles.")
-    expected = len(frames) * pairs * ideal_fraction(radii, edges, trajectory.periodic)
-    return 0.5 * (radii[1:] + radii[:-1]), counts / expected
+    g = counts / (pairs * ideal_fraction(radii, edges, trajectory.periodic))
+    return 0.5 * (radii[1:] + radii[:-1]), g.mean(axis=0), error_of_blocks(g)
+
+
+def error_of_blocks(g):
+    """The standard error of the mean over frames, from parts of the run; NaN of fewer frames than these."""
+    if len(g) < BLOCKS:
+        return np.full(g.shape[1], np.nan)
+    means = [block.mean(axis=0) for block in np.array_split(g, BLOCKS)]
+    return np.std(means, axis=0, ddof=1) / np.sqrt(BLOCKS)
 
 
 def curves_of_table(file, species=None):
@@ -119,20 +130,21 @@ def main(arguments=None):
     with Trajectory(options.run) as trajectory:
         if options.first_frame >= len(trajectory):
             parser.error(f"there are {len(trajectory)} frames")
-        r, g = radial_distribution(trajectory, options.bins, options.largest, species, options.first_frame)
+        r, g, error = radial_distribution(trajectory, options.bins, options.largest, species, options.first_frame)
         title = trajectory.title
     folder = options.run if options.run.is_dir() else options.run.parent
     file = options.output or folder / "rdf.png"
     table = file.with_name(file.stem + "-frames.csv")
-    np.savetxt(table, np.stack([r, g], axis=1), delimiter=",", header="r,g", comments="")
-    draw(file, r, {"g": g}, title)
+    np.savetxt(table, np.stack([r, g, error], axis=1), delimiter=",", header="r,g,error", comments="")
+    draw(file, r, {"g": g}, title, error)
     print(f"Results: {table}, {file}")
 
 
-def draw(file, r, curves, title=""):
-    with picture(file, xlabel="r [length]", ylabel="g(r)", title=title or "Radial distribution function") as axes:
+def draw(file, r, curves, title="", error=np.nan):
+    with picture(file, xlabel="r [length]", ylabel="g(r)", title=f"{title}\nradial distribution function".strip()) as axes:
         for name, g in curves.items():
             axes.plot(r, g, label=name if len(curves) > 1 else None)
+            axes.fill_between(r, g - error, g + error, alpha=0.3)
         axes.axhline(1, color="grey", linewidth=0.8)
 
 

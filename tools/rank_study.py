@@ -10,7 +10,8 @@ start at random places (--placement): cut between the layers of a crystal, ranks
 
 Fitted to the runs with ranks that have neighbours on all sides, with s = (spheres a rank)^(-1/D):
 events run twice (1 + h s)^D - 1, a shell around a cube; events redone r s, a surface; rounds a window a + b log2(spheres
-at all borders), a chain of repairs that gets longer by one with a probability.
+at all borders), a chain of repairs that gets longer by one with a probability. In the picture runs with fewer ranks, which
+are not in the fit, are hollow; bars are standard errors of the counts, were events independent.
 
 Modelled from that: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a rank.
 The work is its collisions by --rate. The imbalance is that of independent events, sqrt(2 ln P / events), times
@@ -141,14 +142,24 @@ def modelled(fitted, options, ranks, per_rank):
             "imbalance": imbalance, "messages": messages, "efficiency": 1 / (1 + twice + redone + imbalance + messages)}
 
 
+def counting_error(row, name):
+    """The standard error of a share of the events, were they independent."""
+    return np.sqrt(row[name] / (row["events"] * row["windows"] * row["ranks"]))
+
+
 def draw(rows, fitted, options, title, file):
     sizes = np.geomspace(min(row["per_rank"] for row in rows), 1e6)
-    with panels(file, {"title": title, "xlabel": "spheres a rank", "ylabel": "share of the events (points: measured)"},
-                {"title": "model", "xlabel": "spheres a rank", "ylabel": "efficiency", "xscale": "log"}) as (left, right):
+    with panels(file, {"title": f"{title}\nevents at borders: measured, and the fit", "xlabel": "spheres a rank",
+                       "ylabel": "share of the events", "xscale": "log", "yscale": "log"},
+                {"title": f"{title}\nefficiency, modelled", "xlabel": "spheres a rank", "ylabel": "efficiency",
+                 "xscale": "log"}) as (left, right):
         curves = [modelled(fitted, options, options.ranks[-1], size) for size in sizes]
-        for name, colour in (("twice", "C0"), ("redone", "C1")):
-            left.loglog([row["per_rank"] for row in rows], [row[name] for row in rows], "o", color=colour)
-            left.loglog(sizes, [row[name] for row in curves], color=colour, label=name)
+        for name, colour, label in (("twice", "C0", "run twice"), ("redone", "C1", "redone")):
+            for row in rows:
+                full = row["ranks"] >= 2 ** fitted["dimension"]
+                left.errorbar(row["per_rank"], row[name], counting_error(row, name), fmt="o", capsize=2, color=colour,
+                              fillstyle="full" if full else "none")
+            left.plot(sizes, [row[name] for row in curves], color=colour, label=label)
         for ranks in (64, 1000, 10000):
             curves = [modelled(fitted, options, ranks, size) for size in sizes]
             right.plot(sizes, [row["efficiency"] for row in curves], label=f"{ranks} ranks")

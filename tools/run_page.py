@@ -22,6 +22,8 @@ import subprocess
 import sys
 import tempfile
 
+from carom_files import one_line
+
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"^```(sh|python|toml|text)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -48,6 +50,7 @@ def run(kind, code, folder):
     return done.stdout
 
 
+@one_line
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("page", type=pathlib.Path)

@@ -12,7 +12,7 @@ import pathlib
 import resource
 import tomllib
 
-from carom_files import RunFailed, find_carom, run_carom, toml_text
+from carom_files import RunFailed, find_carom, reading, run_carom, toml_text
 
 
 def study_parser(description, methods):
@@ -41,7 +41,12 @@ def parse(parser, arguments, study):
 
 
 def read_deck(options):
-    return tomllib.loads(options.deck.read_text())
+    with reading(options.deck):
+        text = options.deck.read_text()
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SystemExit(f"{options.deck}: is not a deck: {error}") from error
 
 
 def integrator_table(method, step):

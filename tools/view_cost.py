@@ -17,7 +17,7 @@ import tempfile
 import time
 import urllib.request
 
-from carom_files import find_carom
+from carom_files import find_carom, one_line
 from view_picture import chromium, wait_for
 
 DECK = pathlib.Path(__file__).resolve().parent.parent / "inputs" / "hard-sphere-fluid.toml"
@@ -101,6 +101,7 @@ def memory_of_a_page(carom, folder, n, minutes):
             print(f"{count} spheres: {browser.execute_script(DRAW, count):.1f} frames a second", flush=True)
 
 
+@one_line
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=int, default=3)

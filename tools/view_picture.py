@@ -18,7 +18,7 @@ import time
 
 from PIL import Image
 
-from carom_files import find_carom
+from carom_files import find_carom, one_line
 
 
 @contextlib.contextmanager
@@ -48,6 +48,7 @@ def wait_for(browser, condition, seconds=60):
     return value
 
 
+@one_line
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", nargs="*", help="directories of runs")

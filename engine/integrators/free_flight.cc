@@ -10,6 +10,7 @@
 #include "engine/events/event_core.h"
 #include "engine/integrators/registry.h"
 #include "engine/ranks/windowed_flight.h"
+#include "engine/setup/epoch.h"
 
 namespace carom::integrator {
 namespace {
@@ -21,6 +22,7 @@ class FreeFlight : public Integrator<D> {
       : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
 
   void start(System<D>& system, Counters&) override {
+    between_looks_ = kCollisionsBetweenLooks / (20 * static_cast<double>(system.size())) * default_epoch(system);
     ranks_ = &system.decomposition.ranks();
     if (ranks_->size() > 1)
       windowed_.emplace(system.box, system.decomposition.sizes(), *ranks_);
@@ -48,6 +50,8 @@ class FreeFlight : public Integrator<D> {
       run_epoch(*core_, system, slab, report);
   }
 
+  double paused_at() const override { return instants_.now; }
+
  private:
   /// About as many collisions are run between looks at SlabReport::pause.
   static constexpr double kCollisionsBetweenLooks = 5e5;
@@ -59,17 +63,16 @@ class FreeFlight : public Integrator<D> {
                                                max_events_ * system.size()};
     begin(flight, system, slab, report.counters);
     at_limit_ = report.counters.sphere_sphere >= slab.collision_limit;
-    const double looks = std::max(1.0, 20.0 * static_cast<double>(system.size()) / kCollisionsBetweenLooks);
-    // Flies to `end`, or as far as it comes; false: not to its end.
+    // Flies to `end`, or as far as it comes; false: not to its end, or paused there.
     const auto run = [&](double end) {
       const Stopwatch watch(report.counters.seconds.queue);
       while (!at_limit_ && !report.paused && instants_.now < end) {
-        const double next = report.pause ? std::min(end, instants_.now + slab.length / looks) : end;
+        const double next = report.pause ? std::min(end, instants_.now + between_looks_) : end;
         instants_.now = flight.run(next, events);
         at_limit_ = instants_.now < next;
         if (report.pause && instants_.now < slab.length) report.paused = at_limit_ || report.pause();
       }
-      return instants_.now == end;
+      return instants_.now == end && !report.paused;
     };
     const Box<D> start = system.box;
     const auto end_at = [&](double time) {
@@ -142,6 +145,7 @@ class FreeFlight : public Integrator<D> {
   }
 
   std::uint64_t max_events_;
+  double between_looks_ = 0;  // [time]
   Vec<D> g_ = Vec<D>::Zero();
   Communicator* ranks_ = nullptr;
   std::optional<EventCore<D>> core_;  // one of the two

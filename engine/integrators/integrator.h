@@ -53,6 +53,9 @@ class Integrator {
   /// Throws Error(Failure::numerical) with the particles' names where a step cannot be done.
   virtual void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) = 0;
 
+  /// How far it has come in a slab that is paused [time].
+  virtual double paused_at() const { return 0; }
+
   /// The state at which energies are to be measured, where this is not the system itself (mcva, variant restart).
   virtual const Particles<D>* energy_state() const { return nullptr; }
 

@@ -159,6 +159,11 @@ class Simulation {
   /// In should_stop(): whether a run with a later end would go on from here as this one has come here, and no longer
   /// after the next slab, which meets the end, or after the end.
   bool is_last_on_the_way() const;
+  /// In should_stop(): whether an epoch of free flight is paused, and the simulated time of the state.
+  bool paused() const { return paused_; }
+  double time() const { return time_of(statistics_.steps) + (paused_ ? integrator_->paused_at() : 0); }
+  /// Where one is paused: the run ends at that time, as though the plan said so, with all particles at it.
+  void end_here() { plan_.end_time = time(); }
 
   const Statistics& statistics() const { return statistics_; }
   const System<D>& system() const { return *system_; }

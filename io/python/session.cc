@@ -154,7 +154,8 @@ void Session<D>::set_integrator(std::string_view name, Parameters given) {
 template <int D>
 bool Session<D>::reached(const Plan& plan) const {
   const Statistics& s = statistics_;
-  return (plan.steps && s.steps >= *plan.steps) || (plan.end_time && s.end_time >= *plan.end_time - 1e-9 * step_) ||
+  return (plan.steps && state_steps_ >= *plan.steps) ||
+         (plan.end_time && s.end_time >= *plan.end_time - 1e-9 * step_) ||
          (plan.collisions && s.counters.sphere_sphere >= *plan.collisions);
 }
 
@@ -191,8 +192,6 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   if (begun && reached(plan))
     refuse("the run is at time " + short_text(statistics_.end_time) + ", step " + std::to_string(statistics_.steps) +
            " already; give a later end, or change something to start anew");
-  if (begun && state_.empty())
-    refuse("a run that a number of collisions has ended within an epoch cannot go on; give a time instead");
   terms_.complete(*system_);
   Parameters parameters = parameters_;
   if (!begun) step_ = parameters.has("step") ? parameters.real("step") : default_epoch(*system_);
@@ -211,14 +210,20 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   running_ = true;
   std::map<std::string, Bytes> state;
   typename Simulation<D>::Hooks inner;
+  bool ending = false;  // within an epoch, at the time of the state
+  inner.pause = inner.leave = inner.leave_here = [&] { return !ending && hooks.stop && hooks.stop(run.statistics()); };
   inner.should_stop = [&] {
+    if (ending) return false;
     const bool stop = hooks.stop && hooks.stop(run.statistics());
     if (stop || run.is_last_on_the_way()) {
       state.clear();
       save_state(*at_work_, into(state));
-      state_time_ = run.statistics().end_time;
+      state_time_ = run.time();
+      state_steps_ = run.statistics().steps;
     }
-    return stop;
+    ending = stop && run.paused();
+    if (ending) run.end_here();
+    return stop && !ending;
   };
   if (begun)
     inner.restore = [&] {
@@ -227,7 +232,9 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     };
   const auto end = [&] {
     statistics_ = *std::exchange(live_, nullptr);
-    shown_until_ = std::max(shown_until_, statistics_.end_time);
+    // What is due at the very time of a paused epoch is shown when the run goes on.
+    const double until = statistics_.end_time;
+    shown_until_ = std::max(shown_until_, ending ? std::nextafter(until, 0.0) : until);
     rest(at_work_->particles);
   };
   try {

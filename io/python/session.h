@@ -95,6 +95,7 @@ class Session {
   Statistics statistics_;               // of the last run
   const Statistics* live_ = nullptr;    // of the one that is going on
   std::map<std::string, Bytes> state_;  // to go on from
+  std::int64_t state_steps_ = 0;
   double state_time_ = 0, interval_ = 0, step_ = 0;
   double shown_until_ = -1;
 };

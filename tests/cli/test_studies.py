@@ -48,6 +48,17 @@ def rows_of(study, table, directory, deck, *options):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.parametrize("study", [energy_study, cost_study, rank_study])
+def test_a_deck_or_a_command_that_is_not_there_is_one_line(tmp_path, study):
+    (tmp_path / "text.toml").write_text("no deck")
+    sound, here = str(ROOT / "inputs" / "five-springs.toml"), ["-o", str(tmp_path / "out")]
+    for arguments, told in (([str(tmp_path / "nowhere.toml")], "nowhere.toml: No such file or directory"),
+                            ([str(tmp_path / "text.toml")], "text.toml: is not a deck"),
+                            ([sound, "--carom", "/nowhere/carom"], "/nowhere/carom: there is no such command")):
+        with pytest.raises(SystemExit, match=f"^[^\n]*{told}[^\n]*$"):
+            study.main([*arguments, *([] if study is rank_study else ["--steps", "0.1"]), *here])
+
+
 @needs_carom
 def test_energy_study(tmp_path, capsys):
     rows = rows_of(energy_study, "energy", tmp_path, "five-springs", "--methods", "psa,cva,cdda",

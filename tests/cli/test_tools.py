@@ -6,6 +6,7 @@ import sys
 import tomllib
 
 import h5py
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -191,6 +192,42 @@ def test_a_locked_file_is_one_line(tmp_path):
                 assert info.returncode == 5 and "a process is writing this file" in info.stderr
 
 
+def test_a_picture_that_cannot_be_written_is_one_line(tmp_path):
+    run = str(make_run(tmp_path / "run"))
+    for tool, name in ((plot_rdf, "g.png"), (plot_msd, "msd.png"), (plot_energy, "energy.png"), (movie, "movie.gif")):
+        with pytest.raises(SystemExit, match="^[^\n]*nowhere[^\n]*: No such file or directory$"):
+            tool.main([run, "-o", str(tmp_path / "nowhere" / name)])
+    with pytest.raises(SystemExit, match="^[^\n]*energy.xyz: Format 'xyz' is not supported[^\n]*$"):
+        plot_energy.main([run, "-o", str(tmp_path / "energy.xyz")])
+
+
+class Still:
+    """The first frame of a moving picture."""
+
+    def __init__(self, figure, draw, *_, **__):
+        draw(0)
+        self.figure = figure
+
+    def save(self, file, **_):
+        self.figure.savefig(file)
+
+
+def test_pictures_say_what_they_show(tmp_path, monkeypatch):
+    """Units on every axis, a title, and the command below."""
+    shown = []
+    monkeypatch.setattr(plt.Figure, "savefig", lambda figure, *_, **__: shown.append(figure))
+    monkeypatch.setattr(movie, "FuncAnimation", Still)
+    monkeypatch.setattr(plt, "close", lambda figure: None)
+    run = str(make_run(tmp_path / "run"))
+    for tool, title in ((plot_rdf, "radial distribution function"), (plot_energy, "Energy error"), (movie, "synthetic\nt = 0 [time]")):
+        monkeypatch.setattr(sys, "argv", [f"{tool.__name__}.py", "run", "-o", "picture.png"])
+        tool.main([run])
+        figure = shown.pop()
+        axes = figure.axes[0]
+        assert title in axes.get_title() and "[" in axes.get_xlabel() and ("[" in axes.get_ylabel() or tool is plot_rdf)
+        assert figure._supxlabel.get_text() == f"tools/{tool.__name__}.py run"
+
+
 @needs_carom
 def test_as_a_program_too(tmp_path):
     (tmp_path / "text").write_text("no HDF5")
@@ -214,16 +251,19 @@ def test_g_of_r_of_an_ideal_gas_is_one(tmp_path, dimension, boundary):
     write_run(tmp_path, np.ones(40), x=x, v=x, edges=edges, boundary=[boundary] * dimension, species=species, names=names)
     with Trajectory(tmp_path) as trajectory:
         for pair in (None, ["a", "b"], ["b", "b"]):
-            r, g = plot_rdf.radial_distribution(trajectory, bins=10, species=pair)
+            r, g, error = plot_rdf.radial_distribution(trajectory, bins=10, species=pair)
             assert r[-1] > (1.3 if boundary == "periodic" else 2.5)
             assert g[2:] == pytest.approx(1.0, abs=0.03)
+            assert np.sqrt(np.mean(((g[2:] - 1) / error[2:]) ** 2)) < 4  # of four parts the error itself is uncertain
+            assert np.all(error[2:] < 0.03)
 
 
 def test_g_of_r_finds_a_lattice(tmp_path):
     square = np.stack(np.meshgrid(np.arange(8.0), np.arange(8.0)), axis=-1).reshape(1, -1, 2)
     write_run(tmp_path, [1.0], x=square, v=square, edges=np.array([8.0, 8.0]), boundary=["periodic"] * 2)
     with Trajectory(tmp_path) as trajectory:
-        r, g = plot_rdf.radial_distribution(trajectory, bins=40)
+        r, g, error = plot_rdf.radial_distribution(trajectory, bins=40)
+    assert np.isnan(error).all()  # one frame
     # 4 neighbours at 1, 4 at √2: g = 4 / (63/64 · 2πr·dr), r the middle of their bins.
     peak = {k: 4 / (63 / 64 * np.pi * (((k + 1) * 0.1) ** 2 - (k * 0.1) ** 2)) for k in (10, 14)}
     assert np.flatnonzero(g)[0] == 10

@@ -22,8 +22,8 @@ def five_springs(**change):
     return sim
 
 
-def gas(n=64, seed=1, boundary="periodic", packing=0.1):
-    """Hard spheres on a cubic lattice with random velocities, by free flight."""
+def gas(n=64, seed=1, boundary="periodic", packing=0.1, **epoch):
+    """Hard spheres on a cubic lattice with random velocities, by free flight; `epoch`: of the length step=…"""
     sites = round(n ** (1 / 3))
     assert sites ** 3 == n
     edge = (n * np.pi / 6 / packing) ** (1 / 3)
@@ -31,7 +31,7 @@ def gas(n=64, seed=1, boundary="periodic", packing=0.1):
     v = np.random.default_rng(seed).normal(size=x.shape)
     sim = carom.Simulation(box=[edge] * 3, boundary=boundary)
     sim.add_particles(position=x, velocity=v - v.mean(axis=0))
-    sim.integrator("free-flight")
+    sim.integrator("free-flight", **epoch)
     return sim
 
 

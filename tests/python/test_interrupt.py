@@ -16,7 +16,7 @@ from scenes import five_springs, gas, same_state
 sim = {make}
 print("ready", flush=True)
 try:
-    sim.run(time=1e7{more})
+    sim.run(time=1e7{more})  # one epoch of the third case takes seconds
 except KeyboardInterrupt:
     at = sim.time
     whole = {make}
@@ -28,7 +28,8 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.parametrize("make, ahead, more", [
-    ("five_springs()", 1.005, ""), ("gas()", 10.0, ""), ("five_springs()", 1.0, ", every=0.05, callback=lambda s: s.energy")])
+    ("five_springs()", 1.005, ""), ("gas()", 10.0, ""), ("gas(4096, step=1000)", 10.0, ""),
+    ("five_springs()", 1.0, ", every=0.05, callback=lambda s: s.energy")])
 def test_ctrl_c_ends_the_step_and_the_run_goes_on(make, ahead, more):
     import pathlib
     script = SCRIPT.format(here=str(pathlib.Path(__file__).parent), make=make, more=more, ahead=ahead)
@@ -38,4 +39,5 @@ def test_ctrl_c_ends_the_step_and_the_run_goes_on(make, ahead, more):
         process.send_signal(signal.SIGINT)
         said = json.loads(process.stdout.readline())
         assert process.wait(60) == 0
-    assert said["time"] > 0 and said["same"] and said["finite"]
+    assert 0 < said["time"] < 1000 or "gas()" in make
+    assert said["same"] and said["finite"]

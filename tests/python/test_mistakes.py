@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import carom
-from scenes import ROOT, five_springs, gas
+from scenes import ROOT, five_springs
 
 NAN = float("nan")
 HERE = [[2.0, 3.0]]
@@ -139,8 +139,6 @@ MISTAKES = {
                                lambda: carom.Simulation.from_deck("nowhere.toml")),
     "unknown key of a deck": (USAGE, "--set integrator.steps", lambda: carom.Simulation.from_deck(
         ROOT / "inputs/five-springs.toml", set={"integrator.steps": 0.1})),
-    "end of collisions within an epoch": (USAGE, "cannot go on; give a time instead",
-                                          lambda: [sim := gas(), sim.run(collisions=10), sim.run(collisions=20)]),
     "directory that is not there": (carom.FileError, "nowhere: is not the directory of a run", lambda: carom.open("nowhere")),
     "directory of something else": (carom.FileError, "has no deck.toml", lambda: carom.open(ROOT)),
     "deck without an end": (USAGE, "write_deck: the deck has no end", lambda: five_springs().write_deck("a.toml")),

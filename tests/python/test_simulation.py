@@ -141,6 +141,25 @@ def test_a_callback_that_raises_ends_the_run_which_then_goes_on():
     assert same_state(sim, undisturbed)
 
 
+def test_a_callback_that_raises_within_an_epoch_ends_the_run_at_the_next_look():
+    sim, undisturbed, times = gas(), gas(), []
+    with pytest.raises(ZeroDivisionError):
+        sim.run(steps=1, every=0.5, callback=lambda s: 1 / (s.time < 1))
+    assert sim.time == 1.5 and sim.step == 1
+    sim.run(steps=1, every=0.5, callback=lambda s: times.append(s.time))
+    undisturbed.run(steps=1)
+    assert same_state(sim, undisturbed) and times[:3] == [1.5, 2, 2.5] and len(times) == len(set(times))
+
+
+def test_a_number_of_collisions_ends_within_an_epoch_and_the_run_goes_on():
+    sim, undisturbed = gas(), gas()
+    for collisions in (10, 20):
+        sim.run(collisions=collisions)
+        assert sim.collisions == collisions
+    undisturbed.run(collisions=20)
+    assert same_state(sim, undisturbed)
+
+
 def test_progress_is_a_line_that_goes_away(capsys, monkeypatch):
     monkeypatch.setattr(carom.progress, "QUIET", 0)
     sim = gas(512)
