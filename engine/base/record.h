@@ -42,15 +42,18 @@ template <int D>
 class Packing {
  public:
   Packing() = default;
-  explicit Packing(std::size_t particles) {
-    slot_bits = std::max(1, static_cast<int>(std::bit_width(particles)));
-    field_bits = std::min(10, (31 - slot_bits) / D);
+  /// Of a core with so many slots, in a system of so many particles.
+  Packing(std::size_t slots, std::size_t particles)
+      : largest_((1 << (bits_left(std::min(records_room(particles), std::size_t{1} << 24)) - 1)) - 1) {
+    slot_bits = bits(slots);
+    field_bits = bits_left(slots);
     if (field_bits < 2) throw Error(Failure::deck, "too many particles for one event core");
     slot_mask = (std::uint32_t{1} << slot_bits) - 1;
     for (int k = 0; k < D; ++k) bias |= 1 << (field_bits * (k + 1) - 1);
   }
 
-  std::int32_t largest() const { return (1 << (field_bits - 1)) - 1; }  ///< boxes along an axis
+  /// Boxes along an axis that an image may be away. The same on any number of ranks, which have cores of their own.
+  std::int32_t largest() const { return largest_; }
   bool fits(const Image<D>& image) const {
     return std::all_of(image.begin(), image.end(), [&](auto n) { return std::abs(n) <= largest(); });
   }
@@ -70,7 +73,8 @@ class Packing {
     Image<D> image;
     const std::uint32_t code = candidate >> slot_bits;
     for (int k = 0; k < D; ++k)
-      image[k] = static_cast<std::int32_t>(code >> (field_bits * k) & ((1u << field_bits) - 1)) - largest() - 1;
+      image[k] =
+          static_cast<std::int32_t>(code >> (field_bits * k) & ((1u << field_bits) - 1)) - (1 << (field_bits - 1));
     return image;
   }
   /// The same pair as its other partner `self` writes it down.
@@ -79,6 +83,11 @@ class Packing {
   int slot_bits = 1, field_bits = 2;
   std::uint32_t slot_mask = 1;
   std::int32_t bias = 0;
+
+ private:
+  static int bits(std::size_t slots) { return std::max(1, static_cast<int>(std::bit_width(slots))); }
+  static int bits_left(std::size_t slots) { return std::min(10, (31 - bits(slots)) / D); }
+  std::int32_t largest_ = 1;
 };
 
 }  // namespace carom

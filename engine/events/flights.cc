@@ -23,7 +23,7 @@ void Flights<D>::assign(std::span<const Id> order) {
   records_.resize(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) records_[i].id = order[i];
   room_ = order.size();
-  packing_ = Packing<D>(room_);
+  packing_ = Packing<D>(room_, room_);
 }
 
 template <int D>
@@ -98,7 +98,7 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
   room_ = records_room(records.size());
-  packing_ = Packing<D>(room_);
+  packing_ = Packing<D>(room_, sizes.spheres);
   records_.clear();
   records_.reserve(room_);
   radius_.clear();

@@ -44,7 +44,7 @@ double default_epoch(const System<D>& system) {
   double epoch = std::min(40 / rate, farthest / thermal_speed);
   // So far that the images of the fastest, in equilibrium too, can be written down on any number of ranks.
   const double speed = std::max(fastest, 5 * std::sqrt(twice_kinetic / (D * n * lightest)));
-  const Packing<D> packing(std::min(records_room(system.size()), std::size_t{1} << 24));
+  const Packing<D> packing(1, system.size());
   for (int k = 0; k < D; ++k)
     if (system.box.periodic(k)) epoch = std::min(epoch, packing.largest() * system.box.edges[k] / speed);
   std::array<char, 32> text{};

@@ -156,6 +156,16 @@ def test_an_error_of_one_rank_ends_all(spoil, words, of_one, tmp_path):
         assert ("carom: rank" in done.stderr) == of_one
 
 
+def test_an_epoch_is_too_long_on_any_number_of_ranks(tmp_path):
+    """64 spheres cross more boxes than an image on ranks has room for, though in one core there is room for more."""
+    deck = write_deck(tmp_path, SPHERES.replace("108", "64").replace("fcc", "simple-cubic"))
+    sets = ["placement.packing_fraction=0.2", "placement.seed=1", "integrator.step=1e4", "run.end_time=1e4",
+            "output.frame_interval=0.0", "output.thermo_interval=1000"]
+    words = "too many periodic boxes in one epoch"
+    assert words in run(deck, tmp_path / "plain", sets, code=4).stderr
+    assert words in mpirun(2, command(deck, tmp_path / "ranks", sets), code=4).stderr
+
+
 def test_other_commands_speak_once(tmp_path):
     deck = write_deck(tmp_path, SPHERES)
     for arguments, code, words in [(["validate", deck], 0, "valid"), (["validate", tmp_path / "missing"], 5, "cannot read"),

@@ -171,7 +171,7 @@ TEST(Search, AWidthThisMachineLacksIsAnError) {
 /// One sphere and 30 others at random, some of them in other boxes.
 template <int D>
 struct Surroundings {
-  explicit Surroundings(bool plain) : packing(31), records(31), radius(31, 0.5) {
+  explicit Surroundings(bool plain) : packing(31, 31), records(31), radius(31, 0.5) {
     RandomStream random(5, RandomPurpose::position, 0);
     for (auto& r : records) {
       for (int k = 0; k < D; ++k) r.x[k] = 6 * random.uniform() - 3, r.v[k] = 2 * random.uniform() - 1;
@@ -283,10 +283,22 @@ TEST(Scan, SeesAnOverlapHoweverSlowlyItGrows) {
   }
 }
 
+TEST(Packing, HasTheSameRoomForImagesInTheCoresOfAnyNumberOfRanks) {
+  for (const std::size_t particles : {64, 1000, 50000, 1000000})
+    for (const std::size_t slots : {particles, records_room(particles), particles / 7}) {
+      const Packing<3> packing(slots, particles), alone(particles, particles);
+      EXPECT_EQ(packing.largest(), alone.largest()) << slots;
+      for (const int sign : {-1, 1}) {
+        const Image<3> farthest{sign * packing.largest(), -sign * packing.largest(), 0};
+        EXPECT_EQ(packing.image(packing.pack(5, packing.linear(farthest))), farthest);
+      }
+    }
+}
+
 TEST(Scan, FindsTheFirstOfMoreThanABlockOfCandidates) {
   Surroundings<3> s(true);
   s.records.resize(200);
-  s.packing = Packing<3>(200);
+  s.packing = Packing<3>(200, 200);
   s.setting.records = reinterpret_cast<const double*>(s.records.data());
   s.setting.slot_mask = s.packing.slot_mask;
   s.setting.slot_bits = s.packing.slot_bits;
