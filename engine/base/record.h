@@ -43,11 +43,12 @@ class Packing {
  public:
   Packing() = default;
   /// Of a core with so many slots, in a system of so many particles.
-  Packing(std::size_t slots, std::size_t particles)
-      : largest_((1 << (bits_left(std::min(records_room(particles), std::size_t{1} << 24)) - 1)) - 1) {
+  Packing(std::size_t slots, std::size_t particles) {
     slot_bits = bits(slots);
     field_bits = bits_left(slots);
     if (field_bits < 2) throw Error(Failure::deck, "too many particles for one event core");
+    const int of_ranks = bits_left(std::min(records_room(particles), std::size_t{1} << 24));
+    largest_ = (1 << (std::min(field_bits, of_ranks) - 1)) - 1;
     slot_mask = (std::uint32_t{1} << slot_bits) - 1;
     for (int k = 0; k < D; ++k) bias |= 1 << (field_bits * (k + 1) - 1);
   }

@@ -8,8 +8,8 @@
 
 namespace carom {
 
-/// Bytes to give to the system at once. A larger write to a new file can be slow: 24 MB take ten times as long in one
-/// with ext4 of Linux 6.18.
+/// Bytes to give to the system at once: with ext4 of Linux 6.18 a large write to a new file takes several times as long
+/// as the same in pieces.
 constexpr std::size_t kLargestWrite = 1 << 20;
 
 class Descriptor {

@@ -39,5 +39,5 @@ def test_ctrl_c_ends_the_step_and_the_run_goes_on(make, ahead, more):
         process.send_signal(signal.SIGINT)
         said = json.loads(process.stdout.readline())
         assert process.wait(60) == 0
-    assert 0 < said["time"] < 1000 or "gas()" in make
+    assert 0 < said["time"] < (1000 if "step=1000" in make else 1e7)  # within the first epoch
     assert said["same"] and said["finite"]
