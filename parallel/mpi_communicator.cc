@@ -23,9 +23,9 @@ void in_pieces(std::size_t size, Start&& start) {
 
 }  // namespace
 
-/// By recursive doubling: log2 P messages, each of which is waited for with an eye on failures. (MPI_Allreduce cannot
-/// be left; MPI_Iallreduce takes thrice as long.) The value of the lower rank comes first, so that all get the same
-/// bits.
+/// By recursive doubling: log2 P messages, each of which is waited for; meanwhile failures are looked for.
+/// (MPI_Allreduce cannot be left; MPI_Iallreduce takes thrice as long.) The value of the lower rank comes first, so
+/// that all get the same bits.
 void MpiCommunicator::combine(std::span<double> most, std::span<std::uint64_t> sums) {
   ranks_.watch().begin_call();
   mine_.assign(sums.begin(), sums.end());

@@ -193,7 +193,7 @@ int Watch::settle_first(const Outcome& mine, bool alone) {
   for (receive_notices(); !all_ended() && !mine.left; receive_notices()) {
     if (failed_) {
       const double waited = since_failure.waited();
-      if (some_wait_is_in_vain() || waited > kGrace) break;
+      if (some_wait_never_ends() || waited > kGrace) break;
       if (waited >= query_next) {
         query_ranks();
         query_next = waited + kQueryAgain;
@@ -235,7 +235,7 @@ int Watch::settle_other(const Outcome& mine, bool alone) {
 }
 
 /// Whether a rank is in a call that one of the failed has not made.
-bool Watch::some_wait_is_in_vain() const {
+bool Watch::some_wait_never_ends() const {
   auto last_call = std::numeric_limits<std::uint64_t>::max();
   for (const State& state : states_)
     if (state.outcome && !state.outcome->failure.empty()) last_call = std::min(last_call, state.calls);

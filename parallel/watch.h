@@ -73,7 +73,7 @@ class Watch {
   void wait(std::span<MPI_Request> requests);
 
   /// Collective: ends a piece of work together. Returns the exit code of the first rank that failed, or of rank 0. Does
-  /// not return (MPI_Abort) where some cannot be reached any more. `alone`: rank 0 works, for as long as it likes.
+  /// not return (MPI_Abort) where some cannot be reached any more. `alone`: rank 0 works, for any time.
   int settle(const Outcome& mine, bool alone);
 
  private:
@@ -100,7 +100,7 @@ class Watch {
   void process(int from, const Notice& notice);
   void send(int to, Kind kind, const Outcome& outcome = {});
   void query_ranks();
-  bool some_wait_is_in_vain() const;
+  bool some_wait_never_ends() const;
   std::string silence_of(const std::function<bool()>& is_over);
   int settle_first(const Outcome& mine, bool alone);
   int settle_other(const Outcome& mine, bool alone);

@@ -25,6 +25,8 @@ struct Box {
       if (piston(k)) return true;
     return false;
   }
+  /// Whether some axis has this boundary.
+  bool has(Boundary kind) const { return std::ranges::find(boundary, kind) != boundary.end(); }
   /// The box as it is a time later.
   Box after(double time) const {
     Box later = *this;
@@ -73,9 +75,7 @@ struct Box {
   }
 
   /// Brings a position back into [0, edge) along the periodic axes and counts the crossings in `image`.
-  /// Returns whether anything changed.
-  bool wrap(Vec<D>& x, Image<D>& image) const {
-    bool moved = false;
+  void wrap(Vec<D>& x, Image<D>& image) const {
     for (int k = 0; k < D; ++k) {
       if (!periodic(k) || (x[k] >= 0 && x[k] < edges[k])) continue;
       const double crossings = std::floor(x[k] / edges[k]);
@@ -86,9 +86,7 @@ struct Box {
         x[k] = 0;
         image[k] += 1;
       }
-      moved = true;
     }
-    return moved;
   }
 };
 

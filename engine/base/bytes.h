@@ -24,7 +24,6 @@ class Reader {
  public:
   explicit Reader(const Bytes& bytes) : at_(bytes.data()), end_(bytes.data() + bytes.size()) {}
   bool more() const { return at_ < end_; }
-  std::size_t left() const { return static_cast<std::size_t>(end_ - at_); }
   template <class T>
   T get() {
     T value;

@@ -29,7 +29,7 @@ struct Counters : ContactTally {
   } seconds;
 };
 
-/// Adds the time of its own life to a total, but for what others have measured meanwhile.
+/// Adds the time from its construction to its destruction to a total, but for what others have measured meanwhile.
 class Stopwatch {
  public:
   explicit Stopwatch(double& total)
@@ -37,9 +37,9 @@ class Stopwatch {
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
   ~Stopwatch() {
-    const double life = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    total_ += life - within_;
-    if (outer_) outer_->within_ += life;
+    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    total_ += elapsed - within_;
+    if (outer_) outer_->within_ += elapsed;
     running_ = outer_;
   }
 

@@ -23,29 +23,12 @@ double pow(double x, double y);
 /// Complementary error function, 2/√π ∫_x^∞ e^(−t²) dt, in full relative precision until it underflows near x = 27.2.
 double erfc(double x);
 
-template <Lanes T>
-[[gnu::always_inline]] inline T exp(T x) {
-  return formula::exp(x);
-}
-template <Lanes T>
-[[gnu::always_inline]] inline T expm1(T x) {
-  return formula::expm1(x);
-}
-template <Lanes T>
-[[gnu::always_inline]] inline T log(T x) {
-  return formula::log(x);
-}
-template <Lanes T>
-[[gnu::always_inline]] inline T log1p(T x) {
-  return formula::log1p(x);
-}
-template <Lanes T>
-[[gnu::always_inline]] inline T pow(T x, double y) {
-  return formula::pow(x, y);
-}
-template <Lanes T>
-[[gnu::always_inline]] inline T erfc(T x) {
-  return formula::erfc(x);
-}
+// Of the lanes of a vector.
+using formula::erfc;
+using formula::exp;
+using formula::expm1;
+using formula::log;
+using formula::log1p;
+using formula::pow;
 
 }  // namespace carom::elementary

@@ -15,6 +15,9 @@ inline constexpr double kLog2e = 0x1.71547652b82fep+0;
 inline constexpr double kLn2Hi = 0x1.62e42fefa2000p-1;  // 40 bits: its product with any exponent is exact
 inline constexpr double kLn2Lo = 0x1.9ef35793c7673p-41;
 
+template <class T>
+concept Number = std::same_as<T, double> || Lanes<T>;
+
 /// hi + lo, with |lo| at most about half an ulp of hi.
 template <class T>
 struct Sum {
@@ -182,12 +185,12 @@ template <class T>
   return scale(result.hi + (result.lo + (e.mantissa.hi * q_lo + e.mantissa.lo * q)), e.k);
 }
 
-template <class T>
+template <Number T>
 [[gnu::always_inline]] inline T exp(T x) {
   return exp_sum(x, all<T>(0));
 }
 
-template <class T>
+template <Number T>
 [[gnu::always_inline]] inline T expm1(T x) {
   const T within = x < 710.0 ? (x > -40.0 ? x : all<T>(-40)) : all<T>(0);
   const Reduced<T> reduced = reduce(within, all<T>(0));
@@ -201,7 +204,7 @@ template <class T>
   return x < 710.0 ? (x < -40.0 ? all<T>(-1) : x == 0.0 ? x : result) : beyond;
 }
 
-template <class T>
+template <Number T>
 [[gnu::always_inline]] inline T log(T x) {
   const auto ordinary = (x > 0.0) & (x < kInfinity);
   const T result = log_sum(ordinary ? x : all<T>(1)).hi;
@@ -209,7 +212,7 @@ template <class T>
   return ordinary ? result : beyond;
 }
 
-template <class T>
+template <Number T>
 [[gnu::always_inline]] inline T log1p(T x) {
   const auto ordinary = (x > -1.0) & (x < kInfinity) & (x != 0.0);
   const Sum<T> u = two_sum(all<T>(1), ordinary ? x : all<T>(1));
@@ -225,7 +228,7 @@ template <class T>
 }
 
 /// The exponent is the same in all lanes.
-template <class T>
+template <Number T>
 [[gnu::always_inline]] inline T pow(T x, double y) {
   if (y == 0) return all<T>(1);
   const auto ordinary = (x > 0.0) & (x < kInfinity);
@@ -243,7 +246,7 @@ template <class T>
   return x == 1.0 ? all<T>(1) : (ordinary ? result : beyond);
 }
 
-template <class T>
+template <Number T>
 [[gnu::always_inline]] inline T erfc(T x) {
   const T size = abs(x);
   const auto small = size < 0.45;

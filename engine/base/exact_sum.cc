@@ -23,10 +23,10 @@ __extension__ void ExactSum::add(__int128 multiple, double power_of_two) {
 }
 
 void ExactSum::add(const ExactSum& other) {
-  ExactSum tidy = other;
-  tidy.carry();
+  ExactSum carried = other;
+  carried.carry();
   carry();
-  for (int k = 0; k < kDigits; ++k) digit_[k] += tidy.digit_[k];
+  for (int k = 0; k < kDigits; ++k) digit_[k] += carried.digit_[k];
   pending_ = 2;
   invalid_ = invalid_ || other.invalid_;
 }
@@ -41,16 +41,16 @@ void ExactSum::carry() {  // afterwards every digit but the highest is in [0, 2^
 
 double ExactSum::value() const {
   if (invalid_) return std::numeric_limits<double>::quiet_NaN();
-  ExactSum tidy = *this;
-  tidy.carry();
-  const bool negative = tidy.digit_[kDigits - 1] < 0;
+  ExactSum carried = *this;
+  carried.carry();
+  const bool negative = carried.digit_[kDigits - 1] < 0;
   if (negative) {
-    for (auto& d : tidy.digit_) d = -d;
-    tidy.carry();
+    for (auto& d : carried.digit_) d = -d;
+    carried.carry();
   }
   int top = kDigits - 1;
-  while (top > 0 && tidy.digit_[top] == 0) --top;
-  auto digit = [&](int k) { return k < 0 ? 0 : static_cast<std::uint64_t>(tidy.digit_[k]); };
+  while (top > 0 && carried.digit_[top] == 0) --top;
+  auto digit = [&](int k) { return k < 0 ? 0 : static_cast<std::uint64_t>(carried.digit_[k]); };
   // The leading 64 bits, the lowest of them standing for everything below ("sticky"); the conversion rounds once.
   const int lead = std::countl_zero(digit(top)) - 32;
   std::uint64_t window = (digit(top) << 32 | digit(top - 1)) << lead;

@@ -22,7 +22,6 @@ class ExactSum {
   void add(const ExactSum& other);
   /// The sum, rounded once to nearest.
   double value() const;
-  void clear() { *this = ExactSum(); }
 
  private:
   void carry();

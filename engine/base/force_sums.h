@@ -30,7 +30,7 @@ class ForceSums {
     high_.clear();
     quantum_ = quantum;
     used_low_ = used_high_ = 0;
-    spoiled_ = false;
+    invalid_ = false;
   }
   std::size_t size() const { return low_.size(); }
   double quantum() const { return quantum_; }
@@ -48,7 +48,7 @@ class ForceSums {
     return limits;
   }
   /// Whether more passes may add to them: not after some hundred without reset(), nor where they are spoiled.
-  bool has_room() const { return !spoiled_ && used_high_ < kForceRoom / 2; }
+  bool has_room() const { return !invalid_ && used_high_ < kForceRoom / 2; }
 
   /// The words themselves, to add to after make_room(); high() makes them where there were none.
   ForceWords* low() { return low_.data(); }
@@ -73,12 +73,12 @@ class ForceSums {
     return true;
   }
   /// Some force could not be added: all values are NaN until reset().
-  void spoil() { spoiled_ = true; }
+  void invalidate() { invalid_ = true; }
 
   /// The force on a particle, rounded once.
   Vec<D> value(Id i) const {
     Vec<D> force;
-    if (spoiled_) return Vec<D>::Constant(std::numeric_limits<double>::quiet_NaN());
+    if (invalid_) return Vec<D>::Constant(std::numeric_limits<double>::quiet_NaN());
     for (int k = 0; k < D; ++k)
       force[k] = quantum_ * (high_.empty() ? static_cast<double>(low_[i].of[k])
                                            : static_cast<double>(whole(high_[i].of[k], low_[i].of[k])));
@@ -109,7 +109,7 @@ class ForceSums {
 
   std::vector<ForceWords> low_, high_;  // high_: empty while there are none
   double quantum_ = 1;
-  bool spoiled_ = false;
+  bool invalid_ = false;
   double used_low_ = 0, used_high_ = 0;  // bounds of the sums [quanta]
 };
 

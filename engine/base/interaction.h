@@ -68,7 +68,7 @@ class Interaction {
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:
   /// only pairs with at least one such particle, and fields on these; sign −1: subtracts exactly what +1 has added.
   /// Returns the number of pairs (or particles, for a field) of this rank within reach. A step that is only tried may
-  /// be wild: forces that are not finite or too large spoil the sums.
+  /// be far too long: forces that are not finite or too large invalidate the sums.
   virtual std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces,
                                         const char* changed = nullptr, int sign = 1) const = 0;
 

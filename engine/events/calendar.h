@@ -1,7 +1,7 @@
 #pragma once
 // The event queue: a ring of time bins with a small heap for the present.
 //
-// Entries of later bins are only appended, to a few cache lines that stay hot; what lies beyond the ring waits in a
+// Entries of later bins are only appended, to a few lines that stay in the cache; what lies beyond the ring waits in a
 // list of its own. When its time has come a bin is sorted once and then served in order, beside a heap that holds what
 // is scheduled into the present. Nothing is ever removed: the caller decides which entries no longer hold, when a bin
 // is opened and again when an entry is served. Bins adapt to the rate of events. (Brown, Commun. ACM 31 (1988) 1220;
@@ -29,16 +29,16 @@ static_assert(sizeof(CalendarEntry) == 12);  // there are some for every particl
 /// Serves entries by time; the order of equal times is the caller's business.
 class Calendar {
  public:
-  /// Empties the calendar and sets it up for times in [now, horizon), for about `alive` entries at a time, which will
+  /// Empties the calendar and sets it up for times in [now, horizon), for about `entries` entries at a time, which will
   /// be spread about like the `sample`. `entries_per_bin` forces the size of bins (0: about right).
-  void reset(double horizon, std::size_t alive, double entries_per_bin = 0, std::vector<double> sample = {},
+  void reset(double horizon, std::size_t entries, double entries_per_bin = 0, std::vector<double> sample = {},
              double now = 0) {
     horizon_ = horizon;
     forced_ = entries_per_bin > 0;
-    wanted_ = forced_ ? entries_per_bin : std::clamp(static_cast<double>(alive) / 256, 8.0, 2048.0);
+    wanted_ = forced_ ? entries_per_bin : std::clamp(static_cast<double>(entries) / 256, 8.0, 2048.0);
     ring_.assign(kBins, Bin{});
     chunks_.clear();
-    chunks_.reserve(2 * alive / kChunk + kBins);  // growing would copy; what is not used is not touched
+    chunks_.reserve(2 * entries / kChunk + kBins);  // growing would copy; what is not used is not touched
     next_.clear();
     free_ = kNone;
     later_ = Bin{};
@@ -46,7 +46,7 @@ class Calendar {
     sorted_.clear();
     served_ = 0;
     // Bins for the density of the first entries there will be.
-    const double each = static_cast<double>(alive) / static_cast<double>(std::max<std::size_t>(sample.size(), 1));
+    const double each = static_cast<double>(entries) / static_cast<double>(std::max<std::size_t>(sample.size(), 1));
     const auto few = std::min(sample.size(), static_cast<std::size_t>(16 * wanted_ / each) + 16);
     double end = horizon;
     if (few > 0) {

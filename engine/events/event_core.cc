@@ -80,7 +80,7 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
     slot = free_.back();
     free_.pop_back();
   } else {
-    if (flights_.size() == flights_.room()) return false;
+    if (flights_.size() == flights_.capacity()) return false;
     slot = static_cast<Slot>(flights_.size());
   }
   const double radius = sizes_->radius_of(r);
@@ -178,15 +178,15 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
   }
   Vec<D> shift = Vec<D>::Zero();
   if (packing.linear(partner) != 0) shift = box_.shift(packing.image(partner));
-  const Blow<D> blow = flights_.collide(i, j, shift, time, generation);
+  const Impact<D> impact = flights_.collide(i, j, shift, time, generation);
   ++queue_[i].version;
   ++queue_[j].version;
-  const double virial = blow.d.dot(blow.impulse);
-  if (report.trace) return report.trace->end(flights_[i], flights_[j], virial, blow.overlap);
-  report.counters.add(EventKind::pair, virial, blow.overlap);
+  const double virial = impact.d.dot(impact.impulse);
+  if (report.trace) return report.trace->end(flights_[i], flights_[j], virial, impact.overlap);
+  report.counters.add(EventKind::pair, virial, impact.overlap);
   if (!report.contacts) return;
   const EventKey<D> key = pair_key<D>(time, generation, flights_[i].id, flights_[j].id, packing.image(partner));
-  report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, blow));
+  report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, impact));
 }
 
 template <int D>
@@ -194,12 +194,12 @@ void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, c
   const EventKey<D> key = queue_.key_of(i);
   if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
   const Wall<D> wall = box_.wall(key.hi);
-  const Blow<D> blow = flights_.bounce(i, wall, time, generation);
+  const Impact<D> impact = flights_.bounce(i, wall, time, generation);
   ++queue_[i].version;
-  const double work = wall.work(blow.impulse);
-  if (report.trace) return report.trace->end(flights_[i], flights_[i], work, blow.overlap);
-  report.counters.add(EventKind::wall, work, blow.overlap);
-  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], blow));
+  const double work = wall.work(impact.impulse);
+  if (report.trace) return report.trace->end(flights_[i], flights_[i], work, impact.overlap);
+  report.counters.add(EventKind::wall, work, impact.overlap);
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], impact));
 }
 
 template class EventCore<2>;

@@ -7,7 +7,7 @@ namespace carom {
 template <int D>
 void EventQueue<D>::clear() {
   next_events_.clear();
-  next_events_.reserve(flights_.room());
+  next_events_.reserve(flights_.capacity());
   next_events_.assign(flights_.size(), NextEvent<D>{});
 }
 

@@ -32,8 +32,8 @@ void EventSearch<D>::start(double now, double max_displacement) {
 
 template <int D>
 void EventSearch<D>::choose(double now) {
-  small_ = 8 * static_cast<double>(flights_.room()) <= options_.in_cache;
-  large_ = static_cast<double>(flights_.room()) > options_.in_cache;
+  small_ = 8 * static_cast<double>(flights_.capacity()) <= options_.in_cache;
+  large_ = static_cast<double>(flights_.capacity()) > options_.in_cache;
   at_border_.clear();
   // The density is that of the whole system: a subdomain has a part of it, or no spheres yet; larger ones may come.
   const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : radii_;
@@ -146,14 +146,14 @@ void EventSearch<D>::foresee_walls(Slot i) {
 template <int D>
 void EventSearch<D>::foresee_update(Slot i, double now) {
   if (lists_)
-    predict_leaving(queue_[i], flights_[i], flights_, room(i), now);
+    predict_leaving(queue_[i], flights_[i], flights_, distance_left(i), now);
   else
     predict_crossing(queue_[i], i, flights_, box_, cells_->grid(), now);
 }
 
 /// How far a sphere may go from the centre of its list's region.
 template <int D>
-double EventSearch<D>::room(Slot i) const {
+double EventSearch<D>::distance_left(Slot i) const {
   return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
 }
 
@@ -169,7 +169,7 @@ void EventSearch<D>::look_again(Slot i, double now) {
     cells_->cross(i, a.where.cell, axis, step);
     cells_->ahead(i, a.where.cell, axis, step, found_);
     if (found_.count > 0) scan({i, found_.packed.data(), found_.count, found_.same}, false);
-  } else if (const Vec<D> x = flights_.at(i, now).x; !flights_.field() || way(x) >= 0.7 * room(i)) {
+  } else if (const Vec<D> x = flights_.at(i, now).x; !flights_.field() || way(x) >= 0.7 * distance_left(i)) {
     ++counts_.rebuilds;
     const std::span<const std::uint32_t> fresh = lists_->renew(i, x);
     if (!fresh.empty()) scan({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
@@ -208,7 +208,7 @@ template <int D>
 void EventSearch<D>::move(Slot i, double now) {
   const Vec<D> x = flights_.at(i, now).x;
   if (lists_) {
-    lists_->move(i, x, room(i));
+    lists_->move(i, x, distance_left(i));
   } else {
     CellPlace<D>& cell = queue_[i].where.cell;
     cells_->remove(i, cell);
@@ -219,11 +219,11 @@ void EventSearch<D>::move(Slot i, double now) {
 
 template <int D>
 void EventSearch<D>::set_border(std::span<const Slot> slots, double now) {
-  at_border_.assign(flights_.room(), 0);
+  at_border_.assign(flights_.capacity(), 0);
   if (!border_fits()) return;
   for (const Slot i : slots) {
     at_border_[i] = 1;
-    if (lists_->move(i, flights_.at(i, now).x, room(i))) {
+    if (lists_->move(i, flights_.at(i, now).x, distance_left(i))) {
       plan(i, now);
       queue_.settle();
     } else {
@@ -246,7 +246,7 @@ std::span<const std::uint32_t> EventSearch<D>::find_near_at_border(Slot i, const
     cells_->find_between(low, high, near_);
     return near_;
   }
-  if (room(i) == lists_->skin()) return find_near(i);
+  if (distance_left(i) == lists_->skin()) return find_near(i);
   return {lists_->candidates(queue_[i]), queue_[i].count};
 }
 

@@ -73,7 +73,7 @@ class EventSearch {
   void scan(const ScanTask& task, bool latest);
   void plan_first(const ScanTask& task, const ScanResult& first);
   [[gnu::noinline]] void offer_all(const ScanTask& task);  // seldom needed, and large
-  double room(Slot i) const;
+  double distance_left(Slot i) const;
   /// Whether lists have room for another `max_displacement` at the border.
   bool border_fits() const { return lists_ && lists_->skin() >= 3 * max_displacement_; }
 

@@ -22,8 +22,8 @@ template <int D>
 void Flights<D>::assign(std::span<const Id> order) {
   records_.resize(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) records_[i].id = order[i];
-  room_ = order.size();
-  packing_ = Packing<D>(room_, room_);
+  capacity_ = order.size();
+  packing_ = Packing<D>(capacity_, capacity_);
 }
 
 template <int D>
@@ -97,10 +97,10 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   horizon_ = horizon;
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
-  room_ = records_room(records.size());
-  packing_ = Packing<D>(room_, sizes.spheres);
+  capacity_ = records_room(records.size());
+  packing_ = Packing<D>(capacity_, sizes.spheres);
   records_.clear();
-  records_.reserve(room_);
+  records_.reserve(capacity_);
   radius_.clear();
   mass_.clear();
   for (const Record<D>& r : records) admit(static_cast<Slot>(records_.size()), r, sizes.radius_of(r), sizes.mass_of(r));
@@ -151,14 +151,14 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
 }
 
 template <int D>
-Blow<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
-                            std::uint32_t generation) const {
+Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                              std::uint32_t generation) const {
   advance(a, t);
   advance(b, t);
   const Vec<D> d = a.x - b.x + shift;
   const double mass_a = mass(i), mass_b = mass(j);
   const double radii = radius(i) + radius(j), sigma = grown(radii, t);
-  const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, sigma, radii * growth_, mass_a, mass_b) * d;
+  const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, mass_a, mass_b, sigma, radii * growth_) * d;
   if (common_mass_ == 1) {  // the same bits without divisions
     a.v += impulse;
     b.v -= impulse;
@@ -171,29 +171,29 @@ Blow<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Ve
 }
 
 template <int D>
-Blow<D> Flights<D>::bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const {
+Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const {
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
   double& v = r.v[wall.axis];
   const double after = wall.reflected(v, rate);
-  Blow<D> blow{r.x - wall.foot(r.x, t), Vec<D>::Zero(), -wall.gap(r.x, at_contact, t) / at_contact};
-  blow.impulse[wall.axis] = mass(i) * (after - v);
+  Impact<D> impact{r.x - wall.foot(r.x, t), Vec<D>::Zero(), -wall.gap(r.x, at_contact, t) / at_contact};
+  impact.impulse[wall.axis] = mass(i) * (after - v);
   v = after;
   r.generation = static_cast<std::uint16_t>(generation);
-  return blow;
+  return impact;
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
-                                  const Blow<D>& blow) const {
-  if (a.id < b.id) return {key, a.x, b.x - shift, blow.impulse, blow.d.dot(blow.impulse), blow.overlap};
-  return {key, b.x, a.x + shift, -blow.impulse, blow.d.dot(blow.impulse), blow.overlap};
+                                  const Impact<D>& impact) const {
+  if (a.id < b.id) return {key, a.x, b.x - shift, impact.impulse, impact.d.dot(impact.impulse), impact.overlap};
+  return {key, b.x, a.x + shift, -impact.impulse, impact.d.dot(impact.impulse), impact.overlap};
 }
 
 template <int D>
-Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const {
+Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const {
   const Wall<D> wall = box_.wall(key.hi);
-  return {key, r.x, wall.foot(r.x, key.time), blow.impulse, wall.work(blow.impulse), blow.overlap};
+  return {key, r.x, wall.foot(r.x, key.time), impact.impulse, wall.work(impact.impulse), impact.overlap};
 }
 
 template class Flights<2>;

@@ -20,7 +20,7 @@ namespace carom {
 
 /// What a collision did.
 template <int D>
-struct Blow {
+struct Impact {
   Vec<D> d;        ///< from the second centre to the first [length]
   Vec<D> impulse;  ///< given to the first sphere [mass·length/time]
   double overlap;  ///< at contact, relative to the contact distance
@@ -41,7 +41,7 @@ class Flights {
   void load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon);
 
   std::size_t size() const { return records_.size(); }
-  std::size_t room() const { return room_; }
+  std::size_t capacity() const { return capacity_; }
   const Packing<D>& packing() const { return packing_; }
   const Record<D>& operator[](Slot i) const { return records_[i]; }
   std::span<const Record<D>> records() const { return records_; }
@@ -82,20 +82,20 @@ class Flights {
   double wall_contact(Slot i, const Wall<D>& wall) const { return wall_contact(i, records_[i], wall); }
 
   /// The two collide at time t.
-  Blow<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
+  Impact<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
     return collide(i, records_[i], j, records_[j], shift, t, generation);
   }
   /// The sphere collides with a wall at time t; the second "centre" is the point touched.
-  Blow<D> bounce(Slot i, const Wall<D>& wall, double t, std::uint32_t generation) {
+  Impact<D> bounce(Slot i, const Wall<D>& wall, double t, std::uint32_t generation) {
     return bounce(i, records_[i], wall, t, generation);
   }
 
   // The same for spheres with other records than their present ones.
   double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
   double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
-  Blow<D> collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
-                  std::uint32_t generation) const;
-  Blow<D> bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const;
+  Impact<D> collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                    std::uint32_t generation) const;
+  Impact<D> bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const;
 
   /// Replaces a record.
   void set(Slot i, const Record<D>& r) { records_[i] = r; }
@@ -104,8 +104,8 @@ class Flights {
 
   /// What observers see of a collision between the two, or with a wall, after it.
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
-                        const Blow<D>& blow) const;
-  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const Blow<D>& blow) const;
+                        const Impact<D>& impact) const;
+  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const;
 
   /// Those of the box.
   std::span<const Wall<D>> walls() const { return walls_; }
@@ -126,7 +126,7 @@ class Flights {
   double growth_ = 0, horizon_ = 0;
   GapTolerance gap_tolerance_;
   PageVector<Record<D>> records_;      // by slot
-  std::size_t room_ = 0;               // that there may be
+  std::size_t capacity_ = 0;           // how many there may be
   Packing<D> packing_;                 // of their slots
   std::vector<double> radius_, mass_;  // by slot; empty where all are equal
   double common_radius_ = 0, common_mass_ = 0;

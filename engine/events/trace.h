@@ -55,7 +55,7 @@ class Trace {
     Slot slot[2];           ///< kNone: a wall
     std::uint32_t last[2];  ///< the entry that the sphere had in an event before, or kNone
   };
-  // A entry in an event has the number 2·event + 0 or 1.
+  // An entry in an event has the number 2·event + 0 or 1.
 
   /// Removes all events, and makes room for so many slots.
   void clear(std::size_t slots) {
@@ -102,11 +102,12 @@ class Trace {
   bool has(Slot i) const { return latest_[i] >= base_; }
   /// The entries of a sphere in the order of time; good until the next call.
   std::span<const std::uint32_t> entries(Slot i) const {
-    shares_.clear();
-    for (std::uint32_t s = has(i) ? latest_[i] - base_ : kNone; s != kNone; s = event_of(s).last[s % 2])
-      shares_.push_back(s);
-    std::reverse(shares_.begin(), shares_.end());
-    return shares_;
+    entries_.clear();
+    for (std::uint32_t entry = has(i) ? latest_[i] - base_ : kNone; entry != kNone;
+         entry = event_of(entry).last[entry % 2])
+      entries_.push_back(entry);
+    std::reverse(entries_.begin(), entries_.end());
+    return entries_;
   }
   double fastest_squared() const { return fastest_squared_; }  ///< of all spheres after events
 
@@ -126,7 +127,7 @@ class Trace {
   std::uint32_t base_ = 1;
   std::size_t most_ = 0;
   double fastest_squared_ = 0;
-  mutable std::vector<std::uint32_t> shares_;
+  mutable std::vector<std::uint32_t> entries_;
 };
 
 }  // namespace carom

@@ -123,6 +123,15 @@ PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
   return system.decomposition.sum(sums);
 }
 
+/// The exact sum of term(i) over all particles of all ranks. Collective.
+template <int D>
+double sum_over_all(const System<D>& system, auto&& term) {
+  ExactSeries own;
+  for (Id i = 0; i < system.particles.size(); ++i)
+    if (system.particles.owns(i)) own.add(term(i));
+  return system.decomposition.sum(own.sum()).value();
+}
+
 /// Exact sums over all particles.
 template <int D>
 struct MotionSums {

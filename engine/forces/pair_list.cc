@@ -10,7 +10,7 @@ namespace carom {
 
 namespace {
 
-constexpr std::size_t kMostPairs = 100'000'000, kMostPartners = 5000;  // a particle; more are a step gone wild
+constexpr std::size_t kMostPairs = 100'000'000, kMostPartners = 5000;  // a particle; more come from far too long a step
 
 /// The larger of two squared distances; NaN does not count: the force there is an error of its own.
 template <int D>
@@ -49,12 +49,12 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
   known = known && follow(step, squared_from_build, squared_step);
   if (!known && !still)
     for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
-  if (!made_) skin_.begin(2 * *learned_);
+  if (!made_) skin_.begin(2 * *shared_width_);
   const double length = std::sqrt(squared_step);
   if (!skin_.lasts(known, std::sqrt(squared_from_build), length)) {
     need_finite(particles, step.x);
     skin_.renew(box_, length, [&] { return "particle " + std::to_string(particles.id_of(farthest(step))); });
-    *learned_ = skin_.width();
+    *shared_width_ = skin_.width();
     ghost_ = particles.ghost;
     build(step, particles);
   }

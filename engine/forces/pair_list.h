@@ -21,7 +21,7 @@ class CutoffList {
   /// `like`: a list with a skin that is good to begin with; null: there is none.
   CutoffList(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList* like = nullptr)
       : box_(box), cutoff_(cutoff), skin_(0.1 * cutoff, 16, 0.8 * cutoff), filter_(std::move(filter)) {
-    if (like) learned_ = like->learned_;
+    if (like) shared_width_ = like->shared_width_;
   }
 
   /// The pairs that are within the cutoff at x or x_new. A pair keeps the image it has at x. `particles` gives ghosts
@@ -39,7 +39,7 @@ class CutoffList {
   const Box<D>& box_;
   double cutoff_;
   Skin skin_;
-  std::shared_ptr<double> learned_ = std::make_shared<double>(0);  // skin of this list and those made like it
+  std::shared_ptr<double> shared_width_ = std::make_shared<double>(0);  // skin of this list and those made like it
   PairFilter filter_;
   const PairKernels* kernels_ = &pair_kernels();
   std::vector<char> ghost_;

@@ -18,12 +18,7 @@ double largest_squared_frequency(const System<D>& system) {
     RandomStream random(0, RandomPurpose::probe, p.id_of(i));
     for (int k = 0; k < D; ++k) u[i][k] = random.uniform() - 0.5;
   }
-  const auto norm = [&] {
-    ExactSum sum;
-    for (Id i = 0; i < n; ++i)
-      if (p.owns(i)) sum.add(u[i].squaredNorm());
-    return std::sqrt(system.decomposition.sum(sum).value());
-  };
+  const auto norm = [&] { return std::sqrt(sum_over_all<D>(system, [&](Id i) { return u[i].squaredNorm(); })); };
   Counters uncounted;
   double curvature = norm();
   for (int round = 0; round < kRounds && curvature > 0; ++round) {

@@ -6,6 +6,7 @@
 // at the start has the trivial contact τ = 0; it is divided out by looking at gap(τ)/τ ≈ (2 d·v̄ + τ v̄²)/2σ instead,
 // which starts at the departing velocity and falls through zero where the pair meets again.
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/integrators/discrete_gradient.h"
@@ -20,7 +21,6 @@ struct PieceEnd {
   bool violates = false;    ///< some sphere has gone into another or a wall, or through it
   bool touches = false;     ///< some gap is closed to tolerance
   double contact = kNever;  ///< c(τ)
-  EventKey<D> key{};        ///< of that contact
   EventKey<D> violator{};   ///< of an overlap
 };
 
@@ -34,7 +34,7 @@ class ChordContacts {
     PieceEnd<D> end;
     EventKey<D> key;
     const auto &chord = piece.chord(), &v_end = piece.v();
-    for (const auto& pair : scan_.candidates(x, piece.x())) {
+    for (const auto& pair : scan_.list().cover(x, piece.x())) {
       const Id i = pair.i, j = pair.j;
       key.lo = i;
       key.hi = j;
@@ -67,11 +67,6 @@ class ChordContacts {
     end.violates = true;
     end.violator = key;
   }
-  static void offer(double contact, const EventKey<D>& key, PieceEnd<D>& end) {
-    if (!(contact < end.contact)) return;
-    end.contact = contact;
-    end.key = key;
-  }
 
   void judge_pair(const EventKey<D>& key, const Vec<D>& d, const Vec<D>& u, const Vec<D>& v, const Vec<D>& v_end,
                   double sigma, double tau, double slack, PieceEnd<D>& end) const {
@@ -84,7 +79,7 @@ class ChordContacts {
         end.touches = true;
       else if (c < tau)
         violate(key, end);
-      offer(c, key, end);
+      end.contact = std::min(end.contact, c);
       return;
     }
     const double departing = 2 * d.dot(v), quotient = 2 * d.dot(u) + tau * u.squaredNorm();
@@ -93,7 +88,8 @@ class ChordContacts {
       violate(key, end);
     else if (gap_end <= tolerance && d_end.dot(v_end) < -slack)
       end.touches = true;
-    if (quotient < departing) offer(std::max(0.0, departing) * tau / (departing - quotient), key, end);
+    if (quotient < departing)
+      end.contact = std::min(end.contact, std::max(0.0, departing) * tau / (departing - quotient));
   }
 
   void judge_wall(const EventKey<D>& key, double gap, double u, double v, double v_end, double radius, double tau,
@@ -104,14 +100,14 @@ class ChordContacts {
         end.touches = true;
       else if (gap_end < 0)
         violate(key, end);
-      if (u < 0) offer(gap / -u, key, end);
+      if (u < 0) end.contact = std::min(end.contact, gap / -u);
       return;
     }
     if (gap_end < scan_.floor(gap, tolerance))
       violate(key, end);
     else if (gap_end <= tolerance && v_end < -scan_.resting_speed())
       end.touches = true;
-    if (u < v) offer(std::max(0.0, v) * tau / (v - u), key, end);
+    if (u < v) end.contact = std::min(end.contact, std::max(0.0, v) * tau / (v - u));
   }
 
   const System<D>& system_;

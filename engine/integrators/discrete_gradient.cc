@@ -55,7 +55,7 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<Resti
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     for (std::size_t i = 0; i < n; ++i) {
       trial_[i] = x_[i] + tau * mean_[i];
-      for (int k = 0; k < D; ++k)  // a wild iterate would meet images without number
+      for (int k = 0; k < D; ++k)  // an iterate far away would meet images without number
         if (box.periodic(k) && !(std::abs(tau * mean_[i][k]) <= 0.5 * box.edges[k])) return give_up();
     }
     evaluate_mean_forces<D>(system_, x_, trial_, force_, counters);

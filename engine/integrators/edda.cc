@@ -34,14 +34,14 @@ namespace {
 constexpr int kMostSweeps = 60;
 constexpr int kMostPieces = 1 << 14;          // of a step
 constexpr std::uint64_t kFew = 5;             // one particle in so many has changed: only its pairs are evaluated
-constexpr int kPatience = 6;                  // sweeps before particles may be frozen
+constexpr int kSweepsBeforeFreezing = 6;      // sweeps before particles may be frozen
 constexpr int kSwaps = 3;                     // of partners after that, until a particle is frozen
 constexpr int kStart = 4;                     // sweeps after which contraction tells of stiffness
 constexpr double kSlow = 0.04;                // contraction of two sweeps that tells of it
 constexpr double kRoom = 1.1;                 // for frequencies above the one found
 constexpr std::int64_t kMeasured = 1000;      // slabs for which it is good
 constexpr std::size_t kSmooth = 3;            // past slabs that the start is extrapolated from
-constexpr double kStalled = 0.1;              // contraction of kPatience sweeps that is too little
+constexpr double kStalled = 0.1;              // contraction of kSweepsBeforeFreezing sweeps that is too little
 constexpr double kTooStiff = 0.5;             // such a contraction expected: nothing is frozen for stiffness
 constexpr double kMostFolded = 0.1;           // of the kinetic energy, for frozen particles
 constexpr double kSettled = 0.5;              // of the tolerance: such a particle keeps its path
@@ -73,12 +73,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     past_.start(system.fields, a_);
     system.fields.add_value("edda", scales_);
     system.fields.add_value("edda found", kept_);
-    const auto sum = [&](auto&& term) {
-      ExactSum own;
-      for (Id i = 0; i < p.size(); ++i)
-        if (p.owns(i)) own.add(term(i));
-      return system.decomposition.sum(own).value();
-    };
+    const auto sum = [&](auto&& term) { return sum_over_all<D>(system, term); };
     const double n = static_cast<double>(std::max<std::size_t>(1, system.size()));
     scales_.speed = std::sqrt(sum([&](Id i) { return p.v[i].squaredNorm(); }) / n);
     scales_.strength = std::sqrt(sum([&](Id i) { return a_[i].squaredNorm(); }) / n);
@@ -134,7 +129,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         continue;
       }
       system.decomposition.need_all();
-      if (!end_.complete && !end_.wild) {
+      if (!end_.complete && !end_.too_strong) {
         scan.count_event(end_.key);
         to_contact = end_.time > 0;
         longest = to_contact ? end_.time : longest;
@@ -176,10 +171,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (!std::isfinite(largest)) return false;
       if (largest <= wanted) return true;
       if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * residual[sweep - 1]) return true;
-      if (sweep >= kPatience && swaps > 0) freeze();
-      const double stalled = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kPatience));
-      if (sweep > kPatience && sweep % kPatience == 0 && stalled < kTooStiff &&
-          largest > stalled * residual[sweep - kPatience])
+      if (sweep >= kSweepsBeforeFreezing && swaps > 0) freeze();
+      const double stalled = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kSweepsBeforeFreezing));
+      if (sweep > kSweepsBeforeFreezing && sweep % kSweepsBeforeFreezing == 0 && stalled < kTooStiff &&
+          largest > stalled * residual[sweep - kSweepsBeforeFreezing])
         freeze_stalled(largest / h);
       const bool slow =
           sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * residual[sweep - 2]);
@@ -291,13 +286,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// Whether what frozen particles lack is little beside the kinetic energy.
   bool can_fold(const System<D>& system, double h) const {
     const auto& p = system.particles;
-    ExactSum lacks, kinetic;
-    for (Id i = 0; i < p.size(); ++i) {
-      if (!p.owns(i)) continue;
-      if (frozen(i)) lacks.add(std::min(std::abs(lack(p, i, h)), std::numeric_limits<double>::max()));
-      kinetic.add(0.5 * p.mass[i] * (p.v[i] - centre()).squaredNorm());
-    }
-    return system.decomposition.sum(lacks).value() <= kMostFolded * system.decomposition.sum(kinetic).value();
+    const double lacks = sum_over_all<D>(system, [&](Id i) {
+      return frozen(i) ? std::min(std::abs(lack(p, i, h)), std::numeric_limits<double>::max()) : 0.0;
+    });
+    return lacks <= kMostFolded * sum_over_all<D>(system, [&](Id i) {
+                      return 0.5 * p.mass[i] * (p.v[i] - centre()).squaredNorm();
+                    });
   }
 
   /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.

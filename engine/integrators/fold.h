@@ -51,6 +51,7 @@ double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, Counters& 
   constexpr std::size_t kLeast = 16, kMost = 64;
   constexpr double kShare = 0.1;
   struct Near {
+    std::size_t lack;  ///< its number
     double squared_distance;
     Id id;
     double mass;
@@ -61,35 +62,27 @@ double fold_near(System<D>& system, const std::vector<Lack<D>>& mine, Counters& 
   };
   Communicator& ranks = system.decomposition.ranks();
   Particles<D>& p = system.particles;
-  Bytes message;
-  for (const Lack<D>& each : mine) put(message, each);
-  std::vector<Lack<D>> lacks;
-  for (const Bytes& bytes : ranks.gather(message))
-    for (Reader reader(bytes); reader.more();) lacks.push_back(reader.get<Lack<D>>());
+  std::vector<Lack<D>> lacks = gather_values<Lack<D>>(ranks, mine);
   if (lacks.empty()) return 0;
   counters.frozen += lacks.size();
   std::ranges::sort(lacks, {}, &Lack<D>::id);
 
   std::vector<std::vector<Near>> near(lacks.size());
-  message.clear();
+  std::vector<Near> own;
   for (std::size_t k = 0; k < lacks.size(); ++k) {
     for (Id j = 0; j < p.size(); ++j) {
       if (!p.owns(j)) continue;
       const Vec<D> d = p.x[j] - lacks[k].x;
       near[k].push_back(
-          {(d + system.box.shift(system.box.nearest_image(d))).squaredNorm(), p.id_of(j), p.mass[j], p.v[j]});
+          {k, (d + system.box.shift(system.box.nearest_image(d))).squaredNorm(), p.id_of(j), p.mass[j], p.v[j]});
     }
     const std::size_t most = std::min(kMost, near[k].size());
     std::ranges::partial_sort(near[k], near[k].begin() + static_cast<std::ptrdiff_t>(most), std::less<>{});
     near[k].resize(most);
-    for (const Near& each : near[k]) put(message, k), put(message, each);
+    own.insert(own.end(), near[k].begin(), near[k].end());
     near[k].clear();
   }
-  for (const Bytes& bytes : ranks.gather(message))
-    for (Reader reader(bytes); reader.more();) {
-      const auto k = reader.get<std::size_t>();
-      near[k].push_back(reader.get<Near>());
-    }
+  for (const Near& each : gather_values<Near>(ranks, own)) near[each.lack].push_back(each);
 
   std::map<Id, Vec<D>> changed;
   const auto velocity = [&](const Near& each) {

@@ -55,13 +55,21 @@ Value handed_on(Communicator& ranks, Value value, Add&& add) {
   return value;
 }
 
+/// The values of all ranks, those of one rank after the other. Collective.
+template <class Value>
+std::vector<Value> gather_values(Communicator& ranks, std::span<const Value> mine) {
+  const auto bytes = std::as_bytes(mine);
+  std::vector<Value> all;
+  for (const Bytes& each : ranks.gather({bytes.begin(), bytes.end()}))
+    for (Reader reader(each); reader.more();) all.push_back(reader.get<Value>());
+  return all;
+}
+
 /// The sum over all ranks of what has a function add().
 template <class Sums>
 Sums sum_of_all(Communicator& ranks, const Sums& mine) {
-  Bytes bytes;
-  put(bytes, mine);
   Sums all;
-  for (const Bytes& each : ranks.gather(bytes)) all.add(Reader(each).get<Sums>());
+  for (const Sums& each : gather_values<Sums>(ranks, {&mine, 1})) all.add(each);
   return all;
 }
 

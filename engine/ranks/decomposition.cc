@@ -109,7 +109,7 @@ bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
   const auto farthest = [&] { return std::sqrt(largest(halo_.squared_farthest(system_.box, system_.particles))); };
   if (all_known_ ? slab < next_ : !width_.outdated(farthest)) return false;
   if (!all_known_) {  // all has gone well since the last time
-    patience_ = std::max<std::int64_t>(patience_ / 2, 1);
+    slabs_with_all_ = std::max<std::int64_t>(slabs_with_all_ / 2, 1);
     width_.relax();
   }
   migrate(!local_, slab_length);
@@ -121,8 +121,8 @@ template <int D>
 void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
   if (width_.asked() && migrate_to_those_near(slab_length)) return;
   migrate_to_all();
-  next_ = slab + patience_;
-  patience_ = std::min(2 * patience_, kSlabs);
+  next_ = slab + slabs_with_all_;
+  slabs_with_all_ = std::min(2 * slabs_with_all_, kSlabs);
 }
 
 template <int D>

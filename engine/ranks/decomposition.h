@@ -139,7 +139,7 @@ class Decomposition {
   HaloWidth width_;
   HaloExchange<D> halo_;
   std::int64_t next_ = 0;  // while all are known: the slab before which to divide
-  std::int64_t patience_ = 1;
+  std::int64_t slabs_with_all_ = 1;
 };
 
 }  // namespace carom

@@ -27,19 +27,10 @@ std::vector<Value> to_those_near(const Bisection<D>& bisection, Communicator& ra
   return near;
 }
 
-/// The particles in this rank's part of the box, and copies of those near it; by id, ascending.
+/// Of the particles that all ranks have together, this one its block: those in this rank's subdomain, and as ghosts
+/// copies of those nearer to it than `distance`, but for rounding. They have only x, radius, id and ghost. Collective.
 template <int D>
-struct Halo {
-  std::vector<Vec<D>> x;
-  std::vector<double> radius;
-  std::vector<Id> id;
-  std::vector<char> ghost;  ///< 1: not in this part, but near it
-};
-
-/// Of the particles that all ranks have together, this one its block; near: nearer than `distance`, but for rounding.
-/// Collective.
-template <int D>
-Halo<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, const Particles<D>& block) {
+Particles<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, const Particles<D>& block) {
   struct Copy {
     Vec<D> x;
     double radius;
@@ -51,7 +42,7 @@ Halo<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, const P
       send(bisection.wrapped(block.x[i]), Copy{block.x[i], block.radius[i], block.id_of(i)});
   });
   std::ranges::sort(copies, {}, &Copy::id);
-  Halo<D> halo;
+  Particles<D> halo;
   for (const Copy& copy : copies) {
     halo.x.push_back(copy.x);
     halo.radius.push_back(copy.radius);

@@ -10,11 +10,11 @@ void Ownership<D>::load(const Bisection<D>& bisection, std::uint32_t number, dou
   number_ = number;
   max_displacement_ = max_displacement;
   unwatched_ = std::numeric_limits<double>::infinity();
-  const std::size_t room = core_.flights().room();
-  slots_.clear(room);
-  edge_.clear();
-  holders_.assign(room, 0);
-  role_.assign(room, Role::none);
+  const std::size_t slots = core_.flights().capacity();
+  slots_.clear(slots);
+  watched_.clear();
+  holders_.assign(slots, 0);
+  role_.assign(slots, Role::none);
   for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, Role::own);
 }
 
@@ -44,19 +44,19 @@ template <int D>
 void Ownership<D>::watch(double now) {
   unwatched_ = 0;
   const double reach = bisection_->reach() + (kSlack + 1) * max_displacement_;
-  std::erase_if(edge_, [&](const Edge& edge) { return role_[edge.slot] != Role::ghost; });
+  std::erase_if(watched_, [&](const Watched& each) { return role_[each.slot] != Role::ghost; });
   for (Slot i = 0; i < core_.flights().size(); ++i)
     if (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)
-      edge_.push_back({i, 0});
+      watched_.push_back({i, 0});
   std::vector<Slot> slots;
-  for (const Edge& edge : edge_) slots.push_back(edge.slot);
+  for (const Watched& each : watched_) slots.push_back(each.slot);
   core_.set_border(slots, now);
 }
 
 /// Finds the owner of a sphere and the subdomains in which it is a ghost, from its position now, and how far it may
 /// come until one of these changes; other subdomains that have it find the same.
 template <int D>
-typename Ownership<D>::Edge Ownership<D>::look_at(Slot i, double now) {
+typename Ownership<D>::Watched Ownership<D>::look_at(Slot i, double now) {
   const Flights<D>& flights = core_.flights();
   const Vec<D> at = bisection_->wrapped(flights.at(i, now).x);
   const double speed = flights[i].v.norm() + flights.g().norm() * flights.horizon();
@@ -95,7 +95,7 @@ bool Ownership<D>::admit(const Record<D>& r, double now) {
   Slot slot = 0;
   if (!core_.admit(r, now, slot)) return false;
   enlist(slot, Role::ghost);
-  edge_.push_back({slot, 0});
+  watched_.push_back({slot, 0});
   return true;
 }
 

@@ -54,7 +54,7 @@ class Ownership {
   static constexpr double kSlack = 20;                        // windows between searches for spheres at the border
   enum class Role : std::uint8_t { none, own, seen, ghost };  // none: no sphere; seen: own, and a ghost elsewhere
 
-  struct Edge {
+  struct Watched {
     Slot slot;
     double quiet;             // how far it may come before it must be looked at again
     double speed = kUnknown;  // until its next event; unknown: as large as any
@@ -63,7 +63,7 @@ class Ownership {
   void enlist(Slot i, Role role);
   void forget(Slot i);
   void watch(double now);
-  Edge look_at(Slot i, double now);
+  Watched look_at(Slot i, double now);
   /// How far a sphere comes from its record before `end` at most.
   double way(const Record<D>& r, double end) const {
     const double time = end - r.t;
@@ -78,7 +78,7 @@ class Ownership {
   IdTable slots_;
   std::vector<Role> role_;              // by slot
   std::vector<std::uint64_t> holders_;  // by slot
-  std::vector<Edge> edge_;              // ghosts, and own spheres that may leave, or that others may see
+  std::vector<Watched> watched_;        // ghosts, and own spheres that may leave, or that others may see
 };
 
 template <int D>
@@ -86,20 +86,20 @@ template <class Deflected, class Send>
 void Ownership<D>::sort_out(double now, double length, Deflected&& deflected, Send&& send) {
   if (unwatched_ += max_displacement_; unwatched_ > kSlack * max_displacement_) watch(now);
   std::size_t stay = 0;
-  for (Edge edge : edge_) {
-    const Slot i = edge.slot;
-    if (edge.speed >= 0 && deflected(i)) edge.speed = kUnknown;
-    edge.quiet -= edge.speed >= 0 ? edge.speed * length : max_displacement_;
-    if (!(edge.quiet > 0)) {
+  for (Watched each : watched_) {
+    const Slot i = each.slot;
+    if (each.speed >= 0 && deflected(i)) each.speed = kUnknown;
+    each.quiet -= each.speed >= 0 ? each.speed * length : max_displacement_;
+    if (!(each.quiet > 0)) {
       const std::uint64_t before = holders_[i];
-      edge = look_at(i, now);
+      each = look_at(i, now);
       if (role_[i] == Role::none) continue;
       for (std::uint64_t fresh = holders_[i] & ~before; fresh != 0; fresh &= fresh - 1)
         send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
     }
-    edge_[stay++] = edge;
+    watched_[stay++] = each;
   }
-  edge_.resize(stay);
+  watched_.resize(stay);
 }
 
 }  // namespace carom

@@ -20,7 +20,7 @@ class PathExchange {
   }
   /// Sends the messages; returns those that have come from neighbours. Collective.
   std::vector<Bytes> swap();
-  /// Sends the paths of a window and mends them until nothing changes on any rank; returns how many rounds it took.
+  /// Sends the paths of a window and repairs them until nothing changes on any rank; returns how many rounds it took.
   /// Once a window: what was received stays until the next. Null: this rank has no subdomain. Collective.
   std::uint64_t agree(Subdomain<D>* subdomain);
 

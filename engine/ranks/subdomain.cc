@@ -1,18 +1,20 @@
 #include "engine/ranks/subdomain.h"
 
+#include <algorithm>
+
 namespace carom {
 
 template <int D>
 void Subdomain<D>::load(std::vector<Record<D>> records, const Bisection<D>& bisection, std::uint32_t number,
                         const Vec<D>& g, double horizon, double now, double max_displacement) {
   core_.load(std::move(records), g, horizon, now, 2 * max_displacement);
-  const std::size_t room = core_.flights().room();
+  const std::size_t slots = core_.flights().capacity();
   ownership_.load(bisection, number, max_displacement);
-  paths_.load(room);
-  repair_.load(room);
+  paths_.load(slots);
+  repair_.load(slots);
   changed_.clear();
   other_.clear();
-  disturbed_.assign(room, 0);
+  disturbed_.assign(slots, 0);
 }
 
 template <int D>
@@ -38,6 +40,23 @@ void Subdomain<D>::commit() {
   for (const auto& [slot, record] : other_) disturbed_[slot] = 1;
   core_.put(other_, end_);
   changed_.clear();
+}
+
+template <int D>
+Contact<D> Subdomain<D>::contact_of(Slot lo, std::size_t k) {
+  const EventKey<D> key = path(lo)[k].key;
+  Record<D> a = before(lo, k);
+  if (key.kind == EventKind::wall) {
+    const Impact<D> impact = flights().bounce(lo, a, box_.wall(key.hi), key.time, key.generation);
+    return flights().contact_of(key, a, impact);
+  }
+  const Slot hi = slot_of(key.hi);
+  const auto nodes = path(hi);
+  const auto met = std::ranges::find(nodes, key, &Node<D>::key) - nodes.begin();
+  Record<D> b = before(hi, static_cast<std::size_t>(met));
+  const Vec<D> shift = box_.shift(key.image);
+  const Impact<D> impact = flights().collide(lo, a, hi, b, shift, key.time, key.generation);
+  return flights().contact_of(key, a, b, shift, impact);
 }
 
 template class Subdomain<2>;

@@ -24,7 +24,8 @@ class Subdomain {
  public:
   /// `sizes` has the masses and radii of all spheres, and outlives the subdomain.
   Subdomain(const Box<D>& box, const Sizes& sizes, const SearchOptions& options)
-      : core_(box, &sizes, options),
+      : box_(box),
+        core_(box, &sizes, options),
         ownership_(core_),
         paths_(core_.flights(), ownership_),
         repair_(box, core_, ownership_, paths_) {}
@@ -60,7 +61,7 @@ class Subdomain {
   void write_path(Slot i, Bytes& to) const { paths_.write(i, to); }
   /// Reads the path of a ghost that its owner has sent; the message must stay until the end of the window.
   void follow(Id id, Reader& message) { paths_.read_script(slot_of(id), message); }
-  /// Mends the window after scripts have come.
+  /// Repairs the window after scripts have come.
   void repair() { changed_ = repair_.run(); }
   /// What a sphere did in the window.
   std::span<const Node<D>> path(Slot i) { return paths_.path(i); }
@@ -73,6 +74,16 @@ class Subdomain {
   void for_each_touched(Visit&& visit) const {
     paths_.for_each_own(visit);
   }
+  /// Calls visit(slot, k) for each node k of a path that stands for a contact of which the lower id is owned.
+  template <class Visit>
+  void for_each_contact(Visit&& visit) {
+    for_each_touched([&](Slot i) {
+      const auto nodes = path(i);
+      for (std::size_t k = 0; k < nodes.size(); ++k)
+        if (nodes[k].key.lo == nodes[k].after.id) visit(i, k);
+    });
+  }
+  Contact<D> contact_of(Slot lo, std::size_t k);
   /// Own spheres that are ghosts elsewhere, and have other paths than before the last run() or repair().
   std::span<const Slot> changed() const { return changed_; }
   /// Which neighbours have an own sphere as a ghost: a bit for each.
@@ -94,6 +105,7 @@ class Subdomain {
   std::uint64_t redone_events() const { return repair_.events(); }  ///< in repairs
 
  private:
+  const Box<D>& box_;
   EventCore<D> core_;
   Ownership<D> ownership_;
   WindowPaths<D> paths_;

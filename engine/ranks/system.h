@@ -1,5 +1,5 @@
 #pragma once
-// The particles and what acts on them: the state that an integrator advances, with its bisection among ranks.
+// The particles and what acts on them: the state that an integrator advances, with its decomposition among ranks.
 
 #include <algorithm>
 #include <memory>
@@ -50,22 +50,18 @@ struct System {
 
   /// Whether nothing changes the total momentum: no wall, no field.
   bool keeps_momentum() const {
-    for (int k = 0; k < D; ++k)
-      if (box.walled(k)) return false;
-    return std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
+    return !box.has(Boundary::wall) &&
+           std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
   }
 
   /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
-  void wrap();
+  void wrap() {
+    for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i]);
+  }
 
   /// Throws Error(Failure::initial_state) where arrays of the particles differ in length, or a value cannot be:
   /// positions or velocities that are not finite, masses, radii or edges that are not positive, unknown species.
   void check() const;
 };
-
-template <int D>
-void System<D>::wrap() {
-  for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i]);
-}
 
 }  // namespace carom

@@ -18,7 +18,7 @@ void WindowPaths<D>::load(std::size_t slots) {
 
 template <int D>
 Trace<D>& WindowPaths<D>::start() {
-  trace_.clear(flights_.room());
+  trace_.clear(flights_.capacity());
   return trace_;
 }
 

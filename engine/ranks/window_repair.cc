@@ -7,7 +7,7 @@ namespace carom {
 template <int D>
 std::vector<Slot> WindowRepair<D>::run() {
   repairs_.clear();
-  paths_.for_each_ghost([&](Slot g) { seed(g); });
+  paths_.for_each_ghost([&](Slot g) { compare(g); });
   while (!tasks_.empty()) {
     const Task task = tasks_.top();
     tasks_.pop();
@@ -21,16 +21,16 @@ std::vector<Slot> WindowRepair<D>::run() {
       case Task::Kind::check:
         check(task);
         break;
-      case Task::Kind::seed:
-        if (mended(task.a)) break;
-        Mended& m = mend(task.a, task.key);
+      case Task::Kind::difference:
+        if (repaired(task.a)) break;
+        Repaired& m = begin(task.a, task.key);
         plan_script(m);
         if (const Node<D>* next = next_of_script(m); !next || next->key != task.key) predict(m, task.key);
     }
   }
   std::vector<Slot> changed;
-  for (const Mended& m : repairs_) {
-    mended_of_[m.slot] = kNone;
+  for (const Repaired& m : repairs_) {
+    repair_of_[m.slot] = kNone;
     if (!ownership_.owns(m.slot)) continue;
     const auto now = paths_.path(m.slot).subspan(m.kept);
     if (!std::equal(now.begin(), now.end(), m.old.begin(), m.old.end())) changed.push_back(m.slot);
@@ -40,26 +40,26 @@ std::vector<Slot> WindowRepair<D>::run() {
 
 /// Where the path of a ghost differs from its script, and not by a contact with own spheres, it is repaired from there.
 template <int D>
-void WindowRepair<D>::seed(Slot g) {
+void WindowRepair<D>::compare(Slot g) {
   if (paths_.matches(g)) return;
   const auto seen = paths_.path(g), script = paths_.script(g);
   const auto [here, there] = std::mismatch(seen.begin(), seen.end(), script.begin(), script.end());
   const bool sees = here != seen.end() && !ownership_.owns_id(here->partner());
   if (there != script.end() && (here == seen.end() || there->key <= here->key)) {
     if (ownership_.owns_id(there->partner()) && !sees) return;
-    tasks_.push({.kind = Task::Kind::seed, .key = there->key, .a = g});
+    tasks_.push({.kind = Task::Kind::difference, .key = there->key, .a = g});
   } else if (sees) {
-    tasks_.push({.kind = Task::Kind::seed, .key = here->key, .a = g});
+    tasks_.push({.kind = Task::Kind::difference, .key = here->key, .a = g});
   }
 }
 
 /// Cuts the path of a sphere at `key`; the partners of the events taken back must be checked.
 template <int D>
-typename WindowRepair<D>::Mended& WindowRepair<D>::mend(Slot i, const EventKey<D>& key) {
+typename WindowRepair<D>::Repaired& WindowRepair<D>::begin(Slot i, const EventKey<D>& key) {
   auto& path = paths_.rewrite(i);
   const auto from = std::find_if(path.begin(), path.end(), [&](const Node<D>& n) { return !(n.key < key); });
-  mended_of_[i] = static_cast<std::uint32_t>(repairs_.size());
-  Mended& m = repairs_.emplace_back();
+  repair_of_[i] = static_cast<std::uint32_t>(repairs_.size());
+  Repaired& m = repairs_.emplace_back();
   m.slot = i;
   m.version = 1;
   m.kept = static_cast<std::size_t>(from - path.begin());
@@ -81,21 +81,21 @@ typename WindowRepair<D>::Mended& WindowRepair<D>::mend(Slot i, const EventKey<D
 
 /// The next node that a ghost has in its script; null: there is none, or it no longer follows it.
 template <int D>
-const Node<D>* WindowRepair<D>::next_of_script(const Mended& m) {
+const Node<D>* WindowRepair<D>::next_of_script(const Repaired& m) {
   const auto script = paths_.script(m.slot);
   return m.left_script || m.script >= script.size() ? nullptr : &script[m.script];
 }
 
 template <int D>
-void WindowRepair<D>::plan_script(Mended& m) {
+void WindowRepair<D>::plan_script(Repaired& m) {
   if (const Node<D>* next = next_of_script(m))
     tasks_.push(
         {.kind = Task::Kind::script, .key = next->key, .a = m.slot, .version_a = static_cast<std::uint32_t>(m.script)});
 }
 
-/// Plans all contacts that a mended sphere may have from `now` on.
+/// Plans all contacts that a repaired sphere may have from `now` on.
 template <int D>
-void WindowRepair<D>::predict(Mended& m, const EventKey<D>& now) {
+void WindowRepair<D>::predict(Repaired& m, const EventKey<D>& now) {
   const bool ghost = ownership_.is_ghost(m.slot);
   Vec<D> low, high;
   if (ghost && !ownership_.meeting_place(m.now, end_, low, high)) return;
@@ -116,9 +116,9 @@ void WindowRepair<D>::predict(Mended& m, const EventKey<D>& now) {
   }
 }
 
-/// Plans the contact of a mended sphere with another one.
+/// Plans the contact of a repaired sphere with another one.
 template <int D>
-void WindowRepair<D>::meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>& now) {
+void WindowRepair<D>::meet(Repaired& m, Slot j, const Image<D>& image, const EventKey<D>& now) {
   const Vec<D> shift = box_.shift(image);
   // The contact with a record of the other one; false: none in the window.
   EventKey<D> key;
@@ -130,8 +130,8 @@ void WindowRepair<D>::meet(Mended& m, Slot j, const Image<D>& image, const Event
     return true;
   };
   bool found = false;
-  if (mended(j)) {
-    found = meets(repairs_[mended_of_[j]].now);
+  if (repaired(j)) {
+    found = meets(repairs_[repair_of_[j]].now);
   } else if (paths_.has_no_events(j)) {
     found = meets(paths_.after(j));
   } else {  // along its path: a contact counts only before the path turns
@@ -157,22 +157,22 @@ void WindowRepair<D>::contact(const Task& task) {
   const bool pair = key.kind == EventKind::pair;
   if (version(task.a) != task.version_a || (pair && version(task.b) != task.version_b)) return;
   ++events_;
-  Mended& a = mended_at(task.a, key);
+  Repaired& a = repaired_at(task.a, key);
   Node<D> of_a{a.now, key};
   if (!pair) {
     const Wall<D> wall = box_.wall(key.hi);
-    const Blow<D> blow = flights_.bounce(a.slot, of_a.after, wall, key.time, key.generation);
-    of_a.virial = wall.work(blow.impulse);
-    of_a.overlap = blow.overlap;
+    const Impact<D> impact = flights_.bounce(a.slot, of_a.after, wall, key.time, key.generation);
+    of_a.virial = wall.work(impact.impulse);
+    of_a.overlap = impact.overlap;
     append(a, of_a);
     return predict(a, key);
   }
-  Mended& b = mended_at(task.b, key);
+  Repaired& b = repaired_at(task.b, key);
   Node<D> of_b{b.now, key};
-  const Blow<D> blow =
+  const Impact<D> impact =
       flights_.collide(a.slot, of_a.after, b.slot, of_b.after, box_.shift(task.image), key.time, key.generation);
-  of_a.virial = of_b.virial = blow.d.dot(blow.impulse);
-  of_a.overlap = of_b.overlap = blow.overlap;
+  of_a.virial = of_b.virial = impact.d.dot(impact.impulse);
+  of_a.overlap = of_b.overlap = impact.overlap;
   append(a, of_a);
   append(b, of_b);
   predict(a, key);
@@ -181,7 +181,7 @@ void WindowRepair<D>::contact(const Task& task) {
 
 /// Adds a node to a path. A ghost follows its script as long as the script has the same node.
 template <int D>
-void WindowRepair<D>::append(Mended& m, const Node<D>& node) {
+void WindowRepair<D>::append(Repaired& m, const Node<D>& node) {
   paths_.rewrite(m.slot).push_back(node);
   m.now = node.after;
   fastest_squared_ = std::max(fastest_squared_, node.after.v.squaredNorm());
@@ -196,7 +196,7 @@ void WindowRepair<D>::append(Mended& m, const Node<D>& node) {
 /// A ghost follows its script in an event without own spheres.
 template <int D>
 void WindowRepair<D>::script(const Task& task) {
-  Mended& m = repairs_[mended_of_[task.a]];
+  Repaired& m = repairs_[repair_of_[task.a]];
   if (m.left_script || m.script != task.version_a) return;
   const Node<D>& node = *next_of_script(m);
   if (ownership_.owns_id(node.partner()))
@@ -206,12 +206,12 @@ void WindowRepair<D>::script(const Task& task) {
   predict(m, task.key);
 }
 
-/// A sphere that has been mended met this one here, and no longer does.
+/// A sphere that has been repaired met this one here, and no longer does.
 template <int D>
 void WindowRepair<D>::check(const Task& task) {
   const bool ghost = ownership_.is_ghost(task.b);
-  if (mended(task.b) || (ownership_.is_ghost(task.a) && ghost)) return;
-  Mended& m = mend(task.b, task.key);
+  if (repaired(task.b) || (ownership_.is_ghost(task.a) && ghost)) return;
+  Repaired& m = begin(task.b, task.key);
   m.left_script = m.left_script || ghost;
   predict(m, task.key);
 }

@@ -20,13 +20,13 @@ class WindowRepair {
       : box_(box), core_(core), flights_(core.flights()), ownership_(ownership), paths_(paths) {}
 
   /// Makes room for so many slots.
-  void load(std::size_t slots) { mended_of_.assign(slots, kNone); }
+  void load(std::size_t slots) { repair_of_.assign(slots, kNone); }
   /// A window that ends at `end` starts.
   void start(double end) {
     end_ = end;
     fastest_squared_ = 0;
   }
-  /// Mends the paths after scripts have come. Returns the own spheres that have other paths than before.
+  /// Repairs the paths after scripts have come. Returns the own spheres that have other paths than before.
   std::vector<Slot> run();
 
   /// The largest square of a speed after an event of the window.
@@ -38,7 +38,7 @@ class WindowRepair {
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
   /// The repair of the path of a sphere.
-  struct Mended {
+  struct Repaired {
     Record<D> now;  // at the time that repair has come to
     Slot slot;
     std::uint32_t version = 0;           // grows with every change: what was planned before no longer holds
@@ -49,7 +49,7 @@ class WindowRepair {
   };
   /// What repair has to look at, in the order of keys.
   struct Task {
-    enum class Kind : std::uint8_t { contact, script, check, seed } kind;
+    enum class Kind : std::uint8_t { contact, script, check, difference } kind;
     EventKey<D> key;
     Slot a = 0, b = 0;  // b: of a contact with a sphere, and of a check
     std::uint32_t version_a = 0, version_b = 0;
@@ -61,19 +61,21 @@ class WindowRepair {
     }
   };
 
-  bool mended(Slot i) const { return mended_of_[i] != kNone; }
-  Mended& mended_at(Slot i, const EventKey<D>& key) { return mended(i) ? repairs_[mended_of_[i]] : mend(i, key); }
-  std::uint32_t version(Slot i) const { return mended(i) ? repairs_[mended_of_[i]].version : 0; }
-  const Node<D>* next_of_script(const Mended& m);
-  void seed(Slot g);
-  Mended& mend(Slot i, const EventKey<D>& key);
-  void predict(Mended& m, const EventKey<D>& now);
-  void meet(Mended& m, Slot j, const Image<D>& image, const EventKey<D>& now);
+  bool repaired(Slot i) const { return repair_of_[i] != kNone; }
+  Repaired& repaired_at(Slot i, const EventKey<D>& key) {
+    return repaired(i) ? repairs_[repair_of_[i]] : begin(i, key);
+  }
+  std::uint32_t version(Slot i) const { return repaired(i) ? repairs_[repair_of_[i]].version : 0; }
+  const Node<D>* next_of_script(const Repaired& m);
+  void compare(Slot g);
+  Repaired& begin(Slot i, const EventKey<D>& key);
+  void predict(Repaired& m, const EventKey<D>& now);
+  void meet(Repaired& m, Slot j, const Image<D>& image, const EventKey<D>& now);
   void contact(const Task& task);
   void script(const Task& task);
   void check(const Task& task);
-  void append(Mended& m, const Node<D>& node);
-  void plan_script(Mended& m);
+  void append(Repaired& m, const Node<D>& node);
+  void plan_script(Repaired& m);
 
   const Box<D>& box_;
   EventCore<D>& core_;
@@ -81,8 +83,8 @@ class WindowRepair {
   const Ownership<D>& ownership_;
   WindowPaths<D>& paths_;
   double end_ = 0;  // of the window
-  std::deque<Mended> repairs_;
-  std::vector<std::uint32_t> mended_of_;  // by slot: in repairs_, or kNone
+  std::deque<Repaired> repairs_;
+  std::vector<std::uint32_t> repair_of_;  // by slot: in repairs_, or kNone
   std::priority_queue<Task> tasks_;
   double fastest_squared_ = 0;
   std::uint64_t events_ = 0;

@@ -5,7 +5,6 @@
 #include "engine/base/error.h"
 #include "engine/ranks/halo.h"
 #include "engine/ranks/shared_contacts.h"
-#include "engine/ranks/window_contacts.h"
 
 namespace carom {
 namespace {
@@ -126,6 +125,19 @@ void WindowedFlight<D>::sort_out(bool loaded) {
   if (full > 0) reload();
 }
 
+/// The key of the n-th pair collision of a window, of those of all ranks, from 1. Collective.
+template <int D>
+EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
+  std::vector<EventKey<D>> mine;
+  if (subdomain_)
+    subdomain_->for_each_contact([&](Slot i, std::size_t k) {
+      if (const EventKey<D>& key = subdomain_->path(i)[k].key; key.kind == EventKind::pair) mine.push_back(key);
+    });
+  auto keys = gather_values<EventKey<D>>(ranks_, mine);
+  std::ranges::nth_element(keys, keys.begin() + static_cast<std::ptrdiff_t>(number - 1));
+  return keys[number - 1];
+}
+
 template <int D>
 double WindowedFlight<D>::run(double end, const Report& report) {
   ContactTally sum;
@@ -152,19 +164,19 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       stop = cut_at(beyond);
     if (subdomain_ && !subdomain_->agrees(stop))
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
-    const WindowContacts<D> found(box_, subdomain_.get());
     ContactTally got = tally();
     std::uint64_t count = got.sphere_sphere;
     ranks_.sum({&count, 1});
     if (collisions + count >= report.collision_limit) {  // there are enough
       count = report.collision_limit - collisions;
-      const EventKey<D> last = *found.key_of_collision(count, ranks_);
+      const EventKey<D> last = key_of_collision(count);
       if (subdomain_) subdomain_->cut(last);
       cut_ = true;
       got = tally();
       reached = stop = last.time;
     }
-    if (report.contacts) found.append_to(contacts);
+    if (report.contacts && subdomain_)
+      subdomain_->for_each_contact([&](Slot i, std::size_t k) { contacts.push_back(subdomain_->contact_of(i, k)); });
     sum.add(got);
     counts_.events += got.contacts();
     std::uint64_t contacts_of_all = got.contacts();

@@ -70,6 +70,7 @@ class WindowedFlight {
   Vec<D> place(const Record<D>& r, double now) const;
   void sort_out(bool loaded);
   double cut_at(double time);
+  EventKey<D> key_of_collision(std::uint64_t number) const;
   ContactTally tally() const { return subdomain_ ? subdomain_->tally() : ContactTally{}; }
 
   const Box<D>& box_;

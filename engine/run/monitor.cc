@@ -76,8 +76,8 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
 template <int D>
 void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
   const double time = statistics_.start_time;
-  for (Schedule* schedule : {&frames_, &rows_}) schedule->pass(time - time_slack());
-  for (Sampler& sampler : samplers_) sampler.due.pass(time - time_slack());
+  for (Schedule* schedule : {&frames_, &rows_}) schedule->pass(time - plan_.slack());
+  for (Sampler& sampler : samplers_) sampler.due.pass(time - plan_.slack());
   shot_ = measure(time, system_.particles, &integrator, info_.shadow, fresh);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   std::copy_n(shot_.momentum.begin(), D, account_.first_momentum.begin());
@@ -114,7 +114,7 @@ void Monitor<D>::guard(double energy_before, double magnitude_before) {
          short_text(account_.energy));
 }
 
-/// Which particle is the fastest, for people. Collective.
+/// Which particle is the fastest, for messages. Collective.
 template <int D>
 std::string Monitor<D>::fastest(const Particles<D>& state) const {
   constexpr double kNone = -std::numeric_limits<double>::infinity();
@@ -138,9 +138,9 @@ std::vector<double> Monitor<D>::due_within(const Slab& slab) const {
   for (;;) {
     double due = std::numeric_limits<double>::infinity();
     for (const Schedule& schedule : all) due = std::min(due, schedule.due());
-    if (!(due < slab.start + slab.length - time_slack())) break;
+    if (!(due < slab.start + slab.length - plan_.slack())) break;
     times.push_back(due - slab.start);
-    for (Schedule& schedule : all) schedule.pass(due + time_slack());
+    for (Schedule& schedule : all) schedule.pass(due + plan_.slack());
   }
   return times;
 }
@@ -148,24 +148,24 @@ std::vector<double> Monitor<D>::due_within(const Slab& slab) const {
 template <int D>
 void Monitor<D>::observe(double time, const Particles<D>& copies) {
   sample(time, copies);
-  if (std::min(frames_.due(), rows_.due()) <= time + time_slack()) show(measure(time, copies, nullptr, false), false);
+  if (std::min(frames_.due(), rows_.due()) <= time + plan_.slack()) show(measure(time, copies, nullptr, false), false);
 }
 
 /// Shows the particles to observers that look at times of their own.
 template <int D>
 void Monitor<D>::sample(double time, const Particles<D>& state) {
   for (Sampler& sampler : samplers_) {
-    if (sampler.due.due() > time + time_slack()) continue;
+    if (sampler.due.due() > time + plan_.slack()) continue;
     const Stopwatch watch(statistics_.counters.seconds.output);
     sampler.observer->sample(time, all_particles(state));
-    sampler.due.pass(time + time_slack());
+    sampler.due.pass(time + plan_.slack());
   }
 }
 
 template <int D>
 void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bool last) {
   Statistics& s = statistics_;
-  const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + time_slack();
+  const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + plan_.slack();
   const bool first = s.steps == s.start_steps + 1;
   const bool with_shadow = info_.shadow && (due || first || system_.size() <= kShadowAtEveryStep);
   const double speed = account_.speed, energy = account_.energy, magnitude = account_.magnitude;
@@ -244,7 +244,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
 
 template <int D>
 void Monitor<D>::show(Snapshot<D> shot, bool last) {
-  const double now = shot.time + time_slack();
+  const double now = shot.time + plan_.slack();
   const bool frame = frames_.due() <= now || (last && shot.time > account_.last_frame);
   const bool row = rows_.due() <= now || (last && shot.time > account_.last_row);
   if (!frame && !row) return;
@@ -274,12 +274,12 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
 template <int D>
 auto Monitor<D>::deepest_overlap() -> Overlap {
   Overlap deepest;
-  const auto look = [&](NeighbourList<D>& list, const auto& p, auto&& id_of) {
+  const auto look = [&](NeighbourList<D>& list, const Particles<D>& p) {
     for (const auto& pair : list.cover(p.x)) {
       const double sigma = p.radius[pair.i] + p.radius[pair.j];
       const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
       if (squared >= sigma * sigma) continue;
-      const auto [lo, hi] = std::minmax({id_of(pair.i), id_of(pair.j)});
+      const auto [lo, hi] = std::minmax({p.id_of(pair.i), p.id_of(pair.j)});
       const Overlap found{1 - std::sqrt(squared) / sigma, lo, hi};
       const auto order = [](const Overlap& o) { return std::tuple(-o.depth, o.lo, o.hi); };
       if (order(found) < order(deepest)) deepest = found;
@@ -288,11 +288,11 @@ auto Monitor<D>::deepest_overlap() -> Overlap {
   const Particles<D>& p = system_.particles;
   const Decomposition<D>& ranks = system_.decomposition;
   if (ranks.joined() && !ranks.by_place()) {
-    const Halo<D> halo = halo_of(system_.box, 2 * ranks.sizes().largest_radius(), ranks.ranks(), p);
+    const Particles<D> halo = halo_of(system_.box, 2 * ranks.sizes().largest_radius(), ranks.ranks(), p);
     NeighbourList<D> touching(system_.box, halo.radius, halo.ghost);
-    look(touching, halo, [&](Id i) { return halo.id[i]; });
+    look(touching, halo);
   } else {
-    look(*touching_, p, [&](Id i) { return p.id_of(i); });
+    look(*touching_, p);
   }
   return deepest;
 }

@@ -62,9 +62,6 @@ class Monitor {
     show(shot_, true);
   }
 
-  /// Due times and ends are met up to this [time].
-  double time_slack() const { return 1e-9 * plan_.step; }
-
  private:
   /// An observer that looks at times of its own.
   struct Sampler {

@@ -36,8 +36,8 @@ void check_spheres(const System<D>& system) {
 }
 
 /// How long the slab that starts then is: to the end, where that is nearer than a step.
-double length_from(double start, const Plan& plan, double slack) {
-  const bool last = plan.end_time && start + plan.step > *plan.end_time - slack;
+double length_from(double start, const Plan& plan) {
+  const bool last = plan.end_time && start + plan.step > *plan.end_time - plan.slack();
   return last ? *plan.end_time - start : plan.step;
 }
 
@@ -129,8 +129,8 @@ void Simulation<D>::run(const Hooks& hooks) {
 
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
-    const auto life = std::chrono::steady_clock::now() - clock_start;
-    s.wall_seconds = seconds_before + std::chrono::duration<double>(life).count();
+    const auto elapsed = std::chrono::steady_clock::now() - clock_start;
+    s.wall_seconds = seconds_before + std::chrono::duration<double>(elapsed).count();
   };
   std::vector<Contact<D>> contacts;
   const auto show_contacts = [&](double start) {
@@ -227,7 +227,7 @@ bool Simulation<D>::is_last_on_the_way() const {
   const Statistics& s = statistics_;
   // A slab that meets an end may be shorter or longer than a step by rounding alone.
   const bool whole = s.end_time == time_of(s.steps) &&
-                     (s.steps == s.start_steps || length_from(time_of(s.steps - 1), plan_, time_slack()) == plan_.step);
+                     (s.steps == s.start_steps || length_from(time_of(s.steps - 1), plan_) == plan_.step);
   return whole && (finished() || next_slab().length != plan_.step);
 }
 
@@ -236,7 +236,7 @@ Slab Simulation<D>::next_slab() const {
   Slab slab;
   slab.index = statistics_.steps;
   slab.start = time_of(slab.index);
-  slab.length = length_from(slab.start, plan_, time_slack());
+  slab.length = length_from(slab.start, plan_);
   if (plan_.collisions && !info_.stepping) slab.collision_limit = *plan_.collisions;
   return slab;
 }
@@ -244,7 +244,8 @@ Slab Simulation<D>::next_slab() const {
 template <int D>
 bool Simulation<D>::finished() const {
   const Statistics& s = statistics_;
-  return (plan_.steps && s.steps >= *plan_.steps) || (plan_.end_time && s.end_time >= *plan_.end_time - time_slack()) ||
+  return (plan_.steps && s.steps >= *plan_.steps) ||
+         (plan_.end_time && s.end_time >= *plan_.end_time - plan_.slack()) ||
          (plan_.collisions && s.counters.sphere_sphere >= *plan_.collisions);
 }
 

@@ -29,6 +29,8 @@ struct Plan {
   double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
   double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
   bool events = false;         ///< pass every contact on to the observers
+
+  double slack() const { return 1e-9 * step; }  ///< due times and ends are met up to this [time]
 };
 
 /// What an observer is shown: a state and its observables, all at `time`.
@@ -186,7 +188,6 @@ class Simulation {
   Slab next_slab() const;
   bool finished() const;
   void need_collisions() const;
-  double time_slack() const { return 1e-9 * plan_.step; }  ///< ends are met up to this [time]
   double fraction_done() const;
 
   std::unique_ptr<System<D>> system_;

@@ -11,7 +11,7 @@
 namespace carom {
 
 namespace {
-constexpr std::size_t kMostPairs = 10'000'000, kMostPartners = 200;  // a particle; more are a step gone wild
+constexpr std::size_t kMostPairs = 10'000'000, kMostPartners = 200;  // a particle; more come from far too long a step
 }  // namespace
 
 /// Cells for particles of one size.

@@ -35,7 +35,7 @@ class NeighbourList {
   NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without = {});
 
   /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them
-  /// (arcs that max_displacement no farther from x than `margin` besides the straight displacement). Rebuilds where
+  /// (arcs that deviate no farther from x than `margin` besides the straight displacement). Rebuilds where
   /// needed. Throws Error(Failure::numerical) for steps of several edges of a periodic box, and with far too many
   /// pairs.
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new, double margin = 0);

@@ -2,7 +2,7 @@
 // How wide the skin of a Verlet list is: what the list holds beyond its reach, so that it lasts while particles move.
 //
 // Wide enough for the step at hand and some more of its length, and as wide as particles come in some calls, where that
-// is not too wide. It only shrinks by halves, and at once where it was made for a single wild step. Results do not
+// is not too wide. It only shrinks by halves, and at once where it was made for a single long step. Results do not
 // depend on it.
 
 #include <algorithm>
@@ -26,12 +26,12 @@ class Skin {
   void begin(double width) { width_ = width; }
 
   /// Whether a list serves a step: particles have come, or will, so far from where they were when it was made
-  /// (`from_build`), may max_displacement by `margin` besides, and move by `step` at most, with the margin. False where
+  /// (`from_build`), may deviate by `margin` besides, and move by `step` at most, with the margin. False where
   /// the list is not `known`.
   bool lasts(bool known, double from_build, double step, double margin = 0) {
     const double to_last = per_calls_ * from_build / static_cast<double>(++calls_);
     wanted_ = std::max({least_, 4 * step, known && to_last <= widest_ ? to_last : 0});
-    wasteful_ = step > 0 && width_ > kTooWide * wanted_;  // made for one wild step
+    wasteful_ = step > 0 && width_ > kTooWide * wanted_;  // made for one long step
     return known && from_build + margin <= 0.5 * width_ && !wasteful_;
   }
 

@@ -14,7 +14,7 @@ constexpr double kFull = 1 + 1e-13;      // the factor aimed at: touching by rou
 constexpr double kShare = 0.1;           // of the free volume that a slab takes, …
 constexpr double kLongest = 10;          // … and its length at most, in diameters at the thermal speed
 constexpr double kJammedPressure = 300;  // from here on free-volume theory predicts where the spheres jam …
-constexpr double kHopeless = 5;          // … and a target so many times farther away is out of reach
+constexpr double kTooFar = 5;            // … and a target so many times farther away is out of reach
 
 template <int D>
 class Compressor {
@@ -70,7 +70,7 @@ class Compressor {
     for (double slabs = 1; result_.factor < kFull; ++slabs) {
       slab();
       const double left = kFull / result_.factor - 1;
-      if (result_.reduced_pressure > kJammedPressure && left * result_.reduced_pressure > kHopeless) return End::jammed;
+      if (result_.reduced_pressure > kJammedPressure && left * result_.reduced_pressure > kTooFar) return End::jammed;
       if (left > 0 && std::max(result_.collisions, slabs) > options_.max_collisions) return End::too_many_collisions;
     }
     return End::reached;

@@ -7,28 +7,17 @@
 #include "engine/ranks/halo.h"
 
 namespace carom {
-namespace {
-
-/// Calls visit(found) with what each rank has found, on all ranks.
-template <class Found>
-void for_each_found(const Found& mine, Communicator& ranks, auto&& visit) {
-  Bytes message;
-  put(message, mine);
-  for (const Bytes& bytes : ranks.gather(message)) visit(Reader(bytes).get<Found>());
-}
-
-}  // namespace
 
 template <int D>
 Outsiders find_outsiders(const System<D>& system) {
   const Particles<D>& p = system.particles;
   Outsiders own = find_outsiders<D>(system.box, p.x, p.radius), all;
   if (own.spheres > 0) own.worst = p.id_of(own.worst);
-  for_each_found(own, system.decomposition.ranks(), [&](const Outsiders& found) {
+  for (const Outsiders& found : gather_values<Outsiders>(system.decomposition.ranks(), {&own, 1})) {
     const std::size_t spheres = all.spheres + found.spheres;
     if (found.depth > all.depth) all = found;
     all.spheres = spheres;
-  });
+  }
   return all;
 }
 
@@ -36,16 +25,16 @@ template <int D>
 Overlaps find_overlaps(const System<D>& system) {
   if (!system.decomposition.joined()) return find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
   const double diameter = 2 * system.decomposition.sizes().largest_radius();
-  const Halo<D> halo = halo_of<D>(system.box, diameter, system.decomposition.ranks(), system.particles);
+  const Particles<D> halo = halo_of<D>(system.box, diameter, system.decomposition.ranks(), system.particles);
   Overlaps own = find_overlaps<D>(system.box, halo.x, halo.radius, halo.ghost), all;
   if (own.pairs > 0) own.lo = halo.id[own.lo], own.hi = halo.id[own.hi];
-  for_each_found(own, system.decomposition.ranks(), [&](const Overlaps& found) {
-    if (found.pairs == 0) return;
+  for (const Overlaps& found : gather_values<Overlaps>(system.decomposition.ranks(), {&own, 1})) {
+    if (found.pairs == 0) continue;
     const std::size_t pairs = all.pairs + found.pairs;
     const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.hi, o.lo); };
     if (all.pairs == 0 || order(found) < order(all)) all = found;
     all.pairs = pairs;
-  });
+  }
   return all;
 }
 

@@ -15,7 +15,6 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
       particles_(system.particles),
       decomposition_(system.decomposition),
       walls_(system.box.walls()),
-      largest_edge_(system.box.edges.maxCoeff()),
       tolerance_(system.box.gap_tolerance()),
       list_(system.box, system.particles.radius),
       max_events_(max_events) {}
@@ -157,7 +156,7 @@ void ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v) {
 template <int D>
 void ContactScan<D>::slide(Positions<D> x, Vectors<D> v) {
   constexpr int kMostSweeps = 100;
-  constexpr double kSteepest = 0.1;  // normal against tangential speed: beyond, it is a blow and no sliding
+  constexpr double kSteepest = 0.1;  // normal against tangential speed: beyond, it is an impact and no sliding
   bool turned = true;
   for (int sweep = 0; turned && sweep < kMostSweeps; ++sweep) {
     turned = false;

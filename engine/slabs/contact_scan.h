@@ -69,13 +69,8 @@ class ContactScan {
   /// once.)
   void slide(Positions<D> x, Vectors<D> v);
 
-  /// The candidates of a straight step from x to x_new, for methods that look for contacts themselves.
-  std::span<const NeighbourPair<D>> candidates(Positions<D> x, Positions<D> x_new) { return list_.cover(x, x_new); }
-
-  /// The candidates while no particle far farther than `margin` from x; and for each particle its partners among
-  /// them.
-  std::span<const NeighbourPair<D>> candidates(Positions<D> x, double margin) { return list_.cover(x, margin); }
-  const Partners& candidate_partners() { return list_.partners(); }
+  /// The candidates, for methods that look for contacts themselves.
+  NeighbourList<D>& list() { return list_; }
 
   double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
   double tolerance(double sigma) const { return tolerance_(sigma); }
@@ -87,7 +82,7 @@ class ContactScan {
   /// The least gap a piece may end with, for a contact that touches at its start: one that rounding has left at the
   /// edge of the tolerance must be able to depart.
   double floor(double gap_at_start, double tolerance) const {
-    return std::min(-tolerance, gap_at_start - std::numeric_limits<double>::epsilon() * largest_edge_);
+    return std::min(-tolerance, gap_at_start - std::numeric_limits<double>::epsilon() * box_.edges.maxCoeff());
   }
   std::span<const Wall<D>> walls() const { return walls_; }
 
@@ -108,7 +103,6 @@ class ContactScan {
   const Particles<D>& particles_;
   const Decomposition<D>& decomposition_;
   std::vector<Wall<D>> walls_;
-  double largest_edge_;
   GapTolerance tolerance_;
   NeighbourList<D> list_;
   std::uint64_t max_events_;

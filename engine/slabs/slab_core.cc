@@ -23,7 +23,7 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       box_(system.box),
       particles_(system.particles),
       max_events_(max_events),
-      wild_(kWild * mean_distance(system)) {
+      most_bend_(kWild * mean_distance(system)) {
   if (system.decomposition.joined() && box_.pistons())
     throw Error(Failure::deck, "forces and walls that move together need one rank; take one, or free-flight");
   system.fields.add_working(
@@ -39,7 +39,7 @@ template <int D>
 void SlabCore<D>::release() {
   scan_.reset();
   const auto free = [](auto&... vectors) { (std::remove_reference_t<decltype(vectors)>().swap(vectors), ...); };
-  free(near_, reach_, room_, held_, x_, last_x_, v_, moved_, slot_, flights_, sequences_, last_sequences_);
+  free(near_, reach_, largest_bend_, held_, x_, last_x_, v_, moved_, slot_, flights_, sequences_, last_sequences_);
 }
 
 template <int D>
@@ -53,7 +53,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   last_sequences_.clear();
   sequences_.clear();
   const std::size_t n = particles_.size();
-  for (auto* each : {&room_, &reach_}) each->resize(n);
+  for (auto* each : {&largest_bend_, &reach_}) each->resize(n);
   for (auto* each : {&x_, &last_x_, &v_}) each->resize(n);
   moved_.resize(n);
   held_.assign(scan_->resting().empty() ? 0 : n, 0);
@@ -65,9 +65,9 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   for (Id i = 0; i < n; ++i) {
     const double straight = length * v[i].norm(), bent = 0.5 * length * length * acceleration(i).norm();
     reach_[i] = kRoom * (straight + bent);
-    margin_ = bent <= wild_ ? std::max(margin_, reach_[i]) : kNever;
+    margin_ = bent <= most_bend_ ? std::max(margin_, reach_[i]) : kNever;
     if (particles_.owns(i)) own_reach_ = std::max(own_reach_, reach_[i]);
-    room_[i] = (kRoom - 1) * straight + kRoom * bent;
+    largest_bend_[i] = (kRoom - 1) * straight + kRoom * bent;
   }
   near_.clear();
   if (std::isfinite(margin_)) find_near();
@@ -77,7 +77,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
 template <int D>
 void SlabCore<D>::find_near() {
   const auto& x = particles_.x;
-  pairs_ = scan_->candidates(x, margin_);
+  pairs_ = scan_->list().cover(x, margin_);
   near_.clear();
   for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
     const auto& [i, j, image] = pairs_[k];
@@ -97,7 +97,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     queue_.clear();
     contacts_.clear();
     longest_path_ = std::isfinite(margin_) ? 0 : kNever;
-    crowded_ = left_ = false;
+    too_many_contacts_ = left_ = false;
     plain_ends();
     if (longest_path_ == 0) {
       const Stopwatch watch(counters_->seconds.queue);
@@ -123,11 +123,11 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   }
   if (!shared && (system_.decomposition.joined() ? system_.decomposition.any(left_) : left_)) throw SlabLeft{};
   if (shared)
-    agree(!end.complete || crowded_ || longest_path_ > 0);
-  else if (crowded_)
+    agree(!end.complete || too_many_contacts_ || longest_path_ > 0);
+  else if (too_many_contacts_)
     throw_too_many_contacts(max_events_, partners(end.key));
   else if (longest_path_ > 0 && !a_.empty())
-    return {.complete = false, .wild = true};
+    return {.complete = false, .too_strong = true};
   else if (longest_path_ > 0) {
     Id i = 0;
     while (i + 1 < x_.size() && std::isfinite(reach_[i]) && x_[i].allFinite()) ++i;
@@ -143,7 +143,7 @@ template <int D>
 void SlabCore<D>::predict_first() {
   for (const std::uint32_t k : near_) predict_pair(pairs_[k].i, pairs_[k].j, pairs_[k].image);
   for (const Id i : beyond_)
-    for (const auto& [j, pair] : scan_->candidate_partners().of(i))
+    for (const auto& [j, pair] : scan_->list().partners().of(i))
       predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
   for (Id i = 0; i < x_.size(); ++i) predict_walls(i);
   std::make_heap(queue_.begin(), queue_.end());
@@ -167,11 +167,11 @@ void SlabCore<D>::plain_ends() {
     const Vec<D> bent = half * a_[i];
     x_[i] = x[i] + h * start_v_[i] + bent;
     v_[i] = start_v_[i] + h * a_[i];
-    if (!(bent.squaredNorm() <= room_[i] * room_[i])) beyond_.push_back(static_cast<Id>(i));
+    if (!(bent.squaredNorm() <= largest_bend_[i] * largest_bend_[i])) beyond_.push_back(static_cast<Id>(i));
   }
   for (const Id i : beyond_)
     if (const double far = path(start_v_[i], a_[i], h); !(far <= margin_))
-      note_path(half * a_[i].norm() <= wild_ ? far : kNever);
+      note_path(half * a_[i].norm() <= most_bend_ ? far : kNever);
 }
 
 /// Serves the queue until it is empty.
@@ -194,7 +194,7 @@ FlightEnd<D> SlabCore<D>::serve() {
     if (held || (approach(key) >= -scan_->resting_speed() && !a_.empty()))
       return {.complete = false, .time = key.time, .key = key};
     if (contacts_.size() >= max_events_) {
-      crowded_ = true;
+      too_many_contacts_ = true;
       return {.complete = false, .time = key.time, .key = key};
     }
     collide(key);
@@ -223,7 +223,7 @@ Vec<D> SlabCore<D>::velocity(Id i, double t) const {
 
 template <int D>
 void SlabCore<D>::predict_all(Id i) {
-  for (const auto& [j, pair] : scan_->candidate_partners().of(i))
+  for (const auto& [j, pair] : scan_->list().partners().of(i))
     predict_pair(std::min(i, j), std::max(i, j), pairs_[pair].image);
   predict_walls(i);
 }

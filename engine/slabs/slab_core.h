@@ -26,9 +26,9 @@ namespace carom {
 template <int D>
 struct FlightEnd {
   bool complete = true;
-  bool wild = false;  ///< where it is not: an acceleration is far too strong for the slab, or NaN
-  double time = 0;    ///< else the slab must end here, because a contact came to rest or a resting one was hit
-  EventKey<D> key{};  ///< by this event
+  bool too_strong = false;  ///< where it is not: an acceleration bends paths far too much for the slab, or is NaN
+  double time = 0;          ///< else the slab must end here, because a contact came to rest or a resting one was hit
+  EventKey<D> key{};        ///< by this event
 };
 
 template <int D>
@@ -136,21 +136,21 @@ class SlabCore {
   std::optional<ContactScan<D>> scan_;
   std::vector<Wall<D>> walls_;
   std::uint64_t max_events_;
-  double wild_;  // path that an acceleration may bend in a slab [length]
+  double most_bend_;  // path that an acceleration may bend in a slab [length]
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
   SlabWatch* watch_ = nullptr;
   double length_ = 0, margin_ = 0, own_reach_ = 0;
   double longest_path_ = 0;  // > 0: how far a particle came, beyond margin_, in this flight
-  bool crowded_ = false, resolved_ = false;
+  bool too_many_contacts_ = false, resolved_ = false;
   bool left_ = false;         // this rank has been asked to stop, in this flight
   Positions<D> start_v_, a_;  // of the slab
   std::span<const NeighbourPair<D>> pairs_;
-  std::vector<std::uint32_t> near_;  // among the pairs: those that first flights may bring together
-  std::vector<double> reach_;        // by particle: how far first flights may lead for which `near_` holds
-  std::vector<double> room_;         // by particle: the largest |½ a h²| for which `near_` holds
-  std::vector<Id> beyond_;           // particles with larger ones
-  std::vector<char> held_;           // resting in contact; empty: none are
+  std::vector<std::uint32_t> near_;   // among the pairs: those that first flights may bring together
+  std::vector<double> reach_;         // by particle: how far first flights may lead for which `near_` holds
+  std::vector<double> largest_bend_;  // by particle: the largest |½ a h²| for which `near_` holds
+  std::vector<Id> beyond_;            // particles with larger ones
+  std::vector<char> held_;            // resting in contact; empty: none are
   std::vector<Vec<D>> x_, last_x_, v_;
   std::vector<char> moved_;
   std::uint64_t all_moved_ = 0;

@@ -66,16 +66,6 @@ int validate_command(const std::filesystem::path& file, const std::vector<std::s
   return deck.dimension == 2 ? describe<2>(deck) : describe<3>(deck);
 }
 
-int schema_command(bool markdown) {
-  std::cout << schema_page(markdown);
-  return 0;
-}
-
-int methods_command() {
-  std::cout << methods_page();
-  return 0;
-}
-
 std::string version_page() {
   return "carom " + version_string() + "\ncompiler: " + compiler_string() + "\nlibraries: " + library_versions();
 }

@@ -11,12 +11,6 @@ namespace carom {
 /// `carom validate`: parses, checks and builds the initial state, and says on stdout what would run.
 int validate_command(const std::filesystem::path& deck, const std::vector<std::string>& set);
 
-/// `carom schema`
-int schema_command(bool markdown);
-
-/// `carom methods`
-int methods_command();
-
 /// What `carom --version` prints.
 std::string version_page();
 

@@ -80,17 +80,8 @@ int convert_command(const ConvertOptions& options) {
   std::error_code ignored;
   if (std::filesystem::equivalent(file, trajectory.path(), ignored))
     throw Error(Failure::deck, "-o " + file.string() + ": error: this is the trajectory itself; name another file");
-  const std::filesystem::path aside = file.string() + ".part";
   std::string note;
-  try {
-    TextFile out(aside);
-    note = format->write(trajectory, frames, out, file);
-    out.close();
-    put_in_place(aside, file);
-  } catch (...) {
-    std::filesystem::remove(aside, ignored);
-    throw;
-  }
+  write_aside(file, [&](TextFile& out) { note = format->write(trajectory, frames, out, file); });
   std::cout << file.string() << ": " << frames.size() << (frames.size() == 1 ? " frame of " : " frames of ")
             << trajectory.particles() << " particles\n"
             << note << (note.empty() ? "" : "\n");

@@ -23,6 +23,7 @@
 #include "io/command/manual.h"
 #include "io/command/run.h"
 #include "io/deck/options.h"
+#include "io/deck/schema.h"
 #include "io/files/info.h"
 #include "io/view/view.h"
 #include "parallel/world.h"
@@ -215,8 +216,8 @@ int carom_main(int argc, char** argv) {
   if (run.parsed() || branch.parsed()) return carom::run_command(options);
   return once([&] {
     if (validate.parsed()) return carom::validate_command(deck, set);
-    if (schema.parsed()) return carom::schema_command(markdown);
-    if (methods.parsed()) return carom::methods_command();
+    if (schema.parsed()) return print(carom::schema_page(markdown));
+    if (methods.parsed()) return print(carom::methods_page());
     if (info.parsed()) return carom::info_command(file);
     if (app.got_subcommand("manual")) return print(carom::manual_page(app));
     if (app.got_subcommand("completion")) return print(carom::completion_script(app, shell));

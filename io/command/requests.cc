@@ -38,9 +38,9 @@ Requests::Requests(std::optional<double> most) : most_(most) {
 Requests::Asked Requests::now(Communicator& ranks) {
   const bool first = ranks.rank() == 0;
   const bool due = first && interval_ && seconds_since(last_checkpoint_) >= *interval_;
-  const double calls = static_cast<double>(std::max(calls_, std::uint64_t{1})), life = seconds_since(last_look_);
+  const double calls = static_cast<double>(std::max(calls_, std::uint64_t{1})), elapsed = seconds_since(last_look_);
   std::array<double, 3> asked = {stop_here(ranks) ? 1.0 : 0.0, keep_signal != 0 || due ? 1.0 : 0.0,
-                                 first ? std::clamp(calls * kBetweenLooks / life, 1.0, kMostCalls) : 0.0};
+                                 first ? std::clamp(calls * kBetweenLooks / elapsed, 1.0, kMostCalls) : 0.0};
   ranks.largest(asked);
   between_ = static_cast<std::uint64_t>(asked[2]);
   calls_ = 0;
@@ -62,19 +62,8 @@ void Requests::checkpoint_is_written() {
   last_checkpoint_ = Clock::now();
 }
 
-std::string_view Requests::reason() const {
-  switch (stop_signal) {
-    case SIGTERM:
-      return "SIGTERM";
-    case SIGINT:
-      return "SIGINT";
-    case SIGHUP:
-      return "SIGHUP";
-    case SIGUSR2:
-      return "SIGUSR2";
-    default:
-      return "--max-wall";
-  }
+std::string Requests::reason() const {
+  return stop_signal == 0 ? "--max-wall" : std::string("SIG").append(sigabbrev_np(stop_signal));
 }
 
 }  // namespace carom

@@ -35,8 +35,8 @@ class Requests {
   bool stop_here(const Communicator& ranks) const;
   /// A checkpoint has been written.
   void checkpoint_is_written();
-  /// Why the run was stopped, for people: the signal's name, or --max-wall.
-  std::string_view reason() const;
+  /// Why the run was stopped, in words: the signal's name, or --max-wall.
+  std::string reason() const;
 
  private:
   using Clock = std::chrono::steady_clock;

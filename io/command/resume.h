@@ -48,7 +48,7 @@ Resumed find_run(const std::filesystem::path& directory, bool take_over, Communi
 /// Error(Failure::file), Error(Failure::deck) where the output is that of the run itself. Collective.
 Resumed find_state(const std::filesystem::path& checkpoint, const std::filesystem::path& output, Communicator& ranks);
 
-/// The deck of a run that is continued, where only the end may be another, or of a branch. Throws DeckError.
+/// The deck of a run that is continued, where only the end may be another, or of a branch. Throws Error(Failure::deck).
 Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks);
 
 /// The run of a deck, from its initial state or from a checkpoint. Throws Error. Collective.

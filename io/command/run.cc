@@ -41,15 +41,6 @@ constexpr std::size_t kFewestToShare = 64;
 /// From look to look within a step: of pieces, sweeps or contacts, as long as many particles make them.
 constexpr std::uint64_t kCallsWithinSteps = 32;
 
-/// Does something that may fail while another failure is being reported: only the first one counts.
-template <class Action>
-void at_best(Action&& action) {
-  try {
-    action();
-  } catch (const std::exception&) {
-  }
-}
-
 /// What the ranks do alike while a run goes on: stop or write checkpoints when they are asked to.
 template <int D>
 class Keeper {
@@ -225,7 +216,8 @@ int run_on_rank(Deck& deck, const RunOptions& options, Communicator& at_work, in
 
 int run_command(const RunOptions& options) {
   Requests requests(options.max_wall_seconds);
-  // A file that grows beyond its limit and a reader of stdout that goes away are errors to report, not reasons to die.
+  // A file that grows beyond its limit and a reader of stdout that goes away are errors to report, and do not end the
+  // process.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   hdf5::start_library();

@@ -1,7 +1,7 @@
 #pragma once
 // A deck, read, checked and resolved: everything a run needs, with defaults filled in.
 //
-//   Deck deck = read_deck("inputs/five-springs.toml", {"integrator.step=0.02"});   // DeckError: all problems
+//   Deck deck = read_deck("inputs/five-springs.toml", {"integrator.step=0.02"});   // Error(Failure::deck)
 //   auto system = build_system<2>(deck);                                           // Error(Failure::initial_state)
 
 #include <filesystem>
@@ -51,14 +51,8 @@ struct Deck {
   std::vector<std::string> warnings;  ///< printed before the run
   std::string toml_text;
 
-  struct Source;  ///< the parsed tables, known to io/deck*.cc only
+  struct Source;  ///< the parsed tables, deck_source.h
   std::shared_ptr<Source> source;
-};
-
-/// All problems of a deck, one a line: `file:line:column: error: what; what to do`.
-class DeckError : public Error {
- public:
-  explicit DeckError(const std::string& all) : Error(Failure::deck, all) {}
 };
 
 /// How the texts are read of which a run is made: the deck, and the positions it may name. Nothing: it cannot be read.
@@ -74,8 +68,8 @@ Deck read_deck(const std::filesystem::path& file, std::span<const std::string> o
                const TextReader& reader = read_text, bool replace = false);
 
 /// The resolved deck of a run, with overrides, for another one that starts from its particles. `same_motion`: they go
-/// on moving as they did, under the same forces and by the same integrator. Throws DeckError, also where an override
-/// would change particles or box. The reader is called for the same file again.
+/// on moving as they did, under the same forces and by the same integrator. Throws Error(Failure::deck), also where an
+/// override would change particles or box. The reader is called for the same file again.
 Deck read_branch(const Deck& of, std::span<const std::string> overrides, const TextReader& reader, bool& same_motion);
 
 /// Puts the results elsewhere than the deck says; the resolved deck says so too.

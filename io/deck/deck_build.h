@@ -22,7 +22,7 @@ template <int D>
 void place_particles(const Deck::Source& source, System<D>& system);
 
 /// The rows of a table of numbers: `columns` a line, separated by commas or blanks; # begins a comment, and the first
-/// line may be a heading. Throws DeckError, which says that a line is `not_what` it should be.
+/// line may be a heading. Throws Error(Failure::deck), which says that a line is `not_what` it should be.
 std::vector<std::vector<double>> rows_in(const std::string& text, const std::filesystem::path& file,
                                          std::size_t columns, const std::string& not_what);
 

@@ -93,8 +93,7 @@ void read_interactions(Deck::Source& source, std::size_t dimension, Problems& pr
     InteractionConfig config;
     config.at = table.at;
     config.parameters = parameters_of(table);
-    for (const InteractionInfo& info : interactions())
-      if (info.name == table.variant->name) config.info = &info;
+    config.info = &find_interaction(table.variant->name);
     bool complete = true;
     table.each_key([&](const Key& key) {
       if ((key.required() || table.given(key.name)) && table.values.find(key.name) == table.values.end())

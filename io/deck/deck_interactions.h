@@ -6,8 +6,8 @@
 namespace carom {
 
 /// Puts the points of tables that are given as files in the place of `file`, and their last point where there is no
-/// cutoff: the values say them themselves from now on. Throws Error(Failure::file), or DeckError for what is wrong in a
-/// file.
+/// cutoff: the values say them themselves from now on. Throws Error(Failure::file), or Failure::deck for what is wrong
+/// in a file.
 void read_potentials(DeckValues& values, const std::filesystem::path& folder, const TextReader& reader,
                      Problems& problems);
 

@@ -149,8 +149,7 @@ class Interpreter {
     deck_.integrator = table->variant->name;
     deck_.integrator_parameters = parameters_of(*table);
     source_.step = table->place("step");
-    for (const IntegratorInfo& info : integrators())
-      if (info.name == deck_.integrator) source_.integrator = &info;
+    source_.integrator = &find_integrator(deck_.integrator);
     if (const auto* step = table->find<double>("step")) deck_.plan.step = *step;
   }
 

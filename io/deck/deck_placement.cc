@@ -44,7 +44,7 @@ Words words_of(std::string_view line) {
   return words;
 }
 
-/// A word for people, of whatever bytes it is.
+/// A word for messages, of whatever bytes it is.
 std::string shown(std::string_view word) {
   constexpr std::size_t kMost = 20;
   std::string text(word.substr(0, kMost));

@@ -47,7 +47,6 @@ void Problems::throw_errors(Failure failure) const {
   });
   std::string all;
   for (const Problem& problem : sorted) all += (all.empty() ? "" : "\n") + problem.text;
-  if (failure == Failure::deck) throw DeckError(all);
   throw Error(failure, all);
 }
 

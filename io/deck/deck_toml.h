@@ -23,8 +23,8 @@ struct DeckToml {
   Place place(const toml::key& key, const toml::node& node) const;
 };
 
-/// Parses the text of a deck. Throws DeckError for malformed TOML; what is wrong with the overrides (`table.key=value`,
-/// `list.0.key=value`) goes to `problems`.
+/// Parses the text of a deck. Throws Error(Failure::deck) for malformed TOML; what is wrong with the overrides
+/// (`table.key=value`, `list.0.key=value`) goes to `problems`.
 DeckToml parse_deck(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
                     Problems& problems);
 

@@ -1,7 +1,6 @@
 #include "io/deck/schema.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "engine/base/interaction.h"
 #include "engine/integrators/integrator.h"
@@ -12,31 +11,11 @@ namespace {
 using enum Key::Type;
 using Range = Parameter::Range;
 
-Key::Type key_type(Parameter::Type type) {
-  switch (type) {
-    case Parameter::Type::boolean:
-      return boolean;
-    case Parameter::Type::integer:
-      return integer;
-    case Parameter::Type::real:
-      return real;
-    case Parameter::Type::real_list:
-      return real_list;
-    case Parameter::Type::text:
-      return text;
-    case Parameter::Type::text_list:
-      return text_list;
-    case Parameter::Type::pair_list:
-      return pair_list;
-  }
-  throw std::logic_error("unknown parameter type");
-}
-
 Variant variant(std::string_view name, const std::vector<Parameter>& parameters) {
   Variant v{std::string(name), {}};
   for (const Parameter& p : parameters)
     v.keys.push_back({std::string(p.name),
-                      key_type(p.type),
+                      static_cast<Key::Type>(p.type),
                       std::string(p.fallback),
                       std::string(p.unit),
                       std::string(p.meaning),
@@ -47,15 +26,9 @@ Variant variant(std::string_view name, const std::vector<Parameter>& parameters)
   return v;
 }
 
-std::vector<Variant> interaction_variants() {
+std::vector<Variant> variants_of(const auto& infos) {
   std::vector<Variant> all;
-  for (const InteractionInfo& info : interactions()) all.push_back(variant(info.name, info.parameters));
-  return all;
-}
-
-std::vector<Variant> integrator_variants() {
-  std::vector<Variant> all;
-  for (const IntegratorInfo& info : integrators()) all.push_back(variant(info.name, info.parameters));
+  for (const auto& info : infos) all.push_back(variant(info.name, info.parameters));
   return all;
 }
 
@@ -176,13 +149,13 @@ std::vector<TableSchema> make_schema() {
        false,
        "a smooth force between or on the particles, besides their hard cores",
        {type_key("which one")},
-       interaction_variants()},
+       variants_of(interactions())},
       {"integrator",
        false,
        true,
        "the method; `carom methods` describes each",
        {type_key("which one")},
-       integrator_variants(),
+       variants_of(integrators()),
        {{"acdda", "write \"edda\", which keeps the energy as exactly"},
         {"acva", "write \"edda\", which keeps the energy exactly, or \"cva\""},
         {"adaptive", "leave it out, or take a shorter 'step'"}}},

@@ -17,7 +17,7 @@ namespace carom {
 
 /// One key of a table.
 struct Key {
-  enum class Type {
+  enum class Type {  // first those of Parameter, in its order
     boolean,
     integer,  ///< a real number without a fraction (1e6) will do
     real,     ///< an integer will do
@@ -29,6 +29,7 @@ struct Key {
     real_or_list,  ///< one number for all, or one for each particle
     text_table,    ///< an inline table of texts: `keys`
   };
+  static_assert(static_cast<int>(Type::pair_list) == static_cast<int>(Parameter::Type::pair_list));
   std::string name;
   Type type = Type::real;
   std::string fallback;  ///< the default as TOML text; "" = must be given; "none" = may be left out

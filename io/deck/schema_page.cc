@@ -1,4 +1,4 @@
-// The schema and the methods as pages for people.
+// The schema and the methods as pages to read.
 
 #include <algorithm>
 #include <iterator>
@@ -6,6 +6,7 @@
 
 #include "engine/base/interaction.h"
 #include "engine/integrators/integrator.h"
+#include "io/deck/deck_problems.h"
 #include "io/deck/schema.h"
 
 namespace carom {
@@ -31,19 +32,13 @@ std::string wrapped(const std::string& text, std::size_t indent) {
   return out;
 }
 
-std::string list(const std::vector<std::string>& words) {
-  std::string all;
-  for (const std::string& word : words) all += (all.empty() ? "" : ", ") + word;
-  return all;
-}
-
 std::string fallback(const Key& key) {
   return key.required() ? "required" : key.has_default() ? "default " + key.fallback : "optional";
 }
 
 std::string meaning(const Key& key) {
   if (key.choices.empty()) return key.meaning;
-  return key.meaning + (key.meaning.empty() ? "" : "; ") + "one of: " + list(key.choices);
+  return key.meaning + (key.meaning.empty() ? "" : "; ") + "one of: " + join(key.choices);
 }
 
 std::string heading(const TableSchema& table) {
@@ -53,12 +48,8 @@ std::string heading(const TableSchema& table) {
 
 /// A line about a variant, from the declaration of the integrator or interaction it stands for.
 std::string about(const TableSchema& table, const std::string& variant) {
-  if (table.name == "integrator")
-    for (const IntegratorInfo& info : integrators())
-      if (info.name == variant) return std::string(info.title);
-  if (table.name == "interaction")
-    for (const InteractionInfo& info : interactions())
-      if (info.name == variant) return "V = " + std::string(info.formula);
+  if (table.name == "integrator") return std::string(find_integrator(variant).title);
+  if (table.name == "interaction") return "V = " + std::string(find_interaction(variant).formula);
   return {};
 }
 

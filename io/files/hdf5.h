@@ -43,7 +43,7 @@ class Handle {
     if (id_ >= 0) close_(id_);
   }
   hid_t id() const { return id_; }
-  /// To be closed by another hand.
+  /// Gives the identifier up: the caller closes it.
   hid_t release() { return std::exchange(id_, H5I_INVALID_HID); }
 
  private:
@@ -53,7 +53,15 @@ class Handle {
 
 /// The HDF5 type of a C++ number.
 template <class T>
-hid_t native_type();
+hid_t native_type() {
+  if constexpr (std::is_same_v<T, double>) return H5T_NATIVE_DOUBLE;
+  if constexpr (std::is_same_v<T, float>) return H5T_NATIVE_FLOAT;
+  if constexpr (std::is_same_v<T, std::uint8_t>) return H5T_NATIVE_UINT8;
+  if constexpr (std::is_same_v<T, std::int32_t>) return H5T_NATIVE_INT32;
+  if constexpr (std::is_same_v<T, std::uint32_t>) return H5T_NATIVE_UINT32;
+  if constexpr (std::is_same_v<T, std::int64_t>) return H5T_NATIVE_INT64;
+  if constexpr (std::is_same_v<T, std::uint64_t>) return H5T_NATIVE_UINT64;
+}
 
 /// A file of HDF5, written by this process alone.
 class File {
@@ -140,9 +148,8 @@ class SeriesBase {
 
  private:
   void extend(std::uint64_t rows);
-  void write(hid_t type, const void* data, const std::vector<hsize_t>& start, const std::vector<hsize_t>& count);
 
-  std::string label_;  // file and name, for messages
+  std::string label_;  // of what is done, for messages
   const File* file_;
   Handle dataset_;
   std::vector<hsize_t> shape_;  // of one row, with a leading axis for the rows
@@ -168,27 +175,22 @@ class Series : public SeriesBase {
   }
 };
 
-/// The untyped part of Array.
-class ArrayBase {
- protected:
-  ArrayBase(const File& file, const Handle& where, const std::string& name, hid_t type, std::size_t size);
-  void write(hid_t type, const void* data, std::size_t first, std::size_t count) const;
-
- private:
-  std::string label_;
-  const File* file_;
-  Handle dataset_;
-};
-
 /// A data set of so many numbers, to be written in parts. The file must outlive it and not move.
 template <class T>
-class Array : public ArrayBase {
+class Array {
  public:
   Array(const File& file, const Handle& where, const std::string& name, std::size_t size)
-      : ArrayBase(file, where, name, native_type<T>(), size) {}
+      : file_(file),
+        label_("write to data set " + name),
+        set_(file.create_data_set(where, name, native_type<T>(), {size})) {}
   void write(std::size_t first, std::span<const T> values) const {
-    ArrayBase::write(native_type<T>(), values.data(), first, values.size());
+    if (!values.empty()) file_.write_part(set_, native_type<T>(), values.data(), {first}, {values.size()}, label_);
   }
+
+ private:
+  const File& file_;
+  std::string label_;
+  Handle set_;
 };
 
 /// Reading; throws Error(Failure::file) where the name is missing, of another kind, or claims more than the file can

@@ -39,23 +39,13 @@ SeriesBase::SeriesBase(const File& file, const Handle& where, const std::string&
   dataset_ = file.create_data_set(where, name, type, shape_, chunk_of(shape_, row_elements_ * H5Tget_size(type)));
 }
 
-ArrayBase::ArrayBase(const File& file, const Handle& where, const std::string& name, hid_t type, std::size_t size)
-    : label_("write to data set " + name), file_(&file) {
-  dataset_ = file.create_data_set(where, name, type, {size});
-}
-
-void ArrayBase::write(hid_t type, const void* data, std::size_t first, std::size_t elements) const {
-  if (elements == 0) return;
-  file_->write_part(dataset_, type, data, {first}, {elements}, label_);
-}
-
 void SeriesBase::append(hid_t type, const void* data, std::size_t elements) {
   if (elements == 0) return;
   std::vector<hsize_t> start(shape_.size(), 0), count = shape_;
   start[0] = rows_;
   count[0] = elements / row_elements_;
   extend(count[0]);
-  write(type, data, start, count);
+  file_->write_part(dataset_, type, data, start, count, label_);
 }
 
 void SeriesBase::append_row() { extend(1); }
@@ -78,7 +68,7 @@ void SeriesBase::write_part(hid_t type, const void* data, std::size_t first, std
   count[0] = 1;
   start[1] = first;
   count[1] = elements / (row_elements_ / shape_[1]);
-  write(type, data, start, count);
+  file_->write_part(dataset_, type, data, start, count, label_);
 }
 
 void SeriesBase::extend(std::uint64_t rows) {
@@ -86,11 +76,6 @@ void SeriesBase::extend(std::uint64_t rows) {
   size[0] = rows_ + rows;
   file_->check(H5Dset_extent(dataset_.id(), size.data()), label_);
   rows_ = size[0];
-}
-
-void SeriesBase::write(hid_t type, const void* data, const std::vector<hsize_t>& start,
-                       const std::vector<hsize_t>& count) {
-  file_->write_part(dataset_, type, data, start, count, label_);
 }
 
 }  // namespace carom::hdf5

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "engine/base/error.h"
+#include "io/deck/deck_problems.h"
 #include "io/files/checkpoint.h"
 #include "io/files/hdf5.h"
 #include "io/files/trajectory_reader.h"
@@ -12,12 +13,6 @@
 namespace carom {
 
 namespace {
-
-std::string joined(const std::vector<std::string>& parts) {
-  std::string all;
-  for (const std::string& part : parts) all += (all.empty() ? "" : ", ") + part;
-  return all;
-}
 
 std::string line(const char* name, const std::string& value) { return fmt::format("{:<14}{}\n", name, value); }
 
@@ -47,14 +42,14 @@ std::string describe_trajectory(const hdf5::File& file) {
       edges.push_back(fmt::format("{:g}", hdf5::diagonal_at(file, particles + "/box/edges/value", frames - 1, k)));
   const auto version = hdf5::attribute_numbers(file, "/h5md", "version", 2);
   return line("kind", fmt::format("H5MD {}.{} trajectory", version[0], version[1])) +
-         line("written by", joined(hdf5::attribute_texts(file, "/h5md/creator", "name")) + " " +
-                                joined(hdf5::attribute_texts(file, "/h5md/creator", "version"))) +
+         line("written by", join(hdf5::attribute_texts(file, "/h5md/creator", "name")) + " " +
+                                join(hdf5::attribute_texts(file, "/h5md/creator", "version"))) +
          line("title", optional_text(file, "/parameters/title")) +
          line("integrator", optional_text(file, "/parameters/integrator")) +
          line("dimension", std::to_string(dimension)) + line("particles", std::to_string(shape[1])) +
-         line("box", joined(edges)) +
-         line("boundary", hdf5::exists(file, "/parameters/boundary") ? joined(hdf5::texts(file, "/parameters/boundary"))
-                                                                     : joined(boundary)) +
+         line("box", join(edges)) +
+         line("boundary", hdf5::exists(file, "/parameters/boundary") ? join(hdf5::texts(file, "/parameters/boundary"))
+                                                                     : join(boundary)) +
          line("frames", std::to_string(frames)) + line("times", range_of(file, particles + "/position/time", frames)) +
          line("steps", range_of(file, particles + "/position/step", frames));
 }
@@ -63,7 +58,7 @@ std::string describe_events(const hdf5::File& file) {
   const hsize_t events = hdf5::shape(file, "/events/time", 1)[0];
   const auto version = hdf5::attribute_numbers(file, "/events", "version", 2);
   return line("kind", fmt::format("events, format {}.{}", version[0], version[1])) +
-         line("written by", joined(hdf5::attribute_texts(file, "/events", "creator"))) +
+         line("written by", join(hdf5::attribute_texts(file, "/events", "creator"))) +
          line("title", optional_text(file, "/parameters/title")) +
          line("integrator", optional_text(file, "/parameters/integrator")) +
          line("dimension", std::to_string(hdf5::attribute_numbers(file, "/events", "dimension", 1)[0])) +

@@ -67,7 +67,7 @@ bool resize(int descriptor, std::uint64_t size) {
   return uninterrupted([&] { return ::ftruncate(descriptor, static_cast<off_t>(size)); }) == 0;
 }
 
-/// Room on the disk. File systems that cannot set it aside are believed to have it.
+/// Room on the disk. File systems that cannot set it aside are taken to have it.
 bool set_aside(int descriptor, int mode, std::uint64_t start, std::uint64_t length) {
   const auto call = [&] {
     return ::fallocate(descriptor, mode, static_cast<off_t>(start), static_cast<off_t>(length));

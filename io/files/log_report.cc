@@ -116,7 +116,7 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
 }
 
 std::optional<std::string> energy_warning(const Statistics& s) {
-  // Errors count from the end of the first step, which may have been the wild one.
+  // Errors count from the end of the first step, which may itself have the large error.
   const auto share = [](double error, double of) { return of > 0 ? error / of : 0; };
   const double later = share(s.max_energy_error, s.energy_reference),
                first = share(std::abs(s.energy_after_first_step - s.energy_initial), s.energy_scale);

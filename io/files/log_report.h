@@ -21,7 +21,7 @@ std::optional<std::string> energy_warning(const Statistics& statistics);
 /// How the run ended, what it found and where the time of the ranks went: of several, least, mean and most.
 std::string report_text(const Deck& deck, const Statistics& statistics, std::span<const RankAccount> ranks);
 
-/// Writes thermo rows into the log as a table for human eyes: the first 32, then 16 of each doubling of their number
+/// Writes thermo rows into the log as a table for people: the first 32, then 16 of each doubling of their number
 /// (a million rows leave 270), and the last. The choice depends on the number of a row alone, so that a run that was
 /// interrupted has the same table.
 template <int D>

@@ -1,30 +1,21 @@
 #include "io/files/run_files.h"
 
 #include <algorithm>
-#include <exception>
 #include <iterator>
 
 #include "engine/base/error.h"
 #include "io/files/output_directory.h"
 
 namespace carom {
-namespace {
-
-/// One of the marks, where there are any.
-template <class Mark>
-std::optional<Mark> mark_of(const std::optional<FileMarks>& marks, Mark FileMarks::*which) {
-  return marks ? std::optional(*marks.*which) : std::nullopt;
-}
-
-}  // namespace
 
 template <int D>
 RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const std::optional<FileMarks>& marks)
-    : trajectory_(deck.output.directory / run_file::trajectory, deck, system, mark_of(marks, &FileMarks::frames)),
-      thermo_(deck.output.directory / run_file::thermo, mark_of(marks, &FileMarks::thermo_bytes)) {
+    : trajectory_(deck.output.directory / run_file::trajectory, deck, system,
+                  marks ? std::optional(marks->frames) : std::nullopt),
+      thermo_(deck.output.directory / run_file::thermo, marks ? std::optional(marks->thermo_bytes) : std::nullopt) {
   if (deck.plan.events)
     events_ = std::make_unique<EventWriter<D>>(deck.output.directory / run_file::events, deck,
-                                               mark_of(marks, &FileMarks::events));
+                                               marks ? std::optional(marks->events) : std::nullopt);
   for (const auto& [info, parameters] : deck.output.observables) {
     const std::filesystem::path path = deck.output.directory / run_file::averages(*info);
     averages_.emplace_back(path, info->template in<D>().make(system, parameters, deck.output.sample_start));
@@ -37,33 +28,26 @@ FileMarks RunFiles<D>::mark() {
 }
 
 template <int D>
+void RunFiles<D>::for_each(auto&& action) {
+  if (events_) action(*events_);
+  action(trajectory_);
+  action(thermo_);
+  for (auto& average : averages_) action(average);
+}
+
+template <int D>
 void RunFiles<D>::add_to(Simulation<D>& simulation) {
-  if (events_) simulation.add(*events_);
-  simulation.add(trajectory_);
-  simulation.add(thermo_);
-  for (auto& average : averages_) simulation.add(average);
+  for_each([&](auto& file) { simulation.add(file); });
 }
 
 template <int D>
 void RunFiles<D>::close() {
-  trajectory_.close();
-  thermo_.close();
-  if (events_) events_->close();
-  for (const auto& average : averages_) average.close();
+  for_each([](auto& file) { file.close(); });
 }
 
 template <int D>
 void RunFiles<D>::close_after_failure() {
-  const auto try_to_close = [](auto& file) {
-    try {
-      file.close();
-    } catch (const std::exception&) {  // the failure that brought us here is the one to report
-    }
-  };
-  try_to_close(trajectory_);
-  try_to_close(thermo_);
-  if (events_) try_to_close(*events_);
-  for (auto& average : averages_) try_to_close(average);
+  for_each([](auto& file) { at_best([&] { file.close(); }); });
 }
 
 template <int D>

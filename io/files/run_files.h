@@ -1,6 +1,7 @@
 #pragma once
 // The files that grow while a run goes on, opened and closed together.
 
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -25,6 +26,14 @@ class Onlooker : public Observer<D> {
  private:
   Sampling sampling_;
 };
+
+/// Does something that may fail while another failure is being reported: only the first one counts.
+void at_best(auto&& action) {
+  try {
+    action();
+  } catch (const std::exception&) {
+  }
+}
 
 /// Where the files of a run stand: what is needed to cut them back and to go on.
 struct FileMarks {
@@ -57,9 +66,11 @@ class RunFiles {
   std::vector<SpeciesValue> species_values() const;
 
  private:
+  void for_each(auto&& action);
+
   TrajectoryWriter<D> trajectory_;
   ThermoWriter<D> thermo_;
-  std::unique_ptr<EventWriter<D>> events_;  // null where the deck does not want it
+  std::unique_ptr<EventWriter<D>> events_;  // null where without output.events
   std::vector<AverageWriter<D>> averages_;
 };
 

@@ -64,19 +64,23 @@ void put_in_place(const std::filesystem::path& aside, const std::filesystem::pat
   throw Error(Failure::file, path.string() + ": cannot put the new file in place: " + e.code().message());
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
+void write_aside(const std::filesystem::path& path, const std::function<void(TextFile&)>& write) {
   std::filesystem::path aside = path;
   aside += ".part";
   try {
     TextFile file(aside);
-    file.append(text);
+    write(file);
     file.close();
     put_in_place(aside, path);
-  } catch (const Error&) {
+  } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(aside, ignored);
     throw;
   }
+}
+
+void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
+  write_aside(path, [&](TextFile& file) { file.append(text); });
 }
 
 }  // namespace carom

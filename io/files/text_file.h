@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string_view>
 
@@ -36,7 +37,8 @@ class TextFile {
 /// Error(Failure::file).
 void put_in_place(const std::filesystem::path& aside, const std::filesystem::path& path);
 
-/// Writes a whole file so that a reader sees the old one or the new one, never a part: aside, then renamed.
+/// Writes a file so that a reader sees the old one or the new one, never a part: aside, then renamed.
+void write_aside(const std::filesystem::path& path, const std::function<void(TextFile&)>& write);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace carom

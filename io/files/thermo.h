@@ -2,7 +2,7 @@
 // thermo.csv: one row an output time, each in the file before the run goes on.
 //
 // Columns: time, step, collisions, kinetic, potential, total, shadow, max_energy_error, momentum_x, momentum_y[,
-// momentum_z], temperature, pressure; reduced units; 17 digits, so that a row holds the exact doubles; `nan` where a
+// momentum_z], temperature, pressure; reduced units; the fewest digits that give the doubles back; `nan` where a
 // method has no shadow energy.
 
 #include <filesystem>

@@ -170,7 +170,7 @@ Bytes Session<D>::saved(const std::string& name, double interval) const {
 }
 
 /// Throws what a run would that begins with this state. Done on a copy: where a constructor of runs throws, its system
-/// goes, and views of it would hang in the air.
+/// goes, and views of it would point to freed memory.
 template <int D>
 void Session<D>::try_out(const Parameters& parameters, const Plan& plan) {
   auto copy = std::make_unique<System<D>>();

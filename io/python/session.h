@@ -60,7 +60,6 @@ class Session {
   const Box<D>& box() const { return box_; }
   const std::vector<std::string>& species() const { return species_; }
   std::size_t size() const { return size_; }
-  bool running() const { return running_; }
   const IntegratorInfo* integrator() const { return integrator_; }
   const Parameters& integrator_parameters() const { return parameters_; }
   const std::vector<Force>& forces() const { return terms_.all(); }

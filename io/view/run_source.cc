@@ -71,11 +71,11 @@ std::string rows_from(const std::filesystem::path& path, std::uint64_t first) {
 }  // namespace
 
 RunSource::RunSource(std::filesystem::path directory, bool awaited)
-    : directory_(std::move(directory)), trajectory_(directory_ / run_file::trajectory), awaited_(awaited) {
-  if (!awaited_ && !std::filesystem::exists(trajectory_))
+    : directory_(std::move(directory)), trajectory_(directory_ / run_file::trajectory) {
+  if (!awaited && !std::filesystem::exists(trajectory_))
     throw Error(Failure::file, fmt::format("{}: has no {}; name the directory that `carom run` has written",
                                            directory_.string(), run_file::trajectory));
-  if (!awaited_) look();
+  if (!awaited) look();
 }
 
 void RunSource::look() {

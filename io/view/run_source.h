@@ -43,7 +43,6 @@ class RunSource {
   void count_collisions(double until);
 
   std::filesystem::path directory_, trajectory_;
-  bool awaited_;
   nlohmann::json head_;          // what does not change while the trajectory is the same file
   std::string seen_, identity_;  // of the trajectory: when it was looked at last; which file it is
   std::uint64_t particles_ = 0, frames_ = 0;

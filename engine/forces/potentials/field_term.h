@@ -46,7 +46,7 @@ class FieldTerm final : public Interaction<D> {
     std::uint64_t count = 0;
     for (Id i = 0; i < x.size(); ++i) {
       if (!particles_.owns(i) || (changed && changed[i] == 0)) continue;
-      if (!forces.add(i, -sign * field_.mean_gradient(i, x[i], x_new[i]), limits)) forces.spoil();
+      if (!forces.add(i, -sign * field_.mean_gradient(i, x[i], x_new[i]), limits)) forces.invalidate();
       ++count;
     }
     return count;
@@ -54,7 +54,7 @@ class FieldTerm final : public Interaction<D> {
   void add_hessian_product(Positions<D> x, Positions<D> w, ForceSums<D>& out) const override {
     const ForceLimits limits = out.make_room(1);
     for (Id i = 0; i < x.size(); ++i)
-      if (particles_.owns(i) && !out.add(i, field_.hessian_product(i, x[i], w[i]), limits)) out.spoil();
+      if (particles_.owns(i) && !out.add(i, field_.hessian_product(i, x[i], w[i]), limits)) out.invalidate();
   }
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t owned = 0;

@@ -5,9 +5,6 @@
 namespace carom::types {
 namespace {
 
-using Type = Parameter::Type;
-using Range = Parameter::Range;
-
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   return options::all_pairs<D>("gravity", InverseDistance(-p.real("constant")), PairWeight::masses, p, context,

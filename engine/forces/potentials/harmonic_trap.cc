@@ -5,9 +5,6 @@
 namespace carom::types {
 namespace {
 
-using Type = Parameter::Type;
-using Range = Parameter::Range;
-
 /// V_i = ½ k |x − c|²; its discrete gradient is the gradient at the midpoint.
 template <int D>
 class HarmonicTrap {
@@ -31,7 +28,7 @@ class HarmonicTrap {
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   constexpr std::string_view type = "harmonic-trap";
-  if (options::any_periodic(context.box))
+  if (context.box.has(Boundary::periodic))
     options::refuse(type, "has no single-valued potential in a periodic box; make the boundaries 'wall' or 'open'");
   const Vec<D> centre = p.has("centre") ? options::vector<D>(type, p, "centre") : Vec<D>(0.5 * context.box.edges);
   return std::make_unique<FieldTerm<D, HarmonicTrap<D>>>(context.particles,

@@ -6,9 +6,6 @@
 namespace carom::types {
 namespace {
 
-using Type = Parameter::Type;
-using Range = Parameter::Range;
-
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   return options::pair_term<D>("morse", Morse(p.real("depth"), p.real("alpha"), p.real("r0")), PairWeight::one, p,

@@ -124,13 +124,4 @@ PairList bonds(std::string_view type, const Parameters& parameters, std::size_t 
   return list;
 }
 
-PairList union_of_all(Communicator& ranks, const PairList& mine) {
-  const auto bytes = std::as_bytes(std::span(mine));
-  PairList all;
-  for (const Bytes& received : ranks.gather({bytes.begin(), bytes.end()}))
-    for (Reader reader(received); reader.more();) all.push_back(reader.get<PairList::value_type>());
-  std::ranges::sort(all);
-  return all;
-}
-
 }  // namespace carom::options

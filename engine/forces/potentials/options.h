@@ -45,29 +45,26 @@ void refuse_cut_options(std::string_view type, const Parameters& parameters);
 /// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending; none for `within`.
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
 
-/// What ranks have found together, ascending. Collective.
-PairList union_of_all(Communicator& ranks, const PairList& mine);
-
 /// The bonds that `pairs`, `chain` or `within` describe, by ids, i < j, ascending: all there are, on each rank.
 template <int D>
 PairList bonds(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
   PairList list = bonds(type, parameters, context.total);
   if (!parameters.has("within") || !context.placed) return list;
   const double distance = parameters.real("within");
-  const auto add = [&](const auto& p, auto&& counts) {
+  const auto add = [&](const Particles<D>& p) {
     NeighbourList<D> near(context.box, std::vector<double>(p.x.size(), 0.5 * distance));
     for (const auto& [i, j, image] : near.cover(p.x)) {
-      if (!counts(i) || !((p.x[i] - p.x[j] + context.box.shift(image)).norm() <= distance)) continue;
-      const PairList::value_type bond{p.id.empty() ? i : p.id[i], p.id.empty() ? j : p.id[j]};
+      if (!p.owns(i) || !((p.x[i] - p.x[j] + context.box.shift(image)).norm() <= distance)) continue;
+      const PairList::value_type bond{p.id_of(i), p.id_of(j)};
       if (list.empty() || list.back() != bond) list.push_back(bond);  // not through another image
     }
   };
   if (context.ranks) {
-    const Halo<D> near = halo_of(context.box, distance, *context.ranks, context.particles);
-    add(near, [&](Id i) { return near.ghost[i] == 0; });
-    list = union_of_all(*context.ranks, list);
+    add(halo_of(context.box, distance, *context.ranks, context.particles));
+    list = gather_values<PairList::value_type>(*context.ranks, list);
+    std::ranges::sort(list);
   } else {
-    add(context.particles, [](Id) { return true; });
+    add(context.particles);
   }
   if (list.empty()) refuse(type, "no particles stand within " + std::to_string(distance) + "; give a larger 'within'");
   return list;
@@ -112,13 +109,6 @@ double least_contact(std::string_view type, const Parameters& parameters, const 
   return contact < kNone ? contact : 0;
 }
 
-template <int D>
-bool any_periodic(const Box<D>& box) {
-  for (int k = 0; k < D; ++k)
-    if (box.periodic(k)) return true;
-  return false;
-}
-
 /// A term over the pairs of a source, with the scale of the potential before it was cut.
 template <int D, Potential P, class Pairs>
 std::unique_ptr<Interaction<D>> term(P potential, PairWeight weight, const InteractionContext<D>& context, Pairs pairs,
@@ -133,7 +123,8 @@ std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, Pa
                                           const Parameters& parameters, const InteractionContext<D>& context,
                                           const std::string& remedy) {
   PairFilter pairs_of = filter(type, parameters, context);
-  if (any_periodic(context.box)) refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
+  if (context.box.has(Boundary::periodic))
+    refuse(type, "acts between all pairs, which a periodic box does not allow; " + remedy);
   return term<D>(potential, weight, context, AllPairs<D>(context.box, context.total, std::move(pairs_of)), potential);
 }
 
@@ -172,7 +163,7 @@ Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, PairWeight wei
   if (context.ranks) sums = sum_of_all(*context.ranks, sums);
   const double pairs = sums.weight[0].value() * sums.weight[1].value();
   const bool alike = !species || (*species)[0] == (*species)[1];
-  return tail_of<D>(cut, alike ? pairs / 2 : pairs, context.box.volume());
+  return tail_correction<D>(cut, alike ? pairs / 2 : pairs, context.box.volume());
 }
 
 /// A term cut as said, with its long-range correction if the deck wants it.

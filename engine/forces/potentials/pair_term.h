@@ -150,7 +150,7 @@ class PairTerm final : public Interaction<D> {
       const bool wide = !function[0](&potential_, *batch_, units, &totals[shared ? 1 : 0]);
       if (wide && !function[1](&potential_, *batch_, units, &totals[shared ? 1 : 0])) {
         if (given.x_new.empty() && given.vectors.empty()) refuse();
-        forces->spoil();
+        forces->invalidate();
       } else if (forces) {
         kernels_->scatter(*batch_, batch_->low, low);
         if (wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));

@@ -77,15 +77,11 @@ class Bonds {
   double reach(const Particles<D>& block, Communicator& ranks) const {
     const Id first = block.size() > 0 ? block.id_of(0) : 0;
     const auto here = [&](Id id) { return id >= first && id - first < block.size(); };
-    Bytes message;  // the higher partners of bonds, where another rank has the lower one
+    std::vector<std::pair<Id, Vec<D>>> higher;  // partners of bonds, where another rank has the lower one
     for (const auto& [i, j] : pairs_)
-      if (!here(i) && here(j)) put(message, j), put(message, block.x[j - first]);
+      if (!here(i) && here(j)) higher.emplace_back(j, block.x[j - first]);
     std::unordered_map<Id, Vec<D>> elsewhere;
-    for (const Bytes& each : ranks.gather(message))
-      for (Reader reader(each); reader.more();) {
-        const auto id = reader.get<Id>();
-        elsewhere[id] = reader.get<Vec<D>>();
-      }
+    for (const auto& [id, x] : gather_values<std::pair<Id, Vec<D>>>(ranks, higher)) elsewhere[id] = x;
     double longest = 0;
     for (const auto& [i, j] : pairs_) {
       if (!here(i)) continue;

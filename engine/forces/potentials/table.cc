@@ -90,8 +90,6 @@ ForceScale Table::scale(double distance) const {
 namespace types {
 namespace {
 
-using Type = Parameter::Type;
-using Range = Parameter::Range;
 using Numbers = std::vector<double>;
 
 void check(const Numbers& r, const Numbers& values, const Numbers& slopes) {

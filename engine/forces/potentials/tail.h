@@ -27,7 +27,7 @@ concept KnowsTail = Potential<P> && requires(const P potential) {
 
 /// The correction for `pairs` pairs of unit weight in a volume.
 template <int D, KnowsTail P>
-Tail tail_of(const Cut<P>& cut, double pairs, double volume) {
+Tail tail_correction(const Cut<P>& cut, double pairs, double volume) {
   const double end = std::sqrt(cut.cutoff_squared());
   const double scale = (D == 3 ? 4 : 2) * std::numbers::pi * pairs / volume;
   const double beyond = scale * cut.whole().tail(end, D);

@@ -5,6 +5,9 @@
 
 namespace carom::types {
 
+using Type = Parameter::Type;
+using Range = Parameter::Range;
+
 InteractionInfo harmonic_bond();
 InteractionInfo gravity();
 InteractionInfo coulomb();

@@ -5,8 +5,6 @@
 namespace carom::types {
 namespace {
 
-using Type = Parameter::Type;
-
 /// V_i = −m_i g·x: all particles fall with the acceleration g.
 template <int D>
 class UniformField {

@@ -6,9 +6,6 @@
 namespace carom::types {
 namespace {
 
-using Type = Parameter::Type;
-using Range = Parameter::Range;
-
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   const double contact = options::least_contact<D>("yukawa", p, context);

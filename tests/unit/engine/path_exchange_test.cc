@@ -63,5 +63,30 @@ TEST(PathExchange, BringsValuesToNeighbours) {
   });
 }
 
+TEST(Subdomain, HasTheContactsOfOneCore) {
+  const auto system = random_system<3>(260, {14, 6, 6}, {P, P, W}, 0.5, 0.5, 11);
+  const Sizes sizes(system->particles);
+  std::vector<Contact<3>> whole;
+  EventCore<3> core(system->box, &sizes, {});
+  core.load(records_of(system->particles), Vec<3>::Zero(), kEnd, 0, 2 * kDisplacement);
+  Counters counters;
+  core.run(kEnd, {.counters = counters, .contacts = &whole});
+  const auto walls = std::ranges::count(whole, EventKind::wall, [](const auto& contact) { return contact.key.kind; });
+  ASSERT_GT(walls, 10);
+  ASSERT_GT(whole.size(), static_cast<std::size_t>(walls) + 50);
+
+  std::vector<std::vector<Contact<3>>> parts(3);
+  in_a_window(*system, sizes, kEnd, [&](Communicator& ranks, Subdomain<3>* subdomain, std::uint64_t) {
+    auto& found = parts[static_cast<std::size_t>(ranks.rank())];
+    if (subdomain)
+      subdomain->for_each_contact([&](Slot i, std::size_t k) { found.push_back(subdomain->contact_of(i, k)); });
+  });
+  ASSERT_FALSE(parts[1].empty());
+  std::vector<Contact<3>> all = parts[0];
+  all.insert(all.end(), parts[1].begin(), parts[1].end());
+  std::ranges::sort(all, {}, &Contact<3>::key);
+  expect_same<3>({whole, {}}, {all, {}}, "two subdomains");
+}
+
 }  // namespace
 }  // namespace carom

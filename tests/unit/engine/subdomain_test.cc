@@ -36,8 +36,8 @@ struct Divided {
       Parts& part = *parts.emplace_back(std::make_unique<Parts>(system->box, sizes));
       part.core.load(records, Vec<3>::Zero(), kEnd, 0, 2 * kDisplacement);
       part.ownership.load(bisection, number, kDisplacement);
-      part.paths.load(part.core.flights().room());
-      part.repair.load(part.core.flights().room());
+      part.paths.load(part.core.flights().capacity());
+      part.repair.load(part.core.flights().capacity());
       part.ownership.sort_out(
           0, 0, [](Slot) { return false; }, [](std::size_t, const Record<3>&) {});
     }
@@ -204,8 +204,8 @@ TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
   EXPECT_EQ(other, later);
 }
 
-TEST(WindowRepair, MendsUntilAllOwnSpheresAreAsInOneCore) {
-  // A blow passes from one subdomain through a row of spheres into the other, which did not see it come.
+TEST(WindowRepair, GoesOnUntilAllOwnSpheresAreAsInOneCore) {
+  // An impact passes from one subdomain through a row of spheres into the other, which did not see it come.
   std::vector<Vec<3>> x, v(16, Vec<3>::Zero());
   for (int i = 0; i < 16; ++i) x.push_back({2.0 + 1.001 * i, 3, 3});
   v[0][0] = 3;

@@ -73,9 +73,7 @@ TEST(TextFile, TakesBackWhatDoesNotFit) {
   EXPECT_EQ(contents(path), "first line\n");
 }
 
-TEST(Log, AFullDiskIsAnError) {
-  EXPECT_THROW(RunLog("/dev/full", true).note("lost"), Error);  // spdlog alone would only print a message
-}
+TEST(Log, AFullDiskIsAnError) { EXPECT_THROW(RunLog("/dev/full", true).note("lost"), Error); }
 
 // A table for people: few rows, evenly in each doubling, and always the last.
 TEST(Log, TheTableIsNoCopyOfThermo) {

@@ -240,7 +240,7 @@ void expect_tail(const P& whole) {
     const double start = switched ? 2.2 : 2.5;
     const double energy = to_infinity(start, [&](double r) { return lost(r) * std::pow(r, D - 1); });
     const double virial = to_infinity(start, [&](double r) { return lost_force(r) * std::pow(r, D); });
-    const Tail tail = tail_of<D>(cut, pairs, volume);
+    const Tail tail = tail_correction<D>(cut, pairs, volume);
     EXPECT_NEAR(tail.energy, area * pairs / volume * energy, 1e-5 * std::abs(tail.energy));
     EXPECT_NEAR(tail.virial, area * pairs / volume * virial, 1e-5 * std::abs(tail.virial));
   }
@@ -259,7 +259,7 @@ TEST(TailCorrection, IsTheIntegralOfWhatTheCutTakesAway) {
 
 TEST(TailCorrection, OfTruncatedLennardJonesIsTheTextbooks) {  // Allen, Tildesley, 2nd ed., eqs 2.144 and 2.145
   const double n = 500, density = 0.776, end = 3, pi = std::numbers::pi;
-  const Tail tail = tail_of<3>(Cut(LennardJones(1, 1), end, CutKind::shifted), n * n / 2, n / density);
+  const Tail tail = tail_correction<3>(Cut(LennardJones(1, 1), end, CutKind::shifted), n * n / 2, n / density);
   EXPECT_NEAR(tail.energy / n, 8 * pi * density * (std::pow(end, -9) / 9 - std::pow(end, -3) / 3), 1e-14);
   EXPECT_NEAR(tail.virial / (3 * n / density),
               32 * pi * density * density * (std::pow(end, -9) / 9 - std::pow(end, -3) / 6), 1e-13);
