@@ -28,6 +28,7 @@ Variant variant(std::string_view name, const std::vector<Parameter>& parameters)
 
 std::vector<Variant> variants_of(const auto& infos) {
   std::vector<Variant> all;
+  all.reserve(infos.size());
   for (const auto& info : infos) all.push_back(variant(info.name, info.parameters));
   return all;
 }
