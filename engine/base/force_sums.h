@@ -47,7 +47,7 @@ class ForceSums {
     used_high_ += count * limits.high;
     return limits;
   }
-  /// Whether more passes may add to them: not after some hundred without reset(), nor where they are spoiled.
+  /// Whether more passes may add to them: not after some hundred without reset(), nor where they are invalid.
   bool has_room() const { return !invalid_ && used_high_ < kForceRoom / 2; }
 
   /// The words themselves, to add to after make_room(); high() makes them where there were none.

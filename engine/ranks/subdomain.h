@@ -83,6 +83,7 @@ class Subdomain {
         if (nodes[k].key.lo == nodes[k].after.id) visit(i, k);
     });
   }
+  /// That contact.
   Contact<D> contact_of(Slot lo, std::size_t k);
   /// Own spheres that are ghosts elsewhere, and have other paths than before the last run() or repair().
   std::span<const Slot> changed() const { return changed_; }

@@ -26,7 +26,7 @@ class Problems {
   void error(const Place& place, const std::string& what, const std::string& remedy);
   void warning(const Place& place, const std::string& what, const std::string& remedy);
   std::size_t errors() const { return errors_.size(); }
-  /// Throws an Error with all errors in the order of their places, if there are any.
+  /// Throws an Error with all errors, one a line, in the order of their places, if there are any.
   void throw_errors(Failure failure) const;
   /// `place: warning: what; remedy`, in the order they came.
   std::vector<std::string> warnings() const;

@@ -131,7 +131,7 @@ struct Expected {
 };
 
 struct Tally {
-  std::uint64_t held = 0, refused = 0, spoiled = 0, unmade = 0;
+  std::uint64_t held = 0, refused = 0, invalid = 0, unmade = 0;
   double worst = 0;
 };
 
@@ -236,7 +236,7 @@ void try_system(Dice& dice, Tally& tally) {
   mean.evaluate(*system, p.x, x_new);
   values();
   if (std::isnan(f[0][0])) {
-    ++tally.spoiled;
+    ++tally.invalid;
     EXPECT_GT(expected.largest_mean, 0.1);
     return;
   }
@@ -263,7 +263,7 @@ void try_systems(std::uint64_t count, std::uint64_t seed) {
   }
   std::printf(
       "    %g systems held, %g refused, %g with mean forces that do not fit; largest error %.3g of what is allowed\n",
-      static_cast<double>(tally.held), static_cast<double>(tally.refused), static_cast<double>(tally.spoiled),
+      static_cast<double>(tally.held), static_cast<double>(tally.refused), static_cast<double>(tally.invalid),
       tally.worst);
   if (testing::Test::HasFailure()) return;
   EXPECT_GT(tally.held, count / 4);
