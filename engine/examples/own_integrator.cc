@@ -22,7 +22,7 @@ class EulerCromer : public carom::Integrator<D> {
     force_.resize(p.size());
     carom::evaluate_forces<D>(system, p.x, force_, report.counters);
     for (carom::Id i = 0; i < p.size(); ++i) p.v[i] += (slab.length / p.mass[i]) * force_[i];
-    core_->begin_step(report.counters, report.contacts, force_, slab.length);
+    core_->begin_step(report.counters, report.contacts, &force_, slab.length);
     core_->begin(p.v, {}, slab.length);  // straight flights
     core_->fly({});
     core_->commit(0);

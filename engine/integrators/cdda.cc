@@ -29,7 +29,8 @@ class CollisionDiscreteDerivative : public Integrator<D> {
         max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
 
   void start(System<D>& system, Counters&) override {
-    scan_.emplace(system, max_events_);
+    scan_.emplace(system, max_events_, reactions_);
+    system.fields.add_value("reactions", reactions_);
     piece_.emplace(system, order_);
     contacts_.emplace(system, *scan_);
   }
@@ -37,7 +38,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     watch_ = report.watch;
-    scan_->begin_slab(report.counters, report.contacts, piece_->a(), slab.length, watch_);
+    scan_->begin_slab(report.counters, report.contacts, &piece_->a(), slab.length, watch_);
     if (watch_) watch_->cut();  // a solve changes the accelerations that the next one starts from
     auto& p = system.particles;
     auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, p); };
@@ -58,9 +59,11 @@ class CollisionDiscreteDerivative : public Integrator<D> {
         continue;
       }
       ended = tau == rest;
+      if (!ended && done + tau == done) scan_->count_event(violator_);  // there must be an end to pieces without length
       std::ranges::copy(piece_->x(), p.x.begin());
       std::ranges::copy(piece_->v(), p.v.begin());
-      if (!scan_->resting().empty()) scan_->slide(p.x, p.v);
+      scan_->remember();
+      scan_->slide(p.x, p.v);
       done += tau;
     }
     system.wrap();
@@ -75,7 +78,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     if (!end.converged) return 0;
     if (!end.violates) return rest;
     double lo = 0, hi = rest, tau = rest, last_tau = 0, last_miss = 0;
-    EventKey<D> violator = end.violator;
+    violator_ = end.violator;
     bool known = false;  // a point for the secant
     for (int iteration = 0; hi - lo > 4 * std::numeric_limits<double>::epsilon() * rest; ++iteration) {
       const double miss = end.contact - tau;
@@ -96,7 +99,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       if (!end.converged) return 0;
       if (end.violates) {
         hi = tau;
-        violator = end.violator;
+        violator_ = end.violator;
       } else {
         if (end.touches) return tau;
         lo = tau;
@@ -104,10 +107,10 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     }
     // The bracket has closed on a jump: a grazing contact that comes and goes with τ. The piece before it stands.
     if (lo == 0)
-      throw Error(Failure::numerical, partners(violator) +
+      throw Error(Failure::numerical, partners(violator_) +
                                           " meet at once, however short the step; "
                                           "separate them or give them a relative velocity");
-    scan_->count_event(violator);
+    scan_->count_event(violator_);
     end = solve(p, lo);
     return end.converged ? lo : 0;
   }
@@ -116,7 +119,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     if (watch_) watch_->look();
     {
       const Stopwatch watch(counters_->seconds.sweep);
-      if (!piece_->solve(p.x, p.v, tau, scan_->resting(), *counters_)) return {.converged = false};
+      if (!piece_->solve(p.x, p.v, tau, *scan_, *counters_)) return {.converged = false};
     }
     const Stopwatch watch(counters_->seconds.predict);
     return contacts_->judge(p.x, p.v, *piece_, tau);
@@ -124,9 +127,11 @@ class CollisionDiscreteDerivative : public Integrator<D> {
 
   int order_;
   std::uint64_t max_events_;
+  std::vector<Reaction<D>> reactions_;
   std::optional<ContactScan<D>> scan_;
   std::optional<DiscreteGradient<D>> piece_;
   std::optional<ChordContacts<D>> contacts_;
+  EventKey<D> violator_{};  // of the contact that limits the last piece
   Counters* counters_ = nullptr;
   SlabWatch* watch_ = nullptr;
 };

@@ -43,7 +43,7 @@ class ChordContacts {
       const double sigma = scan_.contact_distance(i, j);
       const double reach = sigma + tau * u.norm() + scan_.tolerance(sigma);
       if (d.squaredNorm() > reach * reach * kProlongation || scan_.rests(key)) continue;
-      const double slack = sigma * scan_.resting_speed();
+      const double slack = sigma * (scan_.rounding_speed(i, v[i]) + scan_.rounding_speed(j, v[j]));
       judge_pair(key, d, u, v[i] - v[j], v_end[i] - v_end[j], sigma, tau, slack, end);
     }
     key.kind = EventKind::wall;
@@ -55,12 +55,14 @@ class ChordContacts {
         if (scan_.rests(key)) continue;
         const double radius = system_.particles.radius[i];
         judge_wall(key, wall.gap(x[i], radius), wall.along_normal(chord[i]), wall.along_normal(v[i]),
-                   wall.along_normal(v_end[i]), radius, tau, end);
+                   wall.along_normal(v_end[i]), radius, tau, scan_.rounding_speed(i, v[i]), end);
       }
     return end;
   }
 
  private:
+  /// Of the tolerance, so that the positions at the end touch too after they have been rounded.
+  static constexpr double kClosed = 0.5;
   static constexpr double kProlongation = 4;  // contacts are still found this far beyond the end of the chord (squared)
 
   static void violate(const EventKey<D>& key, PieceEnd<D>& end) {
@@ -75,7 +77,7 @@ class ChordContacts {
     const double gap_end = d_end.norm() - sigma;
     if (d.norm() - sigma > tolerance) {
       const double c = contact_time<D>(d, u, sigma, 0.0);
-      if (std::abs(gap_end) <= tolerance)
+      if (std::abs(gap_end) <= kClosed * tolerance)
         end.touches = true;
       else if (c < tau)
         violate(key, end);
@@ -93,10 +95,10 @@ class ChordContacts {
   }
 
   void judge_wall(const EventKey<D>& key, double gap, double u, double v, double v_end, double radius, double tau,
-                  PieceEnd<D>& end) const {
+                  double slack, PieceEnd<D>& end) const {
     const double tolerance = scan_.tolerance(radius), gap_end = gap + tau * u;
     if (gap > tolerance) {
-      if (std::abs(gap_end) <= tolerance)
+      if (std::abs(gap_end) <= kClosed * tolerance)
         end.touches = true;
       else if (gap_end < 0)
         violate(key, end);
@@ -105,7 +107,7 @@ class ChordContacts {
     }
     if (gap_end < scan_.floor(gap, tolerance))
       violate(key, end);
-    else if (gap_end <= tolerance && v_end < -scan_.resting_speed())
+    else if (gap_end <= tolerance && v_end < -slack)
       end.touches = true;
     if (u < v) end.contact = std::min(end.contact, std::max(0.0, v) * tau / (v - u));
   }

@@ -15,14 +15,17 @@ namespace carom::integrator {
 template <int D>
 class VerletPieces {
  public:
-  VerletPieces(System<D>& system, std::uint64_t max_events) : system_(system), scan_(system, max_events) {}
+  VerletPieces(System<D>& system, std::uint64_t max_events) : system_(system), scan_(system, max_events, reactions_) {}
 
-  void start(Counters& counters) { accelerations_.start(system_, counters); }
+  void start(Counters& counters) {
+    accelerations_.start(system_, counters);
+    system_.fields.add_value("reactions", reactions_);
+  }
 
   void begin_slab(SlabReport<D>& report, double length) {
     counters_ = &report.counters;
     watch_ = report.watch;
-    scan_.begin_slab(report.counters, report.contacts, accelerations_.a, length, watch_);
+    scan_.begin_slab(report.counters, report.contacts, &accelerations_.a, length, watch_);
   }
 
   /// Applies the impulse to whatever touches and approaches; see ContactScan::resolve.
@@ -49,6 +52,7 @@ class VerletPieces {
     }
     accelerations_.update(system_, *counters_);
     kick(p.v, accelerations_.a, 0.5 * tau);
+    scan_.remember();
     if (!scan_.resting().empty()) scan_.stop_approach(p.x, p.v);
   }
 
@@ -60,6 +64,7 @@ class VerletPieces {
 
  private:
   System<D>& system_;
+  std::vector<Reaction<D>> reactions_;
   ContactScan<D> scan_;
   Accelerations<D> accelerations_;
   std::vector<Vec<D>> flight_;

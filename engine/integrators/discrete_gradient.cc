@@ -26,12 +26,11 @@ DiscreteGradient<D>::DiscreteGradient(System<D>& system, int order) : system_(sy
 }
 
 template <int D>
-bool DiscreteGradient<D>::solve(Positions<D> x, Positions<D> v, double tau, std::span<RestingContact<D>> resting,
-                                Counters& counters) {
+bool DiscreteGradient<D>::solve(Positions<D> x, Positions<D> v, double tau, ContactScan<D>& scan, Counters& counters) {
   std::ranges::copy(x, x_.begin());
   std::ranges::copy(v, v_.begin());
   for (std::size_t stage = 0; stage < fractions_.size(); ++stage)
-    if (!substep(fractions_[stage] * tau, stage, resting, counters)) return false;
+    if (!substep(fractions_[stage] * tau, stage, scan, counters)) return false;
   if (fractions_.size() == 1)
     std::ranges::copy(mean_, chord_.begin());
   else
@@ -40,12 +39,12 @@ bool DiscreteGradient<D>::solve(Positions<D> x, Positions<D> v, double tau, std:
 }
 
 template <int D>
-bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<RestingContact<D>> resting,
-                                  Counters& counters) {
+bool DiscreteGradient<D>::substep(double tau, std::size_t stage, ContactScan<D>& scan, Counters& counters) {
   const std::size_t n = x_.size();
   const auto& mass = system_.particles.mass;
   auto& a = mean_acceleration_[stage];
   const auto& box = system_.box;
+  const bool resting = !scan.resting().empty();
   auto give_up = [&] {
     for (auto& stage_guess : mean_acceleration_) std::ranges::fill(stage_guess, Vec<D>::Zero());
     return false;
@@ -64,7 +63,7 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<Resti
       a[i] = force_[i] / mass[i];
       next_[i] = v_[i] + (0.5 * tau) * a[i];
     }
-    if (!resting.empty()) hold(tau, resting);
+    if (resting && !scan.hold_means(x_, mean_, next_, tau)) return give_up();
     double change = 0, speed = 0;
     for (std::size_t i = 0; i < n; ++i) {
       change = std::max(change, (next_[i] - mean_[i]).squaredNorm());
@@ -78,7 +77,7 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<Resti
     if (change == 0 || (change >= last && change <= floor)) {
       for (std::size_t i = 0; i < n; ++i) {
         x_[i] += tau * mean_[i];
-        v_[i] = resting.empty() ? Vec<D>(v_[i] + tau * a[i]) : Vec<D>(2 * mean_[i] - v_[i]);
+        v_[i] = resting ? Vec<D>(2 * mean_[i] - v_[i]) : Vec<D>(v_[i] + tau * a[i]);
       }
       return true;
     }
@@ -86,23 +85,6 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, std::span<Resti
     last = change;
   }
   return give_up();
-}
-
-/// Keeps resting contacts from closing: |d'|² − |d|² = τ n·u ≥ 0 with n = d + d', u the relative mean velocity.
-template <int D>
-void DiscreteGradient<D>::hold(double tau, std::span<RestingContact<D>> resting) {
-  const auto& box = system_.box;
-  for (auto& contact : resting) {
-    if (contact.key.kind == EventKind::pair) {
-      const Id lo = contact.key.lo, hi = contact.key.hi;
-      contact.normal = 2 * (x_[lo] - x_[hi] + box.shift(contact.key.image)) + tau * (mean_[lo] - mean_[hi]);
-    } else {
-      contact.normal = box.wall(contact.key.hi).normal();
-    }
-    if (tau < 0) contact.normal = -contact.normal;
-    contact.lambda = contact.bound = 0;
-  }
-  press_apart<D>(resting, system_.particles.mass, next_);
 }
 
 template class DiscreteGradient<2>;

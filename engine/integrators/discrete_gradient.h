@@ -8,10 +8,8 @@
 // error. Order 4 composes five pieces γτ, γτ, (1−4γ)τ, γτ, γτ, γ = 1/(4 − 4^{1/3}) (Suzuki, Phys. Lett. A 146 (1990)
 // 319).
 
-#include <span>
-
 #include "engine/forces/forces.h"
-#include "engine/slabs/resting.h"
+#include "engine/slabs/contact_scan.h"
 
 namespace carom::integrator {
 
@@ -21,9 +19,9 @@ class DiscreteGradient {
   /// order: 2 or 4.
   DiscreteGradient(System<D>& system, int order);
 
-  /// Computes x() and v() from (x, v) over `tau`. Resting contacts are held by reactions λ(d + d'), λ ≥ 0, that do no
-  /// work because |d'| = |d|. False where the iteration does not contract well: take a shorter piece.
-  bool solve(Positions<D> x, Positions<D> v, double tau, std::span<RestingContact<D>> resting, Counters& counters);
+  /// Computes x() and v() from (x, v) over `tau`. The resting contacts of `scan` are held by reactions λ(d + d'), λ ≥
+  /// 0, that do no work because |d'| = |d|. False where the iteration does not contract well: take a shorter piece.
+  bool solve(Positions<D> x, Positions<D> v, double tau, ContactScan<D>& scan, Counters& counters);
 
   const std::vector<Vec<D>>& x() const { return x_; }                          ///< x' of the last solve
   const std::vector<Vec<D>>& v() const { return v_; }                          ///< v' of the last solve
@@ -31,8 +29,7 @@ class DiscreteGradient {
   const std::vector<Vec<D>>& a() const { return mean_acceleration_.front(); }  ///< mean accelerations of the last solve
 
  private:
-  bool substep(double tau, std::size_t stage, std::span<RestingContact<D>> resting, Counters& counters);
-  void hold(double tau, std::span<RestingContact<D>> resting);
+  bool substep(double tau, std::size_t stage, ContactScan<D>& scan, Counters& counters);
 
   const System<D>& system_;
   std::vector<double> fractions_;

@@ -11,20 +11,24 @@
 //
 //   r = Σ m [e·(Δx − h v′) − ½ h² e²],   v′ before the kick,
 //
-// is folded into the velocities by a common factor.
+// is folded into the velocities by a common factor. Where hardly anything moves there is nothing to fold it into: then
+// the sweeps go on to rounding, or the slab is made shorter, and what rounding leaves is kept for the next slab.
+//
+// Contacts at rest are held by reactions (engine/slabs/resting.h), which belong to m a′; their work, zero once the
+// sweeps have settled, is part of r.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "engine/base/error.h"
 #include "engine/forces/forces.h"
 #include "engine/forces/stiffness.h"
 #include "engine/integrators/chebyshev.h"
 #include "engine/integrators/extrapolation.h"
-#include "engine/integrators/fold.h"
 #include "engine/integrators/registry.h"
 #include "engine/slabs/slab_core.h"
 
@@ -32,21 +36,26 @@ namespace carom::integrator {
 namespace {
 
 constexpr int kMostSweeps = 60;
-constexpr int kMostPieces = 1 << 14;          // of a step
-constexpr std::uint64_t kFew = 5;             // one particle in so many has changed: only its pairs are evaluated
-constexpr int kSweepsBeforeFreezing = 6;      // sweeps before particles may be frozen
-constexpr int kSwaps = 3;                     // of partners after that, until a particle is frozen
-constexpr int kStart = 4;                     // sweeps after which contraction tells of stiffness
-constexpr double kSlow = 0.04;                // contraction of two sweeps that tells of it
-constexpr double kRoom = 1.1;                 // for frequencies above the one found
-constexpr std::int64_t kMeasured = 1000;      // slabs for which it is good
-constexpr std::size_t kSmooth = 3;            // past slabs that the start is extrapolated from
-constexpr double kStalled = 0.1;              // contraction of kSweepsBeforeFreezing sweeps that is too little
-constexpr double kTooStiff = 0.5;             // such a contraction expected: nothing is frozen for stiffness
-constexpr double kMostFolded = 0.1;           // of the kinetic energy, for frozen particles
+constexpr int kMostPieces = 1 << 14;      // of a step
+constexpr int kSettledBeforeGrowth = 4;   // pieces in few sweeps, before twice the length is tried
+constexpr int kFewSweeps = 20;            // a third of the most: half the length takes hardly more in all
+constexpr std::uint64_t kFew = 5;         // one particle in so many has changed: only its pairs are evaluated
+constexpr int kSweepsBeforeFreezing = 6;  // sweeps before particles may be frozen
+constexpr int kSwaps = 3;                 // of partners after that, until a particle is frozen
+constexpr int kStart = 4;                 // sweeps after which contraction tells of stiffness
+constexpr double kSlow = 0.04;            // contraction of two sweeps that tells of it
+constexpr double kRoom = 1.1;             // for frequencies above the one found
+constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
+constexpr std::size_t kSmooth = 3;        // past slabs that the start is extrapolated from
+constexpr double kStalled = 0.1;          // contraction of kSweepsBeforeFreezing sweeps that is too little
+constexpr int kMostStalled = 2;           // times: a shorter slab takes fewer sweeps
+constexpr double kTooStiff = 0.5;         // such a contraction expected: nothing is frozen for stiffness
+constexpr double kMostFolded = 0.1;       // of the kinetic energy
+// Of Σ |F| |x|: what rounding of the positions costs in energy, in any method.
+constexpr double kRoundingOfForces = 16 * std::numeric_limits<double>::epsilon();
 constexpr double kSettled = 0.5;              // of the tolerance: such a particle keeps its path
 constexpr double kSettledInCollision = 0.05;  // the same where it collides: its lack of energy is of first order in e
-constexpr double kRounding = 1e-13;           // of the speed scale: increments below it that do not shrink are rounding
+constexpr double kForceRounding = 0x1p-43;  // two quanta of the forces: relative increments below it that do not shrink
 
 template <int D>
 class EventDrivenDiscreteGradient : public Integrator<D> {
@@ -61,11 +70,11 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     system.fields.add_working(
         this,
         [this] {
-          for (auto* each : {&a_, &mean_, &move_}) std::vector<Vec<D>>().swap(*each);
+          for (auto* each : {&a_, &mean_, &move_, &smooth_, &v_end_}) std::vector<Vec<D>>().swap(*each);
           forces_ = {};
         },
         [this, &p] {
-          for (auto* each : {&a_, &mean_, &move_}) each->resize(p.size(), Vec<D>::Zero());
+          for (auto* each : {&a_, &mean_, &move_, &v_end_}) each->resize(p.size(), Vec<D>::Zero());
           swaps_.resize(p.size());
         });
     evaluate_forces<D>(system, p.x, a_, counters);
@@ -73,6 +82,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     past_.start(system.fields, a_);
     system.fields.add_value("edda", scales_);
     system.fields.add_value("edda found", kept_);
+    system.fields.add_value("edda owed", owed_);
     const auto sum = [&](auto&& term) { return sum_over_all<D>(system, term); };
     const double n = static_cast<double>(std::max<std::size_t>(1, system.size()));
     scales_.speed = std::sqrt(sum([&](Id i) { return p.v[i].squaredNorm(); }) / n);
@@ -87,7 +97,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     counters_ = &report.counters;
     slab_ = slab.index;
     watch_ = report.watch;
-    core_->begin_step(report.counters, report.contacts, past_.last(), slab.length, watch_);
+    core_->begin_step(report.counters, report.contacts, &past_.last(), slab.length, watch_);
     found_ = kept_;  // of a step that is done again nothing is known
     advance(system, slab);
     kept_ = found_;
@@ -101,43 +111,57 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     bool touching = true;                // contacts at the slab's start may need to be resolved
     double squared_frequency = 0;        // the largest, once it matters
     std::int64_t measured = -kMeasured;  // the slab in which it was found
+    double longest = kNever;             // piece in which sweeps settle
+    int settled = 0;                     // so many pieces of this length
   };
 
   /// The pieces of a step.
   void advance(System<D>& system, const Slab& slab) {
     auto& p = system.particles;
     auto& scan = core_->scan();
-    double done = 0, longest = slab.length;
-    bool to_contact = false;  // `longest` ends where a contact at rest is met or begins
+    // What a piece ends with at the latest: sweeps that settle, and a contact at rest that is met or begins.
+    double done = 0, contact = kNever;
+    double& longest = found_.longest;
+    longest = std::min(longest, slab.length);
     while (done < slab.length) {
       const bool resolved = found_.touching;
       if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(p.x, p.v)))) {
         system.decomposition.need_all();
-        scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
+        owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
         found_.touching = !scan.resting().empty();
       }
-      const double rest = slab.length - done, piece = std::min(longest, rest);
-      if (solve(system, piece, resolved) && (!any_freezes_ || can_fold(system, piece))) {
+      const double rest = slab.length - done, piece = std::min({longest, contact, rest});
+      if (solve(system, piece, resolved)) {
         core_->commit(done);
         if (piece < rest && watch_) watch_->cut();
         finish(system, piece);
-        if (found_.touching) scan.slide(p.x, p.v);
         ++counters_->pieces;
         done = piece == rest ? slab.length : done + piece;
-        longest = std::max(2 * piece, slab.length / kMostPieces);
-        found_.touching = found_.touching || std::exchange(to_contact, false);
+        if (piece == longest && sweeps_ <= kFewSweeps && ++found_.settled >= kSettledBeforeGrowth) {
+          longest = std::max(2 * piece, slab.length / kMostPieces);
+          found_.settled = 0;
+        }
+        found_.touching = found_.touching || contact < kNever;
+        contact = kNever;
         continue;
       }
       system.decomposition.need_all();
       if (!end_.complete && !end_.too_strong) {
         scan.count_event(end_.key);
-        to_contact = end_.time > 0;
-        longest = to_contact ? end_.time : longest;
-        found_.touching = found_.touching || !to_contact;
+        contact = end_.time > 0 ? end_.time : kNever;
+        found_.touching = found_.touching || contact == kNever;
         continue;
       }
       ++counters_->slabs_halved;
       longest = 0.5 * piece;
+      found_.settled = 0;
+      contact = kNever;
+      if (longest * kMostPieces < slab.length && !end_.complete && end_.too_strong && end_.time > 0)
+        throw Error(Failure::numerical,
+                    partners(end_.key) + " collide again and again without moving, even in pieces of a " +
+                        std::to_string(kMostPieces) +
+                        "th of the step: they have no room between their neighbours or walls; leave gaps between "
+                        "spheres that fill a box from wall to wall, or use a smaller integrator.step");
       if (longest * kMostPieces < slab.length)
         throw Error(Failure::numerical, "the sweeps do not settle even in " + std::to_string(kMostPieces) +
                                             " pieces; the forces, strongest on particle " +
@@ -147,35 +171,50 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     }
   }
 
-  /// Sweeps over a slab from the present state. True: core_ has the flight on a_, mean_ the accelerations it gives;
-  /// false: it is to be shorter. `resolved`: what touches now has been seen to.
+  /// Sweeps over a slab from the present state. True: core_ has the flight on a_, mean_ the accelerations it gives, and
+  /// balance_ what the energy lacks; false: it is to be shorter. `resolved`: what touches now has been seen to.
   bool solve(System<D>& system, double h, bool resolved) {
     const Stopwatch watch(counters_->seconds.sweep);
     auto& p = system.particles;
     const std::size_t n = p.size();
     Chebyshev chebyshev(0.25 * h * h * found_.squared_frequency);
     past_.expect(h, a_, chebyshev.plain() ? kSmooth : 1);  // stiff motion is not smooth from slab to slab
+    held_ = true;
+    if (resting()) {
+      mean_ = a_;
+      hold(system, h, true);
+      a_ = mean_;
+    }
     core_->begin(p.v, a_, h, resolved);
     std::ranges::fill(swaps_, 0);
     std::ranges::fill(move_, Vec<D>::Zero());
     any_freezes_ = false;
+    int times_stalled = 0;
     const double scale = std::max(scales_.speed, h * scales_.strength);
-    const double wanted = core_->scan().resting().empty() ? tolerance_ * scale : 0;  // else contacts would open
-    std::array<double, kMostSweeps + 1> residual{};                                  // by sweep
+    double wanted = resting() ? 0 : tolerance_ * scale;  // 0: rounding; else contacts at rest would open
+    std::array<double, kMostSweeps + 1> residual{};      // by sweep
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
       if (watch_) watch_->look();
+      sweeps_ = sweep;
       end_ = core_->fly(a_);
       if (!end_.complete) return false;
       const auto [squared, swaps] = evaluate(system, h, sweep == 1);
       const double largest = residual[sweep] = h * std::sqrt(squared);
-      if (!std::isfinite(largest)) return false;
-      if (largest <= wanted) return true;
-      if (sweep > 2 && largest <= kRounding * scale && largest > 0.25 * residual[sweep - 1]) return true;
+      if (!std::isfinite(largest) || !held_) return false;
+      const double rounding = kForceRounding * (resting() ? std::max(scale, pressed_) : scale);
+      const bool settled = largest == 0 || (sweep > 2 && largest <= rounding && largest > 0.25 * residual[sweep - 1]);
+      if (settled || largest <= wanted) {
+        if (balance(system, h)) return true;
+        if (settled || any_freezes_) return false;
+        wanted = 0;
+      }
       if (sweep >= kSweepsBeforeFreezing && swaps > 0) freeze();
       const double stalled = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kSweepsBeforeFreezing));
       if (sweep > kSweepsBeforeFreezing && sweep % kSweepsBeforeFreezing == 0 && stalled < kTooStiff &&
-          largest > stalled * residual[sweep - kSweepsBeforeFreezing])
+          largest > stalled * residual[sweep - kSweepsBeforeFreezing]) {
+        if (++times_stalled > kMostStalled) return false;
         freeze_stalled(largest / h);
+      }
       const bool slow =
           sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * residual[sweep - 2]);
       if (slow && slab_ >= found_.measured + kMeasured) {
@@ -185,14 +224,14 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         ++counters_->fallbacks;
       }
       chebyshev.next();
-      const double settled = std::pow(kSettled * wanted / h, 2);
+      const double at_rest = std::pow(kSettled * wanted / h, 2);
       const double in_collision = std::pow(kSettledInCollision * wanted / h, 2);
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
         const Vec<D> e = mean_[i] - a_[i];
         if (!chebyshev.plain())
           a_[i] += move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
-        else if (e.squaredNorm() > (core_->collides(i) ? in_collision : settled))
+        else if (e.squaredNorm() > (core_->collides(i) ? in_collision : at_rest))
           a_[i] = mean_[i];
       }
     }
@@ -212,7 +251,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (Id i = 0; i < x.size(); ++i) mean_[i] = forces_[i];
     system.decomposition.update(std::span(mean_));
     for (Id i = 0; i < x.size(); ++i) mean_[i] /= p.mass[i];
-    if (!core_->scan().resting().empty()) hold(system, h);
+    if (resting()) hold(system, h, false);
     std::array<double, 2> most{};
     for (Id i = 0; i < x.size(); ++i)
       if (p.owns(i) && !frozen(i)) most[0] = std::max(most[0], finite((mean_[i] - a_[i]).squaredNorm()));
@@ -259,60 +298,96 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     }
   }
 
-  /// Adds the reactions λ(d + d′) of resting contacts, which do no work because they hold |d′| = |d|, to mean_.
-  void hold(const System<D>& system, double h) {
-    const auto& p = system.particles;
-    std::vector<Vec<D>> w(p.size());  // mean velocities; what rests has no collision in the slab
-    for (Id i = 0; i < p.size(); ++i) w[i] = p.v[i] + (0.5 * h) * mean_[i];
-    for (auto& contact : core_->scan().resting()) {
-      const Id lo = contact.key.lo, hi = contact.key.hi;
-      if (contact.key.kind == EventKind::pair)
-        contact.normal = 2 * (p.x[lo] - p.x[hi] + system.box.shift(contact.key.image)) +
-                         ((core_->x()[lo] - p.x[lo]) - (core_->x()[hi] - p.x[hi]));
-      contact.lambda = contact.bound = 0;
-    }
-    press_apart<D>(core_->scan().resting(), p.mass, w);
-    for (const auto& contact : core_->scan().resting())
-      for (const Id i : {contact.key.lo, contact.key.hi})
-        if (i == contact.key.lo || contact.key.kind == EventKind::pair) mean_[i] = 2 / h * (w[i] - p.v[i]);
-  }
+  bool resting() { return !core_->scan().resting().empty(); }
 
-  /// What the energy lacks for the kick of a particle.
-  double lack(const Particles<D>& p, Id i, double h) const {
-    const Vec<D> e = mean_[i] - a_[i];
-    return p.mass[i] * (e.dot(core_->x()[i] - p.x[i] - h * core_->v()[i]) - 0.5 * h * h * e.squaredNorm());
-  }
-
-  /// Whether what frozen particles lack is little beside the kinetic energy.
-  bool can_fold(const System<D>& system, double h) const {
+  /// Adds the reactions of resting contacts to the accelerations that forces give, mean_. `first`: no flight is known
+  /// yet.
+  void hold(const System<D>& system, double h, bool first) {
     const auto& p = system.particles;
-    const double lacks = sum_over_all<D>(system, [&](Id i) {
-      return frozen(i) ? std::min(std::abs(lack(p, i, h)), std::numeric_limits<double>::max()) : 0.0;
+    auto& scan = core_->scan();
+    smooth_ = mean_;
+    flown_.resize(p.size());
+    w_.resize(p.size());
+    const auto for_each_body = [](const RestingContact<D>& contact, auto&& visit) {
+      visit(contact.key.lo);
+      if (contact.key.kind == EventKind::pair) visit(contact.key.hi);
+    };
+    const auto for_each_held = [&](auto&& visit) {
+      for (const auto& contact : scan.resting()) for_each_body(contact, visit);
+    };
+    for_each_held([&](Id i) {
+      flown_[i] = first ? p.v[i] : Vec<D>(p.v[i] + (0.5 * h) * a_[i]);  // what rests has no collision in the slab
+      w_[i] = p.v[i] + (0.5 * h) * mean_[i];
     });
-    return lacks <= kMostFolded * sum_over_all<D>(system, [&](Id i) {
-                      return 0.5 * p.mass[i] * (p.v[i] - centre()).squaredNorm();
-                    });
+    held_ = scan.hold_means(p.x, flown_, w_, h);
+    pressed_ = 0;  // what reactions alone would give to one of the bodies
+    for (const auto& contact : scan.resting())
+      for_each_body(contact, [&](Id i) { pressed_ = std::max(pressed_, h * contact.force / p.mass[i]); });
+    for_each_held([&](Id i) { mean_[i] = 2 / h * (w_[i] - p.v[i]); });
   }
 
-  /// Moves the particles to the slab's end, with the kick h e and what the energy still lacks.
-  void finish(System<D>& system, double h) {
-    auto& p = system.particles;
-    ExactSeries lacks;
-    std::vector<Lack<D>> of_frozen;
+  /// The velocities at the slab's end, with the kick h e, and what the energy lacks then. False: it can neither be
+  /// folded into them nor kept as rounding. Collective.
+  bool balance(System<D>& system, double h) {
+    struct Sums {
+      ExactSum lack, kinetic;
+      void add(const Sums& other) { lack.add(other.lack), kinetic.add(other.kinetic); }
+    };
+    const auto& p = system.particles;
+    const auto &x = core_->x(), &v = core_->v();
+    for (Id i = 0; i < p.size(); ++i) v_end_[i] = v[i] + h * (mean_[i] - a_[i]);
+    ExactSeries lack, kinetic;
+    double pressing = 0;  // Σ |F| |x| of reactions
+    if (resting()) {      // then all ranks know all
+      const double lost = core_->scan().slide(x, v_end_);
+      if (system.decomposition.ranks().rank() == 0) {
+        lack.add(lost);
+        for (const auto& contact : core_->scan().resting()) {
+          const Id lo = contact.key.lo, hi = contact.key.hi;
+          Vec<D> moved = x[lo] - p.x[lo];
+          if (contact.key.kind == EventKind::pair) moved -= x[hi] - p.x[hi];
+          lack.add(-contact.force * contact.normal.dot(moved) / contact.normal.norm());
+        }
+      }
+      for (const auto& contact : core_->scan().resting()) pressing += contact.force * p.x[contact.key.lo].norm();
+    }
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
-      const double r = lack(p, i, h);
-      if (frozen(i))
-        of_frozen.push_back({p.id_of(i), core_->x()[i], r});
-      else
-        lacks.add(r);
+      const Vec<D> e = mean_[i] - a_[i];
+      lack.add(p.mass[i] * (e.dot(x[i] - p.x[i] - h * v[i]) - 0.5 * h * h * e.squaredNorm()));
+      kinetic.add(0.5 * p.mass[i] * (v_end_[i] - centre()).squaredNorm());
     }
+    const Sums sums = system.decomposition.sum(Sums{lack.sum(), kinetic.sum()});
+    const double lacks = sums.lack.value(), most = kMostFolded * sums.kinetic.value();
+    const bool settles = std::abs(lacks + owed_) <= most, folds = settles || std::abs(lacks) <= most;
+    const double r = settles ? lacks + owed_ : lacks, share = r / sums.kinetic.value();
+    balance_ = {.owed = settles ? 0
+                        : folds ? owed_
+                                : owed_ + lacks,
+                .folded = folds ? std::abs(r) : 0,
+                .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};
+    if (any_freezes_)
+      balance_.frozen =
+          static_cast<std::uint64_t>(sum_over_all<D>(system, [&](Id i) { return frozen(i) ? 1.0 : 0.0; }));
+    if (folds) return true;
+    const double forces = sum_over_all<D>(
+        system, [&](Id i) { return p.mass[i] * std::sqrt(mean_[i].squaredNorm() * p.x[i].squaredNorm()); });
+    return std::abs(lacks) <= kRoundingOfForces * (forces + pressing);
+  }
+
+  /// Moves the particles to the slab's end, with what the energy still lacks.
+  void finish(System<D>& system, double h) {
+    auto& p = system.particles;
     core_->finish(p);
-    for (Id i = 0; i < p.size(); ++i) p.v[i] += h * (mean_[i] - a_[i]);
-    const double left = any_freezes_ ? fold_near(system, of_frozen, *counters_) : 0;
-    fold(system, centre(), lacks.sum(), left, *counters_);
+    p.v.swap(v_end_);
+    if (balance_.stretch != 0)
+      for (auto& v : p.v) v += balance_.stretch * (v - centre());
+    owed_ = balance_.owed;
+    counters_->folded += balance_.folded;
+    counters_->frozen += balance_.frozen;
     system.decomposition.update_halo();
-    past_.pass(h, mean_);
+    core_->scan().remember();
+    past_.pass(h, resting() ? smooth_ : mean_);
   }
 
   std::uint64_t max_events_;
@@ -324,11 +399,22 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> past_;
   MeanForces<D> forces_;
-  std::uint64_t pairs_ = 0;           // within reach
-  std::vector<Vec<D>> a_, mean_;      // flown on, and what that gives
+  std::uint64_t pairs_ = 0;        // within reach
+  std::vector<Vec<D>> a_, mean_;   // flown on, and what that gives
+  std::vector<Vec<D>> smooth_;     // where contacts rest: mean_ without reactions
+  std::vector<Vec<D>> flown_, w_;  // mean velocities of particles in contacts at rest
+  std::vector<Vec<D>> v_end_;
+  struct Balance {
+    double owed = 0, folded = 0, stretch = 0;
+    std::uint64_t frozen = 0;
+  } balance_;                         // of the last slab that was solved
+  double owed_ = 0;                   // energy that could not be folded yet
+  double pressed_ = 0;                // the largest speed that a reaction gives in the slab, which others take away
+  bool held_ = true;                  // reactions were found
   std::vector<std::uint32_t> swaps_;  // of partners, by particle
   bool any_freezes_ = false;          // on any rank, in this slab
   Found found_, kept_;                // kept_: at the end of the last step
+  int sweeps_ = 0;                    // of the last slab
   FlightEnd<D> end_;                  // of the last flight
   std::int64_t slab_ = 0;
   std::vector<Vec<D>> move_;  // of a_ by the last sweep

@@ -27,7 +27,7 @@ class PrimitiveSplitting : public Integrator<D> {
     auto& p = system.particles;
     kicked_ = p.v;
     kick(kicked_, accelerations_.a, 0.5 * slab.length);
-    core_->begin_step(report.counters, report.contacts, accelerations_.a, slab.length, report.watch);
+    core_->begin_step(report.counters, report.contacts, &accelerations_.a, slab.length, report.watch);
     core_->begin(kicked_, {}, slab.length);
     core_->fly({});
     core_->commit(0);

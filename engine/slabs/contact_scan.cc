@@ -9,45 +9,64 @@
 
 namespace carom {
 
+namespace {
+
+// Rounds of impulses at one instant: a blow through a row of spheres takes as many as there are spheres, a light sphere
+// between two heavy ones π √(M/m), 3000 with masses of 1 : 10⁶ (Galperin, Regul. Chaotic Dyn. 8 (2003) 375).
+constexpr std::uint32_t kMostRounds = 30000;
+
+/// The partners of a contact alone: what a contact at rest is known by.
 template <int D>
-ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events)
+EventKey<D> without_time(EventKey<D> key) {
+  key.time = 0;
+  key.generation = 0;
+  return key;
+}
+
+}  // namespace
+
+template <int D>
+ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events, std::vector<Reaction<D>>& reactions)
     : box_(system.box),
       particles_(system.particles),
-      decomposition_(system.decomposition),
       walls_(system.box.walls()),
       tolerance_(system.box.gap_tolerance()),
       list_(system.box, system.particles.radius),
-      max_events_(max_events) {}
+      keeps_momentum_(system.keeps_momentum()),
+      max_events_(max_events),
+      reactions_(reactions) {}
 
 template <int D>
-void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length,
-                                SlabWatch* watch) {
+void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a,
+                                double length, SlabWatch* watch) {
   counters_ = &counters;
   contacts_ = contacts;
   watch_ = watch;
+  a_ = a;
+  length_ = length;
   events_ = 0;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
-  std::array<double, 2> most{};  // squared speed and acceleration
-  for (const auto& v : particles_.v) most[0] = std::max(most[0], v.squaredNorm());
-  for (const auto& each : a) most[1] = std::max(most[1], each.squaredNorm());
-  decomposition_.ranks().largest(most);
-  resting_speed_ = kRestingSpeed * (std::sqrt(most[0]) + length * std::sqrt(most[1]));
+  note_pressed();
 }
 
 template <int D>
-void ContactScan<D>::collect(double time, Positions<D> x, Positions<D> v) {
+void ContactScan<D>::note_pressed() {
+  pressed_.assign(reactions_.empty() ? 0 : particles_.size(), 0.0);
+  for (const auto& [key, force] : reactions_) {
+    pressed_[key.lo] += force / particles_.mass[key.lo];
+    if (key.kind == EventKind::pair) pressed_[key.hi] += force / particles_.mass[key.hi];
+  }
+}
+
+/// All contacts at x, in the order of their keys.
+template <int D>
+void ContactScan<D>::find_touching(double time, Positions<D> x) {
   if (box_.pistons())
     throw Error(Failure::deck, "this method knows no walls that move; take free-flight or psa, or stop them");
-  approaching_.clear();
-  resting_.clear();
-  auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma) {
+  touching_.clear();
+  const auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma) {
     counters_->max_overlap = std::max(counters_->max_overlap, -gap / sigma);
-    const Touch<D> touch{key, normal};
-    const double speed = normal_speed(touch, v);
-    if (speed < -resting_speed_)
-      approaching_.push_back(touch);
-    else if (speed <= resting_speed_)
-      resting_.push_back({key, normal});
+    touching_.push_back({key, normal});
   };
   EventKey<D> key;
   key.time = time;
@@ -70,6 +89,50 @@ void ContactScan<D>::collect(double time, Positions<D> x, Positions<D> v) {
       key.hi = wall.number();
       note(key, wall.normal(), gap, particles_.radius[i]);
     }
+  std::ranges::sort(touching_, {}, &Touch<D>::key);
+}
+
+/// Which of the contacts approach, and which rest.
+template <int D>
+void ContactScan<D>::sort_out(Positions<D> v) {
+  approaching_.clear();
+  resting_.clear();
+  for (const Touch<D>& touch : touching_) {
+    const double speed = normal_speed(touch, v), rest = resting_speed(touch, v);
+    if (speed < -rest)
+      approaching_.push_back(touch);
+    else if (speed <= rest)
+      resting_.push_back({.key = without_time(touch.key), .normal = touch.normal});
+  }
+}
+
+template <int D>
+double ContactScan<D>::known_force(const EventKey<D>& key) const {
+  const EventKey<D> wanted = without_time(key);
+  const auto known = std::ranges::lower_bound(reactions_, wanted, {}, &Reaction<D>::key);
+  return known != reactions_.end() && known->key == wanted ? known->force : 0.0;
+}
+
+template <int D>
+double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
+                                     const Vec<D>& v_hi) const {
+  const bool pair = key.kind == EventKind::pair;
+  const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
+  Vec<D> a = Vec<D>::Zero();
+  if (a_ && key.lo < a_->size()) a = pair ? Vec<D>((*a_)[key.lo] - (*a_)[key.hi]) : (*a_)[key.lo];
+  const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
+  const double pressing = std::max(known_force(key) * inverse_mass, -a.dot(normal) / normal.norm());
+  const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
+  if (!(pressing > 0)) return rounding;
+  return std::max(rounding,
+                  std::min(std::sqrt(2 * pressing * kRestingGap * sigma), 0.5 * pressing * length_ / kMostBounces));
+}
+
+/// The gradient of the gap of a contact at x, up to a positive factor.
+template <int D>
+Vec<D> ContactScan<D>::normal(const EventKey<D>& key, Positions<D> x) const {
+  if (key.kind == EventKind::wall) return box_.wall(key.hi).normal();
+  return x[key.lo] - x[key.hi] + box_.shift(key.image);
 }
 
 template <int D>
@@ -93,45 +156,102 @@ void ContactScan<D>::commit(double time, std::span<const Contact<D>> executed) {
 }
 
 template <int D>
-void ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
-                             const std::function<void(const Touch<D>&)>& impulse) {
-  collect(time, x, v);
-  for (std::uint32_t generation = 0; !approaching_.empty(); ++generation) {
-    std::ranges::sort(approaching_, {}, &Touch<D>::key);
-    for (Touch<D>& touch : approaching_) {
-      if (!(normal_speed(touch, v) < -resting_speed_)) continue;  // an earlier impulse of this round has parted them
-      touch.key.generation = generation;
-      count_event(touch.key);
-      if (watch_) watch_->cut();
-      const Id lo = touch.key.lo, hi = touch.key.hi;
-      const Vec<D> v_before = v[lo];
-      impulse(touch);
-      const Vec<D> given = particles_.mass[lo] * (v[lo] - v_before);
-      Contact<D> contact{touch.key, x[lo], x[lo], given};
-      if (touch.pair()) {
-        contact.virial = touch.normal.dot(given);
-        contact.x_hi = x[hi] - box_.shift(touch.key.image);
-      } else {
-        contact.x_hi = box_.wall(hi).foot(x[lo]);
-      }
-      counters_->record(contact, contacts_);
-    }
-    collect(time, x, v);
+double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
+                               const std::function<void(const Touch<D>&)>& impulse) {
+  find_touching(time, x);
+  sort_out(v);
+  double lost = 0;
+  for (std::uint32_t generation = 0;; ++generation) {
+    one_by_one(generation, x, v, impulse);
+    sort_out(v);
+    if (!approaching_.empty()) continue;
+    if (resting_.empty()) return lost;
+    if (watch_) watch_->cut();
+    lost += stop_rounding(v) + stop_approach(x, v);
+    sort_out(v);  // what has been stopped may have run away from something else
+    if (approaching_.empty()) break;
+    count_event(approaching_.front().key);
   }
-  if (resting_.empty()) return;
-  if (watch_) watch_->cut();
-  stop_approach(x, v);
+  for (auto& contact : resting_) contact.force = known_force(contact.key);
+  return lost;
+}
+
+/// A round of impulses, in key order.
+template <int D>
+void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v,
+                                const std::function<void(const Touch<D>&)>& impulse) {
+  for (Touch<D>& touch : approaching_) {
+    // An earlier impulse of this round may have parted them.
+    if (!(normal_speed(touch, v) < -resting_speed(touch, v))) continue;
+    touch.key.generation = generation;
+    if (generation > kMostRounds)
+      throw Error(Failure::numerical, partners(touch.key) +
+                                          " and their neighbours collide without end at one instant: they touch on all "
+                                          "sides and have no room to part; leave gaps between spheres that fill the "
+                                          "space between walls, or a periodic box");
+    count_event(touch.key);
+    if (watch_) watch_->cut();
+    const Id lo = touch.key.lo;
+    const Vec<D> before = v[lo];
+    impulse(touch);
+    record(touch, x, particles_.mass[lo] * (v[lo] - before));
+  }
+}
+
+template <int D>
+void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse) {
+  const Id lo = touch.key.lo, hi = touch.key.hi;
+  Contact<D> contact{touch.key, x[lo], x[lo], impulse};
+  if (touch.pair()) {
+    contact.virial = touch.normal.dot(impulse);
+    contact.x_hi = x[hi] - box_.shift(touch.key.image);
+  } else {
+    contact.x_hi = box_.wall(hi).foot(x[lo]);
+  }
+  counters_->record(contact, contacts_);
+}
+
+/// Stops bodies of which the speed is rounding of the forces on them: over many steps it would add up. Where momentum
+/// is conserved they go on. Returns the energy that they lose.
+template <int D>
+double ContactScan<D>::stop_rounding(Vectors<D> v) const {
+  double lost = 0;
+  if (keeps_momentum_) return lost;
+  for (const auto& contact : resting_)
+    for (const Id i : {contact.key.lo, contact.key.hi}) {
+      if (i != contact.key.lo && contact.key.kind != EventKind::pair) continue;
+      if (v[i].norm() > rounding_speed(i, Vec<D>::Zero())) continue;
+      lost += 0.5 * particles_.mass[i] * v[i].squaredNorm();
+      v[i].setZero();
+    }
+  return lost;
 }
 
 template <int D>
 bool ContactScan<D>::rests(const EventKey<D>& key) const {
-  return std::ranges::any_of(resting_, [&](const auto& contact) { return same_partners(contact.key, key); });
+  return std::ranges::binary_search(resting_, without_time(key), {}, &RestingContact<D>::key);
+}
+
+/// How much approach of a contact is left to it.
+template <int D>
+double ContactScan<D>::normal_slack(const RestingContact<D>& contact, Positions<D> v) const {
+  constexpr double kShare = 1.0 / 16;  // of what counts as rounding
+  return kShare * rounding_speed(contact.key, v) * contact.normal.norm();
+}
+
+/// Finds the reactions, from those of the last time. `force`: that a lambda of 1 stands for along a normal of length 1.
+template <int D>
+bool ContactScan<D>::press_apart(Vectors<D> w, double force) {
+  for (auto& contact : resting_) contact.lambda = contact.force / (force * contact.normal.norm());
+  const bool found = solve_reactions<D>(resting_, particles_.mass, w);
+  for (auto& contact : resting_) contact.force = contact.lambda * force * contact.normal.norm();
+  return found;
 }
 
 template <int D>
 void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double rest) {
   for (auto& contact : resting_) {
-    contact.lambda = contact.bound = 0;
+    contact.bound = contact.slack = 0;
     if (contact.key.kind != EventKind::pair) continue;
     // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `rest`. A pair that turns (u) while it
     // is braked (u·a < 0) would go in by the second term; u·a is not changed by the reaction, which is normal to u.
@@ -139,44 +259,58 @@ void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double rest) {
     const double braking = std::max(0.0, -u.dot(a[contact.key.lo] - a[contact.key.hi]));
     contact.bound = braking * rest - u.squaredNorm();
   }
-  press_apart<D>(resting_, particles_.mass, a);
+  press_apart(a, 1);
   std::erase_if(resting_, [](const auto& contact) { return contact.lambda == 0; });  // they leave, and may come back
 }
 
 template <int D>
-void ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v) {
+bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D> w, double length) {
   for (auto& contact : resting_) {
-    if (contact.key.kind == EventKind::pair)
-      contact.normal = x[contact.key.lo] - x[contact.key.hi] + box_.shift(contact.key.image);
-    contact.lambda = contact.bound = 0;
+    const Id lo = contact.key.lo, hi = contact.key.hi;
+    const bool pair = contact.key.kind == EventKind::pair;
+    contact.normal = normal(contact.key, x);
+    const double sigma = pair ? contact_distance(lo, hi) : particles_.radius[lo];
+    const double gap = pair ? contact.normal.norm() - sigma : box_.wall(hi).gap(x[lo], sigma);
+    if (pair) contact.normal = 2 * contact.normal + length * (w_before[lo] - w_before[hi]);
+    if (length < 0) contact.normal = -contact.normal;
+    contact.bound = 0;
+    contact.slack = 0.125 * normal_slack(contact, w_before);  // some 30 roundings: new reactions are hardly better
+    if (std::abs(gap) <= 0.5 * tolerance(sigma)) continue;
+    // Rounding of many pieces has opened or closed the contact; it returns as slowly as what counts as rest.
+    const double speed = 0.5 * rounding_speed(contact.key, w_before);
+    contact.bound = std::clamp(-gap / std::abs(length), -speed, speed) * contact.normal.norm();
   }
-  press_apart<D>(resting_, particles_.mass, v);
+  return press_apart(w, 2 / std::abs(length));
 }
 
 template <int D>
-void ContactScan<D>::slide(Positions<D> x, Vectors<D> v) {
-  constexpr int kMostSweeps = 100;
-  constexpr double kSteepest = 0.1;  // normal against tangential speed: beyond, it is an impact and no sliding
-  bool turned = true;
-  for (int sweep = 0; turned && sweep < kMostSweeps; ++sweep) {
-    turned = false;
-    for (const auto& contact : resting_) {
-      if (contact.lambda == 0) continue;
-      const Id lo = contact.key.lo, hi = contact.key.hi;
-      const bool pair = contact.key.kind == EventKind::pair;
-      const Vec<D> normal =
-          (pair ? Vec<D>(x[lo] - x[hi] + box_.shift(contact.key.image)) : contact.normal).normalized();
-      const Vec<D> u = pair ? Vec<D>(v[lo] - v[hi]) : v[lo];
-      const double along = u.dot(normal);
-      const Vec<D> tangent = u - along * normal;
-      if (std::abs(along) <= 0.1 * resting_speed_ || std::abs(along) > kSteepest * tangent.norm()) continue;
-      const Vec<D> change = tangent * (u.norm() / tangent.norm()) - u;
-      const double share = pair ? particles_.mass[hi] / (particles_.mass[lo] + particles_.mass[hi]) : 1.0;
-      v[lo] += share * change;
-      if (pair) v[hi] -= (1 - share) * change;
-      turned = true;
-    }
+double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v) {
+  for (auto& contact : resting_) {
+    contact.normal = normal(contact.key, x);
+    contact.lambda = contact.bound = 0;
+    contact.slack = normal_slack(contact, v);
   }
+  double lost = 0;
+  solve_reactions<D>(resting_, particles_.mass, v, &lost);
+  return lost;
+}
+
+template <int D>
+void ContactScan<D>::remember() {
+  if (resting_.empty() && reactions_.empty()) return;
+  reactions_.clear();
+  for (const auto& contact : resting_)
+    if (contact.force > 0) reactions_.push_back({contact.key, contact.force});
+  note_pressed();
+}
+
+template <int D>
+double ContactScan<D>::slide(Positions<D> x, Vectors<D> v) {
+  std::vector<RestingContact<D>> held;
+  for (const auto& contact : resting_)
+    if (contact.force > 0) held.push_back({.key = contact.key, .normal = normal(contact.key, x)});
+  for (auto& contact : held) contact.slack = normal_slack(contact, v);
+  return keep_tangential<D>(held, particles_.mass, v);
 }
 
 template <int D>
@@ -201,8 +335,9 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
     key.lo = pair.i;
     key.hi = pair.j;
     key.image = pair.image;
-    key.time = contact_time<D>(d, v[pair.i] - v[pair.j], a[pair.i] - a[pair.j], sigma, rest, touches(d, sigma),
-                               sigma * resting_speed_);
+    const bool touching = touches(d, sigma);
+    key.time = contact_time<D>(d, v[pair.i] - v[pair.j], a[pair.i] - a[pair.j], sigma, rest, touching,
+                               touching ? sigma * rounding_speed(key, v) : 0.0);
     if (key.time < kNever) offer(d);
   }
   key.kind = EventKind::wall;
@@ -212,8 +347,9 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
       const double gap = wall.gap(x[i], particles_.radius[i]);
       key.lo = i;
       key.hi = wall.number();
-      key.time = wall_contact_time(gap, wall.along_normal(v[i]), wall.along_normal(a[i]), rest,
-                                   gap <= tolerance(particles_.radius[i]), resting_speed_);
+      const bool touching = gap <= tolerance(particles_.radius[i]);
+      key.time = wall_contact_time(gap, wall.along_normal(v[i]), wall.along_normal(a[i]), rest, touching,
+                                   touching ? rounding_speed(key, v) : 0.0);
       if (key.time < kNever) offer(wall.normal());
     }
   // Pieces that end in a contact without an impulse count too: there must be an end to them.

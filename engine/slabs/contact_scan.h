@@ -18,6 +18,13 @@
 
 namespace carom {
 
+/// A contact at rest and the force that holds it apart.
+template <int D>
+struct Reaction {
+  EventKey<D> key;   ///< without time and generation
+  double force = 0;  ///< on lo along the normal, and its negative on hi [force]
+};
+
 /// A contact met or to come, and its normal: the gradient of the gap, up to a positive factor.
 template <int D>
 struct Touch {
@@ -29,23 +36,26 @@ struct Touch {
 template <int D>
 class ContactScan {
  public:
-  /// `max_events` limits the contacts of one slab.
-  ContactScan(const System<D>& system, std::uint64_t max_events);
+  /// `max_events` limits the contacts of one slab. `reactions`: those of the last piece, state of the run that outlives
+  /// the scan.
+  ContactScan(const System<D>& system, std::uint64_t max_events, std::vector<Reaction<D>>& reactions);
 
-  /// Starts a slab of this length: counts from zero, logs to `contacts` (may be null), and takes what speeds are
-  /// rounding from the velocities and accelerations (length × acceleration) of the whole system. `watch` (may be null):
-  /// called before each impulse of resolve().
-  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length,
+  /// Starts a slab of this length: counts from zero, and logs to `contacts` (may be null). `a` (may be null, or empty):
+  /// the accelerations that forces give, without reactions; it outlives the slab and may change within it. `watch` (may
+  /// be null): called before each impulse of resolve().
+  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
                   SlabWatch* watch = nullptr);
 
   /// Applies `impulse` to every contact that touches and approaches at x, in key order, again until none approaches,
-  /// and notes which contacts are left at rest. `impulse` changes the velocities in `v`. Throws
+  /// and notes which contacts are left at rest. `impulse`
+  /// changes the velocities in `v`. Returns the energy that contacts lost when they came to rest. Throws
   /// Error(Failure::numerical) beyond max_events.
-  void resolve(double time, Positions<D> x, Vectors<D> v, const std::function<void(const Touch<D>&)>& impulse);
+  double resolve(double time, Positions<D> x, Vectors<D> v, const std::function<void(const Touch<D>&)>& impulse);
 
   /// Whether nothing touches and approaches, or rests in contact.
   bool quiet(Positions<D> x, Positions<D> v) {
-    collect(0, x, v);
+    find_touching(0, x);
+    sort_out(v);
     return approaching_.empty() && resting_.empty();
   }
 
@@ -57,17 +67,26 @@ class ContactScan {
   /// that nothing presses are resting no more.
   void hold(Positions<D> v, Vectors<D> a, double rest);
 
-  /// Takes the approach out of resting contacts at new positions.
-  void stop_approach(Positions<D> x, Vectors<D> v);
+  /// The same for the mean velocities w = v + ½ length a of a discrete-gradient piece from x, which ends at
+  /// x + length · w_before: the reactions do no work (but for rounding that they take back where a contact has opened
+  /// or closed by it). `length` is negative for a piece back in time. Returns whether
+  /// reactions were found to rounding.
+  bool hold_means(Positions<D> x, Positions<D> w_before, Vectors<D> w, double length);
+
+  /// Takes the approach out of resting contacts at new positions; returns the energy that they lose.
+  double stop_approach(Positions<D> x, Vectors<D> v);
 
   /// The first contact on the parabolas x + v s + a s²/2 within [0, rest); key.time is kNever when there is none.
   /// Call resolve() before; contacts held at rest are not looked for.
   Touch<D> earliest(Positions<D> x, Positions<D> v, Positions<D> a, double rest);
 
-  /// Turns the relative velocities of contacts that were held over a piece into the tangent at x, keeping their size
-  /// and so the energy. (What a held piece of finite length leaves along the normal would make the pair bounce at
-  /// once.)
-  void slide(Positions<D> x, Vectors<D> v);
+  /// A piece has ended: its reactions are where the next ones start from.
+  void remember();
+
+  /// Turns the velocities of contacts that were held over a piece into the tangents at its end, x, with the same energy
+  /// (what a held piece of finite length leaves along the normal would make the pair bounce at once). Returns what the
+  /// energy lacks after that.
+  double slide(Positions<D> x, Vectors<D> v);
 
   /// The candidates, for methods that look for contacts themselves.
   NeighbourList<D>& list() { return list_; }
@@ -92,26 +111,54 @@ class ContactScan {
   /// Counts and logs contacts that were found and executed elsewhere, since `time` in the slab.
   void commit(double time, std::span<const Contact<D>> executed);
 
-  /// Approach of a contact slower than this is rounding [length/time].
-  double resting_speed() const { return resting_speed_; }
+  /// What rounding makes of the normal speed of a contact, at most, by the motion of sphere i and what presses it; of a
+  /// pair the sum of both [length/time].
+  double rounding_speed(Id i, const Vec<D>& v) const {
+    double speed = v.norm();
+    if (a_ && i < a_->size()) speed += length_ * (*a_)[i].norm();
+    if (!pressed_.empty()) speed += length_ * pressed_[i];
+    return kRounding * speed;
+  }
+  /// A contact rests below this normal speed: what rounding makes, or a speed at which what presses the spheres
+  /// together closes the contact again before it has opened by kRestingGap. `normal`: of any length.
+  double resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
 
  private:
-  void collect(double time, Positions<D> x, Positions<D> v);
+  void find_touching(double time, Positions<D> x);
+  void sort_out(Positions<D> v);
+  void note_pressed();
+  double rounding_speed(const EventKey<D>& key, Positions<D> v) const {
+    return rounding_speed(key.lo, v[key.lo]) + (key.kind == EventKind::pair ? rounding_speed(key.hi, v[key.hi]) : 0.0);
+  }
+  double resting_speed(const Touch<D>& touch, Positions<D> v) const {
+    return resting_speed(touch.key, touch.normal, v[touch.key.lo], v[touch.pair() ? touch.key.hi : touch.key.lo]);
+  }
+  void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v,
+                  const std::function<void(const Touch<D>&)>& impulse);
+  void record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse);
+  double known_force(const EventKey<D>& key) const;
+  double stop_rounding(Vectors<D> v) const;
+  Vec<D> normal(const EventKey<D>& key, Positions<D> x) const;
+  double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;
+  bool press_apart(Vectors<D> w, double force);
   double normal_speed(const Touch<D>& touch, Positions<D> v) const;
 
   const Box<D>& box_;
   const Particles<D>& particles_;
-  const Decomposition<D>& decomposition_;
   std::vector<Wall<D>> walls_;
   GapTolerance tolerance_;
   NeighbourList<D> list_;
+  bool keeps_momentum_;
   std::uint64_t max_events_;
   std::uint64_t events_ = 0, events_at_last_cut_ = 0;
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* contacts_ = nullptr;
   SlabWatch* watch_ = nullptr;
-  double resting_speed_ = 0;
-  std::vector<Touch<D>> approaching_;
+  const std::vector<Vec<D>>* a_ = nullptr;
+  double length_ = 0;
+  std::vector<Reaction<D>>& reactions_;
+  std::vector<double> pressed_;  // by particle: the accelerations that its reactions would give one by one, summed up
+  std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
 };
 

@@ -1,42 +1,336 @@
 #include "engine/slabs/resting.h"
 
+#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace carom {
-
 namespace {
-constexpr int kMostSweeps = 2000;
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+// Added to a diagonal of ones. The first one makes all pivots alike, so that few exchanges find the contacts that are
+// pressed; the last is larger than the rounding of the factors by 10⁶, and small beside the least eigenvalue that
+// matters, so that each repetition takes digits off the error.
+constexpr double kFirstProximal = 1e-2, kProximalRatio = 0.03, kLastProximal = 1e-10;
+constexpr int kRepetitions = 40;
+constexpr int kExchanges = 50;
+constexpr int kPatience = 5;                    // exchanges of all wrong contacts that do not make them fewer
+constexpr double kFewRoundings = 8 * kEpsilon;  // of a sum of a few terms
+constexpr double kMostStretched = 0.1;          // of the kinetic energy: more is no turn of a sliding pair
+constexpr int kNone = -1;
+
+/// The contacts of a system, with the spheres that they act on.
+template <int D>
+class Problem {
+ public:
+  Problem(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w, bool tied)
+      : contacts_(contacts), w_(w), tied_(tied) {
+    std::vector<Id> ids;
+    for (const auto& contact : contacts) {
+      ids.push_back(contact.key.lo);
+      if (pair(contact)) ids.push_back(contact.key.hi);
+    }
+    std::ranges::sort(ids);
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    for (const Id id : ids) bodies_.push_back({id, 1 / mass[id]});
+    const auto place = [&](Id id) { return static_cast<int>(std::ranges::lower_bound(ids, id) - ids.begin()); };
+    for (const auto& contact : contacts) {
+      Arm arm{place(contact.key.lo), pair(contact) ? place(contact.key.hi) : kNone};
+      const double inverse_mass = bodies_[arm.lo].inverse_mass + (arm.hi == kNone ? 0.0 : bodies_[arm.hi].inverse_mass);
+      arm.scale = std::sqrt(contact.normal.squaredNorm() * inverse_mass);
+      arms_.push_back(arm);
+    }
+  }
+
+  /// Solves each cluster that is not solved yet, and moves w.
+  bool solve(double* lost) {
+    bool solved = true;
+    if (std::vector<int> all = everything(); !settled(all, true)) {
+      for (const auto& cluster : clusters()) solved &= settled(cluster, true) || solve(cluster);
+      push(all);
+    }
+    for (const Body& body : bodies_) {
+      const Vec<D> before = w_[body.id];
+      w_[body.id] += body.shift;
+      if (lost) *lost -= 0.5 / body.inverse_mass * body.shift.dot(before + w_[body.id]);
+    }
+    return solved;
+  }
+
+  /// The same for velocities, of which the kinetic energy is kept: the motion of a cluster relative to its centre of
+  /// mass is stretched, or relative to the walls that it touches along their axes. Returns what the energy still lacks.
+  double solve_and_stretch() {
+    if (settled(everything(), true)) {
+      for (const Body& body : bodies_) w_[body.id] += body.shift;
+      return 0;
+    }
+    double lacks = 0;
+    for (const auto& cluster : clusters()) {
+      if (!settled(cluster, true)) solve(cluster);
+      push(cluster);
+      std::vector<int> bodies;
+      Vec<D> free = Vec<D>::Ones(), momentum = Vec<D>::Zero();  // free: 0 along axes of walls that it touches
+      for (const int k : cluster) {
+        if (arms_[k].hi == kNone) free[wall_axis(contacts_[k].key.hi)] = 0;
+        for (const int b : {arms_[k].lo, arms_[k].hi})
+          if (b != kNone) bodies.push_back(b);
+      }
+      std::ranges::sort(bodies);
+      bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+      double mass = 0, lost = 0, kinetic = 0;
+      for (const int b : bodies) {
+        Vec<D>& v = w_[bodies_[b].id];
+        const Vec<D> after = v + bodies_[b].shift;
+        const double m = 1 / bodies_[b].inverse_mass;
+        lost -= 0.5 * m * bodies_[b].shift.dot(v + after);
+        mass += m;
+        momentum += m * after;
+        v = after;
+      }
+      const Vec<D> centre = free.cwiseProduct(momentum) / mass;
+      for (const int b : bodies) kinetic += 0.5 / bodies_[b].inverse_mass * (w_[bodies_[b].id] - centre).squaredNorm();
+      if (!(std::abs(lost) <= kMostStretched * kinetic)) {
+        lacks += lost;
+        continue;
+      }
+      if (lost == 0) continue;
+      const double share = lost / kinetic, stretch = share / (1 + std::sqrt(1 + share));
+      for (const int b : bodies) w_[bodies_[b].id] += stretch * (w_[bodies_[b].id] - centre);
+    }
+    return lacks;
+  }
+
+ private:
+  struct Body {
+    Id id;
+    double inverse_mass;
+    Vec<D> shift = Vec<D>::Zero();  // of w, by the reactions
+    double size = 0;                // of the terms of w with it
+    std::vector<int> contacts{};
+  };
+  struct Arm {
+    int lo, hi;        // places in bodies_; hi: kNone at a wall
+    double scale = 1;  // square root of the diagonal of N M⁻¹ Nᵀ: what the problem is scaled with
+  };
+
+  std::vector<int> everything() const {
+    std::vector<int> all(size());
+    std::iota(all.begin(), all.end(), 0);
+    return all;
+  }
+  static bool pair(const RestingContact<D>& contact) { return contact.key.kind == EventKind::pair; }
+  int size() const { return static_cast<int>(contacts_.size()); }
+
+  /// Contacts that are joined by spheres, each ascending.
+  std::vector<std::vector<int>> clusters() {
+    for (int k = 0; k < size(); ++k)
+      for (const int body : {arms_[k].lo, arms_[k].hi})
+        if (body != kNone) bodies_[body].contacts.push_back(k);
+    std::vector<std::vector<int>> found;
+    std::vector<char> seen(size(), 0);
+    for (int first = 0; first < size(); ++first) {
+      if (seen[first]) continue;
+      std::vector<int> cluster{first};
+      seen[first] = 1;
+      for (std::size_t at = 0; at < cluster.size(); ++at)
+        for (const int body : {arms_[cluster[at]].lo, arms_[cluster[at]].hi}) {
+          if (body == kNone) continue;
+          for (const int k : bodies_[body].contacts)
+            if (!std::exchange(seen[k], 1)) cluster.push_back(k);
+        }
+      std::ranges::sort(cluster);
+      found.push_back(std::move(cluster));
+    }
+    return found;
+  }
+
+  /// The shifts that the reactions of a cluster give.
+  void push(const std::vector<int>& cluster) {
+    const auto each_body = [&](int k, auto&& visit) {
+      visit(bodies_[arms_[k].lo], 1.0);
+      if (arms_[k].hi != kNone) visit(bodies_[arms_[k].hi], -1.0);
+    };
+    for (const int k : cluster)
+      each_body(k, [&](Body& body, double) {
+        body.shift.setZero();
+        body.size = w_[body.id].norm();
+      });
+    for (const int k : cluster) {
+      const double lambda = contacts_[k].lambda;
+      if (lambda == 0) continue;
+      each_body(k, [&](Body& body, double sign) {
+        body.shift += (sign * lambda * body.inverse_mass) * contacts_[k].normal;
+        body.size += std::abs(lambda) * body.inverse_mass * contacts_[k].normal.norm();
+      });
+    }
+  }
+  /// What n·(w_lo − w_hi) has more than the bound.
+  double excess(int k) const {
+    const auto& [lo, hi, scale] = arms_[k];
+    Vec<D> w = w_[bodies_[lo].id] + bodies_[lo].shift;
+    if (hi != kNone) w -= w_[bodies_[hi].id] + bodies_[hi].shift;
+    return contacts_[k].normal.dot(w) - contacts_[k].bound;
+  }
+  double tolerance(int k) const {
+    const auto& [lo, hi, scale] = arms_[k];
+    const double size = bodies_[lo].size + (hi != kNone ? bodies_[hi].size : 0.0);
+    return kFewRoundings * (contacts_[k].normal.norm() * size + std::abs(contacts_[k].bound));
+  }
+  /// Whether the reactions of a cluster solve the problem.
+  bool settled(const std::vector<int>& cluster, bool with_slack = false) {
+    push(cluster);
+    return std::ranges::all_of(cluster, [&](int k) {
+      const double over = excess(k), allowed = std::max(tolerance(k), with_slack ? contacts_[k].slack : 0.0);
+      return over >= -allowed && ((!tied_ && contacts_[k].lambda == 0) || over <= allowed);
+    });
+  }
+
+  bool solve(const std::vector<int>& cluster) {
+    const int m = static_cast<int>(cluster.size());
+    std::vector<double> last(m);
+    for (int k = 0; k < m; ++k) last[k] = contacts_[cluster[k]].lambda;
+    return solve(cluster, last, kLastProximal) || solve(cluster, std::vector<double>(m, 0.0), kFirstProximal);
+  }
+
+  /// From these reactions; where there are none from all contacts pressed.
+  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal) {
+    const int m = static_cast<int>(cluster.size());
+    const bool known = std::ranges::any_of(start, [](double lambda) { return lambda > 0; });
+    if (!known && !tied_ && proximal == kLastProximal) return false;
+    Eigen::VectorXd reaction(m), before(m), gap(m);
+    active_.assign(m, 0);
+    factored_.clear();
+    for (int k = 0; k < m; ++k) {
+      reaction[k] = start[k] * arms_[cluster[k]].scale;
+      contacts_[cluster[k]].lambda = 0;
+    }
+    push(cluster);
+    for (int k = 0; k < m; ++k) {
+      gap[k] = excess(cluster[k]) / arms_[cluster[k]].scale;
+      active_[k] = tied_ || !known || start[k] > 0;
+    }
+    bool solved = false;
+    for (int repetition = 0; repetition < kRepetitions; ++repetition) {
+      before = reaction;
+      proximal_ = proximal;
+      if (!pivot(cluster, gap, before, reaction)) return false;
+      for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
+      // Once more: beside the large terms of a light sphere what a heavy one lacks is not seen.
+      if (std::exchange(solved, settled(cluster)) && solved) return true;
+      proximal = std::max(kProximalRatio * proximal, kLastProximal);
+    }
+    return false;
+  }
+
+  /// Block principal pivoting: (A + δ) λ + gap − δ λ_before is zero where λ > 0, and not negative elsewhere.
+  bool pivot(const std::vector<int>& cluster, const Eigen::VectorXd& gap, const Eigen::VectorXd& before,
+             Eigen::VectorXd& reaction) {
+    const int m = static_cast<int>(cluster.size());
+    // Exchanging all contacts that are wrong takes few rounds but may go round in circles. Where it makes no progress
+    // only the last one is exchanged, which comes to an end (Murty, Linear Algebra Appl. 7 (1974) 65).
+    int fewest = m + 1, patience = kPatience;
+    std::vector<int> wrong;
+    for (int round = 0; round < kExchanges + 4 * m; ++round) {
+      if (!factor(cluster)) return false;
+      Eigen::VectorXd right(static_cast<Eigen::Index>(factored_.size()));
+      for (std::size_t at = 0; at < factored_.size(); ++at)
+        right[static_cast<Eigen::Index>(at)] = proximal_ * before[factored_[at]] - gap[factored_[at]];
+      reaction.setZero();
+      if (right.size() > 0) {
+        const Eigen::VectorXd found = solver_.solve(right);
+        for (std::size_t at = 0; at < factored_.size(); ++at)
+          reaction[factored_[at]] = found[static_cast<Eigen::Index>(at)];
+      }
+      if (!reaction.allFinite()) return false;
+      if (tied_) return true;
+      for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
+      push(cluster);
+      wrong.clear();
+      for (int k = 0; k < m; ++k) {
+        const double allowed = tolerance(cluster[k]) / arms_[cluster[k]].scale;
+        const bool flips = active_[k] ? reaction[k] < -allowed
+                                      : excess(cluster[k]) / arms_[cluster[k]].scale - proximal_ * before[k] < -allowed;
+        if (flips) wrong.push_back(k);
+      }
+      if (wrong.empty()) {
+        reaction = reaction.cwiseMax(0.0);
+        return true;
+      }
+      const int count = static_cast<int>(wrong.size());
+      if (count < fewest) {
+        fewest = count;
+        patience = kPatience;
+      } else if (patience-- <= 0) {
+        wrong.erase(wrong.begin(), wrong.end() - 1);
+      }
+      for (const int k : wrong) active_[k] ^= 1;
+    }
+    return false;
+  }
+
+  /// Factors the scaled matrix of the active contacts of a cluster, where that is not done yet.
+  bool factor(const std::vector<int>& cluster) {
+    std::vector<int> wanted, place(size(), kNone);
+    for (int k = 0; k < static_cast<int>(cluster.size()); ++k)
+      if (active_[k]) {
+        place[cluster[k]] = static_cast<int>(wanted.size());
+        wanted.push_back(k);
+      }
+    if (wanted == factored_ && proximal_ == factored_proximal_) return true;
+    factored_ = wanted;
+    factored_proximal_ = proximal_;
+    if (wanted.empty()) return true;
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int row = 0; row < static_cast<int>(wanted.size()); ++row) {
+      entries.emplace_back(row, row, proximal_);
+      const int k = cluster[wanted[row]];
+      for (const int b : {arms_[k].lo, arms_[k].hi}) {
+        if (b == kNone) continue;
+        for (const int l : bodies_[b].contacts) {
+          const int column = place[l];
+          if (column == kNone || column > row) continue;
+          const double sign = (arms_[k].lo == b) == (arms_[l].lo == b) ? 1 : -1;
+          const double value = sign * bodies_[b].inverse_mass * contacts_[k].normal.dot(contacts_[l].normal);
+          entries.emplace_back(row, column, value / (arms_[k].scale * arms_[l].scale));
+        }
+      }
+    }
+    const auto n = static_cast<Eigen::Index>(wanted.size());
+    Eigen::SparseMatrix<double> matrix(n, n);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    solver_.compute(matrix);
+    return solver_.info() == Eigen::Success;
+  }
+
+  std::span<RestingContact<D>> contacts_;
+  std::span<Vec<D>> w_;
+  bool tied_;
+  std::vector<Body> bodies_;
+  std::vector<Arm> arms_;
+  std::vector<char> active_;   // of the cluster at hand
+  std::vector<int> factored_;  // for these of its contacts
+  double proximal_ = 0, factored_proximal_ = 0;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
+};
+
+}  // namespace
+
+template <int D>
+bool solve_reactions(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w,
+                     double* lost) {
+  return contacts.empty() || Problem<D>(contacts, mass, w, false).solve(lost);
 }
 
 template <int D>
-void press_apart(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w) {
-  auto push = [&](const RestingContact<D>& contact, double lambda) {
-    const Id lo = contact.key.lo, hi = contact.key.hi;
-    w[lo] += (lambda / mass[lo]) * contact.normal;
-    if (contact.key.kind == EventKind::pair) w[hi] -= (lambda / mass[hi]) * contact.normal;
-  };
-  for (const auto& contact : contacts)
-    if (contact.lambda > 0) push(contact, contact.lambda);
-  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-    double change = 0, size = 0;  // of the reactions' effects on the velocities
-    for (auto& contact : contacts) {
-      const Id lo = contact.key.lo, hi = contact.key.hi;
-      const bool pair = contact.key.kind == EventKind::pair;
-      const double compliance = contact.normal.squaredNorm() * (1 / mass[lo] + (pair ? 1 / mass[hi] : 0.0));
-      const double speed = contact.normal.dot(pair ? Vec<D>(w[lo] - w[hi]) : w[lo]) - contact.bound;
-      const double lambda = std::max(0.0, contact.lambda - speed / compliance);
-      push(contact, lambda - contact.lambda);
-      change = std::max(change, std::abs(lambda - contact.lambda) * compliance);
-      size = std::max(size, lambda * compliance);
-      contact.lambda = lambda;
-    }
-    if (change <= 8 * std::numeric_limits<double>::epsilon() * size) break;
-  }
+double keep_tangential(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> v) {
+  return contacts.empty() ? 0 : Problem<D>(contacts, mass, v, true).solve_and_stretch();
 }
 
-template void press_apart<2>(std::span<RestingContact<2>>, const std::vector<double>&, std::span<Vec<2>>);
-template void press_apart<3>(std::span<RestingContact<3>>, const std::vector<double>&, std::span<Vec<3>>);
+template bool solve_reactions<2>(std::span<RestingContact<2>>, const std::vector<double>&, std::span<Vec<2>>, double*);
+template bool solve_reactions<3>(std::span<RestingContact<3>>, const std::vector<double>&, std::span<Vec<3>>, double*);
+template double keep_tangential<2>(std::span<RestingContact<2>>, const std::vector<double>&, std::span<Vec<2>>);
+template double keep_tangential<3>(std::span<RestingContact<3>>, const std::vector<double>&, std::span<Vec<3>>);
 
 }  // namespace carom

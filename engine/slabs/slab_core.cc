@@ -15,6 +15,10 @@ namespace {
 constexpr double kRoom = 1.25;               // for paths under other accelerations, in parts of the first ones
 constexpr double kWild = 4;                  // mean distances of ½ h² a
 constexpr std::size_t kBetweenLooks = 1024;  // events, planned anew or not
+// Contacts of one particle on parabolas in a slab: a light sphere that heavy ones catch between them collides about
+// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ with masses of 1 : 10⁵. Flights with more are not
+// worth their time before the accelerations are right.
+constexpr std::uint32_t kMostContacts = 1000;
 }  // namespace
 
 template <int D>
@@ -26,10 +30,11 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       most_bend_(kWild * mean_distance(system)) {
   if (system.decomposition.joined() && box_.pistons())
     throw Error(Failure::deck, "forces and walls that move together need one rank; take one, or free-flight");
+  system.fields.add_value("reactions", reactions_);
   system.fields.add_working(
       this, [this] { release(); },
       [this] {
-        scan_.emplace(system_, max_events_);
+        scan_.emplace(system_, max_events_, reactions_);
         slot_.assign(particles_.size(), 0);
       });
 }
@@ -54,7 +59,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   sequences_.clear();
   const std::size_t n = particles_.size();
   for (auto* each : {&largest_bend_, &reach_}) each->resize(n);
-  for (auto* each : {&x_, &last_x_, &v_}) each->resize(n);
+  for (auto* each : {&x_, &last_x_, &v_}) each->resize(n, Vec<D>::Zero());
   moved_.resize(n);
   held_.assign(scan_->resting().empty() ? 0 : n, 0);
   for (const auto& contact : scan_->resting()) {
@@ -70,7 +75,15 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
     largest_bend_[i] = (kRoom - 1) * straight + kRoom * bent;
   }
   near_.clear();
+  limit_margin();
   if (std::isfinite(margin_)) find_near();
+}
+
+/// Parabolas that may lead through a whole periodic box are too strong: there would be too many images to look at.
+template <int D>
+void SlabCore<D>::limit_margin() {
+  for (int k = 0; k < D; ++k)
+    if (box_.periodic(k) && !a_.empty() && margin_ > box_.edges[k]) margin_ = kNever;
 }
 
 /// The candidates within margin_, and those of them that first flights may bring together.
@@ -106,7 +119,11 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     }
     if (!left_ && longest_path_ > 0 && std::isfinite(longest_path_)) {
       margin_ = kRoom * longest_path_;
-      find_near();
+      limit_margin();
+      if (std::isfinite(margin_))
+        find_near();
+      else
+        longest_path_ = kNever;
     }
   } while (!left_ && longest_path_ > 0 && std::isfinite(longest_path_));
   for (const Flight& each : flights_) {
@@ -191,12 +208,12 @@ FlightEnd<D> SlabCore<D>::serve() {
     if (resolved_ && !(key.time > 0)) continue;  // rounding
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses nothing together: what does not approach needs no impulse.
-    if (held || (approach(key) >= -scan_->resting_speed() && !a_.empty()))
-      return {.complete = false, .time = key.time, .key = key};
-    if (contacts_.size() >= max_events_) {
-      too_many_contacts_ = true;
-      return {.complete = false, .time = key.time, .key = key};
-    }
+    if (held || (!a_.empty() && comes_to_rest(key))) return {.complete = false, .time = key.time, .key = key};
+    const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
+    const bool too_strong = !a_.empty() && most >= kMostContacts;
+    too_many_contacts_ = !too_strong && contacts_.size() >= max_events_;
+    if (too_strong || too_many_contacts_)
+      return {.complete = false, .too_strong = too_strong, .time = key.time, .key = key};
     collide(key);
     predict_all(key.lo);
     if (pair) predict_all(key.hi);
@@ -232,10 +249,12 @@ void SlabCore<D>::predict_all(Id i) {
 template <int D>
 void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
   const double t = std::max(start(i), start(j)), sigma = scan_->contact_distance(i, j), rest = length_ - t;
-  const Vec<D> d = position(i, t) - position(j, t) + box_.shift(image), v = velocity(i, t) - velocity(j, t);
-  const double slack = sigma * scan_->resting_speed();
+  const Vec<D> d = position(i, t) - position(j, t) + box_.shift(image);
+  const Vec<D> v_i = velocity(i, t), v_j = velocity(j, t), v = v_i - v_j;
+  const bool touching = scan_->touches(d, sigma);
+  const double slack = touching ? sigma * (scan_->rounding_speed(i, v_i) + scan_->rounding_speed(j, v_j)) : 0.0;
   const double s = a_.empty() ? contact_time<D>(d, v, sigma, slack)
-                              : contact_time<D>(d, v, a_[i] - a_[j], sigma, rest, scan_->touches(d, sigma), slack);
+                              : contact_time<D>(d, v, a_[i] - a_[j], sigma, rest, touching, slack);
   if (!(t + s < length_)) return;
   EventKey<D> key{.time = t + s, .kind = EventKind::pair, .lo = i, .hi = j, .image = image};
   if (!held_.empty() && scan_->rests(key)) return;
@@ -251,8 +270,9 @@ void SlabCore<D>::predict_walls(Id i) {
   const Vec<D> x = position(i, t), v = velocity(i, t), a = acceleration(i);
   for (const Wall<D>& wall : walls_) {
     const double gap = wall.gap(x, radius, t);
-    const double s = wall_contact_time(gap, wall.opening(v), wall.along_normal(a), length_ - t,
-                                       gap <= scan_->tolerance(radius), scan_->resting_speed());
+    const bool touching = gap <= scan_->tolerance(radius);
+    const double s = wall_contact_time(gap, wall.opening(v), wall.along_normal(a), length_ - t, touching,
+                                       touching ? scan_->rounding_speed(i, v) : 0.0);
     if (!(t + s < length_)) continue;
     EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = wall.number()};
     if (!held_.empty() && scan_->rests(key)) continue;
@@ -262,13 +282,40 @@ void SlabCore<D>::predict_walls(Id i) {
   }
 }
 
-/// The normal speed with which the flights meet, negative where they approach.
+/// Where and how two flights meet, or a flight and a wall.
 template <int D>
-double SlabCore<D>::approach(const EventKey<D>& key) const {
-  const Vec<D> v = velocity(key.lo, key.time);
-  if (key.kind == EventKind::wall) return box_.wall(key.hi).opening(v);
-  const Vec<D> normal = position(key.lo, key.time) - position(key.hi, key.time) + box_.shift(key.image);
-  return normal.dot(v - velocity(key.hi, key.time)) / normal.norm();
+struct SlabCore<D>::Meeting {
+  Meeting(const SlabCore& core, const EventKey<D>& key) : v_lo(core.velocity(key.lo, key.time)) {
+    if (key.kind == EventKind::wall) {
+      const Wall<D> wall = core.box_.wall(key.hi);
+      normal = wall.normal();
+      speed = wall.opening(v_lo);
+      sigma = core.particles_.radius[key.lo];
+      return;
+    }
+    normal = core.position(key.lo, key.time) - core.position(key.hi, key.time) + core.box_.shift(key.image);
+    v_hi = core.velocity(key.hi, key.time);
+    speed = normal.dot(v_lo - v_hi) / normal.norm();
+    sigma = core.scan_->contact_distance(key.lo, key.hi);
+  }
+  Vec<D> v_lo, v_hi = v_lo, normal;
+  double speed = 0;  // along the normal, negative where they approach
+  double sigma = 0;
+};
+
+/// Whether they meet too slowly for an impact.
+template <int D>
+bool SlabCore<D>::comes_to_rest(const EventKey<D>& key) const {
+  const Meeting meeting(*this, key);
+  return meeting.speed >= -scan_->resting_speed(key, meeting.normal, meeting.v_lo, meeting.v_hi);
+}
+
+/// When the gap is still a quarter of what counts as touching; 0 where it is so from the start.
+template <int D>
+double SlabCore<D>::end_before(const EventKey<D>& key) const {
+  const Meeting meeting(*this, key);
+  const double early = 0.25 * scan_->tolerance(meeting.sigma);
+  return meeting.speed < 0 ? std::max(0.0, key.time + early / meeting.speed) : key.time;
 }
 
 /// The flight of particle i from this event on, before its impulse.

@@ -26,8 +26,10 @@ namespace carom {
 template <int D>
 struct FlightEnd {
   bool complete = true;
-  bool too_strong = false;  ///< where it is not: an acceleration bends paths far too much for the slab, or is NaN
-  double time = 0;          ///< else the slab must end here, because a contact came to rest or a resting one was hit
+  bool too_strong = false;  ///< where it is not: an acceleration bends paths far too much for the slab, or is NaN, or
+                            ///< there are too many contacts to learn anything from their end
+  double time = 0;          ///< else the slab must end here, because a contact comes to rest or a resting one is hit;
+                            ///< the spheres touch then, with a gap that is left for the rounding of other flights
   EventKey<D> key{};        ///< by this event
 };
 
@@ -41,11 +43,12 @@ class SlabCore {
   SlabCore& operator=(const SlabCore&) = delete;
 
   /// Starts a step; see ContactScan::begin_slab. `watch` is asked within fly() too.
-  void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, Positions<D> a, double length,
+  void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
                   SlabWatch* watch = nullptr) {
     counters_ = &counters;
     log_ = contacts;
     watch_ = watch;
+    if (!reactions_.empty()) system_.decomposition.need_all();
     scan_->begin_slab(counters, contacts, a, length, watch);
   }
 
@@ -104,15 +107,18 @@ class SlabCore {
     auto operator<=>(const Sequence&) const = default;
   };
 
+  struct Meeting;
   void release();
   void find_near();
+  void limit_margin();
   void plain_ends();
   void predict_first();
   FlightEnd<D> serve();
   void predict_pair(Id i, Id j, const Image<D>& image);
   void predict_walls(Id i);
   void predict_all(Id i);
-  double approach(const EventKey<D>& key) const;
+  bool comes_to_rest(const EventKey<D>& key) const;
+  double end_before(const EventKey<D>& key) const;
   void collide(const EventKey<D>& key);
   Flight& flight(Id i, const EventKey<D>& key);
   double path(const Vec<D>& v, const Vec<D>& a, double time) const { return time * (v.norm() + 0.5 * time * a.norm()); }
@@ -133,6 +139,7 @@ class SlabCore {
   System<D>& system_;
   const Box<D>& box_;
   const Particles<D>& particles_;
+  std::vector<Reaction<D>> reactions_;
   std::optional<ContactScan<D>> scan_;
   std::vector<Wall<D>> walls_;
   std::uint64_t max_events_;

@@ -16,8 +16,8 @@ struct Scene {
   Scene(std::vector<Vec<2>> x, std::vector<Vec<2>> v, std::vector<Vec<2>> acceleration, std::uint64_t max_events = 1000)
       : system(test::make_system<2>({20, 6}, Boundary::wall, x, v)),
         a(std::move(acceleration)),
-        scan(*system, max_events) {
-    scan.begin_slab(counters, &contacts, a, 1.0);
+        scan(*system, max_events, reactions) {
+    scan.begin_slab(counters, &contacts, &a, 1.0);
   }
   void resolve() {
     auto& p = system->particles;
@@ -29,6 +29,7 @@ struct Scene {
   std::vector<Vec<2>> a;
   Counters counters;
   std::vector<Contact<2>> contacts;
+  std::vector<Reaction<2>> reactions;
   ContactScan<2> scan;
 };
 
@@ -65,8 +66,9 @@ TEST(ContactScan, LeavesAPairThatAnEarlierImpulseHasParted) {
       {{5, 3}, {5 + std::cos(angle), 3 + std::sin(angle)}, {5 + std::cos(angle), 3 - std::sin(angle)}},
       {{1, 0}, {0, 0}, {0, 0}}, {0.6, 0.4, 0.4}, {0.001, 1, 1});
   Counters counters;
-  ContactScan<2> scan(*system, 100);
-  scan.begin_slab(counters, nullptr, {}, 1.0);
+  std::vector<Reaction<2>> reactions;
+  ContactScan<2> scan(*system, 100, reactions);
+  scan.begin_slab(counters, nullptr, nullptr, 1.0);
   auto& p = system->particles;
   scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
   EXPECT_EQ(counters.sphere_sphere, 1u);
@@ -95,6 +97,156 @@ TEST(ContactScan, HoldsADiscOnAWall) {
   auto a = scene.a;
   scene.scan.hold(scene.system->particles.v, a, 1.0);
   EXPECT_EQ(a[0], Vec<2>(0.1, 0));
+}
+
+/// The squared distance of a pair after s, beyond contact.
+double squared_gap(const Vec<2>& d, const Vec<2>& u, const Vec<2>& a, double s) {
+  return (d + s * u + 0.5 * s * s * a).squaredNorm() - 1;
+}
+
+TEST(ContactScan, HoldsATurningPairThatIsBraked) {
+  // The pair turns by u and is braked by u·a: held apart just so much that it does not overlap before the end.
+  for (const double rest : {0.01, 0.1, 0.25}) {
+    for (const double braking : {0.0, 1.0, -1.0}) {
+      Scene scene({{3, 3}, {4, 3}}, {{0, 0.5}, {0, -0.5}}, {{2, -braking}, {-2, 0}});
+      scene.resolve();
+      ASSERT_EQ(scene.scan.resting().size(), 1u);
+      auto a = scene.a;
+      scene.scan.hold(scene.system->particles.v, a, rest);
+      ASSERT_EQ(scene.scan.resting().size(), 1u);
+      const Vec<2> d = {-1, 0}, u = {0, 1}, held = a[0] - a[1];
+      EXPECT_NEAR(d.dot(held), -1 + std::max(0.0, braking) * rest, 1e-14);
+      for (int k = 1; k <= 8; ++k) EXPECT_GE(squared_gap(d, u, held, 0.125 * k * rest), -1e-15) << rest << " " << k;
+      EXPECT_EQ(held[1], -braking);
+    }
+  }
+}
+
+TEST(ContactScan, AContactThatWouldOpenByLessThanTheRestingGapRests) {
+  // Pressed at 2 on the floor: at the speed v it opens by v²/4. Then pairs, pressed by forces or known reactions.
+  const double of_wall = std::sqrt(2 * 2 * kRestingGap * 0.5), of_pair = std::sqrt(2 * 3 * kRestingGap);
+  for (const double share : {0.99, -0.99, 1.01, -1.01}) {
+    const bool rests = std::abs(share) < 1;
+    SCOPED_TRACE(share);
+    Scene floor({{3, 0.5}}, {{0.5, share * of_wall}}, {{0, -2}});
+    Scene forces({{3, 3}, {4, 3}}, {{-share * of_pair, 0.5}, {0, 0.5}}, {{1, 0}, {-2, 0}});
+    Scene known({{3, 3}, {4, 3}}, {{-share * of_pair, 0.5}, {0, 0.5}}, {{0, 0}, {0, 0}});
+    known.reactions = {{{.lo = 0, .hi = 1}, 1.5}};
+    for (Scene* scene : {&floor, &forces, &known}) {
+      scene->resolve();
+      EXPECT_EQ(scene->scan.resting().size(), rests ? 1u : 0u);
+      EXPECT_EQ(scene->contacts.size(), share < -1 ? 1u : 0u);
+    }
+  }
+}
+
+TEST(ContactScan, WhatHasBeenStoppedMayRunIntoSomethingElse) {
+  // 0 is pressed on 1, and stops to approach it; 2, which nothing presses, was slower to leave than 1 is then.
+  Scene scene({{3, 3}, {4, 3}, {5, 3}}, {{1e-6, 0}, {0, 0}, {1e-9, 0}}, {{2, 0}, {0, 0}, {0, 0}});
+  auto& p = scene.system->particles;
+  const double lost = scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
+  ASSERT_EQ(scene.contacts.size(), 1u);
+  EXPECT_EQ(scene.contacts[0].key.lo, 1u);
+  EXPECT_EQ(scene.contacts[0].key.hi, 2u);
+  EXPECT_TRUE(scene.scan.rests({.lo = 0, .hi = 1}));
+  EXPECT_FALSE(scene.scan.rests({.lo = 1, .hi = 2}));
+  EXPECT_GE(p.v[2][0], p.v[1][0]);
+  EXPECT_NEAR(p.v[0][0] + p.v[1][0] + p.v[2][0], 1.001e-6, 1e-20);
+  EXPECT_NEAR(0.5 * (p.v[0].squaredNorm() + p.v[1].squaredNorm() + p.v[2].squaredNorm()) + lost, 0.5 * (1e-12 + 1e-18),
+              1e-26);
+}
+
+TEST(ContactScan, SlidingKeepsEnergyAndMomentumOfUnequalMasses) {
+  for (const std::vector<double>& mass : {std::vector<double>{1, 5}, {5, 1}}) {
+    auto system = test::make_system<2>({20, 6}, Boundary::open, {{3, 3}, {4, 3}}, {{0, 0.5}, {0, -0.1}}, {}, mass);
+    Counters counters;
+    std::vector<Reaction<2>> reactions;
+    ContactScan<2> scan(*system, 100, reactions);
+    const std::vector<Vec<2>> a = {{2, 0}, {-2, 0}};
+    scan.begin_slab(counters, nullptr, &a, 1.0);
+    auto& p = system->particles;
+    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
+    auto held = a;
+    scan.hold(p.v, held, 0.1);
+    ASSERT_EQ(scan.resting().size(), 1u);
+    const Vec<2> normal = Vec<2>(-0.996, -0.0894).normalized();
+    const std::vector<Vec<2>> turned = {{3, 3}, Vec<2>(3, 3) - normal};
+    auto v = p.v;
+    EXPECT_EQ(scan.slide(turned, v), 0);
+    EXPECT_NEAR(normal.dot(v[0] - v[1]), 0, 1e-16);
+    const auto energy = [&](const std::vector<Vec<2>>& of) {
+      return 0.5 * (mass[0] * of[0].squaredNorm() + mass[1] * of[1].squaredNorm());
+    };
+    EXPECT_NEAR(energy(v), energy(p.v), 1e-16);
+    EXPECT_LE((mass[0] * (v[0] - p.v[0]) + mass[1] * (v[1] - p.v[1])).norm(), 1e-15);
+    EXPECT_GT((v[0] - p.v[0]).norm(), 1e-3);
+  }
+}
+
+TEST(ContactScan, WhatNothingHasHeldDoesNotSlide) {
+  Scene scene({{3, 3}, {4, 3}}, {{0, 0.5}, {0, -0.5}}, {{-2, 0}, {2, 0}});
+  scene.resolve();
+  ASSERT_EQ(scene.scan.resting().size(), 1u);
+  std::vector<Vec<2>> v = {{-0.125, 0.5}, {0.125, -0.5}};
+  const auto given = v;
+  EXPECT_EQ(scene.scan.slide(scene.system->particles.x, v), 0);
+  EXPECT_EQ(v, given);
+}
+
+TEST(ContactScan, RemembersTheReactionsOfContactsThatArePressed) {
+  Scene scene({{3, 0.5}, {3, 1.5}, {5, 0.5}}, std::vector<Vec<2>>(3, Vec<2>::Zero()), {{0, -1}, {0, -1}, {0, 1}});
+  scene.resolve();
+  EXPECT_EQ(scene.scan.resting().size(), 3u);
+  auto a = scene.a;
+  scene.scan.hold(scene.system->particles.v, a, 1.0);
+  scene.scan.remember();
+  ASSERT_EQ(scene.reactions.size(), 2u);
+  EXPECT_EQ(scene.reactions[0].key.hi, 1u);
+  EXPECT_NEAR(scene.reactions[0].force, 1, 1e-14);
+  EXPECT_EQ(scene.reactions[1].key.kind, EventKind::wall);
+  EXPECT_NEAR(scene.reactions[1].force, 2, 1e-14);
+  // The reactions count as forces for what is rounding: per mass, of all contacts of the particle.
+  EXPECT_NEAR(scene.scan.rounding_speed(0, {0, 0}), kRounding * (1 + 1 + 2), 1e-26);
+  EXPECT_NEAR(scene.scan.rounding_speed(1, {0, 3}), kRounding * (3 + 1 + 1), 1e-26);
+  // The next piece starts from them, and those that are no longer needed are forgotten.
+  scene.resolve();
+  EXPECT_EQ(scene.scan.resting()[0].force, scene.reactions[0].force);
+  a.assign(3, {0, 1});
+  a[1] = {0, 2};
+  scene.scan.hold(scene.system->particles.v, a, 1.0);
+  scene.scan.remember();
+  EXPECT_TRUE(scene.reactions.empty());
+}
+
+/// A pair whose gap is `gap` and that is pressed by 2 each; hold_means over `length` gives the mean velocities.
+std::vector<Vec<2>> held_means(double gap, double length) {
+  Scene scene({{3, 3}, {4 + gap, 3}}, {{0, 0}, {0, 0}}, {{2, 0}, {-2, 0}});
+  scene.resolve();
+  const auto& p = scene.system->particles;
+  std::vector<Vec<2>> w = {0.5 * length * scene.a[0], 0.5 * length * scene.a[1]};
+  EXPECT_TRUE(scene.scan.hold_means(p.x, p.v, w, length));
+  EXPECT_EQ(scene.scan.resting().size(), 1u);
+  for (const auto& contact : scene.scan.resting()) EXPECT_NEAR(contact.force, 2, 1e-9);
+  return w;
+}
+
+TEST(ContactScan, HoldsMeansWithoutWork) {
+  // Forces of 2 on unit masses are balanced by a reaction of 2, forwards and backwards in time.
+  for (const double length : {0.1, -0.1})
+    for (const auto& w : held_means(0, length)) EXPECT_LE(w.norm(), 1e-15) << length;
+}
+
+TEST(ContactScan, RoundingThatHasOpenedOrClosedAContactIsTakenBack) {
+  // 0.7 tolerances of this box: more than half of one.
+  const double gap = 0.7 * Box<2>{{20, 6}, {Boundary::wall, Boundary::wall}}.gap_tolerance()(1.0);
+  for (const double length : {0.1, -0.1}) {
+    const auto opened = held_means(gap, length), closed = held_means(-gap, length);
+    // x_1 − x_0 after the piece, less what it was.
+    EXPECT_LT(length * (opened[1] - opened[0])[0], -1e-16) << length;
+    EXPECT_GT(length * (closed[1] - closed[0])[0], 1e-16) << length;
+    EXPECT_GE(length * (opened[1] - opened[0])[0], -1.01 * gap) << length;
+    EXPECT_LE(length * (closed[1] - closed[0])[0], 1.01 * gap) << length;
+  }
 }
 
 TEST(ContactScan, LimitsTheEventsOfASlab) {

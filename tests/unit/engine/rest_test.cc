@@ -1,0 +1,206 @@
+// Bodies at rest: nothing moves, the reactions are those of statics, on any number of ranks.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "engine/forces/forces.h"
+#include "engine/ranks/id_blocks.h"
+#include "engine/slabs/contact_scan.h"
+#include "tests/support/experiments.h"
+#include "tests/support/static_scenes.h"
+#include "tests/support/thread_ranks.h"
+
+namespace carom {
+namespace {
+
+constexpr std::int64_t kSteps = 200;
+constexpr double kStep = 0.01, kRadius = 0.5;
+
+template <int D>
+struct Case {
+  const char* name;
+  std::function<test::StaticScene<D>()> scene;
+};
+
+template <int D>
+void PrintTo(const Case<D>& each, std::ostream* out) {
+  *out << each.name;
+}
+
+/// Expects that these reactions hold every body against the forces.
+template <int D>
+void expect_balance(const System<D>& system, const std::vector<test::Reaction>& reactions, double error) {
+  const auto& p = system.particles;
+  std::vector<Vec<D>> left(p.size());
+  Counters uncounted;
+  evaluate_forces<D>(system, p.x, left, uncounted);
+  for (const test::Reaction& each : reactions) {
+    EXPECT_GT(each.force, 0);
+    const Vec<D> normal =
+        each.wall ? system.box.wall(each.hi).normal() : Vec<D>((p.x[each.lo] - p.x[each.hi]) / (2 * kRadius));
+    left[each.lo] += each.force * normal;
+    if (!each.wall) left[each.hi] -= each.force * normal;
+  }
+  EXPECT_LE(test::largest_difference<D>(left, std::vector<Vec<D>>(p.size(), Vec<D>::Zero())), error);
+}
+
+/// The reactions that the run keeps for its next step.
+template <int D>
+std::vector<test::Reaction> reactions_of(const System<D>& system) {
+  std::vector<Reaction<D>> kept;
+  for (const auto& entry : system.fields.of_run()) {
+    if (entry.name != "reactions") continue;
+    Archive taken;
+    entry.archive(taken);
+    Archive(taken.bytes())(kept);
+  }
+  std::vector<test::Reaction> reactions;
+  for (const auto& [key, force] : kept) reactions.push_back({key.lo, key.hi, key.kind == EventKind::wall, force});
+  return reactions;
+}
+
+/// Expects the forces of these contacts, each to 1e-10 of it, and no other contact.
+void expect_reactions(std::vector<test::Reaction> found, std::vector<test::Reaction> expected) {
+  const auto contact = [](const test::Reaction& each) { return std::tuple(each.wall, each.lo, each.hi); };
+  std::ranges::sort(found, {}, contact);
+  std::ranges::sort(expected, {}, contact);
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    EXPECT_EQ(contact(found[k]), contact(expected[k]));
+    EXPECT_NEAR(found[k].force, expected[k].force, 1e-10 * expected[k].force)
+        << expected[k].lo << (expected[k].wall ? " at wall " : " and ") << expected[k].hi;
+  }
+}
+
+template <int D>
+void expect_rest(const Case<D>& each, const std::string& method) {
+  SCOPED_TRACE(each.name);
+  auto scene = each.scene();
+  const auto expected = scene.reactions;
+  if (!expected.empty()) expect_balance(*scene.system, expected, 1e-11);
+  const auto start = scene.system->particles.x;
+  const auto run = test::run_steps<D>(std::move(scene.system), method, kStep, kSteps);
+  const Statistics& s = run->statistics();
+  EXPECT_LE(test::largest_difference<D>(run->system().particles.x, start), 1e-12 * kRadius);
+  EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);
+  EXPECT_LE(std::abs(s.energy_after_first_step - s.energy_initial), 1e-12 * s.energy_reference);
+  EXPECT_LE(s.counters.max_overlap, 1e-12);
+  const auto reactions = reactions_of(run->system());
+  double largest = 0;
+  for (const auto& reaction : reactions) largest = std::max(largest, reaction.force);
+  expect_balance(run->system(), reactions, 1e-10 * largest);
+  if (!expected.empty()) expect_reactions(reactions, expected);
+}
+
+/// Positions and velocities of all after the steps, on so many ranks.
+template <int D>
+Particles<D> at_the_end(const Case<D>& each, int ranks) {
+  Particles<D> end;
+  test::ThreadRanks(ranks).run([&](Communicator& exchange) {
+    auto system = each.scene().system;
+    system->decomposition.join(exchange);
+    const auto run = test::run_steps<D>(std::move(system), "edda", kStep, kSteps / 4);
+    Particles<D> all = gathered(exchange, run->system().particles);
+    if (exchange.rank() == 0) end = std::move(all);
+  });
+  return end;
+}
+
+template <int D>
+void expect_the_same_on_all_ranks(const Case<D>& each) {
+  SCOPED_TRACE(each.name);
+  const Particles<D> alone = at_the_end(each, 1);
+  for (const int ranks : {2, 3, 4}) {
+    const Particles<D> shared = at_the_end(each, ranks);
+    EXPECT_EQ(shared.x, alone.x) << ranks << " ranks";
+    EXPECT_EQ(shared.v, alone.v) << ranks << " ranks";
+  }
+}
+
+/// Expects bodies that are held in contact and move: energy stays to rounding, and no contact opens.
+template <int D>
+void expect_held_in_motion(std::unique_ptr<System<D>> system, const std::string& method, std::size_t contacts) {
+  const auto run = test::run_steps<D>(std::move(system), method, kStep, 2000);
+  const Statistics& s = run->statistics();
+  EXPECT_LE(s.max_energy_error, (method == "edda" ? 3e-14 : 1e-13) * s.energy_reference) << method;
+  EXPECT_LE(s.max_momentum_error.value_or(0), 1e-14) << method;
+  EXPECT_LE(s.counters.max_overlap, 1e-12) << method;
+  EXPECT_EQ(s.counters.sphere_sphere + s.counters.sphere_wall, 0u) << method;
+  EXPECT_EQ(reactions_of(run->system()).size(), contacts) << method;
+}
+
+/// Two discs that attract each other and turn about each other in contact, free or in a trap, which pulls the lighter
+/// one the more and bends the path of the pair.
+std::unique_ptr<System<2>> turning_pair(double mass, double trap) {
+  auto system = test::make_system<2>({30, 30}, Boundary::open, {{10, 10}, {11, 10}}, {{0.2, -0.5 * mass}, {0.2, 0.5}},
+                                     {}, {1, mass});
+  test::add_interaction(*system, "gravity", {{"constant", 10.0}});
+  if (trap > 0) test::add_interaction(*system, "harmonic-trap", {{"stiffness", trap}});
+  return system;
+}
+/// A column that slides on the floor, to and fro in a trap.
+std::unique_ptr<System<2>> sliding_column(int n) {
+  auto scene = test::in_trap(test::column(n), 0.5);
+  for (auto& v : scene.system->particles.v) v = {0.7, 0};
+  return std::move(scene.system);
+}
+TEST(HeldInMotion, TurningPairs) {
+  for (const char* method : {"edda", "cdda"})
+    for (const double mass : {1.0, 0.2}) expect_held_in_motion(turning_pair(mass, 0), method, 1);
+}
+TEST(HeldInMotion, ATurningPairInATrap) { expect_held_in_motion(turning_pair(0.2, 0.05), "edda", 1); }
+TEST(HeldInMotion, WhatAContactLosesWhenItComesToRestIsGivenBack) {
+  // The disc hits the floor so slowly that it is stopped; its weight would press it back at once.
+  auto scene = test::in_trap(test::column(1), 0.5);
+  scene.system->particles.v[0] = {0.3, -0.9 * std::sqrt(2 * kRestingGap * kRadius)};
+  expect_held_in_motion(std::move(scene.system), "edda", 1);
+}
+TEST(HeldInMotion, SlidingColumns) {
+  for (const char* method : {"edda", "cdda"})
+    for (const int n : {1, 3, 8}) expect_held_in_motion(sliding_column(n), method, static_cast<std::size_t>(n));
+}
+
+template <auto make, int... n>
+auto scene = [] { return make(n...); };
+
+const std::vector<Case<2>> kFlat = {{"ColumnOf2", scene<test::column, 2>},
+                                    {"ColumnOf5", scene<test::column, 5>},
+                                    {"ColumnOf10", scene<test::column, 10>},
+                                    {"ColumnOf20", scene<test::column, 20>},
+                                    {"PyramidOf3", scene<test::pyramid, 3>},
+                                    {"ArchOf1", scene<test::arch, 1>},
+                                    {"ArchOf4", scene<test::arch, 4>},
+                                    {"HangingChain", scene<test::hanging_chain>},
+                                    {"ThreeInARow", scene<test::row_under_attraction, 3>},
+                                    {"SevenInARow", scene<test::row_under_attraction, 7>},
+                                    {"TrappedCrystalOf12", scene<test::trapped_crystal, 5>}};
+const std::vector<Case<2>> kFlatAndLarge = {{"ColumnOf50", scene<test::column, 50>},
+                                            {"PyramidOf8", scene<test::pyramid, 8>},
+                                            {"Crystal", scene<test::crystal, 500>},
+                                            {"TrappedCrystalOf92", scene<test::trapped_crystal, 15>}};
+const std::vector<Case<3>> kHeap = {{"HeapOf5", scene<test::heap, 2>}, {"TrappedHeap", scene<test::trapped_heap>}};
+const std::vector<Case<3>> kLargeHeap = {{"HeapOf55", scene<test::heap, 5>}};
+
+struct Rest2 : testing::TestWithParam<Case<2>> {};
+struct Rest3 : testing::TestWithParam<Case<3>> {};
+struct FewAtRest2 : Rest2 {};  // few enough for cdda
+struct FewAtRest3 : Rest3 {};
+TEST_P(Rest2, Edda) { expect_rest(GetParam(), "edda"); }
+TEST_P(Rest3, Edda) { expect_rest(GetParam(), "edda"); }
+TEST_P(FewAtRest2, Cdda) { expect_rest(GetParam(), "cdda"); }
+TEST_P(FewAtRest3, Cdda) { expect_rest(GetParam(), "cdda"); }
+TEST_P(Rest2, EddaOnAnyRanks) { expect_the_same_on_all_ranks(GetParam()); }
+TEST_P(Rest3, EddaOnAnyRanks) { expect_the_same_on_all_ranks(GetParam()); }
+
+const auto kLabel = [](const auto& test) { return std::string(test.param.name); };
+INSTANTIATE_TEST_SUITE_P(Small, Rest2, testing::ValuesIn(kFlat), kLabel);
+INSTANTIATE_TEST_SUITE_P(Large, Rest2, testing::ValuesIn(kFlatAndLarge), kLabel);
+INSTANTIATE_TEST_SUITE_P(Small, Rest3, testing::ValuesIn(kHeap), kLabel);
+INSTANTIATE_TEST_SUITE_P(Large, Rest3, testing::ValuesIn(kLargeHeap), kLabel);
+INSTANTIATE_TEST_SUITE_P(Small, FewAtRest2, testing::ValuesIn(kFlat), kLabel);
+INSTANTIATE_TEST_SUITE_P(Small, FewAtRest3, testing::ValuesIn(kHeap), kLabel);
+
+}  // namespace
+}  // namespace carom
