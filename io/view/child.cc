@@ -1,6 +1,7 @@
 #include "io/view/child.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -68,22 +69,19 @@ Child::Child(const std::vector<std::string>& arguments) {
 }
 
 Child::~Child() {
-  if (process_ == 0) return;
+  constexpr int kPatience = 5000;  // [ms]
   ::kill(process_, SIGTERM);
-  wait();
+  pollfd ended{.fd = output_.number(), .events = 0, .revents = 0};
+  int changes = 0;
+  while ((changes = ::poll(&ended, 1, kPatience)) < 0 && errno == EINTR) continue;
+  if (changes == 0) ::kill(process_, SIGKILL);
+  while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) continue;
 }
 
 std::string Child::first_line() const {
   std::string line;
   for (char c = 0; ::read(output_.number(), &c, 1) == 1 && c != '\n';) line += c;
   return line;
-}
-
-int Child::wait() {
-  int status = 0;
-  while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) continue;
-  process_ = 0;
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
 std::string open_in_browser(const std::string& address) {

@@ -15,19 +15,17 @@ class Child {
  public:
   /// Its standard input ends with this process; its standard output is first_line()'s. Throws Error(Failure::file).
   explicit Child(const std::vector<std::string>& arguments);
-  /// Sends SIGTERM and waits.
+  /// Sends SIGTERM and waits; SIGKILL to a process that is still there after five seconds, as one that is stopped.
   ~Child();
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
   /// What it says first; empty if it ends without.
   std::string first_line() const;
-  /// Waits for its end; its exit code.
-  int wait();
 
  private:
   Descriptor input_{-1}, output_{-1};
-  pid_t process_ = 0;  // 0: has ended
+  pid_t process_ = 0;
 };
 
 /// Opens an address in the desktop's browser where there is one; returns the file that leads there, to be removed at

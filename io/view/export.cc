@@ -87,8 +87,9 @@ void export_page(const ViewOptions& options) {
   std::string page = kPage;
   const std::string place = "json\">null";
   page.replace(page.find(place) + place.size() - 4, 4, text);
+  std::FILE* const account = is_standard_output(*options.export_to) ? stderr : stdout;
   write_file_atomically(*options.export_to, page);
-  std::fputs(notes.c_str(), stdout);
+  std::fputs(notes.c_str(), account);
 }
 
 }  // namespace carom

@@ -3,10 +3,13 @@
 #include <sys/random.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <exception>
 #include <utility>
+#include <vector>
 
 // What Boost 1.74's awaitable.hpp leaves out stands above.
 #include <boost/asio.hpp>
@@ -20,10 +23,35 @@ namespace carom {
 namespace {
 
 namespace asio = boost::asio;
-namespace http = boost::beast::http;
+namespace beast = boost::beast;
+namespace http = beast::http;
 using asio::ip::tcp;
 using Request = http::request<http::empty_body>;
 using Response = http::response<http::string_body>;
+
+/// A browser keeps six connections, each with at most one answer in memory; whoever needs more loses the stillest one.
+constexpr std::size_t kMostConnections = 24;
+/// A connection on which no request comes and no byte of an answer goes for this long is closed.
+constexpr std::chrono::seconds kPatience(10);
+/// The time until the next attempt where no connection can be accepted, as where no descriptor is free.
+constexpr std::chrono::milliseconds kPause(100);
+
+struct Connection {
+  beast::tcp_stream stream;
+  bool trusted = false;  ///< a request on it had the token
+};
+
+/// Whether a Host header names this machine, with any port (ssh forwards from another one). Any other name has been
+/// made to lead here by its owner, whose page would be of the same origin for the browser.
+bool names_this_machine(std::string_view host) {
+  const auto is_port = [](std::string_view text) {
+    return text.empty() || (text[0] == ':' && text.find_first_not_of("0123456789", 1) == text.npos);
+  };
+  for (const std::string_view name : {"localhost", "127.0.0.1", "[::1]"})
+    if (beast::iequals({host.data(), std::min(host.size(), name.size())}, {name.data(), name.size()}))
+      return is_port(host.substr(name.size()));
+  return false;
+}
 
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
@@ -46,8 +74,9 @@ struct PageServer::Sockets {
   tcp::acceptor acceptor{context};
   asio::posix::stream_descriptor input{context};
   std::array<char, 64> ignored{};
+  std::vector<Connection*> open{};  // that which has been still for longest comes first
 
-  Response response_to(const Request& request) const {
+  Response response_to(const Request& request, Connection& connection) const {
     Response response(http::status::ok, request.version());
     response.keep_alive(request.keep_alive());
     response.set(http::field::cache_control, "no-store");
@@ -58,11 +87,17 @@ struct PageServer::Sockets {
       response.set(http::field::content_type, "text/plain; charset=utf-8");
       response.body() = why + "\n";
     };
-    const std::string_view target(request.target().data(), request.target().size());
-    if (!target.starts_with(root)) {
+    const auto text = [](boost::string_view part) { return std::string_view(part.data(), part.size()); };
+    const std::string_view target = text(request.target());
+    const bool head = request.method() == http::verb::head;
+    connection.trusted = false;
+    if (request.count(http::field::host) != 1 || !names_this_machine(text(request[http::field::host]))) {
+      refuse(http::status::misdirected_request, "no name of this machine: take 127.0.0.1 or localhost in the address");
+    } else if (!target.starts_with(root)) {
       refuse(http::status::forbidden, "not this address: take the whole one that carom has printed");
-    } else if (request.method() != http::verb::get) {
+    } else if (connection.trusted = true; request.method() != http::verb::get && !head) {
       refuse(http::status::method_not_allowed, "this page can only be read");
+      response.set(http::field::allow, "GET, HEAD");
     } else {
       try {
         if (auto answer = answers(target.substr(root.size()))) {
@@ -75,29 +110,58 @@ struct PageServer::Sockets {
         refuse(http::status::service_unavailable, e.what());
       }
     }
+    if (!connection.trusted) response.keep_alive(false);
     response.prepare_payload();
+    if (head) response.body().clear();  // its headers are those of GET
     return response;
   }
 
+  /// Makes a connection the last of those that are to be closed where there are too many.
+  void has_moved(const Connection& connection) {
+    if (const auto at = std::ranges::find(open, &connection); at != open.end()) std::rotate(at, at + 1, open.end());
+  }
+
+  void close_stillest() {
+    auto at = std::ranges::find(open, false, &Connection::trusted);
+    if (at == open.end()) at = open.begin();
+    (*at)->stream.close();
+    open.erase(at);
+  }
+
   asio::awaitable<void> talk(tcp::socket socket) {
+    Connection connection{.stream = beast::tcp_stream(std::move(socket))};
+    if (open.size() == kMostConnections) close_stillest();
+    open.push_back(&connection);
     try {
-      boost::beast::flat_buffer buffer;
+      beast::flat_buffer buffer;
       for (bool more = true; more;) {
         Request request;
-        co_await http::async_read(socket, buffer, request, asio::use_awaitable);
-        Response response = response_to(request);
+        connection.stream.expires_after(kPatience);
+        co_await http::async_read(connection.stream, buffer, request, asio::use_awaitable);
+        Response response = response_to(request, connection);
         more = response.keep_alive();
-        co_await http::async_write(socket, response, asio::use_awaitable);
+        for (http::response_serializer<http::string_body> rest(response); !rest.is_done();) {
+          has_moved(connection);
+          connection.stream.expires_after(kPatience);
+          co_await http::async_write_some(connection.stream, rest, asio::use_awaitable);
+        }
       }
-    } catch (const boost::system::system_error&) {  // the browser has gone, or speaks no HTTP
+    } catch (const std::exception&) {  // the browser has gone, is too slow, or speaks no HTTP
     }
+    std::erase(open, &connection);
   }
 
   asio::awaitable<void> accept() {
+    asio::steady_timer pause(context);
     while (true) {
       boost::system::error_code error;
       tcp::socket socket = co_await acceptor.async_accept(asio::redirect_error(asio::use_awaitable, error));
-      if (!error) asio::co_spawn(context, talk(std::move(socket)), asio::detached);
+      if (!error) {
+        asio::co_spawn(context, talk(std::move(socket)), asio::detached);
+      } else {
+        pause.expires_after(kPause);
+        co_await pause.async_wait(asio::use_awaitable);
+      }
     }
   }
 

@@ -1,6 +1,7 @@
 #pragma once
 // A page on this machine alone: HTTP on a port of 127.0.0.1, behind a random token that is the first part of its
-// address. Only GET; one thread.
+// address. Only GET and HEAD, only for requests whose Host is a name of this machine; one thread, a bounded number of
+// connections.
 
 #include <cstdint>
 #include <functional>

@@ -5,6 +5,9 @@ import http.client
 import json
 import os
 import re
+import resource
+import select
+import shutil
 import signal
 import socket
 import struct
@@ -34,10 +37,32 @@ def page(*arguments):
 
 
 def get(port, path, method="GET"):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-    connection.request(method, path)  # as it stands: urllib would tidy the path
-    answer = connection.getresponse()
+    answer = asked(port, path, method)
     return answer.status, answer.read()
+
+
+def asked(port, path, method="GET", **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    connection.request(method, path, headers=headers)  # as it stands: urllib would tidy the path
+    return connection.getresponse()
+
+
+def open_sockets(process):
+    """The numbers of the descriptors that are sockets."""
+    folder = f"/proc/{process.pid}/fd"
+    found = set()
+    for number in os.listdir(folder):
+        with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+            if os.readlink(f"{folder}/{number}").startswith("socket:"):
+                found.add(int(number))
+    return found
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +97,140 @@ def test_no_other_file_is_given_away(shown, path):
 
 def test_nothing_can_be_changed(shown):
     port, path = shown
-    for method in ("POST", "PUT", "DELETE", "HEAD"):
+    for method in ("POST", "PUT", "DELETE", "OPTIONS"):
         assert get(port, path + "runs", method)[0] == 405
+
+
+def test_head_gets_the_headers_of_get_and_no_body(shown):
+    (port, path), end = shown, "\r\n\r\n"
+    for target in (path, path + "runs", path + "nothing", "/"):
+        expected = asked(port, target)
+        request, n = f"HEAD {target} HTTP/1.1\r\nHost: localhost", 1 if target == "/" else 3  # a refusal ends the connection
+        with socket.create_connection(("127.0.0.1", port), 60) as client:
+            client.sendall(f"{(n - 1) * (request + end)}{request}\r\nConnection: close{end}".encode())
+            received = b"".join(iter(lambda: client.recv(1 << 16), b""))
+        heads = received.decode().split(end)
+        assert heads[-1] == "" and len(heads) == n + 1, received[:1000]
+        assert heads[0].startswith(f"HTTP/1.1 {expected.status} ") and f"Content-Length: {len(expected.read())}" in heads[0]
+
+
+HOSTS = {200: ["localhost", "LocalHost:80", "127.0.0.1", "127.0.0.1:9", "[::1]", "[::1]:8000"],
+         421: ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "localhost.", "localhost:80.evil.example", "local", "", "[::1", "::1",
+               "127.0.0.11", "a@localhost"]}
+
+
+def test_only_names_of_this_machine_are_answered(shown):
+    """The owner of another name can make it lead here, and his page would then be allowed to read this one."""
+    port, path = shown
+    for status, names in HOSTS.items():
+        for name in names:
+            answer = asked(port, path + "runs", Host=name)
+            assert answer.status == status and (status == 200) == (b"no name of this machine" not in answer.read()), name
+    for hosts in ("", "Host: localhost\r\nHost: evil.example\r\n"):
+        with socket.create_connection(("127.0.0.1", port), 60) as client:
+            client.sendall(f"GET {path} HTTP/1.1\r\n{hosts}\r\n".encode())
+            assert client.recv(100).startswith(b"HTTP/1.1 421 ")
+
+
+def test_no_answer_is_kept_in_a_cache_or_leads_elsewhere(shown):
+    port, path = shown
+    answers = [asked(port, path + name) for name in ("", "runs", "0/frame/1", "0/thermo/0", "nothing")]
+    answers += [asked(port, "/"), asked(port, path, "POST"), asked(port, path, "HEAD"), asked(port, path, Host="evil.example")]
+    assert [answer.status for answer in answers] == [200] * 4 + [404, 403, 405, 200, 421]
+    for answer in answers:
+        assert answer.headers["Cache-Control"] == "no-store"
+        assert answer.headers["Referrer-Policy"] == "no-referrer"
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+
+
+def test_connections_without_the_token_do_not_displace_the_page(finished):
+    with page("view", finished) as (process, port, path), contextlib.ExitStack() as clients:
+        before = len(open_sockets(process))
+        mine = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+        mine.request("GET", path + "runs")
+        assert mine.getresponse().read()
+        kept = mine.sock
+        for _ in range(200):
+            clients.enter_context(socket.create_connection(("127.0.0.1", port), 60))
+        assert get(port, path + "runs")[0] == 200
+        assert len(open_sockets(process)) < before + 30
+        mine.request("GET", path + "runs")
+        assert mine.getresponse().status == 200 and mine.sock is kept
+
+
+@pytest.fixture(scope="module")
+def large(finished, tmp_path_factory):
+    """A run with an answer that fits into no buffer of a socket."""
+    folder = tmp_path_factory.mktemp("large") / "run"
+    shutil.copytree(finished, folder)
+    (folder / "rdf.csv").write_bytes(b"1.0,2.0\n" * (1 << 21))
+    return folder
+
+
+def unread(port, path):
+    """A client that has asked for the large answer and reads its headers only."""
+    client = socket.socket()
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 14)
+    client.settimeout(60)
+    client.connect(("127.0.0.1", port))
+    client.sendall(f"GET {path}0/rdf HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+    answer = http.client.HTTPResponse(client)
+    answer.begin()
+    assert answer.status == 200
+    return answer
+
+
+def test_answers_that_nobody_reads_do_not_add_up(large):
+    with page("view", large) as (process, port, path):
+        before, answers = len(open_sockets(process)), []
+        reading = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+        for _ in range(60):
+            reading.request("GET", path + "runs")
+            assert reading.getresponse().read()
+            answers.append(unread(port, path))
+        assert len(open_sockets(process)) < before + 30
+        assert answers[-1].read() == (large / "rdf.csv").read_bytes(), "the latest one is kept"
+        with pytest.raises((http.client.IncompleteRead, ConnectionError)):
+            answers[0].read()
+
+
+def test_a_connection_on_which_nothing_moves_is_closed(large):
+    with page("view", large) as (process, port, path):
+        before = len(open_sockets(process))
+        silent, half = (socket.create_connection(("127.0.0.1", port), 60) for _ in range(2))
+        half.sendall(f"GET {path} HTTP/1.1\r\nHost: loc".encode())
+        unmoved, slow = unread(port, path), unread(port, path)
+        parts = []
+        wait_until(lambda: parts.append(slow.read(1 << 15)) or select.select([silent], [], [], 0.05)[0])
+        assert silent.recv(1) == b"" and half.recv(1) == b""
+        assert b"".join(parts) + slow.read() == (large / "rdf.csv").read_bytes(), "a slow reader gets all of it"
+        slow.close()
+        wait_until(lambda: len(open_sockets(process)) == before)
+        with pytest.raises((http.client.IncompleteRead, ConnectionError)):
+            unmoved.read()
+        assert get(port, path)[0] == 200
+
+
+def test_without_a_free_descriptor_the_server_waits(finished):
+    """It sleeps between its attempts, and takes the connection when it can."""
+    def sleeps():
+        with open(f"/proc/{process.pid}/status") as status:
+            return next(int(line.split()[1]) for line in status if line.startswith("voluntary_ctxt_switches"))
+
+    with page("view", finished) as (process, port, path):
+        before = len(open_sockets(process))
+        assert get(port, path)[0] == 200  # it is at work, and has all descriptors of its own
+        wait_until(lambda: len(open_sockets(process)) == before)
+        limits = resource.prlimit(process.pid, resource.RLIMIT_NOFILE)
+        numbers = set(map(int, os.listdir(f"/proc/{process.pid}/fd")))
+        free = min(set(range(len(numbers) + 1)) - numbers)
+        resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (free, limits[1]))
+        with socket.create_connection(("127.0.0.1", port), 60) as client:
+            client.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+            slept = sleeps()
+            wait_until(lambda: sleeps() > slept + 3)
+            resource.prlimit(process.pid, resource.RLIMIT_NOFILE, limits)
+            assert client.recv(100).startswith(b"HTTP/1.1 200 ")
 
 
 def test_only_this_machine_is_listened_to(shown):
@@ -146,6 +303,20 @@ def test_the_page_ends_with_a_run_that_is_killed(tmp_path):
         while open_at(port) and time.monotonic() < deadline:
             time.sleep(0.05)
         assert not open_at(port)
+
+
+def test_a_stopped_viewer_does_not_keep_the_run_from_ending(tmp_path):
+    with page("run", write_deck(tmp_path, SPHERES), "-o", tmp_path / "run", "--view", "--quiet", "--set", "run.end_time=1e5") as (
+            process, port, _):
+        viewer, = subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True).stdout.split()
+        os.kill(int(viewer), signal.SIGSTOP)
+        try:
+            process.send_signal(signal.SIGUSR2)
+            assert process.wait(60) == 75
+            assert not open_at(port)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(int(viewer), signal.SIGKILL)
 
 
 def test_one_rank_of_several_serves_the_page(tmp_path):
