@@ -5,9 +5,12 @@
 #include <pybind11/stl.h>
 
 #include <chrono>
+#include <optional>
+#include <utility>
 
 #include "engine/base/boundary.h"
 #include "io/files/version.h"
+#include "io/python/python_lock.h"
 #include "io/python/session.h"
 #include "io/python/values.h"
 
@@ -45,39 +48,42 @@ Plan plan_of(const py::dict& ends, double every) {
   return plan;
 }
 
-/// A run for Python: its signals and callbacks. A callback that raises ends the run at the end of the step.
+/// A run for Python: its signals and callbacks. A callback that raises ends the run at the end of the step, the end of
+/// Python likewise.
 template <int D>
 void run(Session<D>& session, const Plan& plan, const py::object& callback, const py::object& progress) {
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kBetweenLooks(50);
   std::optional<py::error_already_set> raised;
-  const auto in_python = [&](auto&& action) {
-    const py::gil_scoped_acquire gil;
-    try {
-      if (!raised) action();
-    } catch (py::error_already_set& error) {
-      raised.emplace(error);
-    }
+  std::optional<Unlocked> unlocked(std::in_place);
+  const auto in_python = [&](auto&& succeeds) {
+    unlocked->with_lock([&] {
+      if (!raised && !succeeds()) raised.emplace();
+    });
   };
   auto last_look = Clock::now();
+  bool cut = false;
   RunHooks hooks;
   hooks.stop = [&](const Statistics& statistics) {
-    if (raised) return true;
+    cut = cut || python_is_ending();
+    if (cut || raised) return true;
     if (const auto now = Clock::now(); now - last_look >= kBetweenLooks) {
       last_look = now;
       in_python([&] {
-        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-        if (!progress.is_none()) progress(statistics.fraction_done, statistics.end_time);
+        return PyErr_CheckSignals() == 0 &&
+               (progress.is_none() || call(progress, "dd", statistics.fraction_done, statistics.end_time));
       });
     }
     return raised.has_value();
   };
-  if (!callback.is_none()) hooks.show = [&] { in_python([&] { callback(); }); };
-  {
-    const py::gil_scoped_release release;
-    session.run(plan, hooks);
-  }
+  if (!callback.is_none()) hooks.show = [&] { in_python([&] { return call(callback); }); };
+  session.run(plan, hooks);
+  unlocked.reset();
   if (raised) throw std::move(*raised);
+  if (cut) {
+    PyErr_SetNone(PyExc_SystemExit);  // ends the thread, and is not reported
+    throw py::error_already_set();
+  }
 }
 
 template <int D>
@@ -243,6 +249,7 @@ PYBIND11_MODULE(_carom, module) {
       raise(error);
     }
   });
+  stop_runs_at_exit();
   bind<2>(module, "Session2");
   bind<3>(module, "Session3");
   module.def("from_deck", from_deck);

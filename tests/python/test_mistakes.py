@@ -10,6 +10,13 @@ NAN = float("nan")
 HERE = [[2.0, 3.0]]
 
 
+def masked(values, hidden=0):
+    """An array with one entry masked."""
+    array = np.ma.array(values)
+    array[np.unravel_index(hidden, array.shape)] = np.ma.masked
+    return array
+
+
 def add(**change):
     carom.Simulation(box=[12, 6]).add_particles(**({"position": HERE} | change))
 
@@ -70,6 +77,21 @@ MISTAKES = {
     "nan": (STATE, "the position of particle 0 cannot be; give finite coordinates", lambda: add(position=[[NAN, 1]])),
     "velocity of another length": (USAGE, "'velocity' has shape (2, 2); give the shape of 'position', (1, 2)",
                                    lambda: add(velocity=[[1, 0], [0, 1]])),
+    "masked box": (USAGE, "Simulation: 'box' has masked entries; fill them, or leave out their rows, and give a plain array",
+                   lambda: carom.Simulation(box=masked([12.0, 6.0]))),
+    "masked positions": (USAGE, "add_particles: 'position' has masked entries", lambda: add(position=masked(HERE, 1))),
+    "rows that are masked": (USAGE, "'position' has masked entries", lambda: add(position=[np.ma.array(HERE[0]), masked(HERE[0])])),
+    "masked velocities": (USAGE, "'velocity' has masked entries", lambda: add(velocity=masked(HERE))),
+    "masked radii": (USAGE, "'radius' has masked entries", lambda: add(radius=masked([0.5]))),
+    "masked number": (USAGE, "'mass' has masked entries", lambda: add(mass=np.ma.masked)),
+    "masked positions that are set": (USAGE, "'position' has masked entries",
+                                      lambda: setattr(five_springs(), "position", masked(five_springs().position))),
+    "masked bonds": (USAGE, "harmonic-bond: 'pairs' has masked entries",
+                     lambda: five_springs().add_force("harmonic-bond", pairs=masked([[0, 1]]), stiffness=1, rest_length=2)),
+    "masked step": (USAGE, "edda: 'step' has masked entries", lambda: five_springs().integrator("edda", step=np.ma.masked)),
+    "masked end": (USAGE, "run: 'time' has masked entries", lambda: five_springs().run(time=np.ma.masked)),
+    "masked value of a deck": (USAGE, "from_deck: 'particles.0.position' has masked entries", lambda: carom.Simulation.from_deck(
+        ROOT / "inputs/five-springs.toml", set={"particles.0.position": masked(five_springs().position)})),
     "infinite velocity": (STATE, "the velocity of particle 0 cannot be", lambda: add(velocity=[[np.inf, 0]])),
     "radii of other particles": (USAGE, "'radius' has shape (3,); give one number, or 1, one for each particle",
                                  lambda: add(radius=[0.5, 0.5, 0.5])),
@@ -165,6 +187,11 @@ def test_a_mistake_leaves_the_simulation_as_it_was():
     for each in (sim, untouched):
         each.run(steps=100)
     assert np.array_equal(sim.position, untouched.position) and sim.species_names == ["particle"]
+
+
+def test_a_masked_array_without_masked_entries_is_an_array():
+    plain, sim = five_springs(), five_springs(position=np.ma.array(five_springs().position), radius=np.ma.array([0.5] * 5, mask=False))
+    assert np.array_equal(sim.position, plain.position) and np.array_equal(sim.radius, plain.radius)
 
 
 def test_errors_have_kinds_and_exit_codes():

@@ -1,5 +1,7 @@
 """carom.open() on what the command leaves, also without the compiled part."""
 
+import copy
+import pickle
 import subprocess
 import sys
 import warnings
@@ -36,6 +38,19 @@ def test_everything_of_a_run_is_there(run):
     assert [frame.time for frame in run.frames[1:3]] == list(run.trajectory.time[1:3])
     with pytest.raises(IndexError):
         run.frames[len(run.frames)]
+
+
+@pytest.mark.parametrize("way", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_copies_read_for_themselves(run, way):
+    run.trajectory.time, run.thermo  # what is kept is not copied
+    other, trajectory, frame = way(run), way(run.trajectory), way(run.frames[-1])
+    run.trajectory.time[0] = 7
+    try:
+        assert other.trajectory.time[0] == trajectory.time[0] == 0 and other.summary == run.summary
+    finally:
+        run.trajectory.time[0] = 0
+    for each in (frame, other.frames[-1]):
+        assert each.time == run.frames[-1].time and np.array_equal(each.position, run.frames[-1].position)
 
 
 def test_a_run_without_events_says_so(tmp_path):

@@ -1,5 +1,7 @@
 """Simulations from Python against the command, and against themselves."""
 
+import copy
+import pickle
 import time as clock
 
 import numpy as np
@@ -114,6 +116,29 @@ def test_bonds_within_a_distance_are_found_once():
     sim.position = sim.position * [0.9, 1] + [1, 0]
     stretched = 0.5 * 1.1 * 4 * (1.8 - 2) ** 2
     assert before == 0 and sim.potential == pytest.approx(stretched)
+
+
+def test_positions_that_are_set_have_images_of_their_own():
+    sim = gas()
+    sim.run(time=10)
+    assert sim.image.any()
+    inside = sim.position.copy()
+    sim.position = inside
+    assert not sim.image.any() and np.array_equal(sim.unwrapped, inside)
+    turns = np.random.default_rng(3).integers(-3, 4, inside.shape)
+    far = inside + turns * sim.box
+    sim.position = far
+    assert np.array_equal(sim.image, turns) and np.allclose(sim.position, inside) and np.allclose(sim.unwrapped, far)
+
+
+COPIES = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda one: pickle.loads(pickle.dumps(one))}
+
+
+@pytest.mark.parametrize("way", COPIES)
+def test_a_simulation_is_not_copied(way):
+    """A copy of the Python object alone would be another name of the same simulation."""
+    with pytest.raises(TypeError, match=r"cannot be copied or pickled; write_deck\(file, time=…\) writes"):
+        COPIES[way](five_springs())
 
 
 @pytest.mark.parametrize("make", [five_springs, gas])

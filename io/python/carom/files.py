@@ -51,7 +51,7 @@ def open_hdf5(path):
 
 def complete_flush(path):
     """Writes what a complete journal beside the file holds to the file, and removes the journal (io/files/journal.h)."""
-    journal = pathlib.Path(f"{path}.journal")
+    journal = pathlib.Path(f"{pathlib.Path(path).resolve()}.journal")
     if not journal.exists():
         return
     with builtins.open(path, "r+b") as file:
@@ -132,6 +132,9 @@ class Trajectory:
     def __len__(self):
         return len(self.time)
 
+    def __reduce__(self):  # a copy opens the file again
+        return Trajectory, (self.path,)
+
     @property
     def charge(self):
         with reading(self.path):
@@ -211,6 +214,9 @@ class Run:
 
     def __repr__(self):
         return f"<run in {self.directory}>"
+
+    def __reduce__(self):  # a copy reads the files again
+        return Run, (self.directory,)
 
     @functools.cached_property
     def summary(self):

@@ -62,6 +62,7 @@ class Simulation:
     def from_deck(cls, deck, set=None):
         """The simulation that a deck describes, with some of its values changed: set={"integrator.step": 0.02}."""
         self = cls.__new__(cls)
+        _refuse_masked("from_deck", set or {})
         changes = [f"{key}={value if isinstance(value, str) else toml_value(value)}" for key, value in (set or {}).items()]
         self._session, self.warnings, self.title = _carom.from_deck(os.fspath(deck), changes)
         for text in self.warnings:
@@ -95,11 +96,11 @@ class Simulation:
 
     def add_force(self, type, **parameters):
         """Adds a term of V by its name in decks; see carom.describe(type). Ids and species in it must be there already."""
-        self._session.add_force(_name("add_force", type), parameters)
+        self._session.add_force(_name("add_force", type), _refuse_masked(type, parameters))
 
     def integrator(self, type, **parameters):
         """Chooses the integrator by its name in decks; see carom.describe(type)."""
-        self._session.set_integrator(_name("integrator", type), parameters)
+        self._session.set_integrator(_name("integrator", type), _refuse_masked(type, parameters))
 
     def run(self, time=None, steps=None, collisions=None, every=None, callback=None, progress=None):
         """Runs to a time, a number of steps, or a number of pair collisions, counted from the start of the run: a later
@@ -115,7 +116,7 @@ class Simulation:
         if callback is not None and every is None and self._session.interval == 0:
             raise UsageError("run: a callback needs 'every', the time between two calls; give the step for every step")
         line = Progress() if (Progress.wanted() if progress is None else progress) else None
-        ends = {"time": time, "steps": steps, "collisions": collisions, "every": every}
+        ends = _refuse_masked("run", {"time": time, "steps": steps, "collisions": collisions, "every": every})
         try:
             self._session.run(ends, callback and (lambda: callback(self)), line)
         finally:
@@ -183,6 +184,10 @@ class Simulation:
     def __len__(self):
         return self._session.size
 
+    def __reduce_ex__(self, protocol):
+        raise TypeError("a Simulation cannot be copied or pickled; write_deck(file, time=…) writes its present state, and "
+                        "Simulation.from_deck(file) makes another one from it")
+
     def __repr__(self):
         session = self._session
         return (f"<carom.Simulation: {session.size} particles in {len(session.box)} dimensions, forces: "
@@ -197,6 +202,7 @@ class Simulation:
 
 def _numbers(of, name, values):
     """Numbers as an array of doubles without gaps; one that is so already is not copied."""
+    _refuse_masked(of, {name: values})
     try:
         array = np.asarray(values)
     except ValueError as error:
@@ -204,6 +210,15 @@ def _numbers(of, name, values):
     if array.dtype.kind not in "iuf":
         raise UsageError(f"{of}: '{name}' has entries of type {array.dtype}; give real numbers")
     return np.asarray(array, dtype=np.float64, order="C")
+
+
+def _refuse_masked(of, given):
+    """The given values by name; numpy would take what stands below a mask, too."""
+    for name, values in given.items():
+        rows = values if isinstance(values, (list, tuple)) else [values]
+        if any(isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row) for row in rows):
+            raise UsageError(f"{of}: '{name}' has masked entries; fill them, or leave out their rows, and give a plain array")
+    return given
 
 
 def _one_or_each(of, name, values, n):

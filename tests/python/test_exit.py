@@ -1,0 +1,101 @@
+"""Python ends while threads run simulations: real processes, which must end by themselves and in peace."""
+
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+SCRIPT = """
+import atexit, itertools, os, sys, threading, time
+sys.path.insert(0, {here!r})
+{before}
+import carom
+{load}
+from scenes import five_springs, gas
+begun = threading.Event()
+def work():
+    try:
+        {work}
+    except BaseException as error:
+        print(repr(error))
+        raise
+    print("went on")
+for _ in range({threads}):
+    threading.Thread(target=work, daemon=True).start()
+assert begun.wait(60)
+{after}
+"""
+
+
+def ends(work, before="", after="", load="carom.version", threads=2):
+    """Standard output of a Python that ends while daemon threads do this work."""
+    script = SCRIPT.format(here=str(pathlib.Path(__file__).parent), work=work, before=before, after=after, load=load,
+                           threads=threads)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and done.stderr == "" and "went on" not in done.stdout, (done.returncode, done.stderr, done.stdout)
+    return done.stdout
+
+
+WORK = {
+    "steps": "begun.set(), five_springs().run(time=1e9)",
+    "events": "begun.set(), gas(512).run(time=1e9)",
+    "one long epoch": "begun.set(), gas(4096, step=1e9).run(time=1e9)",
+    "callbacks": "five_springs().run(time=1e9, every=0.01, callback=lambda s: begun.set())",
+    "a callback that sleeps": "five_springs().run(time=1e9, every=0.01, callback=lambda s: (begun.set(), time.sleep(1e6)))",
+    "a callback that works": "five_springs().run(time=1e9, every=0.01, callback=lambda s: (begun.set(), [None for _ in iter(int, 1)]))",
+    "a line of progress": "sys.stderr = open(os.devnull, 'w'), begun.set(), five_springs().run(time=1e9, progress=True)",
+}
+
+
+@pytest.mark.parametrize("work", WORK)
+@pytest.mark.parametrize("after", ["", "time.sleep(0.3)"])
+def test_python_ends_while_threads_run(work, after):
+    ends(WORK[work], after=after)
+
+
+def test_a_thread_whose_run_is_stopped_ends_too():
+    """By SystemExit, which is not reported; another function at exit gives it the time to do so here."""
+    out = ends(WORK["steps"], before="atexit.register(lambda: [each.join() for each in threading.enumerate() if each.daemon])")
+    assert out.count("SystemExit()") == 2, out
+
+
+def test_the_thread_in_which_python_ends_may_still_run_one():
+    before = """
+def late():
+    sim = five_springs()
+    sim.run(time=1, every=0.1, callback=lambda s: s.energy)
+    print(f"late {sim.step}")
+atexit.register(late)"""
+    assert "late 100" in ends(WORK["steps"], before=before)
+
+
+def test_python_waits_until_no_run_is_in_the_engine():
+    before = """
+def late():
+    for sim in sims:
+        sim.velocity = sim.velocity  # UsageError while a run is going on
+    print(len(sims), "at rest")
+sims = []
+atexit.register(late)"""
+    assert "2 at rest" in ends("sim = gas(4096, step=1e9); sims.append(sim); (len(sims) == 2 and begun.set()); sim.run(time=1e9)",
+                               before=before, after="time.sleep(1)")
+
+
+@pytest.mark.parametrize("runs", ["five_springs().run(time=1e9, every=0.01, callback=lambda s: running.set())",
+                                  "sim = five_springs(); [(sim.run(steps=n), running.set()) for n in itertools.count(1)]"])
+def test_threads_of_a_module_that_is_loaded_too_late_sleep(runs):
+    ends(f"begun.set(), go.wait(); {runs}", load="", threads=4,
+         before="go, running = threading.Event(), threading.Event(); atexit.register(lambda: (go.set(), running.wait(60)))")
+
+
+def test_a_fork_has_no_threads_to_wait_for():
+    out = ends(WORK["steps"], after="""
+time.sleep(0.1)
+if os.fork() == 0:
+    five_springs().run(steps=5)
+    print("child")
+    sys.exit(0)
+assert os.wait()[1] == 0
+""")
+    assert out.startswith("child\n")
