@@ -20,7 +20,7 @@ class World {
  public:
   /// Where a launcher (mpirun, srun) has started this process, starts MPI (MPI_THREAD_FUNNELED) and duplicates the
   /// world communicator. One object a process, once. `silence`: seconds after which ranks that work together give up
-  /// those that do not answer; 0: never.
+  /// those that do not answer, and after which a start or end of MPI that still waits ends the process; 0: never.
   explicit World(double silence = 0);
   ~World();
   World(const World&) = delete;
@@ -44,6 +44,7 @@ class World {
   MPI_Comm world_ = MPI_COMM_NULL;
   int rank_ = 0;
   int size_ = 1;
+  double silence_;
   std::unique_ptr<Watch> watch_;
 };
 

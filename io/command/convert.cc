@@ -80,11 +80,12 @@ int convert_command(const ConvertOptions& options) {
   std::error_code ignored;
   if (std::filesystem::equivalent(file, trajectory.path(), ignored))
     throw Error(Failure::deck, "-o " + file.string() + ": error: this is the trajectory itself; name another file");
+  std::ostream& account = is_standard_output(file) ? std::cerr : std::cout;
   std::string note;
   write_aside(file, [&](TextFile& out) { note = format->write(trajectory, frames, out, file); });
-  std::cout << file.string() << ": " << frames.size() << (frames.size() == 1 ? " frame of " : " frames of ")
-            << trajectory.particles() << " particles\n"
-            << note << (note.empty() ? "" : "\n");
+  account << file.string() << ": " << frames.size() << (frames.size() == 1 ? " frame of " : " frames of ")
+          << trajectory.particles() << " particles\n"
+          << note << (note.empty() ? "" : "\n");
   return 0;
 }
 

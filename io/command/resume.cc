@@ -1,5 +1,7 @@
 #include "io/command/resume.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 
 #include "engine/base/error.h"
@@ -24,7 +26,7 @@ std::string quoted(const std::string& word) {
 void share_head(Resumed& from, Communicator& ranks) {
   const auto archive = [&](Archive& all) {
     from.head.archive(all);
-    all(from.head.deck, from.count, from.in_epoch);
+    all(from.head.deck, from.count, from.in_epoch, from.reached);
   };
   Archive out;
   if (ranks.rank() == 0) {
@@ -55,6 +57,46 @@ void end_epoch(Resumed& from, Communicator& ranks) {
   from.head.step = statistics.steps;
   from.head.time = statistics.end_time;
   from.in_epoch = false;
+}
+
+/// Throws where a run that is continued would end before the point that it has reached. `before`: the deck that it had.
+void check_end(const Deck& deck, const Deck& before, const Resumed& from) {
+  const auto refuse = [&](const std::string& key, const std::string& unit, auto end, auto reached) {
+    const std::string set = fmt::format("--set run.{}=", key);
+    const bool fresh = from.head.branched_from.empty();  // else deck.toml starts elsewhere
+    throw Error(Failure::deck,
+                fmt::format("{}{}: the run has come to {} {} already; give that or more ({}{}){}", set, end, unit,
+                            reached, set, reached,
+                            fresh ? fmt::format(", or start anew: carom run {} {}{} -o {}",
+                                                quoted((from.directory / run_file::deck).string()), set, end,
+                                                quoted(from.directory.lexically_normal().string() + "-earlier"))
+                                  : ""));
+  };
+  const Plan &plan = deck.plan, &old = before.plan;
+  const ThermoPoint& reached = from.reached;
+  if (plan.steps && plan.steps != old.steps && *plan.steps < reached.step)
+    refuse("steps", "step", *plan.steps, reached.step);
+  if (plan.end_time && plan.end_time != old.end_time && *plan.end_time < reached.time - plan.slack())
+    refuse("end_time", "time", *plan.end_time, reached.time);
+  if (plan.collisions && plan.collisions != old.collisions && *plan.collisions < reached.collisions)
+    refuse("collisions", "collision", *plan.collisions, reached.collisions);
+}
+
+/// How far a run has come: its checkpoint, or its last row, which may be later.
+ThermoPoint reached_by(const Checkpoint& checkpoint, const std::filesystem::path& directory) {
+  Statistics statistics;
+  bool in_epoch = false;
+  double flown = 0;
+  Archive(checkpoint.read("statistics"))(statistics);
+  Archive(checkpoint.read("paused"))(in_epoch);
+  if (in_epoch) Archive(checkpoint.read("epoch time"))(flown);
+  const ThermoPoint row = last_thermo_point(directory / run_file::thermo);
+  ThermoPoint reached{std::max(row.time, statistics.end_time + flown),
+                      std::max(row.step, statistics.steps + (in_epoch ? 1 : 0)),  // what has begun is completed
+                      std::max(row.collisions, statistics.counters.sphere_sphere)};
+  // Free flight would have ended at the last collision, before the state.
+  if (!find_integrator(checkpoint.head().integrator).stepping) ++reached.collisions;
+  return reached;
 }
 
 /// Throws where a branch has nothing to do.
@@ -94,9 +136,7 @@ Resumed find_run(const std::filesystem::path& directory, bool take_over, Communi
   if (ranks.rank() == 0) {
     if (std::filesystem::is_directory(directory)) found.lock = std::make_unique<DirectoryLock>(directory, take_over);
     found.checkpoint.emplace(last_checkpoint(directory, found.warning));
-    // The next checkpoint takes the place of one that is damaged, not of the one that is good.
-    if (const auto last = directory / run_file::checkpoint; found.checkpoint->file() != last)
-      std::filesystem::rename(found.checkpoint->file(), last);
+    found.reached = reached_by(*found.checkpoint, directory);
   }
   share_head(found, ranks);
   return found;
@@ -154,6 +194,8 @@ Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks) {
     deck = read_deck(file, options.set, reader);
     set_output_directory(deck, from.directory);
     deck.warnings = from.head.warnings;
+    if (ranks.rank() == 0) check_files(deck, from.head.files, from.head.log);
+    check_end(deck, read_deck(file, {}, reader), from);
   }
   deck.file = from.head.deck_file;
   return deck;

@@ -15,6 +15,7 @@
 #include "io/deck/options.h"
 #include "io/files/checkpoint.h"
 #include "io/files/directory_lock.h"
+#include "io/files/thermo.h"
 
 namespace carom {
 
@@ -32,6 +33,7 @@ struct Resumed {
   std::string warning;     ///< about a later checkpoint that is damaged
   StepCount count;         ///< by which its steps are counted
   bool in_epoch = false;   ///< it was left off within an epoch of free flight
+  ThermoPoint reached;     ///< how far a run that is continued has come
   std::optional<Deck> of;  ///< of a branch: the deck of the run that it branches off
   bool same_motion = false;
   std::map<std::string, Bytes> at_the_end;  ///< of a branch: the state at the end of that epoch

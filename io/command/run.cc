@@ -97,8 +97,10 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
   const Statistics& statistics = simulation.statistics();
   const auto lock = continued ? std::move(continued->lock) : std::make_unique<DirectoryLock>(directory);
   const auto backup = continued ? std::nullopt : prepare_output_directory(directory);
-  RunLog log(directory / run_file::log, options.quiet,
-             continued ? std::optional(continued->head.log_bytes) : std::nullopt);
+  // The next checkpoint takes the place of one that is damaged, not of the one that is good.
+  if (const auto last = directory / run_file::checkpoint; continued && continued->checkpoint->file() != last)
+    rename_file(continued->checkpoint->file(), last);
+  RunLog log(directory / run_file::log, options.quiet, continued ? std::optional(continued->head.log) : std::nullopt);
   RunOutcome outcome{
       .status = "done", .warnings = deck.warnings, .particles = simulation.system().size(), .ranks = ranks};
   if (from) outcome.branched_from = from->head.branched_from;
@@ -146,7 +148,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
                             .step = statistics.steps,
                             .time = statistics.end_time,
                             .files = files->mark(),
-                            .log_bytes = log.size(),
+                            .log = log.mark(),
                             .log_rows = table.rows(),
                             .bonds = bonds,
                             .warnings = deck.warnings,
@@ -161,7 +163,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     outcome.peak_memory_bytes = peak_memory_bytes(accounts);
     if (statistics.stopped_early) outcome.status = "interrupted";
     log.say(report_text(deck, statistics, accounts));
-    if (const auto warning = energy_warning(statistics)) {
+    if (const auto warning = energy_warning(statistics, find_integrator(deck.integrator))) {
       outcome.warnings.push_back(*warning);
       log.warn(*warning);
     }

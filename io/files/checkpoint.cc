@@ -22,7 +22,7 @@ namespace carom {
 namespace {
 
 constexpr std::size_t kBlock = 512;  // before HDF5's own bytes
-constexpr int kFormat = 2;
+constexpr int kFormat = 3;
 constexpr std::string_view kBegin = "carom checkpoint ";
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
@@ -103,7 +103,7 @@ void sign_and_rename(const std::filesystem::path& aside, const std::filesystem::
       refuse_with_reason(aside);
   }
   const auto last = directory / run_file::checkpoint;
-  if (std::filesystem::exists(last)) std::filesystem::rename(last, directory / run_file::previous_checkpoint);
+  if (std::filesystem::exists(last)) rename_file(last, directory / run_file::previous_checkpoint);
   put_in_place(aside, last);
 }
 

@@ -34,15 +34,16 @@ struct CheckpointHead {
   std::uint64_t particles = 0;
   std::int64_t step = 0;  ///< slabs completed
   double time = 0;        ///< simulated time of the last slab's end
-  FileMarks files;        ///< where the files of the run stood
-  std::uint64_t log_bytes = 0, log_rows = 0;
+  FileMarks files{};      ///< where the files of the run stood
+  FileMark log{};
+  std::uint64_t log_rows = 0;
   std::vector<PairList> bonds;        ///< of each interaction that finds them in the initial state, in their order
   std::vector<std::string> warnings;  ///< of the deck, issued when the run began
   std::string branched_from;          ///< the checkpoint that a branch started from; else empty
 
   void archive(Archive& archive) {
-    archive(deck_file, version, integrator, dimension, particles, step, time, files, log_bytes, log_rows, bonds,
-            warnings, branched_from);
+    archive(deck_file, version, integrator, dimension, particles, step, time, files, log, log_rows, bonds, warnings,
+            branched_from);
   }
 };
 

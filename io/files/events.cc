@@ -90,7 +90,7 @@ EventWriter<D>::EventWriter(const std::filesystem::path& path, const Deck& deck,
     contents_->create(deck);
     return;
   }
-  contents_->each([&](auto& column) { column.written.cut(mark->rows); });
+  contents_->each([&](auto& column) { column.written.cut(mark->rows.length); });
   contents_->slabs_done = mark->slabs;
 }
 
@@ -121,7 +121,7 @@ void EventWriter<D>::progress(const Statistics& statistics) {
 template <int D>
 EventMark EventWriter<D>::mark() {
   contents_->write();
-  return {contents_->time.written.rows(), contents_->slabs_done};
+  return {hdf5::mark(contents_->file, kEventRows, contents_->time.written.rows()), contents_->slabs_done};
 }
 
 template <int D>

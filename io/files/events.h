@@ -20,14 +20,18 @@
 
 #include "engine/run/simulation.h"
 #include "io/deck/deck.h"
+#include "io/files/file_mark.h"
 
 namespace carom {
 
 /// Where events.h5 stands.
 struct EventMark {
-  std::uint64_t rows = 0;
+  FileMark rows{};
   std::int64_t slabs = 0;  ///< done
 };
+
+/// What tells the rows of two runs from each other.
+inline constexpr const char* kEventRows[] = {"events/time", "events/lo", "events/hi", "events/x_lo"};
 
 template <int D>
 class EventWriter : public Observer<D> {

@@ -289,10 +289,10 @@ struct TrajectoryWriter<D>::Contents {
 
 template <int D>
 TrajectoryWriter<D>::TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system,
-                                      std::optional<std::uint64_t> frames)
-    : contents_(std::make_unique<Contents>(frames ? File::append(path) : File::create(path), system)) {
-  if (frames)
-    contents_->cut(*frames);
+                                      const std::optional<FileMark>& mark)
+    : contents_(std::make_unique<Contents>(mark ? File::append(path) : File::create(path), system)) {
+  if (mark)
+    contents_->cut(mark->length);
   else
     contents_->create(deck, system);
 }
@@ -318,8 +318,8 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
 }
 
 template <int D>
-std::uint64_t TrajectoryWriter<D>::frames() const {
-  return contents_->step.rows();
+FileMark TrajectoryWriter<D>::mark() const {
+  return hdf5::mark(contents_->file, kFrameRows, contents_->step.rows());
 }
 
 template <int D>

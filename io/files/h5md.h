@@ -27,6 +27,7 @@
 #include "engine/ranks/id_blocks.h"
 #include "engine/run/simulation.h"
 #include "io/deck/deck.h"
+#include "io/files/file_mark.h"
 
 namespace carom {
 
@@ -35,19 +36,22 @@ inline const std::string group = "parameters/vmd_structure", bond_from = group +
                          bond_to = group + "/bond_to";
 }  // namespace vmd_structure
 
+/// What tells the frames of two runs from each other.
+inline constexpr const char* kFrameRows[] = {"particles/trajectory/position/time",
+                                             "particles/trajectory/position/value"};
+
 template <int D>
 class TrajectoryWriter : public Observer<D> {
  public:
-  /// Creates the file, or opens that of the same run again to go on behind its first so many frames. `system` is read
-  /// for what does not change: box, masses, radii, charges, species; and for the ranks. Throws Error(Failure::file).
+  /// Creates the file, or opens that of the same run again to go on from the mark. `system` is read for what does not
+  /// change: box, masses, radii, charges, species; and for the ranks. Throws Error(Failure::file).
   TrajectoryWriter(const std::filesystem::path& path, const Deck& deck, const System<D>& system,
-                   std::optional<std::uint64_t> frames = {});
+                   const std::optional<FileMark>& mark = {});
   ~TrajectoryWriter() override;
 
   /// Appends a frame and flushes. Throws Error(Failure::file).
   void frame(const Snapshot<D>& snapshot) override;
-  /// How many there are.
-  std::uint64_t frames() const;
+  FileMark mark() const;
 
   /// Flushes and closes. Throws Error(Failure::file).
   void close();

@@ -83,6 +83,11 @@ File File::writable(const std::filesystem::path& path, const char* action,
 }
 
 File File::create(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (const auto is = std::filesystem::status(path, ignored); exists(is) && !is_regular_file(is))
+    throw Error(Failure::file, path.string() +
+                                   ": is a directory, a pipe or a device; an HDF5 file cannot be written there, "
+                                   "because it is not written in order; name another file");
   return writable(path, "create the file",
                   [](const char* name, hid_t access) { return H5Fcreate(name, H5F_ACC_TRUNC, H5P_DEFAULT, access); });
 }

@@ -21,6 +21,8 @@
 #include <utility>
 #include <vector>
 
+#include "io/files/file_mark.h"
+
 namespace carom::hdf5 {
 
 /// Starts the library: no printing to stderr, no work of its own when the process ends. To be called before MPI starts:
@@ -206,9 +208,10 @@ std::string text(const File& file, const std::string& dataset);
 /// All numbers of a data set, the last axis fastest.
 template <class T>
 std::vector<T> numbers(const File& file, const std::string& dataset);
-/// So many rows of a data set, from `first` on, the last axis fastest.
+/// So many rows of a data set, from `first` on, the last axis fastest; of the second axis `most` entries.
 template <class T>
-std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first, hsize_t count);
+std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first, hsize_t count,
+                    hsize_t most = HSIZE_UNDEF);
 /// A data set as it is stored.
 std::vector<std::byte> bytes(const File& file, const std::string& dataset);
 std::vector<std::string> texts(const File& file, const std::string& dataset);
@@ -216,5 +219,11 @@ std::vector<std::string> attribute_texts(const File& file, const std::string& ob
 /// So many numbers, or more.
 std::vector<std::int32_t> attribute_numbers(const File& file, const std::string& object, const std::string& name,
                                             std::size_t count);
+
+/// So many rows of some data sets, and the CRC-32 of the deck and of the last of these rows, of a long one of its
+/// beginning.
+FileMark mark(const File& file, std::span<const char* const> datasets, hsize_t rows);
+/// Throws Error(Failure::file) unless the file is there and its rows begin with those at the mark.
+void check_rows(const std::filesystem::path& path, std::span<const char* const> datasets, const FileMark& mark);
 
 }  // namespace carom::hdf5

@@ -1,3 +1,5 @@
+#include <libdeflate.h>
+
 #include <algorithm>
 #include <numeric>
 
@@ -128,7 +130,7 @@ template std::vector<std::int32_t> numbers(const File&, const std::string&);
 template std::vector<std::uint32_t> numbers(const File&, const std::string&);
 
 template <class T>
-std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first, hsize_t n) {
+std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first, hsize_t n, hsize_t most) {
   const Handle set = open_set(file, dataset);
   const Handle space(H5Dget_space(set.id()), H5Sclose);
   std::vector<hsize_t> count = shape_of_space(space.id()), start(count.size(), 0);
@@ -136,6 +138,7 @@ std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first,
     throw Error(Failure::file, file.path().string() + ": " + dataset + " is shorter than the other data sets");
   start[0] = first;
   count[0] = n;
+  if (count.size() > 1) count[1] = std::min(count[1], most);
   std::vector<T> values(product(count));
   if (values.empty()) return values;
   const Handle memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
@@ -144,10 +147,10 @@ std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first,
              "read " + dataset);
   return values;
 }
-template std::vector<float> rows(const File&, const std::string&, hsize_t, hsize_t);
-template std::vector<double> rows(const File&, const std::string&, hsize_t, hsize_t);
-template std::vector<std::int32_t> rows(const File&, const std::string&, hsize_t, hsize_t);
-template std::vector<std::uint32_t> rows(const File&, const std::string&, hsize_t, hsize_t);
+template std::vector<float> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t);
+template std::vector<double> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t);
+template std::vector<std::int32_t> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t);
+template std::vector<std::uint32_t> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t);
 
 std::vector<std::byte> bytes(const File& file, const std::string& dataset) {
   const Handle set = open_set(file, dataset);
@@ -194,6 +197,37 @@ std::vector<std::int32_t> attribute_numbers(const File& file, const std::string&
            object + "@" + name + " has " + std::to_string(numbers.size()) + " numbers, not " + std::to_string(count));
   file.check(H5Aread(attribute.id(), H5T_NATIVE_INT32, numbers.data()), "read attribute " + name);
   return numbers;
+}
+
+FileMark mark(const File& file, std::span<const char* const> datasets, hsize_t length) {
+  constexpr hsize_t kMost = 1000;  // entries of a row
+  const std::string deck = text(file, "parameters/deck");
+  std::uint32_t sum = libdeflate_crc32(0, deck.data(), deck.size());
+  for (const char* name : datasets) {
+    if (length == 0) continue;
+    const auto row = rows<double>(file, name, length - 1, 1, kMost);
+    sum = libdeflate_crc32(sum, row.data(), row.size() * sizeof(double));
+  }
+  return {length, sum};
+}
+
+void check_rows(const std::filesystem::path& path, std::span<const char* const> datasets, const FileMark& then) {
+  if (!std::filesystem::is_regular_file(path))
+    refuse_to_go_on(path, std::filesystem::exists(path) ? "is not a file" : "is missing");
+  FileMark now;
+  try {
+    const File file = File::open(path);
+    now.length = shape(file, datasets[0]).at(0);
+    if (now.length >= then.length) now = mark(file, datasets, then.length);
+  } catch (const Error& e) {
+    refuse_to_go_on(path, std::string(e.what()).substr(path.string().size() + 2));  // which begins with its name
+  }
+  if (now.length < then.length)
+    refuse_to_go_on(path, "has " + std::to_string(now.length) + " rows, and had " + std::to_string(then.length) +
+                              " at the checkpoint");
+  if (now.sum != then.sum)
+    refuse_to_go_on(path, "is the file of another run, or was changed: its deck or row " + std::to_string(then.length) +
+                              " is not the one that it had at the checkpoint");
 }
 
 }  // namespace carom::hdf5

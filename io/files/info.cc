@@ -71,7 +71,7 @@ std::string describe_checkpoint(const std::filesystem::path& path) {
   return line("kind", "checkpoint, good") + line("written by", "carom " + head.version) +
          line("integrator", head.integrator) + line("dimension", std::to_string(head.dimension)) +
          line("particles", std::to_string(head.particles)) + line("step", std::to_string(head.step)) +
-         line("time", fmt::format("{:g}", head.time)) + line("frames", std::to_string(head.files.frames));
+         line("time", fmt::format("{:g}", head.time)) + line("frames", std::to_string(head.files.frames.length));
 }
 
 }  // namespace

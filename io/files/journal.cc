@@ -26,7 +26,7 @@ namespace carom::hdf5 {
 
 namespace {
 
-std::filesystem::path journal_of(std::filesystem::path file) { return file += ".journal"; }
+std::filesystem::path journal_of(const std::filesystem::path& file) { return behind_links(file) += ".journal"; }
 
 /// Calls again what a signal has interrupted.
 template <class Call>
@@ -209,7 +209,7 @@ const Journaled& of(const H5FD_t* file) { return *static_cast<const Journaled*>(
 
 H5FD_t* open_file(const char* name, unsigned flags, hid_t, haddr_t) {
   auto* file = new Journaled{};
-  file->path = name;
+  file->path = behind_links(name);
   file->is_new = (flags & H5F_ACC_CREAT) != 0;
   struct stat status {};
   file->file = ::open(file->name_now().c_str(), O_RDWR | O_CLOEXEC | (file->is_new ? O_CREAT | O_TRUNC : 0), 0666);

@@ -15,17 +15,16 @@ namespace carom {
 
 class RunLog {
  public:
-  /// Creates the file, or opens it again to go on behind its first `size` bytes. `quiet`: nothing but warnings and
-  /// errors goes to the terminal.
-  RunLog(const std::filesystem::path& path, bool quiet, std::optional<std::uint64_t> size = {})
-      : file_(path, size), quiet_(quiet) {}
+  /// Creates the file, or opens it again to go on from the mark. `quiet`: nothing but warnings and errors goes to the
+  /// terminal.
+  RunLog(const std::filesystem::path& path, bool quiet, const std::optional<FileMark>& mark = {})
+      : file_(path, mark), quiet_(quiet) {}
 
   void note(std::string_view text);   ///< to the file
   void say(std::string_view text);    ///< to the file and to stdout
   void warn(std::string_view text);   ///< to the file and to stderr; the text itself says that it is a warning
   void error(std::string_view text);  ///< to the file, as an error; the command prints it when it ends
-  /// In bytes.
-  std::uint64_t size() const { return file_.size(); }
+  const FileMark& mark() const { return file_.mark(); }
   /// Puts everything on the disk.
   void close() { file_.close(); }
 

@@ -115,12 +115,20 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
       ends_at(deck.plan), deck.output.directory.string());
 }
 
-std::optional<std::string> energy_warning(const Statistics& s) {
+std::optional<std::string> energy_warning(const Statistics& s, const IntegratorInfo& method) {
   // Errors count from the end of the first step, which may itself have the large error.
   const auto share = [](double error, double of) { return of > 0 ? error / of : 0; };
   const double later = share(s.max_energy_error, s.energy_reference),
                first = share(std::abs(s.energy_after_first_step - s.energy_initial), s.energy_scale);
-  if (std::max(first, later) <= 1) return {};
+  constexpr double kRounding = 1e-12;  // what the exact methods promise, of the reference energy
+  if (std::max(first, later) <= 1) {
+    if (!method.exact || std::max(first, later) <= kRounding) return {};
+    return fmt::format(
+        "warning: rounding has added up to {:.2g} of the reference energy, though {} is exact but for rounding: "
+        "forces, "
+        "speeds or masses differ by many orders of magnitude, or the run is very long",
+        std::max(first, later), method.name);
+  }
   return fmt::format(
       "warning: the energy was wrong by {:.2g} times its own size{}: what the run shows is no motion of this system; "
       "use a smaller integrator.step",

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "engine/integrators/integrator.h"
 #include "engine/run/simulation.h"
 #include "io/deck/deck.h"
 #include "io/files/log.h"
@@ -15,8 +16,9 @@ namespace carom {
 /// Version, libraries, host, deck and method of a run. `particles`: their number; `ranks`: of MPI.
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 
-/// The warning of a run with energy errors beyond the energy itself, from a step far too long; else nothing.
-std::optional<std::string> energy_warning(const Statistics& statistics);
+/// The warning of a run with energy errors beyond the energy itself, from a step far too long, or beyond 1e-12 of it
+/// with an exact method; else nothing.
+std::optional<std::string> energy_warning(const Statistics& statistics, const IntegratorInfo& method);
 
 /// How the run ended, what it found and where the time of the ranks went: of several, least, mean and most.
 std::string report_text(const Deck& deck, const Statistics& statistics, std::span<const RankAccount> ranks);

@@ -4,15 +4,24 @@
 #include <iterator>
 
 #include "engine/base/error.h"
+#include "io/files/hdf5.h"
 #include "io/files/output_directory.h"
 
 namespace carom {
+
+void check_files(const Deck& deck, const FileMarks& marks, const FileMark& log) {
+  const auto& directory = deck.output.directory;
+  check_text(directory / run_file::log, log);
+  check_text(directory / run_file::thermo, marks.thermo);
+  hdf5::check_rows(directory / run_file::trajectory, kFrameRows, marks.frames);
+  if (deck.plan.events) hdf5::check_rows(directory / run_file::events, kEventRows, marks.events.rows);
+}
 
 template <int D>
 RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const std::optional<FileMarks>& marks)
     : trajectory_(deck.output.directory / run_file::trajectory, deck, system,
                   marks ? std::optional(marks->frames) : std::nullopt),
-      thermo_(deck.output.directory / run_file::thermo, marks ? std::optional(marks->thermo_bytes) : std::nullopt) {
+      thermo_(deck.output.directory / run_file::thermo, marks ? std::optional(marks->thermo) : std::nullopt) {
   if (deck.plan.events)
     events_ = std::make_unique<EventWriter<D>>(deck.output.directory / run_file::events, deck,
                                                marks ? std::optional(marks->events) : std::nullopt);
@@ -24,7 +33,7 @@ RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const std::opti
 
 template <int D>
 FileMarks RunFiles<D>::mark() {
-  return {trajectory_.frames(), thermo_.size(), events_ ? events_->mark() : EventMark()};
+  return {trajectory_.mark(), thermo_.mark(), events_ ? events_->mark() : EventMark()};
 }
 
 template <int D>

@@ -37,10 +37,14 @@ void at_best(auto&& action) {
 
 /// Where the files of a run stand: what is needed to cut them back and to go on.
 struct FileMarks {
-  std::uint64_t frames = 0, thermo_bytes = 0;
-  EventMark events;
-  void archive(Archive& archive) { archive(frames, thermo_bytes, events); }
+  FileMark frames{}, thermo{};
+  EventMark events{};
+  void archive(Archive& archive) { archive(frames, thermo, events); }
 };
+
+/// Throws Error(Failure::file), which names the file, unless the files of a run are there and have what they had at the
+/// marks. Changes nothing.
+void check_files(const Deck& deck, const FileMarks& marks, const FileMark& log);
 
 template <int D>
 class RunFiles {

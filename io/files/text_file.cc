@@ -1,28 +1,29 @@
 #include "io/files/text_file.h"
 
 #include <fcntl.h>
+#include <libdeflate.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <string>
 #include <utility>
+#include <vector>
 
-#include "engine/base/error.h"
 #include "io/files/descriptor.h"
 
 namespace carom {
 
-TextFile::TextFile(std::filesystem::path path, std::optional<std::uint64_t> size)
-    : path_(std::move(path)),
-      descriptor_(::open(path_.c_str(), O_WRONLY | O_CLOEXEC | (size ? 0 : O_CREAT | O_TRUNC), 0666)),
-      size_(size.value_or(0)) {
-  if (descriptor_ < 0) fail(errno);
-  const off_t there = size ? ::lseek(descriptor_, 0, SEEK_END) : 0, end = static_cast<off_t>(size_);
-  if (there < end)
-    throw Error(Failure::file, path_.string() + ": has " + std::to_string(there) + " bytes of " + std::to_string(end) +
-                                   ": it was cut or exchanged since that number was taken");
-  if (size && (::ftruncate(descriptor_, end) != 0 || ::lseek(descriptor_, end, SEEK_SET) < 0)) fail(errno);
+namespace fs = std::filesystem;
+
+TextFile::TextFile(fs::path path, const std::optional<FileMark>& mark)
+    : path_(std::move(path)), mark_(mark.value_or(FileMark())) {
+  if (mark) check_text(path_, *mark);
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC | (mark ? 0 : O_CREAT | O_TRUNC), 0666);
+  const auto end = static_cast<off_t>(mark_.length);
+  if (descriptor_ < 0 || (mark && (::ftruncate(descriptor_, end) != 0 || ::lseek(descriptor_, end, SEEK_SET) < 0)))
+    fail(errno);
 }
 
 TextFile::~TextFile() {
@@ -35,13 +36,14 @@ void TextFile::append(std::string_view piece) {
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
       const int error_number = n < 0 ? errno : ENOSPC;
-      const auto start = static_cast<off_t>(size_);
+      const auto start = static_cast<off_t>(mark_.length);
       if (::ftruncate(descriptor_, start) == 0) ::lseek(descriptor_, start, SEEK_SET);
       fail(error_number);
     }
     done += static_cast<std::size_t>(n);
   }
-  size_ += piece.size();
+  mark_.length += piece.size();
+  mark_.sum = libdeflate_crc32(static_cast<std::uint32_t>(mark_.sum), piece.data(), piece.size());
 }
 
 void TextFile::close() {
@@ -56,30 +58,80 @@ void TextFile::fail(int error_number) const {
                   "; check free space, quota and permissions there, or choose another directory with -o");
 }
 
-void put_in_place(const std::filesystem::path& aside, const std::filesystem::path& path) try {
-  std::filesystem::rename(aside, path);
-  const Descriptor folder(::open(path.has_parent_path() ? path.parent_path().c_str() : ".", O_RDONLY | O_CLOEXEC));
-  if (folder.is_open()) ::fsync(folder.number());  // some folders can't be synced
-} catch (const std::filesystem::filesystem_error& e) {
-  throw Error(Failure::file, path.string() + ": cannot put the new file in place: " + e.code().message());
+void check_text(const fs::path& path, const FileMark& mark) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));  // a pipe is not waited for
+  if (!file.is_open()) refuse_to_go_on(path, std::string("cannot be read: ") + std::strerror(errno));
+  std::vector<char> piece(1 << 16);
+  FileMark there;
+  while (there.length < mark.length) {
+    const ssize_t got = ::read(file.number(), piece.data(), std::min(piece.size(), mark.length - there.length));
+    if (got < 0) refuse_to_go_on(path, std::string("cannot be read: ") + std::strerror(errno));
+    if (got == 0)
+      refuse_to_go_on(path, "has " + std::to_string(there.length) + " bytes, and had " + std::to_string(mark.length) +
+                                " at the checkpoint");
+    there.length += static_cast<std::uint64_t>(got);
+    there.sum = libdeflate_crc32(static_cast<std::uint32_t>(there.sum), piece.data(), static_cast<std::size_t>(got));
+  }
+  if (there.sum != mark.sum)
+    refuse_to_go_on(path, "is the file of another run, or was changed: its first " + std::to_string(mark.length) +
+                              " bytes are not those that it had at the checkpoint");
 }
 
-void write_aside(const std::filesystem::path& path, const std::function<void(TextFile&)>& write) {
-  std::filesystem::path aside = path;
-  aside += ".part";
+void rename_file(const fs::path& from, const fs::path& to) {
+  std::error_code failed;
+  const fs::file_status is = fs::symlink_status(to, failed);
+  if (fs::exists(is) && !fs::is_regular_file(is) && !fs::is_symlink(is))
+    throw Error(Failure::file, to.string() +
+                                   ": is a directory, a pipe or a device, which no new file replaces; move it "
+                                   "away");
+  fs::rename(from, to, failed);
+  if (failed)
+    throw Error(Failure::file, to.string() + ": cannot rename " + from.string() + " to this name: " + failed.message() +
+                                   "; check the disk and the permissions of the directory");
+}
+
+void put_in_place(const fs::path& aside, const fs::path& path) {
+  rename_file(aside, path);
+  const Descriptor folder(::open(path.has_parent_path() ? path.parent_path().c_str() : ".", O_RDONLY | O_CLOEXEC));
+  if (folder.is_open()) ::fsync(folder.number());  // some folders can't be synced
+}
+
+fs::path behind_links(fs::path path) {
+  constexpr int kMostLinks = 40;  // as in Linux
+  std::error_code failed;
+  for (int links = 0; links < kMostLinks && fs::is_symlink(path, failed); ++links)
+    path = path.parent_path() / fs::read_symlink(path, failed);
+  return path;
+}
+
+bool is_standard_output(const fs::path& path) {
+  struct stat named {
+  }, standard{};
+  return ::stat(path.c_str(), &named) == 0 && ::fstat(STDOUT_FILENO, &standard) == 0 &&
+         named.st_dev == standard.st_dev && named.st_ino == standard.st_ino;
+}
+
+void write_aside(const fs::path& path, const std::function<void(TextFile&)>& write) {
+  std::error_code ignored;
+  const fs::path target = behind_links(path);
+  const fs::file_status is = fs::status(path, ignored);
+  // What a link in /proc/self/fd says need not be a name: then the file is there, but not under that name.
+  const bool replace =
+      is.type() == fs::file_type::not_found || (fs::is_regular_file(is) && fs::equivalent(path, target, ignored));
+  fs::path aside = target;
+  if (replace) aside += ".part";
   try {
-    TextFile file(aside);
+    TextFile file(replace ? aside : path);
     write(file);
     file.close();
-    put_in_place(aside, path);
+    if (replace) put_in_place(aside, target);
   } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(aside, ignored);
+    if (replace) fs::remove(aside, ignored);
     throw;
   }
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
+void write_file_atomically(const fs::path& path, std::string_view text) {
   write_aside(path, [&](TextFile& file) { file.append(text); });
 }
 

@@ -13,18 +13,26 @@
 
 namespace carom {
 
+/// When a row was written.
+struct ThermoPoint {
+  double time = 0;
+  std::int64_t step = 0;
+  std::uint64_t collisions = 0;
+};
+
+/// The point of the last whole row of a file; zeros where there is none.
+ThermoPoint last_thermo_point(const std::filesystem::path& path);
+
 template <int D>
 class ThermoWriter : public Observer<D> {
  public:
-  /// Creates the file with its header, or opens it again to go on behind its first so many bytes. Throws
-  /// Error(Failure::file).
-  explicit ThermoWriter(const std::filesystem::path& path, std::optional<std::uint64_t> size = {});
+  /// Creates the file with its header, or opens it again to go on from the mark. Throws Error(Failure::file).
+  explicit ThermoWriter(const std::filesystem::path& path, const std::optional<FileMark>& mark = {});
 
   /// Appends a row. Throws Error(Failure::file).
   void thermo(const Snapshot<D>& snapshot) override;
 
-  /// In bytes.
-  std::uint64_t size() const { return file_.size(); }
+  const FileMark& mark() const { return file_.mark(); }
   /// Puts everything on the disk. Throws Error(Failure::file).
   void close() { file_.close(); }
 

@@ -1,5 +1,7 @@
 // Kills the process at its KILL_AT-th change of a file whose path contains KILL_IN: a write (of which half is done where
 // KILL_HALF=1), a new size, a new name, a removal, a sync. Without KILL_AT the number of changes goes to KILL_COUNT, a file.
+// Where KILL_LOG names a file, each change is noted there, with its path, size and place; also fdatasync, which is not
+// counted: the clock decides how often the journal calls it.
 //   cc -shared -fPIC -o kill_at_write.so kill_at_write.c
 //   LD_PRELOAD=./kill_at_write.so KILL_IN=runs/k KILL_AT=2584 carom run … -o runs/k
 #define _GNU_SOURCE
@@ -13,6 +15,14 @@
 
 static long changes = 0;
 
+static void note(const char* what, const char* path, long long size, long long at) {
+  const char* name = getenv("KILL_LOG");
+  FILE* out = name != NULL ? fopen(name, "a") : NULL;
+  if (out == NULL) return;
+  fprintf(out, "%s %s %lld %lld\n", what, path, size, at);
+  fclose(out);
+}
+
 __attribute__((destructor)) static void report(void) {
   const char* name = getenv("KILL_COUNT");
   FILE* out = name != NULL ? fopen(name, "w") : NULL;
@@ -21,21 +31,34 @@ __attribute__((destructor)) static void report(void) {
   fclose(out);
 }
 
-/// Whether this is the change to die at.
-static int due(const char* path) {
-  const char *in = getenv("KILL_IN"), *at = getenv("KILL_AT");
-  if (in == NULL || strstr(path, in) == NULL) return 0;
-  ++changes;
-  return at != NULL && changes == atol(at);
+static int concerned(const char* path) {
+  const char* in = getenv("KILL_IN");
+  return in != NULL && strstr(path, in) != NULL;
 }
 
-static int due_at(int descriptor) {
-  char link[64], path[4096];
+/// Whether this is the change to die at.
+static int due(const char* what, const char* path, long long size, long long at) {
+  const char* when = getenv("KILL_AT");
+  if (!concerned(path)) return 0;
+  note(what, path, size, at);
+  ++changes;
+  return when != NULL && changes == atol(when);
+}
+
+/// The path of an open file; NULL: it has none.
+static const char* path_of(int descriptor) {
+  static char path[4096];
+  char link[64];
   snprintf(link, sizeof link, "/proc/self/fd/%d", descriptor);
   const ssize_t n = readlink(link, path, sizeof path - 1);
-  if (n < 0) return 0;
+  if (n < 0) return NULL;
   path[n] = 0;
-  return due(path);
+  return path;
+}
+
+static int due_at(const char* what, int descriptor, long long size, long long at) {
+  const char* path = path_of(descriptor);
+  return path != NULL && due(what, path, size, at);
 }
 
 static void die(void) {
@@ -55,7 +78,7 @@ static size_t half(size_t size) {
 #define PWRITE(name, offset)                                           \
   ssize_t name(int file, const void* data, size_t size, offset at) {   \
     REAL(ssize_t, name, int, const void*, size_t, offset);             \
-    if (!due_at(file)) return real(file, data, size, at);              \
+    if (!due_at("write", file, (long long)size, at)) return real(file, data, size, at); \
     if (half(size) > 0) real(file, data, half(size), at);              \
     die();                                                             \
     return -1;                                                         \
@@ -65,7 +88,7 @@ PWRITE(pwrite64, off64_t)
 
 ssize_t write(int file, const void* data, size_t size) {
   REAL(ssize_t, write, int, const void*, size_t);
-  if (!due_at(file)) return real(file, data, size);
+  if (!due_at("write", file, (long long)size, -1)) return real(file, data, size);
   if (half(size) > 0) real(file, data, half(size));
   die();
   return -1;
@@ -74,7 +97,7 @@ ssize_t write(int file, const void* data, size_t size) {
 #define RESIZE(name, offset)             \
   int name(int file, offset size) {      \
     REAL(int, name, int, offset);        \
-    if (due_at(file)) die();             \
+    if (due_at("resize", file, size, 0)) die(); \
     return real(file, size);             \
   }
 RESIZE(ftruncate, off_t)
@@ -82,14 +105,22 @@ RESIZE(ftruncate64, off64_t)
 
 int fsync(int file) {
   REAL(int, fsync, int);
-  if (due_at(file)) die();
+  if (due_at("sync", file, 0, 0)) die();
   return real(file);
+}
+
+int fdatasync(int file) {
+  REAL(int, fdatasync, int);
+  const char* path = path_of(file);
+  if (path == NULL || !concerned(path) || getenv("KILL_LOG") == NULL) return real(file);
+  note("sync", path, 0, 0);
+  return 0;  // which takes no time: so the journal syncs often
 }
 
 #define SET_ASIDE(name, offset)                                  \
   int name(int file, int mode, offset start, offset length) {    \
     REAL(int, name, int, int, offset, offset);                   \
-    if (due_at(file)) die();                                     \
+    if (due_at("room", file, length, start)) die();              \
     return real(file, mode, start, length);                      \
   }
 SET_ASIDE(fallocate, off_t)
@@ -97,18 +128,18 @@ SET_ASIDE(fallocate64, off64_t)
 
 int rename(const char* from, const char* to) {
   REAL(int, rename, const char*, const char*);
-  if (due(to)) die();
+  if (due("rename", to, 0, 0)) die();
   return real(from, to);
 }
 
 int unlink(const char* path) {
   REAL(int, unlink, const char*);
-  if (due(path)) die();
+  if (due("remove", path, 0, 0)) die();
   return real(path);
 }
 
 int remove(const char* path) {
   REAL(int, remove, const char*);
-  if (due(path)) die();
+  if (due("remove", path, 0, 0)) die();
   return real(path);
 }

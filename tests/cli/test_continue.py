@@ -3,6 +3,7 @@
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -10,9 +11,9 @@ import time
 
 import pytest
 
-from going_on import ALL_OUTPUT, CHECKPOINTS, INTERRUPTED, box, expect_same, go_on, toml_text, wait_for_rows
+from going_on import ALL_OUTPUT, CHECKPOINTS, INTERRUPTED, box, compare, expect_same, go_on, toml_text, wait_for_rows
 from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, mpi_environment, mpirun, needs_carom, run, summary,
-                  write_deck)
+                  thermo, write_deck)
 
 pytestmark = needs_carom
 
@@ -224,9 +225,88 @@ def test_the_script_for_slurm(tmp_path):
 def test_what_cannot_be_changed(arguments, code, words, tmp_path):
     out = tmp_path / "out"
     run(write_deck(tmp_path, SPRINGS), out, ["run.steps=20"])
-    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    before = contents(out)
     assert words in go_on(out, arguments, code=code).stderr
-    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert contents(out) == before
+
+
+def contents(directory):
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+def test_an_end_that_lies_behind_is_refused(tmp_path):
+    """Steps, time and collisions are checked, on any number of ranks. Nothing changes, and the command of the message does what was wanted."""
+    text = box("psa", 3, 60).replace("steps = 60", "steps = 60\nend_time = 50.0\ncollisions = 100000")
+    deck, done, short = write_deck(tmp_path, text), tmp_path / "done", tmp_path / "short"
+    run(deck, done, ALL_OUTPUT)
+    account = summary(done)
+    reached = {"steps": 60, "end_time": account["end_time"], "collisions": account["events"]["sphere_sphere"]}
+    run(deck, short, [*ALL_OUTPUT, "run.end_time=1.1937"])  # the last step is a short one: the checkpoint comes before it
+    for out, key, end, least in [(done, "steps", 59, 60), (done, "end_time", 1.19, reached["end_time"]), (done, "collisions", 1, reached["collisions"]),
+                                 (done, "steps", 1, 60), (short, "end_time", 1.19, 1.1937), (short, "steps", 59, 60)]:
+        before = contents(out)
+        for ranks in (1, 2):
+            refused = go_on(out, ["--set", f"run.{key}={end}"], code=2, ranks=ranks).stderr
+            assert f"--set run.{key}={end}: the run has come to" in refused and f"give that or more (--set run.{key}={least})" in refused, refused
+            assert contents(out) == before
+    for key, end in reached.items():
+        same = tmp_path / key
+        shutil.copytree(done, same)
+        go_on(same, ["--set", f"run.{key}={end}"])
+        assert compare(done, same) == [] and (same / "thermo.csv").read_bytes() == (done / "thermo.csv").read_bytes()
+        assert summary(same)["status"] == "done" and summary(same)["steps"] == 60
+    line = re.search("or start anew: (carom run .*)$", go_on(done, ["--set", "run.steps=30"], code=2).stderr.strip())[1]
+    subprocess.run([CAROM, *shlex.split(line)[1:], "--quiet"], check=True)
+    assert summary(tmp_path / "done-earlier")["steps"] == 30
+
+
+def test_an_end_that_lies_behind_within_an_epoch(tmp_path):
+    """There the particles are later than the end of the last step, which is step 0 here."""
+    deck, out, whole = spheres(tmp_path, 4000000), tmp_path / "out", tmp_path / "whole"
+    job = subprocess.Popen(command(deck, out), stderr=subprocess.PIPE, text=True)
+    wait_for_rows(job, out)
+    job.send_signal(signal.SIGUSR2)
+    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    before, collisions = contents(out), summary(out)["events"]["sphere_sphere"]
+    assert summary(out)["end_time"] == 0
+    refused = go_on(out, ["--set", "run.end_time=1.0"], code=2).stderr
+    reached = float(re.search(r"has come to time (\S+) already", refused)[1])
+    assert reached >= thermo(out)["time"][-1] > 50
+    assert f"come to collision {collisions + 1} " in go_on(out, ["--set", f"run.collisions={collisions}"], code=2).stderr
+    assert contents(out) == before
+    for key, end in [("end_time", reached), ("collisions", collisions + 1)]:
+        same, whole = tmp_path / f"same-{key}", tmp_path / f"whole-{key}"
+        shutil.copytree(out, same)
+        go_on(same, ["--set", f"run.{key}={end}"])
+        run(deck, whole, [f"run.{key}={end}"])
+        expect_same(whole, same)
+
+
+def test_a_file_of_another_run_is_named(tmp_path):
+    """A file that is missing, cut off or no file is named too. Nothing is written anywhere, on any number of ranks."""
+    deck, out, other = write_deck(tmp_path, box("psa", 3, 30)), tmp_path / "out", tmp_path / "other"
+    run(deck, out, ALL_OUTPUT)
+    run(deck, other, [*ALL_OUTPUT, "placement.seed=6"])
+    own = contents(out)
+    for name in ("thermo.csv", "trajectory.h5md", "events.h5", "run.log"):
+        for ranks, bytes_ in [(1, (other / name).read_bytes()), (2, (other / name).read_bytes()), (1, own[name][: len(own[name]) // 4]), (1, b""), (2, None)]:
+            (out / name).unlink()
+            if bytes_ is not None:
+                (out / name).write_bytes(bytes_)
+            before = contents(out)
+            refused = go_on(out, ["--set", "run.steps=60"], code=5, ranks=ranks).stderr
+            assert f"{out / name}: " in refused and "put back the file that the run has written, or start a new run" in refused
+            assert "check free space" not in refused and refused.count(str(out / name)) == 1
+            assert contents(out) == before
+        (out / name).unlink(missing_ok=True)
+        os.mkfifo(out / name)
+        assert f"{out / name}: " in go_on(out, code=5).stderr and (out / name).is_fifo()
+        (out / name).unlink()
+        (out / name).write_bytes(own[name])
+    whole = tmp_path / "whole"
+    run(deck, whole, [*ALL_OUTPUT, "run.steps=60"])
+    go_on(out, ["--set", "run.steps=60"])
+    expect_same(whole, out)
 
 
 def test_mistakes(tmp_path):

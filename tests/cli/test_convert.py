@@ -1,5 +1,6 @@
 """`carom convert`, and trajectories themselves, in the programs that they are meant for: each file is opened by a reader of others."""
 
+import os
 import pathlib
 import re
 import shutil
@@ -286,6 +287,56 @@ def test_a_choice_of_frames(trajectory):
         if choice:
             error = convert(trajectory, "extxyz", "--frames", choice, code=2)
             assert error.startswith(f"--frames {choice}: error: ") and len(error.splitlines()) == 1
+
+
+def test_an_open_box_and_mixed_radii(tmp_path):
+    """Each particle has its own size in every format; a direction without boundaries reaches as far as the particles do, or the box."""
+    text = SPRINGS.replace('["wall", "wall"]', '["open", "wall"]').replace("radius = 0.5", "radius = [0.5, 0.2, 0.3, 0.4]")
+    text = text[:text.index("[[interaction]]")] + text[text.index("[integrator]"):]
+    fast = text.replace("[[0.3, 0.1], [1.1, -0.4], [-0.9, 0.7], [0.2, -0.3]]", "[[-3.0, 0.1], [-5.0, -0.4], [4.0, 0.7], [5.0, -0.3]]")
+    run(write_deck(tmp_path, fast), tmp_path / "out", ["integrator.type=cva", "run.steps=50", "output.frame_interval=0.25"])
+    outside = 0
+    with Trajectory(tmp_path / "out") as frames:
+        assert list(frames.radius) == [0.5, 0.2, 0.3, 0.4]
+        for n in range(len(frames)):
+            x = whole(frames, "position", n)
+            convert(frames, "lammps-data", "--frames", str(n), "-o", str(tmp_path / "data"))
+            data = (tmp_path / "data").read_text()
+            bounds = [tuple(map(float, re.search(rf"^(\S+) (\S+) {axis}lo {axis}hi$", data, re.M).groups())) for axis in "xyz"]
+            assert bounds == [(min(0, *(x[:, 0] - frames.radius)), max(9, *(x[:, 0] + frames.radius))), (0, 5), (-0.5, 0.5)]
+            outside += bounds[0][0] < 0 and bounds[0][1] > 9
+            atoms = np.array([line.split() for line in re.search(r"Atoms # sphere\n\n((?:.+\n)+)", data)[1].splitlines()], float)
+            assert np.array_equal(atoms[:, 2], 2 * frames.radius) and np.array_equal(atoms[:, 4:7], x)
+            assert atoms[:, 3] == pytest.approx(frames.mass / (4 / 3 * np.pi * frames.radius**3), rel=1e-14)
+        convert(frames, "extxyz", "-o", str(tmp_path / "xyz"))
+        rows = [line.split() for line in (tmp_path / "xyz").read_text().splitlines() if line.startswith("H ")]
+        assert [float(row[7]) for row in rows] == list(frames.radius) * len(frames)
+        convert(frames, "gsd", "-o", str(tmp_path / "gsd"))
+        assert np.array(2 * frames.radius, "f4").tobytes() in (tmp_path / "gsd").read_bytes()
+    assert 0 < outside < len(frames.time)
+
+
+def test_links_and_pipes_are_written_to(trajectory, tmp_path):
+    """`convert -o` and `view --export` do so. Where the file goes to standard output, what the command says goes to stderr."""
+    plain, target, link, pipe = (tmp_path / name for name in ("plain", "target", "link", "pipe"))
+    export = [CAROM, "view", str(trajectory.path.parent), "--export"]
+    commands = [[CAROM, "convert", str(trajectory.path), "--to", to, "-o"] for to in ("extxyz", "gsd")] + [export]
+    link.symlink_to("target")
+    os.mkfifo(pipe)
+    for command in commands:
+        subprocess.run([*command, str(plain)], check=True, capture_output=True)
+        target.unlink(missing_ok=True)
+        for text in (None, "an older file"):
+            if text:
+                target.write_text(text)
+            subprocess.run([*command, str(link)], check=True, capture_output=True)
+            assert link.is_symlink() and target.read_bytes() == plain.read_bytes()
+        writer = subprocess.Popen([*command, str(pipe)], stdout=subprocess.PIPE)
+        assert pipe.read_bytes() == plain.read_bytes() and pipe.is_fifo()
+        assert writer.communicate()[0] != b"" and writer.returncode == 0
+        done = subprocess.run([*command, "/dev/stdout"], check=True, capture_output=True)
+        assert done.stdout == plain.read_bytes() and b"frames" in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "pipe", "plain", "target"]
 
 
 def test_what_cannot_be_converted(trajectory, tmp_path):

@@ -124,6 +124,66 @@ def test_every_other_write(killer, place):
     assert interrupted > 15  # kills within a flush were among them
 
 
+def logged_run(killer, directory):
+    """What a run does to its files, in order: (what, name, size, place)."""
+    log, out = directory / "log", directory / "out"
+    log.unlink(missing_ok=True)
+    shutil.rmtree(out, ignore_errors=True)
+    environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": str(out), "KILL_LOG": str(log)}
+    subprocess.run(command(deck(directory), out, ['output.checkpoint_wall="0"']), env=environment, check=True)
+    lines = [line.split(" ") for line in log.read_text().splitlines()]
+    return [(what, os.path.relpath(path, out), int(size), int(at)) for what, path, size, at in lines]
+
+
+def test_a_file_is_synced_before_it_takes_its_name(killer, place):
+    """The file is synced after its last write, and the directory after the renaming: a power failure leaves the old file or the new one."""
+    calls = logged_run(killer, place)
+    renamed = {}
+    for n, (what, name, _, _) in enumerate(calls):
+        if what != "rename" or name == "checkpoint.previous.h5":
+            continue
+        before = [(what, size) for what, file, size, _ in calls[:n] if file == name + ".part"]
+        assert before[-1][0] == "sync" and "write" in (what for what, _ in before), (name, before[-3:])
+        assert calls[n + 1][:2] == ("sync", "."), (name, calls[n + 1])
+        renamed[name] = renamed.get(name, 0) + 1
+    assert set(renamed) == {"carom.lock", "deck.toml", "summary.json", "rdf.csv", "trajectory.h5md", "events.h5", "checkpoint.h5"}
+    assert renamed["checkpoint.h5"] > 2
+    # The last checkpoint keeps its name until the next one is on the disk, whose signature, the first block, is written last.
+    for n, (what, name, _, _) in enumerate(calls):
+        if what == "rename" and name == "checkpoint.previous.h5":
+            part = [call for call in calls[:n] if call[1] == "checkpoint.h5.part"]
+            assert part[-1][0] == "sync" and part[-2] == ("write", "checkpoint.h5.part", 512, 0)
+            assert calls[n + 1][:2] == ("rename", "checkpoint.h5")
+
+
+def test_the_journal_is_synced_before_the_file_is_changed(killer, place):
+    """It is emptied after the file is synced: whenever power fails, the file has the state of a flush, or the journal has all that it lacks."""
+    calls, durable = logged_run(killer, place), 0
+    for name in FILES:
+        journal, ours = name + ".journal", [call for call in calls if call[1] in (name, name + ".journal")]
+        flush, synced = None, 0
+        for n, (what, file, size, at) in enumerate(ours):
+            before = ours[n - 1]
+            if file == journal and what == "write" and size > 8:
+                assert at == 0 and flush is None
+                flush, synced = n, 0
+            elif file == journal and what == "write":  # it is emptied
+                assert (size, at) == (8, 0) and flush is not None and synced in (0, 2)
+                assert synced == 0 or before[:2] == ("sync", name)
+                flush = None
+            elif file == journal and what == "sync":
+                # What is new in the file, to which the journal refers, is on the disk before it.
+                assert n == flush + 2 and before[:2] == ("sync", name)
+                synced, durable = 1, durable + 1
+            elif file == name and what == "sync" and synced == 1:
+                assert before[0] in ("write", "resize") and before[1] == name
+                synced = 2
+            elif file == journal and what == "remove" and n > 0 and before[0] != "rename":
+                assert flush is None and before[:2] == ("sync", name), before
+        assert flush is None and [call[0] for call in ours if call[1] == journal][-1] == "remove"
+    assert durable > 1
+
+
 def test_an_incomplete_journal_is_discarded(tmp_path):
     """Also one whose bytes are not those that were written."""
     run(deck(tmp_path), tmp_path / "out")

@@ -13,7 +13,7 @@ import time
 import pytest
 
 from runs import (CAROM, MPIRUN, ROOT, SPHERES, SPRINGS, command, data_sets, frames_are_sound, mpi_environment, mpirun, needs_carom,
-                  run, summary, thermo, write_deck)
+                  needs_compiler, run, summary, thermo, write_deck)
 
 sys.path.insert(0, str(ROOT / "tools"))
 from carom_files import toml_text
@@ -70,6 +70,7 @@ def idle_seconds(output):
     return seconds
 
 
+@pytest.mark.kills_mpirun
 def test_idle_ranks_sleep_and_share_the_exit_code(tmp_path):
     deck, out = write_deck(tmp_path, SPRINGS), tmp_path / "out"
     endless = command(deck, out, ["run.steps=100000000", "output.frame_interval=0.0"])
@@ -175,6 +176,7 @@ def test_other_commands_speak_once(tmp_path):
         assert (done.stdout + done.stderr).count(words) == 1
 
 
+@pytest.mark.kills_mpirun
 def test_a_killed_rank(tmp_path):
     out = tmp_path / "out"
     job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS))
@@ -186,6 +188,7 @@ def test_a_killed_rank(tmp_path):
     assert len(thermo(out)["time"]) >= 3
 
 
+@pytest.mark.kills_mpirun
 def test_a_stopped_rank(tmp_path):
     out = tmp_path / "out"
     job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--silence", "2")))
@@ -194,6 +197,29 @@ def test_a_stopped_rank(tmp_path):
     assert job.returncode == 70 and "no answer from rank 1 of 3 for 2 s" in errors
     assert summary(out)["status"] == "failed" and "rank 1 of 3" in summary(out)["error"]
     assert frames_are_sound(out) >= 3
+
+
+@pytest.mark.kills_mpirun
+@pytest.mark.parametrize("stopped", [0, 1])
+def test_a_rank_that_is_stopped_before_it_starts(stopped, tmp_path):
+    """MPI, which the other waits in, knows nothing of it."""
+    out = tmp_path / "out"
+    first = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = {stopped} ]; then kill -STOP $$; fi; exec "$@"', "sh"]
+    done = mpirun(2, first + command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--silence", "2")), code=70)
+    assert f"carom: rank {1 - stopped}: MPI does not start within 2 s: another rank is stopped" in done.stderr
+    when_it_has_ended(out)
+
+
+@pytest.mark.kills_mpirun
+@needs_compiler
+def test_a_rank_that_is_stopped_at_the_end(tmp_path):
+    """When all has been written."""
+    (tmp_path / "stop.c").write_text("#include <signal.h>\nint MPI_Finalize(void) { return raise(SIGSTOP); }\n")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "stop.so", tmp_path / "stop.c"], check=True)
+    last = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = 1 ]; then export LD_PRELOAD={tmp_path}/stop.so; fi; exec "$@"', "sh"]
+    done = mpirun(2, last + command(write_deck(tmp_path, SPHERES), tmp_path / "out", arguments=("--quiet", "--silence", "2")), code=70)
+    assert "carom: rank 0: MPI does not end within 2 s" in done.stderr
+    assert summary(tmp_path / "out")["status"] == "done"
 
 
 def test_rank_0_cannot_write(tmp_path):
@@ -209,6 +235,7 @@ def test_rank_0_cannot_write(tmp_path):
     assert frames_are_sound(out) >= 3
 
 
+@pytest.mark.kills_mpirun
 def test_a_rank_without_memory(tmp_path):
     out = tmp_path / "out"
     job = start(2, command(write_deck(tmp_path, SPHERES), out, ENDLESS))

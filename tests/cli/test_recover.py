@@ -62,6 +62,7 @@ def test_killed_at_its_writes(method, killer, tmp_path):
     assert continued > kills / 4
 
 
+@pytest.mark.kills_mpirun
 def test_killed_ranks(tmp_path):
     """SIGKILL to mpirun at random instants, each time going on from the last checkpoint."""
     dice = random.Random(3)
@@ -113,13 +114,16 @@ def test_the_other_slot(tmp_path):
     good = last.read_bytes()
     damage = {"its checksum is not that of its contents": good[:5000] + bytes([good[5000] ^ 1]) + good[5001:],
               "damaged or cut off": good[: len(good) // 2],
-              "written by a newer carom": good.replace(b"carom checkpoint 2", b"carom checkpoint 7", 1),
+              "written by a newer carom": good.replace(b"carom checkpoint 3", b"carom checkpoint 7", 1),
               "not a checkpoint of carom": b"something else"}
     for words, contents in damage.items():
         trial = tmp_path / "trial"
         shutil.rmtree(trial, ignore_errors=True)
         shutil.copytree(out, trial)
         (trial / "checkpoint.h5").write_bytes(contents)
+        before = {path.name: path.read_bytes() for path in trial.iterdir()}
+        go_on(trial, ["--set", "run.steps=1"], code=2)  # what is refused leaves the slots as they are
+        assert {path.name: path.read_bytes() for path in trial.iterdir()} == before
         done = go_on(trial, ["--set", "run.steps=300"])
         assert words in done.stderr and "going on from checkpoint.previous.h5" in done.stderr, done.stderr
         expect_same(whole, trial)
@@ -168,21 +172,25 @@ def test_the_checkpoint_is_read_when_the_directory_is_free(tmp_path):
     expect_same(whole, out)
 
 
+def test_a_checkpoint_that_cannot_be_renamed(tmp_path):
+    """Is a file error; the last checkpoint remains, and the run goes on from it once there is room for its name."""
+    whole, out = interrupted(tmp_path)
+    (out / "checkpoint.previous.h5").unlink()
+    (out / "checkpoint.previous.h5").mkdir()
+    before = (out / "checkpoint.h5").read_bytes()
+    refused = go_on(out, ["--set", "run.steps=300"], code=5).stderr
+    assert f"{out}/checkpoint.previous.h5: is a directory, a pipe or a device" in refused and summary(out)["status"] == "failed"
+    assert (out / "checkpoint.h5").read_bytes() == before and not list(out.glob("*.part"))
+    (out / "checkpoint.previous.h5").rmdir()
+    go_on(out, ["--set", "run.steps=300"])
+    expect_same(whole, out)
+
+
 def lock_of(out, process, host=None):
     """Leaves the lock of a process."""
     ticks = pathlib.Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[19]
     host = host or pathlib.Path("/proc/sys/kernel/hostname").read_text().strip()
     (out / "carom.lock").write_text(f"host {host}\nprocess {process}\nstarted then\nticks {ticks}\n")
-
-
-def test_files_that_are_shorter_than_at_the_checkpoint(tmp_path):
-    """What is missing can't be made up."""
-    out = tmp_path / "out"
-    run(write_deck(tmp_path, SPRINGS), out)
-    (out / "thermo.csv").write_text("time\n")
-    assert "thermo.csv" in go_on(out, ["--set", "run.steps=500"], code=5).stderr
-    (out / "thermo.csv").unlink()
-    assert "thermo.csv" in go_on(out, ["--set", "run.steps=500"], code=5).stderr
 
 
 def test_locks(tmp_path):

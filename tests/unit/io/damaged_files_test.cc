@@ -60,6 +60,15 @@ Handle text_of(std::size_t width) {
   return type;
 }
 
+TEST(DamagedFiles, AFileThatIsNotDamagedIsDescribed) {
+  const std::string text = describe_file(written_trajectory());
+  for (const char* line :
+       {"kind          H5MD 1.1 trajectory\n", "title         three spheres\n", "integrator    free-flight\n",
+        "dimension     2\n", "particles     3\n", "box           4, 5\n", "boundary      periodic, wall\n",
+        "frames        2\n", "times         0 to 0.5\n", "steps         0 to 1\n"})
+    EXPECT_NE(text.find(line), std::string::npos) << line << "in\n" << text;
+}
+
 TEST(DamagedFiles, NumbersOfAxesAreChecked) {
   const fs::path path = written_trajectory();
   const std::string group = "/particles/trajectory/";

@@ -133,8 +133,140 @@ TEST_F(DeckTest, ReadsWhatItSays) {
   EXPECT_EQ(p.species, (std::vector<std::uint16_t>{0, 0, 1}));
 }
 
+/// Lists count from the first particle of their own species.
+TEST_F(DeckTest, ListsOfALaterSpeciesAreItsOwn) {
+  Deck deck = read(springs, {"particles.1.position=[[8, 5], [8, 2]]", "particles.1.velocity=[[1, 2], [3, 4]]",
+                             "particles.1.radius=[0.3, 0.4]", "particles.1.mass=[5, 6]", "particles.1.charge=[7, 8]"});
+  const auto system = build_system<2>(deck);
+  const Particles<2>& p = system->particles;
+  EXPECT_EQ(p.v, (std::vector<Vec<2>>{{0.1, 0}, {0, -0.3}, {1, 2}, {3, 4}}));
+  EXPECT_EQ(p.radius, (std::vector<double>{0.5, 0.25, 0.3, 0.4}));
+  EXPECT_EQ(p.mass, (std::vector<double>{1, 1, 5, 6}));
+  EXPECT_EQ(p.charge, (std::vector<double>{0, 0, 7, 8}));
+}
+
+TEST_F(DeckTest, OutputIsWhatItSays) {
+  const Deck deck = read(springs, {"output.directory=there", "output.frame_interval=0.25", "output.thermo_interval=0.5",
+                                   "output.sample_start=1.5", "output.msd_interval=0.75", "output.events=true",
+                                   R"(output.checkpoint_wall="")", R"(output.units={length = "nm", time = "ps"})"});
+  EXPECT_EQ(deck.output.directory, "there");
+  EXPECT_EQ(deck.plan.frame_interval, 0.25);
+  EXPECT_EQ(deck.plan.thermo_interval, 0.5);
+  EXPECT_EQ(deck.output.sample_start, 1.5);
+  ASSERT_EQ(deck.output.observables.size(), 1u);
+  EXPECT_EQ(deck.output.observables[0].info->name, "msd");
+  EXPECT_EQ(deck.output.observables[0].parameters.real("interval"), 0.75);
+  EXPECT_TRUE(deck.plan.events);
+  EXPECT_FALSE(deck.output.checkpoint_wall);
+  EXPECT_EQ(deck.output.units->length, "nm");
+  EXPECT_EQ(deck.output.units->time, "ps");
+}
+
+TEST_F(DeckTest, VectorsHaveANumberForEachAxis) {
+  for (const char* vector : {"[1]", "[1, 2, 3]"})
+    for (const std::string key : {"position", "velocity"}) {
+      const std::string set = "particles.1." + key + "=[" + vector + "]";
+      try {
+        read(springs, {set});
+        ADD_FAILURE() << set << " was not refused";
+      } catch (const Error& e) {
+        EXPECT_EQ(e.failure(), Failure::deck);
+        EXPECT_NE(std::string(e.what()).find("vector 0 (from 0) of '" + key + "' has "), std::string::npos) << e.what();
+      }
+    }
+}
+
+/// An error says what is wrong and where.
+TEST_F(DeckTest, MistakesAreRefused) {
+  const auto said = [&](const std::string& text, const std::vector<std::string>& set, bool replace = false) {
+    try {
+      Deck deck = read_deck(write("deck.toml", text), set, read_text, replace);
+      deck.dimension == 2 ? void(build_system<2>(deck)) : void(build_system<3>(deck));
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  const auto line_of_second = [](const std::string& text, const std::string& part) {
+    const auto at = text.find(part, text.find(part) + 1);
+    return std::to_string(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1);
+  };
+  struct Mistake {
+    const std::string& text;
+    std::vector<std::string> set;
+    std::string says;
+  };
+  for (const auto& [text, set, says] : std::vector<Mistake>{
+           {fluid, {"placement.packing_fraction=1"}, "'packing_fraction' must be below 1"},
+           {springs, {R"(system.boundary=["wall"])"}, "'boundary' has the wrong length (1)"},
+           {springs, {"system.box=[10, 8, 6]"}, "'box' has the wrong length (3)"},
+           {springs, {"interaction.pairs=[[0, -1]]"}, "names the particle -1, which cannot be"},
+           {springs, {"particles.0.velocity=[[0.1, 0]]"}, "'velocity' has 1 vector for 2 particles"},
+           {springs,
+            {"particles.1.position=[[5.7, 5]]"},
+            "deck.toml:" + line_of_second(springs, "[[particles]]") + ":1: error: 1 pair of spheres overlaps"},
+           {springs, {"system.box=[1, 1]"}, "the spheres fill 1.7671"}})
+    EXPECT_NE(said(text, set).find(says), std::string::npos) << says << " in: " << said(text, set);
+  EXPECT_EQ(said(springs, {"system.box=[1, 1]", R"(system.boundary=["open", "open"])"}),
+            "");  // an open box has no volume
+  // Where another type is set, keys of the deck that it does not know are dropped; keys that are set with it are
+  // errors.
+  std::string fourth = springs;
+  fourth.replace(fourth.find("step = 0.01"), 11, "step = 0.01\norder = 4");
+  EXPECT_NE(said(fourth, {"integrator.type=psa"}).find("unknown key 'order'"), std::string::npos);
+  EXPECT_EQ(said(fourth, {"integrator.type=psa"}, true), "");
+  EXPECT_NE(said(fourth, {"integrator.type=psa", "integrator.order=2"}, true).find("unknown key 'order'"),
+            std::string::npos);
+}
+
+TEST_F(DeckTest, WarnsOfAStepBeyondATenthOfThePeriod) {
+  const auto warnings = [&](double share) {
+    const double period = 2 * std::numbers::pi / std::sqrt(3 * (1 + 0.5));
+    Deck deck = read(springs, {"interaction.0.pairs=[[1, 2]]", "integrator.step=" + std::to_string(share * period)});
+    build_system<2>(deck);
+    return deck.warnings;
+  };
+  EXPECT_TRUE(warnings(0.099).empty());
+  ASSERT_EQ(warnings(0.101).size(), 1u);
+  EXPECT_NE(warnings(0.101)[0].find("is long for the shortest period at the start"), std::string::npos);
+}
+
+TEST_F(DeckTest, WarnsOfACutoffBeyondHalfThePeriodicBox) {
+  const auto warnings = [&](const std::string& cutoff) {
+    Deck deck =
+        read(springs + "[[interaction]]\ntype = \"yukawa\"\namplitude = 1\nkappa = 3\ncutoff = " + cutoff + "\n");
+    build_system<2>(deck);
+    return deck.warnings;
+  };
+  EXPECT_TRUE(warnings("4.25").empty());  // the edge between walls is longer
+  ASSERT_EQ(warnings("4.5").size(), 1u);
+  EXPECT_NE(warnings("4.5")[0].find("cutoff 4.5 is more than half the box, 4.25"), std::string::npos);
+}
+
+/// A checkpoint has the bonds that were found at the start of the run, so a branch cannot ask for another length.
+TEST_F(DeckTest, ABranchHasTheBondsOfItsRun) {
+  std::string lattice = fluid + R"([[interaction]]
+type = "harmonic-bond"
+within = 1.3
+stiffness = 2
+rest_length = 1
+)";
+  const std::string free = R"(type = "free-flight")";
+  const Deck of = read(lattice.replace(lattice.find(free), free.size(), "type = \"psa\"\nstep = 0.01"));
+  bool same = true;
+  const auto branch = [&](const std::vector<std::string>& set) { return read_branch(of, set, read_text, same); };
+  for (const char* within : {"1.2", "1.4"})
+    EXPECT_THROW(branch({std::string("interaction.0.within=") + within}), Error) << within;
+  EXPECT_EQ(branch({"run.collisions=2000"}).plan.collisions, 2000u);
+  EXPECT_TRUE(same);
+  EXPECT_EQ(branch({"interaction.0.stiffness=3"}).source->interactions.size(), 1u);
+  EXPECT_FALSE(same);
+  EXPECT_THROW(branch({"particles.0.radius=0.1"}), Error);
+}
+
 TEST_F(DeckTest, ResolvedDeckGivesTheSameRun) {
-  Deck deck = read(springs);
+  Deck deck = read(springs, {R"(title="tab \t, bell \u0007, \u001F, back\\slash, \u007F")"});
+  EXPECT_EQ(deck.title, "tab \t, bell \a, \x1f, back\\slash, \x7f");
   const auto system = build_system<2>(deck);
   Deck again = read(deck.toml_text);
   expect_equal(*system, *build_system<2>(again));
@@ -297,6 +429,36 @@ TEST_F(DeckTest, ExplicitSpheresStandAmongRandomOnes) {
   EXPECT_EQ(system->particles.size(), 15u);
 }
 
+/// The largest sphere of all species decides, wherever it stands in its list.
+TEST_F(DeckTest, LatticesKeepTheLargestOfAListOfRadiiOffTheWalls) {
+  const std::string box = R"(format = 1
+[system]
+dimension = 2
+box = [3.4, 3.4]
+boundary = ["wall", "wall"]
+[placement]
+type = "square"
+[integrator]
+type = "free-flight"
+[run]
+end_time = 1.0
+)";
+  const auto species = [](const std::string& name, int count, const std::string& radius) {
+    return "[[particles]]\nname = \"" + name + "\"\ncount = " + std::to_string(count) +
+           "\ntemperature = 1\nradius = " + radius + "\n";
+  };
+  for (const std::string& particles :
+       {species("a", 4, "[0.2, 0.3, 1.0, 0.25]"), species("a", 2, "0.3") + species("b", 2, "[0.2, 1.0]"),
+        species("a", 2, "[1.0, 0.2]") + species("b", 2, "0.3")}) {
+    Deck deck = read(box + particles);
+    const auto system = build_system<2>(deck);
+    std::vector<Vec<2>> sites = system->particles.x;
+    std::ranges::sort(sites, {}, [](const Vec<2>& x) { return std::pair(x[0], x[1]); });
+    const double far = 3.4 - 1.0;
+    EXPECT_EQ(sites, (std::vector<Vec<2>>{{1, 1}, {1, far}, {far, 1}, {far, far}})) << particles;
+  }
+}
+
 TEST_F(DeckTest, CompressedMixturesAreWhatTheDeckSaysAndComeOutOfTheResolvedDeckAgain) {
   const std::vector<std::string> set{"placement.type=compressed", "placement.packing_fraction=0.5",
                                      "placement.growth_rate=0.5", "particles.1.mass=7"};
@@ -320,6 +482,23 @@ TEST_F(DeckTest, ShortestPeriodOfOneBondIsThatOfItsOscillator) {
   Deck deck = read(springs, {"interaction.0.pairs=[[1, 2]]"});
   const auto system = build_system<2>(deck);
   EXPECT_NEAR(shortest_period(*system), 2 * std::numbers::pi / std::sqrt(3 * (1 + 0.5)), 1e-12);
+}
+
+/// A pair within a cutoff takes four bytes; along a periodic axis a particle meets images, between walls it does not.
+TEST_F(DeckTest, MemoryOfPairsIsThatOfThoseWithinTheCutoff) {
+  const auto pairs = [&](double cutoff) {
+    Deck deck = read(springs + "[[interaction]]\ntype = \"yukawa\"\namplitude = 1\nkappa = 3\ncutoff = " +
+                     std::to_string(cutoff) + "\n");
+    deck.source->species[0].count = 9999;
+    Box<2> box;
+    box.edges = {10, 8};
+    box.boundary = {Boundary::wall, Boundary::periodic};
+    return (estimated_memory(*deck.source, &box) - estimated_memory<2>(*deck.source, nullptr)) / (4 * 0.5 * 1e8);
+  };
+  const double disc = std::numbers::pi / 4;  // of its square
+  EXPECT_NEAR(pairs(1), disc * 0.2 * 0.25, 1e-3 * pairs(1));
+  EXPECT_NEAR(pairs(4), disc * 0.8 * 1.0, 1e-3 * pairs(4));
+  EXPECT_NEAR(pairs(16), disc * 1.0 * 4.0, 1e-3 * pairs(16));
 }
 
 TEST_F(DeckTest, MemoryIsThatOfAllRanksWithinTheLimitOfTheProcess) {

@@ -56,5 +56,51 @@ TEST(Events, HoldsEveryContactExactly) {
   EXPECT_EQ(row[1], -2.0 / 3);
 }
 
+/// Events are written with each row and each frame, though their batch is not full.
+TEST(Events, AreInTheFileWhereARowOrAFrameIs) {
+  const auto path = test::fresh_directory() / "events.h5", copy = path.parent_path() / "copy.h5";
+  const auto system = test::sample_system<2>();
+  EventWriter<2> writer(path, test::sample_deck(2));
+  const auto written = [&] {
+    std::filesystem::copy_file(path, copy, std::filesystem::copy_options::overwrite_existing);
+    return hdf5::shape(hdf5::File::open(copy), "/events/time").at(0);
+  };
+  const auto snapshot = test::sample_snapshot<2>(system->particles, 1, 1);
+  writer.contacts(0, std::array{contact(0.5, 0, 1)});
+  EXPECT_EQ(written(), 0u);
+  writer.thermo(snapshot);
+  EXPECT_EQ(written(), 1u);
+  writer.contacts(0, std::array{contact(0.75, 1, 2)});
+  writer.frame(snapshot);
+  EXPECT_EQ(written(), 2u);
+  writer.contacts(1, std::array{contact(0.25, 0, 2), contact(0.5, 0, 1)});
+  EXPECT_EQ(writer.mark().rows.length, 4u);
+  EXPECT_EQ(written(), 4u);
+}
+
+/// A run that is continued goes on counting its slabs.
+TEST(Events, SlabsGoOnFromTheMark) {
+  const auto path = test::fresh_directory() / "events.h5";
+  Statistics statistics;
+  statistics.steps = 7;
+  std::optional<EventMark> mark;
+  {
+    EventWriter<2> writer(path, test::sample_deck(2));
+    writer.contacts(0, std::array{contact(0.5, 0, 1)});
+    writer.progress(statistics);
+    mark = writer.mark();
+    writer.contacts(3.5, std::array{contact(0.25, 1, 2)});
+    writer.close();
+  }
+  EventWriter<2> writer(path, test::sample_deck(2), mark);
+  writer.contacts(3.5, std::array{contact(0.125, 0, 2)});
+  writer.close();
+  const hdf5::File file = hdf5::File::open(path);
+  ASSERT_EQ(hdf5::shape(file, "/events/slab"), std::vector<hsize_t>{2});
+  EXPECT_EQ(hdf5::number_at(file, "/events/slab", 0), 0);
+  EXPECT_EQ(hdf5::number_at(file, "/events/slab", 1), 7);
+  EXPECT_EQ(hdf5::number_at(file, "/events/time", 1), 3.625);
+}
+
 }  // namespace
 }  // namespace carom

@@ -4,7 +4,9 @@
 #include <numeric>
 
 #include "engine/base/error.h"
+#include "engine/forces/add_interaction.h"
 #include "io/files/hdf5.h"
+#include "io/files/trajectory_reader.h"
 #include "sample_run.h"
 
 namespace carom {
@@ -97,6 +99,20 @@ TYPED_TEST(Trajectory, IsReadableAfterEveryFrame) {
   }
 }
 
+/// VMD takes one radius of a species: the mean of its particles, exactly their own where all have the same.
+TEST(TrajectoryFile, ASpeciesOfMixedRadii) {
+  const auto path = fresh_directory() / "t.h5md";
+  const auto system = test::sample_system<2>();
+  system->particles.radius = {0.1, 0.4, 0.3};
+  TrajectoryWriter<2>(path, test::sample_deck(2), *system).close();
+  const hdf5::File file = hdf5::File::open(path);
+  EXPECT_EQ(all_numbers(file, "/particles/trajectory/radius"), system->particles.radius);
+  const auto radii = all_numbers(file, "/parameters/vmd_structure/radius");
+  ASSERT_EQ(radii.size(), 2u);
+  EXPECT_DOUBLE_EQ(radii[0], 0.25);
+  EXPECT_EQ(radii[1], 0.3);
+}
+
 /// Another rank that has no particles, and is lost in the middle of the second frame.
 TEST(TrajectoryFile, HasNoPartOfAFrameInWhichARankIsLost) {
   struct Lost : Communicator {
@@ -122,6 +138,56 @@ TEST(TrajectoryFile, HasNoPartOfAFrameInWhichARankIsLost) {
     EXPECT_EQ(hdf5::shape(file, name).at(0), 1u) << name;
   EXPECT_EQ(all_numbers(file, "particles/trajectory/position/value")[5], 1.5);
   EXPECT_EQ(all_numbers(file, "particles/trajectory/mass")[2], 3.5);
+}
+
+/// Units are written as the module `units` of H5MD asks, as texts of variable length.
+TEST(TrajectoryFile, SaysItsUnits) {
+  const auto path = fresh_directory() / "t.h5md";
+  Deck deck = test::sample_deck(2);
+  deck.output.units = {"nm", "ps"};
+  TrajectoryWriter<2>(path, deck, *test::sample_system<2>()).close();
+  const hdf5::File file = hdf5::File::open(path);
+  const auto unit = [&](const std::string& name) {
+    const hdf5::Handle attribute(
+        H5Aopen_by_name(file.id(), ("particles/trajectory/" + name).c_str(), "unit", H5P_DEFAULT, H5P_DEFAULT),
+        H5Aclose);
+    const hdf5::Handle type(H5Aget_type(attribute.id()), H5Tclose);
+    char* text = nullptr;
+    EXPECT_GE(H5Aread(attribute.id(), type.id(), &text), 0) << name;
+    const std::string found = text != nullptr ? text : "";
+    H5free_memory(text);
+    return found;
+  };
+  for (const char* length : {"position/value", "box/edges/value", "radius"}) EXPECT_EQ(unit(length), "nm") << length;
+  EXPECT_EQ(unit("velocity/value"), "nm ps-1");
+  EXPECT_EQ(unit("position/time"), "ps");
+}
+
+/// Each bond is written once; ids count from 1 in the file and from 0 in the reader.
+TEST(TrajectoryFile, IsReadAsItWasWritten) {
+  const auto path = fresh_directory() / "t.h5md";
+  const auto system = test::sample_system<3>();
+  for (const PairList& pairs : {PairList{{1, 2}}, PairList{{1, 0}, {2, 1}}})
+    add_interaction(*system, "harmonic-bond", {{"pairs", pairs}, {"stiffness", 1.0}, {"rest_length", 1.0}});
+  TrajectoryWriter<3> writer(path, test::sample_deck(3), *system);
+  for (int f = 0; f < 2; ++f) writer.frame(test::sample_snapshot<3>(system->particles, 0.5 * f, 3 * f));
+  writer.close();
+  const TrajectoryReader reader(path);
+  EXPECT_EQ(reader.bonds, (std::vector<std::array<std::uint32_t, 2>>{{0, 1}, {1, 2}}));
+  EXPECT_EQ(reader.dimension, 3);
+  EXPECT_EQ(reader.species_names, (std::vector<std::string>{"small", "large"}));
+  EXPECT_EQ(reader.species, (std::vector<std::int32_t>{0, 0, 1}));
+  EXPECT_EQ(reader.boundary, (std::vector<std::string>{"periodic", "wall", "wall"}));
+  EXPECT_EQ(reader.mass, (std::vector<double>{1.5, 2.5, 3.5}));
+  EXPECT_EQ(reader.charge, (std::vector<double>{0, -1, -2}));
+  ASSERT_EQ(reader.frames(), 2u);
+  const TrajectoryFrame frame = reader.frame(1);
+  EXPECT_EQ(frame.time, 0.5);
+  EXPECT_EQ(frame.step, 3);
+  EXPECT_EQ(frame.edges, (std::array{4.0, 5.0, 6.0}));
+  EXPECT_EQ(frame.position, (std::vector<double>{0, 0.25, 0.5, 1, 1.25, 1.5, 2, 2.25, 2.5}));
+  EXPECT_EQ(frame.velocity[8], -2.5);
+  EXPECT_EQ(frame.image, (std::vector<std::int32_t>{0, 0, 0, 1, 1, 1, 2, 2, 2}));
 }
 
 TEST(TrajectoryFile, NamesTheFileThatCannotBeCreated) {

@@ -3,9 +3,13 @@
 #include "io/files/journal.h"
 
 #include <libdeflate.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 
+#include <csignal>
 #include <fstream>
 #include <random>
+#include <utility>
 
 #include "engine/base/error.h"
 #include "io/files/hdf5.h"
@@ -139,6 +143,188 @@ TEST(Journal, AFileOpenedAgainIsWholeAfterEveryFlush) {
     EXPECT_EQ(hdf5::number_at(seen, "/g/x", 19), 19);  // element [19][19]
     EXPECT_EQ(hdf5::number_at(seen, "/g/x", 49), 49 + 1000 * times);
   }
+}
+
+/// A file that the driver has open, through HDF5's interface for drivers.
+class DriverFile {
+ public:
+  explicit DriverFile(const fs::path& path) {
+    hdf5::start_library();
+    const hdf5::Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    H5Pset_driver(access.id(), hdf5::journal_driver(), nullptr);
+    file_ = H5FDopen(path.c_str(), H5F_ACC_RDWR | H5F_ACC_CREAT | H5F_ACC_TRUNC, access.id(), HADDR_UNDEF);
+    H5FDset_eoa(file_, H5FD_MEM_DEFAULT, std::uint64_t{1} << 30);
+  }
+  ~DriverFile() { close(); }
+  DriverFile(const DriverFile&) = delete;
+  DriverFile& operator=(const DriverFile&) = delete;
+
+  // These return whether it was done.
+  bool write(std::uint64_t at, const Bytes& data) {
+    return H5FDwrite(file_, H5FD_MEM_DEFAULT, H5P_DEFAULT, at, data.size(), data.data()) >= 0;
+  }
+  bool flush() { return H5FDflush(file_, H5P_DEFAULT, false) >= 0; }
+  bool resize(std::uint64_t size) {
+    const bool done = H5FDset_eoa(file_, H5FD_MEM_DEFAULT, size) >= 0 && H5FDtruncate(file_, H5P_DEFAULT, false) >= 0;
+    return H5FDset_eoa(file_, H5FD_MEM_DEFAULT, std::uint64_t{1} << 30) >= 0 && done;
+  }
+  bool close() { return file_ == nullptr || H5FDclose(std::exchange(file_, nullptr)) >= 0; }
+  Bytes read(std::uint64_t at, std::size_t length) {
+    Bytes data(length, std::byte{99});
+    EXPECT_GE(H5FDread(file_, H5FD_MEM_DEFAULT, H5P_DEFAULT, at, length, data.data()), 0);
+    return data;
+  }
+
+ private:
+  H5FD_t* file_ = nullptr;
+};
+
+Bytes contents(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  const std::string all{std::istreambuf_iterator<char>(in), {}};
+  const auto bytes = std::as_bytes(std::span(all));
+  return {bytes.begin(), bytes.end()};
+}
+
+// HDF5 reads what it has written, also before a flush, while the file has the bytes and the size of the last flush.
+TEST(Journal, TheDriverReadsWhatWaits) {
+  const fs::path path = test::fresh_directory() / "a.h5";
+  DriverFile file(path);
+  std::mt19937 random(11);
+  const auto below = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random); };
+  Bytes now, flushed;
+  for (int n = 0; n < 3000; ++n) {
+    const std::size_t at = below(now.size() + 50);
+    Bytes data(1 + below(400));
+    for (std::byte& each : data) each = static_cast<std::byte>(1 + below(255));
+    ASSERT_TRUE(file.write(at, data));
+    now.resize(std::max(now.size(), at + data.size()));
+    std::copy(data.begin(), data.end(), now.begin() + static_cast<std::ptrdiff_t>(at));
+    const std::size_t from = below(now.size()), length = 1 + below(600);
+    Bytes expected(length);  // zeros behind the end
+    std::copy_n(now.begin() + static_cast<std::ptrdiff_t>(from), std::min(length, now.size() - from), expected.begin());
+    ASSERT_EQ(file.read(from, length), expected) << n;
+    if (n > 10) {
+      const Bytes there = contents(path);
+      ASSERT_GE(there.size(), flushed.size());
+      ASSERT_TRUE(std::equal(flushed.begin(), flushed.end(), there.begin())) << n;
+    }
+    if (below(4) > 0 && n != 10) continue;
+    if (below(3) == 0) {  // HDF5 gives room back, or takes more, before a flush
+      now.resize(now.size() / 2 + below(now.size()));
+      ASSERT_TRUE(file.resize(now.size()));
+    }
+    ASSERT_TRUE(file.flush());
+    flushed = now;
+    ASSERT_EQ(contents(path), now) << n;
+    ASSERT_LE(std::ifstream(path.string() + ".journal", std::ios::binary).get(), 0);  // empty, or emptied
+  }
+  ASSERT_TRUE(file.resize(now.size() / 3));  // without anything that waits
+  ASSERT_TRUE(file.flush());
+  EXPECT_EQ(fs::file_size(path), now.size() / 3);
+}
+
+/// Files cannot be written behind so many bytes while it lives.
+class Limit {
+ public:
+  explicit Limit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~Limit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  Limit(const Limit&) = delete;
+  Limit& operator=(const Limit&) = delete;
+
+ private:
+  void (*handler_)(int);
+  rlimit before_{};
+};
+
+// The journal is complete, and the file cannot be written: the journal stays, and has all, to the last byte.
+TEST(Journal, AFlushThatIsTornIsCompletedLater) {
+  const fs::path path = test::fresh_directory() / "a.h5", journal = path.string() + ".journal";
+  Bytes expected(100000, std::byte{1});
+  {
+    DriverFile file(path);
+    ASSERT_TRUE(file.write(0, expected));
+    ASSERT_TRUE(file.flush());
+    for (const std::size_t at : {std::size_t{10}, std::size_t{70000}, expected.size() - 100}) {
+      const Bytes data(100, static_cast<std::byte>(2 + at % 200));
+      ASSERT_TRUE(file.write(at, data));
+      std::copy(data.begin(), data.end(), expected.begin() + static_cast<std::ptrdiff_t>(at));
+    }
+    const Limit limit(50000);
+    EXPECT_FALSE(file.flush());
+    EXPECT_FALSE(file.flush());  // nothing more is written
+    file.close();
+  }
+  const Bytes torn = contents(path), whole = contents(journal);
+  EXPECT_EQ(torn.size(), expected.size());
+  EXPECT_EQ(torn[10], expected[10]);
+  EXPECT_EQ(torn[70000], std::byte{1});
+  const auto with_journal = [&](const Bytes& bytes) {
+    std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(torn.data()), std::ssize(torn));
+    std::ofstream(journal, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
+    hdf5::replay_journal(path);
+    EXPECT_FALSE(fs::exists(journal));
+    return contents(path);
+  };
+  EXPECT_EQ(with_journal(whole), expected);
+  EXPECT_EQ(with_journal({whole.begin(), whole.end() - 1}), torn);
+}
+
+TEST(Journal, RoomIsGivenBackWhereAFlushFails) {
+  const fs::path path = test::fresh_directory() / "a.h5";
+  DriverFile file(path);
+  const Bytes flushed(1000, std::byte{1}), more(30000, std::byte{2});
+  ASSERT_TRUE(file.write(0, flushed) && file.flush() && file.write(1000, more));
+  EXPECT_EQ(fs::file_size(path), 31000u);  // what is new waits for nothing
+  {
+    const Limit limit(40000);
+    EXPECT_FALSE(file.write(31000, more));
+    file.close();
+  }
+  EXPECT_EQ(contents(path), flushed);
+  EXPECT_FALSE(fs::exists(path.string() + ".journal"));
+}
+
+// By whichever name it is opened, the journal is found beside the file itself.
+TEST(Journal, AFileBehindALink) {
+  const fs::path directory = test::fresh_directory(), file = directory / "there" / "a.h5", link = directory / "a.h5";
+  fs::create_directory(directory / "there");
+  fs::create_symlink("there/a.h5", link);
+  {
+    hdf5::File::create(link).close();
+    hdf5::File again = hdf5::File::append(link);
+    again.group("g");
+    again.flush();
+    EXPECT_TRUE(fs::exists(file.string() + ".journal"));
+  }
+  const Bytes journal = hdf5::Blocks().journal(fs::file_size(file), {});
+  std::ofstream(file.string() + ".journal", std::ios::binary)
+      .write(reinterpret_cast<const char*>(journal.data()), std::ssize(journal));
+  EXPECT_TRUE(hdf5::exists(hdf5::File::open(link), "/g"));
+  EXPECT_FALSE(fs::exists(file.string() + ".journal"));
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory), {}), 2);
+}
+
+TEST(Journal, NoFileIsWrittenToAPipe) {
+  const fs::path pipe = test::fresh_directory() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  try {
+    hdf5::File::create(pipe);
+    ADD_FAILURE() << "created it";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.failure(), Failure::file);
+    EXPECT_NE(std::string(e.what()).find("name another file"), std::string::npos) << e.what();
+  }
+  EXPECT_TRUE(fs::is_fifo(pipe));
 }
 
 }  // namespace

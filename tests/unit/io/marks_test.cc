@@ -104,19 +104,22 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
     ThermoTable<D> table(log);
     show(files, table, 1, 2.5);
     FileMarks at = files.mark();
-    std::uint64_t bytes = log.size(), rows = table.rows();
-    marks(at, bytes, rows);
+    FileMark end = log.mark();
+    std::uint64_t rows = table.rows();
+    marks(at, end, rows);
     show(files, table, 3, 3);  // what the checkpoint knows nothing of; more than a chunk
   }
   EXPECT_NE(data_sets(whole.output.directory / run_file::events), data_sets(cut.output.directory / run_file::events));
   {
     FileMarks at;
-    std::uint64_t bytes = 0, rows = 0;
+    FileMark end;
+    std::uint64_t rows = 0;
     Archive from(marks.bytes());
-    from(at, bytes, rows);
+    from(at, end, rows);
+    check_files(cut, at, end);
     from.finish();
     RunFiles<D> files(cut, *system, at);
-    RunLog log(cut.output.directory / run_file::log, true, bytes);
+    RunLog log(cut.output.directory / run_file::log, true, end);
     ThermoTable<D> table(log, rows);
     show(files, table, 2, 1.7);
     files.close();
@@ -142,27 +145,79 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
   EXPECT_EQ(rows_of(whole.output.directory), rows_of(cut.output.directory));
 }
 
-TEST(MarksOfFiles, FilesThatHaveLessAreErrors) {
+// Each file that is missing, shorter than at the checkpoint, changed, or another run's is named, and nothing changes.
+TEST(MarksOfFiles, FilesThatAreNotThoseOfTheRunAreErrors) {
   const fs::path directory = test::fresh_directory();
-  const auto system = test::sample_system<2>();
-  const auto fails = [](const auto& open) {
+  const auto system = test::hard_spheres<2>(3, 0.6);
+  const auto write = [&](const Deck& deck, unsigned seed, FileMarks& at, FileMark& end) {
+    RunFiles<2> files(deck, *system);
+    RunLog log(deck.output.directory / run_file::log, true);
+    ThermoTable<2> table(log);
+    show(files, table, seed, 1.5);
+    at = files.mark();
+    end = log.mark();
+    show(files, table, seed, 0.5);
+    files.close();
+  };
+  const Deck own = deck_of_all<2>(directory / "own", *system), other = deck_of_all<2>(directory / "other", *system);
+  FileMarks at, ignored;
+  FileMark end;
+  write(other, 2, ignored, end);
+  write(own, 1, at, end);
+  check_files(own, at, end);
+  const auto refusal = [&](const fs::path& path) -> std::string {
+    const std::string before = fs::exists(path) ? contents(path) : "";
     try {
-      open();
-      ADD_FAILURE() << "opened a file behind its end";
+      check_files(own, at, end);
     } catch (const Error& e) {
       EXPECT_EQ(e.exit_code(), 5);
-      EXPECT_NE(std::string(e.what()).find("it was cut or exchanged"), std::string::npos) << e.what();
+      const std::string text = e.what();
+      EXPECT_TRUE(text.starts_with(path.string() + ": ")) << text;
+      EXPECT_NE(text.find("; put back the file that the run has written, or start a new run"), std::string::npos);
+      EXPECT_EQ(fs::exists(path) ? contents(path) : "", before);
+      EXPECT_FALSE(fs::exists(path.string() + ".journal"));
+      return text;
     }
+    ADD_FAILURE() << path;
+    return {};
   };
-  TrajectoryWriter<2>(directory / "t.h5md", test::sample_deck(2), *system)
-      .frame(test::sample_snapshot<2>(system->particles, 0, 0));
-  fails([&] { TrajectoryWriter<2>(directory / "t.h5md", test::sample_deck(2), *system, 2); });
-  EventWriter<2>(directory / "events.h5", test::sample_deck(2)).close();
-  fails([&] { EventWriter<2>(directory / "events.h5", test::sample_deck(2), EventMark{1, 0}); });
-  const auto size = ThermoWriter<2>(directory / "thermo.csv").size();
-  fails([&] { ThermoWriter<2>(directory / "thermo.csv", size + 1); });
-  const auto larger = test::hard_spheres<2>(3, 0.3);
-  EXPECT_THROW(TrajectoryWriter<2>(directory / "t.h5md", test::sample_deck(2), *larger, 1), Error);
+  for (const char* name : {run_file::log, run_file::thermo, run_file::trajectory, run_file::events}) {
+    const fs::path path = own.output.directory / name;
+    const std::string good = contents(path);
+    const auto exchanged = [&](const std::string& bytes) {
+      std::ofstream(path, std::ios::binary) << bytes;
+      return refusal(path);
+    };
+    const auto has = [](const std::string& text, const std::string& words) {
+      EXPECT_NE(text.find(words), text.npos) << text;
+    };
+    has(exchanged(contents(other.output.directory / name)), "is the file of another run, or was changed");
+    exchanged("garbage");
+    exchanged("");
+    fs::remove(path);
+    refusal(path);
+    exchanged(good.substr(0, 200));
+    std::ofstream(path, std::ios::binary) << good;
+    check_files(own, at, end);
+  }
+  for (const char* name : {run_file::log, run_file::thermo}) {
+    const fs::path path = own.output.directory / name;
+    std::string changed = contents(path);
+    changed[changed.size() / 3] ^= 1;
+    std::ofstream(path, std::ios::binary) << changed;
+    EXPECT_NE(refusal(path).find("or was changed"), std::string::npos);
+    changed[changed.size() / 3] ^= 1;
+    std::ofstream(path, std::ios::binary) << changed;
+  }
+  // What the files of this run do not have at all.
+  FileMarks later = at;
+  later.frames.length += 100;
+  std::swap(at, later);
+  EXPECT_NE(refusal(own.output.directory / run_file::trajectory).find(" rows, and had "), std::string::npos);
+  std::swap(at, later);
+  check_files(own, at, end);
+  const auto larger = test::hard_spheres<2>(4, 0.3);
+  EXPECT_THROW(TrajectoryWriter<2>(own.output.directory / run_file::trajectory, own, *larger, at.frames), Error);
 }
 
 }  // namespace

@@ -35,6 +35,22 @@ TEST(Requests, CheckpointsAreAnIntervalApart) {
   EXPECT_FALSE(requests.now(alone).checkpoint);
 }
 
+/// The wall time counts from the start of the run, not from its last checkpoint. A run that has to stop writes a
+/// checkpoint.
+TEST(Requests, TheWallTimeEndsTheRun) {
+  Communicator alone;
+  EXPECT_FALSE(Requests(1e9).stop_here(alone));
+  Requests requests(0.1);
+  for (int looks = 0; looks < 1000 && !requests.stop_here(alone); ++looks) {
+    requests.checkpoint_is_written();
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(requests.stop_here(alone));
+  EXPECT_TRUE(requests.now(alone).stop);
+  EXPECT_TRUE(requests.now(alone).checkpoint);
+  EXPECT_EQ(requests.reason(), "--max-wall");
+}
+
 TEST(Requests, ASignalThatIsIgnoredStaysIgnored) {  // as nohup has it
   Communicator alone;
   std::signal(SIGHUP, SIG_IGN);

@@ -1,12 +1,21 @@
 // thermo.csv, summary.json, run.log, progress, the output directory.
 
+#include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
+#include <bit>
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "engine/base/error.h"
+#include "io/files/averages.h"
+#include "io/files/descriptor.h"
+#include "io/files/directory_lock.h"
 #include "io/files/log.h"
 #include "io/files/log_report.h"
 #include "io/files/output_directory.h"
@@ -50,6 +59,33 @@ TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   EXPECT_EQ(values[11], 1.0 / 3);
 }
 
+// Only a whole row counts: a kill may have left a part of one.
+TEST(Thermo, TheLastRowSaysHowFarARunHasCome) {
+  const auto path = fresh_directory() / "thermo.csv";
+  const auto expect = [&](double time, std::int64_t step, std::uint64_t collisions) {
+    const ThermoPoint point = last_thermo_point(path);
+    EXPECT_EQ(point.time, time);
+    EXPECT_EQ(point.step, step);
+    EXPECT_EQ(point.collisions, collisions);
+  };
+  const auto append = [&](const char* text) { std::ofstream(path, std::ios::app) << text; };
+  expect(0, 0, 0);
+  append("");
+  expect(0, 0, 0);
+  append("time,step,collisions,kinetic\n");
+  expect(0, 0, 0);
+  append("0.30000000000000004,3,5000000000,1.5");
+  expect(0, 0, 0);
+  append("\n");
+  expect(0.30000000000000004, 3, 5000000000);
+  append("0.7,9,6000000000,1");
+  expect(0.30000000000000004, 3, 5000000000);
+  append("\n");
+  for (int n = 10; n < 100; ++n) append("0.75,10,6000000000,1.5,2.5,3.5,4.5,5.5,6.5,7.5,8.5,9.5,10.5\n");
+  append("12,100,6000000001,1.5,2.5,3.5,4.5,5.5,6.5,7.5,8.5,9.5,10.5\n");
+  expect(12, 100, 6000000001);
+}
+
 // A piece that does not fit is taken back, so that the file ends with a whole line, and the message names the file.
 TEST(TextFile, TakesBackWhatDoesNotFit) {
   const auto path = fresh_directory() / "limited.txt";
@@ -71,6 +107,75 @@ TEST(TextFile, TakesBackWhatDoesNotFit) {
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(contents(path), "first line\n");
+}
+
+// A link stays, and what it leads to is exchanged as a whole, or made.
+TEST(WriteAside, GoesBehindLinks) {
+  const auto directory = fresh_directory();
+  fs::create_directory(directory / "there");
+  const auto file = directory / "there" / "file", link = directory / "link", far = directory / "far",
+             dangling = directory / "dangling";
+  std::ofstream(file) << "old";
+  fs::create_symlink("there/file", link);
+  fs::create_symlink(link, far);
+  fs::create_symlink("there/new", dangling);
+  std::ifstream reader(file);
+  for (const auto& name : {link, far}) {
+    write_aside(name, [&](TextFile& out) {
+      out.append(name.string());
+      EXPECT_TRUE(fs::exists(file.string() + ".part"));
+    });
+    EXPECT_EQ(contents(file), name.string());
+  }
+  write_file_atomically(dangling, "new");
+  EXPECT_EQ(contents(directory / "there" / "new"), "new");
+  for (const auto& name : {link, far, dangling}) EXPECT_TRUE(fs::is_symlink(name)) << name;
+  EXPECT_EQ((std::string{std::istreambuf_iterator<char>(reader), {}}), "old");  // of the file that was replaced
+  EXPECT_THROW(write_aside(link, [](TextFile&) { throw Error(Failure::file, "no"); }), Error);
+  EXPECT_EQ(contents(file), far.string());
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory / "there"), {}), 2);  // no part is left
+}
+
+TEST(WriteAside, WritesToPipesAndDevices) {
+  const auto directory = fresh_directory(), pipe = directory / "pipe", device = directory / "device";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const Descriptor reader(::open(pipe.c_str(), O_RDONLY | O_NONBLOCK));
+  write_file_atomically(pipe, "through");
+  std::array<char, 10> got{};
+  EXPECT_EQ(::read(reader.number(), got.data(), got.size()), 7);
+  EXPECT_STREQ(got.data(), "through");
+  fs::create_symlink("/dev/full", device);
+  EXPECT_THROW(write_file_atomically(device, "lost"), Error);
+  EXPECT_TRUE(fs::is_fifo(pipe));
+  EXPECT_TRUE(fs::is_symlink(device));
+  EXPECT_THROW(write_file_atomically(directory, "nowhere"), Error);
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory), {}), 2);
+}
+
+TEST(RenameFile, ReplacesFilesAndLinksOnly) {
+  const auto directory = fresh_directory(), from = directory / "from";
+  fs::create_directory(directory / "directory");
+  ASSERT_EQ(::mkfifo((directory / "pipe").c_str(), 0600), 0);
+  std::ofstream(directory / "file") << "old";
+  fs::create_symlink("file", directory / "link");
+  for (const char* name : {"directory", "pipe", "missing/file"}) {
+    std::ofstream(from) << "new";
+    try {
+      rename_file(from, directory / name);
+      ADD_FAILURE() << name;
+    } catch (const Error& e) {
+      EXPECT_EQ(e.failure(), Failure::file);
+      EXPECT_NE(std::string(e.what()).find((directory / name).string() + ": "), std::string::npos) << e.what();
+    }
+    EXPECT_EQ(contents(from), "new");
+  }
+  for (const char* name : {"file", "link"}) {
+    std::ofstream(from) << name;
+    rename_file(from, directory / name);
+    EXPECT_EQ(contents(directory / name), name);
+    EXPECT_FALSE(fs::exists(from));
+  }
+  EXPECT_EQ(contents(directory / "file"), "file");
 }
 
 TEST(Log, AFullDiskIsAnError) { EXPECT_THROW(RunLog("/dev/full", true).note("lost"), Error); }
@@ -109,11 +214,82 @@ TEST(Log, WarnsOfAnEnergyThatIsWrongByItsOwnSize) {
   Statistics s;
   s.energy_initial = 1, s.energy_after_first_step = 1.5, s.energy_reference = 2, s.energy_scale = 1;
   s.max_energy_error = 1.9;
-  EXPECT_FALSE(energy_warning(s));
+  const IntegratorInfo &psa = find_integrator("psa"), &edda = find_integrator("edda");
+  EXPECT_FALSE(energy_warning(s, psa));
+  EXPECT_NE(energy_warning(s, edda)->find("rounding has added up to 0.95 of"), std::string::npos);
+  s.energy_after_first_step = s.energy_initial, s.max_energy_error = 1.9e-12;
+  EXPECT_FALSE(energy_warning(s, edda));
+  s.energy_after_first_step = 1 + 2e-12;
+  EXPECT_NE(energy_warning(s, edda)->find("rounding has added up to 2e-12 of"), std::string::npos);
+  s.energy_after_first_step = 1.5;
   s.max_energy_error = 5;
-  EXPECT_NE(energy_warning(s)->find("wrong by 2.5 times its own size:"), std::string::npos);
+  EXPECT_NE(energy_warning(s, psa)->find("wrong by 2.5 times its own size:"), std::string::npos);
   s.energy_after_first_step = -3, s.max_energy_error = 0;
-  EXPECT_NE(energy_warning(s)->find("wrong by 4 times its own size after the first step:"), std::string::npos);
+  EXPECT_NE(energy_warning(s, edda)->find("wrong by 4 times its own size after the first step:"), std::string::npos);
+}
+
+TEST(Log, TheBannerSaysWhatRunsAndToWhichEnd) {
+  Deck deck = test::sample_deck(3);
+  deck.plan.end_time = 2.5, deck.plan.collisions = 7;
+  const std::string text = banner_text(deck, 3, 2);
+  for (const char* part :
+       {", 2 ranks\n", "\ndeck sample.toml: three spheres\n",
+        "\n3 particles in 3-D, integrator free-flight, step 0.5, until 10 steps or time 2.5 or 7 pair "
+        "collisions\n"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
+}
+
+/// The second rank has three times the events of the first one.
+TEST(Log, ReportsWhatRanksDidAndWhereTheirTimeWent) {
+  Statistics s;
+  s.steps = 4, s.end_time = 2.5, s.wall_seconds = 8;
+  s.counters.sphere_sphere = 1600, s.counters.sphere_wall = 7;
+  s.energy_final = 12, s.max_energy_error = 3e-3, s.energy_reference = 30;
+  std::array<RankAccount, 2> ranks{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const auto part = static_cast<double>(2 * k + 1);
+    ranks[k].seconds.collide = part, ranks[k].seconds.queue = 4 - part, ranks[k].wall_seconds = 8;
+    ranks[k].windows = {
+        .windows = 10, .rounds = 25, .events = 100 + 200 * k, .run_events = 150 + 300 * k, .redone_events = 2 + 4 * k};
+    ranks[k].peak_memory_bytes = 20'000'000 * (k + 1);
+  }
+  const std::string text = report_text(test::sample_deck(2), s, ranks);
+  for (const char* part :
+       {"done at time 2.5 after 4 steps: 1600 pair and 7 wall collisions in 00:00:08, 200 pair collisions/s",
+        "energy 12, largest error 3.00e-03 (relative 1.00e-04)",
+        "\n10 windows, 2.50 rounds each; events at borders run twice 50.0%, redone 2.00%, imbalance 50.0%",
+        "\nmemory of a rank at the peak 20 to 40 MB, 30 on average",
+        "\nqueue              1.000       2.000       3.000    25.0%",
+        "\ncollide            1.000       2.000       3.000    25.0%",
+        "\nother              4.000       4.000       4.000    50.0%",
+        "\ntotal              8.000       8.000       8.000\n"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
+  std::swap(ranks[0], ranks[1]);
+  EXPECT_EQ(report_text(test::sample_deck(2), s, ranks), text);
+  EXPECT_EQ(peak_memory_bytes(ranks), 40'000'000u);
+}
+
+/// The file is written at 1, 2, 4, 8 … samples and when it is closed.
+TEST(Averages, AreWrittenWheneverTheirSamplesHaveDoubled) {
+  const auto path = fresh_directory() / "profile.csv";
+  const auto system = test::sample_system<2>();
+  AverageWriter<2> writer(path, make_observable<2>("profile", *system, {{"interval", 1.0}, {"bins", 2}}));
+  for (std::uint64_t sample = 1; sample <= 33; ++sample) {
+    writer.sample(static_cast<double>(sample), system->particles);
+    EXPECT_EQ(fs::remove(path), std::has_single_bit(sample)) << sample;
+  }
+  writer.close();
+  EXPECT_TRUE(contents(path).starts_with("x,density,temperature\n1,")) << contents(path);
+}
+
+TEST(Averages, NamesThatCouldBeTakenForSeveralAreInQuotes) {
+  const auto path = fresh_directory() / "msd.csv";
+  const auto system = test::sample_system<2>();
+  system->species = {"small", "la\"rge, heavy"};
+  AverageWriter<2> writer(path, make_observable<2>("msd", *system, {{"interval", 1.0}}));
+  for (int sample = 0; sample < 2; ++sample) writer.sample(sample, system->particles);
+  EXPECT_TRUE(contents(path).starts_with("time,origins,msd,msd_small,\"msd_la\"\"rge, heavy\"\n1,1,0,0,0\n"))
+      << contents(path);
 }
 
 TEST(Summary, HasEveryValueByItsName) {
@@ -174,10 +350,56 @@ TEST(OutputDirectory, KeepsEarlierRunsInBackups) {
   EXPECT_EQ(contents(directory / "notes.txt"), "mine");
 }
 
+/// Journals and unfinished parts are moved with the files of the earlier run.
+TEST(OutputDirectory, WhatAKillHasLeftGoesWithTheFiles) {
+  const auto directory = fresh_directory();
+  for (const char* name : {run_file::trajectory, run_file::events, run_file::checkpoint, "rdf.csv"})
+    for (const char* left : {"", ".journal", ".part"}) std::ofstream(directory / (std::string(name) + left)) << name;
+  ASSERT_TRUE(prepare_output_directory(directory));
+  for (const char* name : {run_file::trajectory, run_file::events, run_file::checkpoint, "rdf.csv"})
+    for (const char* left : {"", ".journal", ".part"}) {
+      EXPECT_FALSE(fs::exists(directory / (std::string(name) + left))) << name << left;
+      EXPECT_EQ(contents(directory / "backup.1" / (std::string(name) + left)), name);
+    }
+}
+
 TEST(OutputDirectory, BelowAFileIsAnError) {
   const auto file = fresh_directory() / "file";
   std::ofstream(file) << "x";
   EXPECT_THROW(make_output_directory(file / "run"), Error);
+}
+
+TEST(DirectoryLock, SaysWhetherTheProcessThatItNamesIsAtWork) {
+  const auto directory = fresh_directory(), lock_file = directory / run_file::lock;
+  EXPECT_FALSE(run_is_at_work(directory));
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = contents(lock_file);
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from << " in " << text;
+    std::ofstream(lock_file) << text.replace(at, from.size(), to);
+    const bool at_work = run_is_at_work(directory);
+    std::ofstream(lock_file) << text.replace(at, to.size(), from);
+    return at_work;
+  };
+  {
+    const DirectoryLock lock(directory);
+    EXPECT_EQ(lock.warning(), "");
+    EXPECT_TRUE(run_is_at_work(directory));
+    EXPECT_THROW(DirectoryLock{directory}, Error);
+    EXPECT_FALSE(with("ticks ", "ticks 1"));  // the number of a process that has ended came again
+    EXPECT_FALSE(with("process " + std::to_string(getpid()), "process 0"));
+    EXPECT_TRUE(with("host ", "host not-"));  // whether it has ended cannot be told from here
+    EXPECT_TRUE(run_is_at_work(directory));
+  }
+  EXPECT_FALSE(fs::exists(lock_file));
+  {
+    const DirectoryLock lock(directory);
+    std::ofstream(lock_file) << "of another run";
+  }
+  EXPECT_EQ(contents(lock_file), "of another run");
+  std::ofstream(lock_file) << "host " << host_name() << "\nprocess " << getpid() << "\nstarted then\nticks 1\n";
+  const DirectoryLock lock(directory);
+  EXPECT_NE(lock.warning().find("the run before in this directory was ended from outside"), std::string::npos);
 }
 
 // The estimate follows the recent pace, not the mean since the start.
@@ -188,6 +410,16 @@ TEST(RecentRates, FollowAChangeOfPace) {
   for (int t = 1; t <= 40; ++t) rates.add(100 + t, 0.1 + 0.01 * t, static_cast<std::uint64_t>(500 * t));
   EXPECT_NEAR(*rates.seconds_left(), 50, 1e-6);
   EXPECT_NEAR(rates.collisions_per_second(), 500, 1e-6);
+}
+
+TEST(Progress, ALineHasTimeShareRateErrorAndTimeLeft) {
+  Statistics s;
+  s.end_time = 2.5, s.fraction_done = 0.25, s.max_energy_error = 3e-3, s.energy_reference = 30;
+  RecentRates rates(10);
+  EXPECT_EQ(progress_text(s, rates), "t = 2.5   25.0 %  0.00e+00 collisions/s  |ΔE/E| = 1.0e-04  ETA --:--:--");
+  rates.add(0, 0.05, 100);
+  rates.add(4, 0.25, 500);
+  EXPECT_EQ(progress_text(s, rates), "t = 2.5   25.0 %  1.00e+02 collisions/s  |ΔE/E| = 1.0e-04  ETA 00:00:15");
 }
 
 TEST(Progress, ClockText) {
