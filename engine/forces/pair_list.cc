@@ -269,9 +269,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     }
   }
   records_.partners[0].swap(plain_);
-  records_.partners[0].resize(std::max(records_.partners[0].size(), plain_size_ + 8));
-  for (int kind = 1; kind < PairRecords<D>::kKinds; ++kind)
-    records_.partners[kind].resize(records_.partners[kind].size() + 8);
+  records_.partners[0].resize(plain_size_);  // behind it the search leaves numbers that may be no places
+  for (auto& partners : records_.partners) partners.resize(partners.size() + 8);
 }
 
 /// Lists the pairs of one particle with those in these ranges.
