@@ -5,6 +5,8 @@
     tools/soak.py --count 100 --seed 7 --ranks 1,2,3,4
     tools/soak.py --only 17 --seed 7 --count 100       # deck 17 of these alone, when something was found
     tools/soak.py --jumps tests/regression/decks/*.toml inputs/*.toml --count 50 --seed 3
+    tools/soak.py --systems --count 1000
+    tools/soak.py --systems cdda,psa,cva,mcva --count 1000 --only 17
 
 Each deck draws a method, forces, boundaries, a dimension, sizes and outputs. It runs once undisturbed, then again on other
 numbers of ranks, with checkpoints a few hundredths of a second apart, while it is killed (KILL to the process, a rank, or
@@ -15,12 +17,21 @@ and free-flight, cdda and edda must keep the energy. Exit code 0: nothing found;
 --jumps measures instead how far the energy jumps in a slab, at most, of the exact methods, relative to what energy errors are
 relative to: in the decks given, where they are of free-flight with their method, else with cdda and edda, and in the random
 ones. A run that takes long is stopped.
+
+--systems runs random systems that are hard (random_systems.py) by edda or the methods named, each once and undisturbed. A run is
+ok where the energy of cdda and edda is right to 1e-12 of the largest K + |V| at all steps, the first included, and no spheres overlap
+by more than 1e-12 of their contact distance; warned where the energy is not right to that but the run says so; an error where it ends
+with exit code 4 and a message of one line; wrong where it ends with 0 but is neither; slow where it takes more than --patience seconds
+of processor time; else a crash. Exit code 1: a run is wrong, slow or a crash, or more than 2 % of the runs of cdda or edda are errors.
+What is not ok is left in --output.
 """
 
 import argparse
+import concurrent.futures
 import os
 import pathlib
 import random
+import resource
 import shutil
 import signal
 import subprocess
@@ -32,9 +43,12 @@ import numpy as np
 
 from carom_files import Error, find_carom, one_line, read_summary, read_thermo, toml_text
 from compare import compare, summary_differences
+from random_systems import random_system
 
 LEAST_DISTANCE = 1e-9  # that spheres may overlap by
 EXACT = {"free-flight": 1e-9, "cdda": 1e-9, "edda": 1e-9}  # largest error of H, over its reference
+ROUNDING = 1e-12  # largest error of H over its scale, and overlap over the contact distance, of a hard system
+MOST_ERRORS = 0.02  # share of hard systems that may end in an error
 PATIENCE = 120  # [s], for one process
 ALONE = 10  # [s] that mpirun may go on after its ranks
 
@@ -313,6 +327,65 @@ def jumps(carom, decks, options):
         print(f"{method}: the largest jump of {runs[method]} runs is {jump:.1e}, in {name}")
 
 
+# Hard systems
+
+def run_system(carom, method, number, options):
+    """One system by a method: what became of it, in a word and in words; (None, "") where the deck is refused."""
+    where = options.output.resolve() / f"{number}-{method}"
+    shutil.rmtree(where, ignore_errors=True)
+    where.mkdir(parents=True)
+    deck = random_system(random.Random(f"{options.seed} {number}"))
+    if method != "edda":
+        deck["integrator"] = {"type": method, "step": deck["integrator"]["step"]}
+    (where / "deck.toml").write_text(toml_text(deck))
+    command = [str(carom), "run", str(where / "deck.toml"), "-o", str(where / "run"), "--quiet"]
+    limit = (int(options.patience), int(options.patience) + 5)
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, limit))
+    said = "\n".join(line for line in done.stderr.strip().splitlines() if ": warning: " not in line)
+    if done.returncode in (2, 3):
+        return "refused", said
+    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return "slow", f"it takes more than {limit[0]} s"
+    if done.returncode == 4 and len(said.splitlines()) == 1:
+        return "error", said
+    if done.returncode != 0:
+        return "crash", f"exit code {done.returncode}: {said}"
+    summary = read_summary(where / "run")
+    energy, overlap = summary["energy"], summary["max_overlap"]
+    rows = read_thermo(where / "run")
+    scale = max(energy["reference"], (rows["kinetic"] + np.abs(rows["potential"])).max())
+    error = max(energy["max_abs_error"], abs(energy["after_first_step"] - energy["initial"])) / (scale or 1)
+    if overlap > ROUNDING or method in EXACT and not error <= ROUNDING:
+        warned = overlap <= ROUNDING and any("rounding has added up" in warning for warning in summary["warnings"])
+        return "warned" if warned else "wrong", f"the energy is off by {error:.1e}, spheres overlap by {overlap:.1e}"
+    shutil.rmtree(where)
+    return "ok", ""
+
+
+def hard_systems(carom, options):
+    """Runs them, a process for each core, and prints a table; returns the exit code."""
+    methods, kinds = options.systems.split(","), ["ok", "error", "warned", "wrong", "slow", "crash", "refused"]
+    numbers = range(options.count) if options.only is None else [options.only]
+    tasks = [(method, number) for number in numbers for method in methods]
+    became = {method: {kind: [] for kind in kinds} for method in methods}
+    with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        for (method, number), (kind, said) in zip(tasks, pool.map(lambda task: run_system(carom, *task, options), tasks)):
+            became[method][kind].append(number)
+            if kind != "ok":
+                print(f"{number:4d}  {method:5} {kind:8} {said[:200]}", flush=True)
+    bad = False
+    print("method " + "".join(f"{kind:>9}" for kind in kinds))
+    for method, found in became.items():
+        print(f"{method:7}" + "".join(f"{len(found[kind]):9d}" for kind in kinds))
+        most = MOST_ERRORS * (len(numbers) - len(found["refused"])) if method in EXACT else len(numbers)
+        bad = bad or any(found[kind] for kind in ("wrong", "slow", "crash")) or len(found["error"]) > most
+    for method, found in became.items():
+        for kind in kinds[1:]:
+            if found[kind]:
+                print(f"seed {options.seed}, {method}, {kind}: {' '.join(map(str, found[kind]))}")
+    return 1 if bad else 0
+
+
 @one_line
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -323,6 +396,8 @@ def main(arguments=None):
     parser.add_argument("--ranks", default="1,2,3,4", help="numbers of ranks to choose from")
     parser.add_argument("--seconds", type=float, default=0.4, help="about what a deck takes")
     parser.add_argument("--jumps", type=pathlib.Path, nargs="*", metavar="DECK", help="measure the largest jump of the energy in a slab")
+    parser.add_argument("--systems", nargs="?", const="edda", metavar="METHODS", help="run hard systems by these methods; default: edda")
+    parser.add_argument("--patience", type=float, default=60, help="processor time that a hard system may take [s]")
     parser.add_argument("--carom", help="the command; default: $CAROM or the build of tools/run")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("runs/soak"))
     options = parser.parse_args(arguments)
@@ -332,6 +407,8 @@ def main(arguments=None):
         return 0
     if options.count == 10**9 and options.minutes == float("inf") and options.only is None:
         parser.error("say --count or --minutes")
+    if options.systems:
+        return hard_systems(carom, options)
     end, done, found, continued = time.monotonic() + 60 * options.minutes, 0, 0, 0
     for number in [options.only] if options.only is not None else range(options.count):
         if time.monotonic() > end:
