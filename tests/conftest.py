@@ -13,6 +13,11 @@ if "TMPDIR" not in os.environ and os.access(MEMORY, os.W_OK):
         tempfile.tempdir = MEMORY
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "kills_mpirun: ends mpirun or one of its ranks, after which mpirun itself may hang; "
+                                       "runs as the CTest test cli.killed_mpirun")
+
+
 def pytest_sessionfinish(session, exitstatus):
     """What is left in memory is there no longer, but for that of tests that have failed."""
     if exitstatus == 0 and tempfile.tempdir == MEMORY:

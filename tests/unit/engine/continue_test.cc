@@ -247,6 +247,25 @@ TEST(Continue, WithinAFlight) {
   compare_within_a_flight<2>({[] { return test::hard_spheres<2>(60, 0.7); }, "psa", plan_of(0.05, 2)}, false);
 }
 
+TEST(Continue, AStateOfAnotherNumberOfParticlesIsRefused) {
+  const Scene<3> scene = fluid();
+  const Outcome<3> begun = run<3>(scene, 0, scene.plan, {.at = 1});
+  for (const std::size_t more : {std::size_t{1}, ~std::size_t{0}})  // one more, one less
+    for (const int ranks : {0, 2}) {
+      State state = begun.state;
+      Bytes& x = state.at("position");
+      x.resize(x.size() + more * sizeof(Vec<3>));
+      std::string said;
+      try {
+        run<3>(scene, ranks, scene.plan, {}, &state);
+      } catch (const Error& e) {
+        EXPECT_EQ(e.failure(), Failure::file);
+        said = e.what();
+      }
+      EXPECT_EQ(said, "the state has no 'position' for each particle of this run") << more << " on " << ranks;
+    }
+}
+
 /// A run with a later end goes on as if it had had that end from the start.
 TEST(Continue, ALaterEnd) {
   std::vector<std::pair<Scene<3>, std::array<Plan, 2>>> cases;

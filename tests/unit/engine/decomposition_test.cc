@@ -255,6 +255,38 @@ TEST(Decomposition, NoRankHasAllParticles) {
     for (Id i = 0; i < p.size(); ++i) EXPECT_EQ(p.x[i], all.x[p.id[i]] + all.v[p.id[i]]);
   });
 }
+/// A step of a kick-drift-kick method moves a particle by h (v + ½ h a); a division allows for twice the largest h v.
+TEST(Decomposition, APathHasHalfTheAccelerationOfTheStep) {
+  constexpr double kStep = 0.02;
+  test::ThreadRanks(8).run([](Communicator& exchange) {
+    auto system = test::hard_spheres<2>(40, 0.5);
+    system->particles.v.assign(system->size(), Vec<2>(1, 0));
+    Decomposition<2>& decomposition = system->decomposition;
+    decomposition.join(exchange);
+    decomposition.divide(true, kStep);
+    ASSERT_FALSE(decomposition.knows_all());
+    const Particles<2>& p = system->particles;
+    // Only the last rank accelerates its own particles. The accelerations of copies do not count.
+    const auto enough = [&](double acceleration) {
+      std::vector<Vec<2>> a(p.size(), Vec<2>::Zero());
+      for (Id i = 0; i < p.size(); ++i)
+        if (!p.owns(i))
+          a[i] = {1e9, 0};
+        else if (exchange.rank() == 7)
+          a[i] = {acceleration, 0};
+      try {
+        decomposition.need_step(a, kStep);
+      } catch (HaloTooSmall) {
+        return false;
+      }
+      return true;
+    };
+    EXPECT_TRUE(enough(0.99 * 2 / kStep));
+    EXPECT_FALSE(enough(1.01 * 2 / kStep));
+    EXPECT_TRUE(enough(-1.01 * 2 / kStep));
+    EXPECT_FALSE(enough(-3.01 * 2 / kStep));
+  });
+}
 /// In such long steps a collision is felt farther away than a rank knows.
 TEST(Decomposition, StepsThatTakeAllParticles) {
   EXPECT_GT(compare<2>([] { return springs(40); }, "psa", 0.5, 2, 1000).counters.slabs_by_all, 0u);

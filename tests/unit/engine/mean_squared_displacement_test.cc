@@ -64,6 +64,15 @@ TEST(MeanSquaredDisplacement, IsThatOfTheKeptPositions) {
     }
   EXPECT_EQ(row, rows.size());
   EXPECT_EQ(rows.back().time, 1000.0);
+  const auto table = msd.table();
+  ASSERT_EQ(table.size(), 5u);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const std::array expected{rows[k].time, static_cast<double>(rows[k].origins), rows[k].msd, rows[k].of[0],
+                              rows[k].of[1]};
+    for (std::size_t c = 0; c < 5; ++c) EXPECT_EQ(table[c].values.at(k), expected[c]) << table[c].name;
+  }
+  EXPECT_EQ(table[3].name, "msd_a");
+  EXPECT_EQ(table[4].name, "msd_b");
 }
 
 TEST(MeanSquaredDisplacement, HasNoRowsBeforeTheSecondSample) {

@@ -79,6 +79,7 @@ TEST(Profile, ByHand) {
 
   const auto across = make_observable("profile", *system, {{"interval", 1.0}, {"bins", 5}, {"axis", 1}});
   across->sample(0, system->particles);
+  EXPECT_EQ(across->table()[0].values, (std::vector<double>{0.5, 1.5, 2.5, 3.5, 4.5}));
   EXPECT_EQ(across->table()[1].values, (std::vector<double>{1 / 8.0, 0, 1 / 8.0, 1 / 8.0, 1 / 8.0}));
 }
 

@@ -99,6 +99,45 @@ TEST(RadialDistribution, HasAContactValueWhereAllRadiiAreOne) {
   }
 }
 
+/// Spheres of radius 0.25 stand in shells around one of radius 0.5, from contact on, with g ∝ e^(−2(r − 0.75)). There
+/// is no contact value where one of them has another radius.
+TEST(RadialDistribution, TheContactValueIsThatAtTheContactDistanceOfTwoSpecies) {
+  constexpr double kWidth = 0.025, kEdge = 6, kDensity = 300;
+  std::vector<Vec<3>> x = {Vec<3>::Constant(3)};
+  for (int shell = 30; shell < 50; ++shell) {
+    const double r = (shell + 0.5) * kWidth;
+    const double volume = 4 * std::numbers::pi / 3 * (std::pow((shell + 1) * kWidth, 3) - std::pow(shell * kWidth, 3));
+    const double expected = kDensity * volume * std::exp(-2 * (r - 0.75));
+    const int spheres = static_cast<int>(std::round(expected));
+    for (int k = 0; k < spheres; ++k) {
+      const double angle = 2.4 * k, z = 1 - (2 * k + 1.0) / spheres, rho = std::sqrt(1 - z * z);
+      x.push_back(x[0] + r * Vec<3>(rho * std::cos(angle), rho * std::sin(angle), z));
+    }
+  }
+  const std::size_t n = x.size();
+  std::vector<double> radius(n, 0.25);
+  radius[0] = 0.5;
+  auto system = test::make_system<3>(Vec<3>::Constant(kEdge), Boundary::periodic, x,
+                                     std::vector<Vec<3>>(n, Vec<3>::Zero()), radius);
+  system->species = {"a", "b"};
+  for (std::size_t i = 1; i < n; ++i) system->particles.species[i] = 1;
+  const double g = kDensity * std::pow(kEdge, 3) / static_cast<double>(n - 1);
+  for (const bool swapped : {false, true}) {
+    if (swapped)
+      for (auto& species : system->particles.species) species = 1 - species;
+    RadialDistribution<3> rdf(*system, {.sampling = {}, .range = 1.5, .bins = 60});
+    rdf.sample(0, system->particles);
+    EXPECT_NEAR(rdf.contact_value(0, 1).value(), g, 0.02 * g);
+    EXPECT_EQ(rdf.contact_value(1, 0), rdf.contact_value(0, 1));
+    system->particles.radius[n - 1] = 0.2;
+    RadialDistribution<3> mixed(*system, {.sampling = {}, .range = 1.5, .bins = 60});
+    mixed.sample(0, system->particles);
+    EXPECT_FALSE(mixed.contact_value(0, 1));
+    EXPECT_FALSE(mixed.contact_value(1, 0));
+    system->particles.radius[n - 1] = 0.25;
+  }
+}
+
 /// g averaged over many samples of an ideal gas: 1 at every r, also along walls.
 template <int D>
 void expect_ideal_gas(const Vec<D>& edges, std::array<Boundary, D> boundary, double range) {

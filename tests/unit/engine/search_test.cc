@@ -163,6 +163,29 @@ TEST(Search, BlowsFromBothSides) {  // two that touch are hit at one instant, ag
                                          100);
 }
 
+/// Lists are used in dense fluids, and in mixtures, where cells for the largest spheres would hold many small ones.
+TEST(SearchTuning, TakesListsForDenseFluidsAndForMixtures) {
+  const auto lists = [](const SearchSituation& situation, Method method = Method::automatic) {
+    SearchTuning tuning({.method = method});
+    tuning.choose(situation, {});
+    return tuning.lists();
+  };
+  const auto fluid = [](int dimension, double filled, double largest) {
+    const double sphere = dimension == 2 ? 0.785 : 0.524;
+    return SearchSituation{dimension, filled / sphere, filled, 1, largest};
+  };
+  for (const auto& [dimension, filled, largest, expected] : {std::tuple{3, 0.2, 1.0, false},
+                                                             {3, 0.4, 1.0, true},
+                                                             {3, 0.2, 1.5, true},
+                                                             {2, 0.4, 1.0, false},
+                                                             {2, 0.6, 1.0, true},
+                                                             {2, 0.4, 1.5, true}}) {
+    EXPECT_EQ(lists(fluid(dimension, filled, largest)), expected) << dimension << ' ' << filled << ' ' << largest;
+    EXPECT_TRUE(lists(fluid(dimension, filled, largest), Method::lists));
+    EXPECT_FALSE(lists(fluid(dimension, filled, largest), Method::cells));
+  }
+}
+
 TEST(Search, AWidthThisMachineLacksIsAnError) {
   const Environment environment("CAROM_SIMD", "mmx");
   EXPECT_THROW(scan_kernels(), Error);

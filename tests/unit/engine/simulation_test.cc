@@ -119,6 +119,29 @@ TEST(Simulation, MeasuresTheMeanFreeFlight) {
   EXPECT_FALSE(none->statistics().mean_free_path);
 }
 
+/// The same two discs in a run that branches off at step 30, which is at another time than 30 steps of its own: sums,
+/// means and what is done begin there.
+TEST(Simulation, ABranchCountsFromItsStart) {
+  for (const Plan& plan : {Plan{.step = 1, .end_time = 745}, Plan{.step = 1, .steps = 730}}) {
+    struct Fractions : Observer<2> {
+      void progress(const Statistics& s) override { all.push_back(s.fraction_done); }
+      std::vector<double> all;
+    } done;
+    auto run = test::make_run<2>(test::make_system<2>({8, 4}, Boundary::periodic, {{1, 1}, {5, 1}}, {{2, 0}, {-1, 0}}),
+                                 "free-flight", plan);
+    run->add(done);
+    run->run({.branch = {{.start = {30, 45}, .from = {30, 45}}}});
+    const Statistics& s = run->statistics();
+    EXPECT_EQ(s.end_time, 745);
+    EXPECT_EQ(s.counters.sphere_sphere, 350u);
+    EXPECT_NEAR(*s.mean_free_time, 2, 1e-12);
+    EXPECT_NEAR(*s.mean_free_path, 3, 1e-12);
+    EXPECT_NEAR(s.collision_rate, 0.5, 1e-12);
+    ASSERT_EQ(done.all.size(), 701u);  // one at the start
+    for (std::size_t n = 0; n <= 700; ++n) EXPECT_NEAR(done.all[n], static_cast<double>(n) / 700, 1e-14);
+  }
+}
+
 /// Two discs that fall one after the other, and meet once: |v| grows alike and evenly, to a mean of ½ + ½ g T.
 TEST(Simulation, TheMeanSpeedIsThatOfTheWholeSlab) {
   auto system = test::make_system<2>({100, 4}, Boundary::open, {{5, 2}, {2, 2}}, {{0, 0}, {1, 0}});
@@ -153,6 +176,39 @@ TEST(Simulation, ShortensTheLastStepToMeetTheEnd) {
   EXPECT_LT(test::largest_difference(run->system().particles.x, straight->system().particles.x), 1e-4);
 }
 
+/// The end is met to the bit, though 3 · 0.1 is more than 0.3 and 3 · 0.7 less than 2.1.
+TEST(Simulation, EndsExactlyAtItsEnd) {
+  EXPECT_GT(3 * 0.1, 0.3);
+  EXPECT_LT(3 * 0.7, 2.1);
+  for (const auto& [step, end] : {std::pair{0.1, 0.3}, {0.7, 2.1}}) {
+    const auto run = test::run_until<2>(test::five_springs(), "cva", step, end);
+    EXPECT_EQ(run->statistics().steps, 3);
+    EXPECT_EQ(run->statistics().end_time, end);
+  }
+}
+
+/// Each of these runs is stopped after two slabs, by which the discs have met once.
+TEST(Simulation, TheFractionDoneIsThatOfTheNearestEnd) {
+  const auto fraction = [](Plan plan) {
+    plan.step = 1;
+    auto run = test::make_run<2>(test::make_system<2>({8, 4}, Boundary::periodic, {{1, 1}, {5, 1}}, {{2, 0}, {-1, 0}}),
+                                 "psa", plan);
+    struct Watcher : Observer<2> {
+      void progress(const Statistics& s) override { fractions.push_back(s.fraction_done); }
+      std::vector<double> fractions;
+    } watcher;
+    run->add(watcher);
+    int slabs = 0;
+    run->run([&] { return slabs++ == 2; });
+    return watcher.fractions.back();
+  };
+  EXPECT_EQ(fraction({.steps = 4}), 0.5);
+  EXPECT_EQ(fraction({.end_time = 20}), 0.1);
+  EXPECT_EQ(fraction({.steps = 4, .end_time = 20, .collisions = 100}), 0.5);
+  EXPECT_EQ(fraction({.steps = 10, .end_time = 2.5, .collisions = 100}), 0.8);
+  EXPECT_EQ(fraction({.steps = 100, .end_time = 20, .collisions = 4}), 0.25);
+}
+
 TEST(Simulation, MeasuresEnergyErrorsFromTheFirstStepOn) {
   const auto one = test::run_steps<2>(test::five_springs(), "cva", 0.3, 1);
   EXPECT_EQ(one->statistics().max_energy_error, 0);
@@ -177,6 +233,7 @@ TEST(Simulation, FreeFlightEndsAtTheNthCollision) {
   run->run();
   EXPECT_EQ(run->statistics().counters.sphere_sphere, 200u);
   EXPECT_EQ(notes.pairs, 200u);
+  EXPECT_EQ(notes.fraction, 1);
   EXPECT_DOUBLE_EQ(run->statistics().end_time, notes.times.back());
 }
 
@@ -302,6 +359,51 @@ std::string failure_of(Simulation<2>& run) {
   return "none";
 }
 
+/// H is 1 − 1 = 0 where two discs pass that attract each other; the energies that it is made of are not.
+TEST(Simulation, EnergiesAreComparedWithWhatTheyConsistOf) {
+  auto system = test::make_system<2>({9, 9}, Boundary::open, {{3, 3}, {6, 7}}, {{0.8, -0.6}, {-0.8, 0.6}});
+  test::add_interaction(*system, "gravity", {{"constant", 5.0}});
+  const auto run = test::run_steps<2>(std::move(system), "psa", 1e-9, 1);
+  EXPECT_NEAR(run->statistics().energy_final, 0, 1e-8);
+  EXPECT_NEAR(run->statistics().energy_reference, 2, 1e-8);
+  EXPECT_NEAR(run->statistics().energy_scale, 2, 1e-8);
+}
+
+/// Störmer–Verlet keeps a harmonic oscillator's H + h²G to fourth order, and H to second.
+TEST(Simulation, TheShadowEnergyIsKeptBetterThanTheEnergy) {
+  const auto errors = [](double step) {
+    const auto run = test::run_steps<2>(oscillator(1), "verlet", step, static_cast<std::int64_t>(6 / step));
+    const Statistics& s = run->statistics();
+    return std::array{s.max_energy_error, s.max_shadow_energy_error.value()};
+  };
+  const auto coarse = errors(0.1), fine = errors(0.05);
+  EXPECT_NEAR(coarse[0] / fine[0], 4, 0.5);
+  EXPECT_NEAR(coarse[1] / fine[1], 16, 2);
+  EXPECT_LT(coarse[1], 0.05 * coarse[0]);
+}
+
+/// A particle that falls from rest has almost no energy at the start. Later H is the rounding of K + V, which are
+/// large.
+TEST(Simulation, EnergiesOfRoundingAreNoBlowUp) {
+  auto system = test::make_system<2>({9, 9}, Boundary::open, {{1e-40, 0}}, {{0, 0}});
+  test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0.1, 0.0}}});
+  Simulation<2> run(std::move(system), "verlet", {{"step", 0.3}}, {.steps = 100});
+  EXPECT_EQ(failure_of(run), "none");
+  EXPECT_LT(run.statistics().energy_scale, 1e-40);
+  EXPECT_GT(run.statistics().max_energy_error, 1e-30);
+}
+
+/// Two discs of radii 1.5 and 0.5 fly into each other, as no method has them do, from a distance of 2.5 to one of 1.8.
+TEST(Simulation, OverlapsAreRelativeToTheContactDistance) {
+  IntegratorInfo info = find_integrator("verlet");
+  info.hard_cores = true, info.smooth_forces = false;
+  Simulation<2> run(
+      test::make_system<2>({20, 20}, Boundary::periodic, {{5, 5}, {7.5, 5}}, {{0.7, 0}, {0, 0}}, {1.5, 0.5}), info,
+      {{"step", 1.0}}, {.steps = 1});
+  EXPECT_TRUE(failure_of(run).starts_with("particles 0 and 1 overlap, by 0.1 of their contact distance"));
+  EXPECT_NEAR(run.statistics().counters.max_overlap, 0.1, 1e-14);
+}
+
 TEST(Simulation, ARunThatHasBlownUpEnds) {
   Simulation<2> later(oscillator(1), "verlet", {{"step", 3.0}}, {.steps = 1000});
   const std::string message = failure_of(later);
@@ -327,6 +429,21 @@ TEST(Simulation, AJumpOfTheEnergyEndsAnExactMethod) {
   }
   for (const auto& method : integrators())
     EXPECT_EQ(method.exact, method.name == "free-flight" || method.name == "cdda" || method.name == "edda");
+}
+
+TEST(Simulation, RefusesAPeriodicBoxThatIsNarrowerThanASphere) {
+  for (const double edge : {0.99, 1.01}) {
+    std::string said;
+    try {
+      Simulation<2>(test::make_system<2>({4, edge}, Boundary::periodic, {{1, 0.5}}, {{1, 0}}), "psa", {},
+                    {.step = 0.1, .steps = 1});
+    } catch (const Error& e) {
+      EXPECT_EQ(e.failure(), Failure::initial_state);
+      said = e.what();
+    }
+    EXPECT_EQ(said.starts_with("the periodic box is 0.99 long on axis 1, less than a diameter of 1;"), edge < 1)
+        << said;
+  }
 }
 
 TEST(Simulation, RefusesAPlanWithoutEnd) {

@@ -21,9 +21,11 @@ struct Parts {
   std::vector<Slot> changed;
 };
 
+std::unique_ptr<System<3>> fluid() { return random_system<3>(320, {14, 6, 6}, {P, P, P}, 0.5, 0.5, 11); }
+
 /// A system in two subdomains, each with all spheres that concern it; and one core with all of them.
 struct Divided {
-  explicit Divided(std::unique_ptr<System<3>> spheres = random_system<3>(320, {14, 6, 6}, {P, P, P}, 0.5, 0.5, 11))
+  explicit Divided(std::unique_ptr<System<3>> spheres = fluid(), const Vec<3>& g = Vec<3>::Zero())
       : system(std::move(spheres)),
         sizes(system->particles),
         bisection(system->box, system->particles.x, 2, 1 + 2 * kDisplacement, alone),
@@ -31,10 +33,10 @@ struct Divided {
     const Particles<3>& p = system->particles;
     std::vector<Record<3>> records;
     for (Id i = 0; i < p.size(); ++i) records.push_back({p.x[i], p.v[i], 0.0, i, 0, p.species[i]});
-    whole.load(records, Vec<3>::Zero(), kEnd, 0, 2 * kDisplacement);
+    whole.load(records, g, kEnd, 0, 2 * kDisplacement);
     for (std::uint32_t number : {0u, 1u}) {
       Parts& part = *parts.emplace_back(std::make_unique<Parts>(system->box, sizes));
-      part.core.load(records, Vec<3>::Zero(), kEnd, 0, 2 * kDisplacement);
+      part.core.load(records, g, kEnd, 0, 2 * kDisplacement);
       part.ownership.load(bisection, number, kDisplacement);
       part.paths.load(part.core.flights().capacity());
       part.repair.load(part.core.flights().capacity());
@@ -92,8 +94,9 @@ struct Divided {
   std::deque<Bytes> messages;
 };
 
-TEST(Ownership, EverySphereHasOneOwnerWhichKnowsWhereItIsAGhost) {
-  Divided d;
+/// Expects that each sphere is owned where it is at this time, and that its owner knows whether it is a ghost in the
+/// other subdomain. Returns the number of ghosts.
+std::size_t expect_owners(const Divided& d, double time) {
   std::size_t ghosts = 0;
   for (Id id = 0; id < d.system->size(); ++id) {
     int owners = 0;
@@ -105,46 +108,78 @@ TEST(Ownership, EverySphereHasOneOwnerWhichKnowsWhereItIsAGhost) {
       const bool ghost = other != IdTable::kNowhere && there.is_ghost(other);
       EXPECT_EQ(here.holders(here.slot_of(id)) != 0, ghost) << id;
       EXPECT_EQ(here.is_seen(here.slot_of(id)), ghost) << id;
-      const Vec<3>& x = d.system->particles.x[id];
+      const Vec<3> x = d.bisection.wrapped(d.parts[k]->core.flights().at(here.slot_of(id), time).x);
       EXPECT_EQ(d.bisection.owner(x), static_cast<std::uint32_t>(k));
       EXPECT_EQ(d.bisection.near(static_cast<std::uint32_t>(1 - k), x), ghost);
       ghosts += ghost ? 1 : 0;
     }
     EXPECT_EQ(owners, 1) << id;
   }
+  return ghosts;
+}
+
+TEST(Ownership, EverySphereHasOneOwnerWhichKnowsWhereItIsAGhost) {
+  Divided d;
+  const std::size_t ghosts = expect_owners(d, 0);
   EXPECT_GT(ghosts, 50u);
   EXPECT_LT(ghosts, 280u);
 }
 
-TEST(Ownership, AGhostMeetsWhatIsAsNearAsBothCanCome) {
-  Divided d;
-  const Ownership<3>& here = d.parts[0]->ownership;
-  const double reach = d.bisection.reach(), end = 0.3;
-  std::size_t somewhere = 0, nowhere = 0;
-  for (Id id = 0; id < d.system->size(); ++id) {
-    const Record<3> r{d.system->particles.x[id], d.system->particles.v[id], 0.0, id, 0, 0};
-    const double way = r.v.norm() * end, away = std::sqrt(d.bisection.squared_distance(0, r.x));
-    Vec<3> low, high;
-    const bool meets = here.meeting_place(r, end, low, high);
-    EXPECT_EQ(meets, away <= reach - kDisplacement + way) << id;
-    ++(meets ? somewhere : nowhere);
-    for (const Vec<3>& place : d.system->particles.x) {  // of those that may meet it
-      Vec<3> x = place - r.x;
-      x = r.x + x + d.system->box.shift(d.system->box.nearest_image(x));
-      const double from_here = std::sqrt(d.bisection.squared_distance(0, place));
-      if (!meets || (x - r.x).norm() > reach + way || from_here > 3 * kDisplacement) continue;
-      EXPECT_TRUE((low.array() <= x.array()).all() && (x.array() <= high.array()).all()) << id;
-    }
-    const Slot j = here.own()[0];
-    const Record<3>& other = d.parts[0]->core.flights()[j];
-    for (const double part : {1 - 1e-9, 1 + 1e-9}) {
-      Record<3> ghost = r;
-      ghost.x = other.x + (end - other.t) * other.v + part * (reach + way) * Vec<3>(0.6, 0, 0.8);
-      EXPECT_EQ(here.may_meet(ghost, j, Vec<3>::Zero(), end), part < 1) << id;
-    }
+/// Spheres that start at rest change owners, and become ghosts, as soon as the field has brought them there.
+TEST(Ownership, SpheresThatFallChangeTheirOwners) {
+  constexpr int kWindows = 10;
+  constexpr double length = kEnd / kWindows;
+  std::unique_ptr<System<3>> at_rest = fluid();
+  at_rest->particles.v.assign(at_rest->size(), Vec<3>::Zero());
+  const Vec<3> g = {kDisplacement / (length * kEnd), 0, 0};
+  const Divided d(std::move(at_rest), g);
+  const std::vector<Slot> first = d.parts[0]->ownership.own();
+  for (int window = 1; window <= kWindows; ++window) {
+    const double now = window * length;
+    std::array<std::vector<Record<3>>, 2> sent;
+    for (const int k : {0, 1})
+      d.parts[k]->ownership.sort_out(
+          now, length, [](Slot) { return false; }, [&](std::size_t, const Record<3>& r) { sent[1 - k].push_back(r); });
+    for (const int k : {0, 1})
+      for (const Record<3>& r : sent[k]) ASSERT_TRUE(d.parts[k]->ownership.admit(r, now));
+    expect_owners(d, now);
+    if (HasFailure()) FAIL() << "in window " << window;
   }
-  EXPECT_GT(somewhere, 50u);
-  EXPECT_GT(nowhere, 0u);
+  EXPECT_NE(d.parts[0]->ownership.own(), first);
+}
+
+TEST(Ownership, AGhostMeetsWhatIsAsNearAsBothCanCome) {
+  for (const Vec<3>& g : {Vec<3>(0, 0, 0), Vec<3>(2, -3, 6)}) {
+    const Divided d(fluid(), g);
+    const Ownership<3>& here = d.parts[0]->ownership;
+    const double reach = d.bisection.reach(), end = 0.3, start = 0.05, left = end - start;
+    std::size_t somewhere = 0, nowhere = 0;
+    for (Id id = 0; id < d.system->size(); ++id) {
+      const Record<3> r{d.system->particles.x[id], d.system->particles.v[id], start, id, 0, 0};
+      const double way = (r.v.norm() + 0.5 * left * g.norm()) * left,
+                   away = std::sqrt(d.bisection.squared_distance(0, r.x));
+      Vec<3> low, high;
+      const bool meets = here.meeting_place(r, end, low, high);
+      EXPECT_EQ(meets, away <= reach - kDisplacement + way) << id;
+      ++(meets ? somewhere : nowhere);
+      for (const Vec<3>& place : d.system->particles.x) {  // of those that may meet it
+        Vec<3> x = place - r.x;
+        x = r.x + x + d.system->box.shift(d.system->box.nearest_image(x));
+        const double from_here = std::sqrt(d.bisection.squared_distance(0, place));
+        if (!meets || (x - r.x).norm() > reach + way || from_here > 3 * kDisplacement) continue;
+        EXPECT_TRUE((low.array() <= x.array()).all() && (x.array() <= high.array()).all()) << id;
+      }
+      const Slot j = here.own()[0];
+      const Record<3> there = d.parts[0]->core.flights().at(j, end);
+      for (const double part : {1 - 1e-9, 1 + 1e-9}) {
+        Record<3> ghost = r;
+        ghost.x = there.x + part * (reach + way) * Vec<3>(0.6, 0, 0.8);
+        EXPECT_EQ(here.may_meet(ghost, j, Vec<3>::Zero(), end), part < 1) << id;
+      }
+    }
+    EXPECT_GT(somewhere, 50u);
+    EXPECT_GT(nowhere, 0u);
+  }
 }
 
 TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
@@ -223,6 +258,12 @@ TEST(WindowRepair, GoesOnUntilAllOwnSpheresAreAsInOneCore) {
   std::uint64_t redone = 0;
   for (const auto& part : d.parts) {
     EXPECT_TRUE(part->paths.agree(kEnd));
+    double fastest = 0;  // of what was seen at first, and of what came by repairs
+    part->paths.for_each_own([&](Slot i) {
+      for (const Node<3>& node : part->paths.path(i)) fastest = std::max(fastest, node.after.v.squaredNorm());
+    });
+    EXPECT_GT(fastest, 8);
+    EXPECT_EQ(std::max(part->paths.trace().fastest_squared(), part->repair.fastest_squared()), fastest);
     redone += part->repair.events();
   }
   EXPECT_GT(redone, 0u);

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 
+#include "engine/forces/pair_list.h"
 #include "engine/forces/potentials/cut.h"
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/lennard_jones.h"
@@ -53,6 +54,32 @@ void expect_the_same_in_all_widths() {
 TEST(PairSums, AreTheSameInEveryVectorWidth) {
   expect_the_same_in_all_widths<2>();
   expect_the_same_in_all_widths<3>();
+}
+
+/// Kernels read up to eight partners behind a run: these must be places in the list, whatever a list of more particles
+/// has left there.
+TEST(CutoffList, HasPlacesBehindTheLastPartnerToo) {
+  for (const PairKernels* kernels : available_pair_kernels()) {
+    SCOPED_TRACE(kernels->name);
+    Box<2> box;
+    box.edges = {10, 10};
+    CutoffList<2> list(box, 2.0, {});
+    list.use(*kernels);
+    for (const std::size_t n : {60, 30, 12, 7, 5, 4, 3, 2}) {
+      Particles<2> p;
+      for (std::size_t i = 0; i < n; ++i)
+        p.x.emplace_back(5 + 0.1 * static_cast<double>(i % 8), 5 + 0.1 * static_cast<double>(i / 8));
+      const PairRecords<2>& records = list.cover({.x = p.x}, p);
+      std::size_t pairs = 0;
+      for (int kind = 0; kind < PairRecords<2>::kKinds; ++kind)
+        for (const PairRun& run : records.runs[kind]) {
+          pairs += run.count;
+          for (std::size_t k = 0; k < run.count + 8u; ++k)
+            ASSERT_LT(records.partners[kind].at(run.begin + k), n) << k << " of " << run.count << ", of " << n;
+        }
+      EXPECT_GE(pairs, n - 1);
+    }
+  }
 }
 
 TEST(PairSums, AreOfTheKernelsThatAreToBeUsed) {

@@ -142,6 +142,30 @@ TEST(Table, TheWorkOfAStepIsTheDifferenceOfTheValues) {
                 1e-14 * (1 + std::abs(table.value(b))));
 }
 
+// Where the spline passes through zero, errors are measured against a share of the largest values at its points.
+TEST(Table, ItsScaleIsThatOfTheSplineButNeverZero) {
+  const Points p = lennard_jones_points(23);  // the third at the distance 1, where V = 0
+  const std::vector<double> slopes = lennard_jones_slopes(p);
+  const Table table(p.r, p.v, slopes);
+  const auto expect = [&](double distance, double force, double energy) {
+    const ForceScale scale = table.scale(distance);
+    EXPECT_NEAR(scale.force, force, 1e-12 * force) << distance;
+    EXPECT_NEAR(scale.energy, energy, 1e-12 * energy) << distance;
+  };
+  for (const double r : {0.85, 0.93, 1.07, 1.9, 2.3})
+    expect(r, 2 * r * std::abs(table.derivative(r * r)), std::abs(table.value(r * r)));
+  expect(0.8, std::abs(slopes.front()), p.v.front());
+  expect(0.1, std::abs(slopes.front()), p.v.front());  // not the parabola's, which is larger
+  const double most_force = 0x1p-16 * std::abs(slopes.front()), most_energy = 0x1p-16 * p.v.front();
+  for (const double beyond : {3.0, 50.0})
+    expect(beyond, std::max(most_force, std::abs(slopes.back())), std::max(most_energy, std::abs(p.v.back())));
+  EXPECT_EQ(table.value(1.0), 0);
+  expect(1, 2 * std::abs(table.derivative(1.0)), most_energy);
+  double low = 1.0, high = 1.5;  // around the minimum
+  for (int n = 0; n < 60; ++n) (table.derivative(0.5 * (low + high)) < 0 ? low : high) = 0.5 * (low + high);
+  expect(std::sqrt(low), most_force, std::abs(table.value(low)));
+}
+
 TEST(Table, LanesGetTheBitsOfDoubles) {
   using Two = double __attribute__((vector_size(16)));
   const Points p = lennard_jones_points(60);
