@@ -61,7 +61,7 @@ class ChordContacts {
   }
 
  private:
-  /// Of the tolerance, so that the positions at the end touch too after they have been rounded.
+  /// A piece ends in contact within this share of the tolerance, so that its rounded positions touch too.
   static constexpr double kClosed = 0.5;
   static constexpr double kProlongation = 4;  // contacts are still found this far beyond the end of the chord (squared)
 

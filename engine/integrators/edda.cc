@@ -51,7 +51,7 @@ constexpr double kStalled = 0.1;          // contraction of kSweepsBeforeFreezin
 constexpr int kMostStalled = 2;           // times: a shorter slab takes fewer sweeps
 constexpr double kTooStiff = 0.5;         // such a contraction expected: nothing is frozen for stiffness
 constexpr double kMostFolded = 0.1;       // of the kinetic energy
-// Of Σ |F| |x|: what rounding of the positions costs in energy, in any method.
+// Rounding of the positions costs this share of Σ |F| |x| in energy, in any method.
 constexpr double kRoundingOfForces = 16 * std::numeric_limits<double>::epsilon();
 constexpr double kSettled = 0.5;              // of the tolerance: such a particle keeps its path
 constexpr double kSettledInCollision = 0.05;  // the same where it collides: its lack of energy is of first order in e

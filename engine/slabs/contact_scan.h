@@ -67,10 +67,10 @@ class ContactScan {
   /// that nothing presses are resting no more.
   void hold(Positions<D> v, Vectors<D> a, double rest);
 
-  /// The same for the mean velocities w = v + ½ length a of a discrete-gradient piece from x, which ends at
-  /// x + length · w_before: the reactions do no work (but for rounding that they take back where a contact has opened
-  /// or closed by it). `length` is negative for a piece back in time. Returns whether
-  /// reactions were found to rounding.
+  /// Keeps resting contacts from approaching for the mean velocities w = v + ½ length a of a discrete-gradient piece
+  /// from x, which ends at x + length · w_before: the reactions do no work (but for rounding that they take back where
+  /// a contact has opened or closed by it). `length` is negative for a piece back in time. Returns whether reactions
+  /// were found to rounding.
   bool hold_means(Positions<D> x, Positions<D> w_before, Vectors<D> w, double length);
 
   /// Takes the approach out of resting contacts at new positions; returns the energy that they lose.

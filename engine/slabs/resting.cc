@@ -59,7 +59,7 @@ class Problem {
     return solved;
   }
 
-  /// The same for velocities, of which the kinetic energy is kept: the motion of a cluster relative to its centre of
+  /// Solves for velocities, of which the kinetic energy is kept: the motion of a cluster relative to its centre of
   /// mass is stretched, or relative to the walls that it touches along their axes. Returns what the energy still lacks.
   double solve_and_stretch() {
     if (settled(everything(), true)) {

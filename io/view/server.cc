@@ -29,7 +29,8 @@ using asio::ip::tcp;
 using Request = http::request<http::empty_body>;
 using Response = http::response<http::string_body>;
 
-/// A browser keeps six connections, each with at most one answer in memory; whoever needs more loses the stillest one.
+/// A browser keeps six connections, each with at most one answer in memory; a client that needs more loses the stillest
+/// one.
 constexpr std::size_t kMostConnections = 24;
 /// A connection on which no request comes and no byte of an answer goes for this long is closed.
 constexpr std::chrono::seconds kPatience(10);

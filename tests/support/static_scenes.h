@@ -20,7 +20,7 @@ struct Reaction {
 template <int D>
 struct StaticScene {
   std::unique_ptr<System<D>> system;
-  /// Of every contact that is pressed, where equilibrium leaves one solution; else empty.
+  /// Every contact that is pressed has one here, where equilibrium leaves one solution; else it is empty.
   std::vector<Reaction> reactions{};
 };
 
