@@ -70,7 +70,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     system.fields.add_working(
         this,
         [this] {
-          for (auto* each : {&a_, &mean_, &move_, &smooth_, &v_end_}) std::vector<Vec<D>>().swap(*each);
+          for (auto* each : {&a_, &mean_, &move_, &smooth_, &flown_, &w_, &v_end_}) std::vector<Vec<D>>().swap(*each);
           forces_ = {};
         },
         [this, &p] {
@@ -122,7 +122,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     // What a piece ends with at the latest: sweeps that settle, and a contact at rest that is met or begins.
     double done = 0, contact = kNever;
     double& longest = found_.longest;
-    longest = std::min(longest, slab.length);
     while (done < slab.length) {
       const bool resolved = found_.touching;
       if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(p.x, p.v)))) {
@@ -224,14 +223,14 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         ++counters_->fallbacks;
       }
       chebyshev.next();
-      const double at_rest = std::pow(kSettled * wanted / h, 2);
+      const double small = std::pow(kSettled * wanted / h, 2);
       const double in_collision = std::pow(kSettledInCollision * wanted / h, 2);
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
         const Vec<D> e = mean_[i] - a_[i];
         if (!chebyshev.plain())
           a_[i] += move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
-        else if (e.squaredNorm() > (core_->collides(i) ? in_collision : at_rest))
+        else if (e.squaredNorm() > (core_->collides(i) ? in_collision : small))
           a_[i] = mean_[i];
       }
     }

@@ -43,7 +43,7 @@ struct Connection {
 };
 
 /// Whether a Host header names this machine, with any port (ssh forwards from another one). Any other name has been
-/// made to lead here by its owner, whose page would be of the same origin for the browser.
+/// made to lead here, and its page would then be of the same origin for the browser.
 bool names_this_machine(std::string_view host) {
   const auto is_port = [](std::string_view text) {
     return text.empty() || (text[0] == ':' && text.find_first_not_of("0123456789", 1) == text.npos);

@@ -119,7 +119,7 @@ TEST(Simulation, MeasuresTheMeanFreeFlight) {
   EXPECT_FALSE(none->statistics().mean_free_path);
 }
 
-/// The same two discs in a run that branches off at step 30, which is at another time than 30 steps of its own: sums,
+/// Two discs as above, in a run that branches off at step 30, which is at another time than 30 steps of its own: sums,
 /// means and what is done begin there.
 TEST(Simulation, ABranchCountsFromItsStart) {
   for (const Plan& plan : {Plan{.step = 1, .end_time = 745}, Plan{.step = 1, .steps = 730}}) {
