@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Writes OUTPUT, C++ with the page of `carom view` and the deck of `carom demo` as texts.
 # cmake -DPAGE=folder -DDECK=file -DOUTPUT=… -P embed_page.cmake
 foreach(script source spheres chart page)

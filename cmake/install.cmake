@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # cmake --install: the command, the engine's library and headers, and a package for find_package(carom), which gives the
 # target carom::engine.
 include(CMakePackageConfigHelpers)

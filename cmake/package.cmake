@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # cpack -G DEB: one package with the command, the library and its headers, manual and completion (tools/package).
 set(CPACK_PACKAGE_NAME carom)
 set(CPACK_PACKAGE_VENDOR Carom)

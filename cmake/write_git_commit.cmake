@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Writes OUTPUT, a header with the commit of the sources; run at every build, touches the file only when it changes.
 # cmake -DGIT=… -DSOURCE=… -DTEMPLATE=… -DOUTPUT=… -P write_git_commit.cmake
 set(CAROM_GIT_COMMIT "unknown")

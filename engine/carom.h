@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The library: what a program includes that runs carom by itself (engine/examples/).
 //

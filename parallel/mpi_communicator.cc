@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "parallel/mpi_communicator.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // How ranks wait for each other, and how they end together when one of them cannot go on.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The ranks of a run: MPI started and ended with the life of one object.
 //

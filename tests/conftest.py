@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Where the tests in Python have their directories: in memory, where there is room, since syncs take no time there."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the tools share: the readers of the package carom, from the sources beside them, and starting runs.
 
     from carom_files import Trajectory, one_line, read_thermo, run_carom

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The look that the pictures of tools/ share.
 
     with picture("msd.png", xlabel="lag", ylabel="msd", title="...") as axes:

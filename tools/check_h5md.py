@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Is a trajectory a sound H5MD 1.1 file, and does it keep Carom's own rules?
 
     tools/check_h5md.py runs/five-springs

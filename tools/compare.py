@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Are two runs the same? Bit for bit, or within a tolerance.
 
     tools/compare.py runs/a runs/b                      # every frame and every thermo row, bit for bit

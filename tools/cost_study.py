@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """What accuracy costs, and what size costs: time and force passes of the methods.
 
     tools/cost_study.py inputs/five-springs.toml --end-time 6 --steps 0.1,0.03,0.01,0.003,0.001

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """How well methods keep the energy, against the step: runs the sweep and draws the thesis figure.
 
     tools/energy_study.py inputs/five-springs.toml --methods psa,cva,mcva,cdda --steps 0.3,0.1,0.03,0.01,0.003,0.001

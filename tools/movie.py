@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """A moving picture of a trajectory: discs, or spheres seen along an axis, with the box around them.
 
     tools/movie.py runs/five-springs

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # shellcheck shell=bash
 # Settings of Open MPI for tests and small boxes; read with `.` before mpirun. tests/cli and tests/mpi read the same
 # lines, so that they stand in one place only: keep to `NAME=value`.

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The energy error of runs over time, from their thermo.csv.
 
     tools/plot_energy.py runs/five-springs

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The mean squared displacement of a trajectory, and the diffusion coefficient from its slope.
 
     tools/plot_msd.py runs/hard-sphere-fluid

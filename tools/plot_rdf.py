@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The radial distribution function g(r) of a trajectory, in 2-D and 3-D, in periodic and walled boxes.
 
     tools/plot_rdf.py runs/hard-sphere-fluid

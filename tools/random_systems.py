@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Random systems that are hard to integrate: masses 1:10⁶, sizes 1:50, spheres that touch others or walls, stiff springs, strong forces.
 
     deck = random_system(random.Random("1 17"))       # a deck of edda as a dictionary, for any method with hard cores

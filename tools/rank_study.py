@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """What to expect of many ranks: counts of runs with many ranks, and a model of the efficiency fitted to them.
 
     tools/rank_study.py

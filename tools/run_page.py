@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs the code blocks of a Markdown page, top to bottom, and compares what they print with the page.
 
     tools/run_page.py inputs/tutorials/1-equation-of-state.md             # in a directory that is thrown away

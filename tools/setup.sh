@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # shellcheck shell=bash disable=SC1091,SC2086
 # Sourced by tools/run, tools/test and tools/renew-regression: from a bare Debian 12 to a built Carom.
 #

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Random decks, killed and continued at random instants: is the end that of an undisturbed run, bit for bit?
 
     tools/soak.py --minutes 30

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What energy_study.py, cost_study.py and rank_study.py share: options, a deck for each run, runs, tables.
 
     parser = study_parser(__doc__, "psa,cva,mcva,cdda")

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """What `carom view` costs: processor time of a run that is shown, memory of a page left open, frames drawn a second.
 
     tools/view_cost.py                  # all three, about five minutes

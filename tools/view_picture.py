@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """A picture of the page of `carom view`, taken by a Chromium without a window.
 
     tools/view_picture.py runs/five-springs -o five-springs.png

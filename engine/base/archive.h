@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // State as bytes and back, by one list of what belongs to it.
 //

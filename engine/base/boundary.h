@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What bounds a box along an axis, and the declarations that make the kinds known by their names: decks, their schema,
 // messages and files take them from here. What a boundary does is in Box (box.h) and Wall (wall.h).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The simulation box: a rectangle or cuboid from the origin to `edges`, with a boundary rule for each axis.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Values as bytes, for messages and checkpoints: all readers are the same program on the same kind of machine.
 

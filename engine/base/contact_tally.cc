@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/base/contact_tally.h"
 
 #include "engine/base/error.h"

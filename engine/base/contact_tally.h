@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Executed contacts, counted: one account for all that execute them, which accounts of several ranks are added to.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What an integrator counts while it works, and where its time went. None of it reaches the physics.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Elementary functions with the same bits on every machine, of a double or of the lanes of a vector (lanes.h).
 //

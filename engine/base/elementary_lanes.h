@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The formulas of elementary.h, for a double or for the lanes of a vector: no branch depends on a lane.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Errors that reach the user. Each knows which exit code the command ends with.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What an event core has done, counted: the same numbers on every machine, unlike times.
 

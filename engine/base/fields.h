@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The state of a run, registered once by name: arrays with one entry a particle, and what there is one of a run.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Sums of forces in fixed point: integers, so that the order of the terms does not matter.
 //

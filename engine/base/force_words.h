@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The words of ForceSums (force_sums.h), as kernels see them.
 

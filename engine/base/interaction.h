@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What acts between and on the particles besides their hard cores: the smooth part V of H = ½ vᵀMv + V(x).
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What a formula needs besides + − × ÷, comparisons and ?: to work on a double or on a vector of doubles alike.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Memory for large arrays that are accessed at random: in huge pages where the system grants them, which saves most of
 // the address translations that a million particles would miss.

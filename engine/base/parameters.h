@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Declared parameters: what an integrator, an interaction or an observable can be given in a deck, and the values.
 //

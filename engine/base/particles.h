@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The particles of a run, in the order of their ids, as integrators and observers see them: all at the same time.
 //

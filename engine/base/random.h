@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Counter-based random numbers: the same (seed, purpose, id, index) gives the same number on every machine, for any
 // number of ranks and in any order of calls. There is no state to carry or to store.

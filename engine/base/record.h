@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What the event core knows of one sphere, and how it writes down a neighbour.
 

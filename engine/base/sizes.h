@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Radii and masses of all spheres of a system, on every rank: one for each species, or, where a species has several,
 // one for each sphere.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A hard, elastic wall of the box: a plane with a normal along an axis, and all that contacts with it need to know. It
 // may move at a constant speed u, a piston: then a collision turns the normal velocity v of a sphere into 2u − v.

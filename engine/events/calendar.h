@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The event queue: a ring of time bins with a small heap for the present.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The elastic collision: momentum and kinetic energy to the last bit that rounding leaves.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // When do two spheres, or a sphere and a wall, touch? Pure functions of the relative motion.
 //

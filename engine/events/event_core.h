@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The event core: runs flights through their contacts, in the order of their keys, to a given time.
 //

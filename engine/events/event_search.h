@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Plans the next event of a sphere: its first contact with the spheres near it, and until when no others are near.
 //

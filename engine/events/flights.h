@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The spheres of one core and all that may happen to them: flight, contact, collision. The physics is here;
 // event_search.h decides for which pairs contacts are computed, event_core.h when.

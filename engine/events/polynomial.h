@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The first time at which a polynomial falls through zero: certified, none missed, none found twice.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Until when what was found around a sphere holds: it has come to the rim of its list's region, or to a face of its
 // cell. A bound in the first case, which may be too early; never too late.

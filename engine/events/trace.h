@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The log of a window that the event core writes: enough to take any event back, and to read the path of any sphere.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Five discs in a box, joined by springs: the first experiment of Enomoto's thesis, with exact energy.
 //
 //   ./five_springs            H = ½ Σ v² + ½ Σ (|x_i − x_i+1| − 2)²

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Nine discs in a box that attract each other like masses in the plane of a star field: the second experiment of
 // Enomoto's thesis, by every integrator that knows forces.
 //

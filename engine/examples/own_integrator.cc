@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An integrator of one's own: Euler–Cromer (symplectic Euler) with hard collisions, beside psa.
 //
 //   ./own_integrator          v += h a(x), then all spheres fly straight for h and collide event by event: order 1

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A potential of one's own: the Gaussian core, V = ε e^{−(r/σ)²}, in a fluid of soft particles with small hard cores.
 //
 //   ./own_potential           edda keeps the energy, which takes all four functions; psa does so to its order

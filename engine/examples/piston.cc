@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A boundary that moves: a piston heats a gas of hard spheres, with the work it does and the adiabat for comparison.
 //
 //   ./piston [SPEED]      of the piston; the thermal speed at the start is 1. The slower, the nearer to the adiabat

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/forces/add_interaction.h"
 
 #include "engine/forces/pair_filter.h"

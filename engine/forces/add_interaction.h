@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Terms of V by their names, or by a declaration of one's own.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Which pairs a term of V leaves out: those of other species, and those joined by a bond.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // From separations to forces: the loop over a batch of pairs for one potential, written once for any number of lanes.
 //

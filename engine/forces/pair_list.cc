@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/forces/pair_list.h"
 
 #include <algorithm>

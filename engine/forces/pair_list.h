@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // All pairs within a cutoff, and some beyond: a Verlet list (Phys. Rev. 159 (1967) 98) with a skin, made from cells.
 

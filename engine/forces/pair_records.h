@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Pairs in the form that the kernels of pair_kernels.h read, and the sums of forces in the order of the list.
 //

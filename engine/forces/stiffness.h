@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The highest frequency of small vibrations: it limits how long a step may be.
 

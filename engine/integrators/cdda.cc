@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // cdda: the whole step is cut at each collision; each piece is a discrete-gradient step, exact in energy for any
 // length.
 //

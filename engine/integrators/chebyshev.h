@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Fixed-point iterations that contract slowly, made faster by what is known of their spectrum.
 //

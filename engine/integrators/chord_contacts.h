@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Contacts of discrete-gradient pieces: how does the piece of size τ end, and where might the first contact be?
 //

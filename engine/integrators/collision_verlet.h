@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Kick-drift-kick pieces that end at contacts: what cva and mcva share.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // cva: the whole step is cut at each collision: K(τ/2) D(τ) K(τ/2), collide, continue with the remaining h − τ.
 
 #include <optional>

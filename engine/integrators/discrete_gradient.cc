@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/integrators/discrete_gradient.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // One discrete-gradient piece: from (x, v) over a time τ to (x', v') with exactly the same energy.
 //

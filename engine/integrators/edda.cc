@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // edda: event-driven discrete gradients.
 //
 // In a slab [0, h] particle i moves under a constant acceleration of its own, a_i: parabolas, cut by collisions, which

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Mean accelerations of the next slab, extrapolated from those of past slabs: where the sweeps of edda start.
 

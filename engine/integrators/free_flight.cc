@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // free-flight: no forces but a uniform field, exact from event to event.
 //
 // The slab is an epoch: at its end all records are flown to one time and wrapped, so that times stay small and their

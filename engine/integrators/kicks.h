@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What the kick methods share: accelerations a = −M⁻¹∇V at the present positions, and the kick v += s a.
 

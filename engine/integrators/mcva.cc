@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // mcva: CVA with impulses that keep the shadow Hamiltonian S_h = H + h² G instead of H.
 //
 // With n the gradient of the gap, w = M⁻¹n and K = V″, an impulse λn changes S_h by bλ + ½aλ² exactly:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // psa: K(h/2), then the drift D(h) resolved event by event, then K(h/2).
 
 #include <optional>

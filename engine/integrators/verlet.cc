@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // verlet: kick-drift-kick, K(h/2) D(h) K(h/2), for points without hard cores.
 
 #include "engine/forces/forces.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // How the box is divided among subdomains: by recursive bisection, so that each has about as much work.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A table with entries for a few spheres of a core only, by slot.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Communication among the ranks of a run, as far as the engine knows: bytes, sums and maxima.
 //

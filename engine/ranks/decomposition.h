@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // How the particles of a system are divided among the ranks that advance it together.
 //

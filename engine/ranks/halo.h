@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Particles sorted by place, with copies of those near: what the owner of a place must know around it.
 

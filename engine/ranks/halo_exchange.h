@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Which rank owns the particles that this one knows, which of its own others have copies of, and how copies get the
 // values of their owners.

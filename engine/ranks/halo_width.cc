@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ranks/halo_width.h"
 
 #include <algorithm>

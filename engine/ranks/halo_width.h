@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // How wide the halo of each rank has to be: learned from how fast particles are and from slabs for which it was not
 // wide enough. All ranks have the same.

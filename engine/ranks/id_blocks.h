@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Blocks of consecutive ids: the order in which several ranks keep particles for files and between epochs, one each.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Slots by id, for cores that have a part of all spheres only: a hash table in one piece of memory.
 

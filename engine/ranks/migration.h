@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Particles with all their fields (fields.h), on the way from their owners to the ranks that know them from then on.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Which spheres a subdomain owns, and which are ghosts: here of those of other subdomains, elsewhere of its own.
 //

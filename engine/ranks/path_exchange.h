@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What subdomains that border on each other send: ghosts that the other one lacks, and paths until both agree about a
 // window.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The contacts of a slab of which every rank has found those of its own particles.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // One subdomain of a system that is divided among several event cores, and what makes it agree with its neighbours.
 //

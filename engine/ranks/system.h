@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The particles and what acts on them: the state that an integrator advances, with its decomposition among ranks.
 

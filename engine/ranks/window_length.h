@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // How long a window may be, so that spheres collide a few tenths of a time in it and none comes farther than
 // `max_displacement` from where it was at its start; and when one was so fast that it may have.

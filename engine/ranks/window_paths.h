@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What the spheres of a subdomain did in a window: their paths, and the scripts of its ghosts, which are the paths that
 // their owners have sent.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Repairs a window where paths of ghosts are not those that their owners sent.
 //

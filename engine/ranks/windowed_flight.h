@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Free flight of a system divided among ranks, a subdomain each, with the bits of one core.
 //

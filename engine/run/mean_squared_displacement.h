@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The mean squared displacement of the particles, taken while a run goes on.
 //

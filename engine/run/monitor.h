@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What is measured while a run goes on, and when observers are shown it. The run itself never looks at it.
 

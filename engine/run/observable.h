@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What is averaged while a run goes on, and the declaration that makes it known by its name.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The radial distribution function g(r), taken while a run goes on.
 //

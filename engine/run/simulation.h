@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A run: slab after slab, with energies measured and observers called at their due times.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The state of a run as bytes, field by field: what a checkpoint holds, on any number of ranks.
 

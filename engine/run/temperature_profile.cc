@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Density and temperature in slabs across one axis.
 //
 // A sample finds n particles (their centres) with the kinetic energy K in a slab of volume V: the density is ⟨n⟩/V, the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A regular grid of search cells over the box, and a table of the particles in each.
 //

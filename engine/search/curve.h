@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Places along a space-filling curve: what is near on it is near in space (Morton).
 

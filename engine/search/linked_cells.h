@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The spheres of each cell, for dilute systems: cells as small as a diameter, most of them empty, with a list through
 // the spheres of each. A sphere that crosses into another cell looks at the new ones around it.

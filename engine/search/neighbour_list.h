@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A Verlet list: the pairs that come within reach while no particle moves far.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/search/region_cells.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The cells of skin_lists.h for spheres of similar size: in which the centres of their regions stand, and which are
 // near a place.

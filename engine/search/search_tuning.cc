@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/search/search_tuning.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // How the event core searches: on neighbour lists or on cells, with which skin, with which cells.
 //

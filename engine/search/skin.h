@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // How wide the skin of a Verlet list is: what the list holds beyond its reach, so that it lasts while particles move.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/search/skin_lists.h"
 
 #include <cmath>

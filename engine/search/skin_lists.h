@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Neighbour lists with a skin: for each sphere all others that it could touch while both stay within `skin` of where
 // they were when their lists were made. A sphere that leaves that region gets a new list, and those of its neighbours

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Initial states by compression: spheres that fly, collide and grow until they have their sizes (Lubachevsky,
 // Stillinger, J. Stat. Phys. 60 (1990) 561; Donev, Torquato, Stillinger, J. Comput. Phys. 202 (2005) 737).

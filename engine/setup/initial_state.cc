@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/setup/initial_state.h"
 
 #include <algorithm>

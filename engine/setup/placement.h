@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Initial positions and velocities: lattices spread over a box, random sequential insertion, Maxwell–Boltzmann
 // velocities, and the check that no two spheres overlap.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Cells for the making of initial states: spheres are inserted one by one, and each finds those near it, through
 // periodic images too. Spheres of a size (up to a factor of two) share a grid, so that small ones don't have the cells

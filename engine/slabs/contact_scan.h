@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Contacts for the integrators that cut the step of all particles (cva, mcva, cdda): which touch now, which first. The
 // slab core takes its candidates and contacts at rest from here, too.

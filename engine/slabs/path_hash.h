@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What happened to each particle in a slab, in a word: two ranks that have it from the same start agree on all of it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Resting contacts: pairs that touch, have no normal velocity, and may be pressed together.
 //

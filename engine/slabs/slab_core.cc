@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/slabs/slab_core.h"
 
 #include <array>

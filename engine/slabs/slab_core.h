@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Flies all particles through one slab, each on parabolas under a constant acceleration of its own, event by event.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A step that takes long can be left before its end, with the state that it started from.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // `carom bench`: how fast the event core is on this machine; `--forces`: the loops over pairs (bench_forces.h).
 //

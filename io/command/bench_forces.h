@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // `carom bench --forces`: how fast the loop over pairs is on this machine, and a run that consists of little else.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The states that `carom bench` measures: a lattice with Maxwell–Boltzmann velocities, or a file.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What the tables of `carom bench` have in common: how they are printed and stored.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The sub-commands of `carom` that read a deck or print what the program knows. Each returns the exit code of the
 // process and throws Error.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The `carom` command.
 //
 //   carom run inputs/five-springs.toml --set integrator.step=0.02 -o runs/trial

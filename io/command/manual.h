@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The manual page of the command and its completion in shells, made from its options and from the schema of decks.
 

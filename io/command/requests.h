@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What is asked of a run from outside while it goes on: signals and the wall clock.
 //

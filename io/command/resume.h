@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What a run goes on from: the checkpoint of a run that is continued, or of one that another branches off.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A deck, read, checked and resolved: everything a run needs, with defaults filled in.
 //

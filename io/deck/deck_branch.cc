@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The deck of a run that starts from the particles of another one.
 
 #include <algorithm>

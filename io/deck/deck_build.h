@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The parts of build_system(): from the words of a deck to particles, box and interactions.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // From the values of a deck to what they mean together: lengths of lists, ids that exist, tables that need each other.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where the particles stand at the start.
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Collects what is wrong with a deck, so that all of it can be reported at once.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What a checked deck says, in the words of a simulation: known to io/deck, and to io/python, which takes the
 // interactions.

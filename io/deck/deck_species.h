@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The [[particles]] tables: species by explicit positions or by count, with one mass, radius and charge a particle.
 

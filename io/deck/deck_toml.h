@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A deck as TOML: the file parsed, `--set` values put in, and the place of every node known for messages.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A deck's values, each checked against its own declaration in the schema and completed by defaults: types, ranges,
 // choices, unknown and missing keys. What keys mean together is checked later (io/deck/deck_interpret.h).

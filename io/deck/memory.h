@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // How much memory a deck will take, and how much there is: a run that cannot have what it needs ends before it takes
 // it.

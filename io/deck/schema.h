@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The declared schema of a deck: every table and every key with type, unit, range, default and meaning, once.
 //

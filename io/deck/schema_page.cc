@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The schema and the methods as pages to read.
 
 #include <algorithm>

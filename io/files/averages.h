@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // rdf.csv and its like: what is averaged while a run goes on (engine/run/observable.h) instead of being written frame
 // by frame. Reduced units; numbers in the fewest digits that give them back exactly.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // checkpoint.h5: the state of a run, from which `carom run --continue` goes on with the same bits.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // GSD, version 2 (gsd.readthedocs.io, "File layer specification" and "HOOMD schema"): a header, the index of all
 // chunks, their names, then the chunks, all in the byte order of the machine. Sizes are known beforehand, so that the
 // file is written from its beginning to its end.

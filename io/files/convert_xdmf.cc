@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // XDMF 3 (xdmf.org): points at each time; their numbers stay in the trajectory, which the file refers to.
 
 #include <spdlog/fmt/fmt.h>

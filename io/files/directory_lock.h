@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // One run at a time in a directory: the file carom.lock with the host, process and start of the run that is at work.
 //

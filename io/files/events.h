@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // events.h5: every collision of a run, exactly as it was executed, in the order of the event keys.
 //

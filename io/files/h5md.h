@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The trajectory: an H5MD 1.1 file with one frame an output time (de Buyl, Colberg, Höfling, Comput. Phys. Commun. 185
 // (2014) 1546).

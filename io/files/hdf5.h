@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A thin layer over the HDF5 C library: identifiers that close themselves, errors with their cause, data sets that grow
 // row by row.

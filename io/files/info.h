@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // `carom info FILE`: what is in a trajectory or in a file of events.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "io/files/journal.h"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A journal beneath HDF5: what has been flushed stays whole, at whatever write the process is killed.
 //

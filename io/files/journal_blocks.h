@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Blocks of a file that wait to be written, and how they stand in a journal (journal.h has its format).
 

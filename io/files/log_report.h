@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What stands in run.log beside the warnings: the banner, the thermo table, the final report with the timing breakdown.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The directory of a run: made where it is missing, and cleared of an earlier run without losing it. (One run at a
 // time: directory_lock.h.)

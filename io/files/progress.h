@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The progress of a run: one line that renews itself on a terminal, plain lines now and then elsewhere.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What each rank sends to rank 0 at the end of a run: the time of its parts, and its memory.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // summary.json: the outcome of a run, for scripts and tests. Written at the end, also of a run that failed or was
 // stopped.

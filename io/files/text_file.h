@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A text file written piece by piece, each piece handed to the operating system at once and checked.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // thermo.csv: one row an output time, each in the file before the run goes on.
 //

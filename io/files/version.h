@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What this build is: for --version, the banner of a log and the files a run leaves.
 

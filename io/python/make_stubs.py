@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Writes carom/__init__.pyi: the hints of the Python files, and a signature of add_force() and integrator() for each name.
 
     PYTHONPATH=build/release/io/python python3 -P make_stubs.py __init__.pyi

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // carom._carom: sessions of two and three dimensions, and the declarations of what they can be given. The package in
 // carom/ makes the interface of it.
 

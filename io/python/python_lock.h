@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The lock of the interpreter, which is released while the engine works, and the end of the interpreter.
 //

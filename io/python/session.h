@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A simulation that is made, run, looked at and run on step by step: what the Python module offers, without Python.
 //

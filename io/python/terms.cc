@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "io/python/terms.h"
 
 #include "engine/forces/add_interaction.h"

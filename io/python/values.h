@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Values of Python as parameters, and declarations as dictionaries of Python.
 

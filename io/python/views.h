@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Arrays of particles that others look at: these keep their addresses while runs swap and free arrays of their own.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What the page asks of a run, answered from the run's files, which may be growing.
 //

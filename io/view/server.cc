@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "io/view/server.h"
 
 #include <sys/random.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A page on this machine alone: HTTP on a port of 127.0.0.1, behind a random token that is the first part of its
 // address. Only GET and HEAD, only for requests whose Host is a name of this machine; one thread, a bounded number of

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // `carom view`, `carom run --view` and `carom demo`: runs to look at in a browser.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The event queue: one push and one pop, with the entries of N particles in it.
 
 #include <benchmark/benchmark.h>

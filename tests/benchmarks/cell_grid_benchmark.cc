@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Search cells: the cell of a sphere, the spheres near it, and the table of all.
 
 #include <benchmark/benchmark.h>

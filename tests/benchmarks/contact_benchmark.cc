@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // When do two spheres touch, and what then: the arithmetic of one candidate and of one collision.
 
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sums that do not depend on the order: a term, and a rounding.
 
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the tests of bad input share: two decks, changes of them, and what the command says to them."""
 
 import subprocess

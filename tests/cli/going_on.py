@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the tests of going on share: a run, to take it up again, and to compare it with an undisturbed one."""
 
 import subprocess

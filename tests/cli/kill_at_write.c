@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Kills the process at its KILL_AT-th change of a file whose path contains KILL_IN: a write (of which half is done where
 // KILL_HALF=1), a new size, a new name, a removal, a sync. Without KILL_AT the number of changes goes to KILL_COUNT, a file.
 // Where KILL_LOG names a file, each change is noted there, with its path, size and place; also fdatasync, which is not

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the tests of `carom run` share: small decks, ways to start the command, reading what it left."""
 
 import csv

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Writes the files of a run from given positions, as `carom run` would: for tests of the tools that read them."""
 
 import csv

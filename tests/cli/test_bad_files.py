@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs the real command on files that decks name, and on decks, that cannot be read or are too much for the machine."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs the real command on bad decks: each problem has its exit code, its place and its remedy."""
 
 import pytest

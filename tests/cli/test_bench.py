@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`carom bench`, tiny: what it reports, states written and read back, forces, bad usage. And what
 tools/count-instructions makes of it, with a stand-in for valgrind. No times are checked."""
 

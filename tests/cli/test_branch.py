@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`carom branch`: a new run from the particles of a checkpoint, with a changed deck."""
 
 import shlex

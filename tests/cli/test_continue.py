@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`carom run --continue`: however a run was interrupted, its files in the end are those of an undisturbed one, bit for bit."""
 
 import os

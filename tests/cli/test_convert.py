@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`carom convert`, and trajectories themselves, in the programs that they are meant for: each file is opened by a reader of others."""
 
 import os

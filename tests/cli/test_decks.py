@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every deck of inputs/, shortened, through the command itself ($CAROM).
 
 Each must end well, keep its energy, leave a sound file, and not care how it is observed.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The diffusion coefficient of tools/plot_msd.py: of walks that are known, and of hard spheres."""
 
 import re

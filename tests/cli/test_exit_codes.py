@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Trouble at run time: exit code, message, and what is left to read."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The trajectory in MDAnalysis, and `carom info`."""
 
 import pathlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A run is killed at every other change of its files in turn: nothing that was flushed is lost."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The library as a program finds it: installed, with the examples built on it."""
 
 import os

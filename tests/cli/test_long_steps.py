@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A step that takes long: it is left when the run is asked to stop, and done again from its start when the run goes on."""
 
 import signal

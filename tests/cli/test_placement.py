@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Initial states through the command: compression to high density, its errors, mixtures on lattices and at random."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`mpirun carom run`: how ranks wait, stop and end, and what happens when one of them fails."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`mpirun carom run`: the same files on any number of ranks."""
 
 import filecmp

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`carom run --continue` after what no run can help: kills, full disks, damaged checkpoints, processes that hold the directory."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`carom run`: the files it leaves, that observing changes nothing, early stops and kills."""
 
 import csv

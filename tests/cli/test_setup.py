@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """tools/setup.sh on machines that it can't be run on here: what it would install, and by which commands."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The studies of tools/: of errors, of costs and of many ranks, by the command itself ($CAROM)."""
 
 import csv

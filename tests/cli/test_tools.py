@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The Python tools against files with known contents."""
 
 import fcntl

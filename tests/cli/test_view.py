@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`carom view`: which requests get an answer, and which. The page itself in a browser: test_view_page.py."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The page of `carom view` in a real browser: Chromium without a window, where it is installed (tools/test-packages.txt)."""
 
 import contextlib

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Large cold cations and small hot anions under edda: the energy stays exact through the collisions, the species come
 // to one temperature, and g(r) at contact is that of psa at a tiny step from the same start.
 //

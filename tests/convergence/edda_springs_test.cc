@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // edda on lattices and chains of springs: what its sweeps cost, and what becomes of those that do not converge.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // edda: each particle under a constant acceleration of its own. What that must keep, and what it must cost.
 
 #include <gtest/gtest.h>

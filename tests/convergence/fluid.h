@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Fluids for the tests against the literature: melted at once, and measured with error bars.
 

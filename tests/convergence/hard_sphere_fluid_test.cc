@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Hard spheres, hard discs and mixtures of spheres against the literature: pressure, collision rate, mean free path,
 // g(r) at contact.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Lennard-Jones fluids against other programs: temperature, energy and pressure.
 //
 // Runs keep their energy: they start as an fcc crystal at a temperature that is chosen so that the melt comes near the

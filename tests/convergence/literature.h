@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Equations of state of hard spheres, hard discs and mixtures of spheres, from the literature.
 //

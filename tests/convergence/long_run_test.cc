@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Long runs: the energy of cdda wanders like a random walk of rounding errors, and no faster.
 
 #include <gtest/gtest.h>

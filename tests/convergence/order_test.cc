@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Orders of convergence, at a fixed end time, averaged over perturbed starts.
 
 #include <gtest/gtest.h>

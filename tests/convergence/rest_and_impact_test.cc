@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Bodies at rest for 10⁴ steps, and bodies at rest that are hit: edda against cdda at small steps.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The two experiments of Enomoto's thesis against the numbers of an independent plain code (tests/data/reference).
 
 #include <gtest/gtest.h>

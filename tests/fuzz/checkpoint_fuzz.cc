@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The reader of checkpoints on bytes of a fuzzer, as they are and signed with their length and CRC-32: what a run goes
 // on from, `carom info`, or an Error.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The parser of decks on bytes that a fuzzer makes (tools/fuzz): it ends with a deck or with an Error.
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // `carom info` on the bytes of a trajectory or a file of events: it ends with a text or with an Error.
 
 #include "engine/base/error.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The replay of a journal made by a fuzzer, as it is and with the right length and CRC-32: the file is written to only
 // where the journal is complete.
 

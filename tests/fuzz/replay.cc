@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Runs a fuzz target without a fuzzer: `TARGET MUTATIONS FILE…` gives it each file and so many mutations of each, the
 // same ones every time.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Ranks that work together and fail, for tests/mpi/CMakeLists.txt: `communicator_ranks WHAT [SILENCE]`.
 //
 // On rank 0 while the others sleep:

@@ -1,6 +1,7 @@
 #!/bin/sh
 # expect.sh SETTINGS CODE WORDS RANKS PROGRAM [ARGUMENT…]: runs the program on that many ranks (0: without mpirun) and
 # succeeds if it ends with the exit code and prints the words (a regular expression, any case; with ^ and $ once only).
+# SPDX-License-Identifier: BSD-3-Clause
 # shellcheck source=/dev/null
 . "$1"
 code=$2 words=$3 ranks=$4

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Python ends while threads run simulations: real processes, which must end by themselves and in peace."""
 
 import pathlib

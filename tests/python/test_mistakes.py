@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What users get wrong: each has an exception of its kind, with a text that says what is wrong and what to do."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """carom.open() on what the command leaves, also without the compiled part."""
 
 import copy

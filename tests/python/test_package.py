@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The package as users find it: hints, the first example, the starter, the installation."""
 
 import ast

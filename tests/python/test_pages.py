@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Pages with code that is run: what the blocks print is what stands in the page."""
 
 import pathlib

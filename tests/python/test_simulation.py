@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Simulations from Python against the command, and against themselves."""
 
 import copy

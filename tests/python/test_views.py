@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Views of the particles: no copies, and never of memory that is gone."""
 
 import gc

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Regression runs: does Carom still compute, bit for bit, what it computed when the results were stored?
 
     CAROM=build/release/io/carom tests/regression/regression.py check cva-2d

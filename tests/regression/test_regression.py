@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A regression run that deviates must be noticed, and only then."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every room includes only what stands below it."""
 
 import pathlib

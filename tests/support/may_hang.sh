@@ -1,6 +1,7 @@
 #!/bin/sh
 # may_hang.sh NAME COMMAND…: runs a test after which mpirun itself may hang (parallel/README.md). Where CAROM_REPEATED
 # names a file, a test that fails runs a second time, and its name and what it printed the first time are appended there.
+# SPDX-License-Identifier: BSD-3-Clause
 name=$1
 shift
 if [ -z "$CAROM_REPEATED" ]; then exec "$@"; fi

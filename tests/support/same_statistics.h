@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Two runs of one system, on other ranks or taken up in between: all of their accounts that says anything of the
 // motion.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Bodies at rest in contact, and what holds them: positions are exact to rounding, so nothing may move.
 //

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sphinx: the pages that stand beside the sources, as a site (tools/docs)."""
 
 project = "Carom"

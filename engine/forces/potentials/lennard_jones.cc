@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/forces/potentials/lennard_jones.h"
 
 #include "engine/forces/potentials/options.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What the types of interaction have in common in a deck: shared parameters, and how they are read.
 //

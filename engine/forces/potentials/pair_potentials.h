@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The potentials that pair kernels are made for in every vector width: a new one takes a line here.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Which pairs a term of V is summed over: a list of bonds, all pairs, or the pairs within a cutoff.
 //

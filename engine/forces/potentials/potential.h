@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What a pair potential is: four functions of ρ = r², the square of the distance.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every type of interaction there is, in the order of the manual: one line each.
 
 #include "engine/base/interaction.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Long-range corrections: what a cutoff takes away from the energy and the pressure of a uniform fluid.
 //

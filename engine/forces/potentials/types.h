@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The declarations of all types of interaction. Each is defined in the file of its name; registry.cc lists them.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/forces/potentials/field_term.h"
 #include "engine/forces/potentials/options.h"
 #include "engine/forces/potentials/types.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The interface between loops over pairs and their kernels, which exist once for each vector width.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/forces/simd/pair_kernel.h"
 
 namespace carom::kernels {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/search/simd/scan.h"
 
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The innermost loops, compiled several times for different vector widths and chosen when a core is made.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The kernels of scan.h, written once for any number of lanes. Included by scan_*.cc only, which are compiled for
 // different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so that no
 // function compiled for one machine can end up in another's binary.

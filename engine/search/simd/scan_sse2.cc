@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // See scan_kernel.h.
 #include "engine/search/simd/scan_kernel.h"
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Carom from Python: event-driven molecular dynamics of hard spheres with smooth forces.
 
     import carom

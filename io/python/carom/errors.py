@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What goes wrong, by kind; `exit_code` is that of the command for the same failure."""
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What a run leaves in its directory, as arrays: thermo.csv, trajectory.h5md, events.h5, summary.json, deck.toml.
 
 Needs Debian's python3-h5py and python3-numpy, not the compiled part of the package. Everything is in the units of the deck.

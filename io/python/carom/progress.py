@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A line that shows how far a run has come, in terminals and notebooks."""
 
 import sys

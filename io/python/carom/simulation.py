@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Simulations: arrays and keywords checked here, everything else by the engine, with its texts."""
 
 import os

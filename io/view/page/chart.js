@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 "use strict";
 // A curve that grows: when it has too many points, each two become one, of the larger values where `largest`.
 class Curve {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 "use strict";
 // The page: a panel for each run, one eye for all, curves of all runs beside them.
 const COLOURS = ["#f28e2b", "#4e9af1", "#59c16a", "#e15759", "#b07aa1", "#edc948"];

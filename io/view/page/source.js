@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 "use strict";
 // Where data come from: the server that has sent this page, or the page itself where it was exported.
 const source = (() => {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 "use strict";
 // Spheres by WebGL 2, all by one call: a square for each, turned towards the eye; the fragment shader meets the ray with the sphere.
 const VERTEX = `#version 300 es

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How a piece of cdda ends: contacts at the edge of the tolerance.
 
 #include "engine/integrators/chord_contacts.h"

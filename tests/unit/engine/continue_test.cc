@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A run that is stopped, taken up from its state and ended, against one that went on: every bit, whatever the method
 // and the ranks before and after.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Methods that share their work among ranks, against themselves on one: every bit.
 
 #include "engine/ranks/decomposition.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How long an epoch of free flight is where no step is given: forty mean free times by Enskog's theory, to two digits.
 
 #include "engine/setup/epoch.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Systems for tests that compare runs bit for bit, and what such runs leave.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/base/exact_sum.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The mean acceleration of the next slab is extrapolated from slabs of any lengths.
 
 #include "engine/integrators/extrapolation.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Of random particles that ranks know by a bisection: owners, copies that matter, and values that owners send.
 
 #include "engine/ranks/halo_exchange.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A halo is as wide as paths and collisions ask for, and a division ends before a particle has left what it allows for.
 
 #include "engine/ranks/halo_width.h"

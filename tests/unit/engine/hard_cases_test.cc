@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The cases in which plain codes hang, overlap or lose energy: contacts that rest, graze, come together or in chains.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Free flight on ranks that have blocks of the particles, against one that has all.
 
 #include "engine/ranks/id_blocks.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The table of slots by id does what a map does, however ids fall together.
 
 #include "engine/ranks/id_table.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Overlaps and spheres that are not inside the walls are the same on any number of ranks.
 
 #include "engine/setup/initial_state.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The engine as a library: what a program may get wrong, and the errors.
 
 #include <carom/carom.h>

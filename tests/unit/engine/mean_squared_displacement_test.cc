@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/run/mean_squared_displacement.h"
 
 #include <gtest/gtest.h>

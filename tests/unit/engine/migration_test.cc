@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Particles go with all their fields to each rank that is to know them, and stand there by their ids.
 
 #include "engine/ranks/migration.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Observables by their names: all that are declared, and the profile.
 
 #include "engine/run/observable.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Temperature, pressure and energies of a snapshot, by hand, in two and three dimensions; long-range corrections.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Subdomains on two ranks that exchange paths agree, and have what one core has.
 
 #include "engine/ranks/path_exchange.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Two ranks that have a particle agree on the word of its path where its events are the same, and only there.
 
 #include "engine/slabs/path_hash.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Walls that move: every bounce, the work and the energy against what is known exactly.
 
 #include <gtest/gtest.h>

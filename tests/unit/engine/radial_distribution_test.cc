@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "engine/run/radial_distribution.h"
 
 #include <gtest/gtest.h>

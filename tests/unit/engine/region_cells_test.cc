@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What cells find near a place is what trying all spheres in all images finds.
 
 #include "engine/search/region_cells.h"

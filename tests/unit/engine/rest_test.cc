@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Bodies at rest: nothing moves, the reactions are those of statics, on any number of ranks.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Reactions of resting contacts: closed forms, all sets of contacts in turn, and what the stretch keeps.
 
 #include "engine/slabs/resting.h"

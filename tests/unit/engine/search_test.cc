@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Nothing that the search does may reach the physics: the same bits whatever the method, the skin, the cells, the bins,
 // the sorting and the vector width.
 

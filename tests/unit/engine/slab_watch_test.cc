@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A slab that is left restores the state that it started from.
 
 #include "engine/slabs/slab_watch.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Walls, boundaries and the account of contacts: what they are to all that use them.
 
 #include "engine/base/wall.h"

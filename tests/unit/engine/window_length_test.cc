@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Windows end before a sphere may come too far, are as many as collisions ask for, and a sphere that is too fast is
 // found.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A system divided among ranks has the bits of one that is not, whatever the subdomains and the windows.
 
 #include "engine/ranks/windowed_flight.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A damaged checkpoint is refused: every byte changed in turn, cut off at every length.
 
 #include "io/files/checkpoint.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // `carom info` on files that are whole for HDF5, but claim what no writer of carom writes: each is refused with its
 // name.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "io/deck/deck_problems.h"
 
 #include <gtest/gtest.h>

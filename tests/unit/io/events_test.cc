@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "io/files/events.h"
 
 #include "io/files/hdf5.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Blocks of a journal against a plain array of bytes, and files that are left in the middle of a flush.
 
 #include "io/files/journal.h"

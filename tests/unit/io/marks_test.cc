@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Files of a run that are cut back to a mark and appended to are those of a run that went on.
 
 #include <fstream>

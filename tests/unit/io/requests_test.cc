@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What signals and the clock ask of a run.
 
 #include "io/command/requests.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A deck, a system and snapshots made by hand, for the tests of the writers.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // thermo.csv, summary.json, run.log, progress, the output directory.
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Measures a potential's four functions against 50-digit arithmetic, over wide ranges of ρ and of the step from ρ to
 // ρ'.

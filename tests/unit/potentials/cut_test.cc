@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Cut potentials: accuracy against 50 digits, also for pairs that cross the cutoff or the start of the switch, and
 // continuity there.
 

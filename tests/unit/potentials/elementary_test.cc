@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The elementary functions against 50-digit arithmetic: errors in ulps over their whole range, and the special cases.
 
 #include "engine/base/elementary.h"

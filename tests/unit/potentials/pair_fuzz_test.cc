@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Random small systems over many orders of magnitude: sums of forces, energies and virials are those of plain loops, or
 // an error names a pair that is the reason. CAROM_FUZZ_SYSTEMS sets the number of systems of the slow test.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sums over pairs at the limits of what they can hold: what does not fit is refused, with the pair that is the reason.
 
 #include "engine/base/error.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sums over pairs: every bit of them, whatever computes them and in which order.
 
 #include <cstdlib>

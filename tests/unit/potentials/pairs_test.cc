@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which pairs a term sums over, in which order, and what a deck may not ask for.
 
 #include <gtest/gtest.h>

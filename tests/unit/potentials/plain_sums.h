@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // All bits that a term sums up, and the same sums by plain loops over pairs.
 

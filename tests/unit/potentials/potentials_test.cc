@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every pair potential against 50-digit arithmetic; the stated number of ε is what its header promises.
 
 #include <boost/math/special_functions/erf.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What the tests of this folder measure errors with: 50-digit arithmetic and units in the last place.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Random pair potentials over many orders of magnitude, by formulas of their own in long double.
 

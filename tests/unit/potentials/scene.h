@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A small system to try interactions on: random particles in a box, and interactions made by name.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Potentials given by points: the spline against 50 digits, its continuity, pairs that cross knots, and both ends.
 
 #include "engine/forces/potentials/table.h"

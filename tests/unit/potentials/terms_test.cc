@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every type of interaction in two and three dimensions: its loops must agree with its own energy.
 
 #include <gtest/gtest.h>
