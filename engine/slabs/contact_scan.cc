@@ -276,9 +276,12 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     if (length < 0) contact.normal = -contact.normal;
     contact.bound = 0;
     contact.slack = 0.125 * normal_slack(contact, w_before);  // some 30 roundings: new reactions are hardly better
-    if (std::abs(gap) <= 0.5 * tolerance(sigma)) continue;
-    // Rounding of many pieces has opened or closed the contact; it returns as slowly as what counts as rest.
-    const double speed = 0.5 * rounding_speed(contact.key, w_before);
+    const double touching = tolerance(sigma);
+    if (std::abs(gap) <= 0.5 * touching) continue;
+    // Rounding of many pieces has opened or closed the contact. It returns as slowly as what counts as rest; from deeper
+    // than the tolerance by half of that at once, for in short pieces the rounding of positions would undo a slow return.
+    double speed = 0.5 * rounding_speed(contact.key, w_before);
+    if (gap < -touching) speed = std::max(speed, 0.5 * touching / std::abs(length));
     contact.bound = std::clamp(-gap / std::abs(length), -speed, speed) * contact.normal.norm();
   }
   return press_apart(w, 2 / std::abs(length));
