@@ -12,8 +12,7 @@
 namespace carom {
 
 struct Counters : ContactTally {
-  double force_passes =
-      0;  ///< evaluations of pair forces, mean forces and products with the Hessian, in units of the interacting pairs
+  double force_passes = 0;   ///< pair evaluations of forces and Hessian products / interacting pairs
   std::uint64_t sweeps = 0;  ///< iterations of implicit solves
   std::uint64_t pieces = 0;  ///< edda: pieces in which steps were solved; more than the steps if any step was cut
   std::uint64_t slabs_halved = 0;

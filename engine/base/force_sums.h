@@ -40,16 +40,16 @@ class ForceSums {
   ForceLimits make_room(std::size_t forces) {
     const double count = static_cast<double>(forces < 1 ? 1 : forces);
     const auto half = [&](double room) { return std::exp2(std::floor(std::log2(room / 2 / count))); };
-    const ForceLimits limits{std::fmin(kMostInLow, half(kForceRoom)),
-                             std::fmin(kMostInHigh, half(kForceRoom - used_high_))};
+    const ForceLimits limits{std::fmin(kMaxLowWord, half(kMaxWordSum)),
+                             std::fmin(kMaxHighWord, half(kMaxWordSum - used_high_))};
     const double low = count * std::fmax(limits.low, 0x1p39);
-    if (used_low_ + low > kForceRoom) carry();
+    if (used_low_ + low > kMaxWordSum) carry();
     used_low_ += low;
     used_high_ += count * limits.high;
     return limits;
   }
   /// Whether more passes can be added: some hundred passes fill the sums, and invalid sums have no room.
-  bool has_room() const { return !invalid_ && used_high_ < kForceRoom / 2; }
+  bool has_room() const { return !invalid_ && used_high_ < kMaxWordSum / 2; }
 
   /// The words themselves, to add to after make_room(). high() allocates the high words if there are none.
   ForceWords* low() { return low_.data(); }

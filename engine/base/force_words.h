@@ -21,10 +21,10 @@ struct ForceScale {
   double spread = 1;  ///< factor by which both are larger between the particles of the largest weights
 };
 
-inline constexpr int kHighShift = 40;          // a high word counts 2^40 times a low one
-inline constexpr double kMostInLow = 0x1p50;   // [quanta]; larger forces use both words
-inline constexpr double kMostInHigh = 0x1p46;  // [2^40 quanta]
-inline constexpr double kForceRoom = 0x1p62;   // largest sum of words
+inline constexpr int kHighShift = 40;           // a high word counts 2^40 times a low one
+inline constexpr double kMaxLowWord = 0x1p50;   // [quanta]; larger forces use both words
+inline constexpr double kMaxHighWord = 0x1p46;  // [2^40 quanta]
+inline constexpr double kMaxWordSum = 0x1p62;   // largest sum of words
 
 /// Upper bounds of one force, in quanta.
 struct ForceLimits {

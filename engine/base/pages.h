@@ -18,8 +18,7 @@ struct PageAllocator {
   using value_type = T;
   PageAllocator() = default;
   template <class U>
-  PageAllocator(const PageAllocator<U>&) {
-  }  // NOLINT(google-explicit-constructor): the standard requires an implicit constructor
+  PageAllocator(const PageAllocator<U>&) {}  // NOLINT(google-explicit-constructor): the standard requires it
 
   T* allocate(std::size_t n) {
     const std::size_t bytes = n * sizeof(T), page = bytes < kHugePage ? kLine : kHugePage;
