@@ -11,7 +11,7 @@
 //   run.statistics().max_energy_error, run.system().particles.x …
 //
 // Integrators, interactions and their parameters have the same names as in decks (`carom methods`, `carom schema`).
-// Mistakes throw carom::Error, whose message says what to do.
+// Mistakes throw carom::Error; its message says what to do.
 
 #include "engine/base/error.h"
 #include "engine/base/interaction.h"

@@ -8,7 +8,7 @@
 // same way (a bad deck, an impossible step), the error is reported once and all return its exit code. Rank 0 waits at
 // most kGrace for ranks that do not answer because they compute or are stopped.
 //
-// If a wait lasts longer than the allowed silence, the waiting rank queries the others and names those that do not
+// If a wait lasts longer than the allowed silence, the waiting rank queries the others and names the ranks that do not
 // answer. Time in which the process does not run is not counted: a whole job may be suspended.
 
 #include <mpi.h>

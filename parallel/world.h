@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The ranks of a run; an object whose lifetime starts and ends MPI.
+// The ranks of a run; one object starts MPI and, when destroyed, ends it.
 //
 //   World ranks(600);
 //   return ranks.on_all([&] { return simulate(deck, exchange); });

@@ -16,7 +16,7 @@ template <int D>
 struct Box {
   Vec<D> edges = Vec<D>::Ones();  ///< [length]; within a slab: the edges at its start
   std::array<Boundary, D> boundary{};
-  Vec<D> edge_velocity = Vec<D>::Zero();  ///< of the upper walls, along their axes [length/time]; nonzero: a piston
+  Vec<D> edge_velocity = Vec<D>::Zero();  ///< upper walls, along their axes [length/time]; nonzero: a piston
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }

@@ -13,7 +13,8 @@ namespace carom {
 enum class EventKind : std::uint8_t { pair = 0, wall = 1 };
 
 /// A total order of events, the same on every machine and for every decomposition. `generation` orders events at the
-/// same instant: it is 1 + the larger generation of those partners' records that have the time of the event, or 0.
+/// same instant: it is 1 + the largest generation of the partners' records with the time of the event, or 0 if there is
+/// none.
 template <int D>
 struct EventKey {
   double time = 0;  ///< since the start of the slab or epoch
@@ -55,7 +56,7 @@ struct Contact {
   EventKey<D> key;
   Vec<D> x_lo, x_hi;   ///< centres at contact [length], x_hi at the image that is touched; for a wall event x_hi is the
                        ///< point touched
-  Vec<D> impulse;      ///< of the force on `lo`; `hi` receives its negative [mass·length/time]
+  Vec<D> impulse;      ///< on `lo`; `hi` receives its negative [mass·length/time]
   double virial = 0;   ///< pair: (x_lo − x_hi)·impulse as computed; wall: the work done on the sphere [energy]
   double overlap = 0;  ///< at contact, relative to the contact distance, if the method computes it
 };

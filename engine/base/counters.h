@@ -22,8 +22,8 @@ struct Counters : ContactTally {
   std::uint64_t divisions = 0;     ///< times that particles were divided among ranks (methods with forces)
   std::uint64_t slabs_again = 0;   ///< slabs repeated with more ghosts
   std::uint64_t slabs_by_all = 0;  ///< slabs repeated with all particles on each rank
-  EventCounts events;              ///< of the event core, at the end of the last slab; 0 if a method has none
-  WindowCounts windows;            ///< of the subdomains of this rank; 0 if there is only one subdomain
+  EventCounts events;              ///< counts of the event core at the end of the last slab; 0 if the method has none
+  WindowCounts windows;            ///< counts of this rank's subdomain; 0 if there is only one subdomain
 
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;

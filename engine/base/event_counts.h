@@ -9,11 +9,11 @@ namespace carom {
 struct EventCounts {
   std::uint64_t predictions = 0;  ///< scans of a particle's surroundings for its next contact
   std::uint64_t candidates = 0;   ///< pairs evaluated in these scans
-  std::uint64_t stale = 0;  ///< contacts whose partner had collided before they were due: the particle is scanned again
-  std::uint64_t crossings = 0;  ///< particles that moved into another cell
-  std::uint64_t rebuilds = 0;   ///< rebuilds of neighbour lists (0 if the core uses cells alone)
-  std::uint64_t scheduled = 0;  ///< entries put into the calendar
-  std::uint64_t dropped = 0;    ///< scheduled entries that were invalid when they came up
+  std::uint64_t stale = 0;        ///< contacts due after the partner had collided: the particle is scanned again
+  std::uint64_t crossings = 0;    ///< particles that moved into another cell
+  std::uint64_t rebuilds = 0;     ///< rebuilds of neighbour lists (0 if the core uses cells alone)
+  std::uint64_t scheduled = 0;    ///< entries put into the calendar
+  std::uint64_t dropped = 0;      ///< scheduled entries that were invalid when they came up
 
   EventCounts& operator+=(const EventCounts& other) {
     predictions += other.predictions;
@@ -29,7 +29,7 @@ struct EventCounts {
 
 /// The cost, on one rank, of making subdomains consistent (engine/ranks/windowed_flight.h).
 struct WindowCounts {
-  std::uint64_t subdomains = 0;  ///< of all ranks; fewer than requested where the box has no room for more
+  std::uint64_t subdomains = 0;  ///< on all ranks; fewer than requested if the box has no room for more
   std::uint64_t windows = 0;
   std::uint64_t rounds = 0;         ///< exchanges with neighbours, each followed by a repair
   std::uint64_t cut = 0;            ///< windows that were cut because a sphere was too fast

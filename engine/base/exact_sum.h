@@ -60,7 +60,7 @@ class ExactSeries {
   void begin(double first);
 
   ExactSum sum_;
-  double limit_ = 0;  // of terms that are split
+  double limit_ = 0;  // upper bound of terms that are split
   double to_high_ = 0, to_low_ = 0, high_ = 0, low_ = 0;
   int left_ = 0;  // terms that can be added before the sums are flushed
 };
@@ -74,7 +74,7 @@ inline void ExactSum::add(double term) {
   }
   std::uint64_t mantissa = bits & 0xfffffffffffffULL;
   if (biased != 0) mantissa |= 1ULL << 52;
-  const int position = biased == 0 ? 0 : biased - 1;  // of the mantissa's lowest bit, above kLowestBit
+  const int position = biased == 0 ? 0 : biased - 1;  // the mantissa's lowest bit, counted from kLowestBit
   const int digit = position / 32, shift = position % 32;
   const std::uint64_t low = mantissa << shift;
   const std::uint64_t high = shift == 0 ? 0 : mantissa >> (64 - shift);

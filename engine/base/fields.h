@@ -47,7 +47,7 @@ class Fields {
     const std::string name;
     const Kind kind;
     const Scalar scalar;
-    const std::size_t size;     ///< of an entry [bytes]
+    const std::size_t size;     ///< bytes of an entry
     const std::size_t columns;  ///< scalars in an entry
   };
 

@@ -8,7 +8,7 @@
 // (force_sums.h), so no sum depends on how the pairs were found.
 //
 // If a system is divided among ranks (engine/ranks/decomposition.h), sums over the system run over what this rank owns:
-// its particles, and the pairs whose lower id it owns. Forces on ghosts are incomplete.
+// its particles, and the pairs with a lower id that it owns. Forces on ghosts are incomplete.
 
 #include <memory>
 #include <span>
@@ -89,7 +89,7 @@ class Interaction {
   /// `force_passes`.
   virtual std::uint64_t interacting_pairs(Positions<D> x) const = 0;
 
-  /// The acceleration, if this term gives all particles the same constant one; else null. Free flight integrates such a
+  /// The acceleration, if this term gives all particles the same constant one; else null. Free flight integrates this
   /// field exactly.
   virtual const Vec<D>* common_acceleration() const { return nullptr; }
 
@@ -119,7 +119,7 @@ struct InteractionContext {
   bool placed = true;                        ///< whether positions are known; if not, only the parameters are checked
   std::size_t total = particles.size();      ///< number of particles on all ranks; `particles` may be a block of them
   Communicator* ranks = nullptr;             ///< the ranks that hold the blocks; null: all particles are here
-  std::shared_ptr<const BondTable> bonds{};  ///< of all bonded terms; null: there are none
+  std::shared_ptr<const BondTable> bonds{};  ///< bonds of all terms; null: there are none
 };
 
 /// The declaration of one type of interaction; engine/forces/potentials/registry.cc lists them all.

@@ -45,7 +45,7 @@ using BitsOf = typename LanesOf<T>::Bits;
 template <class T>
 using IntegerOf = typename LanesOf<T>::Integer;
 
-/// The same number in every lane.
+/// A vector with this number in every lane.
 template <class T>
 CAROM_INLINE T all(double value) {
   if constexpr (std::same_as<T, double>)

@@ -19,7 +19,7 @@ template <int D>
 struct Particle {
   Vec<D> x;                   ///< position of the centre [length]
   Vec<D> v = Vec<D>::Zero();  ///< velocity [length/time]
-  double radius = 0.5;        ///< of the hard core [length]
+  double radius = 0.5;        ///< hard core [length]
   double mass = 1;            ///< [mass]
   double charge = 0;          ///< [charge]
   std::uint16_t species = 0;  ///< index into System::species
@@ -30,7 +30,7 @@ struct Particles {
   std::vector<Vec<D>> x;               ///< position of the centre [length]
   std::vector<Vec<D>> v;               ///< velocity [length/time]
   std::vector<double> mass;            ///< [mass], positive
-  std::vector<double> radius;          ///< of the hard core [length], positive
+  std::vector<double> radius;          ///< hard core [length], positive
   std::vector<double> charge;          ///< [charge]
   std::vector<std::uint16_t> species;  ///< index into System::species
   std::vector<Image<D>> image;  ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge

@@ -64,7 +64,7 @@ class RandomStream {
   }
 
   /// Two independent normal numbers of mean 0 and variance 1 (Box, Muller, Ann. Math. Stat. 29 (1958) 610). Evaluated
-  /// in long double: the C library chooses its double log and cos by CPU, and their last bits would reach the physics.
+  /// in long double: the C library chooses its double log and cos by CPU, and their last bits would change the results.
   std::array<double, 2> normal_pair() {
     const long double u = uniform(), turn = uniform();
     const long double length = std::sqrt(-2 * std::log(u));

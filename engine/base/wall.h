@@ -30,8 +30,8 @@ struct Wall {
   }
   /// The rate at which the gap of a sphere with velocity v grows.
   double opening(const Vec<D>& v) const { return along_normal(v) - velocity; }
-  /// The component along the axis after the collision of a sphere whose radius grows at `rate`; v is the component
-  /// before it.
+  /// The component along the axis after the collision of a sphere with a radius that grows at `rate`; v is the
+  /// component before it.
   double reflected(double v, double rate = 0) const { return inward * (2 * (velocity + rate)) - v; }
   /// The work that this impulse does on a sphere [energy].
   double work(const Vec<D>& impulse) const { return velocity * along_normal(impulse); }

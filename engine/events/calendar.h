@@ -22,7 +22,7 @@ namespace carom {
 #pragma pack(push, 4)
 struct CalendarEntry {
   double time;
-  std::uint32_t slot;  ///< of the sphere whose event this is
+  std::uint32_t slot;  ///< slot of the sphere with this event
 };
 #pragma pack(pop)
 static_assert(sizeof(CalendarEntry) == 12);  // several entries exist for every particle
@@ -252,7 +252,7 @@ class Calendar {
 
   double horizon_ = 0, wanted_ = 8;
   bool forced_ = false;
-  double start_ = 0, width_ = 0, per_width_ = 0;  // of the ring
+  double start_ = 0, width_ = 0, per_width_ = 0;  // ring: start, width of a bin and its inverse
   int current_ = -1;                              // the open bin, or the last one opened
   std::vector<Bin> ring_;
   PageVector<Chunk> chunks_;

@@ -7,7 +7,7 @@
 namespace carom {
 
 /// The factor g of the impulse: the first sphere receives g·d, the second −g·d, with d = x_i − x_j at contact and v =
-/// v_i − v_j. d is not normalised: a unit vector whose length is off by an ulp would change the energy with the same
+/// v_i − v_j. d is not normalised: a unit vector that is wrong by an ulp would change the energy with the same
 /// sign at every collision. If the contact distance sigma grows at the rate w, the collision is elastic in the frame of
 /// the moving surfaces: d·v − sigma w changes sign, the spheres separate faster than they grow, and the collision adds
 /// energy.

@@ -4,9 +4,9 @@
 //
 // Every sphere moves on x + v s + g s²/2 (g, zero or a uniform field, is common to all), which its record determines;
 // an event changes only the records of the spheres that take part in it. The core stores one planned event for each
-// particle, with the partner scanned last. A planned contact is stale if its partner has had an event since; the
-// particle is scanned again when the stale event is due (Lubachevsky, J. Comput. Phys. 94 (1991) 255). Neighbour lists,
-// or cells in dilute systems, reduce the candidates without changing any record, so the search cannot affect the
+// particle, and the contact of a pair with the particle scanned last. A contact is stale if its partner has had an
+// event since; the particle is scanned again when it is due (Lubachevsky, J. Comput. Phys. 94 (1991) 255). Neighbour
+// lists, or cells in dilute systems, reduce the candidates without changing any record, so the search cannot affect the
 // results.
 //
 // All spheres may grow by a common factor (engine/setup/compression.h): contact distances and distances from walls are
@@ -30,8 +30,8 @@ class EventCore {
   struct Report {
     Counters& counters;
     std::vector<Contact<D>>* contacts = nullptr;
-    std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();  ///< on counters.sphere_sphere
-    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();       ///< on contacts since load()
+    std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();  ///< largest counters.sphere_sphere
+    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();       ///< most contacts since load()
     Trace<D>* trace = nullptr;  ///< records paths if given; contacts are then not counted, because they may be revoked
   };
 
@@ -45,7 +45,7 @@ class EventCore {
   EventCore& operator=(const EventCore&) = delete;
 
   /// Starts a slab: all spheres at time 0, at particles.x with velocities particles.v, under the acceleration g. No
-  /// event at or after `horizon` is needed. Radii are those of the particles times 1 + growth·t, t since the start of
+  /// event at or after `horizon` is needed. Each radius is the particle's times 1 + growth·t, t since the start of
   /// the slab; `growth` ≥ 0 [1/time].
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth = 0);
 
@@ -98,7 +98,7 @@ class EventCore {
   void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
 
   const Box<D>& box_;
-  const Sizes* sizes_;  // of the larger system; null if there is none
+  const Sizes* sizes_;  // sizes in the larger system; null if there is none
   double sort_interval_;
   Flights<D> flights_;
   EventQueue<D> queue_;

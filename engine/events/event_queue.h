@@ -99,7 +99,7 @@ class EventQueue {
   Calendar calendar_;
   std::priority_queue<Tied> tied_;  // events at the same time, in the order of their keys
   double tied_time_ = 0;
-  Slot just_planned_[2]{};  // spheres planned in the last event, whose partners' versions are still to be read
+  Slot just_planned_[2]{};  // spheres planned in the last event; their partners' versions must still be read
   unsigned planned_ = 0;    // their number
   EventCounts counts_;
 };

@@ -111,7 +111,7 @@ void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
 }
 
 /// Plans the first contact with the candidates if it is earlier than the planned one. `latest`: no record is later than
-/// that of the sphere.
+/// the sphere's.
 template <int D>
 void EventSearch<D>::scan(const ScanTask& task, bool latest) {
   counts_.candidates += task.n;

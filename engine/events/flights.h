@@ -23,7 +23,7 @@ namespace carom {
 template <int D>
 struct Impact {
   Vec<D> d;        ///< from the second centre to the first [length]
-  Vec<D> impulse;  ///< on the first sphere [mass·length/time]
+  Vec<D> impulse;  ///< impulse on the first sphere [mass·length/time]
   double overlap;  ///< at contact, relative to the contact distance
 };
 
@@ -124,9 +124,9 @@ class Flights {
   bool field_ = false;
   double growth_ = 0, horizon_ = 0;
   GapTolerance gap_tolerance_;
-  PageVector<Record<D>> records_;      // by slot
-  std::size_t capacity_ = 0;           // largest number of spheres
-  Packing<D> packing_;                 // of slots
+  PageVector<Record<D>> records_;  // by slot
+  std::size_t capacity_ = 0;       // largest number of spheres
+  Packing<D> packing_;
   std::vector<double> radius_, mass_;  // by slot; empty if all are equal
   double common_radius_ = 0, common_mass_ = 0;
 };

@@ -51,7 +51,7 @@ class Trace {
   struct Event {
     double time, virial, overlap;
     std::uint32_t generation;
-    std::uint32_t partner;  ///< of the first sphere, as in NextEvent
+    std::uint32_t partner;  ///< the partner of the first sphere, as in NextEvent
     Id id[2];
     Slot slot[2];           ///< kNone: a wall
     std::uint32_t last[2];  ///< the sphere's entry in its previous event, or kNone

@@ -73,7 +73,7 @@ void evaluate_mean_forces(const System<D>& system, Positions<D> x, Positions<D> 
   force_pass<D>(system, out, forces, counters, [&](const auto& term) { term.add_mean_forces(x, x_new, forces); });
 }
 
-/// Mean forces over a step whose end is corrected repeatedly, for changes of a few particles.
+/// Mean forces over a step, for repeated corrections of its end that change only a few particles.
 template <int D>
 class MeanForces {
  public:

@@ -19,7 +19,7 @@ namespace carom {
 template <int D>
 class CutoffList {
  public:
-  /// `like`: a list whose skin width is used at first, or null.
+  /// `like`: a list from which to take the first skin width, or null.
   CutoffList(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList* like = nullptr)
       : box_(box), cutoff_(cutoff), skin_(0.1 * cutoff, 16, 0.8 * cutoff), filter_(std::move(filter)) {
     if (like) shared_width_ = like->shared_width_;

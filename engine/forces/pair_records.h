@@ -50,7 +50,7 @@ class PairRecords {
   /// Sums in the order of the list: low() sets its words to zero, high() allocates its words.
   ForceWords* low();
   ForceWords* high();
-  /// Adds the sums to those of all terms.
+  /// Adds the sums of this list to `sums`.
   void flush_to(ForceSums<D>& sums);
 
  private:

@@ -26,7 +26,7 @@ struct OrderStatistic {
     std::uint64_t key;
     std::uint32_t weight;  // how often the key occurs
   };
-  std::vector<Element> elements;  // on this rank; finally those with the wanted key
+  std::vector<Element> elements;  // on this rank; finally only elements with the wanted key
   std::uint64_t number;           // index from 0, below the number of elements; unused if there are none
   std::uint64_t found = 0;        // the bits known so far
 };
@@ -65,7 +65,7 @@ struct Bisection<D>::Piece {
   Part part;
   std::uint32_t first;
   std::size_t subdomains;
-  std::span<Sphere> spheres;        // on this rank
+  std::span<Sphere> spheres;        // spheres on this rank
   std::int32_t above_cut = kNoCut;  // the cut that has this piece on one side
   bool upper = false;
 };

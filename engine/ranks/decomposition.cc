@@ -15,7 +15,7 @@ namespace carom {
 namespace {
 
 constexpr std::int64_t kSlabsPerDivision = 64;  // between divisions while all are known
-constexpr double kMaxKnownFraction = 0.9;       // of all particles; a rank that would know more knows all
+constexpr double kMaxKnownFraction = 0.9;       // if a rank would get more of all particles, all ranks get all
 
 }  // namespace
 

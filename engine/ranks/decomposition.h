@@ -12,9 +12,10 @@
 //   all particles that it has.
 //
 // A rank advances its ghosts like its own particles. Ghosts at the rim of the halo lack partners and may become wrong,
-// so the ranks check that the ghosts that matter did what they did on their owners (engine/slabs/slab_core.h). If not,
-// the slab is repeated with a larger halo (halo_width.h), finally with all particles on each rank. Before any particle
-// has moved too far, particles migrate: each owner sends it, with its fields, to the ranks that need it (migration.h).
+// so the ranks check that the ghosts that matter had the same events as on their owners (engine/slabs/slab_core.h). If
+// not, the slab is repeated with a larger halo (halo_width.h), finally with all particles on each rank. Before any
+// particle has moved too far, particles migrate: each owner sends it, with its fields, to the ranks that need it
+// (migration.h).
 
 #include <memory>
 #include <optional>

@@ -29,7 +29,7 @@ std::vector<Value> sent_to_near(const Bisection<D>& bisection, Communicator& ran
 }
 
 /// From blocks of all particles, `block` on this rank, makes the particles of this rank's subdomain and, as ghosts,
-/// those within `distance` of it up to rounding. Only x, radius, id and ghost are set. Collective.
+/// copies of particles within `distance` of it up to rounding. Only x, radius, id and ghost are set. Collective.
 template <int D>
 Particles<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, const Particles<D>& block) {
   struct Copy {

@@ -45,7 +45,7 @@ class HaloExchange {
 
  private:
   std::vector<std::vector<Id>> copied_to_, copies_of_;  // by rank: own particles with ghosts there; ghosts owned there
-  std::vector<int> neighbours_;  // ranks with entries in either
+  std::vector<int> neighbours_;                         // ranks with entries in either
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // unwrapped positions at assign()
 };

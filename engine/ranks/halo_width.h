@@ -46,7 +46,7 @@ class HaloWidth {
   }
 
  private:
-  static constexpr double kMinDepth = 3;       // of ghosts that do not matter [largest diameter]
+  static constexpr double kMinDepth = 3;       // width of the layer of ghosts that do not matter [largest diameter]
   static constexpr double kUsableSlack = 0.8;  // fraction of the slack that may be used
 
   double near_ = 0, far_ = 0;
@@ -54,7 +54,7 @@ class HaloWidth {
   double safe_slabs_ = 0;               // until a particle may be displaced too far
   double wanted_path_ = 0;              // lower bound, after a path was too long recently
   bool asked_ = false;                  // the slab needs a larger halo, of finite width
-  double least_depth_ = 0, depth_ = 0;  // of ghosts that do not matter [largest diameter]
+  double least_depth_ = 0, depth_ = 0;  // width of the layer of ghosts that do not matter [largest diameter]
 };
 
 }  // namespace carom

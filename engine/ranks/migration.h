@@ -31,8 +31,8 @@ std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const s
   return messages;
 }
 
-/// Replaces this rank's particles by those in the messages, ordered by id and not marked as ghosts. No id may occur
-/// twice; `total` is the number of particles on all ranks.
+/// Replaces this rank's particles by the particles in the messages, ordered by id and not marked as ghosts. No id may
+/// occur twice; `total` is the number of particles on all ranks.
 template <int D>
 void receive_particles(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total) {
   struct Arrival {

@@ -74,7 +74,7 @@ class Ownership {
   EventCore<D>& core_;
   const Bisection<D>* bisection_ = nullptr;
   std::uint32_t number_ = 0;
-  double max_displacement_ = 0;  // in a window
+  double max_displacement_ = 0;  // largest displacement in a window
   double unwatched_ = 0;         // the largest displacement of spheres since watch()
   IdTable slots_;
   std::vector<Role> role_;              // by slot

@@ -18,7 +18,7 @@ class PathExchange {
   void add(std::size_t neighbour, const T& value) {
     put(outgoing_[neighbour], value);
   }
-  /// Sends the messages; returns those received from the neighbours. Collective.
+  /// Sends the messages; returns the messages received from the neighbours. Collective.
   std::vector<Bytes> swap();
   /// Exchanges the paths of a window and repairs it until no path changes on any rank; returns the number of rounds.
   /// Call once a window: received messages are kept until the next call. Null: this rank has no subdomain. Collective.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Collects the contacts of a slab when each rank has found those of its own particles.
+// Collects the contacts of a slab when each rank has found the contacts of its own particles.
 
 #include <algorithm>
 #include <span>

@@ -5,12 +5,12 @@
 //
 // A subdomain owns the spheres in it and has copies of nearby ones, ghosts, which other subdomains own (ownership.h).
 // Time is divided into windows. In each window the subdomain first runs its spheres as if there were no others, and
-// records all paths (window_paths.h). Then owners send the paths of spheres that are ghosts elsewhere; such a path is
-// the script of the ghost. If a script differs from the path computed here, the window is repaired (window_repair.h)
-// from the first difference on, in the order of keys and only as far as the difference propagates. Changed paths are
-// sent again until nothing changes: then every ghost moved as on its owner, and since a contact is a pure function of
-// two records, the result is that of a run on one core. (The smallest key at which any path is wrong grows with each
-// round.)
+// records all paths (window_paths.h). Then owners send the paths of spheres that are ghosts elsewhere; for the
+// ghost this path is its script. If a script differs from the path computed here, the window is repaired
+// (window_repair.h) from the first difference on, in the order of keys and only as far as the difference propagates.
+// Changed paths are sent again until nothing changes: then every ghost moved as on its owner, and since a contact is a
+// pure function of two records, the result is that of a run on one core. (The smallest key at which any path is wrong
+// grows with each round.)
 //
 //   subdomain.load(records, bisection, number, …);
 //   subdomain.run(now, end);
@@ -77,7 +77,7 @@ class Subdomain {
   void for_each_touched(Visit&& visit) const {
     paths_.for_each_own(visit);
   }
-  /// Calls visit(slot, k) for each node k that is a contact whose lower id is owned here.
+  /// Calls visit(slot, k) for each node k that is a contact with its lower id owned here.
   template <class Visit>
   void for_each_contact(Visit&& visit) {
     for_each_touched([&](Slot i) {
@@ -86,9 +86,9 @@ class Subdomain {
         if (nodes[k].key.lo == nodes[k].after.id) visit(i, k);
     });
   }
-  /// The contact of such a node.
+  /// The contact of node k, visited by for_each_contact().
   Contact<D> contact_of(Slot lo, std::size_t k);
-  /// Own spheres that are ghosts elsewhere and whose paths changed in the last run() or repair().
+  /// Own spheres that are ghosts elsewhere and got new paths in the last run() or repair().
   std::span<const Slot> changed() const { return changed_; }
   /// A bit for each neighbour that has an own sphere as a ghost.
   std::uint64_t holders(Slot i) const { return ownership_.holders(i); }
@@ -105,8 +105,8 @@ class Subdomain {
   void commit();
 
   EventCounts counts() const { return core_.counts(); }
-  std::uint64_t run_events() const { return run_events_; }          ///< in first runs
-  std::uint64_t redone_events() const { return repair_.events(); }  ///< in repairs
+  std::uint64_t run_events() const { return run_events_; }          ///< events of first runs
+  std::uint64_t redone_events() const { return repair_.events(); }  ///< events of repairs
 
  private:
   const Box<D>& box_;
@@ -114,9 +114,9 @@ class Subdomain {
   Ownership<D> ownership_;
   WindowPaths<D> paths_;
   WindowRepair<D> repair_;
-  double end_ = 0, length_ = 0;  // of the window
+  double end_ = 0, length_ = 0;  // the present window
   std::vector<Slot> changed_;
-  std::vector<std::pair<Slot, Record<D>>> other_;  // after the last window: records that differ from those of the core
+  std::vector<std::pair<Slot, Record<D>>> other_;  // after the last window: records that differ from the core's
   std::vector<std::uint8_t> disturbed_;            // by slot: whether it is in other_
   std::uint64_t run_events_ = 0;
 };

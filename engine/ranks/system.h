@@ -39,7 +39,7 @@ struct System {
   System& operator=(const System&) = delete;
 
   Box<D> box;
-  Particles<D> particles;                           ///< of this rank; with one rank, all
+  Particles<D> particles;                           ///< particles on this rank; with one rank, all
   std::vector<std::string> species = {"particle"};  ///< names
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
   Quanta quanta{};  ///< set before the first force pass

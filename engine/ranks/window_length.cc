@@ -7,7 +7,7 @@
 namespace carom {
 namespace {
 
-constexpr double kCollisionsPerWindow = 0.3;                       // of a sphere in a window, on average
+constexpr double kCollisionsPerWindow = 0.3;                       // mean collisions of a sphere in a window
 constexpr double kMaxDisplacement = 1.0, kMinDisplacement = 0.02;  // [largest diameter]
 constexpr double kSpeedAllowance = 1.15;                           // speed allowed for, relative to the largest speed
 

@@ -12,7 +12,7 @@ namespace carom {
 template <int D>
 class WindowLength {
  public:
-  /// `diameter`: the largest. `forced` returns the length of windows [time], which it can only shorten.
+  /// `diameter`: the largest. `forced` returns an upper limit of the length of windows [time].
   explicit WindowLength(double diameter, std::function<double()> forced = {})
       : diameter_(diameter), forced_(std::move(forced)) {}
 

@@ -53,7 +53,7 @@ std::vector<std::pair<Slot, Record<D>>> WindowPaths<D>::finish() {
   return other;
 }
 
-/// Node k of a path, read from the log; `entries` are those of the sphere.
+/// Node k of a path, read from the log; `entries`: the sphere's entries.
 template <int D>
 Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const {
   const auto& event = trace_.event_of(entries[k]);

@@ -27,7 +27,7 @@ class WindowPaths {
   Trace<D>& start();
   /// Call when the log is complete. Returns the own spheres with events that are ghosts elsewhere.
   std::vector<Slot> end();
-  /// Ends the window; returns the records that differ from those of the core.
+  /// Ends the window; returns the records that differ from the core's.
   std::vector<std::pair<Slot, Record<D>>> finish();
 
   const Trace<D>& trace() const { return trace_; }
@@ -97,10 +97,10 @@ class WindowPaths {
   const Flights<D>& flights_;
   const Ownership<D>& ownership_;
   Trace<D> trace_;
-  BySlot<Path> paths_;                   // those in use
+  BySlot<Path> paths_;                   // paths in use
   std::vector<std::uint8_t> rewritten_;  // by slot: whether the path differs from the log
-  BySlot<Script> scripts_;               // of ghosts
-  std::vector<Slot> touched_ghosts_;     // ghosts with events in the log
+  BySlot<Script> scripts_;
+  std::vector<Slot> touched_ghosts_;  // ghosts with events in the log
   std::vector<std::uint32_t>
       matched_in_;            // by slot: the window in which the ghost's path was found equal to its script
   std::uint32_t window_ = 0;  // number of the present window

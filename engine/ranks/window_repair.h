@@ -2,7 +2,7 @@
 #pragma once
 // Repairs a window in which ghosts have moved differently from the paths that their owners sent.
 //
-// The path of such a ghost is cut at the first difference and then follows its script. Spheres that met it, or meet it
+// The path of the ghost is cut at the first difference and then follows its script. Spheres that met it, or meet it
 // now, are cut there and advanced again, and so on in the order of keys, as far as the difference propagates. Contacts
 // of a ghost with own spheres are decided here, not by its owner.
 
@@ -27,7 +27,7 @@ class WindowRepair {
     end_ = end;
     fastest_squared_ = 0;
   }
-  /// Repairs the paths after scripts were received. Returns the own spheres whose paths have changed.
+  /// Repairs the paths after scripts were received. Returns the own spheres with changed paths.
   std::vector<Slot> run();
 
   /// The largest squared speed after an event of the window.
@@ -54,7 +54,7 @@ class WindowRepair {
     EventKey<D> key;
     Slot a = 0, b = 0;  // b: partner of a contact, or sphere to check
     std::uint32_t version_a = 0, version_b = 0;
-    Image<D> image{};                          // of a contact, relative to a
+    Image<D> image{};                          // image of the partner in a contact, relative to a
     bool operator<(const Task& other) const {  // std::priority_queue has the largest on top
       if (other.key < key) return true;
       if (key < other.key) return false;

@@ -11,7 +11,7 @@ namespace carom {
 namespace {
 
 constexpr std::size_t kMinSpheres = 8;                // spheres in a subdomain
-constexpr std::size_t kMaxNeighbours = 64;            // of a subdomain: the bits of Subdomain::holders()
+constexpr std::size_t kMaxNeighbours = 64;            // neighbours of a subdomain: the bits of Subdomain::holders()
 constexpr double kMeanWork = 64, kMaxWork = 64 * 64;  // mean and largest work of a sphere, as integers
 constexpr double kWorkTolerance = 0.1;                // smaller relative differences from the mean are ignored
 
@@ -240,7 +240,7 @@ void WindowedFlight<D>::give_back(double time, Particles<D>& particles) {
   collect(time, particles, &work_);
 }
 
-/// Measures the work of subdomains: the next bisection gives fewer spheres to those with more events a sphere.
+/// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events a sphere.
 template <int D>
 void WindowedFlight<D>::measure_work() {
   const std::uint64_t events = subdomain_ ? subdomain_->run_events() - run_before_ : 0;

@@ -28,8 +28,8 @@ namespace carom {
 /// The last event of each particle in an epoch that is interrupted at `now`.
 struct Instants {
   double now = 0;                         ///< since the start of the epoch [time]
-  std::vector<double> t;                  ///< of the last event
-  std::vector<std::uint16_t> generation;  ///< of the last event
+  std::vector<double> t;                  ///< time of the last event
+  std::vector<std::uint16_t> generation;  ///< generation of this event
 };
 
 template <int D>
@@ -79,7 +79,7 @@ class WindowedFlight {
   std::size_t subdomains_ = 0;
   SearchOptions options_;
   std::optional<Bisection<D>> bisection_;
-  std::unique_ptr<Subdomain<D>> subdomain_;  // of this rank, with its number; null if it has none
+  std::unique_ptr<Subdomain<D>> subdomain_;  // this rank's, with the rank as number; null if it has none
   PathExchange<D> exchange_;
   WindowLength<D> length_;
   Vec<D> g_ = Vec<D>::Zero();
@@ -92,7 +92,7 @@ class WindowedFlight {
   std::uint32_t subdomain_work_ = 0;
   std::vector<std::uint32_t> work_;
   std::uint64_t run_before_ = 0;  // events of first runs before the epoch
-  EventCounts event_counts_;      // of former subdomains
+  EventCounts event_counts_;      // counts of former subdomains
   WindowCounts counts_;
 };
 

@@ -12,8 +12,8 @@ namespace carom {
 namespace {
 
 constexpr double kTarget = 1 + 1e-13;    // final factor: a gap of rounding size, so that no spheres overlap
-constexpr double kFreePart = 0.1;        // of the free volume, for the growth in one slab
-constexpr double kMaxLength = 10;        // of a slab, in diameters at the thermal speed
+constexpr double kFreePart = 0.1;        // part of the free volume that spheres grow into in a slab
+constexpr double kMaxLength = 10;        // longest slab, in diameters at the thermal speed
 constexpr double kJammedPressure = 300;  // above it, free-volume theory predicts where the spheres jam
 constexpr double kTooFar = 5;            // how much farther than the jamming point the target must be for giving up
 
@@ -120,7 +120,7 @@ class Compressor {
   const std::span<const double> radius_;
   const CompressionOptions options_;
   double largest_ = 0;
-  double collision_rate_ = 0;  // of one particle, in the last slab
+  double collision_rate_ = 0;  // collisions of a particle in a unit of time, in the last slab
   Particles<D> particles_;
   EventCore<D> core_;
   Compression<D> result_;

@@ -38,7 +38,7 @@ struct Compression {
   End end = End::reached;
   std::vector<Vec<D>> x;        ///< centres, in the box
   double factor = 0;            ///< factor of the radii without overlap; ≥ 1 if reached
-  double reduced_pressure = 1;  ///< of the last slab
+  double reduced_pressure = 1;  ///< Z of the last slab
   double collisions = 0;        ///< a particle
   bool reached() const { return end == End::reached; }
 };

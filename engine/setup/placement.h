@@ -59,12 +59,12 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
                              std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries = 20000);
 
 /// Pairs closer than their contact distance by more than the gap tolerance (engine/base/wall.h), also through periodic
-/// images; pairs whose later sphere is marked in `beyond` are ignored.
+/// images; pairs are ignored if `beyond` marks the sphere with the larger index.
 struct Overlaps {
   std::size_t pairs = 0;
   Id lo = 0, hi = 0;    ///< the pair with the largest overlap relative to its contact distance
-  double distance = 0;  ///< of this pair [length]
-  double contact = 0;   ///< of this pair [length]
+  double distance = 0;  ///< its distance [length]
+  double contact = 0;   ///< its contact distance [length]
 };
 template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,

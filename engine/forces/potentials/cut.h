@@ -30,7 +30,7 @@ enum class CutKind {
 ///   (W(a) − W(b))/(a − b) = [Q(b̄, ā) − c₁ − ½ c₂ ((ā − ρ_c) + (b̄ − ρ_c)) − F/(√ā + √b̄)] (ā − b̄)/(a − b),
 ///   ā, b̄ at most ρ_c
 ///
-/// Errors: as for V; for S and Q_S up to 8 ε more; for the other kinds a few ε of the terms, whose differences go to
+/// Errors: as for V; for S and Q_S up to 8 ε more; for the other kinds a few ε of the terms; their differences go to
 /// zero at the cutoff. Sources: Toxvaerd, Dyre, J. Chem. Phys. 134 (2011) 081102 (shifted forces); Steinbach, Brooks,
 /// J. Comput. Chem. 15 (1994) 667 (switching).
 template <Potential P>

@@ -53,7 +53,7 @@ class DampedCoulomb {
     const T difference = (upper - lower) / (r + s);  // s − r without cancellation
     const T erfc_r = elementary::erfc(alpha_ * r), erfc_s = elementary::erfc(alpha_ * s);
     const T m = 0.5 * alpha_ * (r + s), d = 0.5 * alpha_ * difference;
-    T mean = mean_by_series(m, d);  // of e^(−α²t²) over [r, s]
+    T mean = mean_by_series(m, d);  // mean of e^(−α²t²) over [r, s]
     const auto wide = !((d < 0.015) & (m * d < 0.02));
     if (elementary::any(wide)) {
       const auto near = (d < 0.25) & (m * d < 0.5);

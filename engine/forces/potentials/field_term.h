@@ -77,7 +77,7 @@ class FieldTerm final : public Interaction<D> {
   double reach(const Particles<D>&, Communicator&) const override { return 0; }
 
  private:
-  static constexpr double kForceFraction = 0x1p-8;  // so that accelerations of light particles keep their digits
+  static constexpr double kForceFraction = 0x1p-8;  // small, so that accelerations of light particles keep their digits
 
   const Particles<D>& particles_;
   Field field_;

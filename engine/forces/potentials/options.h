@@ -153,7 +153,7 @@ Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, PairWeight wei
     refuse(type, "the long-range correction diverges: V falls off too slowly; leave 'tail' out");
   const SpeciesPair species = species_pair(type, parameters, context.species);
   struct Sums {
-    std::array<ExactSum, 2> weight;  // of either species
+    std::array<ExactSum, 2> weight;  // sum of weights for either species
     void add(const Sums& other) {
       for (int k = 0; k < 2; ++k) weight[k].add(other.weight[k]);
     }

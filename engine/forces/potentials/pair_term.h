@@ -139,7 +139,7 @@ class PairTerm final : public Interaction<D> {
     constexpr double kNoLimit = std::numeric_limits<double>::infinity();  // for forces that are not requested
     PairUnits units{.limits = {kNoLimit, kNoLimit}};
     if (sums) units.per_energy = 1 / sums->quantum;
-    PairTotals totals[2];  // of pairs of own particles, and of pairs shared with another rank
+    PairTotals totals[2];  // for pairs of own particles, and pairs shared with another rank
     std::uint64_t own = 0;
     ForceWords* low = nullptr;
     pairs_.batches(step(given), particles_, cutoff_squared(), *batch_, [&](bool shared) {
@@ -170,7 +170,7 @@ class PairTerm final : public Interaction<D> {
     return own;
   }
 
-  /// Names the pair of the batch with the largest force, or one whose force is NaN.
+  /// Names the pair of the batch with the largest force, or one with a NaN force.
   [[noreturn]] void refuse() const {
     unsigned worst = 0;
     double largest = -1, apart = 0;

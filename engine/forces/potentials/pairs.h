@@ -79,7 +79,7 @@ class Bonds {
   double reach(const Particles<D>& block, Communicator& ranks) const {
     const Id first = block.size() > 0 ? block.id_of(0) : 0;
     const auto here = [&](Id id) { return id >= first && id - first < block.size(); };
-    std::vector<std::pair<Id, Vec<D>>> higher;  // bonded partners whose lower partner is on another rank
+    std::vector<std::pair<Id, Vec<D>>> higher;  // upper partners of bonds, if the lower one is on another rank
     for (const auto& [i, j] : pairs_)
       if (!here(i) && here(j)) higher.emplace_back(j, block.x[j - first]);
     std::unordered_map<Id, Vec<D>> elsewhere;
@@ -146,11 +146,11 @@ class Bonds {
     return shift;
   }
 
-  static constexpr double kMaxBondLength = 0.48;  // of a bond along a periodic axis [edge]
+  static constexpr double kMaxBondLength = 0.48;  // longest bond along a periodic axis [edge]
 
   const Box<D>& box_;
   PairList pairs_;
-  mutable PairList shared_;  // with other ranks, set by batches()
+  mutable PairList shared_;  // bonds shared with other ranks, set by batches()
   std::span<const Id> ids_;  // the particles' global ids; empty: pairs_ has them
   std::size_t most_partners_ = 0;
 };
@@ -189,7 +189,7 @@ class AllPairs {
   void arrange(const Particles<D>& particles) const {
     ghost_ = particles.ghost;
     records_.clear();
-    std::vector<std::uint32_t> end;  // of each group: by species, then own particles before ghosts
+    std::vector<std::uint32_t> end;  // ends of groups: by species, then own particles before ghosts
     const bool apart = !filter_.species.all() && filter_.species.a != filter_.species.b;
     for (const std::uint64_t code : {PartnerSearch::kFirst, PartnerSearch::kSecond})
       for (const bool owned : {true, false}) {

@@ -33,7 +33,7 @@ concept Potential = requires(const P potential, double rho) {
   { potential.quotient(rho, rho) } -> std::same_as<double>;
 };
 
-/// A potential whose four functions are zero beyond `cutoff_squared()`.
+/// A potential with all four functions zero beyond `cutoff_squared()`.
 template <class P>
 concept ShortRanged = Potential<P> && requires(const P potential) {
   { potential.cutoff_squared() } -> std::same_as<double>;
