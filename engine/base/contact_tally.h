@@ -16,7 +16,7 @@ struct ContactTally {
   std::uint64_t sphere_wall = 0;    ///< executed wall collisions
   double max_overlap = 0;           ///< deepest overlap at a contact, relative to the contact distance
   ExactSum collision_virial;        ///< Σ d·impulse over pair collisions [mass·length²/time]
-  ExactSum wall_work;               ///< done on spheres by walls that move [energy]
+  ExactSum wall_work;               ///< work done on spheres by moving walls [energy]
 
   std::uint64_t contacts() const { return sphere_sphere + sphere_wall; }
   /// `virial`: the virial of a pair, or the work of a wall.

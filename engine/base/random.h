@@ -56,7 +56,7 @@ class RandomStream {
 
   /// Uniform in 0 … n − 1, n > 0. (Lemire, ACM Trans. Model. Comput. Simul. 29 (2019) 3.)
   std::uint32_t below(std::uint32_t n) {
-    const std::uint32_t unfair = -n % n;  // 2^32 mod n low products would occur once more than others
+    const std::uint32_t unfair = -n % n;  // rejects 2^32 mod n low products, which occur too often
     while (true) {
       const std::uint64_t product = (bits() >> 32) * n;
       if (static_cast<std::uint32_t>(product) >= unfair) return static_cast<std::uint32_t>(product >> 32);

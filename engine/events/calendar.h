@@ -87,7 +87,6 @@ class Calendar {
     }
   }
 
-  /// Removes the entry that top() returned.
   void pop() {
     if (from_heap_)
       present_.pop();
@@ -114,7 +113,7 @@ class Calendar {
     bool operator()(const CalendarEntry& a, const CalendarEntry& b) const { return b.time < a.time; }
   };
   static constexpr std::uint32_t kNone = 0xffffffff;
-  static constexpr std::uint32_t kChunk = 16;  // entries: three cache lines
+  static constexpr std::uint32_t kChunk = 16;  // entries of a chunk: three cache lines
   static constexpr int kBins = 2048;
   struct Chunk {
     CalendarEntry entry[kChunk];
@@ -258,7 +257,7 @@ class Calendar {
   PageVector<Chunk> chunks_;
   std::vector<std::uint32_t> next_;  // by chunk: the previous chunk of its bin, or the next free chunk
   std::uint32_t free_ = kNone;
-  Bin later_;  // beyond the ring
+  Bin later_;  // entries beyond the ring
 
   std::vector<CalendarEntry> sorted_, scratch_;  // the open bin
   std::vector<std::uint32_t> bucket_, which_;

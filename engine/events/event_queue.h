@@ -61,7 +61,6 @@ class EventQueue {
 
   /// Removes and returns the next event before `end`; false if there is none.
   bool next(double end, Slot& slot, double& time);
-  /// As in Calendar.
   const CalendarEntry* upcoming(std::size_t ahead) const { return calendar_.upcoming(ahead); }
 
   /// Whether the partner has collided since the contact was planned.

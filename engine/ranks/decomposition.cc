@@ -14,7 +14,7 @@
 namespace carom {
 namespace {
 
-constexpr std::int64_t kSlabsPerDivision = 64;  // between divisions while all are known
+constexpr std::int64_t kSlabsPerDivision = 64;  // while all ranks have all particles
 constexpr double kMaxKnownFraction = 0.9;       // if a rank would get more of all particles, all ranks get all
 
 }  // namespace

@@ -40,7 +40,6 @@ class Subdomain {
 
   // Between windows: no event before the time `now` may be pending.
 
-  /// All own spheres.
   std::vector<Slot> own() const { return ownership_.own(); }
   const Flights<D>& flights() const { return core_.flights(); }
   /// Updates ownership and ghosts here and elsewhere, and removes spheres that are neither own nor ghosts. Calls
@@ -60,11 +59,9 @@ class Subdomain {
   /// cut it before that. Returns `end`, or the time of the first event for which the log has no room; the window is
   /// then invalid too.
   double run(double now, double end);
-  /// Appends the path of a sphere to a message.
   void write_path(Slot i, Bytes& to) const { paths_.write(i, to); }
   /// Reads the script of a ghost; the message must stay until the end of the window.
   void follow(Id id, Reader& message) { paths_.read_script(slot_of(id), message); }
-  /// Repairs the window after scripts were received.
   void repair() { changed_ = repair_.run(); }
   /// The events of a sphere in the window.
   std::span<const Node<D>> path(Slot i) { return paths_.path(i); }

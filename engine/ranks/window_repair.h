@@ -22,7 +22,6 @@ class WindowRepair {
 
   /// Makes room for this many slots.
   void load(std::size_t slots) { repair_of_.assign(slots, kNone); }
-  /// Starts a window that ends at `end`.
   void start(double end) {
     end_ = end;
     fastest_squared_ = 0;

@@ -65,7 +65,7 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
     return true;
   };
   std::size_t subdomains = subdomains_;
-  while (!divide(subdomains)) subdomains -= (subdomains + 7) / 8;  // the box is too small for so many
+  while (!divide(subdomains)) subdomains -= (subdomains + 7) / 8;  // the box is too small for so many subdomains
   if (subdomains < subdomains_) make_subdomain(subdomains);
   exchange_.start(*bisection_);
   load(instants ? instants->now : 0, [&](auto&& add) {

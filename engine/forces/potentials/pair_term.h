@@ -136,7 +136,7 @@ class PairTerm final : public Interaction<D> {
                            : !given.vectors.empty() ? formula.hessian_product
                            : given.x_new.empty()    ? formula.forces
                                                     : formula.mean_forces;
-    constexpr double kNoLimit = std::numeric_limits<double>::infinity();  // for forces that are not requested
+    constexpr double kNoLimit = std::numeric_limits<double>::infinity();  // used without forces
     PairUnits units{.limits = {kNoLimit, kNoLimit}};
     if (sums) units.per_energy = 1 / sums->quantum;
     PairTotals totals[2];  // for pairs of own particles, and pairs shared with another rank

@@ -230,7 +230,6 @@ class AllPairs {
   mutable std::vector<char> ghost_;
 };
 
-/// The pairs within a cutoff.
 template <int D>
 class PairsWithinCutoff {
  public:

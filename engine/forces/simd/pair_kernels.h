@@ -14,7 +14,6 @@
 
 namespace carom {
 
-/// Data of one particle.
 struct alignas(32) PairRecord {
   double x, y, z, w;
 };
