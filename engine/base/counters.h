@@ -20,8 +20,8 @@ struct Counters : ContactTally {
   std::uint64_t frozen = 0;        ///< edda: particles that kept the acceleration of an earlier sweep
   double folded = 0;               ///< edda: Σ|r|, the energy errors folded into velocities [energy]
   std::uint64_t divisions = 0;     ///< times that particles were divided among ranks (methods with forces)
-  std::uint64_t slabs_again = 0;   ///< slabs repeated with more ghosts
-  std::uint64_t slabs_by_all = 0;  ///< slabs repeated with all particles on each rank
+  std::uint64_t slabs_again = 0;   ///< slabs repeated with more ghosts or all particles
+  std::uint64_t slabs_by_all = 0;  ///< slabs repeated with all particles
   EventCounts events;              ///< counts of the event core at the end of the last slab; 0 if the method has none
   WindowCounts windows;            ///< counts of this rank's subdomain; 0 if there is only one subdomain
 
