@@ -10,23 +10,23 @@ namespace carom {
 
 namespace {
 
-constexpr std::size_t kPiece = std::size_t{1} << 30;  // bytes of one message, at most
-constexpr std::size_t kFirst = std::size_t{1} << 15;  // bytes that go with the first message among neighbours
+constexpr std::size_t kMaxMessage = std::size_t{1} << 30;    // bytes of one message, at most
+constexpr std::size_t kFirstMessage = std::size_t{1} << 15;  // bytes sent with the first message between neighbours
 enum Tag : int { data, fold, step, first };
 
 int bytes(std::size_t count) { return static_cast<int>(count); }
 
-/// Starts to send or receive a message in as many pieces as it takes.
+/// Starts to send or receive a message in as many pieces as necessary.
 template <class Start>
 void in_pieces(std::size_t size, Start&& start) {
-  for (std::size_t at = 0; at < size; at += kPiece) start(at, bytes(std::min(kPiece, size - at)));
+  for (std::size_t at = 0; at < size; at += kMaxMessage) start(at, bytes(std::min(kMaxMessage, size - at)));
 }
 
 }  // namespace
 
-/// By recursive doubling: log2 P messages, each of which is waited for; meanwhile failures are looked for.
-/// (MPI_Allreduce cannot be left; MPI_Iallreduce takes thrice as long.) The value of the lower rank comes first, so
-/// that all get the same bits.
+/// Recursive doubling: log2 P exchanges, each waited for with polls for failures. (A blocking MPI_Allreduce cannot be
+/// left; MPI_Iallreduce takes three times as long.) The value of the lower rank comes first, so that all ranks get the
+/// same bits.
 void MpiCommunicator::combine(std::span<double> most, std::span<std::uint64_t> sums) {
   ranks_.watch().begin_call();
   mine_.assign(sums.begin(), sums.end());
@@ -42,12 +42,12 @@ void MpiCommunicator::combine(std::span<double> most, std::span<std::uint64_t> s
   const auto larger = [](std::uint64_t a, std::uint64_t b) {
     return std::bit_cast<std::uint64_t>(std::max(std::bit_cast<double>(a), std::bit_cast<double>(b)));
   };
-  const auto take_in = [&](bool mine_first) {
+  const auto combine_received = [&](bool mine_first) {
     if (!mine_first) mine_.swap(theirs_);
     for (std::size_t k = 0; k < mine_.size(); ++k)
       mine_[k] = k < sums.size() ? mine_[k] + theirs_[k] : larger(mine_[k], theirs_[k]);
   };
-  // Ranks beyond the largest power of two give their values to one below, and get the result from it.
+  // Ranks beyond the largest power of two send their values to a rank below it, which sends the result back.
   int whole = 1;
   while (2 * whole <= size) whole *= 2;
   if (rank >= whole) {
@@ -57,11 +57,11 @@ void MpiCommunicator::combine(std::span<double> most, std::span<std::uint64_t> s
   } else {
     if (rank + whole < size) {
       swap_with(rank + whole, fold, false, true);
-      take_in(true);
+      combine_received(true);
     }
     for (int bit = 1; bit < whole; bit *= 2) {
       swap_with(rank ^ bit, step, true, true);
-      take_in((rank & bit) == 0);
+      combine_received((rank & bit) == 0);
     }
     if (rank + whole < size) swap_with(rank + whole, fold, true, false);
   }
@@ -106,7 +106,7 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing) {
   return incoming;
 }
 
-/// The first message to a neighbour has the length, and as much of the data as fits; few need a second one.
+/// The first message to a neighbour has the length and as much of the data as fits; few need a second message.
 std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<const int> partners) {
   ranks_.watch().begin_call();
   outgoing_ = std::move(outgoing);
@@ -121,8 +121,8 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<
     Bytes &in = first_in_[k], &out = first_out_[k];
     out.clear();
     put(out, std::uint64_t{all.size()});
-    out.insert(out.end(), all.begin(), all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size(), kFirst)));
-    in.resize(sizeof(std::uint64_t) + kFirst);
+    out.insert(out.end(), all.begin(), all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size(), kFirstMessage)));
+    in.resize(sizeof(std::uint64_t) + kFirstMessage);
     MPI_Irecv(in.data(), bytes(in.size()), MPI_BYTE, partners[k], first, ranks_.handle(), next());
     MPI_Isend(out.data(), bytes(out.size()), MPI_BYTE, partners[k], first, ranks_.handle(), next());
   }
@@ -132,14 +132,14 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<
     Reader reader(first_in_[k]);
     Bytes &in = incoming_[k], &out = outgoing_[k];
     in.resize(reader.get<std::uint64_t>());
-    if (!in.empty()) std::memcpy(in.data(), reader.skip(0), std::min(in.size(), kFirst));
-    if (in.size() > kFirst)
-      in_pieces(in.size() - kFirst, [&](std::size_t at, int count) {
-        MPI_Irecv(in.data() + kFirst + at, count, MPI_BYTE, partners[k], data, ranks_.handle(), next());
+    if (!in.empty()) std::memcpy(in.data(), reader.skip(0), std::min(in.size(), kFirstMessage));
+    if (in.size() > kFirstMessage)
+      in_pieces(in.size() - kFirstMessage, [&](std::size_t at, int count) {
+        MPI_Irecv(in.data() + kFirstMessage + at, count, MPI_BYTE, partners[k], data, ranks_.handle(), next());
       });
-    if (out.size() > kFirst)
-      in_pieces(out.size() - kFirst, [&](std::size_t at, int count) {
-        MPI_Isend(out.data() + kFirst + at, count, MPI_BYTE, partners[k], data, ranks_.handle(), next());
+    if (out.size() > kFirstMessage)
+      in_pieces(out.size() - kFirstMessage, [&](std::size_t at, int count) {
+        MPI_Isend(out.data() + kFirstMessage + at, count, MPI_BYTE, partners[k], data, ranks_.handle(), next());
       });
   }
   if (!requests.empty()) ranks_.watch().wait(requests);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Communicator among the ranks of a World, by MPI.
+// The MPI implementation of Communicator, for the ranks of a World.
 //
-// Waits look for failures of others (parallel/watch.h) and throw RankFailure or SilentRanks; messages may arrive after
-// that, so the object must outlive World::on_all(). They may be of any length: MPI's limit of 2^31 bytes does
-// not show.
+// Waits poll for failures of other ranks (parallel/watch.h) and throw RankFailure or SilentRanks. Messages may still
+// arrive afterwards, so the object must outlive World::on_all(). Messages can have any length: long ones are split to
+// stay below MPI's limit of 2^31 bytes.
 
 #include "engine/ranks/communicator.h"
 #include "parallel/world.h"
@@ -13,7 +13,7 @@ namespace carom {
 
 class MpiCommunicator : public Communicator {
  public:
-  /// Keeps a reference. There are several ranks.
+  /// Stores a reference. Requires several ranks.
   explicit MpiCommunicator(const World& ranks) : ranks_(ranks) {}
 
   int rank() const override { return ranks_.rank(); }
@@ -27,11 +27,11 @@ class MpiCommunicator : public Communicator {
   std::vector<Bytes> trade(const std::function<const Bytes&(std::size_t)>& outgoing);
 
   const World& ranks_;
-  // Where messages arrive; what leaves in swap().
+  // Buffers of received messages, and of messages sent by swap().
   std::vector<std::uint64_t> leaving_, coming_;
   std::vector<Bytes> incoming_, outgoing_;
-  std::vector<Bytes> first_in_, first_out_;   // the first messages among neighbours
-  std::vector<std::uint64_t> mine_, theirs_;  // values that are combined
+  std::vector<Bytes> first_in_, first_out_;   // the first messages between neighbours
+  std::vector<std::uint64_t> mine_, theirs_;  // values to combine
 };
 
 }  // namespace carom

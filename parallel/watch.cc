@@ -17,12 +17,12 @@ namespace carom {
 
 namespace {
 
-constexpr int kSpins = 200;           // polls before anything else is looked at
-constexpr double kShortRest = 1e-3;   // seconds, while others work
-constexpr double kLongRest = 50e-3;   // while there is nothing left to do
+constexpr int kSpins = 200;           // polls before the timer and the notices are checked
+constexpr double kShortPause = 1e-3;  // seconds, while other ranks work
+constexpr double kLongPause = 50e-3;  // seconds, when this rank has finished
 constexpr double kQueryAgain = 0.1;   // seconds between queries to ranks that have not ended
 constexpr double kTimeToAnswer = 2;   // seconds
-constexpr double kLongestNotice = 1;  // seconds between two polls; more, and the process was not running
+constexpr double kMaxPollGap = 1;     // seconds between two polls; longer gaps mean that the process was not running
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -38,14 +38,14 @@ void flush_all() {
 
 }  // namespace
 
-double Patience::waited() {
+double WaitTimer::waited() {
   const double time = now();
-  if (last_ >= 0) waited_ += std::min(time - last_, kLongestNotice);
+  if (last_ >= 0) waited_ += std::min(time - last_, kMaxPollGap);
   last_ = time;
   return waited_;
 }
 
-void Patience::rest(double longest) const {
+void WaitTimer::pause(double longest) const {
   const double seconds = std::min(waited_ / 100, longest);
   if (seconds < 1e-5)
     sched_yield();
@@ -117,7 +117,7 @@ void Watch::process(int from, const Notice& notice) {
   }
 }
 
-/// Sends a question to all that have not ended.
+/// Sends a question to all ranks that have not ended.
 void Watch::query_ranks() {
   for (int r = 0; r < size_; ++r)
     if (r != rank_ && !states_[static_cast<std::size_t>(r)].outcome) send(r, Kind::question);
@@ -133,29 +133,29 @@ void Watch::wait(std::span<MPI_Request> requests) {
   };
   for (int i = 0; i < kSpins; ++i)
     if (complete()) return;
-  Patience patience, since_failure;
+  WaitTimer timer, since_failure;
   while (!complete()) {
     receive_notices();
     if (failed_) {
-      // A rank that failed after this call lets it complete.
+      // A rank that failed after this call still completes it.
       const State& state = states_[static_cast<std::size_t>(*failed_)];
       if (state.calls < calls_ || since_failure.waited() > kGrace)
         throw RankFailure(names({&*failed_, 1}) + ": " + state.outcome->failure);
     }
-    if (const double waited = patience.waited(); silence_ > 0 && waited > silence_) {
+    if (const double waited = timer.waited(); silence_ > 0 && waited > silence_) {
       if (const std::string silence = silence_of(complete); !silence.empty()) throw SilentRanks(silence);
       return;
     }
-    patience.rest(kShortRest);
+    timer.pause(kShortPause);
   }
 }
 
-/// Names the silent ranks; empty where the wait ends meanwhile: ranks that answer may have come just now.
+/// Names the silent ranks; empty if is_over() becomes true, as the missing answers may arrive meanwhile.
 std::string Watch::silence_of(const std::function<bool()>& is_over) {
   for (State& state : states_) state.answered = false;
   query_ranks();
   std::vector<int> silent;
-  for (Patience patience; patience.waited() < kTimeToAnswer; patience.rest(kShortRest)) {
+  for (WaitTimer timer; timer.waited() < kTimeToAnswer; timer.pause(kShortPause)) {
     if (is_over()) return {};
     receive_notices();
     silent.clear();
@@ -173,19 +173,19 @@ std::string Watch::silence_of(const std::function<bool()>& is_over) {
 
 // ---- Ending ----
 
-int Watch::settle(const Outcome& mine, bool alone) {
-  // Output comes first: when another rank ends with an error, mpirun ends the rest.
+int Watch::finish(const Outcome& mine, bool alone) {
+  // Output is flushed first: when another rank ends with an error, mpirun ends the rest.
   flush_all();
-  return rank_ == 0 ? settle_first(mine, alone) : settle_other(mine, alone);
+  return rank_ == 0 ? finish_first(mine, alone) : finish_other(mine, alone);
 }
 
-int Watch::settle_first(const Outcome& mine, bool alone) {
+int Watch::finish_first(const Outcome& mine, bool alone) {
   const auto end = [this](const Outcome& outcome) {
     states_[0] = {.calls = calls_, .outcome = outcome};
     if (!failed_ && !outcome.failure.empty()) failed_ = 0;
   };
   end(mine);
-  Patience patience, since_failure;
+  WaitTimer timer, since_failure;
   double query_next = 0;
   const auto all_ended = [&] {
     return std::all_of(states_.begin(), states_.end(), [](const State& state) { return state.outcome.has_value(); });
@@ -199,14 +199,14 @@ int Watch::settle_first(const Outcome& mine, bool alone) {
         query_ranks();
         query_next = waited + kQueryAgain;
       }
-    } else if (silence_ > 0 && patience.waited() > silence_) {
+    } else if (silence_ > 0 && timer.waited() > silence_) {
       const std::string silence = silence_of(all_ended);
       if (silence.empty()) continue;
       end({kFault, silence});
       break;
     }
-    patience.waited();
-    patience.rest(kLongRest);
+    timer.waited();
+    timer.pause(kLongPause);
   }
 
   const int code = states_[static_cast<std::size_t>(failed_.value_or(0))].outcome->code;
@@ -218,24 +218,24 @@ int Watch::settle_first(const Outcome& mine, bool alone) {
   return code;
 }
 
-int Watch::settle_other(const Outcome& mine, bool alone) {
+int Watch::finish_other(const Outcome& mine, bool alone) {
   verdict_.reset();
   send(0, Kind::ended, mine);
-  Patience patience;
+  WaitTimer timer;
   for (receive_notices(); !verdict_; receive_notices()) {
-    const double waited = patience.waited();
+    const double waited = timer.waited();
     if (!mine.failure.empty()) {
       if (waited > 2 * kGrace) abort(mine.code, "carom: " + names({&rank_, 1}) + ": " + mine.failure);
     } else if (!alone && silence_ > 0 && waited > silence_) {
       const std::string silence = silence_of([&] { return verdict_.has_value(); });
       if (!silence.empty()) abort(kFault, "carom: " + names({&rank_, 1}) + ": " + silence);
     }
-    patience.rest(kLongRest);
+    timer.pause(kLongPause);
   }
   return *verdict_;
 }
 
-/// Whether a rank is in a call that one of the failed has not made.
+/// Whether a rank waits in a call that a failed rank has not made.
 bool Watch::some_wait_never_ends() const {
   auto last_call = std::numeric_limits<std::uint64_t>::max();
   for (const State& state : states_)
@@ -244,7 +244,7 @@ bool Watch::some_wait_never_ends() const {
                      [&](const State& state) { return !state.outcome && state.answered && state.calls > last_call; });
 }
 
-/// What has failed, a line each; ranks that have failed alike in one.
+/// The failures, one line each; ranks with the same failure share a line.
 std::string Watch::account(bool alone) const {
   const auto beginning = [](const std::string& text) {
     return text.substr(0, std::tuple_size_v<decltype(Notice::failure)> - 1);

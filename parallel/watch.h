@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// How ranks wait for each other, and how they end together when one of them cannot go on.
+// Waits between ranks, and the common end of all ranks when one of them fails.
 //
-// A rank that waits polls for notices of other ranks meanwhile. A rank that fails sends a notice to rank 0, which
-// queries the others. Where one of them waits in a call that the failed rank will never make, the failure is not common
-// to all: rank 0 leaves its work (RankFailure), closes its files, names the rank and ends all. Where all have failed
-// alike (a bad deck, a step that cannot be done) it is reported once, and all return its exit code. A rank that does
-// not answer within kGrace, because it computes or is stopped, is not waited for.
+// A waiting rank polls for notices from other ranks. A rank that fails sends a notice to rank 0, which queries the
+// others. If one of them waits in a call that the failed rank will never make, the failure is not common to all: rank 0
+// leaves its work (RankFailure), closes its files, names the failed rank and ends all ranks. If all ranks failed in the
+// same way (a bad deck, an impossible step), the error is reported once and all return its exit code. Rank 0 waits at
+// most kGrace for ranks that do not answer because they compute or are stopped.
 //
-// Where a wait lasts longer than the silence allowed, the rank that waits queries the others; those that do not answer
-// are the silent ones. Time in which the process itself does not run does not count: a job may be suspended as a whole.
+// If a wait lasts longer than the allowed silence, the waiting rank queries the others and names the ranks that do not
+// answer. Time in which the process does not run is not counted: a whole job may be suspended.
 
 #include <mpi.h>
 
@@ -30,28 +30,28 @@ class RankFailure : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The ranks that the message names do not answer.
+/// Some ranks do not answer; the message names them.
 class SilentRanks : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Exit code of a fault that is not the deck's: of the program, of its memory, of a rank that is lost.
+/// Exit code for faults that are not errors of the deck or files: bugs, lack of memory, lost ranks.
 constexpr int kFault = 70;
 
-/// How the work of a rank has ended.
+/// The end of a rank's work.
 struct Outcome {
   int code = 0;
-  std::string failure{};  ///< why it failed; empty: it has not
-  bool left = false;      ///< it left a call in which it waited for others
+  std::string failure{};  ///< why it failed; empty if it did not
+  bool left = false;      ///< it left a call in which it waited for other ranks
 };
 
-/// The length of a wait [seconds], as far as this process was running meanwhile.
-class Patience {
+/// The length of a wait [seconds], without time in which this process did not run.
+class WaitTimer {
  public:
-  /// To be called again and again; the length so far.
+  /// The length so far; must be called regularly.
   double waited();
-  /// Lets others run: for a hundredth of the wait so far, at most `longest`.
-  void rest(double longest) const;
+  /// Leaves the processor to others for a hundredth of the wait so far, at most `longest`.
+  void pause(double longest) const;
 
  private:
   double last_ = -1, waited_ = 0;
@@ -61,35 +61,36 @@ class Watch {
  public:
   static constexpr double kGrace = 5;  ///< seconds
 
-  /// Collective. `silence`: seconds after which ranks that do not answer are given up; 0: never.
+  /// Collective. `silence`: seconds after which ranks that do not answer count as lost; 0: never.
   Watch(MPI_Comm world, double silence);
   ~Watch();
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// To be called at the beginning of each collective call of the work, so that ranks can compare how far they are.
+  /// Call at the beginning of each collective call, so that ranks can compare their progress.
   void begin_call() { ++calls_; }
 
-  /// Waits until all are complete. Throws RankFailure where another rank will never come, and SilentRanks.
+  /// Waits until all requests are complete. Throws RankFailure if they depend on a failed rank, or SilentRanks.
   void wait(std::span<MPI_Request> requests);
 
-  /// Collective: ends a piece of work together. Returns the exit code of the first rank that failed, or of rank 0. Does
-  /// not return (MPI_Abort) where some cannot be reached any more. `alone`: rank 0 works, for any time.
-  int settle(const Outcome& mine, bool alone);
+  /// Ends the work of all ranks together; collective. Returns the exit code of the first rank that failed, or of rank
+  /// 0. If some ranks cannot be reached, it calls MPI_Abort and does not return. `alone`: only rank 0 works, for any
+  /// length of time.
+  int finish(const Outcome& mine, bool alone);
 
  private:
   enum class Kind : int { question, answer, ended, verdict };
   struct Notice {
     Kind kind;
     int code;
-    std::uint64_t calls;               ///< that the sender has begun
-    std::array<char, 2000> failure{};  ///< its beginning
+    std::uint64_t calls;               ///< collective calls begun by the sender
+    std::array<char, 2000> failure{};  ///< the beginning of the message
   };
   struct Sent {
     Notice notice;
     MPI_Request request = MPI_REQUEST_NULL;
   };
-  /// What is known of a rank.
+  /// The last known state of a rank.
   struct State {
     std::uint64_t calls = 0;
     bool answered = false;
@@ -103,8 +104,8 @@ class Watch {
   void query_ranks();
   bool some_wait_never_ends() const;
   std::string silence_of(const std::function<bool()>& is_over);
-  int settle_first(const Outcome& mine, bool alone);
-  int settle_other(const Outcome& mine, bool alone);
+  int finish_first(const Outcome& mine, bool alone);
+  int finish_other(const Outcome& mine, bool alone);
   std::string account(bool alone) const;
   std::string names(std::span<const int> ranks) const;
   [[noreturn]] void abort(int code, const std::string& message) const;
@@ -113,9 +114,9 @@ class Watch {
   int rank_ = 0, size_ = 1;
   double silence_;
   std::uint64_t calls_ = 0;
-  std::vector<State> states_;   ///< by rank; outcomes are sent to rank 0 only
-  std::optional<int> failed_;   ///< the rank with the first notice of a failure
-  std::optional<int> verdict_;  ///< of rank 0
+  std::vector<State> states_;   ///< by rank; only rank 0 receives outcomes
+  std::optional<int> failed_;   ///< rank with the first notice of a failure
+  std::optional<int> verdict_;  ///< exit code sent by rank 0
   Notice incoming_{};
   MPI_Request receive_ = MPI_REQUEST_NULL;
   std::list<Sent> sent_;

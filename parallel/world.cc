@@ -33,14 +33,14 @@ Outcome outcome_of(const std::function<int()>& work) {
   }
 }
 
-/// Whether a launcher has started this process, perhaps with others.
+/// Whether a launcher started this process, perhaps with others.
 bool launched() { return std::getenv("PMIX_RANK") != nullptr || std::getenv("PMI_RANK") != nullptr; }
 
-/// Ends the process where MPI takes longer than the silence allowed. MPI starts and ends in calls that wait for all
-/// ranks: nothing else can leave them when one is stopped.
+/// Ends the process if starting or ending MPI takes longer than the allowed silence. These calls wait for all ranks and
+/// cannot be left if one of them is stopped.
 class Guard {
  public:
-  /// `silence`: seconds; 0: never. `what`: does not begin or end.
+  /// `silence`: seconds; 0: never. `what`: "start" or "end", for the message.
   Guard(double silence, const char* what) {
     if (silence > 0) thread_ = std::jthread([=](const std::stop_token& over) { watch(over, silence, what); });
   }
@@ -50,7 +50,7 @@ class Guard {
     constexpr auto kBetweenLooks = std::chrono::milliseconds(100);
     std::mutex mutex;
     std::unique_lock lock(mutex);
-    for (Patience patience; patience.waited() <= silence;)
+    for (WaitTimer timer; timer.waited() <= silence;)
       if (std::condition_variable_any().wait_for(lock, over, kBetweenLooks, [] { return false; });
           over.stop_requested())
         return;
@@ -60,7 +60,7 @@ class Guard {
                  "allows longer waits\n",
                  rank != nullptr ? rank : "unknown", what, silence);
     std::fflush(stderr);
-    std::_Exit(kFault);  // the launcher ends the others
+    std::_Exit(kFault);  // the launcher ends the other ranks
   }
 
   std::jthread thread_;  // ends with the object
@@ -89,14 +89,14 @@ World::~World() {
 
 int World::on_all(const std::function<int()>& work) const {
   const Outcome outcome = outcome_of(work);
-  if (watch_) return watch_->settle(outcome, false);
+  if (watch_) return watch_->finish(outcome, false);
   if (!outcome.failure.empty()) std::fprintf(stderr, "%s\n", outcome.failure.c_str());
   return outcome.code;
 }
 
 int World::on_first(const std::function<int()>& work) const {
   if (!watch_) return on_all(work);
-  return watch_->settle(rank_ == 0 ? outcome_of(work) : Outcome{}, true);
+  return watch_->finish(rank_ == 0 ? outcome_of(work) : Outcome{}, true);
 }
 
 }  // namespace carom

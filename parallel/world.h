@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The ranks of a run: MPI started and ended with the life of one object.
+// The ranks of a run; one object starts MPI and, when destroyed, ends it.
 //
 //   World ranks(600);
 //   return ranks.on_all([&] { return simulate(deck, exchange); });
 //
-// Works under mpirun and as a single process alike: one that no launcher has started is the only rank and starts no
-// MPI, which would take longer than a small run. The engine knows nothing of it.
+// Works under mpirun and as a single process: without a launcher the process is the only rank and does not start MPI,
+// which would take longer than a small run. The engine does not depend on it.
 
 #include <mpi.h>
 
@@ -19,9 +19,9 @@ namespace carom {
 
 class World {
  public:
-  /// Where a launcher (mpirun, srun) has started this process, starts MPI (MPI_THREAD_FUNNELED) and duplicates the
-  /// world communicator. One object a process, once. `silence`: seconds after which ranks that work together give up
-  /// those that do not answer, and after which a start or end of MPI that still waits ends the process; 0: never.
+  /// If a launcher (mpirun, srun) started this process, starts MPI (MPI_THREAD_FUNNELED) and duplicates the world
+  /// communicator. Only one object may exist in a process. `silence`: seconds after which ranks that do not answer
+  /// count as lost, and after which the process ends if MPI cannot start or end; 0: never.
   explicit World(double silence = 0);
   ~World();
   World(const World&) = delete;
@@ -30,15 +30,15 @@ class World {
   int rank() const { return rank_; }
   int size() const { return size_; }
   MPI_Comm handle() const { return world_; }
-  /// To wait by; only where there are several ranks.
+  /// Waits between ranks; requires several ranks.
   Watch& watch() const { return *watch_; }
 
-  /// Runs `work` on all ranks, which may communicate in it. Returns the exit code of all: what it returns, or that of
-  /// the first failure. An exception is reported on stderr, once where all ranks meet the same Error, else with the
-  /// names of the ranks; ranks that cannot be reached are ended (MPI_Abort).
+  /// Runs `work` on all ranks, which may communicate in it. Returns the exit code of all: the value of `work`, or the
+  /// code of the first failure. Exceptions are reported on stderr, once if all ranks meet the same Error, otherwise
+  /// with the names of the ranks. Ranks that cannot be reached are ended (MPI_Abort).
   int on_all(const std::function<int()>& work) const;
 
-  /// Runs `work` on rank 0, while the others sleep. Otherwise the same.
+  /// Like on_all(), but runs `work` on rank 0 while the other ranks sleep.
   int on_first(const std::function<int()>& work) const;
 
  private:

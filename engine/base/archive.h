@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// State as bytes and back, by one list of what belongs to it.
+// Writes state to bytes and reads it back; one function `archive` lists the members for both directions.
 //
 //   struct Sums {
 //     std::uint64_t samples;
@@ -8,10 +8,10 @@
 //     void archive(Archive& archive) { archive(samples, of_bin); }
 //   };
 //   Archive out;             Archive in(out.bytes());
-//   sums.archive(out);       others.archive(in);         // now the same
+//   sums.archive(out);       others.archive(in);         // now `others` equals `sums`
 //
-// Plain values go byte by byte; vectors and arrays of them, or of what has a member `archive`, element by element. The
-// bytes are for the same program on a machine of the same kind.
+// Plain values are copied byte by byte; vectors and arrays element by element, also of types with a member `archive`.
+// Only the same program on the same kind of machine can read the bytes.
 
 #include <array>
 #include <cstdint>
@@ -28,9 +28,9 @@ namespace carom {
 
 class Archive {
  public:
-  /// Takes state.
+  /// An archive that is written to.
   Archive() = default;
-  /// Gives it back.
+  /// An archive that is read from.
   explicit Archive(Bytes bytes) : bytes_(std::move(bytes)), reading_(true) {}
 
   template <class... Values>
@@ -39,7 +39,7 @@ class Archive {
   }
   const Bytes& bytes() const { return bytes_; }
   bool more() const { return at_ < bytes_.size(); }
-  /// After all has been read: throws Error(Failure::file) if there is more.
+  /// Throws Error(Failure::file) if bytes are left after the last value has been read.
   void finish() const {
     if (at_ != bytes_.size()) mismatch();
   }

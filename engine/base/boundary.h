@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What bounds a box along an axis, and the declarations that make the kinds known by their names: decks, their schema,
-// messages and files take them from here. What a boundary does is in Box (box.h) and Wall (wall.h).
+// The kinds of boundary along an axis and their declarations, from which decks, their schema, messages and files take
+// the names. Box (box.h) and Wall (wall.h) implement what a boundary does.
 
 #include <cstdint>
 #include <string_view>
@@ -19,10 +19,10 @@ struct BoundaryInfo {
   std::string_view h5md;     ///< the word that H5MD has for it
 };
 
-/// Every boundary there is, in the order of the manual.
+/// All kinds of boundary, in the order of the manual.
 const std::vector<BoundaryInfo>& boundaries();
 
-/// The one of that name; throws Error(Failure::deck), which lists the names.
+/// The declaration of this boundary; throws Error(Failure::deck), which lists the names, if there is none.
 const BoundaryInfo& find_boundary(std::string_view name);
 const BoundaryInfo& find_boundary(Boundary boundary);
 

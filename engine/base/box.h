@@ -14,9 +14,9 @@ namespace carom {
 
 template <int D>
 struct Box {
-  Vec<D> edges = Vec<D>::Ones();  ///< [length]; under way, those at the start of the slab
+  Vec<D> edges = Vec<D>::Ones();  ///< [length]; within a slab: the edges at its start
   std::array<Boundary, D> boundary{};
-  Vec<D> edge_velocity = Vec<D>::Zero();  ///< of the upper walls along their axes [length/time]; not 0: a piston
+  Vec<D> edge_velocity = Vec<D>::Zero();  ///< upper walls, along their axes [length/time]; nonzero: a piston
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }
@@ -28,38 +28,39 @@ struct Box {
   }
   /// Whether some axis has this boundary.
   bool has(Boundary kind) const { return std::ranges::find(boundary, kind) != boundary.end(); }
-  /// The box as it is a time later.
+  /// The box after a time, with its pistons moved.
   Box after(double time) const {
     Box later = *this;
     for (int k = 0; k < D; ++k)
       if (piston(k)) later.edges[k] += edge_velocity[k] * time;
     return later;
   }
-  /// Whether all positions along the axis are between 0 and the edge, at any time.
+  /// Whether all positions along the axis stay between 0 and the edge at all times.
   bool bounded(int axis) const { return boundary[axis] != Boundary::open && !piston(axis); }
-  /// Whether it is so along all axes: then the box has a density.
+  /// Whether all axes are bounded, so that the box has a density.
   bool closed() const {
     for (int k = 0; k < D; ++k)
       if (!bounded(k)) return false;
     return true;
   }
-  /// The wall of that number, on an axis with walls.
+  /// The wall with this number; its axis must have walls.
   Wall<D> wall(Id number) const {
     const int axis = wall_axis(number);
     return number % 2 == 0 ? Wall<D>{axis, 1, 0, 0} : Wall<D>{axis, -1, edges[axis], -edge_velocity[axis]};
   }
-  /// All of them, by their numbers.
+  /// All walls, ordered by number.
   std::vector<Wall<D>> walls() const {
     std::vector<Wall<D>> all;
     for (Id number = 0; number < 2 * D; ++number)
       if (walled(wall_axis(number))) all.push_back(wall(number));
     return all;
   }
-  /// What counts as touching, anywhere in the box.
+  /// The gap below which spheres count as touching, anywhere in the box.
   GapTolerance gap_tolerance() const { return GapTolerance(edges.maxCoeff()); }
   double volume() const { return edges.prod(); }
 
-  /// The image of `d`, a difference of two positions, nearest to the origin: how many box edges to add on each axis.
+  /// The image that brings `d`, a difference of two positions, nearest to the origin: the number of edges to add on
+  /// each axis.
   Image<D> nearest_image(const Vec<D>& d) const {
     Image<D> image{};
     for (int k = 0; k < D; ++k)
@@ -68,7 +69,7 @@ struct Box {
     return image;
   }
 
-  /// The displacement that an image stands for.
+  /// The displacement of an image.
   Vec<D> shift(const Image<D>& image) const {
     Vec<D> s;
     for (int k = 0; k < D; ++k) s[k] = image[k] == 0 ? 0.0 : image[k] * edges[k];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Values as bytes, for messages and checkpoints: all readers are the same program on the same kind of machine.
+// Values as bytes for messages and checkpoints, which only the same program on the same kind of machine reads.
 
 #include <cstddef>
 #include <cstring>
@@ -32,7 +32,7 @@ class Reader {
     at_ += sizeof(T);
     return value;
   }
-  /// Where the next so many bytes stand, and goes on behind them.
+  /// Skips this many bytes; returns where they begin.
   const std::byte* skip(std::size_t bytes) { return std::exchange(at_, at_ + bytes); }
 
  private:

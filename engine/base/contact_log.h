@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A collision as observers see it.
+// A collision, as observers receive it.
 
 #include <compare>
 #include <string>
@@ -12,20 +12,21 @@ namespace carom {
 
 enum class EventKind : std::uint8_t { pair = 0, wall = 1 };
 
-/// Total order of events: the same on every machine and for every decomposition. `generation` orders what happens at
-/// one instant: 1 + the larger generation of the partners' records where these are of the same time, else 0.
+/// A total order of events, the same on every machine and for every decomposition. `generation` orders events at the
+/// same instant: it is 1 + the largest generation of the partners' records with the time of the event, or 0 if there is
+/// none.
 template <int D>
 struct EventKey {
   double time = 0;  ///< since the start of the slab or epoch
   std::uint32_t generation = 0;
   EventKind kind = EventKind::pair;
-  Id lo = 0;  ///< the lower id; at a wall: the particle
-  Id hi = 0;  ///< the higher id; at a wall: its number
+  Id lo = 0;  ///< the lower id; for a wall event the particle
+  Id hi = 0;  ///< the higher id; for a wall event the number of the wall
   Image<D> image{};
   auto operator<=>(const EventKey&) const = default;
 };
 
-/// The key of a contact between two spheres, the first at x_first − x_second + shift(image) from the second.
+/// The key of a contact between two spheres with separation x_first − x_second + shift(image).
 template <int D>
 EventKey<D> pair_key(double time, std::uint32_t generation, Id first, Id second, Image<D> image) {
   if (second < first) {
@@ -35,7 +36,7 @@ EventKey<D> pair_key(double time, std::uint32_t generation, Id first, Id second,
   return {.time = time, .generation = generation, .lo = first, .hi = second, .image = image};
 }
 
-/// Whether two events have the same partners, whenever they happen.
+/// Whether two events have the same partners, whatever their times.
 template <int D>
 bool same_partners(const EventKey<D>& a, const EventKey<D>& b) {
   return a.kind == b.kind && a.lo == b.lo && a.hi == b.hi && a.image == b.image;
@@ -53,11 +54,11 @@ std::string partners(const EventKey<D>& key) {
 template <int D>
 struct Contact {
   EventKey<D> key;
-  Vec<D> x_lo, x_hi;   ///< centres at contact [length]; x_hi is shifted to the image that is touched; at a wall: the
+  Vec<D> x_lo, x_hi;   ///< centres at contact [length], x_hi at the image that is touched; for a wall event x_hi is the
                        ///< point touched
-  Vec<D> impulse;      ///< given to `lo`, taken from `hi` [mass·length/time]
-  double virial = 0;   ///< (x_lo − x_hi)·impulse of a pair, as it was computed; of a wall its work [energy]
-  double overlap = 0;  ///< at contact, relative to the contact distance; where the method knows it
+  Vec<D> impulse;      ///< on `lo`; `hi` receives its negative [mass·length/time]
+  double virial = 0;   ///< pair: (x_lo − x_hi)·impulse as computed; wall: the work done on the sphere [energy]
+  double overlap = 0;  ///< at contact, relative to the contact distance, if the method computes it
 };
 
 }  // namespace carom

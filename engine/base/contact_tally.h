@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Executed contacts, counted: one account for all that execute them, which accounts of several ranks are added to.
+// Counts and sums over executed contacts. The tallies of several ranks can be added.
 
 #include <algorithm>
 #include <string>
@@ -14,12 +14,12 @@ namespace carom {
 struct ContactTally {
   std::uint64_t sphere_sphere = 0;  ///< executed pair collisions
   std::uint64_t sphere_wall = 0;    ///< executed wall collisions
-  double max_overlap = 0;           ///< deepest overlap met, relative to the contact distance
+  double max_overlap = 0;           ///< deepest overlap at a contact, relative to the contact distance
   ExactSum collision_virial;        ///< Σ d·impulse over pair collisions [mass·length²/time]
-  ExactSum wall_work;               ///< done on spheres by walls that move [energy]
+  ExactSum wall_work;               ///< work done on spheres by moving walls [energy]
 
   std::uint64_t contacts() const { return sphere_sphere + sphere_wall; }
-  /// `virial`: of a pair; of a wall its work.
+  /// `virial`: the virial of a pair, or the work of a wall.
   void add(EventKind kind, double virial, double overlap) {
     ++(kind == EventKind::pair ? sphere_sphere : sphere_wall);
     (kind == EventKind::pair ? collision_virial : wall_work).add(virial);
@@ -32,7 +32,7 @@ struct ContactTally {
     collision_virial.add(other.collision_virial);
     wall_work.add(other.wall_work);
   }
-  /// Counts a contact and appends it to `log`, unless that is null.
+  /// Counts a contact and appends it to `log` unless `log` is null.
   template <int D>
   void record(const Contact<D>& contact, std::vector<Contact<D>>* log) {
     add(contact.key.kind, contact.virial, contact.overlap);
@@ -40,8 +40,7 @@ struct ContactTally {
   }
 };
 
-/// Throws the error of a step that needs more contacts than it may; `last`: the partners of the last one, where they
-/// are known.
+/// Throws the error for a step with more contacts than `most`; `last` names the partners of the last one, if known.
 [[noreturn]] void throw_too_many_contacts(std::uint64_t most, const std::string& last = "");
 
 }  // namespace carom

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What an integrator counts while it works, and where its time went. None of it reaches the physics.
+// Counts and times of an integrator. They do not affect the results.
 
 #include <chrono>
 #include <cstdint>
@@ -12,25 +12,25 @@
 namespace carom {
 
 struct Counters : ContactTally {
-  double force_passes = 0;   ///< pair evaluations of forces and their kin / interacting pairs; energies not counted
+  double force_passes = 0;   ///< pair evaluations of forces and Hessian products / interacting pairs
   std::uint64_t sweeps = 0;  ///< iterations of implicit solves
-  std::uint64_t pieces = 0;  ///< edda: in which steps were solved; more than the steps where one was cut
+  std::uint64_t pieces = 0;  ///< edda: pieces in which steps were solved; more than the steps if any step was cut
   std::uint64_t slabs_halved = 0;
   std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; edda: searches for the highest frequency
-  std::uint64_t frozen = 0;        ///< edda: particles that kept an acceleration of an earlier sweep
-  double folded = 0;               ///< edda: Σ|r| of what was folded into velocities [energy]
-  std::uint64_t divisions = 0;     ///< of the particles among ranks under forces
-  std::uint64_t slabs_again = 0;   ///< done again, with more particles known
-  std::uint64_t slabs_by_all = 0;  ///< of these, with all particles known
-  EventCounts events;              ///< of the event core, at the end of the last slab; 0 where a method has none
-  WindowCounts windows;            ///< of the subdomains of this rank; 0 where there is one
+  std::uint64_t frozen = 0;        ///< edda: particles that kept the acceleration of an earlier sweep
+  double folded = 0;               ///< edda: Σ|r|, the energy errors folded into velocities [energy]
+  std::uint64_t divisions = 0;     ///< times that particles were divided among ranks (methods with forces)
+  std::uint64_t slabs_again = 0;   ///< slabs repeated with more ghosts or all particles
+  std::uint64_t slabs_by_all = 0;  ///< slabs repeated with all particles
+  EventCounts events;              ///< counts of the event core at the end of the last slab; 0 if the method has none
+  WindowCounts windows;            ///< counts of this rank's subdomain; 0 if there is only one subdomain
 
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;
   } seconds;
 };
 
-/// Adds the time from its construction to its destruction to a total, but for what others have measured meanwhile.
+/// Adds its lifetime to a total, without the time that nested stopwatches measure.
 class Stopwatch {
  public:
   explicit Stopwatch(double& total)
@@ -48,7 +48,7 @@ class Stopwatch {
   inline static thread_local Stopwatch* running_ = nullptr;
 
   double& total_;
-  double within_ = 0;  // measured by others
+  double within_ = 0;  // measured by nested stopwatches
   Stopwatch* outer_;
   std::chrono::steady_clock::time_point start_;
 };

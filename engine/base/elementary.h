@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Elementary functions with the same bits on every machine, of a double or of the lanes of a vector (lanes.h).
+// Elementary functions with the same bits on every machine, for a double or for the lanes of a vector (lanes.h).
 //
-// The C library picks its exp, log, … by the processor it finds (with or without fused multiply-add), so their last
-// bits differ from machine to machine; a chaotic run would follow. These are plain double arithmetic, compiled like the
-// rest of the engine. Errors, against 50-digit arithmetic over the whole range: below 1 ulp (exp, expm1, log,
-// log1p), 1.5 ulp (pow up to |y| = 50), 1.2 ulp (erfc). They neither set errno nor promise floating-point exceptions.
+// The C library chooses its exp, log, … by processor (with or without fused multiply-add), so the last bits differ
+// between machines, and a chaotic run amplifies the difference. These functions use plain double arithmetic, compiled
+// like the rest of the engine. Errors against 50-digit arithmetic over the whole range: below 1 ulp (exp, expm1, log,
+// log1p), 1.5 ulp (pow up to |y| = 50), 1.2 ulp (erfc). They do not set errno and guarantee no floating-point
+// exceptions.
 
 #include "engine/base/elementary_lanes.h"
 
@@ -24,7 +25,7 @@ double pow(double x, double y);
 /// Complementary error function, 2/√π ∫_x^∞ e^(−t²) dt, in full relative precision until it underflows near x = 27.2.
 double erfc(double x);
 
-// Of the lanes of a vector.
+// The overloads for the lanes of a vector.
 using formula::erfc;
 using formula::exp;
 using formula::expm1;

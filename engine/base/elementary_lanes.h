@@ -2,9 +2,9 @@
 #pragma once
 // The formulas of elementary.h, for a double or for the lanes of a vector: no branch depends on a lane.
 //
-// Method, the same for all: reduce the argument to a short interval, keep what rounding loses in a second double, and
-// sum the Taylor series there (exp: |r| ≤ ln 2 / 2; log: 2 artanh s, |s| ≤ 0.172). Muller, Elementary Functions, 3rd
-// ed., chapters 5 and 11; error-free sums and products: Dekker, Numer. Math. 18 (1971) 224.
+// All functions use the same method: reduce the argument to a short interval, keep the rounding error in a second
+// double, and sum the Taylor series there (exp: |r| ≤ ln 2 / 2; log: 2 artanh s, |s| ≤ 0.172). Muller, Elementary
+// Functions, 3rd ed., chapters 5 and 11; error-free sums and products: Dekker, Numer. Math. 18 (1971) 224.
 
 #include "engine/base/lanes.h"
 
@@ -13,7 +13,7 @@ namespace carom::elementary::formula {
 inline constexpr double kInfinity = __builtin_inf();
 inline constexpr double kNaN = __builtin_nan("");
 inline constexpr double kLog2e = 0x1.71547652b82fep+0;
-inline constexpr double kLn2Hi = 0x1.62e42fefa2000p-1;  // 40 bits: its product with any exponent is exact
+inline constexpr double kLn2Hi = 0x1.62e42fefa2000p-1;  // 40 bits, so that its product with any exponent is exact
 inline constexpr double kLn2Lo = 0x1.9ef35793c7673p-41;
 
 template <class T>
@@ -46,7 +46,7 @@ template <class T>
   return {p, ((x.hi * y.hi - p) + x.hi * y.lo + x.lo * y.hi) + x.lo * y.lo};
 }
 
-/// x 2^k for −1132 ≤ k ≤ 1024 and 2^-10 < x < 2: one rounding, in the last multiplication.
+/// x 2^k for −1132 ≤ k ≤ 1024 and 2^-10 < x < 2. Only the last multiplication rounds.
 template <class T>
 [[gnu::always_inline]] inline T scale(T x, T k) {
   const T half = nearest_integer(0.5 * k);
@@ -144,8 +144,8 @@ template <class T>
 }
 
 /// (1 + 2x) e^(x²) erfc(x) for x ≥ 0 as a polynomial in t = (x − 3.75)/(x + 3.75), from its Chebyshev series of degree
-/// 24 (truncated below 2^-57). The form is that of Shepherd and Laframboise, Math. Comp. 36 (1981) 249; the
-/// coefficients were computed anew with 60 digits.
+/// 24 (truncated below 2^-57). The form is from Shepherd and Laframboise, Math. Comp. 36 (1981) 249; the coefficients
+/// were recomputed with 60 digits.
 inline constexpr double kErfcx[25] = {
     0x1.3ccda0b5d5dc2p+0,  -0x1.1f367683f89a5p-3,  0x1.d5f294815a405p-9,   0x1.510169d09665bp-4,
     -0x1.bda9309a2949ap-4, 0x1.7a14188a9ce2ap-4,   -0x1.e0d0fa6ddfe85p-5,  0x1.d0b0037d167adp-6,
@@ -199,7 +199,7 @@ template <Number T>
   const T k = reduced.k;
   const T one = power_of_two(-min(k, all<T>(1000)));  // 2^k e^r − 1 = 2^k ((1 − 2^-k) + (e^r − 1))
   const Sum<T> shifted = two_sum(1 - one, e.hi);
-  const T lost = k > 53.0 ? -one : all<T>(0);  // of 1 − 2^-k
+  const T lost = k > 53.0 ? -one : all<T>(0);  // the rounding error of 1 − 2^-k
   const T result = scale(shifted.hi + (shifted.lo + e.lo + lost), k);
   const T beyond = x > 0.0 ? all<T>(kInfinity) : x;  // or NaN
   return x < 710.0 ? (x < -40.0 ? all<T>(-1) : x == 0.0 ? x : result) : beyond;
@@ -221,7 +221,7 @@ template <Number T>
   const T k = part.exponent;
   const T f = part.mantissa - 1;
   const T s = f / (2 + f);
-  // log m = f − s (f − tail), because 2 s = f − s f; what 1 + x lost counts as lo/u
+  // log m = f − s (f − tail), because 2 s = f − s f; lo/u corrects the rounding error of 1 + x
   const T correction = k * kLn2Lo + u.lo / u.hi;
   const T result = k * kLn2Hi + (f - (s * (f - artanh_tail(s * s)) - correction));
   const T beyond = x > -1.0 ? x : (x == -1.0 ? all<T>(-kInfinity) : all<T>(kNaN));

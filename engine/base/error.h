@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Errors that reach the user. Each knows which exit code the command ends with.
+// Errors that are reported to the user, each with the exit code of the command.
 
 #include <cstdio>
 #include <stdexcept>
@@ -11,7 +11,7 @@ namespace carom {
 /// What went wrong; the value is the exit code of the `carom` command.
 enum class Failure { deck = 2, initial_state = 3, numerical = 4, file = 5 };
 
-/// An error with what happened, where, and what to do about it, all in its message.
+/// An error; the message says what happened, where, and what to do about it.
 class Error : public std::runtime_error {
  public:
   Error(Failure failure, const std::string& message) : std::runtime_error(message), failure_(failure) {}
@@ -22,7 +22,7 @@ class Error : public std::runtime_error {
   Failure failure_;
 };
 
-/// A number as messages show it, with so many digits, whatever its size.
+/// A number as printed in messages, with at most this many significant digits.
 inline std::string short_text(double value, int digits = 6) {
   char text[32];
   std::snprintf(text, sizeof text, "%.*g", digits, value);

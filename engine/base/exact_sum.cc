@@ -52,7 +52,7 @@ double ExactSum::value() const {
   int top = kDigits - 1;
   while (top > 0 && carried.digit_[top] == 0) --top;
   auto digit = [&](int k) { return k < 0 ? 0 : static_cast<std::uint64_t>(carried.digit_[k]); };
-  // The leading 64 bits, the lowest of them standing for everything below ("sticky"); the conversion rounds once.
+  // The leading 64 bits; the lowest stands for all digits below it ("sticky"). The conversion rounds once.
   const int lead = std::countl_zero(digit(top)) - 32;
   std::uint64_t window = (digit(top) << 32 | digit(top - 1)) << lead;
   if (lead > 0) window |= digit(top - 2) >> (32 - lead);
@@ -76,7 +76,8 @@ void ExactSeries::begin(double first) {
   limit_ = 0;
   if (!(std::abs(first) > 0x1p-900 && std::abs(first) < 0x1p900)) return;
   limit_ = std::ldexp(1.0, std::ilogb(first) + 13);
-  // To add these rounds to multiples of 2^-44 and 2^-89 of the limit: 512 terms, or rests, stay below 2^53 of them.
+  // Adding these rounds to multiples of 2^-44 and 2^-89 of the limit: 512 terms, or remainders, stay below 2^53
+  // multiples.
   to_high_ = 0x1.8p8 * limit_;
   to_low_ = 0x1.8p-37 * limit_;
   left_ = 512;

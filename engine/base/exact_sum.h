@@ -2,9 +2,10 @@
 #pragma once
 // A sum of doubles that does not depend on the order of its terms.
 //
-// Reported sums (energy, momentum, virial) must be the same digits on any number of ranks. ExactSum is a small Kulisch
-// accumulator: a fixed-point number wide enough for every double, kept in 32-bit digits inside 64-bit limbs so that
-// carries can wait. Adding a term is exact; value() rounds once. (Kulisch, Computer Arithmetic and Validity, 2008.)
+// Reported sums (energy, momentum, virial) must have the same digits on any number of ranks. ExactSum is a small
+// Kulisch accumulator: a fixed-point number wide enough for every double, stored as 32-bit digits in 64-bit limbs so
+// that carries can be delayed. Adding a term is exact; value() rounds once. (Kulisch, Computer Arithmetic and Validity,
+// 2008.)
 
 #include <array>
 #include <bit>
@@ -17,9 +18,9 @@ class ExactSum {
  public:
   /// Adds one term. A NaN or infinity makes the whole sum NaN.
   void add(double term);
-  /// Adds so many times a power of two.
+  /// Adds `multiple` times a power of two.
   __extension__ void add(__int128 multiple, double power_of_two);
-  /// Adds another sum: the parts of several ranks may be joined in any order.
+  /// Adds another sum; the sums of several ranks can be added in any order.
   void add(const ExactSum& other);
   /// The sum, rounded once to nearest.
   double value() const;
@@ -34,8 +35,8 @@ class ExactSum {
   bool invalid_ = false;
 };
 
-/// The same for many terms one after the other, most of them of about the size of the first that is not zero: those
-/// are split into multiples of two powers of two, and the sums of these are exact in a double.
+/// An exact sum of many terms, fast if most are about as large as the first nonzero one. Terms of that size are split
+/// into multiples of two powers of two, which doubles sum exactly.
 class ExactSeries {
  public:
   [[gnu::always_inline]] void add(double term) {
@@ -59,9 +60,9 @@ class ExactSeries {
   void begin(double first);
 
   ExactSum sum_;
-  double limit_ = 0;  // of the terms that are taken
+  double limit_ = 0;  // upper bound of terms that are split
   double to_high_ = 0, to_low_ = 0, high_ = 0, low_ = 0;
-  int left_ = 0;  // terms before the sums are emptied
+  int left_ = 0;  // terms that can be added before the sums are flushed
 };
 
 inline void ExactSum::add(double term) {
@@ -73,7 +74,7 @@ inline void ExactSum::add(double term) {
   }
   std::uint64_t mantissa = bits & 0xfffffffffffffULL;
   if (biased != 0) mantissa |= 1ULL << 52;
-  const int position = biased == 0 ? 0 : biased - 1;  // of the mantissa's least bit, above kLowestBit
+  const int position = biased == 0 ? 0 : biased - 1;  // the mantissa's lowest bit, counted from kLowestBit
   const int digit = position / 32, shift = position % 32;
   const std::uint64_t low = mantissa << shift;
   const std::uint64_t high = shift == 0 ? 0 : mantissa >> (64 - shift);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The state of a run, registered once by name: arrays with one entry a particle, and what there is one of a run.
+// The registry of a run's state by name: arrays with one entry a particle, and single values of the whole run.
 //
 //   system.fields.add("acceleration", a_);                         // a field: it migrates with its particle
-//   system.fields.add_working([&] { list_.reset(); },              // working memory: freed before other particles
-//                             [&] { list_.emplace(…); });          // come, made again for them
-//   system.fields.add_value("debt", debt_);                        // one of a run
+//   system.fields.add_working([&] { list_.reset(); },              // working memory: released before other particles
+//                             [&] { list_.emplace(…); });          // arrive, built again for them
+//   system.fields.add_value("debt", debt_);                        // one value of the run
 //
-// The particles' own arrays are fields from the start. What divides or keeps particles walks over the registry; no
-// method packs or unpacks anything by hand.
+// The particles' own arrays are always registered. Decomposition and checkpoints loop over the registry; no method
+// packs or unpacks anything itself.
 
 #include <array>
 #include <cstddef>
@@ -28,12 +28,12 @@ namespace carom {
 
 class Fields {
  public:
-  /// What a field is to a run.
+  /// Whether an entry can change during a run.
   enum class Kind {
-    constant,  ///< one entry a particle, given by the initial state, never changed
-    state      ///< one entry a particle: from the same state the same bits follow
+    constant,  ///< one entry a particle, set by the initial state, never changed
+    state      ///< one entry a particle, part of the state that determines all later bits
   };
-  /// What an entry consists of, as far as other programs can read it.
+  /// The scalars of an entry, as other programs can read them.
   enum class Scalar { float64, int32, uint32, uint16, bytes };
 
   /// An array with one entry a particle.
@@ -41,39 +41,39 @@ class Fields {
     Field(std::string name_, Kind kind_, Scalar scalar_, std::size_t size_, std::size_t columns_)
         : name(std::move(name_)), kind(kind_), scalar(scalar_), size(size_), columns(columns_) {}
     virtual ~Field() = default;
-    virtual std::byte* data() = 0;  ///< of the first entry
+    virtual std::byte* data() = 0;  ///< the first entry
     virtual std::size_t entries() const = 0;
     virtual void resize(std::size_t entries) = 0;  ///< 0: frees the memory
     const std::string name;
     const Kind kind;
     const Scalar scalar;
-    const std::size_t size;     ///< of an entry [bytes]
-    const std::size_t columns;  ///< scalars of an entry
+    const std::size_t size;     ///< bytes of an entry
+    const std::size_t columns;  ///< scalars in an entry
   };
 
-  /// Registers a vector that has an entry for each particle of this rank and outlives the registry's use. A name that
-  /// is there already now stands for this vector.
+  /// Registers a vector with an entry for each particle of this rank; it must outlive the use of the registry. It
+  /// replaces a vector registered by the same name.
   template <class T>
   void add(std::string name, std::vector<T>& values, Kind kind = Kind::state) {
     std::erase_if(fields_, [&](const auto& field) { return field->name == name; });
     fields_.push_back(std::make_unique<List<T>>(std::move(name), kind, values));
   }
-  /// What there is one of a run; where ranks differ in it that of rank 0 counts.
+  /// A value of the whole run. If ranks have different values, rank 0's counts.
   struct OfRun {
     std::string name;
-    std::function<void(Archive&)> archive;  ///< gives and takes it
+    std::function<void(Archive&)> archive;  ///< writes or reads it
   };
   void add_of_run(OfRun entry) {
     std::erase_if(of_run_, [&](const OfRun& each) { return each.name == entry.name; });
     of_run_.push_back(std::move(entry));
   }
-  /// Registers a value, a list, or what has a member archive(Archive&), of which there is one a run.
+  /// Registers a value of the whole run: plain, a vector, or a type with a member archive(Archive&).
   template <class T>
   void add_value(std::string name, T& value) {
     add_of_run({std::move(name), [&value](Archive& archive) { archive(value); }});
   }
 
-  /// Registers working memory and calls prepare(). `owner` names it, for remove_working().
+  /// Registers working memory and calls prepare(). `owner` identifies it for remove_working().
   void add_working(const void* owner, std::function<void()> release, std::function<void()> prepare) {
     prepare();
     working_.push_back({owner, std::move(release), std::move(prepare)});
@@ -84,17 +84,17 @@ class Fields {
 
   // For the decomposition and for checkpoints.
 
-  /// The fields with an entry for each particle, and those of the run.
+  /// The fields with an entry for each particle, and the values of the run.
   const std::vector<std::unique_ptr<Field>>& of_particles() const { return fields_; }
   const std::vector<OfRun>& of_run() const { return of_run_; }
 
-  /// What all fields hold of one particle [bytes].
+  /// The bytes of one particle in all fields.
   std::size_t bytes() const {
     std::size_t sum = 0;
     for (const auto& field : fields_) sum += field->size;
     return sum;
   }
-  /// Copies all that belongs to particle i to, or from, bytes() bytes.
+  /// Copies all fields of particle i to, or from, bytes() bytes.
   void pack(Id i, std::byte* to) const {
     for (const auto& field : fields_) {
       std::memcpy(to, field->data() + i * field->size, field->size);
@@ -107,7 +107,7 @@ class Fields {
       from += field->size;
     }
   }
-  /// Makes room for so many particles in all fields; 0: frees the memory.
+  /// Resizes all fields to this many particles; 0 frees the memory.
   void resize(std::size_t particles) {
     for (const auto& field : fields_) field->resize(particles);
   }

@@ -3,8 +3,8 @@
 // Sums of forces in fixed point: integers, so that the order of the terms does not matter.
 //
 // Each component of each force is rounded to a multiple of a quantum, a power of two that is constant in a run
-// (quanta() in forces.h). Forces of pairs then cancel exactly in the sum over all particles. A sum has a low word, and
-// a high one for forces that are too large for it: the value is (2^40 high + low) quanta whichever pair took which.
+// (quanta() in forces.h), so pair forces cancel exactly in the sum over all particles. A sum has a low word, and a high
+// word for forces too large for the low one: its value is (2^40 high + low) quanta, however pairs used the two words.
 
 #include <array>
 #include <cmath>
@@ -25,7 +25,7 @@ class ForceSums {
   ForceSums() = default;
   ForceSums(std::size_t particles, double quantum) { reset(particles, quantum); }
 
-  /// All zero. `quantum`: a power of two [force].
+  /// Sets all sums to zero. `quantum`: a power of two [force].
   void reset(std::size_t particles, double quantum) {
     low_.assign(particles, {});
     high_.clear();
@@ -36,29 +36,29 @@ class ForceSums {
   std::size_t size() const { return low_.size(); }
   double quantum() const { return quantum_; }
 
-  /// Makes room for adding at most so many forces to any particle, and says how large each may be.
+  /// Makes room for at most this many forces on any particle; returns how large each may be.
   ForceLimits make_room(std::size_t forces) {
     const double count = static_cast<double>(forces < 1 ? 1 : forces);
     const auto half = [&](double room) { return std::exp2(std::floor(std::log2(room / 2 / count))); };
-    const ForceLimits limits{std::fmin(kMostInLow, half(kForceRoom)),
-                             std::fmin(kMostInHigh, half(kForceRoom - used_high_))};
+    const ForceLimits limits{std::fmin(kMaxLowWord, half(kMaxWordSum)),
+                             std::fmin(kMaxHighWord, half(kMaxWordSum - used_high_))};
     const double low = count * std::fmax(limits.low, 0x1p39);
-    if (used_low_ + low > kForceRoom) carry();
+    if (used_low_ + low > kMaxWordSum) carry();
     used_low_ += low;
     used_high_ += count * limits.high;
     return limits;
   }
-  /// Whether more passes may add to them: not after some hundred without reset(), nor where they are invalid.
-  bool has_room() const { return !invalid_ && used_high_ < kForceRoom / 2; }
+  /// Whether more passes can be added: some hundred passes fill the sums, and invalid sums have no room.
+  bool has_room() const { return !invalid_ && used_high_ < kMaxWordSum / 2; }
 
-  /// The words themselves, to add to after make_room(); high() makes them where there were none.
+  /// The words themselves, to add to after make_room(). high() allocates the high words if there are none.
   ForceWords* low() { return low_.data(); }
   ForceWords* high() {
     if (high_.empty()) high_.resize(low_.size());
     return high_.data();
   }
 
-  /// Adds a force on one particle, for which there is room. False where it is too large or NaN.
+  /// Adds a force on one particle, after make_room(). Returns false if the force is too large or NaN.
   bool add(Id i, const Vec<D>& force, const ForceLimits& limits) {
     for (int k = 0; k < D; ++k) {
       const double quanta = force[k] / quantum_;
@@ -73,7 +73,7 @@ class ForceSums {
     }
     return true;
   }
-  /// Some force could not be added: all values are NaN until reset().
+  /// Marks that some force could not be added: all values are NaN until reset().
   void invalidate() { invalid_ = true; }
 
   /// The force on a particle, rounded once.
@@ -85,7 +85,7 @@ class ForceSums {
                                            : static_cast<double>(whole(high_[i].of[k], low_[i].of[k])));
     return force;
   }
-  /// The same in quanta.
+  /// The force on a particle in quanta.
   std::array<Whole, D> quanta(Id i) const {
     std::array<Whole, D> sum;
     for (int k = 0; k < D; ++k) sum[k] = whole(high_.empty() ? 0 : high_[i].of[k], low_[i].of[k]);
@@ -95,7 +95,7 @@ class ForceSums {
  private:
   static Whole whole(std::int64_t high, std::int64_t low) { return (static_cast<Whole>(high) << kHighShift) + low; }
 
-  /// Empties the low words into the high ones.
+  /// Carries the low words into the high ones.
   void carry() {
     high();
     for (std::size_t i = 0; i < low_.size(); ++i)
@@ -108,7 +108,7 @@ class ForceSums {
     used_high_ += 0x1p24;
   }
 
-  std::vector<ForceWords> low_, high_;  // high_: empty while there are none
+  std::vector<ForceWords> low_, high_;  // high_ is empty until a force needs it
   double quantum_ = 1;
   bool invalid_ = false;
   double used_low_ = 0, used_high_ = 0;  // bounds of the sums [quanta]

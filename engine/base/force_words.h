@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The words of ForceSums (force_sums.h), as kernels see them.
+// The words of ForceSums (force_sums.h), as the kernels access them.
 
 #include <cstdint>
 
 namespace carom {
 
-/// One word of each component; the same for two and three dimensions, where kernels add them.
+/// One word for each component; two and three dimensions have the same layout.
 struct alignas(32) ForceWords {
   std::int64_t of[4] = {0, 0, 0, 0};
 
@@ -15,20 +15,20 @@ struct alignas(32) ForceWords {
   }
 };
 
-/// Of a term of V: what is small beside it may be rounded. 0: it gives no hint.
+/// Typical sizes for a term of V, below which quantities may be rounded. 0: unknown.
 struct ForceScale {
   double force = 0, energy = 0;
-  double spread = 1;  ///< so many times larger are both between the particles of the largest weights
+  double spread = 1;  ///< factor by which both are larger between the particles of the largest weights
 };
 
-inline constexpr int kHighShift = 40;          // a high word counts so many times two low ones
-inline constexpr double kMostInLow = 0x1p50;   // quanta; more goes into two words
-inline constexpr double kMostInHigh = 0x1p46;  // of 2^40 quanta
-inline constexpr double kForceRoom = 0x1p62;   // that sums of words may use
+inline constexpr int kHighShift = 40;           // a high word counts 2^40 times a low one
+inline constexpr double kMaxLowWord = 0x1p50;   // [quanta]; larger forces use both words
+inline constexpr double kMaxHighWord = 0x1p46;  // [2^40 quanta]
+inline constexpr double kMaxWordSum = 0x1p62;   // largest sum of words
 
-/// What one force, given in quanta, may be at most.
+/// Upper bounds of one force, in quanta.
 struct ForceLimits {
-  double low, high;  ///< in the low word alone; in the high one of two
+  double low, high;  ///< for the low word alone; for the high word of two
 };
 
 }  // namespace carom

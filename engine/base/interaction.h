@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What acts between and on the particles besides their hard cores: the smooth part V of H = ½ vᵀMv + V(x).
+// Forces between and on the particles besides their hard cores: the smooth part V of H = ½ vᵀMv + V(x).
 //
 // An Interaction is one term of V: a pair potential over a list of bonds or over all pairs within a cutoff, or an
-// external field. It offers V, its gradient, its discrete gradient and its second derivative, each as a whole loop over
-// the particles. Positions are passed in as arrays in id order. Forces, energies and virials are summed in fixed point
-// (force_sums.h): no sum depends on how the pairs were found.
+// external field. It computes V, its gradient, its discrete gradient and products with its Hessian, each in one loop
+// over the particles. Arrays of positions are in id order. Forces, energies and virials are summed in fixed point
+// (force_sums.h), so no sum depends on how the pairs were found.
 //
-// Where several ranks share a system (engine/ranks/decomposition.h) sums over the system are over what this rank owns:
-// its particles, and the pairs of which it owns the lower id. What acts on a ghost is left incomplete.
+// If a system is divided among ranks (engine/ranks/decomposition.h), sums over the system run over what this rank owns:
+// its particles, and the pairs with a lower id that it owns. Forces on ghosts are incomplete.
 
 #include <memory>
 #include <span>
@@ -33,12 +33,12 @@ using Positions = std::span<const Vec<D>>;
 template <int D>
 using Vectors = std::span<Vec<D>>;
 
-/// Sums over one evaluation of V; exact, so that they do not depend on the order of summation.
+/// Sums over one evaluation of V, exact and so independent of the order of summation.
 struct PotentialSums {
   ExactSum energy{};     ///< V [energy]
   ExactSum magnitude{};  ///< Σ|V| over pairs and particles [energy]
-  ExactSum virial{};  ///< Σ d·F over pairs, d = x_i − x_j, F the force on i [energy]; external fields add nothing
-  double quantum = 0x1p-46;  ///< of pairs: each pair's terms are rounded to a multiple of it [energy]
+  ExactSum virial{};     ///< Σ d·F over pairs, d = x_i − x_j, F the force on i, without external fields [energy]
+  double quantum = 0x1p-46;  ///< each pair's terms are rounded to a multiple of it [energy]
 
   void add(const PotentialSums& other) {
     energy.add(other.energy);
@@ -47,7 +47,7 @@ struct PotentialSums {
   }
 };
 
-/// A constant that is added to what is reported of V (engine/forces/potentials/tail.h).
+/// A constant correction to the reported V (engine/forces/potentials/tail.h).
 struct Tail {
   double energy = 0;  ///< [energy]
   double virial = 0;  ///< as in PotentialSums [energy]
@@ -58,67 +58,68 @@ class Interaction {
  public:
   virtual ~Interaction() = default;
 
-  /// V and its companions at positions x.
+  /// Adds V and the other sums at positions x.
   virtual void add_energy(Positions<D> x, PotentialSums& sums) const = 0;
 
-  /// Adds −∂V/∂x_i for each particle, and where `sums` is given V and its companions. Throws
-  /// Error(Failure::numerical) where a force is not finite or too large to be summed, and names its particles.
+  /// Adds −∂V/∂x_i for each particle; if `sums` is given, adds V and the other sums to it. Throws
+  /// Error(Failure::numerical), which names the particles, if a force is not finite or too large to be summed.
   virtual void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums = nullptr) const = 0;
 
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:
-  /// only pairs with at least one such particle, and fields on these; sign −1: subtracts exactly what +1 has added.
-  /// Returns the number of pairs (or particles, for a field) of this rank within reach. A step that is only tried may
-  /// be far too long: forces that are not finite or too large invalidate the sums.
+  /// only pairs with at least one changed particle, and fields on changed particles; sign −1 subtracts exactly what +1
+  /// added. Returns the number of this rank's pairs (or particles, for a field) within reach. A trial step may be far
+  /// too long: forces that are not finite or too large invalidate the sums.
   virtual std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces,
                                         const char* changed = nullptr, int sign = 1) const = 0;
 
   /// Adds V″(x) w.
   virtual void add_hessian_product(Positions<D> x, Positions<D> w, ForceSums<D>& out) const = 0;
 
-  /// The same term for `some` of all particles, which outlive it. Null where they are not enough for those of them that
-  /// are owned.
+  /// This term for the subset `some` of the particles, which must outlive it. Null if the subset lacks particles that
+  /// act on owned ones.
   virtual std::unique_ptr<Interaction> among(const Particles<D>& some) const = 0;
-  /// How far it reaches from positions x, as far as this rank knows [length]; infinite: it needs all particles.
+  /// The distance from x within which other particles matter, as far as this rank knows [length]; infinite: all
+  /// particles do.
   virtual double reach(Positions<D> x) const = 0;
-  /// The same of a term that was made for a block of the particles. Collective.
+  /// The reach of a term that was made for a block of the particles. Collective.
   virtual double reach(const Particles<D>& block, Communicator& ranks) const = 0;
 
-  /// How many pairs (or particles, for a field) of this rank one evaluation visits within reach: the unit of
+  /// The number of this rank's pairs (or particles, for a field) within reach in one evaluation: the unit of
   /// `force_passes`.
   virtual std::uint64_t interacting_pairs(Positions<D> x) const = 0;
 
-  /// The constant acceleration, the same for every particle, that this term gives; null where it gives anything else.
-  /// Free flight can carry such a field exactly.
+  /// The acceleration, if this term gives all particles the same constant one; else null. Free flight integrates this
+  /// field exactly.
   virtual const Vec<D>* common_acceleration() const { return nullptr; }
 
-  /// What its cutoff takes away, estimated; of all particles, on each rank.
+  /// The estimated contribution beyond the cutoff, of all particles, on each rank.
   virtual Tail tail() const { return {}; }
 
-  /// The bonds it stands for, by ids, where it was made for all particles or a block; null where it has none.
+  /// The bonds of this term, by ids, if it was made for all particles or a block; null if it has none.
   virtual const PairList* bonds() const { return nullptr; }
 
-  /// How large its forces are where particles are so far apart on average [length]; a function of parameters and of
-  /// this rank's particles.
+  /// The size of its forces at this mean distance between particles [length], from parameters and this rank's
+  /// particles.
   virtual ForceScale scale(double distance) const = 0;
 
-  /// Takes these kernels instead of pair_kernels(). The sums are the same to the bit; fields have none.
+  /// Replaces pair_kernels() by these kernels, which give the same bits. Fields use no kernels.
   virtual void use(const PairKernels&) {}
 
-  /// Whether the term is invariant under translation, so that it keeps the total momentum.
+  /// Whether the term is invariant under translation, so that it conserves the total momentum.
   virtual bool keeps_momentum() const { return true; }
 };
 
-/// What an interaction is made from, besides its own parameters. The box and particles outlive the interaction.
+/// The context in which an interaction is made. The box and particles must outlive it.
 template <int D>
 struct InteractionContext {
   const Box<D>& box;
   const Particles<D>& particles;
   const std::vector<std::string>& species;   ///< names, in the order of Particles::species
-  bool placed = true;                        ///< whether positions are known; else only the parameters count
-  std::size_t total = particles.size();      ///< how many there are on all ranks, where `particles` are a block of them
-  Communicator* ranks = nullptr;             ///< these ranks; null: all particles are here
-  std::shared_ptr<const BondTable> bonds{};  ///< of all terms of bonds; null: there are no such terms
+  bool placed = true;                        ///< whether positions are known; if not, only the parameters are checked
+  std::size_t total = particles.size();      ///< number of particles on all ranks; `particles` may be a block of them
+  Communicator* ranks = nullptr;             ///< the ranks that hold the blocks; null: all particles are here
+  std::shared_ptr<const BondTable> bonds{};  ///< bonds of all terms; null: there are none
 };
 
 /// The declaration of one type of interaction; engine/forces/potentials/registry.cc lists them all.
@@ -142,10 +143,10 @@ struct InteractionInfo {
   }
 };
 
-/// Every type of interaction there is, in the order of the manual.
+/// All types of interaction, in the order of the manual.
 const std::vector<InteractionInfo>& interactions();
 
-/// The one of that name; throws Error(Failure::deck), which lists the names.
+/// The declaration of this type; throws Error(Failure::deck), which lists the names, if there is none.
 const InteractionInfo& find_interaction(std::string_view name);
 
 }  // namespace carom

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What a formula needs besides + − × ÷, comparisons and ?: to work on a double or on a vector of doubles alike.
+// The functions, besides + − × ÷, comparisons and ?:, that a formula needs to work on a double and on a vector alike.
 //
 //   template <class T> T value(T rho) const { return c_ / elementary::sqrt(rho); }
 //
-// T is double or a vector of the compiler (vector_size), one pair of particles a lane. Each lane gets the bits that the
-// double would get: every function is made of the same IEEE operations. Vectors are for the kernels (pair_kernel.h),
-// which are compiled once for each instruction set; everything here is inlined into them, so that no function compiled
-// for one machine ends up in another's binary.
+// T is double or a vector type of the compiler (vector_size), with one pair of particles in each lane. Each lane gets
+// the bits that the double would get, because every function uses the same IEEE operations. Vectors are for the kernels
+// (pair_kernel.h), which are compiled once for each instruction set. Everything here is inlined into them, so that the
+// linker cannot use a function compiled for another instruction set.
 
 #include <cmath>
 #include <concepts>
@@ -39,13 +39,13 @@ struct LanesOf<double> {
   using Integer = long long;
 };
 
-/// Unsigned 64-bit integers, as many as T has doubles; their bits are converted by __builtin_bit_cast.
+/// Unsigned 64-bit integers, one for each double of T; __builtin_bit_cast converts between the two.
 template <class T>
 using BitsOf = typename LanesOf<T>::Bits;
 template <class T>
 using IntegerOf = typename LanesOf<T>::Integer;
 
-/// The same number in every lane.
+/// A vector with this number in every lane.
 template <class T>
 CAROM_INLINE T all(double value) {
   if constexpr (std::same_as<T, double>)
@@ -76,7 +76,7 @@ CAROM_INLINE void store(void* at, V lanes) {
   __builtin_memcpy(at, &lanes, sizeof lanes);
 }
 
-/// The sign of each lane, one bit a lane; of lanes of 32 or 64 bits.
+/// The sign bit of each lane, one bit a lane, for lanes of 32 or 64 bits.
 template <class M>
 CAROM_INLINE unsigned bits(M mask) {
   constexpr bool kHalf = sizeof mask[0] == 4;
@@ -100,7 +100,7 @@ CAROM_INLINE unsigned bits(M mask) {
   return all;
 }
 
-/// a < b, a mask: GCC for SSE2 takes the conjunction of two comparisons to pieces.
+/// The mask a < b. GCC for SSE2 would split the conjunction of two comparisons into scalars.
 template <class V>
 CAROM_INLINE IntegerOf<V> below(V a, V b) {
 #if defined(__SSE2__)
@@ -108,7 +108,7 @@ CAROM_INLINE IntegerOf<V> below(V a, V b) {
 #endif
   return (IntegerOf<V>)(a < b);
 }
-/// Where a < b, one bit a lane.
+/// The lanes with a < b, one bit a lane.
 template <class V>
 CAROM_INLINE unsigned less(V a, V b) {
 #if defined(__AVX512F__)
@@ -140,12 +140,12 @@ CAROM_INLINE T sqrt(T x) {
   return x;
 }
 
-/// |x|, also of −0.
+/// |x|; also correct for −0.
 template <class T>
 CAROM_INLINE T abs(T x) {
   return __builtin_bit_cast(T, __builtin_bit_cast(BitsOf<T>, x) & 0x7fffffffffffffffULL);
 }
-/// The lesser and the greater of two numbers; the second where one is NaN.
+/// The minimum and the maximum of two numbers; the second number if either is NaN.
 template <class T>
 CAROM_INLINE T min(T a, T b) {
 #if defined(__AVX512F__)
@@ -164,7 +164,7 @@ CAROM_INLINE T max(T a, T b) {
   return a > b ? a : b;
 }
 
-/// The nearest integer, the even one of two, for |x| < 2^51.
+/// The nearest integer, ties to even, for |x| < 2^51.
 template <class T>
 CAROM_INLINE T nearest_integer(T x) {
   return (x + 0x1.8p52) - 0x1.8p52;

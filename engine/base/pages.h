@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Memory for large arrays that are accessed at random: in huge pages where the system grants them, which saves most of
-// the address translations that a million particles would miss.
+// Memory for large arrays with random access, in huge pages if the system grants them: with a million particles these
+// avoid most TLB misses.
 
 #include <cstdlib>
 #include <new>
@@ -18,7 +18,7 @@ struct PageAllocator {
   using value_type = T;
   PageAllocator() = default;
   template <class U>
-  PageAllocator(const PageAllocator<U>&) {}  // NOLINT(google-explicit-constructor): as the standard wants it
+  PageAllocator(const PageAllocator<U>&) {}  // NOLINT(google-explicit-constructor): the standard requires it
 
   T* allocate(std::size_t n) {
     const std::size_t bytes = n * sizeof(T), page = bytes < kHugePage ? kLine : kHugePage;
@@ -36,7 +36,7 @@ struct PageAllocator {
   static constexpr std::size_t kLine = 64, kHugePage = std::size_t{1} << 21;
 };
 
-/// A vector for the core's large arrays; its memory starts at a cache line.
+/// A vector for large arrays of the event core; its memory starts at a cache line.
 template <class T>
 using PageVector = std::vector<T, PageAllocator<T>>;
 

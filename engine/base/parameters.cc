@@ -20,7 +20,7 @@ constexpr std::array kTypes = {"true or false", "a whole number",  "a number",  
 
 std::string quoted(std::string_view name) { return std::string(1, '\'').append(name) + '\''; }
 
-/// A default, which is true, false, a number or a quoted word (Parameter::fallback).
+/// The parsed default: true, false, a number or a quoted word (Parameter::fallback).
 ParameterValue default_value(const Parameter& parameter) {
   const std::string_view text = parameter.fallback;
   const char* const end = text.data() + text.size();

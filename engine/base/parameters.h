@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Declared parameters: what an integrator, an interaction or an observable can be given in a deck, and the values.
+// Declared parameters of integrators, interactions and observables, as given in a deck, and their values.
 //
-// A declaration is written once, beside the code that uses the value. The deck's schema, its validation, the
-// `carom schema` and `carom methods` pages and the resolved deck are all made from it.
+// A declaration is written once, beside the code that uses the value. The deck's schema and validation, the pages of
+// `carom schema` and `carom methods`, and the resolved deck are generated from it.
 
 #include <array>
 #include <cstdint>
@@ -27,13 +27,13 @@ struct Parameter {
 
   std::string_view name;
   Type type = Type::real;
-  std::string_view fallback;  ///< the default as TOML text; "" = must be given; "none" = may be left out
+  std::string_view fallback;  ///< the default as TOML text; "" = required; "none" = optional without default
   std::string_view unit;      ///< dimension, for instance "length", "energy/length^2", "-" for a pure number
   std::string_view meaning;   ///< one sentence for the manual
-  Range range = Range::any;   ///< for integer and real (and each of real_list)
-  std::vector<std::string_view> choices{};                ///< for text: what it may be; empty = anything
-  std::vector<std::array<std::string_view, 2>> former{};  ///< for text: what it may no longer be, and the remedy
-  double most = std::numeric_limits<double>::infinity();  ///< for numbers: the largest allowed
+  Range range = Range::any;   ///< for integer, real and each number of real_list
+  std::vector<std::string_view> choices{};                ///< for text: the allowed values; empty = any
+  std::vector<std::array<std::string_view, 2>> former{};  ///< for text: former values, each with what to write instead
+  double most = std::numeric_limits<double>::infinity();  ///< for numbers: the largest allowed value
 };
 
 /// Pairs of particle ids.
@@ -42,7 +42,7 @@ using PairList = std::vector<std::array<std::uint32_t, 2>>;
 using ParameterValue =
     std::variant<bool, std::int64_t, double, std::vector<double>, std::string, std::vector<std::string>, PairList>;
 
-/// Validated values by name. Every declared parameter with a default is present; those with "none" only where given.
+/// Validated values by name. Parameters with a default are always present, those declared "none" only if given.
 class Parameters {
  public:
   Parameters() = default;
@@ -50,7 +50,7 @@ class Parameters {
   void set(std::string name, ParameterValue value) { values_[std::move(name)] = std::move(value); }
   void erase(const std::string& name) { values_.erase(name); }
   bool has(std::string_view name) const { return values_.find(name) != values_.end(); }
-  /// The value of a declared parameter; std::out_of_range if it is absent, std::bad_variant_access on the wrong type.
+  /// The value of a declared parameter; throws std::out_of_range if absent, std::bad_variant_access if of another type.
   template <class T>
   const T& get(std::string_view name) const {
     const auto at = values_.find(name);
@@ -67,24 +67,24 @@ class Parameters {
   std::map<std::string, ParameterValue, std::less<>> values_;
 };
 
-/// What is wrong with the value of a parameter, and what to do.
+/// What is wrong with a parameter's value, and what to do about it.
 struct ParameterError {
   std::string_view parameter;
   std::string what, remedy;
 };
 
-/// Of a number; nothing where it is finite, in the range and not above `most`.
+/// Checks a number; nothing if it is finite, in the range and at most `most`.
 std::optional<ParameterError> number_error(double value, Parameter::Range range, double most);
 
-/// `given` with the defaults of what it leaves out. Throws Error(Failure::deck) where a value is missing, unknown, of
-/// another type, out of its range or none of the choices; `of` names what the parameters are for. A whole number is
-/// taken for a real one.
+/// `given`, completed with defaults; whole numbers become reals if the parameter is real. Throws Error(Failure::deck)
+/// if a value is missing, unknown, of another type, out of range or none of the choices; `of` names what the parameters
+/// belong to.
 Parameters completed(std::string_view of, std::span<const Parameter> declared, Parameters given);
 
-/// Throws Error(Failure::deck): there is no such `kind` of thing, and `known` are those there are.
+/// Throws Error(Failure::deck): no `kind` has this name; the message lists `known`.
 [[noreturn]] void throw_unknown(std::string_view kind, std::string_view name, std::span<const std::string_view> known);
 
-/// The declaration of that name among others.
+/// The declaration with this name.
 template <class Infos>
 const auto& find_named(const Infos& declared, std::string_view kind, std::string_view name) {
   std::vector<std::string_view> known;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The particles of a run, in the order of their ids, as integrators and observers see them: all at the same time.
+// The particles of a run at one time, in the order of their ids, as integrators and observers access them.
 //
-// Where several ranks share a system (engine/ranks/decomposition.h) each has the particles it owns and copies of
-// others, ghosts. It may have only some of all then: their numbers here follow the order of their ids.
+// If a system is divided among ranks (engine/ranks/decomposition.h), each rank has the particles it owns and copies of
+// others, the ghosts. If it does not have all particles, their numbers here still follow the order of ids.
 
 #include <span>
 #include <string>
@@ -14,12 +14,12 @@
 
 namespace carom {
 
-/// What Particles::add() takes.
+/// The argument of Particles::add().
 template <int D>
 struct Particle {
   Vec<D> x;                   ///< position of the centre [length]
   Vec<D> v = Vec<D>::Zero();  ///< velocity [length/time]
-  double radius = 0.5;        ///< of the hard core [length]
+  double radius = 0.5;        ///< hard core [length]
   double mass = 1;            ///< [mass]
   double charge = 0;          ///< [charge]
   std::uint16_t species = 0;  ///< index into System::species
@@ -30,11 +30,11 @@ struct Particles {
   std::vector<Vec<D>> x;               ///< position of the centre [length]
   std::vector<Vec<D>> v;               ///< velocity [length/time]
   std::vector<double> mass;            ///< [mass], positive
-  std::vector<double> radius;          ///< of the hard core [length], positive
+  std::vector<double> radius;          ///< hard core [length], positive
   std::vector<double> charge;          ///< [charge]
   std::vector<std::uint16_t> species;  ///< index into System::species
   std::vector<Image<D>> image;  ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
-  std::vector<char> ghost{};    ///< 1: another rank owns it; empty: there are no others
+  std::vector<char> ghost{};    ///< 1: another rank owns it; empty: this rank owns all
   std::vector<Id> id{};         ///< ascending; empty: 0, 1, …
 
   std::size_t size() const { return x.size(); }
@@ -53,7 +53,7 @@ struct Particles {
   Id id_of(Id i) const { return id.empty() ? i : id[i]; }
 };
 
-/// Throws Error(Failure::numerical) where one of these positions of the particles is not finite.
+/// Throws Error(Failure::numerical) if one of these positions is not finite.
 template <int D>
 void need_finite(const Particles<D>& particles, std::span<const Vec<D>> x) {
   for (Id i = 0; i < x.size(); ++i)

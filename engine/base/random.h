@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Counter-based random numbers: the same (seed, purpose, id, index) gives the same number on every machine, for any
-// number of ranks and in any order of calls. There is no state to carry or to store.
+// Counter-based random numbers: (seed, purpose, id, index) determines the number on every machine, for any number of
+// ranks and any order of calls. There is no state to store.
 //
 //   RandomStream random(seed, RandomPurpose::velocity, id);
 //   const double u = random.uniform();   // in (0, 1)
@@ -15,7 +15,7 @@
 
 namespace carom {
 
-/// The Philox 4x32-10 bijection: 128 bits of counter and 64 bits of key to 128 random bits.
+/// The Philox 4x32-10 bijection: maps a 128-bit counter and a 64-bit key to 128 random bits.
 constexpr std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
                                                   std::array<std::uint32_t, 2> key) {
   for (int round = 0; round < 10; ++round) {
@@ -29,11 +29,11 @@ constexpr std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> c
   return counter;
 }
 
-/// What numbers are drawn for: streams of different purposes are independent of each other. Values are part of what a
-/// seed means and never change.
+/// The purpose of a stream of numbers; streams with different purposes are independent. The values are part of the
+/// meaning of a seed and never change.
 enum class RandomPurpose : std::uint32_t { position = 1, velocity = 2, species = 3, probe = 4, compression = 5 };
 
-/// The numbers of one purpose and one id, one after the other.
+/// The numbers of one purpose and one id, in sequence.
 class RandomStream {
  public:
   RandomStream(std::uint64_t seed, RandomPurpose purpose, std::uint32_t id)
@@ -56,7 +56,7 @@ class RandomStream {
 
   /// Uniform in 0 … n − 1, n > 0. (Lemire, ACM Trans. Model. Comput. Simul. 29 (2019) 3.)
   std::uint32_t below(std::uint32_t n) {
-    const std::uint32_t unfair = -n % n;  // 2^32 mod n low products would be hit once more than the others
+    const std::uint32_t unfair = -n % n;  // rejects 2^32 mod n low products, which occur too often
     while (true) {
       const std::uint64_t product = (bits() >> 32) * n;
       if (static_cast<std::uint32_t>(product) >= unfair) return static_cast<std::uint32_t>(product >> 32);
@@ -64,7 +64,7 @@ class RandomStream {
   }
 
   /// Two independent normal numbers of mean 0 and variance 1 (Box, Muller, Ann. Math. Stat. 29 (1958) 610). Evaluated
-  /// in long double: the C library chooses its double log and cos by CPU, and their last bits would reach the physics.
+  /// in long double: the C library chooses its double log and cos by CPU, and their last bits would change the results.
   std::array<double, 2> normal_pair() {
     const long double u = uniform(), turn = uniform();
     const long double length = std::sqrt(-2 * std::log(u));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What the event core knows of one sphere, and how it writes down a neighbour.
+// The event core's record of a sphere, and the packed form of a neighbour.
 
 #include <algorithm>
 #include <bit>
@@ -11,7 +11,7 @@
 
 namespace carom {
 
-/// A particle's place in the core's arrays. Ids never change; slots do whenever the core sorts its particles.
+/// The index of a particle in the core's arrays. Ids never change; slots change whenever the core sorts its particles.
 using Slot = std::uint32_t;
 
 /// The state of a sphere right after its last event. One cache line; the kernels of scan.h rely on the layout.
@@ -19,7 +19,7 @@ template <int D>
 struct alignas(64) Record {
   Vec<D> x;  ///< not wrapped within a slab
   Vec<D> v;
-  double t;  ///< of the last event, since the start of the slab
+  double t;  ///< time of the last event, since the start of the slab
   Id id;
   std::uint16_t generation;
   std::uint16_t species;
@@ -27,23 +27,22 @@ struct alignas(64) Record {
 static_assert(sizeof(Record<3>) == 64 && offsetof(Record<3>, v) == 24 && offsetof(Record<3>, t) == 48);
 static_assert(sizeof(Record<2>) == 64 && offsetof(Record<2>, v) == 16 && offsetof(Record<2>, t) == 32);
 
-/// How many records a core makes room for that has so many at first, and may admit more.
+/// The capacity of a core that starts with this many records and may admit more.
 constexpr std::size_t records_room(std::size_t records) { return records + records / 4 + 256; }
 
-/// The error where an image does not fit into the bits of a candidate.
+/// The error for an image that does not fit into the bits of a candidate.
 [[noreturn]] inline void throw_too_far() {
   throw Error(Failure::numerical,
               "spheres fly through too many periodic boxes in one epoch; give integrator.step a smaller value");
 }
 
-/// A candidate for a contact in 31 bits: the slot in the low bits, above it the image as a number of few bits an axis.
-/// The last bit is for lists of them. Images are also handled as one integer, `linear`: its sums and differences are
-/// those of the images.
+/// A candidate for a contact in 31 bits: the slot in the low bits, above it the image with a few bits for each axis;
+/// the last bit is free for lists of candidates. `linear` maps an image to one integer, linear in the image.
 template <int D>
 class Packing {
  public:
   Packing() = default;
-  /// Of a core with so many slots, in a system of so many particles.
+  /// For a core with this many slots in a system with this many particles.
   Packing(std::size_t slots, std::size_t particles) {
     slot_bits = bits(slots);
     field_bits = bits_left(slots);
@@ -54,7 +53,7 @@ class Packing {
     for (int k = 0; k < D; ++k) bias |= 1 << (field_bits * (k + 1) - 1);
   }
 
-  /// Boxes along an axis that an image may be away. The same on any number of ranks, which have cores of their own.
+  /// The largest number of boxes an image may be away along an axis; it does not depend on the number of ranks.
   std::int32_t largest() const { return largest_; }
   bool fits(const Image<D>& image) const {
     return std::all_of(image.begin(), image.end(), [&](auto n) { return std::abs(n) <= largest(); });
@@ -79,7 +78,7 @@ class Packing {
           static_cast<std::int32_t>(code >> (field_bits * k) & ((1u << field_bits) - 1)) - (1 << (field_bits - 1));
     return image;
   }
-  /// The same pair as its other partner `self` writes it down.
+  /// The same pair as packed by its other partner, from `self`.
   std::uint32_t reversed(Slot self, std::uint32_t candidate) const { return pack(self, -linear(candidate)); }
 
   int slot_bits = 1, field_bits = 2;

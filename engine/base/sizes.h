@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Radii and masses of all spheres of a system, on every rank: one for each species, or, where a species has several,
+// Radii and masses of all spheres of a system, on every rank: one for each species or, if spheres of a species differ,
 // one for each sphere.
 
 #include <algorithm>
@@ -13,13 +13,13 @@
 namespace carom {
 
 struct Sizes {
-  std::size_t spheres = 0;           ///< how many there are
-  bool by_species = false;           ///< else by id
-  std::vector<double> radius, mass;  ///< of each species or sphere
-  std::vector<double> number;        ///< of spheres of each species; empty: by id
+  std::size_t spheres = 0;           ///< total number of spheres
+  bool by_species = false;           ///< indexed by species, else by id
+  std::vector<double> radius, mass;  ///< for each species or sphere
+  std::vector<double> number;        ///< number of spheres of each species; empty if indexed by id
 
   Sizes() = default;
-  /// Of a system of which all particles are here.
+  /// For a system with all particles on this rank.
   template <int D>
   Sizes(const Particles<D>& all) : spheres(all.radius.size()) {
     const std::size_t species = spheres > 0 ? *std::ranges::max_element(all.species) + std::size_t{1} : 0;

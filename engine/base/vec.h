@@ -12,10 +12,10 @@ namespace carom {
 template <int D>
 using Vec = Eigen::Matrix<double, D, 1>;
 
-/// A particle's number, given by its place in the deck; it never changes.
+/// The number of a particle in the deck's order; it never changes.
 using Id = std::uint32_t;
 
-/// How many times a particle or a pair has been carried round each periodic axis.
+/// How often a particle or a pair has crossed each periodic axis.
 template <int D>
 using Image = std::array<std::int32_t, D>;
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The event queue: a ring of time bins with a small heap for the present.
+// The event queue: a ring of time bins, with a small heap for the bin that is open.
 //
-// Entries of later bins are only appended, to a few lines that stay in the cache; what lies beyond the ring waits in a
-// list of its own. When its time has come a bin is sorted once and then served in order, beside a heap that holds what
-// is scheduled into the present. Nothing is ever removed: the caller decides which entries no longer hold, when a bin
-// is opened and again when an entry is served. Bins adapt to the rate of events. (Brown, Commun. ACM 31 (1988) 1220;
-// Paul, J. Comput. Phys. 221 (2007) 615.)
+// Entries for later bins are only appended, to a few cache lines in use; entries beyond the ring wait in a separate
+// list. A bin is sorted once when it opens, then served in order, merged with a heap of entries scheduled into the open
+// bin. Entries are never removed: the caller decides which are still valid when a bin opens and again when an entry is
+// served. Bin widths adapt to the rate of events. (Brown, Commun. ACM 31 (1988) 1220; Paul, J. Comput. Phys. 221 (2007)
+// 615.)
 
 #include <algorithm>
 #include <boost/heap/d_ary_heap.hpp>
@@ -22,16 +22,16 @@ namespace carom {
 #pragma pack(push, 4)
 struct CalendarEntry {
   double time;
-  std::uint32_t slot;  ///< of the sphere that has the event
+  std::uint32_t slot;  ///< slot of the sphere with this event
 };
 #pragma pack(pop)
-static_assert(sizeof(CalendarEntry) == 12);  // there are some for every particle
+static_assert(sizeof(CalendarEntry) == 12);  // several entries exist for every particle
 
-/// Serves entries by time; the order of equal times is the caller's business.
+/// Serves entries by time; the caller orders entries with equal times.
 class Calendar {
  public:
-  /// Empties the calendar and sets it up for times in [now, horizon), for about `entries` entries at a time, which will
-  /// be spread about like the `sample`. `entries_per_bin` forces the size of bins (0: about right).
+  /// Empties the calendar and sets it up for times in [now, horizon) and about `entries` entries at once, distributed
+  /// like `sample`. `entries_per_bin` sets the bin size (0: automatic).
   void reset(double horizon, std::size_t entries, double entries_per_bin = 0, std::vector<double> sample = {},
              double now = 0) {
     horizon_ = horizon;
@@ -39,14 +39,14 @@ class Calendar {
     wanted_ = forced_ ? entries_per_bin : std::clamp(static_cast<double>(entries) / 256, 8.0, 2048.0);
     ring_.assign(kBins, Bin{});
     chunks_.clear();
-    chunks_.reserve(2 * entries / kChunk + kBins);  // growing would copy; what is not used is not touched
+    chunks_.reserve(2 * entries / kChunk + kBins);  // growing would copy; unused memory is never touched
     next_.clear();
     free_ = kNone;
     later_ = Bin{};
     present_.clear();
     sorted_.clear();
     served_ = 0;
-    // Bins for the density of the first entries there will be.
+    // The bin width follows from the density of the earliest entries.
     const double each = static_cast<double>(entries) / static_cast<double>(std::max<std::size_t>(sample.size(), 1));
     const auto few = std::min(sample.size(), static_cast<std::size_t>(16 * wanted_ / each) + 16);
     double end = horizon;
@@ -57,7 +57,7 @@ class Calendar {
     lay_out(now, (end - now) * wanted_ / (each * static_cast<double>(std::max<std::size_t>(few, 1))));
   }
 
-  /// Schedules an entry; times at or beyond the horizon are not kept.
+  /// Schedules an entry; entries at or beyond the horizon are discarded.
   void push(double time, std::uint32_t slot) {
     if (!(time < horizon_)) return;
     const double bin = (time - start_) * per_width_;
@@ -69,8 +69,8 @@ class Calendar {
       present_.push({time, slot});
   }
 
-  /// The earliest entry, or null when none is left before the horizon. Stays valid until the next call. Entries for
-  /// which holds(entry) is false may be left out.
+  /// The earliest entry, or null if none is left before the horizon; valid until the next call. Entries with
+  /// holds(entry) false may be skipped.
   template <class Holds>
   const CalendarEntry* top(Holds&& holds) {
     for (;;) {
@@ -87,7 +87,6 @@ class Calendar {
     }
   }
 
-  /// Removes what top() returned.
   void pop() {
     if (from_heap_)
       present_.pop();
@@ -95,13 +94,13 @@ class Calendar {
       ++served_;
   }
 
-  /// Whether another entry of this time, that of the entry served last, is waiting.
+  /// Whether another entry has this time, which must be that of the entry served last.
   bool more_at(double time) const {
     return (served_ < sorted_.size() && sorted_[served_].time == time) ||
            (!present_.empty() && present_.top().time == time);
   }
 
-  /// The entry that comes up `ahead` places later, as far as is known; null where it is not.
+  /// The entry due `ahead` places later, or null if it is not yet sorted.
   const CalendarEntry* upcoming(std::size_t ahead) const {
     return served_ + ahead < sorted_.size() ? &sorted_[served_ + ahead] : nullptr;
   }
@@ -114,13 +113,13 @@ class Calendar {
     bool operator()(const CalendarEntry& a, const CalendarEntry& b) const { return b.time < a.time; }
   };
   static constexpr std::uint32_t kNone = 0xffffffff;
-  static constexpr std::uint32_t kChunk = 16;  // entries: three cache lines
+  static constexpr std::uint32_t kChunk = 16;  // entries of a chunk: three cache lines
   static constexpr int kBins = 2048;
   struct Chunk {
     CalendarEntry entry[kChunk];
   };
   struct Bin {
-    std::uint32_t chunk = kNone;  // the last one, not full but for the moment
+    std::uint32_t chunk = kNone;  // the last chunk; between calls it is not full
     std::uint32_t count = 0;
   };
 
@@ -142,7 +141,7 @@ class Calendar {
     ++bin.count;
   }
 
-  /// Calls visit(entry) for the entries of a bin and gives their memory back as it goes.
+  /// Calls visit(entry) for the entries of a bin and frees its chunks.
   template <class Visit>
   void empty(Bin& bin, Visit&& visit) {
     std::uint32_t n = in_last(bin);
@@ -158,7 +157,7 @@ class Calendar {
   }
   static std::uint32_t in_last(const Bin& bin) { return bin.count == 0 ? 0 : (bin.count - 1) % kChunk + 1; }
 
-  /// Opens the next bin that has entries; false when there is none. sorted_ and present_ are empty.
+  /// Opens the next nonempty bin; false if there is none. Requires sorted_ and present_ to be empty.
   template <class Holds>
   bool open_next(Holds&& holds) {
     for (;;) {
@@ -181,7 +180,7 @@ class Calendar {
     }
   }
 
-  /// Lays out the ring anew from the first of the entries that wait; false where there are none.
+  /// Lays out the ring again from the earliest entry beyond it; false if there is none.
   template <class Holds>
   bool turn(Holds&& holds) {
     current_ = kBins - 1;
@@ -210,7 +209,7 @@ class Calendar {
     return true;
   }
 
-  /// Makes bins of a width from `start`.
+  /// Lays out the bins, each of this width, from `start`.
   void lay_out(double start, double width) {
     start_ = start;
     width_ = std::max(width, std::max(horizon_ * 1e-9, start_ * 1e-12));
@@ -219,7 +218,7 @@ class Calendar {
     current_ = -1;
   }
 
-  /// Sorts the opened bin: into buckets first, then neighbours among themselves.
+  /// Sorts the opened bin: distributes it over buckets, then sorts by insertion.
   void sort() {
     const std::size_t n = sorted_.size();
     if (n > 24) {
@@ -243,7 +242,7 @@ class Calendar {
       for (; to > 0 && entry.time < sorted_[to - 1].time; --to) sorted_[to] = sorted_[to - 1];
       sorted_[to] = entry;
       moves += k - to;
-      if (moves > 16 * n) {  // crowded into one bucket
+      if (moves > 16 * n) {  // most entries are in one bucket
         std::sort(sorted_.begin(), sorted_.end(), Earlier{});
         return;
       }
@@ -252,13 +251,13 @@ class Calendar {
 
   double horizon_ = 0, wanted_ = 8;
   bool forced_ = false;
-  double start_ = 0, width_ = 0, per_width_ = 0;  // of the ring
-  int current_ = -1;                              // the bin that is open, or was last
+  double start_ = 0, width_ = 0, per_width_ = 0;  // ring: start, width of a bin and its inverse
+  int current_ = -1;                              // the open bin, or the last one opened
   std::vector<Bin> ring_;
   PageVector<Chunk> chunks_;
-  std::vector<std::uint32_t> next_;  // by chunk: the one filled before it, or the next free one
+  std::vector<std::uint32_t> next_;  // by chunk: the previous chunk of its bin, or the next free chunk
   std::uint32_t free_ = kNone;
-  Bin later_;  // beyond the ring
+  Bin later_;  // entries beyond the ring
 
   std::vector<CalendarEntry> sorted_, scratch_;  // the open bin
   std::vector<std::uint32_t> bucket_, which_;

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// When do two spheres, or a sphere and a wall, touch? Pure functions of the relative motion.
+// The time at which two spheres, or a sphere and a wall, touch: pure functions of the relative motion.
 //
-// d = x_i − x_j is the separation of the centres (of the image that is meant), v and a its rates, sigma = r_i + r_j the
-// contact distance. Times count from now. A contact is the first instant at which the gap is not positive and falling:
-// spheres that overlap by rounding and part are left alone, spheres that overlap and approach touch at once.
+// d = x_i − x_j is the separation of the centres (of the chosen image), v and a its derivatives, sigma = r_i + r_j the
+// contact distance. Times count from now. A contact is the first time at which the gap is not positive and decreasing:
+// spheres that overlap by rounding and separate do not collide, spheres that overlap and approach touch at once.
 //
 //   const double s = contact_time(d, v, sigma, slack);            // straight flights
 //   const double s = contact_time(d, v, sigma, w, slack);         // straight flights of spheres that grow
 //   const double s = contact_time(d, v, a, sigma, rest, slack);   // parabolas, sought in [0, rest)
 //
-// Approach slower than `slack` (rounding of the velocities, see approach_slack) does not count for pairs that touch:
-// no impulse could change it, and a contact that changes nothing would repeat without end.
+// For touching pairs, an approach slower than `slack` (the rounding of velocities, see approach_slack) does not count:
+// no impulse could change it, so the contact would repeat without end.
 
 #include <cmath>
 
@@ -20,13 +20,13 @@
 
 namespace carom {
 
-/// Rounding level of d·v for two touching spheres with velocities of the given sizes.
+/// Rounding error of d·v for two touching spheres with these speeds.
 inline double approach_slack(double sigma, double speed_i, double speed_j) {
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   return 8 * kEpsilon * sigma * (speed_i + speed_j);
 }
 
-/// |d × v|², the squared area that d and v span. Unlike d²v² − (d·v)² it has no cancellation.
+/// |d × v|², the squared area spanned by d and v. Unlike d²v² − (d·v)² it has no cancellation.
 template <int D>
 double squared_cross(const Vec<D>& d, const Vec<D>& v) {
   const double z = d[0] * v[1] - d[1] * v[0];
@@ -37,7 +37,7 @@ double squared_cross(const Vec<D>& d, const Vec<D>& v) {
   }
 }
 
-/// Straight relative motion: the smaller root of |d + v s|² = sigma², in the form that does not cancel.
+/// Straight relative motion: the smaller root of |d + v s|² = sigma², in the form without cancellation.
 template <int D>
 double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double slack) {
   const double b = d.dot(v);
@@ -49,12 +49,11 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double slack
   return c / (std::sqrt(discriminant) - b);
 }
 
-/// The same for spheres that grow: the first s ≥ 0 with |d + v s| = sigma + w s, where w ≥ 0 is the rate of the contact
-/// distance (Lubachevsky, Stillinger, J. Stat. Phys. 60 (1990) 561). With w = 0 the bits are those of the function
-/// above.
+/// For growing spheres: the first s ≥ 0 with |d + v s| = sigma + w s, where w ≥ 0 is the rate of the contact distance
+/// (Lubachevsky, Stillinger, J. Stat. Phys. 60 (1990) 561). With w = 0 it gives the bits of the function above.
 ///
-/// With A = v² − w², b = d·v − sigma w and c = d² − sigma² the squared gap is c + 2 b s + A s². Growth catches up even
-/// with spheres that part, where A < 0. Spheres that touch and part have A ≥ 0 and never meet again.
+/// With A = v² − w², b = d·v − sigma w and c = d² − sigma², the squared gap is c + 2 b s + A s². If A < 0, growth
+/// overtakes even spheres that separate. Spheres that touch and separate have A ≥ 0 and never meet again.
 template <int D>
 double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double w, double slack) {
   const double dv = d.dot(v), b = dv - sigma * w;
@@ -66,18 +65,17 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double w, do
       v.squaredNorm() * sigma * sigma - squared_cross<D>(d, v) + w * (w * d.squaredNorm() - 2 * sigma * dv);
   if (discriminant <= 0) return kNever;
   const double root = std::sqrt(discriminant);
-  return b < 0 ? c / (root - b) : (b + root) / -outrun;  // of the two forms of one root the one that does not cancel
+  return b < 0 ? c / (root - b) : (b + root) / -outrun;  // the form of the root without cancellation
 }
 
-/// Parabolic relative motion d + v s + a s²/2, sought in [0, rest). `touching` divides out the root s = 0 of a pair in
-/// contact. The time is 0 for a pair that touches and approaches, and for one that touches, rests and is pressed
-/// together.
+/// Parabolic relative motion d + v s + a s²/2, with s in [0, rest). `touching` divides out the root s = 0 of a pair in
+/// contact. The time is 0 for a touching pair that approaches, and for one at rest that is pressed together.
 template <int D>
 double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double rest, bool touching,
                     double slack) {
   const double c0 = d.squaredNorm() - sigma * sigma;
   const double b = d.dot(v);
-  if (!touching) {  // most pairs are too far away to meet: distance against the length of the path
+  if (!touching) {  // most pairs are too far apart: compare the distance with the path length
     const double path = rest * (v.norm() + 0.5 * rest * a.norm());
     if (c0 > 0 && path * (path + 2 * sigma) < c0) return kNever;
   }
@@ -91,7 +89,7 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
     s = first_fall(gap, rest);
   }
   if (s == 0 || s == kNever) return s;
-  const Vec<D> at = d + s * v + (0.5 * s * s) * a;  // polish on the vectors themselves
+  const Vec<D> at = d + s * v + (0.5 * s * s) * a;  // a Newton step on the vectors themselves
   const double falling = at.dot(v + s * a);
   if (falling < 0) {
     const double correction = 0.5 * (at.squaredNorm() - sigma * sigma) / falling;
@@ -100,7 +98,7 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
   return s < rest ? s : kNever;
 }
 
-/// A sphere and a wall: gap + v s + a s²/2, v and a along the wall's inward normal, sought in [0, rest).
+/// A sphere and a wall: gap + v s + a s²/2, v and a along the wall's inward normal, s in [0, rest).
 inline double wall_contact_time(double gap, double v, double a, double rest, bool touching, double slack) {
   if (touching) {
     if (v < -slack) return 0;

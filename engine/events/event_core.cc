@@ -42,11 +42,11 @@ void EventCore<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon
 
 template <int D>
 void EventCore<D>::give_back(double time, Particles<D>& particles) {
-  queue_.empty();  // makes room
+  queue_.empty();  // frees memory
   fly_to(time, particles);
 }
 
-/// Takes over the records, sorted in space anew where that is due.
+/// Loads the records, sorted in space again if that is due.
 template <int D>
 void EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
   const std::size_t n = particles.size();
@@ -88,7 +88,7 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
   flights_.admit(slot, r, radius, sizes_->mass_of(r));
   queue_.admit(slot);
   search_.admit(slot, radius, now);
-  queue_.settle();
+  queue_.read_versions();
   return true;
 }
 
@@ -110,7 +110,7 @@ void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, doub
   for (const auto& [i, r] : records) search_.move(i, now);
   for (const auto& [i, r] : records) {
     search_.plan(i, now);
-    queue_.settle();
+    queue_.read_versions();
   }
 }
 
@@ -121,7 +121,7 @@ double EventCore<D>::run(double end, const Report& report) {
   while (queue_.next(end, i, now)) {
     now_ = now;
     search_.prefetch();
-    queue_.settle();
+    queue_.read_versions();
     NextEvent<D>& a = queue_[i];
     if (a.update < a.contact) {
       search_.look_again(i, now);
@@ -151,7 +151,7 @@ double EventCore<D>::run(double end, const Report& report) {
       break;
     }
   }
-  queue_.settle();
+  queue_.read_versions();
   return end;
 }
 

@@ -9,7 +9,7 @@ bool meets(const NextEvent<D>& a) {
   return a.contact < a.update && a.kind == EventKind::pair;
 }
 
-/// What is read of a core, in registers.
+/// Pointers into the core, held in registers.
 template <int D>
 struct View {
   const NextEvent<D>* plans;
@@ -63,7 +63,7 @@ template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
                        Candidates& found) {
   const View<D> view(queue, flights);
-  // To look at the cells twice costs less than to wait for the spheres in them.
+  // Reading the cells twice is cheaper than waiting for the spheres in them.
   const auto fetch = [&](Slot j) { view.fetch(j); };
   const auto step = [](const NextEvent<D>& a) { return a.contact <= a.update ? 0 : a.face % 2 == 1 ? 1 : -1; };
   if (const CalendarEntry* const later = queue.upcoming(8)) {

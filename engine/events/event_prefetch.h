@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What the next events will need is fetched while this one is at work.
+// Prefetches the data of the next events while the current one is executed.
 //
-// What an event needs is known step by step: the sphere, its partner and its list or cells, the candidates in these,
-// their records. Each step takes a wait for memory, so they are spread over the events before.
+// The data of an event become known step by step: the sphere, its partner and its list or cells, the candidates in
+// them, their records. Each step waits for memory, so the steps are spread over the preceding events.
 
 #include "engine/events/event_queue.h"
 #include "engine/search/linked_cells.h"
@@ -11,15 +11,15 @@
 
 namespace carom {
 
-/// Fetches less where the core is not `large`: it stands in a cache.
+/// Prefetches less if the core is not `large`, that is, fits into a cache.
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const SkinLists<D>& lists, bool large);
 
-/// The same where there are cells and the core stands in a cache.
+/// For a core with cells that fits into a cache.
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells);
 
-/// The same where it does not; `found` is room to work in.
+/// For a core with cells that does not fit; `found` is working memory.
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
                        Candidates& found);

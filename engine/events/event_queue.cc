@@ -59,7 +59,7 @@ typename EventQueue<D>::Tied EventQueue<D>::tie(Slot i) const {
   return {stale(a) ? Tied::Rank::stale : Tied::Rank::contact, key_of(i), i};
 }
 
-/// Whether two spheres plan the same contact, and it still holds.
+/// Whether two spheres plan the same contact and it is valid.
 template <int D>
 bool EventQueue<D>::mirrored(Slot i, Slot j) const {
   const NextEvent<D>&a = next_events_[i], &b = next_events_[j];
@@ -84,8 +84,8 @@ bool EventQueue<D>::next(double end, Slot& slot, double& time) {
       slot = entry.slot;
       time = entry.time;
       if (!calendar_.more_at(time)) return true;
-      settle();  // from here on it matters which plans are stale
-      // Often it is the same contact, planned by both partners: the other's plan falls with this one.
+      read_versions();  // stale plans must be recognised from here on
+      // Often both partners planned the same contact: both plans are then served at once.
       Slot other = slot;
       if (const CalendarEntry* const next = calendar_.top(holds); mirrored(slot, next->slot)) {
         other = next->slot;
@@ -96,7 +96,7 @@ bool EventQueue<D>::next(double end, Slot& slot, double& time) {
       if (other != slot) tied_.push(tie(other));
       tied_time_ = time;
     }
-    settle();
+    read_versions();
     time = tied_time_;
     while (calendar_.more_at(time)) {
       const CalendarEntry* const top = calendar_.top(holds);
@@ -106,10 +106,10 @@ bool EventQueue<D>::next(double end, Slot& slot, double& time) {
     const Tied first = tied_.top();
     tied_.pop();
     slot = first.slot;
-    if (next_events_[slot].due() != time) continue;  // its plans have changed, and its new ones are in the calendar
+    if (next_events_[slot].due() != time) continue;  // its plan has changed, and the new one is in the calendar
     const Tied now = tie(slot);
     if (now == first) return true;
-    tied_.push(now);  // what it plans has another place among these: its partner has collided
+    tied_.push(now);  // its partner has collided, so its key has changed
   }
 }
 

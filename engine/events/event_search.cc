@@ -16,7 +16,7 @@ void EventSearch<D>::start(double now, double max_displacement) {
   max_displacement_ = max_displacement;
   setting_ = flights_.setting();
   std::vector<double> radii = flights_.radii(flights_.horizon());
-  if (lists_ && radii_ == radii) {  // lists outlive a slab while they are good for its radii
+  if (lists_ && radii_ == radii) {  // lists are reused in the next slab if the radii are unchanged
     lists_->follow(flights_.records());
   } else {
     clear();
@@ -26,7 +26,7 @@ void EventSearch<D>::start(double now, double max_displacement) {
   }
   for (Slot i = 0; i < flights_.size(); ++i) {
     foresee(i, now);
-    queue_.settle();
+    queue_.read_versions();
   }
   queue_.fill(now, flights_.horizon(), options_.entries_per_bin);
 }
@@ -36,7 +36,8 @@ void EventSearch<D>::choose(double now) {
   small_ = 8 * static_cast<double>(flights_.capacity()) <= options_.in_cache;
   large_ = static_cast<double>(flights_.capacity()) > options_.in_cache;
   at_border_.clear();
-  // The density is that of the whole system: a subdomain has a part of it, or no spheres yet; larger ones may come.
+  // The density is that of the whole system: a subdomain has a part of it, perhaps no spheres yet, and may receive
+  // larger ones.
   const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : radii_;
   if (counts_.predictions == 0) tuning_ = SearchTuning(options_);
   Extent<D> extent = flights_.extent();
@@ -61,14 +62,14 @@ void EventSearch<D>::choose(double now) {
   }
   double skin = tuning_.skin();
   for (int k = 0; k < D; ++k)
-    if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // less than half a box: images stay clear
+    if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // below half a box: images stay distinct
   lists_ = std::make_unique<SkinLists<D>>(box_, flights_.packing(), kernels_, radii_, flights_.equal(), largest_, skin,
                                           queue_.plans());
   lists_->build(
       flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, max_displacement_);
 }
 
-/// What the kernels look at for the contacts of a sphere; `found` is room for it.
+/// The input of the kernels for the contacts of a sphere; `found` is working memory.
 template <int D>
 ScanTask EventSearch<D>::around(Slot i, Candidates& found) {
   const NextEvent<D>& a = queue_[i];
@@ -109,8 +110,8 @@ void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
   }
 }
 
-/// Plans the first contact with the candidates where it comes before the one that is planned. `latest`: no record is of
-/// a later time than the sphere's own.
+/// Plans the first contact with the candidates if it is earlier than the planned one. `latest`: no record is later than
+/// the sphere's.
 template <int D>
 void EventSearch<D>::scan(const ScanTask& task, bool latest) {
   counts_.candidates += task.n;
@@ -126,7 +127,7 @@ void EventSearch<D>::plan_first(const ScanTask& task, const ScanResult& first) {
   offer_all(task);
 }
 
-/// Plans the first contact with the candidates, one by one.
+/// Plans the first contact with the candidates, computed one by one.
 template <int D>
 void EventSearch<D>::offer_all(const ScanTask& task) {
   for (unsigned q = 0; q < task.n; ++q) {
@@ -152,7 +153,7 @@ void EventSearch<D>::foresee_update(Slot i, double now) {
     predict_crossing(queue_[i], i, flights_, box_, cells_->grid(), now);
 }
 
-/// How far a sphere may go from the centre of its list's region.
+/// The distance that a sphere may be from the centre of its list's region.
 template <int D>
 double EventSearch<D>::distance_left(Slot i) const {
   return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
@@ -161,7 +162,7 @@ double EventSearch<D>::distance_left(Slot i) const {
 template <int D>
 void EventSearch<D>::look_again(Slot i, double now) {
   NextEvent<D>& a = queue_[i];
-  const auto way = [&](const Vec<D>& x) {  // from the centre of its list's region
+  const auto way = [&](const Vec<D>& x) {  // distance from the centre of its list's region
     return (x - Eigen::Map<const Vec<D>>(a.where.centre)).norm();
   };
   if (cells_) {
@@ -174,7 +175,7 @@ void EventSearch<D>::look_again(Slot i, double now) {
     ++counts_.rebuilds;
     const std::span<const std::uint32_t> fresh = lists_->renew(i, x);
     if (!fresh.empty()) scan({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
-  }  // else it is still far from where its list ends
+  }  // else its list is still valid far enough
   foresee_update(i, now);
   queue_.schedule(i);
 }
@@ -226,7 +227,7 @@ void EventSearch<D>::set_border(std::span<const Slot> slots, double now) {
     at_border_[i] = 1;
     if (lists_->move(i, flights_.at(i, now).x, distance_left(i))) {
       plan(i, now);
-      queue_.settle();
+      queue_.read_versions();
     } else {
       foresee_update(i, now);
       queue_.schedule(i);

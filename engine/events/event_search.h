@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Plans the next event of a sphere: its first contact with the spheres near it, and until when no others are near.
+// Plans the next event of a sphere: its first contact with nearby spheres, and the time until which its neighbourhood
+// is valid.
 //
-// Those near a sphere stand in neighbour lists, or in cells where the system is dilute; neither changes a contact. So
-// nothing that happens here can reach the physics.
+// Nearby spheres come from neighbour lists, or from cells if the system is dilute. Neither changes a contact, so the
+// search cannot affect the results.
 
 #include <memory>
 
@@ -17,7 +18,7 @@ namespace carom {
 template <int D>
 class EventSearch {
  public:
-  /// Plans go into `queue`. `sizes` as in EventCore. All outlive the search.
+  /// Stores plans in `queue`. `sizes` as in EventCore. All arguments must outlive the search.
   EventSearch(const Box<D>& box, const Flights<D>& flights, EventQueue<D>& queue, const Sizes* sizes,
               const SearchOptions& options)
       : box_(box),
@@ -28,31 +29,31 @@ class EventSearch {
         kernels_(scan_kernels()),
         tuning_(options) {}
 
-  /// Slots are about to change: forgets which spheres are near which.
+  /// Discards lists and cells; call it before slots change.
   void clear();
-  /// Plans the first event of every sphere, and fills the queue. No record is of a later time than `now`; find_near()
-  /// will use `max_displacement`.
+  /// Plans the first event of every sphere and fills the queue. No record may be later than `now`; find_near() uses
+  /// `max_displacement`.
   void start(double now, double max_displacement);
 
-  /// After a change of a sphere's record, or its partner's: plans its next event.
+  /// Plans the next event of a sphere after its record, or its partner's, has changed.
   void plan(Slot i, double now);
-  /// The same for two spheres that have just collided.
+  /// plan() for two spheres that have just collided.
   void plan_two(Slot i, Slot j, double now);
-  /// NextEvent::update has come: looks at a sphere's surroundings again. The planned contact stands, but for others
-  /// that come before it.
+  /// Updates a sphere's neighbourhood when NextEvent::update is due. Its planned contact stays unless an earlier one is
+  /// found.
   void look_again(Slot i, double now);
 
-  /// Takes in a sphere that flights and queue have.
+  /// Adds a sphere that flights and queue already have.
   void admit(Slot i, double radius, double now);
   void dismiss(Slot i);
-  /// The record of a sphere has been replaced.
+  /// Updates the search after the record of a sphere has been replaced.
   void move(Slot i, double now);
   /// As in EventCore.
   void set_border(std::span<const Slot> slots, double now);
   std::span<const std::uint32_t> find_near(Slot i);
   std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high);
 
-  /// Starts to fetch what the next events will need.
+  /// Starts to prefetch the data of the next events.
   void prefetch() {
     if (small_) return;
     if (lists_)
@@ -75,7 +76,7 @@ class EventSearch {
   void plan_first(const ScanTask& task, const ScanResult& first);
   [[gnu::noinline]] void offer_all(const ScanTask& task);  // seldom needed, and large
   double distance_left(Slot i) const;
-  /// Whether lists have room for another `max_displacement` at the border.
+  /// Whether the skin leaves room for another `max_displacement` at the border.
   bool border_fits() const { return lists_ && lists_->skin() >= 3 * max_displacement_; }
 
   const Box<D>& box_;
@@ -87,14 +88,14 @@ class EventSearch {
   SearchTuning tuning_;
   ScanSetting setting_;
 
-  std::unique_ptr<SkinLists<D>> lists_;  // one of the two
+  std::unique_ptr<SkinLists<D>> lists_;  // lists_ or cells_ is set
   std::unique_ptr<LinkedCells<D>> cells_;
   Candidates found_, others_;
   std::vector<std::uint32_t> near_;
-  std::vector<double> radii_;                  // that lists or cells are made for; one where all are equal
-  double max_displacement_ = 0, largest_ = 0;  // how far spheres may be from where the core has them; largest radius
-  std::vector<std::uint8_t> at_border_;        // by slot; empty: no sphere is
-  bool small_ = true, large_ = false;          // few enough for a fast cache; too many for any
+  std::vector<double> radii_;                  // for which lists or cells were made; one value if all are equal
+  double max_displacement_ = 0, largest_ = 0;  // bound on displacements (load); largest radius
+  std::vector<std::uint8_t> at_border_;        // by slot; empty if there is no border
+  bool small_ = true, large_ = false;          // fits into a fast cache; fits into no cache
   EventCounts counts_;
 };
 

@@ -11,7 +11,7 @@
 namespace carom {
 namespace {
 
-/// The common value, or nothing where they differ.
+/// The common value, or 0 if the values differ.
 double common(const std::vector<double>& values) {
   const bool equal = std::all_of(values.begin(), values.end(), [&](double v) { return v == values[0]; });
   return equal && !values.empty() ? values[0] : 0;
@@ -160,7 +160,7 @@ Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const 
   const double mass_a = mass(i), mass_b = mass(j);
   const double radii = radius(i) + radius(j), sigma = grown(radii, t);
   const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, mass_a, mass_b, sigma, radii * growth_) * d;
-  if (common_mass_ == 1) {  // the same bits without divisions
+  if (common_mass_ == 1) {  // gives the same bits without divisions
     a.v += impulse;
     b.v -= impulse;
   } else {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The spheres of one core and all that may happen to them: flight, contact, collision. The physics is here;
-// event_search.h decides for which pairs contacts are computed, event_core.h when.
+// The spheres of one core and their physics: flight, contact, collision. event_search.h decides for which pairs
+// contacts are computed, event_core.h when.
 //
-// Between contacts every sphere flies on x + v s + g s²/2 from its record. All radii may grow by a common factor
-// 1 + growth·t. A contact is a pure function of two records: neither the time of its computation nor a list is in it.
+// Between contacts every sphere moves on x + v s + g s²/2 from its record. All radii may grow by a common factor 1 +
+// growth·t. A contact is a pure function of two records: it depends neither on when it is computed nor on the lists.
 
 #include <span>
 
@@ -19,11 +19,11 @@
 
 namespace carom {
 
-/// What a collision did.
+/// The result of a collision.
 template <int D>
 struct Impact {
   Vec<D> d;        ///< from the second centre to the first [length]
-  Vec<D> impulse;  ///< given to the first sphere [mass·length/time]
+  Vec<D> impulse;  ///< impulse on the first sphere [mass·length/time]
   double overlap;  ///< at contact, relative to the contact distance
 };
 
@@ -32,13 +32,13 @@ class Flights {
  public:
   explicit Flights(const Box<D>& box) : box_(box), walls_(box.walls()), gap_tolerance_(box.gap_tolerance()) {}
 
-  /// Gives every particle a slot.
+  /// Assigns a slot to every particle.
   void assign(std::span<const Id> order);
 
-  /// Starts a slab: all spheres at time 0, in the slots given before.
+  /// Starts a slab: all spheres at time 0, in the slots assigned before.
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
 
-  /// The same for records of other times, in their order; with room for more that come meanwhile.
+  /// Loads records of various times, in their order, with room for spheres that are admitted later.
   void load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon);
 
   std::size_t size() const { return records_.size(); }
@@ -50,7 +50,7 @@ class Flights {
   bool field() const { return field_; }
   double horizon() const { return horizon_; }
 
-  /// One radius where all are equal, else by slot; as they are at a time.
+  /// The radii at time t: by slot, or a single value if all are equal.
   std::vector<double> radii(double t) const;
   /// The positions of all spheres at a time, by slot.
   std::vector<Vec<D>> places(double t) const {
@@ -59,59 +59,57 @@ class Flights {
     for (Slot i = 0; i < size(); ++i) places.push_back(at(i, t).x);
     return places;
   }
-  /// Of the places at the records.
+  /// The extent of the positions in the records.
   Extent<D> extent() const;
-  /// What the kernels of scan.h are to know.
+  /// The settings for the kernels of scan.h.
   ScanSetting setting() const;
 
-  /// The record as it is at time t.
+  /// The record, advanced to time t.
   Record<D> at(Slot i, double t) const { return at(records_[i], t); }
   Record<D> at(Record<D> r, double t) const {
     advance(r, t);
     return r;
   }
-  /// 1 + the generation of the record where it is of this very time, else 0 (EventKey).
+  /// 1 + the generation of the record if the record has exactly this time, else 0 (EventKey).
   static std::uint32_t generation_at(const Record<D>& r, double t) { return r.t == t ? r.generation + 1u : 0u; }
   std::uint32_t generation_at(Slot i, double t) const { return generation_at(records_[i], t); }
 
-  /// The time at which the two next touch, x_i − x_j taken with `shift`; infinite: never. Exchanging the two gives the
-  /// same bits, because every difference only changes its sign.
+  /// The time at which two spheres next touch, with `shift` added to x_i − x_j; infinite if never. Exchanging the two
+  /// gives the same bits, because every difference only changes its sign.
   double pair_contact(Slot i, Slot j, const Vec<D>& shift) const {
     return pair_contact(i, records_[i], j, records_[j], shift);
   }
-  /// The same for a sphere and a wall. Throws Error(Failure::numerical) for a sphere that rests there under the field.
+  /// The time at which a sphere touches a wall. Throws Error(Failure::numerical) if it rests there under the field.
   double wall_contact(Slot i, const Wall<D>& wall) const { return wall_contact(i, records_[i], wall); }
 
-  /// The two collide at time t.
+  /// Executes the collision of two spheres at time t.
   Impact<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
     return collide(i, records_[i], j, records_[j], shift, t, generation);
   }
-  /// The sphere collides with a wall at time t; the second "centre" is the point touched.
+  /// Executes the collision of a sphere with a wall at time t; the second "centre" is the point touched.
   Impact<D> bounce(Slot i, const Wall<D>& wall, double t, std::uint32_t generation) {
     return bounce(i, records_[i], wall, t, generation);
   }
 
-  // The same for spheres with other records than their present ones.
+  // The functions above for records other than the present ones.
   double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
   double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
   Impact<D> collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
                     std::uint32_t generation) const;
   Impact<D> bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const;
 
-  /// Replaces a record.
   void set(Slot i, const Record<D>& r) { records_[i] = r; }
-  /// Gives a sphere the slot `i`, one of those there are or the next.
+  /// Stores a sphere in slot `i`, an existing one or the next.
   void admit(Slot i, const Record<D>& r, double radius, double mass);
 
-  /// What observers see of a collision between the two, or with a wall, after it.
+  /// The contact reported to observers after a collision of two spheres, or of a sphere with a wall.
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
                         const Impact<D>& impact) const;
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const;
 
-  /// Those of the box.
   std::span<const Wall<D>> walls() const { return walls_; }
 
-  /// Whether all spheres have one radius.
+  /// Whether all spheres have the same radius.
   bool equal() const { return common_radius_ != 0; }
 
  private:
@@ -126,10 +124,10 @@ class Flights {
   bool field_ = false;
   double growth_ = 0, horizon_ = 0;
   GapTolerance gap_tolerance_;
-  PageVector<Record<D>> records_;      // by slot
-  std::size_t capacity_ = 0;           // how many there may be
-  Packing<D> packing_;                 // of their slots
-  std::vector<double> radius_, mass_;  // by slot; empty where all are equal
+  PageVector<Record<D>> records_;  // by slot
+  std::size_t capacity_ = 0;       // largest number of spheres
+  Packing<D> packing_;
+  std::vector<double> radius_, mass_;  // by slot; empty if all are equal
   double common_radius_ = 0, common_mass_ = 0;
 };
 

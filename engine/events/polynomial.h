@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The first time at which a polynomial falls through zero: certified, none missed, none found twice.
+// The first time at which a polynomial falls through zero, guaranteed: no root is missed or found twice.
 //
 // The gap between two spheres on parabolas is a quartic of time; a contact is the first instant at which the gap is not
 // positive *and falling*. Between neighbouring zeros of its derivative a polynomial is monotone, so a sign change there
@@ -43,8 +43,8 @@ struct Roots {
   const double* end() const { return at.data() + count; }
 };
 
-/// The zero of a polynomial, or any function with a derivative, that changes sign once between lo and hi:
-/// Newton's method inside a shrinking bracket, to the last bit.
+/// The single sign change between lo and hi of a polynomial, or any function with a derivative, by Newton's method in a
+/// shrinking bracket, to the last bit.
 template <class F, class DF>
 double bracketed_root(const F& f, const DF& df, double lo, double hi) {
   const bool rising = f(lo) < 0;
@@ -61,7 +61,7 @@ double bracketed_root(const F& f, const DF& df, double lo, double hi) {
   return s;
 }
 
-/// The zeros with a change of sign in the open interval (0, end), ascending.
+/// The zeros in the open interval (0, end) at which p changes sign, ascending.
 template <int N>
 Roots<N> sign_changes(const Polynomial<N>& p, double end) {
   Roots<N> roots;
@@ -89,7 +89,7 @@ Roots<N> sign_changes(const Polynomial<N>& p, double end) {
   return roots;
 }
 
-/// The first s in [0, end) with p(s) ≤ 0 and p falling there, kNever if there is none.
+/// The first s in [0, end) with p(s) ≤ 0 and p falling there; kNever if there is none.
 template <int N>
 double first_fall(const Polynomial<N>& p, double end) {
   const auto d = p.derivative();

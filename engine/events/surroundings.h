@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Until when what was found around a sphere holds: it has come to the rim of its list's region, or to a face of its
-// cell. A bound in the first case, which may be too early; never too late.
+// The time until which the neighbourhood found for a sphere is valid: it leaves the region of its list, or its cell.
+// For lists this is a lower bound; it is never too late.
 
 #include <bit>
 #include <cmath>
@@ -14,8 +14,8 @@
 
 namespace carom {
 
-/// Sets a.update: when a sphere with this record leaves the region its list is good for, a ball of radius `skin`. Its
-/// contact has been planned.
+/// Sets a.update to a time before which a sphere with this record stays in the region of its list, a ball of radius
+/// `skin`. Its contact must have been planned.
 template <int D>
 void predict_leaving(NextEvent<D>& a, const Record<D>& r, const Flights<D>& flights, double skin, double now) {
   Vec<D> e;
@@ -23,23 +23,23 @@ void predict_leaving(NextEvent<D>& a, const Record<D>& r, const Flights<D>& flig
   skin *= 1 - 1e-6;
   if (!flights.field()) {
     if (a.contact < kNever && (e + (a.contact - r.t) * r.v).squaredNorm() < skin * skin) {
-      a.update = kNever;  // not before its contact: a straight way between two places of a ball stays in it
+      a.update = kNever;  // not before its contact: a segment between two points of a ball stays in it
       return;
     }
-    // |e + v s| = skin; the form that cancels is good enough for a bound
+    // |e + v s| = skin; the form with cancellation is accurate enough for a bound
     const double b = e.dot(r.v), v_squared = r.v.squaredNorm(), room = skin * skin - e.squaredNorm();
     const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
     a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
     return;
   }
-  // At most |v| s + |g| s²/2 farther than at `now`.
+  // A sphere moves at most |v| s + |g| s²/2 from where it is at `now`.
   const double s0 = now - r.t;
   e += s0 * r.v + (0.5 * s0 * s0) * flights.g();
   const double speed = (r.v + s0 * flights.g()).norm(), room = std::max(skin - e.norm(), 0.0);
   a.update = std::max(now + 2 * room / (speed + std::sqrt(speed * speed + 2 * flights.g().norm() * room)), now);
 }
 
-/// predict_crossing() in a field.
+/// predict_crossing() with a field.
 template <int D>
 void predict_crossing_in_field(NextEvent<D>& a, Slot i, const Flights<D>& flights, const Box<D>& box,
                                const CellGrid<D>& grid, double now) {
@@ -50,10 +50,11 @@ void predict_crossing_in_field(NextEvent<D>& a, Slot i, const Flights<D>& flight
       const std::int32_t c = a.where.cell.unwrapped[k] + side;
       if (!box.periodic(k) && (c <= 0 || c >= grid.count(k))) continue;  // the outermost cells have no outer face
       const double outward = side == 1 ? 1.0 : -1.0;
-      const double gap = outward * (grid.face(k, c) - r.x[k]);  // to go until the face, ≥ 0 but for rounding
+      const double gap = outward * (grid.face(k, c) - r.x[k]);  // distance to the face, ≥ 0 up to rounding
       const double s = wall_contact_time(std::max(gap, 0.0), -outward * r.v[k], -outward * flights.g()[k],
                                          flights.horizon() - now, false, 0.0);
-      // At least an ulp from now: at the top of its path a particle could cross back and forth in no time.
+      // At least one ulp after now: at the top of its path a particle could otherwise cross back and forth at the same
+      // time.
       const double t = std::max(now + s, std::nextafter(now, kNever));
       if (t < a.update) {
         a.update = t;
@@ -62,19 +63,19 @@ void predict_crossing_in_field(NextEvent<D>& a, Slot i, const Flights<D>& flight
     }
 }
 
-/// Sets a.update and a.face: when sphere i leaves its cell, and through which face.
+/// Sets a.update and a.face to the time at which sphere i leaves its cell and the face it crosses.
 template <int D>
 void predict_crossing(NextEvent<D>& a, Slot i, const Flights<D>& flights, const Box<D>& box, const CellGrid<D>& grid,
                       double now) {
   if (flights.field()) return predict_crossing_in_field(a, i, flights, box, grid, now);
   const Record<D>& r = flights[i];
-  // Without a branch, which could not be predicted: times that are not negative are in the order of their bits.
+  // Written without a branch, which would be unpredictable: nonnegative times are ordered like their bits.
   std::uint64_t first = std::bit_cast<std::uint64_t>(kNever);
   unsigned face = 0;
   for (int k = 0; k < D; ++k) {
     const unsigned up = static_cast<unsigned>(std::bit_cast<std::uint64_t>(r.v[k]) >> 63) ^ 1;
     const std::int32_t c = a.where.cell.unwrapped[k] + static_cast<std::int32_t>(up);
-    double s = std::abs(grid.face(k, c) - r.x[k]) / std::abs(r.v[k]);  // 0/0 comes after all
+    double s = std::abs(grid.face(k, c) - r.x[k]) / std::abs(r.v[k]);  // 0/0, a NaN, sorts last
     if (!box.periodic(k) && (c <= 0 || c >= grid.count(k))) s = kNever;
     const std::uint64_t bits = std::bit_cast<std::uint64_t>(s);
     face = bits < first ? 2 * static_cast<unsigned>(k) + up : face;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The log of a window that the event core writes: enough to take any event back, and to read the path of any sphere.
+// The log of a window that the event core writes: enough to revoke any event and to read the path of any sphere.
 //
-// The log is in the order of keys and costs an event three cache lines, one after the other. Paths are read from it
-// where they are wanted, which is for the few spheres near the border of a subdomain (engine/ranks/window_paths.h).
+// The log is in the order of keys and costs three consecutive cache lines an event. Paths are read from it only for the
+// few spheres near the border of a subdomain (engine/ranks/window_paths.h).
 
 #include <algorithm>
 #include <limits>
@@ -16,12 +16,12 @@
 
 namespace carom {
 
-/// An event of one sphere, and the sphere after it.
+/// An event of one sphere, and the sphere's record after it.
 template <int D>
 struct Node {
   Record<D> after;
   EventKey<D> key;
-  double virial = 0;   ///< d·impulse of a pair collision; of a wall its work [energy]
+  double virial = 0;   ///< d·impulse of a pair; the work of a wall [energy]
   double overlap = 0;  ///< at contact, relative to the contact distance
 
   /// The other sphere's id; kNoPartner at a wall.
@@ -32,14 +32,14 @@ struct Node {
   }
 };
 
-/// Whether two nodes are the same, bit for bit.
+/// Whether two nodes are equal, bit for bit.
 template <int D>
 bool operator==(const Node<D>& a, const Node<D>& b) {
   return a.key == b.key && a.after.x == b.after.x && a.after.v == b.after.v && a.after.t == b.after.t &&
          a.after.id == b.after.id;
 }
 
-/// Thrown before an event for which the log has no room left; all that it has stands.
+/// Thrown before an event for which the log has no room; the events in the log stay valid.
 struct LogFull {};
 
 template <int D>
@@ -47,18 +47,18 @@ class Trace {
  public:
   static constexpr std::uint32_t kNone = 0xffffffff;
 
-  /// What happened to one sphere, or to two: the one with the lower id first.
+  /// An event of one sphere, or of two, the one with the lower id first.
   struct Event {
     double time, virial, overlap;
     std::uint32_t generation;
-    std::uint32_t partner;  ///< of the first, as the core has it (NextEvent)
+    std::uint32_t partner;  ///< the partner of the first sphere, as in NextEvent
     Id id[2];
     Slot slot[2];           ///< kNone: a wall
-    std::uint32_t last[2];  ///< the entry that the sphere had in an event before, or kNone
+    std::uint32_t last[2];  ///< the sphere's entry in its previous event, or kNone
   };
-  // An entry in an event has the number 2·event + 0 or 1.
+  // Sphere k of an event, k = 0 or 1, has the entry number 2·event + k.
 
-  /// Removes all events, and makes room for so many slots.
+  /// Removes all events and makes room for this many slots.
   void clear(std::size_t slots) {
     base_ += 2 * static_cast<std::uint32_t>(events_.size());
     if (base_ > kNone / 4) {
@@ -69,10 +69,10 @@ class Trace {
     events_.clear();
     before_.clear();
     fastest_squared_ = 0;
-    most_ = kMostEvents + kMostEventsOfASphere * slots;
+    most_ = kMaxEvents + kMaxEventsPerSphere * slots;
   }
 
-  /// An event is about to happen to the sphere `i`, and to `j` unless that is kNone.
+  /// Call before an event of sphere `i`, and of sphere `j` unless `j` is kNone.
   void begin(Slot i, const Record<D>& a, Slot j, const Record<D>& b, std::uint32_t partner, std::uint32_t generation) {
     if (events_.size() == most_) throw LogFull{};
     Event& event = events_.emplace_back();
@@ -82,12 +82,12 @@ class Trace {
     event.id[1] = b.id;
     event.slot[0] = i;
     event.slot[1] = j;
-    event.last[0] = take_entry(i, 0);
-    event.last[1] = j == kNone ? kNone : take_entry(j, 1);
+    event.last[0] = new_entry(i, 0);
+    event.last[1] = j == kNone ? kNone : new_entry(j, 1);
     before_.push_back(a);
     before_.push_back(b);
   }
-  /// It has happened.
+  /// Call after the event.
   void end(const Record<D>& a, const Record<D>& b, double virial, double overlap) {
     Event& event = events_.back();
     event.time = a.t;
@@ -98,10 +98,10 @@ class Trace {
 
   std::span<const Event> events() const { return events_; }
   const Event& event_of(std::uint32_t entry) const { return events_[entry / 2]; }
-  /// The sphere before its entry in an event.
+  /// The sphere's record before its entry in an event.
   const Record<D>& before(std::uint32_t entry) const { return before_[entry]; }
   bool has(Slot i) const { return latest_[i] >= base_; }
-  /// The entries of a sphere in the order of time; good until the next call.
+  /// The entries of a sphere in order of time; valid until the next call.
   std::span<const std::uint32_t> entries(Slot i) const {
     entries_.clear();
     for (std::uint32_t entry = has(i) ? latest_[i] - base_ : kNone; entry != kNone;
@@ -110,13 +110,13 @@ class Trace {
     std::reverse(entries_.begin(), entries_.end());
     return entries_;
   }
-  double fastest_squared() const { return fastest_squared_; }  ///< of all spheres after events
+  double fastest_squared() const { return fastest_squared_; }  ///< over all spheres, after events
 
  private:
-  // So many fit into a log: a window has 0.3 of a sphere.
-  static constexpr std::size_t kMostEvents = 20'000, kMostEventsOfASphere = 16;
+  // The capacity of a log: a window has 0.3 events a sphere.
+  static constexpr std::size_t kMaxEvents = 20'000, kMaxEventsPerSphere = 16;
 
-  std::uint32_t take_entry(Slot i, std::uint32_t which) {
+  std::uint32_t new_entry(Slot i, std::uint32_t which) {
     const std::uint32_t last = has(i) ? latest_[i] - base_ : kNone;
     latest_[i] = base_ + 2 * static_cast<std::uint32_t>(events_.size() - 1) + which;
     return last;
@@ -124,7 +124,7 @@ class Trace {
 
   std::vector<Event> events_;
   PageVector<Record<D>> before_;       // by entry
-  std::vector<std::uint32_t> latest_;  // by slot: base_ + entry; what is less is of windows before
+  std::vector<std::uint32_t> latest_;  // by slot: base_ + entry; smaller values are from earlier windows
   std::uint32_t base_ = 1;
   std::size_t most_ = 0;
   double fastest_squared_ = 0;

@@ -15,7 +15,7 @@ int main() {
   system->particles.v[1] = {1.1, -0.4};
   system->particles.v[3] = {-0.7, 0.9};
 
-  // 2. What acts between them.
+  // 2. The interactions between them.
   add_interaction(*system, "harmonic-bond", {{"chain", true}, {"stiffness", 1.0}, {"rest_length", 2.0}});
 
   // 3. A run to t = 60.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A fluid of hard spheres that attract each other, its pressure and g(r).
+// A fluid of attractive hard spheres: its pressure and g(r).
 //
 //   ./fluid [PARTICLES]       hard cores of diameter 1, V = −Σ e^{−1.8 (r − 1)}/r up to r = 3
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Nine discs in a box that attract each other like masses in the plane of a star field: the second experiment of
-// Enomoto's thesis, by every integrator that knows forces.
+// Nine discs in a box that attract each other like point masses in 3-D: the second experiment of Enomoto's thesis, with
+// every integrator that handles forces.
 //
 //   ./nine_gravity [STEP]     H = ½ Σ v² − Σ 1/|x_i − x_j|
 

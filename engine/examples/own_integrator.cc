@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// An integrator of one's own: Euler–Cromer (symplectic Euler) with hard collisions, beside psa.
+// A user-defined integrator: Euler–Cromer (symplectic Euler) with hard collisions, compared with psa.
 //
-//   ./own_integrator          v += h a(x), then all spheres fly straight for h and collide event by event: order 1
+//   ./own_integrator          v += h a(x), then all spheres move straight for h and collide event by event: order 1
 
 #include <carom/carom.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A potential of one's own: the Gaussian core, V = ε e^{−(r/σ)²}, in a fluid of soft particles with small hard cores.
+// A user-defined potential: the Gaussian core, V = ε e^{−(r/σ)²}, in a fluid of soft particles with small hard cores.
 //
-//   ./own_potential           edda keeps the energy, which takes all four functions; psa does so to its order
+//   ./own_potential           edda conserves the energy, which needs all four functions; psa does so to its order
 
 #include <carom/carom.h>
 

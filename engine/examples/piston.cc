@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A boundary that moves: a piston heats a gas of hard spheres, with the work it does and the adiabat for comparison.
+// A moving boundary: a piston heats a gas of hard spheres; its work and the adiabat are printed for comparison.
 //
-//   ./piston [SPEED]      of the piston; the thermal speed at the start is 1. The slower, the nearer to the adiabat
+//   ./piston [SPEED]      of the piston; the initial thermal speed is 1. Slower pistons come closer to the adiabat
 
 #include <carom/carom.h>
 
@@ -16,8 +16,8 @@ namespace {
 constexpr std::size_t kSpheres = 500;
 constexpr double kLong = 40, kWide = 10;
 
-/// The temperature, 1 at the start, on the adiabat d ln T = −⅔ Z d ln V of the equation of state of Carnahan and
-/// Starling. Centres stay half a diameter from the two walls.
+/// The temperature, initially 1, on the adiabat d ln T = −⅔ Z d ln V of the equation of state of Carnahan and Starling.
+/// Centres stay half a diameter from the two walls.
 double adiabat(double edge) {
   const auto filled = [](double length) { return kSpheres * std::numbers::pi / 6 / ((length - 1) * kWide * kWide); };
   const auto integral = [](double f) { return std::log(f) + (4 * f - 3 * f * f) / ((1 - f) * (1 - f)); };  // ∫ Z df/f

@@ -13,18 +13,18 @@
 
 namespace carom {
 
-/// (V/N)^(1/D) [length].
+/// The mean distance (V/N)^(1/D) [length].
 template <int D>
 double mean_distance(const System<D>& system) {
   return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, system.size())), 1.0 / D);
 }
 
-/// The quanta of a system; a function of its parameters, masses, charges and box. Collective.
+/// Computes the quanta from parameters, masses, charges and box. Collective.
 template <int D>
 Quanta quanta(const System<D>& system) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const double distance = mean_distance(system);
-  std::array<double, 4> most = {-kNone, -kNone, 0, 0};  // the smallest force and energy, negative; the largest
+  std::array<double, 4> most = {-kNone, -kNone, 0, 0};  // −smallest force and energy; largest force and energy
   for (const auto& term : system.interactions) {
     const ForceScale scale = term->scale(distance);
     if (scale.force > 0) most[0] = std::max(most[0], -scale.force);
@@ -34,18 +34,18 @@ Quanta quanta(const System<D>& system) {
   }
   system.decomposition.ranks().largest(most);
   const auto power = [](double x) { return x < kNone ? std::exp2(std::floor(std::log2(std::max(x, 0x1p-900)))) : 1; };
-  // Not so small that the largest do not fit.
+  // The second bound lets the largest forces and energies fit.
   return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])),
           std::max(0x1p-46 * power(-most[1]), 0x1p-70 * power(most[3]))};
 }
 
-/// Those that were determined at the start of the run.
+/// The quanta set at the start of the run, or computed if they are not set.
 template <int D>
 Quanta quanta_of(const System<D>& system) {
   return system.quanta.force > 0 ? system.quanta : quanta(system);
 }
 
-/// The forces of one pass: `add` adds each interaction's share, `out` gets the sums.
+/// One force pass: `add` adds the terms of each interaction, `out` gets the sums.
 template <int D, class Add>
 void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, Counters& counters, Add&& add) {
   const Stopwatch watch(counters.seconds.force);
@@ -55,7 +55,7 @@ void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, C
   counters.force_passes += 1;
 }
 
-/// out[i] = force on particle i at positions x, and where `sums` is given V and its companions over what this rank
+/// out[i] = force on particle i at positions x. If `sums` is given, sets it to V and the other sums over what this rank
 /// owns. One force pass.
 template <int D>
 void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Counters& counters,
@@ -73,18 +73,19 @@ void evaluate_mean_forces(const System<D>& system, Positions<D> x, Positions<D> 
   force_pass<D>(system, out, forces, counters, [&](const auto& term) { term.add_mean_forces(x, x_new, forces); });
 }
 
-/// Mean forces over a step with an end that is changed again and again, for some particles only.
+/// Mean forces over a step, for repeated corrections of its end that change only a few particles.
 template <int D>
 class MeanForces {
  public:
-  /// All pairs. Returns how many pairs of this rank are within reach.
+  /// Evaluates all pairs. Returns the number of this rank's pairs within reach.
   std::uint64_t evaluate(const System<D>& system, Positions<D> x, Positions<D> x_new) {
     forces_.reset(x.size(), quanta_of(system).force);
     std::uint64_t pairs = 0;
     for (const auto& term : system.interactions) pairs += term->add_mean_forces(x, x_new, forces_);
     return pairs;
   }
-  /// The same to the bit where only positions of `changed` particles are not those of the last call, `x_before`.
+  /// Evaluates changes only, with the bits of evaluate(); x_new may differ from that of the last call, `x_before`, only
+  /// for `changed` particles.
   std::uint64_t update(const System<D>& system, Positions<D> x, Positions<D> x_before, Positions<D> x_new,
                        const char* changed) {
     if (!forces_.has_room()) return evaluate(system, x, x_new);
@@ -110,13 +111,13 @@ void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions
   for (Id i = 0; i < w.size(); ++i)
     if (system.particles.owns(i)) most = std::max(most, w[i].template lpNorm<Eigen::Infinity>());
   most = system.decomposition.largest(most);
-  // The quantum of forces where particles are displaced by a part of their distance.
+  // Particles are displaced by a fraction of their mean distance; the quantum of forces is scaled by it.
   const double share = most > 0 && std::isfinite(most) ? most / mean_distance(system) : 1;
   ForceSums<D> sums(x.size(), quanta_of(system).force * std::exp2(std::floor(std::log2(share)) + 2));
   force_pass<D>(system, out, sums, counters, [&](const auto& term) { term.add_hessian_product(x, w, sums); });
 }
 
-/// V, Σ|V| and the virial at x; exact sums, not counted as a pass.
+/// V, Σ|V| and the virial at x, as exact sums; not counted as a force pass.
 template <int D>
 PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
   PotentialSums sums{.quantum = quanta_of(system).energy};
@@ -147,7 +148,7 @@ struct MotionSums {
   }
 };
 
-/// Of all particles of a system: the momentum in one state, the rest in another.
+/// Sums over all particles of a system: the momentum in `state`, the rest in `at`.
 template <int D>
 MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
   ExactSeries kinetic, speed;
@@ -164,9 +165,9 @@ MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state
   return system.decomposition.sum(sums);
 }
 
-/// G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet follows to second order:
-/// G = (1/12) vᵀ V″ v − (1/24) ∇Vᵀ M⁻¹ ∇V (Hairer, Lubich, Wanner, Geometric Numerical Integration, IX.3).
-/// `a` = −M⁻¹∇V(x) is given; `scratch` is overwritten. One force pass.
+/// The G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet conserves to second order: G = (1/12) vᵀ
+/// V″ v − (1/24) ∇Vᵀ M⁻¹ ∇V (Hairer, Lubich, Wanner, Geometric Numerical Integration, IX.3). `a` must be −M⁻¹∇V(x);
+/// `scratch` is overwritten. One force pass.
 template <int D>
 double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D> a, Vectors<D> scratch,
                    Counters& counters) {

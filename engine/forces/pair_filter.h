@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Which pairs a term of V leaves out: those of other species, and those joined by a bond.
+// The pairs on which a term of V acts: a filter by species and by bonds.
 
 #include <algorithm>
 #include <array>
@@ -37,11 +37,11 @@ class BondTable {
   }
 
  private:
-  std::vector<std::size_t> first_;  ///< where the higher partners of each particle begin
+  std::vector<std::size_t> first_;  ///< start of each particle's bonded partners with higher ids
   std::vector<Id> partners_;
 };
 
-/// The bonds that these terms stand for; null: none of them does.
+/// The bonds of these terms; null if none has bonds.
 template <class Terms>
 std::shared_ptr<const BondTable> bonds_of(const Terms& terms) {
   PairList all;
@@ -54,16 +54,16 @@ std::shared_ptr<const BondTable> bonds_of(const Terms& terms) {
   return any ? std::make_shared<BondTable>(std::move(all)) : nullptr;
 }
 
-/// Two species, in either order; or no restriction.
+/// Two species in either order; empty: all species.
 using SpeciesPair = std::optional<std::array<std::uint16_t, 2>>;
 
-/// Between which of two species a pair is wanted; both equal: within one.
+/// Selects pairs of one particle of each species; a = b: pairs within one species.
 struct SpeciesRule {
   const std::vector<std::uint16_t>* species_of = nullptr;  ///< null: all pairs
   std::uint16_t a = 0, b = 0;
 
   bool all() const { return species_of == nullptr; }
-  /// codes of PartnerSearch: those of a particle, and of which partners must have one.
+  /// The code of a particle for PartnerSearch; partner_code(): bits of which the code of a partner must have one.
   std::uint64_t code(Id i) const {
     if (all()) return PartnerSearch::kFirst;
     const std::uint16_t s = (*species_of)[i];
@@ -76,13 +76,13 @@ struct SpeciesRule {
   }
 };
 
-/// Which pairs a term acts between; the particles that it refers to outlive it.
+/// The pairs on which a term acts. The particles it refers to must outlive it.
 struct PairFilter {
   SpeciesRule species;
-  std::shared_ptr<const BondTable> excluded;  ///< pairs that these join are left out; null: none
-  const std::vector<Id>* id = nullptr;        ///< where there are such
+  std::shared_ptr<const BondTable> excluded;  ///< bonded pairs are excluded; null: no exclusions
+  const std::vector<Id>* id = nullptr;        ///< ids of the particles, if there are exclusions
 
-  /// The same for other particles.
+  /// The filter for other particles.
   template <int D>
   PairFilter among(const Particles<D>& some) const {
     PairFilter other = *this;

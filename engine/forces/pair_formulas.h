@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// From separations to forces: the loop over a batch of pairs for one potential, written once for any number of lanes.
+// Forces from separations: the loop over a batch of pairs for one potential, written once for any number of lanes.
 //
-// The kernels have it for the potentials of pair_potentials.h in every vector width; for others it is compiled where
-// they are used (pair_term.h). Linkage is internal, so that no function compiled for one machine can end up in
-// another's binary.
+// The kernels instantiate it for the potentials of pair_potentials.h in every vector width; for other potentials it is
+// compiled where they are used (pair_term.h). Linkage is internal, so that the linker cannot use a function compiled
+// for another instruction set.
 
 #include <type_traits>
 
@@ -14,9 +14,8 @@
 namespace carom {
 namespace {
 
-constexpr double kToInteger = 0x1.8p52;  // the bits of |x| < 2^51 plus this are an integer, and those of this
-
-/// x as integers, |x| < 2^51: to nearest, the even one of two.
+/// The bits of x + kToInteger minus the bits of kToInteger are the integer x, |x| < 2^51.
+constexpr double kToInteger = 0x1.8p52;
 template <class V>
 CAROM_INLINE IntegerOf<V> integers(V x) {
   return (IntegerOf<V>)((BitsOf<V>)(x + kToInteger) - (BitsOf<V>)all<V>(kToInteger));
@@ -29,7 +28,7 @@ template <int W, class P, Wanted wanted, bool wide>
                                PairTotals* totals) {
   using V = typename Width<W>::Double;
   using I = IntegerOf<V>;
-  // A copy lets the compiler keep constants in registers; what owns memory is not to be copied here.
+  // A copy lets the compiler keep constants in registers; potentials that own memory are not copied.
   std::conditional_t<std::is_trivially_copyable_v<P>, const P, const P&> potential =
       *static_cast<const P*>(any_potential);
   constexpr int kWords = wide ? 2 : 1;
@@ -38,12 +37,12 @@ template <int W, class P, Wanted wanted, bool wide>
   I fits = ~I{};
   constexpr double kFactor = wanted == Wanted::mean_forces ? -1 : wanted == Wanted::hessian_product ? 1 : -2;
   const double limit = wide ? units.limits.high * 0x1p40 : units.limits.low;
-  const double per_virial = 0x1p-6 * units.per_energy / units.per_force;  // virials are counted in 64 quanta
+  const double per_virial = 0x1p-6 * units.per_energy / units.per_force;  // virials are in units of 64 quanta
   for (unsigned k = 0; k < batch.n; k += W) {
     V d[3], force[3], e[3], squared;
     for (int axis = 0; axis < 3; ++axis) d[axis] = load<V>(batch.d[axis] + k);
     const V rho = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], weight = load<V>(batch.weight + k);
-    const V w = weight * (kFactor * units.per_force);  // a power of two: the same as of the product
+    const V w = weight * (kFactor * units.per_force);  // scaling by a power of two commutes with rounding
     if constexpr (wanted == Wanted::mean_forces || wanted == Wanted::hessian_product) {
       for (int axis = 0; axis < 3; ++axis) e[axis] = load<V>(batch.d_new[axis] + k);
       if constexpr (wanted == Wanted::mean_forces) {
@@ -70,7 +69,7 @@ template <int W, class P, Wanted wanted, bool wide>
         }
       }
     }
-    fits &= below(squared, all<V>(limit * limit));  // false where one is NaN
+    fits &= below(squared, all<V>(limit * limit));  // false also for NaN
     for (int axis = 0; axis < 3; ++axis) {
       if constexpr (wide) {
         const V upper = elementary::nearest_integer(force[axis] * 0x1p-40);

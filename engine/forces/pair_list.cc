@@ -11,9 +11,8 @@ namespace carom {
 
 namespace {
 
-constexpr std::size_t kMostPairs = 100'000'000, kMostPartners = 5000;  // a particle; more come from far too long a step
-
-/// The larger of two squared distances; NaN does not count: the force there is an error of its own.
+/// More pairs, in all and for each particle, result from a step that is far too long.
+constexpr std::size_t kMaxPairs = 100'000'000, kMaxPartners = 5000;
 template <int D>
 double farther(double squared, const Vec<D>& way) {
   const double other = way.squaredNorm();
@@ -31,7 +30,7 @@ Id farthest(const PairStep<D>& step) {
 
 }  // namespace
 
-/// Neighbouring places of the list, seen through one image.
+/// Consecutive places of the list, shifted by one image.
 struct PartnerRange {
   std::uint32_t begin, end;
   std::array<std::int32_t, 3> image;
@@ -63,8 +62,8 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
   return records_;
 }
 
-/// The largest distances from the places at the last build. Notes which particles have been wrapped since the last
-/// time; false where one has that was not expected to, or where a position is not finite.
+/// The largest displacements since the last build. Updates the boxes of particles that were wrapped; returns false if
+/// one was wrapped that is not marked as moving, or if a position is not finite.
 template <int D>
 bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, double& squared_step) {
   const double allowed = 0.25 * skin_.width() * skin_.width();
@@ -98,12 +97,12 @@ bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, 
 
 namespace {
 
-/// A part of a row of cells along the last axis, `boxes` boxes away.
+/// Part of a row of cells along the last axis, displaced by `boxes` boxes.
 struct Piece {
   std::int32_t begin, end, boxes;
 };
 
-/// The cells from `low` to `high`, which may reach around the box.
+/// The cells from `low` to `high`, which may cross the periodic boundary.
 std::vector<Piece> pieces(std::int32_t low, std::int32_t high, std::int32_t count, bool periodic) {
   if (!periodic) return {{std::max(low, 0), std::min(high, count - 1) + 1, 0}};
   std::vector<Piece> found;
@@ -113,15 +112,15 @@ std::vector<Piece> pieces(std::int32_t low, std::int32_t high, std::int32_t coun
   return found;
 }
 
-/// Where the cells of the list begin, and how far a search goes along each axis. Those of a grid are cut into kSlices
-/// along the last axis, along which partners stand one after the other.
+/// The places of particles, sorted by cell, and the range of a search along each axis. Grid cells are divided into
+/// kSlices slices along the last axis, so that partners are consecutive along it.
 template <int D>
 struct Cells {
   static constexpr std::int32_t kSlices = 8;
   CellGrid<D> grid;
   std::array<std::int32_t, D> range;
   std::vector<std::uint32_t> start;
-  std::vector<std::vector<Piece>> around, ahead;  // of each cell of a row: the whole range, and its own half of it
+  std::vector<std::vector<Piece>> around, ahead;  // for each cell of a row: the whole range, and its upper half
 
   Cells(const CellGrid<D>& cells, double reach) : grid(cells), start(kSlices * cells.cells() + 1) {
     for (int k = 0; k < D; ++k) {
@@ -142,8 +141,8 @@ struct Cells {
     return kSlices * grid.index(cell) + static_cast<std::size_t>(std::clamp(kSlices * part, 0.0, kSlices - 1.0));
   }
 
-  /// The ranges in which partners of those in a cell stand, each pair of cells once; by image. The first begins with
-  /// the cell itself.
+  /// The ranges of places with partners for the particles of a cell, sorted by image, each pair of cells once. The
+  /// first range begins with the cell itself.
   void partners(const Cell<D>& centre, std::vector<PartnerRange>& found) const {
     found.clear();
     bool elsewhere = false;
@@ -236,7 +235,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
       for (int k = 0; k < D; ++k) (&records_.box.back().x)[k] = box[k];
     }
 
-  std::vector<std::uint32_t> owned(members.size() + 1);  // records of own particles before this one
+  std::vector<std::uint32_t> owned(members.size() + 1);  // number of own particles before each place
   for (std::size_t r = 0; r < members.size(); ++r)
     owned[r + 1] = owned[r] + ((code_[r] & PartnerSearch::kGhost) == 0 ? 1 : 0);
   const auto all_ghosts = [&](const PartnerRange& range) { return owned[range.begin] == owned[range.end]; };
@@ -258,7 +257,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
       for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
         if (among) ranges[0].begin = r + 1;
         find_pairs(r, ranges);
-        if (plain_size_ + records_.partners[PairRecords<D>::kMoving].size() > kMostPairs + kMostPartners * particles_) {
+        if (plain_size_ + records_.partners[PairRecords<D>::kMoving].size() > kMaxPairs + kMaxPartners * particles_) {
           made_ = false;
           throw Error(Failure::numerical, "far too many pairs are within " + short_text(reach) +
                                               " of each other: the cutoff and " + short_text(skin_.width()) +
@@ -270,11 +269,11 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     }
   }
   records_.partners[0].swap(plain_);
-  records_.partners[0].resize(plain_size_);  // behind it the search leaves numbers that may be no places
+  records_.partners[0].resize(plain_size_);  // beyond it the search leaves invalid places
   for (auto& partners : records_.partners) partners.resize(partners.size() + 8);
 }
 
-/// Lists the pairs of one particle with those in these ranges.
+/// Lists the pairs of one particle with the particles in these ranges.
 template <int D>
 void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> ranges) {
   const std::uint64_t code = code_[row];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// All pairs within a cutoff, and some beyond: a Verlet list (Phys. Rev. 159 (1967) 98) with a skin, made from cells.
+// All pairs within a cutoff plus a skin: a Verlet list (Phys. Rev. 159 (1967) 98), built from cells.
 
 #include <array>
 #include <cstdint>
@@ -19,15 +19,15 @@ namespace carom {
 template <int D>
 class CutoffList {
  public:
-  /// `like`: a list with a skin that is good to begin with; null: there is none.
+  /// `like`: a list from which to take the first skin width, or null.
   CutoffList(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList* like = nullptr)
       : box_(box), cutoff_(cutoff), skin_(0.1 * cutoff, 16, 0.8 * cutoff), filter_(std::move(filter)) {
     if (like) shared_width_ = like->shared_width_;
   }
 
-  /// The pairs that are within the cutoff at x or x_new. A pair keeps the image it has at x. `particles` gives ghosts
-  /// and ids. Throws Error(Failure::numerical) for positions that are not finite, and for steps of several edges of a
-  /// periodic box or with far too many pairs.
+  /// The pairs within the cutoff at x or x_new, and some beyond. A pair keeps the image it has at x. `particles` has
+  /// ghosts and ids. Throws Error(Failure::numerical) if positions are not finite, or for steps of several periodic
+  /// boxes or with far too many pairs.
   PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles);
 
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
@@ -40,7 +40,7 @@ class CutoffList {
   const Box<D>& box_;
   double cutoff_;
   Skin skin_;
-  std::shared_ptr<double> shared_width_ = std::make_shared<double>(0);  // skin of this list and those made like it
+  std::shared_ptr<double> shared_width_ = std::make_shared<double>(0);  // skin width, common to lists made like this
   PairFilter filter_;
   const PairKernels* kernels_ = &pair_kernels();
   std::vector<char> ghost_;

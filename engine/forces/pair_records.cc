@@ -78,7 +78,7 @@ ForceWords* PairRecords<D>::high() {
 }
 
 template <int D>
-void PairRecords<D>::pass_on(ForceSums<D>& sums) {
+void PairRecords<D>::flush_to(ForceSums<D>& sums) {
   ForceWords* const low = sums.low();
   for (std::size_t r = 0; r < low_.size(); ++r) low[order[r]].add(low_[r]);
   if (high_.empty()) return;

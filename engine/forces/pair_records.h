@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Pairs in the form that the kernels of pair_kernels.h read, and the sums of forces in the order of the list.
+// Pairs in the layout that the kernels of pair_kernels.h read, and sums of forces in the order of the list.
 //
-// Particles are numbered by their place in the list, those that are near each other close together. A pair stands once
-// in the list for each of its images, with whichever particle comes first there: its separation only changes sign.
+// Particles are numbered by their place in the list, where neighbours in space are close together. The list has each
+// pair once for each of its images, with the particle that comes first as the first one; the order only changes the
+// sign of the separation.
 
 #include <span>
 #include <vector>
@@ -18,44 +19,44 @@ namespace carom {
 template <int D>
 struct PairStep {
   std::span<const Vec<D>> x;
-  std::span<const Vec<D>> x_new{};              ///< of mean forces; else empty
-  std::span<const Vec<D>> vectors{};            ///< of Hessian products, in place of new positions
-  const std::vector<double>* weight = nullptr;  ///< pairs count by the product of these; null: as they are
-  const char* changed = nullptr;                ///< only pairs with such a particle; null: all
+  std::span<const Vec<D>> x_new{};              ///< for mean forces; else empty
+  std::span<const Vec<D>> vectors{};            ///< for Hessian products, instead of x_new; else empty
+  const std::vector<double>* weight = nullptr;  ///< pairs are weighted with the product of these; null: weight 1
+  const char* changed = nullptr;                ///< only pairs with a changed particle; null: all pairs
 };
 
 template <int D>
 class PairRecords {
  public:
   enum Kind {
-    kPlain,   ///< both are owned
-    kMoving,  ///< so too, but one may be carried round the box
-    kShared,  ///< another rank owns one of them
+    kPlain,   ///< both particles are owned
+    kMoving,  ///< both are owned, but one may be wrapped into another box
+    kShared,  ///< another rank owns one of the particles
     kKinds
   };
 
   std::vector<Id> order;  ///< particles by place
   std::vector<PairRun> runs[kKinds];
-  std::vector<std::uint32_t> partners[kKinds];  ///< and eight more
-  std::vector<PairRecord> box;                  ///< numbers of the boxes that particles are in; empty: 0
-  std::size_t most_partners = 0;                ///< of a particle, or more
+  std::vector<std::uint32_t> partners[kKinds];  ///< followed by eight more, for padding
+  std::vector<PairRecord> box;                  ///< numbers of the boxes that the particles are in; empty: all 0
+  std::size_t most_partners = 0;                ///< upper bound for any particle
 
   void clear();
-  /// Takes the positions and weights of a step.
+  /// Loads the positions and weights of a step.
   void load(const PairStep<D>& step);
-  /// What kernels are to read; after load().
+  /// The input of the kernels; call load() first.
   PairRows rows(Kind kind, const Box<D>& box, const PairStep<D>& step);
 
-  /// Sums in the order of the list: low() begins them at zero, high() has them where there is need of them.
+  /// Sums in the order of the list: low() sets its words to zero, high() allocates its words.
   ForceWords* low();
   ForceWords* high();
-  /// Moves the sums to those of all terms.
-  void pass_on(ForceSums<D>& sums);
+  /// Adds the sums of this list to `sums`.
+  void flush_to(ForceSums<D>& sums);
 
  private:
   std::vector<PairRecord> x_, x_new_;
   std::vector<ForceWords> low_, high_;
-  std::vector<PairRun> some_runs_;  // with a changed particle
+  std::vector<PairRun> some_runs_;  // only runs with a changed particle
   std::vector<std::uint32_t> some_partners_;
 };
 

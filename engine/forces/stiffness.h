@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The highest frequency of small vibrations: it limits how long a step may be.
+// The highest frequency of small vibrations, which limits the length of a step.
 
 #include "engine/base/random.h"
 #include "engine/forces/forces.h"
 
 namespace carom {
 
-/// The largest |ω²| [1/time²] of small vibrations about the present positions: of the eigenvalues of M⁻¹V″, by power
-/// iteration from random directions. 0 where nothing acts. The same on any number of ranks; collective.
+/// The largest |ω²| [1/time²] of small vibrations about the present positions, an eigenvalue of M⁻¹V″, by power
+/// iteration from random directions. 0 without forces. Does not depend on the number of ranks; collective.
 template <int D>
 double largest_squared_frequency(const System<D>& system) {
   constexpr int kRounds = 40;

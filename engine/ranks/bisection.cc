@@ -9,9 +9,9 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// Doubles as whole numbers in the same order.
+/// Maps doubles to unsigned integers in the same order.
 std::uint64_t ordered(double value) {
-  const auto bits = std::bit_cast<std::uint64_t>(value + 0.0);  // one zero only
+  const auto bits = std::bit_cast<std::uint64_t>(value + 0.0);  // −0 becomes +0
   constexpr std::uint64_t kSign = std::uint64_t{1} << 63;
   return (bits & kSign) != 0 ? ~bits : bits | kSign;
 }
@@ -20,18 +20,18 @@ double from_ordered(std::uint64_t key) {
   return std::bit_cast<double>((key & kSign) != 0 ? key & ~kSign : ~key);
 }
 
-/// The position of the wanted element in a sorted sequence that all ranks have parts of.
+/// The search for the wanted element of a sorted sequence that is distributed over all ranks.
 struct OrderStatistic {
   struct Element {
     std::uint64_t key;
-    std::uint32_t weight;  // it stands there so many times
+    std::uint32_t weight;  // how often the key occurs
   };
-  std::vector<Element> elements;  // of this rank; in the end those that are left
-  std::uint64_t number;           // from 0, less than there are; unused where there are no elements
+  std::vector<Element> elements;  // on this rank; finally only elements with the wanted key
+  std::uint64_t number;           // index from 0, below the number of elements; unused if there are none
   std::uint64_t found = 0;        // the bits known so far
 };
 
-/// Finds the wanted elements, digit by digit from the highest, by counting: all ranks find the same.
+/// Finds the wanted elements by counting, digit by digit from the highest. All ranks get the same result.
 void select(std::span<OrderStatistic> wanted, Communicator& ranks) {
   constexpr int kBits = 8;
   constexpr std::size_t kDigits = std::size_t{1} << kBits;
@@ -59,14 +59,14 @@ struct Bisection<D>::Sphere {
   std::uint32_t work;
 };
 
-/// What is still to be cut, into so many subdomains from `first` on.
+/// A part of the box still to be cut, into this many subdomains numbered from `first`.
 template <int D>
 struct Bisection<D>::Piece {
   Part part;
   std::uint32_t first;
   std::size_t subdomains;
-  std::span<Sphere> spheres;        // of this rank
-  std::int32_t above_cut = kNoCut;  // that it is a side of
+  std::span<Sphere> spheres;        // spheres on this rank
+  std::int32_t above_cut = kNoCut;  // the cut that has this piece on one side
   bool upper = false;
 };
 
@@ -82,16 +82,16 @@ Bisection<D>::Bisection(const Box<D>& box, std::span<const Vec<D>> x, std::size_
     all.part.high[k] = box.periodic(k) ? box.edges[k] : kInfinite;
   }
   std::vector<Piece> pieces;
-  settle(all, pieces);
+  attach(all, pieces);
   while (!pieces.empty()) pieces = cut(pieces, ranks);
   for (std::uint32_t r = 0; r < parts_.size(); ++r) neighbours_.push_back(neighbours_of(r));
 }
 
-/// Makes a piece known to the cut that it is a side of, and a subdomain where that is all; else it is cut further.
+/// Links a piece to the cut above it; stores it if it is a single subdomain, else appends it to the pieces to cut.
 template <int D>
-void Bisection<D>::settle(Piece piece, std::vector<Piece>& pieces) {
+void Bisection<D>::attach(Piece piece, std::vector<Piece>& pieces) {
   const bool subdomain = piece.subdomains == 1;
-  // Pieces that are cut further are cut in their order.
+  // Pieces are cut in this order.
   const auto node =
       subdomain ? ~static_cast<std::int32_t>(piece.first) : static_cast<std::int32_t>(cuts_.size() + pieces.size());
   if (piece.above_cut == kNoCut)
@@ -111,11 +111,11 @@ void Bisection<D>::settle(Piece piece, std::vector<Piece>& pieces) {
                                      : !std::isfinite(part.low[k]) && !std::isfinite(part.high[k]);
 }
 
-/// Cuts pieces across their longest edges, all at once; returns what is to be cut further.
+/// Cuts all pieces across their longest edges at once; returns the pieces to cut further.
 template <int D>
 auto Bisection<D>::cut(std::span<const Piece> pieces, Communicator& ranks) -> std::vector<Piece> {
-  // Where the spheres of each are, for edges that are not those of the box; and their work.
-  std::vector<double> bounds;  // largest of −x, and of x
+  // The extent of the spheres in each piece, used if the box has no edge there, and their work.
+  std::vector<double> bounds;  // maxima of −x and of x
   std::vector<std::uint64_t> work;
   for (const Piece& piece : pieces) {
     Vec<D> low = box_.edges, high = Vec<D>::Zero();
@@ -148,7 +148,7 @@ auto Bisection<D>::cut(std::span<const Piece> pieces, Communicator& ranks) -> st
   }
   select(wanted, ranks);
 
-  // Between two layers, where there are layers: spheres of one that is cut would soon stand on one side of it.
+  // In a crystal, cut between two layers: a cut through a layer would soon have its spheres on one side.
   const std::size_t first = cuts_.size() - pieces.size();
   std::vector<double> layer_below(pieces.size(), -kInfinite);
   for (std::size_t p = 0; p < pieces.size(); ++p)
@@ -175,8 +175,8 @@ auto Bisection<D>::cut(std::span<const Piece> pieces, Communicator& ranks) -> st
                 number,
                 true};
     lower.part.high[cut.axis] = upper.part.low[cut.axis] = cut.at;
-    settle(lower, further);
-    settle(upper, further);
+    attach(lower, further);
+    attach(upper, further);
   }
   return further;
 }
@@ -211,7 +211,7 @@ bool Bisection<D>::clip(std::uint32_t subdomain, double margin, Vec<D>& low, Vec
   return true;
 }
 
-/// Between two stretches of an axis.
+/// The distance between two intervals on an axis.
 template <int D>
 double Bisection<D>::gap(int axis, double low, double high, double other_low, double other_high) const {
   const double edge = box_.edges[axis];
@@ -227,7 +227,7 @@ template <int D>
 std::vector<std::uint32_t> Bisection<D>::neighbours_of(std::uint32_t subdomain) const {
   std::vector<std::uint32_t> near;
   for (std::uint32_t r = 0; r < parts_.size(); ++r) {
-    const Part &a = parts_[std::min(r, subdomain)], &b = parts_[std::max(r, subdomain)];  // the same for both
+    const Part &a = parts_[std::min(r, subdomain)], &b = parts_[std::max(r, subdomain)];  // in this order on both sides
     double sum = 0;
     for (int k = 0; k < D; ++k) {
       const double d = gap(k, a.low[k], a.high[k], b.low[k], b.high[k]);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// How the box is divided among subdomains: by recursive bisection, so that each has about as much work.
+// Divides the box into subdomains of about equal work by recursive bisection.
 //
-// Which subdomain owns a sphere never reaches the physics; all that matters is that all ranks compute the same cuts:
-// they come from sums of whole numbers, whichever rank has which spheres.
+// The owner of a sphere never affects the results; but all ranks must compute the same cuts, so the cuts come from sums
+// of integers and do not depend on which rank has which spheres.
 
 #include <algorithm>
 #include <limits>
@@ -18,18 +18,18 @@ namespace carom {
 template <int D>
 class Bisection {
  public:
-  /// Subdomains for the spheres of all ranks, of which this one has those at x; so that each has about as much `work`,
-  /// of each sphere (empty: the same). Places that are nearer to a subdomain than `reach` concern it. Collective; the
-  /// cuts do not depend on which rank has which spheres.
+  /// Divides the spheres of all ranks; this rank has the spheres at x. `work`: of each sphere (empty: all equal). A
+  /// position is near a subdomain if its distance is at most `reach`. Collective; the cuts do not depend on which rank
+  /// has which spheres.
   Bisection(const Box<D>& box, std::span<const Vec<D>> x, std::size_t subdomains, double reach, Communicator& ranks,
             std::span<const std::uint32_t> work = {});
 
   std::size_t subdomains() const { return parts_.size(); }
   double reach() const { return reach_; }
-  /// The subdomains that are nearer than the reach to a subdomain, without itself.
+  /// The other subdomains within reach of a subdomain.
   std::span<const std::uint32_t> neighbours(std::uint32_t subdomain) const { return neighbours_[subdomain]; }
 
-  /// A place as it is in the box. The others take such.
+  /// The position wrapped into the box, as all other functions require.
   Vec<D> wrapped(Vec<D> x) const {
     for (int k = 0; k < D; ++k) {
       if (!box_.periodic(k) || (x[k] >= 0 && x[k] < box_.edges[k])) continue;
@@ -38,9 +38,9 @@ class Bisection {
     }
     return x;
   }
-  /// The subdomain that a place belongs to.
+  /// The subdomain that contains a position.
   std::uint32_t owner(const Vec<D>& at) const;
-  /// Calls visit(subdomain) for all subdomains that a place concerns, its own first.
+  /// Calls visit(subdomain) for all subdomains near a position, the one that contains it first.
   template <class Visit>
   void for_each_near(const Vec<D>& at, Visit&& visit) const {
     const std::uint32_t own = owner(at);
@@ -49,13 +49,13 @@ class Bisection {
     for (const std::uint32_t r : neighbours_[own])
       if (near(r, at)) visit(r);
   }
-  /// Whether a place concerns a subdomain.
+  /// Whether a position is near a subdomain.
   bool near(std::uint32_t subdomain, const Vec<D>& at) const {
     return squared_distance(subdomain, at) <= reach_ * reach_;
   }
-  /// Whether a place is so deep in a subdomain that it concerns no other, however distances are rounded.
+  /// Whether a position with this depth is near no other subdomain, allowing for rounding.
   bool deep(double depth) const { return depth > (1 + 1e-6) * reach_; }
-  /// Of a place from a subdomain.
+  /// The squared distance of a position from a subdomain.
   double squared_distance(std::uint32_t subdomain, const Vec<D>& at) const {
     const Part& part = parts_[subdomain];
     double sum = 0;
@@ -71,9 +71,9 @@ class Bisection {
     }
     return sum;
   }
-  /// Cuts what lies between two corners down to places up to `margin` from a subdomain; false: nothing is left.
+  /// Reduces the box between two corners to the positions within `margin` of a subdomain; false if none is left.
   bool clip(std::uint32_t subdomain, double margin, Vec<D>& low, Vec<D>& high) const;
-  /// How far a place in a subdomain is from its faces; infinite where it has none. Negative: it is not in it.
+  /// The distance of a position in a subdomain from its faces; infinite if there are none, negative outside.
   double depth(std::uint32_t subdomain, const Vec<D>& at) const {
     const Part& part = parts_[subdomain];
     double least = std::numeric_limits<double>::infinity();
@@ -84,21 +84,21 @@ class Bisection {
 
  private:
   struct Part {
-    Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();     // infinite where the box has a wall or an open end
+    Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();     // infinite at a wall or an open end of the box
     Vec<D> centre = Vec<D>::Zero(), half = Vec<D>::Zero();  // along periodic axes
-    std::array<bool, D> whole{};                            // has no faces along the axis
+    std::array<bool, D> whole{};                            // axes along which it has no faces
   };
   struct Cut {
     int axis;
     double at;
-    std::int32_t below, above;  // a further cut, or ~subdomain
+    std::int32_t below, above;  // index of another cut, or ~subdomain
   };
 
   struct Sphere;
   struct Piece;
   static constexpr std::int32_t kNoCut = -1;
 
-  void settle(Piece piece, std::vector<Piece>& pieces);
+  void attach(Piece piece, std::vector<Piece>& pieces);
   std::vector<Piece> cut(std::span<const Piece> pieces, Communicator& ranks);
   double gap(int axis, double low, double high, double other_low, double other_high) const;
   std::vector<std::uint32_t> neighbours_of(std::uint32_t subdomain) const;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A table with entries for a few spheres of a core only, by slot.
+// A table by slot, for the few spheres of a core that have entries.
 
 #include <deque>
 #include <limits>
@@ -16,17 +16,17 @@ class BySlot {
  public:
   void resize(std::size_t slots) { index_.resize(slots, kNone); }
   bool has(Slot i) const { return index_[i] != kNone; }
-  /// Of a sphere that has an entry.
+  /// The entry of a sphere; it must have one.
   T& at(Slot i) { return items_[index_[i]]; }
   const T& at(Slot i) const { return items_[index_[i]]; }
-  /// Makes an entry for a sphere that has none; what an entry before it held may still be in it.
+  /// Adds an entry for a sphere that has none; it may contain the values of an earlier entry.
   T& add(Slot i) {
     index_[i] = static_cast<std::uint32_t>(slots_.size());
     slots_.push_back(i);
     if (items_.size() < slots_.size()) items_.emplace_back();
     return items_[index_[i]];
   }
-  /// The spheres that have entries, in the order in which they were added.
+  /// The spheres with entries, in the order in which they were added.
   std::span<const Slot> slots() const { return slots_; }
   void clear() {
     for (const Slot i : slots_) index_[i] = kNone;
@@ -37,7 +37,7 @@ class BySlot {
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> index_;  // by slot
   std::vector<Slot> slots_;
-  std::deque<T> items_;  // kept for their memory; they stay where they are
+  std::deque<T> items_;  // never shrinks, to reuse its memory; entries do not move
 };
 
 }  // namespace carom

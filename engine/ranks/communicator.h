@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Communication among the ranks of a run, as far as the engine knows: bytes, sums and maxima.
+// The engine's interface for communication among ranks: exchange of bytes, sums and maxima.
 //
-// By default there is one rank. parallel/ has the class for MPI. Every call is collective: all ranks make the same
-// calls in the same order.
+// The default is a single rank; parallel/ implements MPI. Every call is collective: all ranks make the same calls in
+// the same order.
 
 #include <cstdint>
 #include <span>
@@ -21,29 +21,29 @@ class Communicator {
   virtual int rank() const { return 0; }
   virtual int size() const { return 1; }
 
-  /// Sends outgoing[r] to rank r and returns what each rank has sent here, by rank. Empty messages are not sent.
+  /// Sends outgoing[r] to rank r and returns the messages received, by rank. Empty messages are not sent.
   virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing) { return outgoing; }
-  /// The same among neighbours: outgoing[k] goes to partners[k], and this rank is among the partners of that one;
-  /// returns what they have sent, in their order. Others are not waited for.
+  /// Exchange between neighbours: sends outgoing[k] to partners[k] and returns the messages from the partners, in their
+  /// order. The relation is mutual: this rank is a partner of its partners. Waits for no other rank.
   virtual std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> /*partners*/) { return outgoing; }
   /// The messages of all ranks, by rank.
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
-  /// Makes each of `most` the largest among all ranks and each of `sums` the sum over them.
+  /// Replaces each of `most` by its maximum over all ranks and each of `sums` by its sum.
   virtual void combine(std::span<double> /*most*/, std::span<std::uint64_t> /*sums*/) {}
   void largest(std::span<double> values) { combine(values, {}); }
   void sum(std::span<std::uint64_t> values) { combine({}, values); }
 };
 
-/// The messages of all ranks, by rank, on rank 0; empty ones elsewhere. Collective.
+/// The messages of all ranks, by rank, on rank 0; empty messages on other ranks. Collective.
 inline std::vector<Bytes> gather_on_first(Communicator& ranks, Bytes mine) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
   outgoing[0] = std::move(mine);
   return ranks.swap(std::move(outgoing));
 }
 
-/// Hands a value from rank to rank, each of which does add(value): the result is that of one rank that does it all.
+/// Passes a value from rank to rank, each of which calls add(value): the result is that of one rank doing all.
 template <class Value, class Add>
-Value handed_on(Communicator& ranks, Value value, Add&& add) {
+Value accumulated_in_order(Communicator& ranks, Value value, Add&& add) {
   for (int rank = 0; rank < ranks.size(); ++rank) {
     Bytes mine;
     if (rank == ranks.rank()) {
@@ -56,7 +56,7 @@ Value handed_on(Communicator& ranks, Value value, Add&& add) {
   return value;
 }
 
-/// The values of all ranks, those of one rank after the other. Collective.
+/// The values of all ranks, in the order of ranks. Collective.
 template <class Value>
 std::vector<Value> gather_values(Communicator& ranks, std::span<const Value> mine) {
   const auto bytes = std::as_bytes(mine);
@@ -66,7 +66,7 @@ std::vector<Value> gather_values(Communicator& ranks, std::span<const Value> min
   return all;
 }
 
-/// The sum over all ranks of what has a function add().
+/// The sum over all ranks of an object with a member add().
 template <class Sums>
 Sums sum_of_all(Communicator& ranks, const Sums& mine) {
   Sums all;
@@ -74,7 +74,7 @@ Sums sum_of_all(Communicator& ranks, const Sums& mine) {
   return all;
 }
 
-/// Another one, and the time that is spent in it.
+/// Measures the time spent in another communicator.
 class TimedCommunicator final : public Communicator {
  public:
   explicit TimedCommunicator(Communicator& ranks) : ranks_(ranks) {}

@@ -14,8 +14,8 @@
 namespace carom {
 namespace {
 
-constexpr std::int64_t kSlabs = 64;  // between divisions while all are known
-constexpr double kMost = 0.9;        // of all particles; a rank that would know more knows all
+constexpr std::int64_t kSlabsPerDivision = 64;  // while all ranks have all particles
+constexpr double kMaxKnownFraction = 0.9;       // if a rank would get more of all particles, all ranks get all
 
 }  // namespace
 
@@ -51,7 +51,7 @@ bool Decomposition<D>::divide(bool local, double slab_length, bool cores) {
   local_ = local;
   width_.start(cores);
   migrate(!local, slab_length);
-  next_ = kSlabs;
+  next_ = kSlabsPerDivision;
   return true;
 }
 
@@ -109,33 +109,33 @@ bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
   if (!by_place_) return false;
   const auto farthest = [&] { return std::sqrt(largest(halo_.squared_farthest(system_.box, system_.particles))); };
   if (all_known_ ? slab < next_ : !width_.outdated(farthest)) return false;
-  if (!all_known_) {  // all has gone well since the last time
+  if (!all_known_) {  // the last division was good enough
     slabs_with_all_ = std::max<std::int64_t>(slabs_with_all_ / 2, 1);
     width_.relax();
   }
   migrate(!local_, slab_length);
-  next_ = slab + kSlabs;
+  next_ = slab + kSlabsPerDivision;
   return true;
 }
 
 template <int D>
 void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
-  if (width_.asked() && migrate_to_those_near(slab_length)) return;
+  if (width_.asked() && migrate_to_near(slab_length)) return;
   migrate_to_all();
   next_ = slab + slabs_with_all_;
-  slabs_with_all_ = std::min(2 * slabs_with_all_, kSlabs);
+  slabs_with_all_ = std::min(2 * slabs_with_all_, kSlabsPerDivision);
 }
 
 template <int D>
 void Decomposition<D>::migrate(bool all, double slab_length) {
-  if (!all && migrate_to_those_near(slab_length)) return;
+  if (!all && migrate_to_near(slab_length)) return;
   if (by_place_ && all_known_)
-    own_anew();
+    divide_ownership();
   else
     migrate_to_all();
 }
 
-/// The messages of pack_own(). No particle is known any more after that.
+/// The messages of pack_own(). Afterwards this rank has no particles.
 template <int D>
 std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver) {
   Particles<D>& p = system_.particles;
@@ -152,9 +152,9 @@ std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& part
   return messages;
 }
 
-/// Gives each particle to the ranks that need it; false, and nothing has changed: all ranks have to know all.
+/// Sends each particle to the ranks near it; returns false, with nothing changed, if all ranks need all particles.
 template <int D>
-bool Decomposition<D>::migrate_to_those_near(double slab_length) {
+bool Decomposition<D>::migrate_to_near(double slab_length) {
   const Particles<D>& p = system_.particles;
   std::array<double, 2> most{};  // reach and speed
   auto& [reach, speed] = most;
@@ -174,12 +174,12 @@ bool Decomposition<D>::migrate_to_those_near(double slab_length) {
   for (const Vec<D>& x : own) bisection.for_each_near(bisection.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
   const std::vector<std::uint64_t> mine = known;
   ranks_->sum(known);
-  if (static_cast<double>(std::ranges::max(known)) > kMost * static_cast<double>(total())) return false;
+  if (static_cast<double>(std::ranges::max(known)) > kMaxKnownFraction * static_cast<double>(total())) return false;
 
   const auto messages = ranks_->swap(
       pack(mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); }));
   all_known_ = false;
-  take_in(system_.fields, system_.particles, messages, total());
+  receive_particles(system_.fields, system_.particles, messages, total());
   assign(bisection, width_.near());
   system_.fields.prepare_working();
   return true;
@@ -190,13 +190,13 @@ void Decomposition<D>::migrate_to_all() {
   const auto messages =
       ranks_->gather(pack({total() / blocks().ranks}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
   all_known_ = true;
-  take_in(system_.fields, system_.particles, messages, total());
-  own_anew();
+  receive_particles(system_.fields, system_.particles, messages, total());
+  divide_ownership();
 }
 
-/// All are known: sets anew which rank owns each.
+/// Divides ownership again; all ranks must have all particles.
 template <int D>
-void Decomposition<D>::own_anew() {
+void Decomposition<D>::divide_ownership() {
   constexpr double kAll = std::numeric_limits<double>::infinity();
   Communicator alone;
   assign(Bisection<D>(system_.box, system_.particles.x, blocks().ranks, kAll, alone), kAll);
@@ -204,8 +204,8 @@ void Decomposition<D>::own_anew() {
   system_.fields.prepare_working();
 }
 
-/// Sets the owners of those known; copies nearer than `near` matter. Makes what acts on those known, where it is not
-/// there.
+/// Sets the owners of this rank's particles; ghosts nearer than `near` matter. Builds the interactions for them if they
+/// are missing.
 template <int D>
 void Decomposition<D>::assign(const Bisection<D>& bisection, double near) {
   Particles<D>& p = system_.particles;

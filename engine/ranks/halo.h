@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Particles sorted by place, with copies of those near: what the owner of a place must know around it.
+// Particles distributed by place, with copies of nearby ones on each rank.
 
 #include <algorithm>
 #include <utility>
@@ -12,10 +12,10 @@
 
 namespace carom {
 
-/// Sends values to all ranks that they concern by their places: for_each(send) calls send(x, value), x in the box.
-/// Returns the values that concern this rank, those of one rank after the other. Collective.
+/// Sends values to all ranks near their positions: for_each(send) calls send(x, value), with x in the box. Returns the
+/// values received, in the order of ranks. Collective.
 template <class Value, int D>
-std::vector<Value> to_those_near(const Bisection<D>& bisection, Communicator& ranks, auto&& for_each) {
+std::vector<Value> sent_to_near(const Bisection<D>& bisection, Communicator& ranks, auto&& for_each) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
   for_each([&](const Vec<D>& x, const Value& value) {
     bisection.for_each_near(x, [&](std::uint32_t rank) { put(outgoing[rank], value); });
@@ -28,8 +28,8 @@ std::vector<Value> to_those_near(const Bisection<D>& bisection, Communicator& ra
   return near;
 }
 
-/// Of the particles that all ranks have together, this one its block: those in this rank's subdomain, and as ghosts
-/// copies of those nearer to it than `distance`, but for rounding. They have only x, radius, id and ghost. Collective.
+/// From blocks of all particles, `block` on this rank, makes the particles of this rank's subdomain and, as ghosts,
+/// copies of particles within `distance` of it up to rounding. Only x, radius, id and ghost are set. Collective.
 template <int D>
 Particles<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, const Particles<D>& block) {
   struct Copy {
@@ -38,7 +38,7 @@ Particles<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, co
     Id id;
   };
   const Bisection<D> bisection(box, block.x, static_cast<std::size_t>(ranks.size()), distance * (1 + 1e-6), ranks);
-  auto copies = to_those_near<Copy>(bisection, ranks, [&](auto&& send) {
+  auto copies = sent_to_near<Copy>(bisection, ranks, [&](auto&& send) {
     for (Id i = 0; i < block.size(); ++i)
       send(bisection.wrapped(block.x[i]), Copy{block.x[i], block.radius[i], block.id_of(i)});
   });

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Which rank owns the particles that this one knows, which of its own others have copies of, and how copies get the
-// values of their owners.
+// Owners of a rank's ghosts, ranks with ghosts of its own particles, and the exchange that updates ghosts.
 
 #include <span>
 #include <vector>
@@ -19,15 +18,15 @@ class Bisection;
 template <int D>
 class HaloExchange {
  public:
-  /// Sets the owners of the particles that rank `me` knows, and which ranks know its own: those that they concern by
-  /// the bisection. Copies nearer to its subdomain than `near` matter.
+  /// Sets the owners of the particles on rank `me`, and the ranks that have its own ones as ghosts, from the bisection.
+  /// Ghosts within `near` of the rank's subdomain matter.
   void assign(const Bisection<D>& bisection, const Box<D>& box, Particles<D>& p, int me, double near);
-  /// Whether what a copy does matters to own particles.
+  /// Whether the motion of a ghost matters to own particles.
   bool matters(Id i) const { return matters_[i] != 0; }
-  /// The square of the farthest that an own particle has come since assign().
+  /// The largest squared displacement of an own particle since assign().
   double squared_farthest(const Box<D>& box, const Particles<D>& p) const;
 
-  /// Copies get the values of their owners; each vector has an entry for each particle known. Collective.
+  /// Ghosts get the values of their owners; each vector has an entry for each particle of this rank. Collective.
   template <class... T>
   void update(Communicator& ranks, std::span<T>... values) const {
     std::vector<Bytes> outgoing(neighbours_.size());
@@ -45,10 +44,10 @@ class HaloExchange {
   }
 
  private:
-  std::vector<std::vector<Id>> copied_to_, copies_of_;  // by rank: own particles that it knows, copies of its own
-  std::vector<int> neighbours_;                         // the ranks of which there are any
+  std::vector<std::vector<Id>> copied_to_, copies_of_;  // by rank: own particles with ghosts there; ghosts owned there
+  std::vector<int> neighbours_;                         // ranks with entries in either
   std::vector<char> matters_;
-  std::vector<Vec<D>> at_;  // where those known were at assign(), images undone
+  std::vector<Vec<D>> at_;  // unwrapped positions at assign()
 };
 
 }  // namespace carom

@@ -7,17 +7,17 @@
 namespace carom {
 namespace {
 
-constexpr double kLeastSlack = 0.5, kMostSlack = 2;  // that a particle comes between divisions [largest diameter]
-constexpr double kSlabsApart = 16;                   // divisions, about
-constexpr double kFaster = 2;                        // factor between the longest path and the one allowed for
-constexpr double kRoom = 1.25;                       // for a path that was too long
-constexpr double kForget = 0.75;                     // of what was asked for is kept after a division that was enough
+constexpr double kMinSlack = 0.5, kMaxSlack = 2;  // largest displacement between divisions [largest diameter]
+constexpr double kSlabsBetweenDivisions = 16;     // typical number of slabs between divisions
+constexpr double kPathAllowance = 2;              // path allowed for, relative to the longest path
+constexpr double kPathMargin = 1.25;              // path allowed for, relative to one that was too long
+constexpr double kDecay = 0.75;                   // factor on enlarged widths after a division that was good enough
 
 }  // namespace
 
 void HaloWidth::fit(double reach, double path, double diameter) {
-  path_ = std::max(kFaster * path, wanted_path_);
-  slack_ = std::clamp(kSlabsApart * path, kLeastSlack * diameter, kMostSlack * diameter);
+  path_ = std::max(kPathAllowance * path, wanted_path_);
+  slack_ = std::clamp(kSlabsBetweenDivisions * path, kMinSlack * diameter, kMaxSlack * diameter);
   near_ = std::max(reach, diameter) + 2 * path_ + 2 * slack_;
   far_ = near_ + depth_ * diameter;
   safe_slabs_ = 0;
@@ -25,7 +25,7 @@ void HaloWidth::fit(double reach, double path, double diameter) {
 
 void HaloWidth::ask_for_path(double path) {
   asked_ = std::isfinite(path);
-  if (asked_) wanted_path_ = kRoom * path;
+  if (asked_) wanted_path_ = kPathMargin * path;
 }
 
 void HaloWidth::ask_for_depth() {
@@ -34,8 +34,8 @@ void HaloWidth::ask_for_depth() {
 }
 
 void HaloWidth::relax() {
-  depth_ = std::max(kForget * depth_, least_depth_);
-  wanted_path_ *= kForget;
+  depth_ = std::max(kDecay * depth_, least_depth_);
+  wanted_path_ *= kDecay;
 }
 
 }  // namespace carom

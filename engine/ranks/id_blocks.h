@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Blocks of consecutive ids: the order in which several ranks keep particles for files and between epochs, one each.
+// Blocks of consecutive ids, one for each rank: the order of particles in files and between epochs.
 
 #include <cstring>
 #include <span>
@@ -14,7 +14,7 @@ namespace carom {
 struct IdBlocks {
   std::size_t particles = 0, ranks = 1;
 
-  /// The first id of a rank's block; that of the next rank is its end.
+  /// The first id of a rank's block, which ends where the next block begins.
   Id first(int rank) const { return static_cast<Id>(particles * static_cast<std::size_t>(rank) / ranks); }
   int rank_of(Id id) const {
     auto rank = static_cast<int>(id * ranks / particles);
@@ -23,9 +23,9 @@ struct IdBlocks {
   }
 };
 
-/// Sends what there is of particles, `size` bytes each, to the ranks of their blocks: for_each(send) calls
-/// send(id, bytes) for each on one of the ranks, take(place, bytes) is called for each where it belongs, place: in the
-/// block. Collective.
+/// Sends data of particles, `size` bytes each, to the ranks of their blocks: for_each(send) calls send(id, bytes) for
+/// each particle on one of the ranks; store(place, bytes) is called on the rank of its block, place being the index in
+/// the block. Collective.
 void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, std::size_t size, auto&& for_each, auto&& take) {
   std::vector<Bytes> outgoing(blocks.ranks);
   for_each([&](Id id, const std::byte* bytes) {
@@ -41,7 +41,7 @@ void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, std::size_t size,
     }
 }
 
-/// The same of values: send(id, value), take(place, value).
+/// to_id_blocks() for values: send(id, value), store(place, value).
 template <class Value>
 void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, auto&& for_each, auto&& take) {
   to_id_blocks(
@@ -56,7 +56,7 @@ void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, auto&& for_each, 
       });
 }
 
-/// Calls visit(vector) for everything that is kept of each particle, but for its id and owner.
+/// Calls visit(vector) for all arrays of the particles except id and ghost.
 template <int D, class Visit>
 void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.x);
@@ -68,8 +68,8 @@ void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.species);
 }
 
-/// Sends the messages of all ranks to rank 0 one after the other, so that it never holds more than one. pack() makes a
-/// rank's message, visit(rank, message) is called on rank 0. Collective.
+/// Sends the messages of all ranks to rank 0, one rank at a time, to limit its memory. Each rank calls pack() for its
+/// message; rank 0 calls visit(rank, message). Collective.
 template <class Pack, class Visit>
 void one_after_the_other(Communicator& ranks, Pack&& pack, Visit&& visit) {
   for (int rank = 0; rank < ranks.size(); ++rank) {
@@ -78,7 +78,7 @@ void one_after_the_other(Communicator& ranks, Pack&& pack, Visit&& visit) {
   }
 }
 
-/// Copies of all particles on rank 0, by id, from the blocks of all ranks; none elsewhere. Collective.
+/// Copies of all particles on rank 0, by id, from the blocks of all ranks; empty on other ranks. Collective.
 template <int D>
 Particles<D> gathered(Communicator& ranks, const Particles<D>& block) {
   Bytes mine;

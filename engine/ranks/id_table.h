@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Slots by id, for cores that have a part of all spheres only: a hash table in one piece of memory.
+// Slots by id, for cores that have only part of all spheres: a hash table with open addressing.
 
 #include <bit>
 #include <limits>
@@ -14,7 +14,7 @@ class IdTable {
  public:
   static constexpr Slot kNowhere = std::numeric_limits<Slot>::max();
 
-  /// Removes all, and makes room for so many.
+  /// Removes all entries and makes room for `most`.
   void clear(std::size_t most) {
     mask_ = std::bit_ceil(2 * most + 2) - 1;
     entries_.assign(mask_ + 1, {});
@@ -30,12 +30,12 @@ class IdTable {
     while (entries_[at].slot != kNowhere && entries_[at].id != id) at = (at + 1) & mask_;
     entries_[at] = {id, slot};
   }
-  /// Removes one that is there; those behind it close the gap.
+  /// Removes an existing entry; later entries move up to close the gap.
   void remove(Id id) {
     std::size_t gap = home(id);
     while (entries_[gap].id != id || entries_[gap].slot == kNowhere) gap = (gap + 1) & mask_;
     for (std::size_t at = (gap + 1) & mask_; entries_[at].slot != kNowhere; at = (at + 1) & mask_) {
-      if (((at - home(entries_[at].id)) & mask_) < ((at - gap) & mask_)) continue;  // its home is behind the gap
+      if (((at - home(entries_[at].id)) & mask_) < ((at - gap) & mask_)) continue;  // its home is after the gap
       entries_[gap] = entries_[at];
       gap = at;
     }

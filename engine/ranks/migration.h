@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Particles with all their fields (fields.h), on the way from their owners to the ranks that know them from then on.
+// Migration of particles with all their fields (fields.h) from their owners to the ranks that need them.
 
 #include <algorithm>
 #include <vector>
@@ -11,8 +11,8 @@
 
 namespace carom {
 
-/// This rank's own particles, put into the messages that for_each_receiver(place, visit) visits; `particles`: in each
-/// of them.
+/// Packs this rank's own particles into the messages that for_each_receiver(place, visit) visits; `particles` is the
+/// number of particles in each message.
 template <int D>
 std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const std::vector<std::uint64_t>& particles,
                             auto&& for_each_receiver) {
@@ -31,10 +31,10 @@ std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const s
   return messages;
 }
 
-/// The particles of messages, of which no two have the same, become those that are known, by id, and no ghosts yet;
-/// `total`: so many there are on all ranks.
+/// Replaces this rank's particles by the particles in the messages, ordered by id and not marked as ghosts. No id may
+/// occur twice; `total` is the number of particles on all ranks.
 template <int D>
-void take_in(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total) {
+void receive_particles(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total) {
   struct Arrival {
     Id id;
     const std::byte* at;

@@ -40,11 +40,11 @@ std::vector<Slot> Ownership<D>::own() const {
   return own;
 }
 
-/// Finds out anew which own spheres may come to the border before this is called again.
+/// Finds the own spheres that may reach the border before the next call.
 template <int D>
 void Ownership<D>::watch(double now) {
   unwatched_ = 0;
-  const double reach = bisection_->reach() + (kSlack + 1) * max_displacement_;
+  const double reach = bisection_->reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
   std::erase_if(watched_, [&](const Watched& each) { return role_[each.slot] != Role::ghost; });
   for (Slot i = 0; i < core_.flights().size(); ++i)
     if (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)
@@ -54,8 +54,8 @@ void Ownership<D>::watch(double now) {
   core_.set_border(slots, now);
 }
 
-/// Finds the owner of a sphere and the subdomains in which it is a ghost, from its position now, and how far it may
-/// come until one of these changes; other subdomains that have it find the same.
+/// Finds the owner of a sphere and the subdomains that have it as a ghost, from its present position, and how far it
+/// can move before either changes. All subdomains that have the sphere find the same.
 template <int D>
 typename Ownership<D>::Watched Ownership<D>::look_at(Slot i, double now) {
   const Flights<D>& flights = core_.flights();

@@ -21,7 +21,7 @@ std::vector<Bytes> PathExchange<D>::swap() {
 }
 
 template <int D>
-std::uint64_t PathExchange<D>::agree(Subdomain<D>* subdomain) {
+std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain) {
   received_.clear();
   std::uint64_t rounds = 0;
   for (double more = 1; more > 0; ++rounds) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The contacts of a slab of which every rank has found those of its own particles.
+// Collects the contacts of a slab when each rank has found the contacts of its own particles.
 
 #include <algorithm>
 #include <span>
@@ -19,7 +19,7 @@ Bytes packed(std::span<const Contact<D>> contacts) {
   return {bytes.begin(), bytes.end()};
 }
 
-/// Appends the contacts that were received from ranks, in the order of their keys.
+/// Appends the contacts in messages from all ranks, in the order of their keys.
 template <int D>
 void merge_contacts(const std::vector<Bytes>& messages, std::vector<Contact<D>>& to) {
   const auto before = static_cast<std::ptrdiff_t>(to.size());
@@ -28,8 +28,8 @@ void merge_contacts(const std::vector<Bytes>& messages, std::vector<Contact<D>>&
   std::sort(to.begin() + before, to.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
 }
 
-/// Counts the contacts of all ranks and appends them to `log`, unless it is null; `found` are those that this rank has
-/// found, of its own particles and of ghosts. False where there are more than `most`: then nothing is done.
+/// Counts the contacts of all ranks and appends them to `log` unless it is null; `found` are the contacts of this
+/// rank's own particles and ghosts. Returns false, without any effect, if there are more than `most`.
 template <int D>
 bool commit_contacts(const System<D>& system, std::span<const Contact<D>> found, std::uint64_t most, Counters& counters,
                      std::vector<Contact<D>>* log) {

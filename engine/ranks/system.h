@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The particles and what acts on them: the state that an integrator advances, with its decomposition among ranks.
+// The state that an integrator advances: particles, interactions, and the decomposition among ranks.
 
 #include <algorithm>
 #include <memory>
@@ -15,13 +15,13 @@
 
 namespace carom {
 
-/// The units in which forces and energies of pairs are rounded: constants of a run, powers of two.
+/// The units to which pair forces and energies are rounded: powers of two, constant in a run.
 struct Quanta {
   double force = 0;   ///< 2^-44 of the smallest scale of the forces of all terms [force]; 0: not determined
   double energy = 0;  ///< 2^-46 of the smallest scale of their energies [energy]
 };
 
-/// Lives on the heap and is never moved: interactions refer to its box and particles, the registry to its arrays.
+/// Must be on the heap and never move: interactions refer to its box and particles, the registry to its arrays.
 template <int D>
 struct System {
   System() {
@@ -39,29 +39,29 @@ struct System {
   System& operator=(const System&) = delete;
 
   Box<D> box;
-  Particles<D> particles;                           ///< that this rank works with; one rank: all
+  Particles<D> particles;                           ///< particles on this rank; with one rank, all
   std::vector<std::string> species = {"particle"};  ///< names
   std::vector<std::unique_ptr<Interaction<D>>> interactions;
   Quanta quanta{};  ///< set before the first force pass
-  Fields fields;    ///< what belongs to each particle
+  Fields fields;    ///< all data of each particle
   Decomposition<D> decomposition{*this};
 
-  /// How many particles there are, on all ranks together, also while they are in the cores.
+  /// The number of particles on all ranks, also while event cores hold them.
   std::size_t size() const { return decomposition.total(); }
 
-  /// Whether nothing changes the total momentum: no wall, no field.
+  /// Whether the total momentum is conserved: no walls, no external field.
   bool keeps_momentum() const {
     return !box.has(Boundary::wall) &&
            std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
   }
 
-  /// Brings all particles back into the periodic box. Called at slab ends only: a pure function of the records.
+  /// Wraps all particles into the periodic box. Called only at the ends of slabs.
   void wrap() {
     for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i]);
   }
 
-  /// Throws Error(Failure::initial_state) where arrays of the particles differ in length, or a value cannot be:
-  /// positions or velocities that are not finite, masses, radii or edges that are not positive, unknown species.
+  /// Throws Error(Failure::initial_state) if arrays of the particles differ in length, positions or velocities are not
+  /// finite, masses, radii or edges are not positive, or a species is unknown.
   void check() const;
 };
 

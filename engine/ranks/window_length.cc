@@ -7,14 +7,14 @@
 namespace carom {
 namespace {
 
-constexpr double kCollisions = 0.3;                                   // of a sphere in a window, about
-constexpr double kMostDisplacement = 1.0, kLeastDisplacement = 0.02;  // in diameters
-constexpr double kFaster = 1.15;  // factor between the largest speed and the one allowed for
+constexpr double kCollisionsPerWindow = 0.3;                       // mean collisions of a sphere in a window
+constexpr double kMaxDisplacement = 1.0, kMinDisplacement = 0.02;  // [largest diameter]
+constexpr double kSpeedAllowance = 1.15;                           // speed allowed for, relative to the largest speed
 
-/// The time in which a sphere collides kCollisions times, by Enskog's theory.
+/// The time in which a sphere has kCollisionsPerWindow collisions, by Enskog's theory.
 template <int D>
 double first_pace(const Box<D>& box, const Sizes& sizes, Communicator& ranks, const Particles<D>& block) {
-  ExactSum squares;  // the same for any number of ranks
+  ExactSum squares;  // exact, so that it does not depend on the number of ranks
   Extent<D> extent;
   for (const Vec<D>& v : block.v) squares.add(v.squaredNorm());
   for (const Vec<D>& x : block.x) extent.add(x);
@@ -28,7 +28,7 @@ double first_pace(const Box<D>& box, const Sizes& sizes, Communicator& ranks, co
     extent.low[k] = -bounds[std::size_t{2} * k], extent.high[k] = bounds[std::size_t{2} * k + 1];
   extent.particles = sizes.spheres;
   const double thermal = std::sqrt(sum_of_all(ranks, squares).value() / static_cast<double>(D * sizes.spheres));
-  return kCollisions / (contacts_a_length(situation_of<D>(box, sizes.radius, extent, sizes.number)) * thermal);
+  return kCollisionsPerWindow / (contacts_a_length(situation_of<D>(box, sizes.radius, extent, sizes.number)) * thermal);
 }
 
 }  // namespace
@@ -41,9 +41,8 @@ void WindowLength<D>::start(const Box<D>& box, const Sizes& sizes, Communicator&
   for (const Vec<D>& v : block.v) fastest_ = std::max(fastest_, v.norm());
   ranks.largest({&fastest_, 1});
   if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(box, sizes, ranks, block);
-  fastest_ = kFaster * fastest_ + field_;
-  max_displacement_ =
-      std::clamp(1.05 * pace_ * fastest_, kLeastDisplacement * diameter_, kMostDisplacement * diameter_);
+  fastest_ = kSpeedAllowance * fastest_ + field_;
+  max_displacement_ = std::clamp(1.05 * pace_ * fastest_, kMinDisplacement * diameter_, kMaxDisplacement * diameter_);
 }
 
 template <int D>
@@ -63,11 +62,11 @@ double WindowLength<D>::first_beyond(Subdomain<D>* subdomain, double now, double
     subdomain->for_each_touched([&](Slot i) { first = std::min(first, beyond_at(*subdomain, i, now, end)); });
   std::array<double, 2> worst{speed, -first};
   ranks.largest(worst);
-  if (worst[0] > fastest_) fastest_ = kFaster * worst[0];
+  if (worst[0] > fastest_) fastest_ = kSpeedAllowance * worst[0];
   return -worst[1];
 }
 
-/// The same of one sphere, by the length of its path.
+/// first_beyond() for one sphere, from the length of its path.
 template <int D>
 double WindowLength<D>::beyond_at(Subdomain<D>& subdomain, Slot i, double now, double end) const {
   const auto path = subdomain.path(i);
@@ -85,7 +84,8 @@ double WindowLength<D>::beyond_at(Subdomain<D>& subdomain, Slot i, double now, d
 template <int D>
 void WindowLength<D>::note(double length, std::uint64_t collisions, std::size_t spheres) {
   if (collisions == 0) return;
-  const double pace = length * kCollisions * static_cast<double>(spheres) / (2 * static_cast<double>(collisions));
+  const double pace =
+      length * kCollisionsPerWindow * static_cast<double>(spheres) / (2 * static_cast<double>(collisions));
   pace_ = pace_ > 0 ? 0.9 * pace_ + 0.1 * pace : pace;
 }
 

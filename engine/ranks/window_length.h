@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// How long a window may be, so that spheres collide a few tenths of a time in it and none comes farther than
-// `max_displacement` from where it was at its start; and when one was so fast that it may have.
+// The length of a window, chosen so that a sphere has a few tenths of a collision in it and moves no farther than
+// `max_displacement` from its start; and the time at which a sphere may have exceeded that limit.
 
 #include <functional>
 
@@ -12,21 +12,21 @@ namespace carom {
 template <int D>
 class WindowLength {
  public:
-  /// `diameter`: the largest. `forced` gives the length of windows [time], where they would be longer.
+  /// `diameter`: the largest. `forced` returns an upper limit of the length of windows [time].
   explicit WindowLength(double diameter, std::function<double()> forced = {})
       : diameter_(diameter), forced_(std::move(forced)) {}
 
-  /// At the start of an epoch, for the spheres of all ranks, of which this one has a block. Collective.
+  /// Call at the start of an epoch; this rank has a block of the spheres. Collective.
   void start(const Box<D>& box, const Sizes& sizes, Communicator& ranks, const Particles<D>& block, const Vec<D>& g,
              double horizon);
-  /// How far a sphere comes in a window at most.
+  /// The largest displacement of a sphere in a window.
   double max_displacement() const { return max_displacement_; }
   /// The end of the next window on the way to `end`.
   double window_end(double now, double end) const;
-  /// When a sphere may first have come farther than `max_displacement` in a window; infinite: never. The next ones
-  /// allow for its speed. Null: this rank has no subdomain. Collective.
+  /// The first time at which a sphere may have moved farther than `max_displacement`; infinite if none has. Later
+  /// windows allow for its speed. Null: this rank has no subdomain. Collective.
   double first_beyond(Subdomain<D>* subdomain, double now, double end, Communicator& ranks);
-  /// After a window of this length in which so many spheres had so many collisions.
+  /// Call after a window of this length in which all `spheres` together had this many collisions.
   void note(double length, std::uint64_t collisions, std::size_t spheres);
 
  private:
@@ -35,9 +35,9 @@ class WindowLength {
   double diameter_;
   std::function<double()> forced_;
   double max_displacement_ = 0;
-  double field_ = 0;    // the speed that the field may add in the epoch
-  double fastest_ = 0;  // the largest speed expected
-  double pace_ = 0;     // time in which a sphere collides kCollisions times, about
+  double field_ = 0;    // speed that the field may add in the epoch
+  double fastest_ = 0;  // largest speed expected
+  double pace_ = 0;     // estimated time in which a sphere has kCollisionsPerWindow collisions
 };
 
 }  // namespace carom

@@ -14,7 +14,7 @@ void WindowPaths<D>::load(std::size_t slots) {
   scripts_.clear();
   scripts_.resize(slots);
   rewritten_.assign(slots, 0);
-  agreed_.assign(slots, 0);
+  matched_in_.assign(slots, 0);
 }
 
 template <int D>
@@ -53,7 +53,7 @@ std::vector<std::pair<Slot, Record<D>>> WindowPaths<D>::finish() {
   return other;
 }
 
-/// Node k of a path, as the log has it, given the entries of the sphere.
+/// Node k of a path, read from the log; `entries`: the sphere's entries.
 template <int D>
 Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const {
   const auto& event = trace_.event_of(entries[k]);
@@ -87,7 +87,7 @@ const Record<D>& WindowPaths<D>::after(Slot i) const {
 template <int D>
 typename WindowPaths<D>::Nodes& WindowPaths<D>::rewrite(Slot i) {
   rewritten_[i] = 1;
-  agreed_[i] = 0;
+  matched_in_[i] = 0;
   return path_of(i).nodes;
 }
 
@@ -111,7 +111,7 @@ void WindowPaths<D>::read_script(Slot g, Reader& message) {
   script.count = message.get<std::uint32_t>();
   script.bytes = message.skip(script.count * sizeof(Node<D>));
   script.nodes.clear();
-  agreed_[g] = 0;
+  matched_in_[g] = 0;
 }
 
 template <int D>
@@ -131,25 +131,25 @@ std::span<const Node<D>> WindowPaths<D>::script(Slot g) {
 
 template <int D>
 bool WindowPaths<D>::matches(Slot g) {
-  if (agreed_[g] == window_) return true;
+  if (matched_in_[g] == window_) return true;
   const View path = view(g);
   const std::size_t count = scripts_.has(g) ? scripts_.at(g).count : 0;
   if (path.size() != count) return false;
   for (std::size_t k = 0; k < count; ++k)
     if (!(path.node(k) == scripts_.at(g).node(k))) return false;
-  agreed_[g] = window_;
+  matched_in_[g] = window_;
   return true;
 }
 
 template <int D>
-bool WindowPaths<D>::agree(double end) {
+bool WindowPaths<D>::all_match(double end) {
   const auto until = [&](std::span<const Node<D>> nodes) {
     while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
     return nodes;
   };
   bool all = true;
   for_each_ghost([&](Slot g) {
-    if (!all || agreed_[g] == window_) return;
+    if (!all || matched_in_[g] == window_) return;
     const auto seen = until(path(g)), sent = until(script(g));
     all = std::equal(seen.begin(), seen.end(), sent.begin(), sent.end());
   });

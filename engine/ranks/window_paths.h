@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What the spheres of a subdomain did in a window: their paths, and the scripts of its ghosts, which are the paths that
-// their owners have sent.
+// The paths of a subdomain's spheres in a window, and the scripts of its ghosts: the paths received from their owners.
 //
-// The event core writes a log (trace.h). A path is read from that where it is wanted, and stands by itself from then
-// on; one that has been rewritten counts instead of what the log has.
+// The event core writes a log (trace.h), from which paths are read on demand and then stored. A rewritten path replaces
+// the one in the log.
 
 #include "engine/base/bytes.h"
 #include "engine/base/contact_tally.h"
@@ -19,28 +18,28 @@ class WindowPaths {
  public:
   using Nodes = std::vector<Node<D>>;
 
-  /// `flights` are as the core left them at the end of the window. Both outlive this.
+  /// `flights` must be in the state the core left at the end of the window. Both arguments must outlive this object.
   WindowPaths(const Flights<D>& flights, const Ownership<D>& ownership) : flights_(flights), ownership_(ownership) {}
 
-  /// Forgets all, and makes room for so many slots.
+  /// Removes everything and makes room for this many slots.
   void load(std::size_t slots);
-  /// Starts a window; the core is to write its log there.
+  /// Starts a window; the core must write to the returned log.
   Trace<D>& start();
-  /// The log is complete. Returns the own spheres with events that are ghosts elsewhere.
+  /// Call when the log is complete. Returns the own spheres with events that are ghosts elsewhere.
   std::vector<Slot> end();
-  /// Forgets the window; returns the records that are not those of the core.
+  /// Ends the window; returns the records that differ from the core's.
   std::vector<std::pair<Slot, Record<D>>> finish();
 
   const Trace<D>& trace() const { return trace_; }
   bool has_no_events(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
   std::span<const Node<D>> path(Slot i) { return path_of(i).nodes; }
-  /// The sphere before node k of its path, and after the last one.
+  /// The sphere's record before node k of its path; after(): after the last node.
   const Record<D>& before(Slot i, std::size_t k) {
     Path& path = path_of(i);
     return k > 0 ? path.nodes[k - 1].after : path.start;
   }
   const Record<D>& after(Slot i) const;
-  /// A path that is going to be changed.
+  /// The path of a sphere, to be changed.
   Nodes& rewrite(Slot i);
   /// Removes all events after `last`.
   void cut(const EventKey<D>& last);
@@ -49,20 +48,20 @@ class WindowPaths {
   void write(Slot i, Bytes& to) const;
   /// Reads the script of a ghost; the message must stay until the end of the window.
   void read_script(Slot g, Reader& message);
-  /// Of a ghost that had no events with its owner, nothing.
+  /// The script of a ghost; empty if it had no events on its owner.
   std::span<const Node<D>> script(Slot g);
-  /// Whether the path of a ghost here is its script.
+  /// Whether the path of a ghost equals its script.
   bool matches(Slot g);
-  /// The same for all ghosts, before a time.
-  bool agree(double end);
+  /// Whether the paths of all ghosts equal their scripts before a time.
+  bool all_match(double end);
 
-  /// Calls visit(slot) for each own sphere, or each ghost, that had events at any time, here or in its script. It may
-  /// ask for paths.
+  /// Calls visit(slot) for each own sphere, or each ghost, that had events in any version of the window or in its
+  /// script. visit() may call path().
   template <class Visit>
   void for_each_own(Visit&& visit) const;
   template <class Visit>
   void for_each_ghost(Visit&& visit) const;
-  /// Of own spheres; each collision counts where its lower id is owned.
+  /// The contacts of own spheres; each counts where its lower id is owned.
   ContactTally tally() const;
 
  private:
@@ -71,14 +70,14 @@ class WindowPaths {
     Record<D> start;  // at the start of the window
     Nodes nodes;
   };
-  /// Of a ghost. Most are compared with what was seen and never read.
+  /// The script of a ghost. Most are compared with the path and never decoded.
   struct Script {
     const std::byte* bytes;
     std::uint32_t count;
-    Nodes nodes;  // where they have been read
+    Nodes nodes;  // empty until decoded
     Node<D> node(std::size_t k) const;
   };
-  /// A path where it stands, or as the log has it; good until another one is looked at.
+  /// A path, stored or read from the log; valid until another path is viewed.
   struct View {
     const WindowPaths& all;
     Slot slot;
@@ -98,12 +97,13 @@ class WindowPaths {
   const Flights<D>& flights_;
   const Ownership<D>& ownership_;
   Trace<D> trace_;
-  BySlot<Path> paths_;                   // those that are wanted
-  std::vector<std::uint8_t> rewritten_;  // by slot: its path is not that of the trace
-  BySlot<Script> scripts_;               // of ghosts
-  std::vector<Slot> touched_ghosts_;     // that had events in the log
-  std::vector<std::uint32_t> agreed_;    // by slot: the window in which the path of a ghost was found to be its script
-  std::uint32_t window_ = 0;             // its number
+  BySlot<Path> paths_;                   // paths in use
+  std::vector<std::uint8_t> rewritten_;  // by slot: whether the path differs from the log
+  BySlot<Script> scripts_;
+  std::vector<Slot> touched_ghosts_;  // ghosts with events in the log
+  std::vector<std::uint32_t>
+      matched_in_;            // by slot: the window in which the ghost's path was found equal to its script
+  std::uint32_t window_ = 0;  // number of the present window
 };
 
 template <int D>

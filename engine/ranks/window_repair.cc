@@ -39,7 +39,7 @@ std::vector<Slot> WindowRepair<D>::run() {
   return changed;
 }
 
-/// Where the path of a ghost differs from its script, and not by a contact with own spheres, it is repaired from there.
+/// Starts a repair where the path of a ghost differs from its script, except by a contact with an own sphere.
 template <int D>
 void WindowRepair<D>::compare(Slot g) {
   if (paths_.matches(g)) return;
@@ -54,7 +54,7 @@ void WindowRepair<D>::compare(Slot g) {
   }
 }
 
-/// Cuts the path of a sphere at `key`; the partners of the events taken back must be checked.
+/// Cuts the path of a sphere at `key`; the partners of the removed events must be checked.
 template <int D>
 typename WindowRepair<D>::Repaired& WindowRepair<D>::begin(Slot i, const EventKey<D>& key) {
   auto& path = paths_.rewrite(i);
@@ -80,7 +80,7 @@ typename WindowRepair<D>::Repaired& WindowRepair<D>::begin(Slot i, const EventKe
   return m;
 }
 
-/// The next node that a ghost has in its script; null: there is none, or it no longer follows it.
+/// The next node in the script of a ghost; null if there is none or the ghost has left its script.
 template <int D>
 const Node<D>* WindowRepair<D>::next_of_script(const Repaired& m) {
   const auto script = paths_.script(m.slot);
@@ -94,7 +94,7 @@ void WindowRepair<D>::plan_script(Repaired& m) {
         {.kind = Task::Kind::script, .key = next->key, .a = m.slot, .version_a = static_cast<std::uint32_t>(m.script)});
 }
 
-/// Plans all contacts that a repaired sphere may have from `now` on.
+/// Plans all contacts that a repaired sphere may have after `now`.
 template <int D>
 void WindowRepair<D>::predict(Repaired& m, const EventKey<D>& now) {
   const bool ghost = ownership_.is_ghost(m.slot);
@@ -121,7 +121,7 @@ void WindowRepair<D>::predict(Repaired& m, const EventKey<D>& now) {
 template <int D>
 void WindowRepair<D>::meet(Repaired& m, Slot j, const Image<D>& image, const EventKey<D>& now) {
   const Vec<D> shift = box_.shift(image);
-  // The contact with a record of the other one; false: none in the window.
+  // Computes the contact with a record of the other sphere; false if there is none in the window.
   EventKey<D> key;
   const auto meets = [&](const Record<D>& other) {
     const double t = flights_.pair_contact(m.slot, m.now, j, other, shift);
@@ -135,7 +135,7 @@ void WindowRepair<D>::meet(Repaired& m, Slot j, const Image<D>& image, const Eve
     found = meets(repairs_[repair_of_[j]].now);
   } else if (paths_.has_no_events(j)) {
     found = meets(paths_.after(j));
-  } else {  // along its path: a contact counts only before the path turns
+  } else {  // along its path: a contact counts only before the next node
     const auto path = paths_.path(j);
     std::size_t k = 0;
     while (k < path.size() && path[k].key < now) ++k;
@@ -180,7 +180,7 @@ void WindowRepair<D>::contact(const Task& task) {
   predict(b, key);
 }
 
-/// Adds a node to a path. A ghost follows its script as long as the script has the same node.
+/// Appends a node to a path. A ghost follows its script while the script has the same nodes.
 template <int D>
 void WindowRepair<D>::append(Repaired& m, const Node<D>& node) {
   paths_.rewrite(m.slot).push_back(node);
@@ -194,20 +194,20 @@ void WindowRepair<D>::append(Repaired& m, const Node<D>& node) {
   plan_script(m);
 }
 
-/// A ghost follows its script in an event without own spheres.
+/// Executes a script event of a ghost with another ghost or a wall.
 template <int D>
 void WindowRepair<D>::script(const Task& task) {
   Repaired& m = repairs_[repair_of_[task.a]];
   if (m.left_script || m.script != task.version_a) return;
   const Node<D>& node = *next_of_script(m);
   if (ownership_.owns_id(node.partner()))
-    m.left_script = true;  // here they did not meet, and this subdomain decides that
+    m.left_script = true;  // they did not meet here, and this subdomain decides contacts of own spheres
   else
     append(m, node);
   predict(m, task.key);
 }
 
-/// A sphere that has been repaired met this one here, and no longer does.
+/// Checks a sphere that met a repaired one before the repair: they may no longer meet.
 template <int D>
 void WindowRepair<D>::check(const Task& task) {
   const bool ghost = ownership_.is_ghost(task.b);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Repairs a window where paths of ghosts are not those that their owners sent.
+// Repairs a window in which ghosts have moved differently from the paths that their owners sent.
 //
-// The path of such a ghost is cut at the first difference, and follows its script; spheres that it met, or meets now,
-// are cut there and flown again, and so on in the order of keys, as far as the difference reaches. Contacts of a ghost
-// with own spheres are decided here, not by its owner.
+// The path of the ghost is cut at the first difference and then follows its script. Spheres that met it, or meet it
+// now, are cut there and advanced again, and so on in the order of keys, as far as the difference propagates. Contacts
+// of a ghost with own spheres are decided here, not by its owner.
 
 #include <deque>
 #include <queue>
@@ -16,46 +16,45 @@ namespace carom {
 template <int D>
 class WindowRepair {
  public:
-  /// All outlive this.
+  /// All arguments must outlive this object.
   WindowRepair(const Box<D>& box, EventCore<D>& core, const Ownership<D>& ownership, WindowPaths<D>& paths)
       : box_(box), core_(core), flights_(core.flights()), ownership_(ownership), paths_(paths) {}
 
-  /// Makes room for so many slots.
+  /// Makes room for this many slots.
   void load(std::size_t slots) { repair_of_.assign(slots, kNone); }
-  /// A window that ends at `end` starts.
   void start(double end) {
     end_ = end;
     fastest_squared_ = 0;
   }
-  /// Repairs the paths after scripts have come. Returns the own spheres that have other paths than before.
+  /// Repairs the paths after scripts were received. Returns the own spheres with changed paths.
   std::vector<Slot> run();
 
-  /// The largest square of a speed after an event of the window.
+  /// The largest squared speed after an event of the window.
   double fastest_squared() const { return fastest_squared_; }
-  /// In all windows.
+  /// Number of events in all repairs.
   std::uint64_t events() const { return events_; }
 
  private:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
-  /// The repair of the path of a sphere.
+  /// The repair of one sphere's path.
   struct Repaired {
-    Record<D> now;  // at the time that repair has come to
+    Record<D> now;  // at the time that the repair has reached
     Slot slot;
-    std::uint32_t version = 0;           // grows with every change: what was planned before no longer holds
+    std::uint32_t version = 0;           // incremented with every change; older plans are invalid
     bool left_script = false;            // a ghost that no longer follows its script
-    std::size_t script = 0;              // the next node of its script
-    std::size_t kept = 0;                // nodes of its old path that stand
-    typename WindowPaths<D>::Nodes old;  // the others
+    std::size_t script = 0;              // index of the next node of its script
+    std::size_t kept = 0;                // nodes of the old path that remain
+    typename WindowPaths<D>::Nodes old;  // removed nodes
   };
-  /// What repair has to look at, in the order of keys.
+  /// A task of the repair; tasks are in the order of keys.
   struct Task {
     enum class Kind : std::uint8_t { contact, script, check, difference } kind;
     EventKey<D> key;
-    Slot a = 0, b = 0;  // b: of a contact with a sphere, and of a check
+    Slot a = 0, b = 0;  // b: partner of a contact, or sphere to check
     std::uint32_t version_a = 0, version_b = 0;
-    Image<D> image{};                          // of a contact, seen from a
-    bool operator<(const Task& other) const {  // std::priority_queue keeps the largest on top
+    Image<D> image{};                          // image of the partner in a contact, relative to a
+    bool operator<(const Task& other) const {  // std::priority_queue has the largest on top
       if (other.key < key) return true;
       if (key < other.key) return false;
       return other.kind < kind;
@@ -83,9 +82,9 @@ class WindowRepair {
   const Flights<D>& flights_;
   const Ownership<D>& ownership_;
   WindowPaths<D>& paths_;
-  double end_ = 0;  // of the window
+  double end_ = 0;  // end of the window
   std::deque<Repaired> repairs_;
-  std::vector<std::uint32_t> repair_of_;  // by slot: in repairs_, or kNone
+  std::vector<std::uint32_t> repair_of_;  // by slot: index in repairs_, or kNone
   std::priority_queue<Task> tasks_;
   double fastest_squared_ = 0;
   std::uint64_t events_ = 0;

@@ -10,10 +10,10 @@
 namespace carom {
 namespace {
 
-constexpr std::size_t kFewest = 8;                      // spheres a subdomain
-constexpr std::size_t kMostNeighbours = 64;             // of a subdomain: the bits of Subdomain::holders()
-constexpr double kUsualWork = 64, kMostWork = 64 * 64;  // in whole numbers
-constexpr double kUneven = 0.1;                         // what differs less from the usual counts as usual
+constexpr std::size_t kMinSpheres = 8;                // spheres in a subdomain
+constexpr std::size_t kMaxNeighbours = 64;            // neighbours of a subdomain: the bits of Subdomain::holders()
+constexpr double kMeanWork = 64, kMaxWork = 64 * 64;  // mean and largest work of a sphere, as integers
+constexpr double kWorkTolerance = 0.1;                // smaller relative differences from the mean are ignored
 
 }  // namespace
 
@@ -26,7 +26,7 @@ WindowedFlight<D>::WindowedFlight(const Box<D>& box, Sizes sizes, Communicator& 
       options_(options),
       exchange_(ranks),
       length_(2 * sizes_.largest_radius(), std::move(window)) {
-  make_subdomain(std::clamp<std::size_t>(sizes_.spheres / kFewest, 1, static_cast<std::size_t>(ranks_.size())));
+  make_subdomain(std::clamp<std::size_t>(sizes_.spheres / kMinSpheres, 1, static_cast<std::size_t>(ranks_.size())));
 }
 
 template <int D>
@@ -51,7 +51,7 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
     if (instants) r.t = instants->t[i], r.generation = instants->generation[i];
     return r;
   };
-  std::vector<Vec<D>> places;  // where they are now
+  std::vector<Vec<D>> places;  // present positions
   for (Id i = 0; instants && i < particles.size(); ++i) {
     const double s = instants->now - instants->t[i];
     Image<D> image{};
@@ -61,11 +61,11 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
     bisection_.emplace(box_, instants ? places : particles.x, subdomains,
                        2 * (sizes_.largest_radius() + length_.max_displacement()), ranks_, work_);
     for (std::uint32_t r = 0; r < subdomains; ++r)
-      if (bisection_->neighbours(r).size() > kMostNeighbours) return false;
+      if (bisection_->neighbours(r).size() > kMaxNeighbours) return false;
     return true;
   };
   std::size_t subdomains = subdomains_;
-  while (!divide(subdomains)) subdomains -= (subdomains + 7) / 8;  // the box is too small for so many
+  while (!divide(subdomains)) subdomains -= (subdomains + 7) / 8;  // the box is too small for so many subdomains
   if (subdomains < subdomains_) make_subdomain(subdomains);
   exchange_.start(*bisection_);
   load(instants ? instants->now : 0, [&](auto&& add) {
@@ -76,7 +76,7 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   run_before_ = subdomain_ ? subdomain_->run_events() : 0;
 }
 
-/// Where a sphere is, as Flights has it, bit for bit.
+/// The position of a sphere, with the bits that Flights computes.
 template <int D>
 Vec<D> WindowedFlight<D>::place(const Record<D>& r, double now) const {
   const double s = now - r.t;
@@ -85,11 +85,11 @@ Vec<D> WindowedFlight<D>::place(const Record<D>& r, double now) const {
   return bisection_->wrapped(x);
 }
 
-/// Starts all subdomains anew. `spheres(add)` calls add(record) for each sphere, on one of the ranks.
+/// Loads all subdomains. `spheres(add)` calls add(record) for each sphere, on one of the ranks.
 template <int D>
 template <class Spheres>
 void WindowedFlight<D>::load(double now, Spheres&& spheres) {
-  auto near = to_those_near<Record<D>>(
+  auto near = sent_to_near<Record<D>>(
       *bisection_, ranks_, [&](auto&& send) { spheres([&](const Record<D>& r) { send(place(r, now), r); }); });
   if (subdomain_)
     subdomain_->load(std::move(near), *bisection_, static_cast<std::uint32_t>(ranks_.rank()), g_, horizon_, now,
@@ -99,7 +99,7 @@ void WindowedFlight<D>::load(double now, Spheres&& spheres) {
   sort_out(true);
 }
 
-/// Starts all subdomains anew from what they have now.
+/// Loads all subdomains again from their present spheres.
 template <int D>
 void WindowedFlight<D>::reload() {
   load(now_, [&](auto&& add) {
@@ -108,8 +108,8 @@ void WindowedFlight<D>::reload() {
   });
 }
 
-/// At the start of a window: updates ownership and ghosts, and sends neighbours the ghosts that they lack. Where
-/// subdomains have just been loaded they have them all.
+/// Call at the start of a window: updates ownership and ghosts and sends neighbours the ghosts that they lack.
+/// Subdomains that have just been loaded lack none.
 template <int D>
 void WindowedFlight<D>::sort_out(bool loaded) {
   sorted_ = true;
@@ -126,7 +126,7 @@ void WindowedFlight<D>::sort_out(bool loaded) {
   if (full > 0) reload();
 }
 
-/// The key of the n-th pair collision of a window, of those of all ranks, from 1. Collective.
+/// The key of the n-th pair collision of a window over all ranks, n from 1. Collective.
 template <int D>
 EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
   std::vector<EventKey<D>> mine;
@@ -152,7 +152,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     full = -(subdomain_ ? subdomain_->run(now_, stop) : stop);
     ranks_.largest({&full, 1});
     full = -full;
-    if (full < stop) {  // too many events for a window: it is taken back, and run again up to there
+    if (full < stop) {  // too many events for the log: revoke the window and run it up to there
       if (!(full > now_)) throw_too_many_contacts(report.max_events);
       cut_at(now_);
       sorted_ = false;
@@ -160,15 +160,15 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     }
     full = std::numeric_limits<double>::infinity();
     ++counts_.windows;
-    counts_.rounds += exchange_.agree(subdomain_.get());
+    counts_.rounds += exchange_.make_consistent(subdomain_.get());
     if (const double beyond = length_.first_beyond(subdomain_.get(), now_, stop, ranks_); beyond < stop)
       stop = cut_at(beyond);
-    if (subdomain_ && !subdomain_->agrees(stop))
+    if (subdomain_ && !subdomain_->consistent(stop))
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
     ContactTally got = tally();
     std::uint64_t count = got.sphere_sphere;
     ranks_.sum({&count, 1});
-    if (collisions + count >= report.collision_limit) {  // there are enough
+    if (collisions + count >= report.collision_limit) {  // collision limit reached
       count = report.collision_limit - collisions;
       const EventKey<D> last = key_of_collision(count);
       if (subdomain_) subdomain_->cut(last);
@@ -196,7 +196,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   return reached;
 }
 
-/// Removes the events from a time on, and returns it.
+/// Removes the events from a time on; returns the time.
 template <int D>
 double WindowedFlight<D>::cut_at(double time) {
   ++counts_.cut;
@@ -240,7 +240,7 @@ void WindowedFlight<D>::give_back(double time, Particles<D>& particles) {
   collect(time, particles, &work_);
 }
 
-/// So that the next bisection gives fewer spheres to subdomains with more events a sphere.
+/// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events a sphere.
 template <int D>
 void WindowedFlight<D>::measure_work() {
   const std::uint64_t events = subdomain_ ? subdomain_->run_events() - run_before_ : 0;
@@ -249,11 +249,11 @@ void WindowedFlight<D>::measure_work() {
   ranks_.sum(all);
   const double expected = static_cast<double>(all[0]) / static_cast<double>(all[1]) * static_cast<double>(spheres);
   double work = expected > 0 ? static_cast<double>(events) / expected : 1;
-  if (std::abs(work - 1) < kUneven) work = 1;
-  subdomain_work_ = static_cast<std::uint32_t>(std::clamp(std::round(work * kUsualWork), 1.0, kMostWork));
+  if (std::abs(work - 1) < kWorkTolerance) work = 1;
+  subdomain_work_ = static_cast<std::uint32_t>(std::clamp(std::round(work * kMeanWork), 1.0, kMaxWork));
 }
 
-/// Sends the spheres, flown to a time, to the ranks of their blocks; and their work by subdomain_work_.
+/// Sends the spheres, advanced to a time, to the ranks of their blocks, and their work if asked for.
 template <int D>
 void WindowedFlight<D>::collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const {
   struct State {

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Free flight of a system divided among ranks, a subdomain each, with the bits of one core.
+// Free flight of a system divided among ranks, one subdomain each, with the bits of a single core.
 //
-// Time goes in windows (engine/ranks/subdomain.h). In each no sphere may come farther than `max_displacement` from
-// where it was at its start, so that a subdomain needs to know those only that start within a diameter and twice
-// `max_displacement` of it; where a sphere is faster than expected the window is cut to the time at which it would have
-// mattered. A sphere belongs to the subdomain that it is in at a window's start, which all subdomains that have it
-// compute alike.
+// Time is divided into windows (engine/ranks/subdomain.h). In a window no sphere may move farther than
+// `max_displacement` from its start, so a subdomain needs only the spheres that start within a diameter plus twice
+// `max_displacement` of it. If a sphere is faster than expected, the window is cut at the time at which it could have
+// moved too far. A sphere belongs to the subdomain that contains it at the start of the window; all subdomains that
+// have it compute the same owner.
 //
 //   WindowedFlight<3> flight(box, particles, ranks);
 //   flight.take(particles, g, horizon);
 //   flight.run(end, report);
 //   flight.give_back(end, particles);
 //
-// All of it is collective. No rank has all particles: between epochs it has a block of them (id_blocks.h), in an epoch
-// those of its subdomain and their ghosts. Where there are too few particles for all ranks, or the box has no room for
-// so many subdomains, the last ranks have none.
+// All functions are collective. No rank has all particles: between epochs it has a block of them (id_blocks.h), in an
+// epoch the spheres and ghosts of its subdomain. If there are too few particles for all ranks, or the box is too small
+// for so many subdomains, the last ranks have none.
 
 #include <optional>
 
@@ -25,11 +25,11 @@
 
 namespace carom {
 
-/// When each particle had its last event in an epoch that is left off at `now`.
+/// The last event of each particle in an epoch that is interrupted at `now`.
 struct Instants {
   double now = 0;                         ///< since the start of the epoch [time]
-  std::vector<double> t;                  ///< of the last event
-  std::vector<std::uint16_t> generation;  ///< of that event
+  std::vector<double> t;                  ///< time of the last event
+  std::vector<std::uint16_t> generation;  ///< generation of this event
 };
 
 template <int D>
@@ -37,25 +37,24 @@ class WindowedFlight {
  public:
   using Report = typename EventCore<D>::Report;
 
-  /// `window` forces the length of windows [time].
+  /// `window` sets the length of windows [time].
   WindowedFlight(const Box<D>& box, Sizes sizes, Communicator& ranks, const SearchOptions& options = {},
                  std::function<double()> window = {});
 
-  /// As EventCore::take(), load() and so on. Particles are this rank's block; contacts are reported on rank 0.
+  /// Functions as in EventCore. `particles` is this rank's block; contacts are reported on rank 0.
   void take(Particles<D>& particles, const Vec<D>& g, double horizon) { take(particles, g, horizon, nullptr); }
-  /// Goes on in an epoch from what records() gave. Collective.
+  /// Continues an epoch from the result of records(). Collective.
   void go_on(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants& instants) {
     take(particles, g, horizon, &instants);
   }
-  /// The records of the particles of this rank's block as they are now: positions and velocities at their instants.
-  /// Collective.
+  /// The present records of this rank's block: positions and velocities at the times in `instants`. Collective.
   void records(Particles<D>& particles, Instants& instants) const;
   double run(double end, const Report& report);
   void fly_to(double time, Particles<D>& copies) const;
   void give_back(double time, Particles<D>& particles);
   double now() const { return now_; }
 
-  /// Of this rank, since the flight was made.
+  /// On this rank, since construction.
   EventCounts counts() const;
   WindowCounts window_counts() const;
 
@@ -80,20 +79,20 @@ class WindowedFlight {
   std::size_t subdomains_ = 0;
   SearchOptions options_;
   std::optional<Bisection<D>> bisection_;
-  std::unique_ptr<Subdomain<D>> subdomain_;  // of this rank, with its number; null: it has none
+  std::unique_ptr<Subdomain<D>> subdomain_;  // this rank's, with the rank as number; null if it has none
   PathExchange<D> exchange_;
   WindowLength<D> length_;
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
-  bool sorted_ = false;       // owners and ghosts are those of now_
-  bool cut_ = false;          // the last window was cut, and subdomains must be loaded again
+  bool sorted_ = false;       // owners and ghosts are up to date at now_
+  bool cut_ = false;          // the last window was cut, so subdomains must be loaded again
   std::uint64_t events_ = 0;  // contacts since take()
-  // How much the subdomain had to do in the epoch, a sphere of it, the mean of all being kUsualWork; and each sphere of
-  // this rank's block.
+  // Events per sphere of the subdomain in the epoch, relative to a mean of kMeanWork over all subdomains; and the same
+  // value for each sphere of this rank's block.
   std::uint32_t subdomain_work_ = 0;
   std::vector<std::uint32_t> work_;
-  std::uint64_t run_before_ = 0;  // events of first runs, before the epoch
-  EventCounts event_counts_;      // of a subdomain that is no more
+  std::uint64_t run_before_ = 0;  // events of first runs before the epoch
+  EventCounts event_counts_;      // counts of former subdomains
   WindowCounts counts_;
 };
 

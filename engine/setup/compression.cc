@@ -11,11 +11,11 @@
 namespace carom {
 namespace {
 
-constexpr double kFull = 1 + 1e-13;      // the factor aimed at: touching by rounding is not overlapping
-constexpr double kShare = 0.1;           // of the free volume that a slab takes, …
-constexpr double kLongest = 10;          // … and its length at most, in diameters at the thermal speed
-constexpr double kJammedPressure = 300;  // from here on free-volume theory predicts where the spheres jam …
-constexpr double kTooFar = 5;            // … and a target so many times farther away is out of reach
+constexpr double kTarget = 1 + 1e-13;    // final factor: a gap of rounding size, so that no spheres overlap
+constexpr double kFreePart = 0.1;        // part of the free volume that spheres grow into in a slab
+constexpr double kMaxLength = 10;        // longest slab, in diameters at the thermal speed
+constexpr double kJammedPressure = 300;  // above it, free-volume theory predicts where the spheres jam
+constexpr double kTooFar = 5;            // how much farther than the jamming point the target must be for giving up
 
 template <int D>
 class Compressor {
@@ -42,10 +42,10 @@ class Compressor {
  private:
   using End = typename Compression<D>::End;
 
-  /// Small spheres at random places, and velocities.
+  /// Inserts small spheres at random and draws velocities.
   bool start() {
     for (int k = 0; k < D; ++k)
-      if (box_.edges[k] < 2 * kFull * largest_) return false;
+      if (box_.edges[k] < 2 * kTarget * largest_) return false;
     std::vector<Id> all(radius_.size());
     std::iota(all.begin(), all.end(), Id{0});
     constexpr double dilute = D == 2 ? 0.2 : 0.1, least = 1e-3;
@@ -68,23 +68,23 @@ class Compressor {
   }
 
   End grow() {
-    for (double slabs = 1; result_.factor < kFull; ++slabs) {
+    for (double slabs = 1; result_.factor < kTarget; ++slabs) {
       slab();
-      const double left = kFull / result_.factor - 1;
+      const double left = kTarget / result_.factor - 1;
       if (result_.reduced_pressure > kJammedPressure && left * result_.reduced_pressure > kTooFar) return End::jammed;
       if (left > 0 && std::max(result_.collisions, slabs) > options_.max_collisions) return End::too_many_collisions;
     }
     return End::reached;
   }
 
-  /// Grows for the time in which the factor takes its share of the free volume, or for fewer collisions.
+  /// Grows for a time in which the factor uses kFreePart of the free volume, or for fewer collisions.
   void slab() {
     const auto n = static_cast<double>(radius_.size());
     const double diameter = 2 * result_.factor * largest_;
     const double growth = options_.growth_rate / (diameter * result_.reduced_pressure);
-    const double to_the_end = (kFull / result_.factor - 1) / growth;
-    const double length = std::min(diameter * std::min(kShare / options_.growth_rate, kLongest), to_the_end);
-    // Ten times what the last rate predicts: more come where the spheres jam on the way.
+    const double to_the_end = (kTarget / result_.factor - 1) / growth;
+    const double length = std::min(diameter * std::min(kFreePart / options_.growth_rate, kMaxLength), to_the_end);
+    // At most ten times the predicted collisions: if the spheres jam on the way, there are more.
     const double expected = 100 + 10 * collision_rate_ * length;
     const double most = n * std::min(expected, 1 + options_.max_collisions - result_.collisions);
     Counters counters;
@@ -93,7 +93,7 @@ class Compressor {
         core_.run(length, {.counters = counters, .collision_limit = static_cast<std::uint64_t>(most)});
     core_.fly_to(reached, particles_);
     for (std::size_t i = 0; i < particles_.size(); ++i) box_.wrap(particles_.x[i], particles_.image[i]);
-    result_.factor = reached == to_the_end ? kFull : result_.factor * (1 + growth * reached);
+    result_.factor = reached == to_the_end ? kTarget : result_.factor * (1 + growth * reached);
     scale_radii();
 
     const double collisions = static_cast<double>(counters.sphere_sphere) / n;
@@ -106,7 +106,7 @@ class Compressor {
     result_.collisions += collisions;
   }
 
-  /// Scales the velocities to temperature 1; returns the temperature before.
+  /// Scales the velocities to temperature 1; returns the previous temperature.
   double cool() {
     double twice_kinetic = 0;
     for (const Vec<D>& v : particles_.v) twice_kinetic += v.squaredNorm();
@@ -120,7 +120,7 @@ class Compressor {
   const std::span<const double> radius_;
   const CompressionOptions options_;
   double largest_ = 0;
-  double collision_rate_ = 0;  // of a particle, in the last slab
+  double collision_rate_ = 0;  // collisions of a particle in a unit of time, in the last slab
   Particles<D> particles_;
   EventCore<D> core_;
   Compression<D> result_;

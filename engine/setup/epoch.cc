@@ -21,8 +21,8 @@ double default_epoch(const System<D>& system) {
     double twice_kinetic = 0, mass = 0, diameter = 0, fastest = 0, lightest = std::numeric_limits<double>::infinity();
   };
   Communicator alone;
-  const auto [twice_kinetic, mass, diameter, fastest, lightest] =
-      handed_on(system.decomposition.others() ? *system.decomposition.others() : alone, Sums{}, [&](Sums& sums) {
+  const auto [twice_kinetic, mass, diameter, fastest, lightest] = accumulated_in_order(
+      system.decomposition.others() ? *system.decomposition.others() : alone, Sums{}, [&](Sums& sums) {
         for (std::size_t i = 0; i < p.size(); ++i) {
           sums.twice_kinetic += p.mass[i] * p.v[i].squaredNorm();
           sums.mass += p.mass[i] / n;
@@ -33,7 +33,8 @@ double default_epoch(const System<D>& system) {
       });
   const double filled = packing_fraction<D>(system.box.volume(), p.radius, system.decomposition.others());
   if (twice_kinetic == 0) return 1;
-  // Collision rate of one particle by Enskog's theory, contact value by Carnahan–Starling (3-D), Henderson (2-D).
+  // Collision rate of a particle by Enskog's theory, with the contact value of Carnahan–Starling (3-D) or Henderson
+  // (2-D).
   const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));
   const double density = n / system.box.volume();
   const double empty = std::max(1 - filled, 0.01);
@@ -43,7 +44,7 @@ double default_epoch(const System<D>& system) {
   const double rate = density * cross_section * contact_value * std::sqrt(std::numbers::pi) * thermal_speed;
   const double farthest = std::min(300 * diameter, 4 * system.box.edges.minCoeff());
   double epoch = std::min(40 / rate, farthest / thermal_speed);
-  // So far that the images of the fastest, in equilibrium too, can be written down on any number of ranks.
+  // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.
   const double speed = std::max(fastest, 5 * std::sqrt(twice_kinetic / (D * n * lightest)));
   const Packing<D> packing(1, system.size());
   for (int k = 0; k < D; ++k)

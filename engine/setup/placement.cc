@@ -11,14 +11,14 @@
 namespace carom {
 namespace {
 
-/// Equally spaced planes of sites along one axis.
+/// Equally spaced lattice planes along one axis.
 struct Planes {
   int number = 1;
   double first = 0, spacing = 0;
   bool periodic = false;
 
   double at(int plane) const { return first + plane * spacing; }
-  /// Distance to a like site `planes` planes on; infinite where there is none.
+  /// Distance to the equivalent site `planes` planes away; infinite if there is none.
   double step(int planes) const {
     return periodic || number > planes ? planes * spacing : std::numeric_limits<double>::infinity();
   }
@@ -39,7 +39,7 @@ Planes planes(Lattice lattice, const Box<D>& box, int axis, int cells, double ma
   return p;
 }
 
-/// The smallest distance between two sites. In centred lattices those with an even sum of plane numbers are sites.
+/// The smallest distance between two sites. In centred lattices the sites have an even sum of plane numbers.
 template <int D>
 double site_distance(Lattice lattice, const std::array<Planes, D>& p) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -70,7 +70,7 @@ LatticeCells<D> fit_lattice(Lattice lattice, const Box<D>& box, std::size_t coun
   double best_distance = -1;
   std::array<int, D> n{};
   n.fill(1);
-  while (n[0] <= most[0]) {  // every choice of all but the last axis; that one takes as few cells as will do
+  while (n[0] <= most[0]) {  // all choices for all axes but the last, which gets the fewest cells that suffice
     std::size_t others = basis;
     for (int k = 0; k + 1 < D; ++k) others *= static_cast<std::size_t>(n[k]);
     n[D - 1] = static_cast<int>((count + others - 1) / others);
@@ -120,7 +120,7 @@ std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_
 template <int D>
 Vec<D> commensurate_edges(Lattice lattice, std::size_t count, double volume) {
   if (lattice == Lattice::simple || D == 3) return Vec<D>::Constant(D == 2 ? std::sqrt(volume) : std::cbrt(volume));
-  // Hexagonal: nx by ny cells of a by a√3. Few vacancies come first, a box near the square second.
+  // Hexagonal: nx by ny cells of a by a√3, with few vacancies first, a nearly square box second.
   const double square = std::sqrt(static_cast<double>(count) * std::numbers::sqrt3 / 2);
   const int least = std::max(1, static_cast<int>(square / 1.5)), most = static_cast<int>(square * 1.5) + 1;
   double best_cost = std::numeric_limits<double>::infinity(), best_aspect = 1;
@@ -251,7 +251,7 @@ void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::s
     double mass = 0, twice_kinetic_wanted = 0, twice_kinetic = 0;
     Vec<D> momentum = Vec<D>::Zero();
   };
-  const Sums drawn = handed_on(ranks ? *ranks : alone, Sums{}, [&](Sums& sums) {
+  const Sums drawn = accumulated_in_order(ranks ? *ranks : alone, Sums{}, [&](Sums& sums) {
     sums.particles += chosen.size();
     for (std::size_t n = 0; n < chosen.size(); ++n) {
       const Id i = chosen[n];
@@ -260,7 +260,7 @@ void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::s
       sums.twice_kinetic_wanted += D * temperature[n];
     }
   });
-  const Sums centred = handed_on(ranks ? *ranks : alone, drawn, [&](Sums& sums) {
+  const Sums centred = accumulated_in_order(ranks ? *ranks : alone, drawn, [&](Sums& sums) {
     for (const Id i : chosen) {
       if (sums.particles > 1) particles.v[i] -= sums.momentum / sums.mass;
       sums.twice_kinetic += particles.mass[i] * particles.v[i].squaredNorm();
@@ -273,7 +273,7 @@ void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::s
 template <int D>
 double packing_fraction(double volume, std::span<const double> radius, Communicator* ranks) {
   Communicator alone;
-  const double filled = handed_on(ranks ? *ranks : alone, 0.0, [&](double& sum) {
+  const double filled = accumulated_in_order(ranks ? *ranks : alone, 0.0, [&](double& sum) {
     for (const double r : radius) sum += D == 2 ? std::numbers::pi * r * r : 4 * std::numbers::pi / 3 * r * r * r;
   });
   return filled / volume;

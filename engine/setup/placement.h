@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Initial positions and velocities: lattices spread over a box, random sequential insertion, Maxwell–Boltzmann
-// velocities, and the check that no two spheres overlap.
+// Initial positions and velocities: lattices that fill a box, random sequential insertion, Maxwell–Boltzmann
+// velocities, and the check for overlaps.
 //
 //   const auto sites = lattice_sites(Lattice::fcc, box, n, largest_radius);
-//   const auto worst = find_overlaps(box, sites, radius);        // worst.pairs == 0: there are none
+//   const auto worst = find_overlaps(box, sites, radius);        // no overlap if worst.pairs == 0
 //
-// Everything is a pure function of its arguments and a seed. Lengths, masses and temperatures are in the deck's units
-// (k_B = 1).
+// All functions are pure functions of their arguments and a seed. Lengths, masses and temperatures are in the deck's
+// units (k_B = 1).
 
 #include <cstddef>
 #include <functional>
@@ -21,74 +21,74 @@
 
 namespace carom {
 
-enum class Lattice { simple, centred };  ///< simple cubic and square; face-centred cubic and hexagonal
+enum class Lattice { simple, centred };  ///< simple: cubic, square; centred: face-centred cubic, hexagonal
 
-/// How many unit cells along each axis, and how many sites that makes.
+/// The number of unit cells along each axis, and their number of sites.
 template <int D>
 struct LatticeCells {
   std::array<int, D> cells{};
   std::size_t sites = 0;
 };
 
-/// The numbers of unit cells that hold at least `count` sites in a box of these edges with the largest distance between
-/// neighbouring sites. On axes with walls the outer layers stay `margin` away from the wall.
+/// The numbers of unit cells with at least `count` sites in this box and the largest distance between neighbouring
+/// sites. On axes with walls the outer layers are at least `margin` from the wall.
 template <int D>
 LatticeCells<D> fit_lattice(Lattice lattice, const Box<D>& box, std::size_t count, double margin);
 
-/// Calls visit(x) for all sites (at least `count`) of that lattice, in the order of their coordinates; returns how
-/// many.
+/// Calls visit(x) for all sites of the lattice (at least `count`), in the order of their coordinates; returns their
+/// number.
 template <int D>
 std::size_t for_each_site(Lattice lattice, const Box<D>& box, std::size_t count, double margin,
                           const std::function<void(const Vec<D>&)>& visit);
 template <int D>
 std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_t count, double margin);
 
-/// Edges of a box of this volume in which `count` sites make an undistorted lattice: a cube or square, except for the
-/// hexagonal lattice (centred, 2-D): its box has the proportions of its cells.
+/// Edges of a box of this volume in which `count` sites form an undistorted lattice: a cube or square; for the
+/// hexagonal lattice (centred, 2-D) a rectangle with the proportions of its cells.
 template <int D>
 Vec<D> commensurate_edges(Lattice lattice, std::size_t count, double volume);
 
-/// Which group each site belongs to: `counts[g]` sites drawn at random for every group g, the others get −1.
+/// The group of each site: `counts[g]` sites, drawn at random, are in group g, the remaining ones in group −1.
 std::vector<int> distribute(std::size_t sites, std::span<const std::size_t> counts, std::uint64_t seed);
 
-/// Random sequential insertion (Widom, J. Chem. Phys. 44 (1966) 3888): x[i] for every i in `ids`, large spheres first,
-/// each at a random place where it touches none that stand already (those not in `ids` do) and no wall. Returns how
-/// many could be placed: fewer than all where one found no place in `tries` trials.
+/// Random sequential insertion (Widom, J. Chem. Phys. 44 (1966) 3888): sets x[i] for every i in `ids`, large spheres
+/// first, at random positions without overlap with walls or placed spheres (all spheres not in `ids` are placed).
+/// Returns the number of spheres placed; insertion ends when a sphere fails in `tries` trials.
 template <int D>
 std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<const double> radius,
                              std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries = 20000);
 
-/// Pairs closer than their contact distance by more than the gap tolerance (engine/base/wall.h), through periodic
-/// images too; without those with the later sphere `beyond` what is looked at.
+/// Pairs closer than their contact distance by more than the gap tolerance (engine/base/wall.h), also through periodic
+/// images; pairs are ignored if `beyond` marks the sphere with the larger index.
 struct Overlaps {
   std::size_t pairs = 0;
-  Id lo = 0, hi = 0;    ///< the pair that overlaps most, relative to its contact distance
-  double distance = 0;  ///< of that pair [length]
+  Id lo = 0, hi = 0;    ///< the pair with the largest overlap relative to its contact distance
+  double distance = 0;  ///< its distance [length]
   double contact = 0;   ///< its contact distance [length]
 };
 template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
                        std::span<const char> beyond = {});
 
-/// Spheres that reach through a wall by more than the gap tolerance.
+/// Spheres that extend beyond a wall by more than the gap tolerance.
 struct Outsiders {
   std::size_t spheres = 0;
   Id worst = 0;
   int axis = 0;
-  double depth = 0;  ///< how far the worst one reaches through [length]
+  double depth = 0;  ///< how far the worst one extends beyond the wall [length]
 };
 template <int D>
 Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius);
 
-/// Maxwell–Boltzmann velocities for the particles `chosen`, one temperature each: drawn, freed of total momentum (not
-/// so a single particle) and scaled so that 2K = D Σ temperature exactly, up to rounding. With `ranks`, each does so
-/// for its block of the particles, with the same bits; collective.
+/// Maxwell–Boltzmann velocities for the particles `chosen`, with a temperature for each: drawn at random, shifted to
+/// zero total momentum (unless there is only one particle) and scaled so that 2K = D Σ temperature up to rounding. With
+/// `ranks`, each rank sets its block of the particles, with the same bits; collective.
 template <int D>
 void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::span<const double> temperature,
                      std::uint64_t seed, RandomPurpose purpose = RandomPurpose::velocity,
                      Communicator* ranks = nullptr);
 
-/// The part of the box that the spheres fill, 0 … 1; with `ranks`, those of all of them.
+/// The fraction of the box filled by spheres, 0 … 1; with `ranks`, by the spheres of all ranks.
 template <int D>
 double packing_fraction(double volume, std::span<const double> radius, Communicator* ranks = nullptr);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Cells for the making of initial states: spheres are inserted one by one, and each finds those near it, through
-// periodic images too. Spheres of a size (up to a factor of two) share a grid, so that small ones don't have the cells
-// of large ones. The event core has cells of its own, built for speed; these are built for correctness in any box.
+// Cells for initial states, where spheres are inserted one by one and each must find its neighbours, also through
+// periodic images. Spheres within a factor of two in size share a grid, so that small spheres get small cells. The
+// cells of the event core are built for speed; these are built to be correct in any box.
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@ namespace carom {
 template <int D>
 class PlacementGrid {
  public:
-  /// For spheres of these radii, which outlive the grid.
+  /// For spheres of these radii, which must outlive the grid.
   PlacementGrid(const Box<D>& box, std::span<const double> radius) : radius_(radius) {
     largest_ = *std::max_element(radius.begin(), radius.end());
     std::array<std::size_t, kLevels> spheres{};
@@ -31,8 +31,8 @@ class PlacementGrid {
     at.members[at.grid.index(cell(at.grid, x))].push_back(id);
   }
 
-  /// Calls visit(id, shift) for every sphere that one of this radius at x may touch (and for some more); id's position
-  /// plus shift is the image that is near x. x lies in the box on periodic axes.
+  /// Calls visit(id, shift) for every sphere that a sphere of this radius at x may touch (and for some more); the
+  /// position of `id` plus `shift` is the image near x. x must be in the box on periodic axes.
   template <class Visit>
   void near(const Vec<D>& x, double radius, Visit&& visit) const {
     for (const auto& at : levels_) {
@@ -47,9 +47,9 @@ class PlacementGrid {
   }
 
  private:
-  static constexpr int kLevels = 8;  // the last holds all that is smaller
+  static constexpr int kLevels = 8;  // the last level has all smaller spheres
 
-  /// The grid of one size. Cells are no smaller than a diameter (along axes that are long enough), and about as many as
+  /// The grid of one size. Its cells are at least a diameter wide (if the axis is long enough), and about as many as
   /// there are spheres.
   struct Level {
     Level(const Box<D>& box, double radius, std::size_t spheres)
@@ -59,7 +59,7 @@ class PlacementGrid {
     std::vector<std::vector<Id>> members;
   };
 
-  /// That of a sphere in the box, also where rounding takes it to the edge.
+  /// The cell of a sphere in the box, even if rounding puts it on the edge.
   static Cell<D> cell(const CellGrid<D>& grid, const Vec<D>& x) {
     Cell<D> c = grid.cell(x);
     for (int k = 0; k < D; ++k) c[k] = std::clamp(c[k], 0, grid.count(k) - 1);

@@ -8,7 +8,7 @@
 
 namespace carom {
 
-/// The Coulomb potential of unit charges, damped as the real-space part of an Ewald sum; cut smoothly, it stands for
+/// The Coulomb potential of unit charges, damped like the real-space part of an Ewald sum; cut smoothly, it replaces
 /// the long-ranged potential in periodic boxes (Wolf, Keblinski, Phillpot, Eggebrecht, J. Chem. Phys. 110 (1999) 8254;
 /// Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104).
 ///
@@ -17,11 +17,12 @@ namespace carom {
 ///   (V(a) − V(b))/(a − b) = C [½ (1/r + 1/s) E − ½ (erfc αr + erfc αs)/(r s)]/(r + s),
 ///   E = (erfc αs − erfc αr)/(s − r),   r = √b, s = √a
 ///
-/// Both terms of the bracket are negative, so nothing cancels. E is the mean of −(2α/√π) e^(−α²t²) over [r, s]: from
-/// its Taylor series about the middle where α|s − r| < 0.03 and α²|a − b| < 0.08 (a usual step), by 8-point Gauss where
-/// α|s − r| < ½ and α²|a − b| < 2, else as it stands. Series and Gauss leave out less than ε/10.
+/// Both terms in the bracket are negative, so there is no cancellation. E is the mean of −(2α/√π) e^(−α²t²) over [r,
+/// s]: from its Taylor series about the midpoint if α|s − r| < 0.03 and α²|a − b| < 0.08 (a usual step), by 8-point
+/// Gauss quadrature if α|s − r| < ½ and α²|a − b| < 2, else from the formula. Truncation errors of series and
+/// quadrature are below ε/10.
 ///
-/// Errors: a few ulp, and (αr)² ulp more from rounding α²ρ.
+/// Errors: a few ulp, plus (αr)² ulp from rounding α²ρ.
 class DampedCoulomb {
  public:
   DampedCoulomb(double constant, double damping) : c_(constant), alpha_(damping) {}
@@ -49,10 +50,10 @@ class DampedCoulomb {
   T quotient(T rho_old, T rho_new) const {
     const T lower = elementary::min(rho_old, rho_new), upper = elementary::max(rho_old, rho_new);
     const T r = elementary::sqrt(lower), s = elementary::sqrt(upper);
-    const T difference = (upper - lower) / (r + s);  // s − r without its cancellation
+    const T difference = (upper - lower) / (r + s);  // s − r without cancellation
     const T erfc_r = elementary::erfc(alpha_ * r), erfc_s = elementary::erfc(alpha_ * s);
     const T m = 0.5 * alpha_ * (r + s), d = 0.5 * alpha_ * difference;
-    T mean = mean_by_series(m, d);  // of e^(−α²t²) over [r, s]
+    T mean = mean_by_series(m, d);  // mean of e^(−α²t²) over [r, s]
     const auto wide = !((d < 0.015) & (m * d < 0.02));
     if (elementary::any(wide)) {
       const auto near = (d < 0.25) & (m * d < 0.5);
@@ -71,7 +72,7 @@ class DampedCoulomb {
     return c_ * kTwoOverRootPi * alpha_ * elementary::exp(-alpha_ * alpha_ * rho);
   }
 
-  /// Mean of e^(−t²) over [m − d, m + d]: Σ f⁽²ᵏ⁾(m) d²ᵏ/(2k + 1)!, to d⁶.
+  /// The mean of e^(−t²) over [m − d, m + d]: Σ f⁽²ᵏ⁾(m) d²ᵏ/(2k + 1)!, up to d⁶.
   template <class T>
   static T mean_by_series(T m, T d) {
     const T m2 = m * m, d2 = d * d;

@@ -2,14 +2,14 @@
 #pragma once
 // The loop over particles, written once for all external fields.
 //
-// A field offers, for particle i at x,
+// A field has, for particle i at x,
 //   value(i, x)                    V_i
 //   gradient(i, x)                 ∇V_i
 //   mean_gradient(i, x, x_new)     a discrete gradient: · (x_new − x) = V_i(x_new) − V_i(x)
 //   hessian_product(i, x, w)       V_i″ w
-//   least_force(distance)          on a particle so far from where there is none [force]; 0: unknown
-//   among(particles)               itself for other particles
-// and, where it accelerates all particles alike, acceleration().
+//   least_force(distance)          the force at this distance from where it is zero [force]; 0: unknown
+//   among(particles)               the field for other particles
+// and, if it gives all particles the same acceleration, acceleration().
 
 #include <algorithm>
 #include <utility>
@@ -22,7 +22,7 @@ namespace carom {
 template <int D, class Field>
 class FieldTerm final : public Interaction<D> {
  public:
-  /// `particles` marks ghosts, and outlives the term.
+  /// `particles` marks ghosts and must outlive the term.
   FieldTerm(const Particles<D>& particles, Field field) : particles_(particles), field_(std::move(field)) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override {
@@ -68,7 +68,7 @@ class FieldTerm final : public Interaction<D> {
     else
       return nullptr;
   }
-  ForceScale scale(double distance) const override { return {kShare * field_.least_force(distance), 0}; }
+  ForceScale scale(double distance) const override { return {kForceFraction * field_.least_force(distance), 0}; }
   bool keeps_momentum() const override { return false; }
   std::unique_ptr<Interaction<D>> among(const Particles<D>& some) const override {
     return std::make_unique<FieldTerm>(some, field_.among(some));
@@ -77,7 +77,7 @@ class FieldTerm final : public Interaction<D> {
   double reach(const Particles<D>&, Communicator&) const override { return 0; }
 
  private:
-  static constexpr double kShare = 0x1p-8;  // so that accelerations of light particles keep their digits
+  static constexpr double kForceFraction = 0x1p-8;  // small, so that accelerations of light particles keep their digits
 
   const Particles<D>& particles_;
   Field field_;

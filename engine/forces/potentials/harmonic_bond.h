@@ -10,7 +10,7 @@ namespace carom {
 ///   V(r) = ½ k (r − L)²
 ///   V′ = ½ k (r − L)/r,   V″ = k L/(4 r³),   (V(a) − V(b))/(a − b) = ½ k (r + s − 2L)/(r + s),   r = √b, s = √a
 ///
-/// Errors: V′ and the quotient to a few ε of ½ k max(1, L/r); they pass zero at r = L.
+/// Errors: V′ and the quotient to a few ε of ½ k max(1, L/r); both are zero at r = L.
 class HarmonicBond {
  public:
   HarmonicBond(double stiffness, double rest_length) : half_k_(0.5 * stiffness), length_(rest_length) {}
@@ -27,7 +27,7 @@ class HarmonicBond {
   }
   template <class T>
   T derivative(T rho) const {
-    if (length_ == 0) return all<T>(half_k_);  // also where the particles coincide
+    if (length_ == 0) return all<T>(half_k_);  // also valid if the particles coincide
     const T r = elementary::sqrt(rho);
     return half_k_ * ((r - length_) / r);
   }

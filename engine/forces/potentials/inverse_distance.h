@@ -7,7 +7,7 @@
 
 namespace carom {
 
-/// Gravity and the Coulomb potential, for unit masses or charges.
+/// Gravity or the Coulomb potential, for unit masses or charges.
 ///
 ///   V(r) = C/r
 ///   V′ = −C/(2 r³),   V″ = 3C/(4 r⁵),   (V(a) − V(b))/(a − b) = −C/(r s (r + s)),   r = √b, s = √a

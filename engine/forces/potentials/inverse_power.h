@@ -15,7 +15,7 @@ namespace carom {
 ///   V′ = −n V/ρ,   V″ = n (n + 1) V/ρ²
 ///   (V(a) − V(b))/(a − b) = V(b) expm1(−n log1p((a − b)/b))/(a − b),   b the smaller of the two
 ///
-/// Errors: a few ulp, in the quotient n ulp more at most (the exponent's own rounding).
+/// Errors: a few ulp; for the quotient up to n ulp more, from rounding the exponent.
 class InversePower {
  public:
   InversePower(double epsilon, double sigma, double exponent)

@@ -13,7 +13,7 @@ namespace carom {
 ///   V′ = −(12ε/σ²) x u (2u − 1),   V″ = 24ε u (7u − 2)/ρ²
 ///   (V(a) − V(b))/(a − b) = −(4ε/σ²) x y (x² + y² + x y)(u + w − 1),   x, u at b; y, w = y³ at a
 ///
-/// Errors: a few ε of the sum of the magnitudes of the repulsive and the attractive part.
+/// Errors: a few ε of the sum of the magnitudes of repulsion and attraction.
 class LennardJones {
  public:
   LennardJones(double epsilon, double sigma)

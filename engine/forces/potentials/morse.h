@@ -14,8 +14,7 @@ namespace carom {
 ///   (V(a) − V(b))/(a − b) = −D α u φ(x) (u + w − 2)/(r + s),   r = √b the smaller, s = √a, u at r, w at s,
 ///   φ(x) = (1 − e^(−x))/x, x = α(s − r)
 ///
-/// Errors: a few ε of the sum of the magnitudes of the repulsive and the attractive part, and αr ε more from rounding
-/// the exponent.
+/// Errors: a few ε of the sum of the magnitudes of repulsion and attraction, plus αr ε from rounding the exponent.
 class Morse {
  public:
   Morse(double depth, double alpha, double r0) : depth_(depth), alpha_(alpha), r0_(r0) {}
@@ -41,13 +40,13 @@ class Morse {
   T quotient(T rho_old, T rho_new) const {
     const T lower = elementary::min(rho_old, rho_new), upper = elementary::max(rho_old, rho_new);
     const T r = elementary::sqrt(lower), sum = r + elementary::sqrt(upper);
-    const T x = alpha_ * ((upper - lower) / sum);  // α(s − r) without its cancellation
+    const T x = alpha_ * ((upper - lower) / sum);  // α(s − r) without cancellation
     const T u = decay(r), fall = elementary::expm1(-x);
     const T mean = x > 0 ? -fall / x : all<T>(1);
     return -depth_ * alpha_ * u * mean * (2 * (u - 1) + u * fall) / sum;
   }
-  /// ∫_r^∞ V r^(D−1) dr, from that of e^(−kr): e^(−kr) (r²/k + 2r/k² + 2/k³) or, in two dimensions, e^(−kr) (r/k +
-  /// 1/k²)
+  /// ∫_r^∞ V r^(D−1) dr, using ∫_r^∞ e^(−kr) r^(D−1) dr = e^(−kr) (r²/k + 2r/k² + 2/k³), in two dimensions e^(−kr) (r/k
+  /// + 1/k²)
   double tail(double r, int dimension) const {
     const double u = decay(r);
     const auto integral = [&](double k) {
@@ -63,7 +62,7 @@ class Morse {
     return elementary::exp(-alpha_ * (r - r0_));
   }
 
-  double depth_;  ///< D, of the well [energy]
+  double depth_;  ///< D, the depth of the well [energy]
   double alpha_;  ///< [1/length]
   double r0_;     ///< [length]
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What the types of interaction have in common in a deck: shared parameters, and how they are read.
+// Parameters shared by many types of interaction, and how they are read.
 //
-// All functions throw Error(Failure::deck); its message begins with the type's name and says what to do.
+// All functions throw Error(Failure::deck); the message begins with the type's name and says what to do.
 
 #include <memory>
 #include <string>
@@ -18,21 +18,21 @@
 
 namespace carom::options {
 
-/// `own` followed by those that say between which particles a term acts.
+/// `own`, followed by the parameters that select pairs.
 std::vector<Parameter> with_filter(std::vector<Parameter> own);
 
-/// The same, followed by cutoff, cut and switch_from.
+/// with_filter(), followed by cutoff, cut and switch_from.
 std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view absent_cutoff);
 
-/// The same, followed by tail: what a potential without an end of its own can be given.
+/// with_cut(), followed by tail: for potentials of infinite range.
 std::vector<Parameter> with_pair_options(std::vector<Parameter> own);
 
 [[noreturn]] void refuse(std::string_view type, const std::string& problem);
 
-/// The two species `species` names, as indices into `known`.
+/// The two species in `species`, as indices into `known`.
 SpeciesPair species_pair(std::string_view type, const Parameters& parameters, const std::vector<std::string>& known);
 
-/// What `cutoff`, `cut` and `switch_from` say; it ends at `end` where there is no `cutoff`.
+/// The values of `cutoff`, `cut` and `switch_from`; without `cutoff` the potential ends at `end`.
 struct CutOptions {
   double cutoff;
   CutKind kind;
@@ -40,13 +40,13 @@ struct CutOptions {
 };
 CutOptions cut_options(std::string_view type, const Parameters& parameters, double end = 0);
 
-/// Refuses what is said of the end of a potential without `cutoff`.
+/// Refuses parameters of the cutoff if there is no `cutoff`.
 void refuse_cut_options(std::string_view type, const Parameters& parameters);
 
-/// The bonds that `pairs` or `chain` describe among so many particles, i < j, ascending; none for `within`.
+/// The bonds that `pairs` or `chain` describe among this many particles, i < j, ascending; none for `within`.
 PairList bonds(std::string_view type, const Parameters& parameters, std::size_t particles);
 
-/// The bonds that `pairs`, `chain` or `within` describe, by ids, i < j, ascending: all there are, on each rank.
+/// The bonds that `pairs`, `chain` or `within` describe, by ids, i < j, ascending: the whole list on each rank.
 template <int D>
 PairList bonds(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
   PairList list = bonds(type, parameters, context.total);
@@ -57,7 +57,7 @@ PairList bonds(std::string_view type, const Parameters& parameters, const Intera
     for (const auto& [i, j, image] : near.cover(p.x)) {
       if (!p.owns(i) || !((p.x[i] - p.x[j] + context.box.shift(image)).norm() <= distance)) continue;
       const PairList::value_type bond{p.id_of(i), p.id_of(j)};
-      if (list.empty() || list.back() != bond) list.push_back(bond);  // not through another image
+      if (list.empty() || list.back() != bond) list.push_back(bond);  // not again for another image
     }
   };
   if (context.ranks) {
@@ -81,7 +81,7 @@ Vec<D> vector(std::string_view type, const Parameters& parameters, std::string_v
   return Eigen::Map<const Vec<D>>(given.data());
 }
 
-/// What `species` and `exclude` say.
+/// The filter from `species` and `exclude`.
 template <int D>
 PairFilter filter(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
   const SpeciesPair species = species_pair(type, parameters, context.species);
@@ -95,13 +95,13 @@ PairFilter filter(std::string_view type, const Parameters& parameters, const Int
   return filter;
 }
 
-/// The least contact distance of the pairs between which a term acts [length]; 0 where there are none. Collective.
+/// The smallest contact distance of the pairs on which a term acts [length]; 0 if there are none. Collective.
 template <int D>
 double least_contact(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const SpeciesPair species = species_pair(type, parameters, context.species);
   const auto& radius = context.particles.radius;
-  std::array<double, 2> least = {-kNone, -kNone};  // radius of either species, negative
+  std::array<double, 2> least = {-kNone, -kNone};  // negative radius, for either species
   for (Id i = 0; i < radius.size(); ++i)
     for (std::size_t k = 0; k < 2; ++k)
       if (!species || context.particles.species[i] == (*species)[k]) least[k] = std::max(least[k], -radius[i]);
@@ -110,7 +110,7 @@ double least_contact(std::string_view type, const Parameters& parameters, const 
   return contact < kNone ? contact : 0;
 }
 
-/// A term over the pairs of a source, with the scale of the potential before it was cut.
+/// A term over pairs from this source; its scale is that of `whole`, the potential before it was cut.
 template <int D, Potential P, class Pairs>
 std::unique_ptr<Interaction<D>> term(P potential, PairWeight weight, const InteractionContext<D>& context, Pairs pairs,
                                      const auto& whole, Tail tail = {}) {
@@ -118,7 +118,8 @@ std::unique_ptr<Interaction<D>> term(P potential, PairWeight weight, const Inter
   return std::make_unique<PairTerm<D, P, Pairs>>(context.particles, potential, weight, std::move(pairs), scale, tail);
 }
 
-/// A term over all pairs; `remedy` says what to write instead in a periodic box, where there is no such sum.
+/// A term over all pairs. Periodic boxes, where the sum does not exist, are refused; `remedy` says what to write
+/// instead.
 template <int D, Potential P>
 std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, PairWeight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context,
@@ -129,7 +130,7 @@ std::unique_ptr<Interaction<D>> all_pairs(std::string_view type, P potential, Pa
   return term<D>(potential, weight, context, AllPairs<D>(context.box, context.total, std::move(pairs_of)), potential);
 }
 
-/// A term over the pairs within the reach of a potential that ends by itself, or of `whole` that was cut.
+/// A term over the pairs within the range of a potential of finite range, or of `whole` after it was cut.
 template <int D, ShortRanged P>
 std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential, PairWeight weight,
                                              const Parameters& parameters, const InteractionContext<D>& context,
@@ -140,7 +141,7 @@ std::unique_ptr<Interaction<D>> within_reach(std::string_view type, P potential,
 }
 
 /// The long-range correction of a term over all particles on all ranks.
-template <int D, KnowsTail P>
+template <int D, HasTail P>
 Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, PairWeight weight, const Parameters& parameters,
           const InteractionContext<D>& context) {
   if (kind == CutKind::force_shifted)
@@ -152,7 +153,7 @@ Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, PairWeight wei
     refuse(type, "the long-range correction diverges: V falls off too slowly; leave 'tail' out");
   const SpeciesPair species = species_pair(type, parameters, context.species);
   struct Sums {
-    std::array<ExactSum, 2> weight;  // of either species
+    std::array<ExactSum, 2> weight;  // sum of weights for either species
     void add(const Sums& other) {
       for (int k = 0; k < 2; ++k) weight[k].add(other.weight[k]);
     }
@@ -167,20 +168,20 @@ Tail tail(std::string_view type, const Cut<P>& cut, CutKind kind, PairWeight wei
   return tail_correction<D>(cut, alike ? pairs / 2 : pairs, context.box.volume());
 }
 
-/// A term cut as said, with its long-range correction if the deck wants it.
+/// A term cut as `options` say, with its long-range correction if requested.
 template <int D, Potential P>
 std::unique_ptr<Interaction<D>> cut_term(std::string_view type, P potential, PairWeight weight,
                                          const CutOptions& options, const Parameters& parameters,
                                          const InteractionContext<D>& context) {
   const Cut<P> cut(potential, options.cutoff, options.kind, options.switch_from);
   Tail correction;
-  if constexpr (KnowsTail<P>)
+  if constexpr (HasTail<P>)
     if (parameters.has("tail") && parameters.flag("tail"))
       correction = tail<D>(type, cut, options.kind, weight, parameters, context);
   return within_reach<D>(type, cut, weight, parameters, context, potential, correction);
 }
 
-/// A term cut as `cutoff` and `cut` say; over all pairs if `cutoff` is absent.
+/// A term cut as `cutoff` and `cut` say, or over all pairs without `cutoff`.
 template <int D, Potential P>
 std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, PairWeight weight,
                                           const Parameters& parameters, const InteractionContext<D>& context) {

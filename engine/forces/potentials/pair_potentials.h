@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The potentials that pair kernels are made for in every vector width: a new one takes a line here.
+// The potentials for which kernels are compiled in every vector width; add a line here for a new one.
 
 #include <cstddef>
 #include <type_traits>
@@ -33,7 +33,7 @@ using PairPotentials = PotentialList<HarmonicBond,                     // bonds
                                      InversePower, Cut<InversePower>,  //
                                      Cut<Table>>;
 
-/// Where in the list a potential stands; its length where it does not.
+/// The index of a potential in the list, or the list's length if it is not there.
 template <class P, class... Listed>
 constexpr std::size_t place_of(PotentialList<Listed...>) {
   std::size_t place = 0;

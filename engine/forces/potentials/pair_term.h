@@ -3,8 +3,8 @@
 // The loop over pairs, written once for all pair potentials.
 //
 //   V = Σ_{i<j} w_ij U(ρ_ij),   ρ_ij = d·d,   d = x_i − x_j (+ the image's shift)
-//   force on i, minus that on j:   −2 w U′ d;    mean force: −w Q(ρ, ρ′) (d + d′)
-//   Hessian product, on i, minus that on j:   w [2 U′ u + 4 U″ (d·u) d],   u = w_i − w_j
+//   force on i, and its negative on j:   −2 w U′ d;    mean force: −w Q(ρ, ρ′) (d + d′)
+//   Hessian product on i, and its negative on j:   w [2 U′ u + 4 U″ (d·u) d],   u = w_i − w_j
 //
 // Q is the divided difference of U; since ρ′ − ρ = (d + d′)·(d′ − d), the mean forces are a discrete gradient.
 
@@ -31,7 +31,7 @@ const std::vector<double>* pair_factors(PairWeight weight, const Particles<D>& p
 template <int D, Potential P, class Pairs>
 class PairTerm final : public Interaction<D> {
  public:
-  /// `particles` tells which are ghosts, and outlives the term. `scale`: of pairs of weight 1, at a given distance.
+  /// `particles` marks ghosts and must outlive the term. `scale`: for pairs of weight 1 at a given distance.
   PairTerm(const Particles<D>& particles, P potential, PairWeight weight, Pairs pairs,
            std::function<ForceScale(double)> scale, Tail tail = {})
       : particles_(particles),
@@ -97,7 +97,7 @@ class PairTerm final : public Interaction<D> {
   }
 
  private:
-  /// From the kernels where the potential is listed; else two lanes wide, compiled here.
+  /// The formula from the kernels if the potential is listed; else compiled here, two lanes wide.
   const PairFormula& formula() const {
     constexpr std::size_t place = place_of<P>(PairPotentials{});
     if constexpr (place < PairPotentials::kLength) {
@@ -119,7 +119,7 @@ class PairTerm final : public Interaction<D> {
     return given;
   }
 
-  /// How many pairs of the batch are this rank's: each pair is that of the rank that owns its lower particle.
+  /// The number of this rank's pairs in the batch: a pair is counted by the owner of its lower particle.
   std::uint64_t owned(bool shared) const {
     if (!shared) return batch_->n;
     std::uint64_t own = 0;
@@ -129,17 +129,17 @@ class PairTerm final : public Interaction<D> {
     return own;
   }
 
-  /// The loop over pairs. Returns how many are this rank's, for mean forces.
+  /// The loop over pairs. For mean forces, returns the number of this rank's pairs.
   std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1) const {
     const PairFormula& formula = this->formula();
     const auto& function = sums                     ? formula.forces_and_sums
                            : !given.vectors.empty() ? formula.hessian_product
                            : given.x_new.empty()    ? formula.forces
                                                     : formula.mean_forces;
-    constexpr double kNoLimit = std::numeric_limits<double>::infinity();  // of forces that are not asked for
+    constexpr double kNoLimit = std::numeric_limits<double>::infinity();  // used without forces
     PairUnits units{.limits = {kNoLimit, kNoLimit}};
     if (sums) units.per_energy = 1 / sums->quantum;
-    PairTotals totals[2];  // of own pairs, and of those shared with another rank
+    PairTotals totals[2];  // for pairs of own particles, and pairs shared with another rank
     std::uint64_t own = 0;
     ForceWords* low = nullptr;
     pairs_.batches(step(given), particles_, cutoff_squared(), *batch_, [&](bool shared) {
@@ -158,9 +158,9 @@ class PairTerm final : public Interaction<D> {
       }
       if (!given.x_new.empty()) own += owned(shared);
     });
-    if (low) pairs_.pass_on(*forces);
+    if (low) pairs_.flush_to(*forces);
     if (!sums) return own;
-    // A shared pair counts half here and half there.
+    // A shared pair counts half on each rank.
     const auto add = [&](ExactSum& sum, PairTotals::Whole PairTotals::*part, double quanta) {
       sum.add(2 * totals[0].*part + totals[1].*part, 0.5 * quanta * sums->quantum);
     };
@@ -170,7 +170,7 @@ class PairTerm final : public Interaction<D> {
     return own;
   }
 
-  /// Names the pair of the batch with the largest force, or one that is NaN.
+  /// Names the pair of the batch with the largest force, or one with a NaN force.
   [[noreturn]] void refuse() const {
     unsigned worst = 0;
     double largest = -1, apart = 0;

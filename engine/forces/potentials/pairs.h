@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Which pairs a term of V is summed over: a list of bonds, all pairs, or the pairs within a cutoff.
+// Sources of pairs for the sum of a term of V: a list of bonds, all pairs, or the pairs within a cutoff.
 //
-// Each source offers
-//   batches(step, particles, cutoff², batch, visit)   fills the batch again and again and calls visit(shared), shared:
-//                               of each pair another rank owns one particle; pairs of two ghosts are left out
-//   id(place)                   the particle that a batch means
-//   low(sums), high(sums)       words to which the forces of a batch are added; pass_on(sums) comes last
-//   most_partners()             of any particle in these batches, or more
-//   use(kernels)                instead of pair_kernels()
+// Each source has
+//   batches(step, particles, cutoff², batch, visit)   fills the batch repeatedly and calls visit(shared); shared:
+//                               another rank owns one particle of each pair; pairs of two ghosts are omitted
+//   id(place)                   the particle with this number in a batch
+//   low(sums), high(sums)       words to which the forces of a batch are added; flush_to(sums) comes last
+//   most_partners()             upper bound for any particle in these batches
+//   use(kernels)                replaces pair_kernels()
 // and
-//   reach(x), reach(block, ranks)           how far apart partners are at most; infinite: no end
-//   among(some)                             itself for some of the particles, if they are enough
+//   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
+//   among(some)                             the source for a subset of the particles, or nothing if partners are
+//   missing
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +30,7 @@
 
 namespace carom {
 
-/// Fills the batch from a list, for each of the parts of the list.
+/// Fills the batch from each part of a list in turn.
 template <int D, class Visit>
 void collect_batches(PairRecords<D>& records, const Box<D>& box, const PairStep<D>& step, double cutoff_squared,
                      const PairKernels& kernels, PairBatch& batch, Visit&& visit) {
@@ -40,8 +41,8 @@ void collect_batches(PairRecords<D>& records, const Box<D>& box, const PairStep<
   }
 }
 
-/// Bonds, given with i < j in ascending order. A bond spans the image that is nearest at x; one that grows to nearly
-/// half an edge of a periodic box, where another image becomes the nearest, throws Error(Failure::numerical).
+/// Bonds, given with i < j in ascending order. A bond uses the nearest image at x. A bond of nearly half an edge of a
+/// periodic box, beyond which another image is the nearest, throws Error(Failure::numerical).
 template <int D>
 class Bonds {
  public:
@@ -78,7 +79,7 @@ class Bonds {
   double reach(const Particles<D>& block, Communicator& ranks) const {
     const Id first = block.size() > 0 ? block.id_of(0) : 0;
     const auto here = [&](Id id) { return id >= first && id - first < block.size(); };
-    std::vector<std::pair<Id, Vec<D>>> higher;  // partners of bonds, where another rank has the lower one
+    std::vector<std::pair<Id, Vec<D>>> higher;  // upper partners of bonds, if the lower one is on another rank
     for (const auto& [i, j] : pairs_)
       if (!here(i) && here(j)) higher.emplace_back(j, block.x[j - first]);
     std::unordered_map<Id, Vec<D>> elsewhere;
@@ -126,18 +127,18 @@ class Bonds {
   Id id(std::uint32_t place) const { return place; }
   ForceWords* low(ForceSums<D>& sums) const { return sums.low(); }
   ForceWords* high(ForceSums<D>& sums) const { return sums.high(); }
-  void pass_on(ForceSums<D>&) const {}
+  void flush_to(ForceSums<D>&) const {}
   std::size_t most_partners() const { return most_partners_; }
   void use(const PairKernels&) {}
 
  private:
-  /// Of the image in which the bond is at x.
+  /// The shift of the image in which the bond is at x.
   Vec<D> shift_of(Id i, Id j, Positions<D> x) const {
     const Vec<D> straight = x[i] - x[j];
-    if ((straight.array().abs() <= kLongest * box_.edges.array()).all()) return Vec<D>::Zero();
+    if ((straight.array().abs() <= kMaxBondLength * box_.edges.array()).all()) return Vec<D>::Zero();
     Vec<D> shift = box_.shift(box_.nearest_image(straight));
     for (int k = 0; k < D; ++k)
-      if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > kLongest * box_.edges[k])
+      if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > kMaxBondLength * box_.edges[k])
         throw Error(Failure::numerical, "the bond of particles " + std::to_string(ids_.empty() ? i : ids_[i]) +
                                             " and " + std::to_string(ids_.empty() ? j : ids_[j]) +
                                             " spans nearly half the periodic box along axis " + std::to_string(k) +
@@ -145,17 +146,17 @@ class Bonds {
     return shift;
   }
 
-  static constexpr double kLongest = 0.48;  // of a bond along a periodic axis [edge]
+  static constexpr double kMaxBondLength = 0.48;  // longest bond along a periodic axis [edge]
 
   const Box<D>& box_;
   PairList pairs_;
-  mutable PairList shared_;  // with other ranks, in batches()
-  std::span<const Id> ids_;  // that all ranks know; empty: those of pairs_
+  mutable PairList shared_;  // bonds shared with other ranks, set by batches()
+  std::span<const Id> ids_;  // the particles' global ids; empty: pairs_ has them
   std::size_t most_partners_ = 0;
 };
 
-/// All pairs of `particles` particles, in a box without periodic axes. They are not stored: partners of one stand one
-/// after the other, sorted by species where these matter and by whether they are owned.
+/// All pairs of `particles` particles in a box without periodic axes. They are not stored: the partners of a particle
+/// are consecutive, sorted by species if necessary and by ownership.
 template <int D>
 class AllPairs {
  public:
@@ -180,7 +181,7 @@ class AllPairs {
   Id id(std::uint32_t place) const { return records_.order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_.low(); }
   ForceWords* high(ForceSums<D>&) const { return records_.high(); }
-  void pass_on(ForceSums<D>& sums) const { records_.pass_on(sums); }
+  void flush_to(ForceSums<D>& sums) const { records_.flush_to(sums); }
   std::size_t most_partners() const { return particles_; }
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
 
@@ -188,7 +189,7 @@ class AllPairs {
   void arrange(const Particles<D>& particles) const {
     ghost_ = particles.ghost;
     records_.clear();
-    std::vector<std::uint32_t> end;  // of each group: by species and, within that, owned and not
+    std::vector<std::uint32_t> end;  // ends of groups: by species, then own particles before ghosts
     const bool apart = !filter_.species.all() && filter_.species.a != filter_.species.b;
     for (const std::uint64_t code : {PartnerSearch::kFirst, PartnerSearch::kSecond})
       for (const bool owned : {true, false}) {
@@ -224,12 +225,11 @@ class AllPairs {
   std::size_t particles_;
   PairFilter filter_;
   const PairKernels* kernels_ = &pair_kernels();
-  // Caches: their state never shows in the sums.
+  // Caches, which do not affect the sums.
   mutable PairRecords<D> records_;
   mutable std::vector<char> ghost_;
 };
 
-/// The pairs within a cutoff.
 template <int D>
 class PairsWithinCutoff {
  public:
@@ -251,7 +251,7 @@ class PairsWithinCutoff {
   Id id(std::uint32_t place) const { return records_->order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_->low(); }
   ForceWords* high(ForceSums<D>&) const { return records_->high(); }
-  void pass_on(ForceSums<D>& sums) const { records_->pass_on(sums); }
+  void flush_to(ForceSums<D>& sums) const { records_->flush_to(sums); }
   std::size_t most_partners() const { return records_->most_partners; }
   void use(const PairKernels& kernels) {
     kernels_ = &kernels;
@@ -263,7 +263,7 @@ class PairsWithinCutoff {
   double cutoff_;
   PairFilter filter_;
   const PairKernels* kernels_ = &pair_kernels();
-  // Caches: their state never shows in the sums.
+  // Caches, which do not affect the sums.
   mutable CutoffList<D> list_;
   mutable PairRecords<D>* records_ = nullptr;
 };

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What a pair potential is: four functions of ρ = r², the square of the distance.
+// The concept of a pair potential: four functions of ρ = r², the squared distance.
 //
 //   value(ρ)              V                              [energy]
 //   derivative(ρ)         dV/dρ                          [energy/length²]; the force on i is −2 V′ d, d = x_i − x_j
 //   second_derivative(ρ)  d²V/dρ²                        [energy/length⁴]
-//   quotient(b, a)        (V(a) − V(b))/(a − b)          [energy/length²], b before, a after; V′ where they coincide
+//   quotient(b, a)        (V(a) − V(b))/(a − b)          [energy/length²], b before, a after; V′ if they coincide
 //
-// In ρ no square root is needed where the formula has none, and the discrete gradient of a pair is the quotient times
-// d + d′ (LaBudde, Greenspan, J. Comput. Phys. 15 (1974) 134). The quotient is always in closed form: never a
-// difference of values divided by a small a − b, and the same bits whichever of the two comes first.
+// As functions of ρ, many potentials need no square root, and the discrete gradient of a pair is the quotient times d +
+// d′ (LaBudde, Greenspan, J. Comput. Phys. 15 (1974) 134). The quotient must be in closed form, never a difference of
+// values divided by a small a − b, and symmetric in its arguments bit for bit.
 //
-// and, for what is rounded in sums of forces (force_sums.h),
-//   scale(distance)       the force and energy of a pair that is typical, or less, where particles are so far apart
+// A potential also has, for the rounding of force sums (force_sums.h),
+//   scale(distance)       force and energy of a typical pair, or less, at this mean distance of particles
 //
-// The four are templates over T, a double or a vector of doubles (lanes.h), so that the loops over pairs work on
-// several pairs at once: choices are written with ?:, never with if, and sqrt, exp, … are those of elementary.h. Each
-// potential stands in a file of its own, small enough to be read whole; loops over pairs are in pair_term.h.
+// The four functions are templates over T, a double or a vector of doubles (lanes.h), so that the loops over pairs
+// evaluate several pairs at once: conditions are written with ?:, never with if, and sqrt, exp, … are those of
+// elementary.h. Each potential has a short file of its own; pair_term.h has the loops over pairs.
 
 #include <concepts>
 
@@ -33,7 +33,7 @@ concept Potential = requires(const P potential, double rho) {
   { potential.quotient(rho, rho) } -> std::same_as<double>;
 };
 
-/// A potential that is zero, with all four functions, from `cutoff_squared()` outwards.
+/// A potential with all four functions zero beyond `cutoff_squared()`.
 template <class P>
 concept ShortRanged = Potential<P> && requires(const P potential) {
   { potential.cutoff_squared() } -> std::same_as<double>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Every type of interaction there is, in the order of the manual: one line each.
+// All types of interaction, in the order of the manual, one line each.
 
 #include "engine/base/interaction.h"
 #include "engine/forces/potentials/types.h"
@@ -8,15 +8,15 @@ namespace carom {
 
 const std::vector<InteractionInfo>& interactions() {
   static const std::vector<InteractionInfo> all = {
-      types::harmonic_bond(),  // springs between given pairs
+      types::harmonic_bond(),  // springs between bonded pairs
       types::gravity(),        // all pairs
       types::coulomb(),        // all pairs, or damped and cut
       types::yukawa(),         // screened charges
-      types::lennard_jones(),  // van der Waals
-      types::wca(),            // its repulsive part
+      types::lennard_jones(),  // van der Waals forces
+      types::wca(),            // the repulsive part of Lennard-Jones
       types::morse(),          // a well of any width
       types::inverse_power(),  // soft spheres
-      types::table(),          // any pair potential, from points
+      types::table(),          // any pair potential, from tabulated points
       types::uniform_field(),  // weight
       types::harmonic_trap(),  // a spring to one point
   };

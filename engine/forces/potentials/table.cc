@@ -15,8 +15,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMostCells = 65536;
 
-/// The spline's slopes at its knots: continuity of V″ in between, and at either end a given slope or V″ = 0. The matrix
-/// has three diagonals and is diagonally dominant.
+/// The spline's slopes at its knots, from the continuity of V″ inside and a given slope or V″ = 0 at either end. The
+/// matrix is tridiagonal and diagonally dominant.
 std::vector<double> knot_slopes(const std::vector<double>& rho, std::span<const double> v,
                                 std::span<const double> end_slopes) {
   const std::size_t n = rho.size();
@@ -75,7 +75,7 @@ Table::Table(std::span<const double> r, std::span<const double> values, std::spa
   data_ = std::move(data);
 }
 
-/// That at the distance, in the table; 2^-16 of the largest at a point, where this is more.
+/// The scale at this distance within the table, but at least 2^-16 of the largest one at the points.
 ForceScale Table::scale(double distance) const {
   const auto size = [&](double rho) -> ForceScale {
     return {2 * std::sqrt(rho) * std::abs(derivative(rho)), std::abs(value(rho))};

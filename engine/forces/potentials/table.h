@@ -10,21 +10,21 @@
 
 namespace carom {
 
-/// A potential given at points r_0 < r_1 < … < r_n: the cubic spline in ρ through them, C².
+/// A potential given at points r_0 < r_1 < … < r_n: the C² cubic spline in ρ through them.
 ///
-///   V(ρ) = c0 + x (c1 + x (c2 + x c3)),   x = ρ − r_k² in the piece from r_k² to r_(k+1)²
+///   V(ρ) = c0 + x (c1 + x (c2 + x c3)),   x = ρ − r_k² for ρ from r_k² to r_(k+1)²
 ///   within a piece: (V(a) − V(b))/(a − b) = c1 + c2 (x + y) + c3 (x² + x y + y²)
-///   from a piece to a later one: the sum of what is left of the first, of what comes before the second in the last,
-///   and of the difference of the two points between, over a − b
+///   across pieces: the sum of V(end of the first piece) − V(b), V(a) − V(start of the last piece) and the difference
+///   between these two knots, over a − b
 ///
-/// At its ends the spline has the given slopes, or no second derivative (natural). Below r_0 it goes on as the parabola
-/// with its slope and second derivative there; beyond r_n as the constant V(r_n), where a cutoff ends it in time.
+/// At its ends the spline has the given slopes, or zero second derivative (natural). Below r_0 it continues as the
+/// parabola with the same slope and second derivative, beyond r_n as the constant V(r_n); the cutoff is at most r_n.
 ///
-/// Errors: a few ε of the largest |c0|, |x c1|, … of the piece; across pieces 4 ε (|V(a)| + |V(b)|)/|a − b| at most.
+/// Errors: a few ε of the largest |c0|, |x c1|, … of the piece; across pieces at most 4 ε (|V(a)| + |V(b)|)/|a − b|.
 /// Source: de Boor, A Practical Guide to Splines, 1978, chapter IV.
 class Table {
  public:
-  /// `r` ascending and positive, at least two; V there; dV/dr at the first and the last point, or empty.
+  /// `r`: ascending and positive, at least two; `values`: V; `slopes`: dV/dr at the first and the last point, or empty.
   Table(std::span<const double> r, std::span<const double> values, std::span<const double> slopes);
 
   ForceScale scale(double distance) const;
@@ -55,16 +55,16 @@ class Table {
 
  private:
   struct Piece {
-    double start;  ///< ρ from which it holds; the first: all below the first point
-    double base;   ///< ρ of x = 0
+    double start;  ///< lowest ρ of the piece; the first one extends below the table
+    double base;   ///< ρ at x = 0
     double c0, c1, c2, c3;
     [[gnu::always_inline]] double quotient(double x, double y) const {
       return c1 + (c2 * (x + y) + c3 * (x * x + x * y + y * y));
     }
   };
 
-  /// The piece that a point lies in, found from that at the start of its cell; cells are no wider than any piece,
-  /// unless that were too many.
+  /// The piece that contains ρ, found from the piece at the start of its cell. Cells are no wider than any piece,
+  /// unless there would be too many cells.
   [[gnu::always_inline]] const Piece& piece(double rho) const {
     const double cell = (rho - first_) * inverse_cell_;
     const Piece* p = pieces_ + cells_[static_cast<std::size_t>(cell > 0 ? (cell < last_cell_ ? cell : last_cell_) : 0)];
@@ -96,11 +96,11 @@ class Table {
   }
 
   struct Data {
-    std::vector<Piece> pieces;  ///< below the table, its pieces, beyond it, and one that never begins
+    std::vector<Piece> pieces;  ///< below the table, its pieces, beyond it, and a sentinel that never starts
     std::vector<std::uint32_t> cells;
   };
   std::shared_ptr<const Data> data_;
-  const Piece* pieces_;         ///< data_'s; kernels call no functions of the library (lanes.h)
+  const Piece* pieces_;         ///< points into data_; kernels cannot call library functions (lanes.h)
   const std::uint32_t* cells_;  ///< the piece at the start of each cell
   double first_, last_, inverse_cell_, last_cell_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The declarations of all types of interaction. Each is defined in the file of its name; registry.cc lists them.
+// Declarations of all types of interaction. Each is defined in the file with its name; registry.cc lists them.
 
 #include "engine/base/interaction.h"
 

@@ -6,7 +6,7 @@
 namespace carom::types {
 namespace {
 
-/// V_i = −m_i g·x: all particles fall with the acceleration g.
+/// V_i = −m_i g·x: every particle has the acceleration g.
 template <int D>
 class UniformField {
  public:

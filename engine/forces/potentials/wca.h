@@ -10,8 +10,8 @@ namespace carom {
 ///
 ///   V(r) = 4ε [(σ/r)¹² − (σ/r)⁶] + ε = ε (2u − 1)²,   u = (σ²/ρ)³;   0 beyond ρ_c
 ///
-/// Derivatives and quotient inside are those of Lennard-Jones. Only V′ is continuous at ρ_c, V″ jumps. The square keeps
-/// V's digits there. Errors: as Lennard-Jones.
+/// For ρ < ρ_c derivatives and quotient equal the ones of Lennard-Jones. At ρ_c V′ is continuous and V″ jumps; the
+/// square keeps the digits of V there. Errors: as for Lennard-Jones.
 class Wca {
  public:
   Wca(double epsilon, double sigma)

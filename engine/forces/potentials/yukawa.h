@@ -14,12 +14,13 @@ namespace carom {
 ///   V(r) = A e^(−κr)/r
 ///   V′ = −V (1 + κr)/(2ρ),   V″ = V (3 + 3κr + κ²ρ)/(4ρ²)
 ///   (V(a) − V(b))/(a − b) = −A e^(−κm) (cosh y + κm sinh(y)/y)/(r s (r + s)),   m = ½(r + s), y = ½κ(s − r),
-///   r = √b, s = √a; where |y| ≥ ½: e^(−κr) (1 + κr φ(2|y|)) for the product, φ(x) = (1 − e^(−x))/x, r the smaller
+///   r = √b, s = √a; for |y| ≥ ½ the product is e^(−κr) (1 + κr φ(2|y|)), φ(x) = (1 − e^(−x))/x, r the smaller
 ///
-/// Errors: a few ulp, and κr ulp more from rounding the exponent.
+/// Errors: a few ulp, plus κr ulp from rounding the exponent.
 class Yukawa {
  public:
-  /// `contact` [length]: no pair is nearer. Only scale() needs it: V(1/κ) says nothing of cores that are wider.
+  /// `contact`: a lower bound of the distance of pairs [length], used by scale(): with wide cores V(1/κ) is not
+  /// typical.
   Yukawa(double amplitude, double kappa, double contact = 0)
       : amplitude_(amplitude), kappa_(kappa), contact_(contact) {}
 
@@ -27,7 +28,7 @@ class Yukawa {
     const auto size = [&](double r) { return 0x1p-2 * std::abs(value(r * r)); };
     const double near = std::max(contact_, std::min(distance, 1 / kappa_));
     double energy = size(near);
-    // Without cores that touch: where it is far weaker at the usual distances, pairs hardly come so near.
+    // Without a contact distance: if V is much weaker at typical distances, pairs rarely come so close.
     if (near > contact_) energy = std::clamp(0x1p4 * size(distance), 0x1p-16 * energy, energy);
     return {energy / near, energy};
   }
@@ -50,7 +51,7 @@ class Yukawa {
   T quotient(T rho_old, T rho_new) const {
     const T r = elementary::sqrt(rho_old), s = elementary::sqrt(rho_new), sum = r + s;
     const T m = 0.5 * kappa_ * sum;
-    const T y = 0.5 * kappa_ * (elementary::abs(rho_new - rho_old) / sum);  // κ(s − r)/2 without its cancellation
+    const T y = 0.5 * kappa_ * (elementary::abs(rho_new - rho_old) / sum);  // κ(s − r)/2 without cancellation
     const T z = y * y;
     const T cosh =
         1 + z * (1.0 / 2 +

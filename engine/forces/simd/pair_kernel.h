@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The kernels of pair_kernels.h, written once for any number of lanes. Included by pair_kernels_*.cc only, which are
-// compiled for different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so
-// that no function compiled for one machine can end up in another's binary.
+// The kernels of pair_kernels.h, written once for any number of lanes. Only pair_kernels_*.cc include it, which are
+// compiled for different instruction sets. Everything here has internal linkage and uses only raw pointers, so that the
+// linker cannot use a function compiled for another instruction set.
 
 #include "engine/forces/pair_formulas.h"
 #include "engine/forces/potentials/pair_potentials.h"
@@ -14,7 +14,7 @@ struct Fields {
   V x, y, z, w;
 };
 
-/// The fields of W records that stand at `at(lane)`.
+/// The fields of the W records at the addresses `at(lane)`.
 template <class V>
 CAROM_INLINE Fields<V> transposed(const auto& at) {
   if constexpr (sizeof(V) == 16) {
@@ -43,7 +43,7 @@ CAROM_INLINE Fields<V> transposed(const auto& at) {
   }
 }
 
-/// For each mask of four lanes the halves of those that are in it, first things first.
+/// For each mask of four lanes, the 32-bit halves of the selected lanes, packed to the front.
 struct Compression {
   alignas(32) std::uint32_t half[16][8];
   alignas(16) std::uint32_t lane[16][4];
@@ -60,7 +60,7 @@ struct Compression {
 };
 constexpr Compression kCompression;
 
-/// Stores the lanes in a mask one after another; may write up to W numbers.
+/// Stores the selected lanes consecutively; may write up to W numbers.
 template <class V>
 CAROM_INLINE void compress(double* to, unsigned mask, V x) {
 #if defined(__AVX512F__)
@@ -101,13 +101,13 @@ CAROM_INLINE unsigned bits_in(unsigned mask) {
   if constexpr (W == 2)
     return (mask & 1) + (mask >> 1);
   else
-    return static_cast<unsigned>(__builtin_popcount(mask));  // all machines with so wide vectors have an instruction
+    return static_cast<unsigned>(__builtin_popcount(mask));  // an instruction wherever vectors are this wide
 }
 
-/// What a batch has beside separations: nothing, new ones, or differences of vectors.
-enum class Beside { nothing, step, vectors };
+/// What a batch contains besides separations: nothing, new separations, or differences of vectors.
+enum class Extra { nothing, step, vectors };
 
-template <int W, Beside beside, bool moving, bool weighted>
+template <int W, Extra extra, bool moving, bool weighted>
 bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   using V = typename Width<W>::Double;
   batch.clear();
@@ -117,7 +117,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   for (; cursor.run < rows.runs; ++cursor.run, cursor.at = 0) {
     const PairRun& run = rows.run[cursor.run];
     const std::uint32_t* const partner = rows.partner + run.begin;
-    const PairRecord &own = rows.x[run.row], &own_new = beside == Beside::nothing ? own : rows.x_new[run.row];
+    const PairRecord &own = rows.x[run.row], &own_new = extra == Extra::nothing ? own : rows.x_new[run.row];
     const V x = all<V>(own.x), y = all<V>(own.y), z = all<V>(own.z), w = all<V>(own.w);
     const V x_new = all<V>(own_new.x), y_new = all<V>(own_new.y), z_new = all<V>(own_new.z);
     V image[3], shift[3];
@@ -129,11 +129,11 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
     batch.n = n;
     batch.begin_row(run.row);
     const std::uint32_t count = run.count;
-    std::uint32_t at = cursor.at, end = at;  // there is room for the partners before `end`
+    std::uint32_t at = cursor.at, end = at;  // the batch has room for the partners before `end`
     unsigned mask = 0;
     for (;; at += W) {
       if (at >= end) {
-        n -= bits_in<W>(mask >> (W - (at - end)));  // partners of the next row
+        n -= bits_in<W>(mask >> (W - (at - end)));  // lanes beyond `end` belong to the next row
         const std::uint32_t most = (PairBatch::kCapacity - n) / W * W;
         if (at >= count || most == 0) break;
         end = count - at < most ? count : at + most;
@@ -150,10 +150,10 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       const V rho = dx * dx + dy * dy + dz * dz;
       mask = less(rho, cutoff);
       V ex, ey, ez;
-      if constexpr (beside != Beside::nothing) {
+      if constexpr (extra != Extra::nothing) {
         const auto after = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x_new + j[l]; });
         ex = x_new - after.x, ey = y_new - after.y, ez = z_new - after.z;
-        if constexpr (beside == Beside::step) {
+        if constexpr (extra == Extra::step) {
           ex += shift[0], ey += shift[1], ez += shift[2];
           mask |= less(ex * ex + ey * ey + ez * ez, cutoff);
         }
@@ -166,7 +166,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
       compress(batch.d[0] + n, mask, dx);
       compress(batch.d[1] + n, mask, dy);
       compress(batch.d[2] + n, mask, dz);
-      if constexpr (beside != Beside::nothing) {
+      if constexpr (extra != Extra::nothing) {
         compress(batch.d_new[0] + n, mask, ex);
         compress(batch.d_new[1] + n, mask, ey);
         compress(batch.d_new[2] + n, mask, ez);
@@ -185,29 +185,29 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   return n > 0;
 }
 
-template <int W, Beside beside>
-constexpr decltype(&collect_pairs<W, beside, false, false>) kCollect[4] = {
-    collect_pairs<W, beside, false, false>, collect_pairs<W, beside, false, true>,
-    collect_pairs<W, beside, true, false>, collect_pairs<W, beside, true, true>};
+template <int W, Extra extra>
+constexpr decltype(&collect_pairs<W, extra, false, false>) kCollect[4] = {
+    collect_pairs<W, extra, false, false>, collect_pairs<W, extra, false, true>, collect_pairs<W, extra, true, false>,
+    collect_pairs<W, extra, true, true>};
 
 template <int W>
 bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
   const unsigned which = (rows.box ? 2 : 0) + (rows.weighted ? 1 : 0);
-  if (!rows.x_new) return kCollect<W, Beside::nothing>[which](rows, cursor, batch);
-  if (rows.vectors) return kCollect<W, Beside::vectors>[which](rows, cursor, batch);
-  return kCollect<W, Beside::step>[which](rows, cursor, batch);
+  if (!rows.x_new) return kCollect<W, Extra::nothing>[which](rows, cursor, batch);
+  if (rows.vectors) return kCollect<W, Extra::vectors>[which](rows, cursor, batch);
+  return kCollect<W, Extra::step>[which](rows, cursor, batch);
 }
 
 /// Adds the words to the sums of both particles.
 template <int W>
-void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums) {
-  constexpr std::size_t L = W == 2 ? 2 : 4, kParts = 4 / L;  // a record is no wider
+void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kPaddedCapacity], ForceWords* sums) {
+  constexpr std::size_t L = W == 2 ? 2 : 4, kParts = 4 / L;  // a ForceWords has four words
   using I = IntegerOf<typename Width<L>::Double>;
   for (unsigned r = 0; r < batch.rows; ++r) {
     const unsigned end = batch.row[r + 1].begin;
     I own[kParts] = {};
     for (unsigned k = batch.row[r].begin; k < end; k += L == 4 ? 4 : 1) {
-      if constexpr (L == 4) {  // pairs of the next row count as zero
+      if constexpr (L == 4) {  // pairs of the next row are masked to zero
         static constexpr std::int64_t kLanes[8] = {-1, -1, -1, -1};
         const I some = load<I>(kLanes + 4 - (end - k < 4 ? end - k : 4)), none = {};
         const I x = load<I>(words[0] + k) & some, y = load<I>(words[1] + k) & some, z = load<I>(words[2] + k) & some;

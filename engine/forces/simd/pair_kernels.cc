@@ -19,7 +19,7 @@ bool available(const PairKernels& kernels) {
   return true;
 }
 
-/// What CAROM_SIMD says; nothing: any.
+/// The value of CAROM_SIMD; empty: any width.
 std::string wanted_width() {
   const char* const wanted = std::getenv("CAROM_SIMD");
   return wanted ? wanted : "";

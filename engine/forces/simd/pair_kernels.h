@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The interface between loops over pairs and their kernels, which exist once for each vector width.
+// The interface between the loops over pairs and their kernels, which are compiled once for each vector width.
 //
-// A loop works on batches: kernels collect pairs within the cutoff from a list (pair_records.h) into arrays of one
-// coordinate each, a potential's formula turns them into forces in quanta, and kernels add these to the sums of both
-// particles. Particles are numbered here by their place in the list. Two dimensions are three with z = 0.
+// A loop works on batches. The kernels collect pairs within the cutoff from a list (pair_records.h) into an array for
+// each coordinate, the formula of a potential computes forces in quanta, and the kernels add them to the sums of both
+// particles. Particles are numbered by their place in the list. Two dimensions are three with z = 0.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,13 +14,12 @@
 
 namespace carom {
 
-/// Of a particle.
 struct alignas(32) PairRecord {
   double x, y, z, w;
 };
 
-/// Partners of one particle through one image: with box numbers b (see PairRows) the separation of row and partner is
-/// x_row − x_partner + (image − b_row + b_partner)·edges.
+/// The partners of one particle through one image: with box numbers b (see PairRows), the separation of row and partner
+/// is x_row − x_partner + (image − b_row + b_partner)·edges.
 struct PairRun {
   std::uint32_t row, begin, count;  ///< partners begin … begin + count − 1
   std::int32_t image[3];
@@ -28,34 +27,34 @@ struct PairRun {
 
 struct PairRows {
   const PairRecord* x = nullptr;           ///< positions; w: weight
-  const PairRecord* x_new = nullptr;       ///< new positions, for mean forces, or other vectors; else null
-  bool vectors = false;                    ///< these are vectors of the particles: they have no images
+  const PairRecord* x_new = nullptr;       ///< new positions for mean forces, or other vectors; else null
+  bool vectors = false;                    ///< x_new has vectors, which have no images
   const PairRecord* box = nullptr;         ///< box numbers; null: all 0
-  const std::uint32_t* partner = nullptr;  ///< eight more than there are can be read
+  const std::uint32_t* partner = nullptr;  ///< padded by eight readable entries
   const PairRun* run = nullptr;
   std::size_t runs = 0;
   double edges[3] = {0, 0, 0};
   double cutoff_squared = 0;
-  bool weighted = false;  ///< multiply the weights, leave out pairs of zero weight
+  bool weighted = false;  ///< multiply the weights and omit pairs of zero weight
 };
 
-/// Where in a list the next batch begins.
+/// The position in a list where the next batch begins.
 struct PairCursor {
   std::size_t run = 0;
   std::uint32_t at = 0;
 };
 
 struct PairBatch {
-  static constexpr unsigned kCapacity = 256, kRoom = kCapacity + 8;  ///< pairs; numbers that can be read
+  static constexpr unsigned kCapacity = 256, kPaddedCapacity = kCapacity + 8;  ///< pairs; entries including padding
   struct Row {
-    std::uint32_t row, begin;  ///< pairs from `begin` to that of the next row have this first particle
+    std::uint32_t row, begin;  ///< pairs from `begin` to the next row's `begin` have this first particle
   };
 
-  alignas(64) double d[3][kRoom];      ///< separation, first minus second
-  alignas(64) double d_new[3][kRoom];  ///< the new one, or the difference of vectors
-  alignas(64) double weight[kRoom];
-  alignas(64) std::int64_t low[3][kRoom];   ///< force on the first, in quanta
-  alignas(64) std::int64_t high[3][kRoom];  ///< where it took two words
+  alignas(64) double d[3][kPaddedCapacity];      ///< separation, first minus second
+  alignas(64) double d_new[3][kPaddedCapacity];  ///< new separation, or difference of vectors
+  alignas(64) double weight[kPaddedCapacity];
+  alignas(64) std::int64_t low[3][kPaddedCapacity];   ///< force on the first particle, in quanta
+  alignas(64) std::int64_t high[3][kPaddedCapacity];  ///< high words, if two words are used
   std::uint32_t second[kCapacity + 16];
   Row row[kCapacity + 1];
   unsigned n = 0, rows = 0;
@@ -63,24 +62,24 @@ struct PairBatch {
   PairBatch() {
     for (double& w : weight) w = 1;
   }
-  /// Empties it. Weights stay as they are, which is 1 where the list has none.
+  /// Removes all pairs. Weights remain, which is correct because they are all 1 if the list has none.
   void clear() {
     for (; n % 8 != 0; ++n) weight[n] = 1;
     n = rows = 0;
   }
-  /// Begins the pairs of another first particle.
+  /// Starts the pairs of a new first particle.
   void begin_row(std::uint32_t first) {
-    if (rows > 0 && row[rows - 1].begin == n) --rows;  // an empty one: there are never more rows than pairs, and one
+    if (rows > 0 && row[rows - 1].begin == n) --rows;  // reuses an empty row: there are at most n + 1 rows
     if (rows == 0 || row[rows - 1].row != first) row[rows++] = {first, n};
   }
-  /// Makes the last vector whole by pairs of zero weight.
+  /// Fills the last vector with pairs of zero weight.
   void pad() {
     row[rows].begin = n;
     for (unsigned k = n; k % 8 != 0; ++k) {
       for (int axis = 0; axis < 3; ++axis) d[axis][k] = d[axis][0], d_new[axis][k] = d_new[axis][0];
       weight[k] = 0;
     }
-    for (unsigned k = n; k < n + 4; ++k) second[k] = row[0].row;  // some place
+    for (unsigned k = n; k < n + 4; ++k) second[k] = row[0].row;  // any valid place
   }
   std::uint32_t first_of(unsigned pair) const {
     unsigned r = 0;
@@ -89,56 +88,58 @@ struct PairBatch {
   }
 };
 
-/// Units and limits of what formulas give.
+/// Units and limits of the results of formulas.
 struct PairUnits {
   double per_force = 1;   ///< 1/quantum, or −1/quantum to subtract
-  double per_energy = 0;  ///< 1/quantum; virials, which are larger, are counted in 64 of these
+  double per_energy = 0;  ///< 1/quantum; virials, which are larger, are in units of 64 quanta
   ForceLimits limits{0, 0};
 };
 
-/// Sums over a batch, in quanta; the virial in 64 of these.
+/// Sums over a batch, in quanta; virial: in units of 64 quanta.
 struct PairTotals {
   __extension__ using Whole = __int128;
   Whole energy = 0, magnitude = 0, virial = 0;
 };
 
-/// One potential in one vector width. `wide`: in two words. False where something does not fit.
+/// The formulas of one potential in one vector width. `wide`: forces in two words. They return false if a value does
+/// not fit.
 struct PairFormula {
   using Function = bool (*)(const void* potential, PairBatch&, const PairUnits&, PairTotals*);
-  Function forces[2], forces_and_sums[2], mean_forces[2], hessian_product[2];  ///< by `wide`
+  Function forces[2], forces_and_sums[2], mean_forces[2], hessian_product[2];  ///< index: `wide`
 };
 
-/// A look at some particles for the partners of one, when a list is made.
+/// A search for the partners of one particle in a range of places, when a list is built.
 struct PartnerSearch {
-  // Codes of particles: may leave the box, a ghost, of the first and of the second species; one of the former two.
+  // Bits of a particle's code: may be wrapped, ghost, of the first species, of the second; kOdd: one of the former two.
   static constexpr std::uint64_t kMoving = 1, kGhost = 2, kFirst = 4, kSecond = 8, kOdd = 1ULL << 63;
   const double* x[3] = {};  ///< coordinates in the box
   const std::uint64_t* code = nullptr;
   std::uint32_t row = 0;
-  double own[3];  ///< its position, with the image's shift
+  double own[3];  ///< its position, shifted by the image
   double reach_squared = 0;
-  std::uint64_t wanted = 0;  ///< the highest of these bits of the partner's code
-  bool plain = false;        ///< not odd
-  bool here = false;         ///< no other image
+  std::uint64_t wanted = 0;  ///< the partner's code must have the highest of these bits
+  bool plain = false;        ///< the particle is not odd
+  bool here = false;         ///< the image is zero
 };
-/// Where it goes: pairs that are plain, and others. Room for `count` more of each, and eight.
+/// The results: plain pairs and others; each array has room for `count` more entries plus eight.
 struct PartnersFound {
   std::uint32_t *plain, *other;
 };
 
 struct PairKernels {
   const char* name;
-  /// Fills a batch; false where the list is at its end and the batch empty.
+  /// Fills a batch; returns false at the end of the list, with an empty batch.
   bool (*collect)(const PairRows&, PairCursor&, PairBatch&);
   /// Adds the words of a batch to the sums of both particles.
-  void (*scatter)(const PairBatch&, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums);
+  void (*scatter)(const PairBatch&, const std::int64_t (*words)[PairBatch::kPaddedCapacity], ForceWords* sums);
   void (*find)(const PartnerSearch&, std::uint32_t begin, std::uint32_t end, PartnersFound&);
-  const PairFormula* formulas;  ///< of each of PairPotentials
+  const PairFormula* formulas;  ///< for each of PairPotentials
 };
 
-/// Those that this machine has, the widest first; only what CAROM_SIMD says, where it does: sse2, avx2 or avx512.
+/// The kernels available on this machine, the widest first; only the width in CAROM_SIMD (sse2, avx2, avx512) if it is
+/// set.
 std::vector<const PairKernels*> available_pair_kernels();
-/// The first of these. Throws Error(Failure::deck) where there is none.
+/// The first available kernels. Throws Error(Failure::deck) if there are none.
 const PairKernels& pair_kernels();
 namespace kernels {
 extern const PairKernels pairs_sse2, pairs_avx2, pairs_avx512;

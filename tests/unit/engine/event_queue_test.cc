@@ -107,10 +107,10 @@ TEST(EventQueue, ReadsThePartnersVersionWhenItSettles) {
   s.queue.plan_pair(0, 1.0, s.flights.packing().pack(1, 0));
   ++s.queue[1].version;  // in the same event
   EXPECT_TRUE(s.queue.stale(s.queue[0]));
-  s.queue.settle();
+  s.queue.read_versions();
   EXPECT_FALSE(s.queue.stale(s.queue[0]));
   ++s.queue[1].version;
-  s.queue.settle();
+  s.queue.read_versions();
   EXPECT_TRUE(s.queue.stale(s.queue[0]));
 }
 

@@ -93,7 +93,7 @@ void expect_nothing_missed(Searched<D>& s) {
   double now = Searched<D>::kStart;
   while (s.queue.next(Searched<D>::kEnd, i, now) && s.queue[i].update < s.queue[i].contact) {
     s.search.look_again(i, now);
-    s.queue.settle();
+    s.queue.read_versions();
     EXPECT_GE(s.queue[i].update, now);
   }
   EXPECT_EQ(now, first);
@@ -116,7 +116,7 @@ void expect_contacts(Searched<D>& s, int contacts) {
   Slot i = 0;
   double now = 0;
   for (int events = 0; events < 10000 && contacts > 0 && s.queue.next(Searched<D>::kEnd, i, now); ++events) {
-    s.queue.settle();
+    s.queue.read_versions();
     const NextEvent<D> a = s.queue[i];
     if (a.update < a.contact) {
       s.search.look_again(i, now);
@@ -160,7 +160,7 @@ TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
     const auto plan_all = [&] {
       for (Slot i = 0; i < s.flights.size(); ++i) {
         if (i != s.dismissed) s.search.plan(i, now);
-        s.queue.settle();
+        s.queue.read_versions();
       }
       for (Slot i = 0; i < s.flights.size(); ++i)
         if (i != s.dismissed) s.expect_planned(i);

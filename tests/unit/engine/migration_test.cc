@@ -47,8 +47,8 @@ TEST(Migration, BringsOwnParticlesWithTheirFields) {
   };
   const auto from_one = pack_own(one.fields, one.p, {2, 2}, by_place),
              from_two = pack_own(two.fields, two.p, {2, 2}, by_place);
-  take_in(one.fields, one.p, {from_one[0], from_two[0]}, 6);
-  take_in(two.fields, two.p, {from_one[1], from_two[1]}, 6);
+  receive_particles(one.fields, one.p, {from_one[0], from_two[0]}, 6);
+  receive_particles(two.fields, two.p, {from_one[1], from_two[1]}, 6);
   one.expect_ids({0, 1, 3, 4});
   two.expect_ids({3, 4, 6, 7});
 }
@@ -57,7 +57,7 @@ TEST(Migration, NeedsNoIdsWhereAllAreKnown) {
   Known one;
   for (const Id id : {2u, 0u, 1u}) one.add(id, false);
   const auto messages = pack_own(one.fields, one.p, {3}, [](const Vec<2>&, auto&& visit) { visit(0); });
-  take_in(one.fields, one.p, messages, 3);
+  receive_particles(one.fields, one.p, messages, 3);
   EXPECT_TRUE(one.p.id.empty());
   one.expect_ids({0, 1, 2});
 }

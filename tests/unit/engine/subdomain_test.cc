@@ -201,15 +201,15 @@ TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
     EXPECT_EQ(paths.script(g).size(), paths.path(g).size());
   });
   EXPECT_GT(compared, 10);
-  EXPECT_TRUE(paths.agree(kEnd));
+  EXPECT_TRUE(paths.all_match(kEnd));
   Slot last = 0;
   paths.for_each_ghost([&](Slot g) { last = g; });
   Node<3>& node = paths.rewrite(last).back();
   node.after.v[1] = std::nextafter(node.after.v[1], 2.0);
   const double time = node.key.time;
   EXPECT_FALSE(paths.matches(last));
-  EXPECT_FALSE(paths.agree(kEnd));
-  EXPECT_TRUE(paths.agree(time));  // it counts only before
+  EXPECT_FALSE(paths.all_match(kEnd));
+  EXPECT_TRUE(paths.all_match(time));  // it counts only before
 }
 
 TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
@@ -258,7 +258,7 @@ TEST(WindowRepair, GoesOnUntilAllOwnSpheresAreAsInOneCore) {
   EXPECT_EQ(d.wrong(), 0u);
   std::uint64_t redone = 0;
   for (const auto& part : d.parts) {
-    EXPECT_TRUE(part->paths.agree(kEnd));
+    EXPECT_TRUE(part->paths.all_match(kEnd));
     double fastest = 0;  // of what was seen at first, and of what came by repairs
     part->paths.for_each_own([&](Slot i) {
       for (const Node<3>& node : part->paths.path(i)) fastest = std::max(fastest, node.after.v.squaredNorm());

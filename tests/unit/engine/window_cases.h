@@ -29,8 +29,8 @@ std::unique_ptr<Subdomain<D>> subdomain_of(const System<D>& system, const Sizes&
   return subdomain;
 }
 
-/// Three ranks, of which the last has no subdomain, advance a system up to `end` and agree about that window: then
-/// check(ranks, subdomain, rounds of the exchange) on each.
+/// Three ranks, of which the last has no subdomain, advance a system up to `end` and make_consistent about that window:
+/// then check(ranks, subdomain, rounds of the exchange) on each.
 template <int D>
 void in_a_window(const System<D>& system, const Sizes& sizes, double end, auto&& check) {
   test::ThreadRanks(3).run([&](Communicator& ranks) {
@@ -41,7 +41,7 @@ void in_a_window(const System<D>& system, const Sizes& sizes, double end, auto&&
     if (subdomain) subdomain->run(0, end);
     PathExchange<D> exchange(ranks);
     exchange.start(bisection);
-    const std::uint64_t rounds = exchange.agree(subdomain.get());
+    const std::uint64_t rounds = exchange.make_consistent(subdomain.get());
     check(ranks, subdomain.get(), rounds);
   });
 }
