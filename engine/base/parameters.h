@@ -22,25 +22,42 @@
 namespace carom {
 
 struct Parameter {
-  enum class Type { boolean, integer, real, real_list, text, text_list, pair_list };
+  /// The first nine in the order of ParameterValue. The last three are known to decks only.
+  enum class Type {
+    boolean,
+    integer,  ///< a real number without a fraction (1e6) will do
+    real,     ///< an integer will do
+    real_list,
+    text,
+    text_list,
+    pair_list,
+    vector_list,   ///< one vector of system.dimension numbers for each particle
+    text_table,    ///< an inline table of texts: `keys`
+    real_or_list,  ///< one number for all, or one for each particle
+  };
   enum class Range { any, positive, non_negative };
 
-  std::string_view name;
+  std::string name;
   Type type = Type::real;
-  std::string_view fallback;  ///< the default as TOML text; "" = must be given; "none" = may be left out
-  std::string_view unit;      ///< dimension, for instance "length", "energy/length^2", "-" for a pure number
-  std::string_view meaning;   ///< one sentence for the manual
-  Range range = Range::any;   ///< for integer and real (and each of real_list)
-  std::vector<std::string_view> choices{};                ///< for text: what it may be; empty = anything
-  std::vector<std::array<std::string_view, 2>> former{};  ///< for text: what it may no longer be, and the remedy
+  std::string fallback;                ///< the default as TOML text; "" = must be given; "none" = may be left out
+  std::string unit;                    ///< dimension, for instance "length", "energy/length^2", "-" for a pure number
+  std::string meaning;                 ///< one sentence for the manual
+  Range range = Range::any;            ///< for integer and real (and each of a list)
+  std::vector<std::string> choices{};  ///< for text: what it may be; empty = anything
+  std::vector<std::array<std::string, 2>> former{};       ///< for text: what it may no longer be, and the remedy
   double most = std::numeric_limits<double>::infinity();  ///< for numbers: the largest allowed
+  std::vector<Parameter> keys{};                          ///< of a text_table: its texts, each of them needed
+
+  bool required() const { return fallback.empty(); }
+  bool has_default() const { return !required() && fallback != "none"; }
 };
 
 /// Pairs of particle ids.
 using PairList = std::vector<std::array<std::uint32_t, 2>>;
 
 using ParameterValue =
-    std::variant<bool, std::int64_t, double, std::vector<double>, std::string, std::vector<std::string>, PairList>;
+    std::variant<bool, std::int64_t, double, std::vector<double>, std::string, std::vector<std::string>, PairList,
+                 std::vector<std::vector<double>>, std::map<std::string, std::string>>;
 
 /// Validated values by name. Every declared parameter with a default is present; those with "none" only where given.
 class Parameters {
@@ -50,6 +67,12 @@ class Parameters {
   void set(std::string name, ParameterValue value) { values_[std::move(name)] = std::move(value); }
   void erase(const std::string& name) { values_.erase(name); }
   bool has(std::string_view name) const { return values_.find(name) != values_.end(); }
+  /// The value, or null where it is absent or of another type.
+  template <class T>
+  const T* find(std::string_view name) const {
+    const auto at = values_.find(name);
+    return at == values_.end() ? nullptr : std::get_if<T>(&at->second);
+  }
   /// The value of a declared parameter; std::out_of_range if it is absent, std::bad_variant_access on the wrong type.
   template <class T>
   const T& get(std::string_view name) const {
@@ -74,7 +97,14 @@ struct ParameterError {
 };
 
 /// Of a number; nothing where it is finite, in the range and not above `most`.
-std::optional<ParameterError> number_error(double value, Parameter::Range range, double most);
+std::optional<ParameterError> number_error(double value, const Parameter& parameter);
+
+/// Of a text, or of a whole number written as one; nothing where it is one of the choices, or there are none. The
+/// remedy is empty where it is to choose one of them.
+std::optional<ParameterError> choice_error(const std::string& word, const Parameter& parameter);
+
+/// The default of a parameter that has one: true, false, a number or a quoted word.
+ParameterValue default_value(const Parameter& parameter);
 
 /// `given` with the defaults of what it leaves out. Throws Error(Failure::deck) where a value is missing, unknown, of
 /// another type, out of its range or none of the choices; `of` names what the parameters are for. A whole number is

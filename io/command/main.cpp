@@ -18,7 +18,6 @@
 #include "engine/base/error.h"
 #include "io/command/command.h"
 #include "io/command/convert.h"
-#include "io/command/manual.h"
 #include "io/command/run.h"
 #include "io/deck/options.h"
 #include "io/deck/schema.h"
@@ -29,6 +28,16 @@
 namespace {
 
 constexpr int usage_error = 2;
+
+/// What were commands once, and what to do instead.
+constexpr const char* kFormer[][2] = {
+    {"bench",
+     "carom bench is a program of its own now; from the sources: cmake --build build/release --target carom_bench && "
+     "build/release/tests/benchmarks/carom_bench, with the same options (--state and --save-state are gone: a deck "
+     "describes a state)"},
+    {"completion", "the scripts that complete commands are installed with carom; from the sources: io/about in the build"},
+    {"manual", "the manual page is installed with carom: man carom; from the sources: io/about/carom.1 in the build"},
+};
 
 /// Each --set takes one value; what has commas or brackets in it is not split.
 void add_set(CLI::App& command, std::vector<std::string>& set) {
@@ -144,15 +153,7 @@ int carom_main(int argc, char** argv) {
       ->type_name("FRAMES");
   Views views(app);
 
-  CLI::App& bench = *app.add_subcommand("bench", "")->group("")->allow_extras();
-
-  app.add_subcommand("manual", "The manual page, for man(1)");
-  std::string shell;
-  app.add_subcommand("completion", "A script that completes commands and options in a shell")
-      ->add_option("shell", shell, "bash, zsh or fish")
-      ->required()
-      ->type_name("SHELL")
-      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  for (const auto& [name, instead] : kFormer) app.add_subcommand(name, "")->group("")->allow_extras();
 
   // 2. The command.
   try {
@@ -171,15 +172,10 @@ int carom_main(int argc, char** argv) {
     if (schema.parsed()) return print(carom::schema_page(markdown));
     if (methods.parsed()) return print(carom::methods_page());
     if (info.parsed()) return carom::info_command(file);
-    if (app.got_subcommand("manual")) return print(carom::manual_page(app));
-    if (app.got_subcommand("completion")) return print(carom::completion_script(app, shell));
     if (convert.parsed()) return carom::convert_command(to);
     if (views.view->parsed()) return carom::view_command(views.options);
-    if (bench.parsed())
-      throw carom::Error(carom::Failure::deck,
-                         "carom bench is a program of its own now; from the sources: cmake --build build/release "
-                         "--target carom_bench && build/release/tests/benchmarks/carom_bench, with the same options "
-                         "(--state and --save-state are gone: a deck describes a state)");
+    for (const auto& [name, instead] : kFormer)
+      if (app.got_subcommand(name)) throw carom::Error(carom::Failure::deck, instead);
     return carom::demo_command(views.directory, views.options);
   });
 }
