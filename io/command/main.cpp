@@ -35,7 +35,8 @@ constexpr const char* kFormer[][2] = {
      "carom bench is a program of its own now; from the sources: cmake --build build/release --target carom_bench && "
      "build/release/tests/benchmarks/carom_bench, with the same options (--state and --save-state are gone: a deck "
      "describes a state)"},
-    {"completion", "the scripts that complete commands are installed with carom; from the sources: io/about in the build"},
+    {"completion",
+     "the scripts that complete commands are installed with carom; from the sources: io/about in the build"},
     {"manual", "the manual page is installed with carom: man carom; from the sources: io/about/carom.1 in the build"},
 };
 
@@ -153,7 +154,7 @@ int carom_main(int argc, char** argv) {
       ->type_name("FRAMES");
   Views views(app);
 
-  for (const auto& [name, instead] : kFormer) app.add_subcommand(name, "")->group("")->allow_extras();
+  for (const auto& [name, instead] : kFormer) app.add_subcommand(name, "")->group("")->allow_extras()->set_help_flag();
 
   // 2. The command.
   try {

@@ -90,8 +90,7 @@ std::string checksum(const std::vector<Vec<3>>& vectors) {
 }
 
 /// One potential: passes over its pairs, in each vector width.
-void measure_pairs(const Case& each, std::uint64_t n, const Options& options,
-                   const std::function<void(Json)>& add) {
+void measure_pairs(const Case& each, std::uint64_t n, const Options& options, const std::function<void(Json)>& add) {
   Deck deck = deck_of(each, n, 1);
   const auto system = build_system<3>(deck);
   auto& x = system->particles.x;

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from runs import CAROM, ROOT
+from runs import ROOT
 
 BENCH = os.environ.get("CAROM_BENCH", "")
 pytestmark = pytest.mark.skipif(not BENCH, reason="needs the program: CAROM_BENCH=build/release/tests/benchmarks/carom_bench")
@@ -141,12 +141,6 @@ def test_no_such_lattice():
 def test_files_that_cannot_be_used(tmp_path):
     done = bench("--n", 100, "--packing-fraction", 0.3, "--json", tmp_path / "nowhere" / "bench.json", *QUICK, code=5)
     assert "nowhere" in done.stderr and done.stdout == ""  # reported before any work
-
-
-def test_the_command_names_the_program():
-    done = subprocess.run([CAROM, "bench", "--n", "1000"], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2 and "carom_bench" in done.stderr and not done.stdout
-    assert "bench" not in subprocess.run([CAROM, "--help"], capture_output=True, text=True, timeout=60).stdout
 
 
 # Runs the program and counts $COST instructions a collision or pair.
