@@ -46,6 +46,17 @@ std::optional<std::string> read_text(const std::filesystem::path& file) {
   return text;
 }
 
+TextReader reader_for(Communicator& ranks) {
+  return [&ranks](const std::filesystem::path& file) -> std::optional<std::string> {
+    auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
+    if (text) text->push_back('.');  // it can be read, and may be empty
+    const auto bytes = std::as_bytes(std::span(text ? std::string_view(*text) : std::string_view()));
+    const Bytes received = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
+    if (received.empty()) return {};
+    return std::string(reinterpret_cast<const char*>(received.data()), received.size() - 1);
+  };
+}
+
 Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides, const TextReader& reader,
                bool replace) {
   const auto text = reader(file);
