@@ -77,7 +77,8 @@ class Interpreter {
     SpeciesConfig species;
     species.at = table.at;
     table.read<std::string>("name", species.name);
-    if (!species.name.empty() && std::ranges::count(source_.species, species.name, &SpeciesConfig::name) > 0)
+    const bool named = table.find<std::string>("name") != nullptr;
+    if (named && std::ranges::count(source_.species, species.name, &SpeciesConfig::name) > 0)
       problems_.error(table.place("name"), "two species are called '" + species.name + "'", "give each its own name");
     positions(table, species);
     velocities(table, species);
