@@ -70,7 +70,7 @@ std::string write_deck(const DeckValues& values) {
   std::string text;
   for (const TableSchema& schema : deck_schema())
     for (const ValueTable& table : values.list(schema.name)) {
-      if (!schema.name.empty()) text += "\n" + schema.heading() + "\n";
+      if (!schema.name.empty()) text.append("\n").append(schema.heading()).append("\n");
       table.each_key([&](const Parameter& key) {
         const auto at = table.values.all().find(key.name);
         if (at == table.values.all().end()) return;
