@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <malloc.h>
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>
 
 #include <algorithm>
 #include <fstream>
+#include <numbers>
 #include <string>
 
 #include "bench.h"
@@ -15,7 +17,7 @@
 namespace carom::bench {
 namespace {
 
-constexpr std::uint64_t kWarmUp = 1;  // epochs of the measured core before it is measured
+constexpr std::uint64_t kWarmUp = 2;  // epochs of the measured core before it is measured
 
 /// A size in the table of /proc/self/status [bytes]; nothing where there is no such table.
 std::optional<double> process_memory(const std::string& name) {
@@ -120,22 +122,24 @@ double compressibility(const System<D>& system, double virial, double time) {
 template <int D>
 std::unique_ptr<System<D>> lattice_state(std::uint64_t n, double filled) {
   constexpr const char* text = R"(format = 1
-system = {{ dimension = {}, boundary = {} }}
+system = {{ dimension = {}, box = {}, boundary = {} }}
 particles = [{{ name = "sphere", count = {}, radius = 0.5, temperature = 1.0 }}]
-placement = {{ type = "{}", packing_fraction = {}, seed = {} }}
+placement = {{ type = "{}", seed = {} }}
 integrator = {{ type = "free-flight" }}
 run = {{ steps = 1 }}
 )";
-  const auto on = [&](const char* lattice) {
-    const char* const boundary = D == 2 ? R"(["periodic", "periodic"])" : R"(["periodic", "periodic", "periodic"])";
-    Deck deck = deck_of(fmt::format(text, D, boundary, n, lattice, filled, kSeed));
+  const double sphere = D == 2 ? std::numbers::pi / 4 : std::numbers::pi / 6;
+  const auto on = [&](Lattice lattice, const char* name) {
+    const Vec<D> edges = commensurate_edges<D>(lattice, n, static_cast<double>(n) * sphere / filled);
+    Deck deck = deck_of(fmt::format(text, D, std::vector<double>(edges.begin(), edges.end()),
+                                    std::vector<std::string>(D, "periodic"), n, name, kSeed));
     return build_system<D>(deck);
   };
   try {
-    return on(D == 2 ? "square" : "simple-cubic");
+    return on(Lattice::simple, D == 2 ? "square" : "simple-cubic");
   } catch (const Error& e) {
     if (e.failure() != Failure::initial_state) throw;
-    return on(D == 2 ? "hexagonal" : "fcc");
+    return on(Lattice::centred, D == 2 ? "hexagonal" : "fcc");
   }
 }
 
