@@ -129,18 +129,21 @@ integrator = {{ type = "free-flight" }}
 run = {{ steps = 1 }}
 )";
   const double sphere = D == 2 ? std::numbers::pi / 4 : std::numbers::pi / 6;
-  const auto on = [&](Lattice lattice, const char* name) {
+  for (const bool centred : {false, true}) {
+    const Lattice lattice = centred ? Lattice::centred : Lattice::simple;
+    const char* const name = centred ? (D == 2 ? "hexagonal" : "fcc") : (D == 2 ? "square" : "simple-cubic");
     const Vec<D> edges = commensurate_edges<D>(lattice, n, static_cast<double>(n) * sphere / filled);
     Deck deck = deck_of(fmt::format(text, D, std::vector<double>(edges.begin(), edges.end()),
                                     std::vector<std::string>(D, "periodic"), n, name, kSeed));
-    return build_system<D>(deck);
-  };
-  try {
-    return on(Lattice::simple, D == 2 ? "square" : "simple-cubic");
-  } catch (const Error& e) {
-    if (e.failure() != Failure::initial_state) throw;
-    return on(Lattice::centred, D == 2 ? "hexagonal" : "fcc");
+    try {
+      return build_system<D>(deck);
+    } catch (const Error& e) {
+      if (e.failure() != Failure::initial_state) throw;
+    }
   }
+  throw Error(
+      Failure::initial_state,
+      fmt::format("{} spheres at packing fraction {} overlap on any lattice; lower the packing fraction", n, filled));
 }
 
 /// Equilibrates and measures one state. The core that is measured has not seen the lattice melt, which is hard work.
