@@ -11,8 +11,9 @@ namespace carom {
 namespace {
 
 /// In the order of ParameterValue and of Parameter::Type.
-constexpr std::array kTypes = {"true or false", "a whole number",  "a number",          "a list of numbers",
-                               "a text",        "a list of texts", "a list of id pairs"};
+constexpr std::array kTypes = {"true or false",   "a whole number",  "a number",           "a list of numbers",
+                               "a text",          "a list of texts", "a list of id pairs", "a list of vectors",
+                               "a table of texts"};
 
 [[noreturn]] void refuse(std::string_view of, const std::string& what, const std::string& remedy) {
   throw Error(Failure::deck, std::string(of) + ": " + what + "; " + remedy);
@@ -20,7 +21,52 @@ constexpr std::array kTypes = {"true or false", "a whole number",  "a number",  
 
 std::string quoted(std::string_view name) { return std::string(1, '\'').append(name) + '\''; }
 
-/// The parsed default: true, false, a number or a quoted word (Parameter::fallback).
+std::string listed(const auto& words) {
+  std::string list;
+  for (const std::string_view word : words) list += (list.empty() ? "" : ", ") + std::string(word);
+  return list;
+}
+
+void check(std::string_view of, const Parameter& parameter, const ParameterValue& value) {
+  const auto type = static_cast<std::size_t>(parameter.type);
+  if (value.index() != type)
+    refuse(of, quoted(parameter.name) + " is " + kTypes[value.index()], std::string("give ") + kTypes[type]);
+  const auto complain = [&](const std::optional<ParameterError>& error) {
+    if (!error) return;
+    refuse(of, quoted(parameter.name) + " " + error->what,
+           error->remedy.empty() ? "give one of: " + listed(parameter.choices) : error->remedy);
+  };
+  const auto check_number = [&](double number) { complain(number_error(number, parameter)); };
+  if (const auto* real = std::get_if<double>(&value)) check_number(*real);
+  if (const auto* whole = std::get_if<std::int64_t>(&value)) {
+    check_number(static_cast<double>(*whole));
+    complain(choice_error(std::to_string(*whole), parameter));
+  }
+  if (const auto* list = std::get_if<std::vector<double>>(&value)) std::ranges::for_each(*list, check_number);
+  if (const auto* text = std::get_if<std::string>(&value)) complain(choice_error(*text, parameter));
+}
+
+}  // namespace
+
+std::optional<ParameterError> number_error(double value, const Parameter& parameter) {
+  const std::string is = short_text(value, 15);
+  if (!std::isfinite(value)) return ParameterError{{}, "must be finite (is " + is + ")", "give an ordinary number"};
+  if (value > parameter.most) return ParameterError{{}, "is " + is, "take at most " + short_text(parameter.most, 15)};
+  if (parameter.range == Parameter::Range::positive && !(value > 0))
+    return ParameterError{{}, "must be positive (is " + is + ")", "give a number above 0"};
+  if (parameter.range == Parameter::Range::non_negative && value < 0)
+    return ParameterError{{}, "must be zero or positive (is " + is + ")", "give 0 or a number above"};
+  return {};
+}
+
+std::optional<ParameterError> choice_error(const std::string& word, const Parameter& parameter) {
+  const auto& choices = parameter.choices;
+  if (choices.empty() || std::ranges::find(choices, word) != choices.end()) return {};
+  for (const auto& [former, remedy] : parameter.former)
+    if (word == former) return ParameterError{{}, "can no longer be " + quoted(word), remedy};
+  return ParameterError{{}, "cannot be " + quoted(word), {}};
+}
+
 ParameterValue default_value(const Parameter& parameter) {
   const std::string_view text = parameter.fallback;
   const char* const end = text.data() + text.size();
@@ -31,60 +77,19 @@ ParameterValue default_value(const Parameter& parameter) {
     return whole;
   }
   double real = 0;
-  if (parameter.type != Parameter::Type::real || std::from_chars(text.data(), end, real).ec != std::errc{})
+  const bool number = parameter.type == Parameter::Type::real || parameter.type == Parameter::Type::real_or_list;
+  if (!number || std::from_chars(text.data(), end, real).ec != std::errc{})
     throw std::logic_error("the default of " + quoted(parameter.name) + " cannot be read");
   return real;
-}
-
-std::string listed(std::span<const std::string_view> words) {
-  std::string list;
-  for (const std::string_view word : words) list += (list.empty() ? "" : ", ") + std::string(word);
-  return list;
-}
-
-void check(std::string_view of, const Parameter& parameter, const ParameterValue& value) {
-  const auto type = static_cast<std::size_t>(parameter.type);
-  if (value.index() != type)
-    refuse(of, quoted(parameter.name) + " is " + kTypes[value.index()], std::string("give ") + kTypes[type]);
-  const auto check_number = [&](double number) {
-    if (const auto error = number_error(number, parameter.range, parameter.most))
-      refuse(of, quoted(parameter.name) + " " + error->what, error->remedy);
-  };
-  std::string word;
-  if (const auto* real = std::get_if<double>(&value)) check_number(*real);
-  if (const auto* whole = std::get_if<std::int64_t>(&value)) {
-    check_number(static_cast<double>(*whole));
-    word = std::to_string(*whole);
-  }
-  if (const auto* list = std::get_if<std::vector<double>>(&value)) std::ranges::for_each(*list, check_number);
-  if (const auto* text = std::get_if<std::string>(&value)) word = *text;
-  if (parameter.choices.empty() || std::ranges::find(parameter.choices, word) != parameter.choices.end()) return;
-  for (const auto& [former, remedy] : parameter.former)
-    if (word == former) refuse(of, quoted(parameter.name) + " can no longer be " + quoted(word), std::string(remedy));
-  refuse(of, quoted(parameter.name) + " cannot be " + quoted(word), "give one of: " + listed(parameter.choices));
-}
-
-}  // namespace
-
-std::optional<ParameterError> number_error(double value, Parameter::Range range, double most) {
-  const std::string is = short_text(value, 15);
-  if (!std::isfinite(value)) return ParameterError{{}, "must be finite (is " + is + ")", "give an ordinary number"};
-  if (value > most) return ParameterError{{}, "is " + is, "take at most " + short_text(most, 15)};
-  if (range == Parameter::Range::positive && !(value > 0))
-    return ParameterError{{}, "must be positive (is " + is + ")", "give a number above 0"};
-  if (range == Parameter::Range::non_negative && value < 0)
-    return ParameterError{{}, "must be zero or positive (is " + is + ")", "give 0 or a number above"};
-  return {};
 }
 
 Parameters completed(std::string_view of, std::span<const Parameter> declared, Parameters given) {
   for (const auto& [name, value] : given.all()) find_named(declared, "parameter of " + std::string(of), name);
   for (const Parameter& parameter : declared) {
-    const std::string name(parameter.name);
+    const std::string& name = parameter.name;
     if (!given.has(name)) {
-      if (parameter.fallback.empty())
-        refuse(of, "missing parameter " + quoted(name), "give it: " + std::string(parameter.meaning));
-      if (parameter.fallback != "none") given.set(name, default_value(parameter));
+      if (parameter.required()) refuse(of, "missing parameter " + quoted(name), "give it: " + parameter.meaning);
+      if (parameter.has_default()) given.set(name, default_value(parameter));
       continue;
     }
     ParameterValue value = given.all().find(name)->second;

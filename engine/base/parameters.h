@@ -22,25 +22,42 @@
 namespace carom {
 
 struct Parameter {
-  enum class Type { boolean, integer, real, real_list, text, text_list, pair_list };
+  /// The first nine are in the order of ParameterValue. Only decks have the last three.
+  enum class Type {
+    boolean,
+    integer,  ///< a real number without a fraction (1e6) will do
+    real,     ///< an integer will do
+    real_list,
+    text,
+    text_list,
+    pair_list,
+    vector_list,   ///< one vector of system.dimension numbers for each particle
+    text_table,    ///< an inline table of texts: `keys`
+    real_or_list,  ///< one number for all, or one for each particle
+  };
   enum class Range { any, positive, non_negative };
 
-  std::string_view name;
+  std::string name;
   Type type = Type::real;
-  std::string_view fallback;  ///< the default as TOML text; "" = required; "none" = optional without default
-  std::string_view unit;      ///< dimension, for instance "length", "energy/length^2", "-" for a pure number
-  std::string_view meaning;   ///< one sentence for the manual
-  Range range = Range::any;   ///< for integer, real and each number of real_list
-  std::vector<std::string_view> choices{};                ///< for text: the allowed values; empty = any
-  std::vector<std::array<std::string_view, 2>> former{};  ///< for text: former values, each with what to write instead
+  std::string fallback;                ///< the default as TOML text; "" = required; "none" = optional without default
+  std::string unit;                    ///< dimension, for instance "length", "energy/length^2", "-" for a pure number
+  std::string meaning;                 ///< one sentence for the manual
+  Range range = Range::any;            ///< for integer, real and each number of a list
+  std::vector<std::string> choices{};  ///< for text: the allowed values; empty = any
+  std::vector<std::array<std::string, 2>> former{};       ///< for text: former values, each with what to write instead
   double most = std::numeric_limits<double>::infinity();  ///< for numbers: the largest allowed value
+  std::vector<Parameter> keys{};                          ///< of a text_table: its texts, all required
+
+  bool required() const { return fallback.empty(); }
+  bool has_default() const { return !required() && fallback != "none"; }
 };
 
 /// Pairs of particle ids.
 using PairList = std::vector<std::array<std::uint32_t, 2>>;
 
 using ParameterValue =
-    std::variant<bool, std::int64_t, double, std::vector<double>, std::string, std::vector<std::string>, PairList>;
+    std::variant<bool, std::int64_t, double, std::vector<double>, std::string, std::vector<std::string>, PairList,
+                 std::vector<std::vector<double>>, std::map<std::string, std::string>>;
 
 /// Validated values by name. Parameters with a default are always present, those declared "none" only if given.
 class Parameters {
@@ -50,6 +67,12 @@ class Parameters {
   void set(std::string name, ParameterValue value) { values_[std::move(name)] = std::move(value); }
   void erase(const std::string& name) { values_.erase(name); }
   bool has(std::string_view name) const { return values_.find(name) != values_.end(); }
+  /// The value, or null if it is absent or of another type.
+  template <class T>
+  const T* find(std::string_view name) const {
+    const auto at = values_.find(name);
+    return at == values_.end() ? nullptr : std::get_if<T>(&at->second);
+  }
   /// The value of a declared parameter; throws std::out_of_range if absent, std::bad_variant_access if of another type.
   template <class T>
   const T& get(std::string_view name) const {
@@ -73,8 +96,15 @@ struct ParameterError {
   std::string what, remedy;
 };
 
-/// Checks a number; nothing if it is finite, in the range and at most `most`.
-std::optional<ParameterError> number_error(double value, Parameter::Range range, double most);
+/// Checks a number; returns nothing if it is finite, in the range and at most `most`.
+std::optional<ParameterError> number_error(double value, const Parameter& parameter);
+
+/// Checks a text, or an integer written as text; returns nothing if it is one of the choices, or if there are none. An
+/// empty remedy means: use one of the choices.
+std::optional<ParameterError> choice_error(const std::string& word, const Parameter& parameter);
+
+/// The parsed default: true, false, a number or a quoted word (Parameter::fallback).
+ParameterValue default_value(const Parameter& parameter);
 
 /// `given`, completed with defaults; whole numbers become reals if the parameter is real. Throws Error(Failure::deck)
 /// if a value is missing, unknown, of another type, out of range or none of the choices; `of` names what the parameters

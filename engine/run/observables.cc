@@ -33,7 +33,7 @@ Parameter parameter::interval(std::string_view meaning) {
           .type = Parameter::Type::real,
           .fallback = "0.0",
           .unit = "time",
-          .meaning = meaning,
+          .meaning = std::string(meaning),
           .range = Parameter::Range::non_negative};
 }
 

@@ -6,7 +6,6 @@
 //   carom validate DECK     carom schema --markdown     carom methods     carom info FILE     carom --version
 //   carom convert RUN --to extxyz
 //   carom view RUN     carom demo
-//   carom bench --n 10000 --packing-fraction 0.49
 //
 // Exit codes: 0 done; 2 deck or usage; 3 impossible initial state; 4 numerical failure; 5 file trouble; 75
 // interrupted.
@@ -17,11 +16,8 @@
 #include <optional>
 
 #include "engine/base/error.h"
-#include "io/command/bench.h"
-#include "io/command/bench_forces.h"
 #include "io/command/command.h"
 #include "io/command/convert.h"
-#include "io/command/manual.h"
 #include "io/command/run.h"
 #include "io/deck/options.h"
 #include "io/deck/schema.h"
@@ -33,56 +29,22 @@ namespace {
 
 constexpr int usage_error = 2;
 
+/// What were commands once, and what to do instead.
+constexpr const char* kFormer[][2] = {
+    {"bench",
+     "carom bench is a program of its own now; from the sources: cmake --build build/release --target carom_bench && "
+     "build/release/tests/benchmarks/carom_bench, with the same options (--state and --save-state are gone: a deck "
+     "describes a state)"},
+    {"completion",
+     "the scripts that complete commands are installed with carom; from the sources: io/about in the build"},
+    {"manual", "the manual page is installed with carom: man carom; from the sources: io/about/carom.1 in the build"},
+};
+
 /// Each --set takes one value; what has commas or brackets in it is not split.
 void add_set(CLI::App& command, std::vector<std::string>& set) {
   command.add_option("--set", set, "Change a value of the deck: table.key=value, list.0.key=value; may be repeated")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
-}
-
-void add_bench(CLI::App& app, carom::BenchOptions& options) {
-  CLI::App& bench = *app.add_subcommand("bench", "The speed of the event core on this machine, or of forces");
-  auto* forces = bench.add_flag("--forces", options.forces, "Measure the loops over pairs instead of the event core");
-  auto* n = bench.add_option("--n", options.n, "Numbers of particles; 1000 10000 100000 1000000, of --forces 32000");
-  n->type_name("N")->check(CLI::Range(std::uint64_t{10}, std::uint64_t{4000000000}));
-  auto* filled = bench.add_option("--packing-fraction", options.packing_fraction, "Packing fractions");
-  filled->capture_default_str()->type_name("PHI")->check(CLI::Range(1e-6, 0.91));
-  auto* dimension = bench.add_option("--dimension", options.dimension, "2 or 3")->capture_default_str();
-  dimension->check(CLI::IsMember({2, 3}));
-  auto* equilibrate = bench.add_option("--equilibrate", options.equilibrate,
-                                       "Epochs of forty mean free times before measuring; 3, of a state 0");
-  equilibrate->type_name("NUMBER")->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
-  auto* collisions = bench.add_option("--collisions", options.collisions,
-                                      "Collisions of a measurement, at least; whole epochs are measured");
-  collisions->capture_default_str()->type_name("NUMBER")->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 50));
-  bench.add_option("--repeat", options.repeat, "Measurements of each state")
-      ->capture_default_str()
-      ->type_name("NUMBER")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1000000}));
-  bench.add_option("--json", options.json, "Also write all results to this file")->type_name("FILE");
-  auto* save = bench.add_option("--save-state", options.save_state, "Write the equilibrated state, as text");
-  save->type_name("FILE");
-  auto* state = bench.add_option("--state", options.state, "Measure this state instead of a table");
-  state->type_name("FILE")->excludes(n)->excludes(filled)->excludes(dimension);
-  for (auto* other : {filled, dimension, equilibrate, collisions, save, state}) forces->excludes(other);
-
-  bench.add_option("--potential", options.potential, "Of --forces: these potentials; all")
-      ->needs(forces)
-      ->check(CLI::IsMember(carom::bench_potentials()));
-  bench.add_option("--kind", options.kind, "Of --forces: forces or 'mean forces'; both")
-      ->needs(forces)
-      ->check(CLI::IsMember({"forces", "mean forces"}));
-  bench
-      .add_option("--pairs", options.pairs, "Of --forces: pairs of a measurement, at least; whole passes are measured")
-      ->needs(forces)
-      ->capture_default_str()
-      ->type_name("NUMBER")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 50));
-  bench.add_option("--steps", options.steps, "Of --forces: steps of a measurement of the melt; 0: none")
-      ->needs(forces)
-      ->capture_default_str()
-      ->type_name("NUMBER")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1000000000}));
 }
 
 int print(const std::string& page) {
@@ -192,16 +154,7 @@ int carom_main(int argc, char** argv) {
       ->type_name("FRAMES");
   Views views(app);
 
-  carom::BenchOptions bench;
-  add_bench(app, bench);
-
-  app.add_subcommand("manual", "The manual page, for man(1)");
-  std::string shell;
-  app.add_subcommand("completion", "A script that completes commands and options in a shell")
-      ->add_option("shell", shell, "bash, zsh or fish")
-      ->required()
-      ->type_name("SHELL")
-      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  for (const auto& [name, instead] : kFormer) app.add_subcommand(name, "")->group("")->allow_extras()->set_help_flag();
 
   // 2. The command.
   try {
@@ -220,12 +173,11 @@ int carom_main(int argc, char** argv) {
     if (schema.parsed()) return print(carom::schema_page(markdown));
     if (methods.parsed()) return print(carom::methods_page());
     if (info.parsed()) return carom::info_command(file);
-    if (app.got_subcommand("manual")) return print(carom::manual_page(app));
-    if (app.got_subcommand("completion")) return print(carom::completion_script(app, shell));
     if (convert.parsed()) return carom::convert_command(to);
     if (views.view->parsed()) return carom::view_command(views.options);
-    if (views.demo->parsed()) return carom::demo_command(views.directory, views.options);
-    return carom::bench_command(bench);
+    for (const auto& [name, instead] : kFormer)
+      if (app.got_subcommand(name)) throw carom::Error(carom::Failure::deck, instead);
+    return carom::demo_command(views.directory, views.options);
   });
 }
 

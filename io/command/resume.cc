@@ -113,17 +113,6 @@ void check_end(const Deck& deck, const CheckpointHead& head) {
 
 }  // namespace
 
-TextReader reader_for(Communicator& ranks) {
-  return [&ranks](const std::filesystem::path& file) -> std::optional<std::string> {
-    auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
-    if (text) text->push_back('.');  // it can be read, and may be empty
-    const auto bytes = std::as_bytes(std::span(text ? std::string_view(*text) : std::string_view()));
-    const Bytes received = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
-    if (received.empty()) return {};
-    return std::string(reinterpret_cast<const char*>(received.data()), received.size() - 1);
-  };
-}
-
 StateReader Resumed::reader() const {
   return [this](const std::string& name) {
     const auto later = at_the_end.find(name);
@@ -203,16 +192,10 @@ Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks) {
 }
 
 template <int D>
-Simulation<D> simulation_of(Deck& deck, Communicator& ranks, Resumed* from) {
-  std::optional<GivenState> given;
-  if (from) {
-    if (from->is_branch() && from->in_epoch) end_epoch<D>(*from, ranks);
-    if (from->is_branch()) check_end(deck, from->head);
-    given = {from->reader(), from->head.bonds, from->is_branch()};
-  }
-  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, given ? &*given : nullptr);
-  const IntegratorInfo& info = find_integrator(deck.integrator);
-  return Simulation<D>(std::move(system), info, info.make<D>(deck.integrator_parameters), deck.plan);
+GivenState state_of(Resumed& from, const Deck& deck, Communicator& ranks) {
+  if (from.is_branch() && from.in_epoch) end_epoch<D>(from, ranks);
+  if (from.is_branch()) check_end(deck, from.head);
+  return {from.reader(), from.head.bonds, from.is_branch()};
 }
 
 template <int D>
@@ -226,8 +209,8 @@ void set_hooks(const Resumed& from, const Deck& deck, Simulation<D>& simulation,
   hooks.branch = {start, counted ? count : start};
 }
 
-template Simulation<2> simulation_of(Deck&, Communicator&, Resumed*);
-template Simulation<3> simulation_of(Deck&, Communicator&, Resumed*);
+template GivenState state_of<2>(Resumed&, const Deck&, Communicator&);
+template GivenState state_of<3>(Resumed&, const Deck&, Communicator&);
 template void set_hooks(const Resumed&, const Deck&, Simulation<2>&, Simulation<2>::Hooks&);
 template void set_hooks(const Resumed&, const Deck&, Simulation<3>&, Simulation<3>::Hooks&);
 

@@ -4,7 +4,7 @@
 //
 //   Resumed from = find_run(directory, false, ranks);           Resumed from = find_state(checkpoint, output, ranks);
 //   Deck deck = deck_of(from, options, ranks);
-//   auto simulation = simulation_of<2>(deck, ranks, &from);
+//   GivenState given = state_of<2>(from, deck, ranks);   // for build_system()
 //   set_hooks(from, deck, simulation, hooks);
 //   simulation.run(hooks);
 
@@ -19,9 +19,6 @@
 #include "io/files/thermo.h"
 
 namespace carom {
-
-/// Reads a file on rank 0, for all: the others may not see it.
-TextReader reader_for(Communicator& ranks);
 
 /// The checkpoint on rank 0, and what all ranks know of it.
 struct Resumed {
@@ -54,9 +51,10 @@ Resumed find_state(const std::filesystem::path& checkpoint, const std::filesyste
 /// The deck of a run that is continued, where only the end may be another, or of a branch. Throws Error(Failure::deck).
 Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks);
 
-/// The run of a deck, from its initial state or from a checkpoint. Throws Error. Collective.
+/// The state that the run of this deck starts from; a branch first flies to the end of the epoch. `from` must outlive
+/// it. Throws Error(Failure::deck) where a branch would have nothing to do. Collective.
 template <int D>
-Simulation<D> simulation_of(Deck& deck, Communicator& ranks, Resumed* from);
+GivenState state_of(Resumed& from, const Deck& deck, Communicator& ranks);
 
 /// Sets restore and branch.
 template <int D>

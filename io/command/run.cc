@@ -42,6 +42,16 @@ constexpr std::size_t kFewestToShare = 64;
 /// From look to look within a step: of pieces, sweeps or contacts, as long as many particles make them.
 constexpr std::uint64_t kCallsWithinSteps = 32;
 
+/// The run of a deck, from its initial state or from a checkpoint. Throws Error. Collective.
+template <int D>
+Simulation<D> simulation_of(Deck& deck, Communicator& ranks, Resumed* from) {
+  std::optional<GivenState> given;
+  if (from) given = state_of<D>(*from, deck, ranks);
+  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, given ? &*given : nullptr);
+  const IntegratorInfo& info = find_integrator(deck.integrator);
+  return Simulation<D>(std::move(system), info, info.make<D>(deck.integrator_parameters), deck.plan);
+}
+
 /// What the ranks do alike while a run goes on: stop or write checkpoints when they are asked to.
 template <int D>
 class Keeper {

@@ -2,14 +2,26 @@
 #include "io/deck/deck.h"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 
-#include "io/deck/deck_build.h"
-#include "io/deck/deck_interactions.h"
-#include "io/deck/deck_interpret.h"
-#include "io/deck/deck_toml.h"
+#include "io/deck/deck_source.h"
 
 namespace carom {
+namespace {
+
+/// Whether the tables of this name say the same about how particles move.
+bool same_tables(const Deck& one, const Deck& other, std::string_view name) {
+  const auto values = [&](const Deck& deck) {
+    std::vector<std::map<std::string, ParameterValue, std::less<>>> all;
+    for (const ValueTable& table : deck.source->values.list(name)) all.push_back(table.values.all());
+    for (auto& each : all) each.erase("max_events_per_step");  // which moves nothing
+    return all;
+  };
+  return values(one) == values(other);
+}
+
+}  // namespace
 
 std::optional<std::string> read_text(const std::filesystem::path& file) {
   constexpr std::size_t kPiece = 1 << 20, kMost = std::size_t{1} << 30;  // of what is no file and may have no end
@@ -34,19 +46,26 @@ std::optional<std::string> read_text(const std::filesystem::path& file) {
   return text;
 }
 
+TextReader reader_for(Communicator& ranks) {
+  return [&ranks](const std::filesystem::path& file) -> std::optional<std::string> {
+    auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
+    if (text) text->push_back('.');  // it can be read, and may be empty
+    const auto bytes = std::as_bytes(std::span(text ? std::string_view(*text) : std::string_view()));
+    const Bytes received = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
+    if (received.empty()) return {};
+    return std::string(reinterpret_cast<const char*>(received.data()), received.size() - 1);
+  };
+}
+
 Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides, const TextReader& reader,
                bool replace) {
   const auto text = reader(file);
   if (!text)
     throw Error(Failure::file, file.string() + ": error: cannot read this deck; check the path and its permissions");
   Problems problems;
-  DeckToml toml = parse_deck(file, *text, overrides, problems);
-  if (replace) drop_replaced(toml);
   Deck deck;
   deck.file = file;
-  DeckValues values = read_values(toml, problems);
-  read_potentials(values, file.parent_path(), reader, problems);
-  interpret(std::move(values), deck, problems);
+  interpret(read_values(file, *text, overrides, replace, problems), reader, deck, problems);
   problems.throw_errors(Failure::deck);
   PlacementConfig& placement = deck.source->placement;
   const auto& all = deck.source->species;
@@ -61,9 +80,35 @@ Deck read_deck(const std::filesystem::path& file, std::span<const std::string> o
   return deck;
 }
 
+Deck read_branch(const Deck& of, std::span<const std::string> overrides, const TextReader& reader, bool& same_motion) {
+  constexpr std::array kKept = {"system", "particles", "placement"};
+  Problems problems;
+  for (const std::string& text : overrides) {
+    const std::string key = text.substr(0, text.find('=')), table = key.substr(0, key.find('.'));
+    if (std::ranges::find(kKept, table) != kKept.end())
+      problems.error({"--set " + key}, "a branch has the particles and the box of its checkpoint",
+                     "set [integrator], [[interaction]], [run] or [output]; for other particles start a new run");
+  }
+  problems.throw_errors(Failure::deck);
+  Deck deck = read_deck(of.source->values.file, overrides, reader, true);
+  const auto &before = of.source->interactions, &now = deck.source->interactions;
+  for (std::size_t n = 0; n < now.size(); ++n) {
+    const auto within = [&](const auto& all) {
+      return n < all.size() && all[n].parameters.has("within") ? all[n].parameters.real("within") : 0.0;
+    };
+    if (within(before) != within(now))
+      problems.error({"--set interaction." + std::to_string(n) + ".within"},
+                     "which particles are bonded has been found in the initial state of the run",
+                     "give the bonds as 'pairs', or leave 'within' as it is");
+  }
+  problems.throw_errors(Failure::deck);
+  same_motion = same_tables(of, deck, "integrator") && same_tables(of, deck, "interaction");
+  return deck;
+}
+
 void set_output_directory(Deck& deck, const std::filesystem::path& directory) {
   deck.output.directory = directory;
-  deck.source->values.find("output")->values.insert_or_assign("directory", directory.string());
+  deck.source->values.find("output")->values.set("directory", directory.string());
   deck.toml_text = write_deck(deck.source->values);
 }
 

@@ -61,6 +61,8 @@ using TextReader = std::function<std::optional<std::string>(const std::filesyste
 
 /// Reads a whole file.
 std::optional<std::string> read_text(const std::filesystem::path& file);
+/// Reads a file on rank 0, for all: the others may not see it. Collective.
+TextReader reader_for(Communicator& ranks);
 
 /// Reads, applies `table.key=value` overrides, validates against the schema, resolves defaults. The reader is called
 /// for the deck, then for the positions. `replace`: where an override gives a table another type, the keys that this

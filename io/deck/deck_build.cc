@@ -1,96 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/deck/deck_build.h"
-
 #include <algorithm>
 
+#include "engine/forces/pair_filter.h"
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/placement.h"
-#include "io/deck/deck_interactions.h"
+#include "io/deck/deck_source.h"
 #include "io/deck/memory.h"
 #include "io/deck/validate_state.h"
 
 namespace carom {
 namespace {
 
-/// Velocities as given, or drawn for the species that have a temperature.
-template <int D>
-void give_velocities(const Deck::Source& source, System<D>& system) {
-  std::vector<Id> drawn;
-  std::vector<double> temperature;
-  Particles<D>& p = system.particles;
-  std::size_t first = 0;  // id of the species
-  Id i = 0;
-  for (const SpeciesConfig& species : source.species) {
-    for (; i < p.size() && p.id_of(i) < first + species.count; ++i) {
-      if (!species.velocity.empty()) p.v[i] = Eigen::Map<const Vec<D>>(species.velocity[p.id_of(i) - first].data());
-      if (!species.temperature) continue;
-      drawn.push_back(i);
-      temperature.push_back(*species.temperature);
-    }
-    first += species.count;
-  }
-  draw_velocities<D>(p, drawn, temperature, source.placement.seed, RandomPurpose::velocity,
-                     system.decomposition.others());
-}
-
-/// Writes what was left to the initial state into the values of the deck, so that they say it themselves from now on.
-/// What [output] requires must have a meaning in the box.
-template <int D>
-void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
-  Deck::Source& source = *deck.source;
-  if (source.edges.empty()) {
-    source.edges.assign(system.box.edges.begin(), system.box.edges.end());
-    source.values.find("system")->values.insert_or_assign("box", source.edges);
-    source.values.find("placement")->values.erase("packing_fraction");
-  }
-  if (ValueTable* placement = source.values.find("placement"); placement != nullptr && !source.placement.file.empty())
-    placement->values.insert_or_assign("file", source.placement.file.string());
-  if (deck.plan.step == 0) {
-    deck.plan.step = default_epoch(system);
-    deck.integrator_parameters.set("step", deck.plan.step);
-    source.values.find("integrator")->values.insert_or_assign("step", deck.plan.step);
-  }
-  ValueTable& output = *source.values.find("output");
-  for (auto& [info, parameters] : deck.output.observables) {
-    if (const auto wrong = info->template in<D>().complete(parameters, system))
-      problems.error(output.place(output_key(*info, wrong->parameter)), wrong->what, wrong->remedy);
-    for (const auto& [name, value] : parameters.all())
-      std::visit(
-          [&, &info = info, &key = name](const auto& v) { output.values.insert_or_assign(output_key(*info, key), v); },
-          value);
-  }
-  deck.toml_text = write_deck(source.values);
-}
-
-/// Gives the interactions that find their bonds in the initial state those that they have found there.
-void take_bonds(Deck::Source& source, const std::vector<PairList>& bonds) {
-  std::size_t n = 0;
-  for (InteractionConfig& config : source.interactions)
-    if (config.parameters.has("within") && n < bonds.size()) {
-      config.parameters.erase("within");
-      config.parameters.set("pairs", bonds[n++]);
-    }
-}
-
-}  // namespace
-
-bool built_in_blocks(const Deck::Source& source) {
-  const std::string& type = source.placement.type;
-  const bool lattice = !type.empty() && type != "file" && type != "random" && type != "compressed";
-  return lattice && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
-           return species.placed && species.radius.size() == 1 && species.mass.size() == 1;
-         });
-}
-
-template <int D>
-void fill_box(const Deck::Source& source, System<D>& system) {
-  std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
-  if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
-  system.species.clear();
-  for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
-}
-
+/// Masses, radii and charges; of this rank's block, where there are `ranks` and built_in_blocks().
 template <int D>
 void fill_particles(const Deck::Source& source, System<D>& system, Communicator* ranks) {
   Particles<D>& all = system.particles;
@@ -128,6 +50,123 @@ void fill_particles(const Deck::Source& source, System<D>& system, Communicator*
   all.image.assign(n, Image<D>{});
 }
 
+/// Velocities as given, or drawn for the species that have a temperature.
+template <int D>
+void give_velocities(const Deck::Source& source, System<D>& system) {
+  std::vector<Id> drawn;
+  std::vector<double> temperature;
+  Particles<D>& p = system.particles;
+  std::size_t first = 0;  // id of the species
+  Id i = 0;
+  for (const SpeciesConfig& species : source.species) {
+    for (; i < p.size() && p.id_of(i) < first + species.count; ++i) {
+      if (!species.velocity.empty()) p.v[i] = Eigen::Map<const Vec<D>>(species.velocity[p.id_of(i) - first].data());
+      if (!species.temperature) continue;
+      drawn.push_back(i);
+      temperature.push_back(*species.temperature);
+    }
+    first += species.count;
+  }
+  draw_velocities<D>(p, drawn, temperature, source.placement.seed, RandomPurpose::velocity,
+                     system.decomposition.others());
+}
+
+/// Writes what was left to the initial state into the values of the deck, so that they say it themselves from now on.
+/// What [output] requires must have a meaning in the box.
+template <int D>
+void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
+  Deck::Source& source = *deck.source;
+  if (source.edges.empty()) {
+    source.edges.assign(system.box.edges.begin(), system.box.edges.end());
+    source.values.find("system")->values.set("box", source.edges);
+    source.values.find("placement")->values.erase("packing_fraction");
+  }
+  if (ValueTable* placement = source.values.find("placement"); placement != nullptr && !source.placement.file.empty())
+    placement->values.set("file", source.placement.file.string());
+  if (deck.plan.step == 0) {
+    deck.plan.step = default_epoch(system);
+    deck.integrator_parameters.set("step", deck.plan.step);
+    source.values.find("integrator")->values.set("step", deck.plan.step);
+  }
+  ValueTable& output = *source.values.find("output");
+  for (auto& [info, parameters] : deck.output.observables) {
+    if (const auto wrong = info->template in<D>().complete(parameters, system))
+      problems.error(output.place(output_key(*info, wrong->parameter)), wrong->what, wrong->remedy);
+    for (const auto& [name, value] : parameters.all()) output.values.set(output_key(*info, name), value);
+  }
+  deck.toml_text = write_deck(source.values);
+}
+
+/// Gives the interactions that find their bonds in the initial state those that they have found there.
+void take_bonds(Deck::Source& source, const std::vector<PairList>& bonds) {
+  std::size_t n = 0;
+  for (InteractionConfig& config : source.interactions)
+    if (config.parameters.has("within") && n < bonds.size()) {
+      config.parameters.erase("within");
+      config.parameters.set("pairs", bonds[n++]);
+    }
+}
+
+}  // namespace
+
+bool built_in_blocks(const Deck::Source& source) {
+  const std::string& type = source.placement.type;
+  const bool lattice = !type.empty() && type != "file" && type != "random" && type != "compressed";
+  return lattice && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
+           return species.placed && species.radius.size() == 1 && species.mass.size() == 1;
+         });
+}
+
+template <int D>
+void fill_box(const Deck::Source& source, System<D>& system) {
+  std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
+  if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
+  system.species.clear();
+  for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
+}
+
+template <int D>
+void make_interactions(const Deck::Source& source, System<D>& system, bool placed, Problems& problems) {
+  InteractionContext<D> context{.box = system.box,
+                                .particles = system.particles,
+                                .species = system.species,
+                                .placed = placed,
+                                .total = source.particles(),
+                                .ranks = system.decomposition.others()};
+  const auto bonded = [](const InteractionConfig& config) {
+    return config.info->kind == InteractionInfo::Kind::bonded;
+  };
+  std::vector<std::unique_ptr<Interaction<D>>> terms(source.interactions.size());
+  const auto make = [&](std::size_t n) {
+    const InteractionConfig& config = source.interactions[n];
+    if (config.wrong) return;
+    try {
+      auto term = config.info->make<D>(config.parameters, context);
+      if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
+        problems.error(config.at,
+                       std::string(source.integrator->name) + " cannot carry the interaction '" +
+                           std::string(config.info->name) + "'",
+                       "it knows no forces but a uniform-field; leave the interaction out, or take psa, edda or "
+                       "their relatives");
+      terms[n] = std::move(term);
+    } catch (const Error& e) {  // its message has the form "what; what to do"
+      const std::string message = e.what();
+      const std::size_t cut = std::min(message.find("; "), message.size());
+      problems.error(config.at, message.substr(0, cut),
+                     cut < message.size() ? message.substr(cut + 2) : "see `carom schema`");
+    }
+  };
+  const auto& all = source.interactions;  // bonds before the terms that leave out bonded pairs
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (bonded(all[n])) make(n);
+  context.bonds = bonds_of(terms);
+  if (!context.bonds && std::ranges::any_of(all, bonded)) context.bonds = std::make_shared<BondTable>(PairList());
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (!bonded(all[n])) make(n);
+  for (auto& term : terms)
+    if (term) system.interactions.push_back(std::move(term));
+}
+
 template <int D>
 std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system) {
   std::vector<PairList> found;
@@ -160,7 +199,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   }
 
   Problems problems;
-  make_interactions(source, {}, *system, true, problems);
+  make_interactions(source, *system, true, problems);
   problems.throw_errors(Failure::deck);
   if (given && !given->branch) return system;
   complete_values(deck, *system, problems);
@@ -174,12 +213,12 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
 }
 
 template void fill_box(const Deck::Source&, System<2>&);
-template void fill_particles(const Deck::Source&, System<2>&, Communicator*);
+template void make_interactions(const Deck::Source&, System<2>&, bool, Problems&);
 template std::unique_ptr<System<2>> build_system<2>(Deck&, Communicator*, const GivenState*);
 template std::vector<PairList> found_bonds(const Deck&, const System<2>&);
 
 template void fill_box(const Deck::Source&, System<3>&);
-template void fill_particles(const Deck::Source&, System<3>&, Communicator*);
+template void make_interactions(const Deck::Source&, System<3>&, bool, Problems&);
 template std::unique_ptr<System<3>> build_system<3>(Deck&, Communicator*, const GivenState*);
 template std::vector<PairList> found_bonds(const Deck&, const System<3>&);
 

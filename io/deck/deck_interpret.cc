@@ -1,40 +1,35 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/deck/deck_interpret.h"
-
 #include <algorithm>
+#include <array>
 
-#include "io/deck/deck_interactions.h"
-#include "io/deck/deck_species.h"
+#include "io/deck/deck_source.h"
 #include "io/deck/options.h"
 
 namespace carom {
 namespace {
 
-/// Sets a parameter to the value of a key, if it has one.
-void copy_value(const ValueTable& table, std::string_view key, Parameters& parameters, std::string_view name) {
-  const auto at = table.values.find(key);
-  if (at == table.values.end()) return;
-  std::visit(
-      [&](const auto& value) {
-        if constexpr (std::is_constructible_v<ParameterValue, decltype(value)>)
-          parameters.set(std::string(name), value);
-      },
-      at->second);
+constexpr std::int64_t kMostParticles = 1'000'000'000;  // of a species; ids have 32 bits
+
+/// "1 particle", "2 particles"
+std::string count_of(std::size_t n, const std::string& what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
 
 /// The parts of a deck in the order in which they build on each other.
 class Interpreter {
  public:
-  Interpreter(Deck& deck, Problems& problems)
-      : deck_(deck), source_(*deck.source), values_(source_.values), problems_(problems) {}
+  Interpreter(Deck& deck, const TextReader& reader, Problems& problems)
+      : deck_(deck), source_(*deck.source), values_(source_.values), reader_(reader), problems_(problems) {}
 
   void all() {
     top();
     system();
-    read_species(values_, dimension_, source_.species, problems_);
+    for (const ValueTable& table : values_.list("particles")) species(table);
     placement();
     integrator();
-    read_interactions(source_, dimension_, problems_);
+    for (ValueTable& table : values_.list("interaction"))
+      if (table.variant != nullptr) interaction(table);
+    try_interactions();
     run();
     output();
   }
@@ -45,8 +40,8 @@ class Interpreter {
     if (const auto* format = table.find<std::int64_t>("format"); format != nullptr && *format != 1)
       problems_.error(table.place("format"), "unknown deck format " + std::to_string(*format),
                       "this version reads format 1");
-    if (const auto* title = table.find<std::string>("title")) deck_.title = *title;
-    if (const auto* description = table.find<std::string>("description")) deck_.description = *description;
+    table.read<std::string>("title", deck_.title);
+    table.read<std::string>("description", deck_.description);
   }
 
   void system() {
@@ -78,6 +73,87 @@ class Interpreter {
                       "give " + std::to_string(dimension_) + ", one for each axis");
   }
 
+  void species(const ValueTable& table) {
+    SpeciesConfig species;
+    species.at = table.at;
+    table.read<std::string>("name", species.name);
+    const bool named = table.find<std::string>("name") != nullptr;
+    if (named && std::ranges::count(source_.species, species.name, &SpeciesConfig::name) > 0)
+      problems_.error(table.place("name"), "two species are called '" + species.name + "'", "give each its own name");
+    positions(table, species);
+    velocities(table, species);
+    if (species.count > 0) {
+      species.radius = numbers(table, "radius", species.count);
+      species.mass = numbers(table, "mass", species.count);
+      species.charge = numbers(table, "charge", species.count);
+    }
+    source_.species.push_back(std::move(species));
+  }
+
+  void positions(const ValueTable& table, SpeciesConfig& species) {
+    const auto* position = table.find<std::vector<std::vector<double>>>("position");
+    const auto* count = table.find<std::int64_t>("count");
+    if (!table.given("position") && !table.given("count"))
+      problems_.error(table.at, "missing key 'position' or 'count' in [[particles]]",
+                      "give explicit positions, or a count for [placement] to place");
+    if (table.given("position") && table.given("count"))
+      problems_.error(table.place("count"), "'position' and 'count' exclude each other", "leave one of them out");
+    if (position != nullptr) {
+      species.position = *position;
+      species.count = position->size();
+      if (position->empty())
+        problems_.error(table.place("position"), "'position' is empty", "give at least one vector");
+      vectors(table, "position", *position);
+    } else if (count != nullptr && *count > kMostParticles) {
+      problems_.error(table.place("count"), "'count' is too large", "give at most " + std::to_string(kMostParticles));
+    } else if (count != nullptr) {
+      species.count = static_cast<std::size_t>(*count);
+      species.placed = true;
+    }
+  }
+
+  void velocities(const ValueTable& table, SpeciesConfig& species) {
+    table.read<double>("temperature", species.temperature);
+    if (const auto* velocity = table.find<std::vector<std::vector<double>>>("velocity")) {
+      species.velocity = *velocity;
+      if (species.count > 0 && velocity->size() != species.count && !species.placed)
+        problems_.error(
+            table.place("velocity"),
+            "'velocity' has " + count_of(velocity->size(), "vector") + " for " + count_of(species.count, "particle"),
+            "give one for each");
+      vectors(table, "velocity", *velocity);
+    }
+    if (table.given("velocity") && table.given("temperature"))
+      problems_.error(table.place("temperature"), "'velocity' and 'temperature' exclude each other",
+                      "leave one of them out");
+    else if (table.given("count") && table.given("velocity"))
+      problems_.error(table.place("velocity"), "'velocity' goes with explicit positions only",
+                      "give a temperature with a count");
+    else if (table.given("count") && !table.given("temperature"))
+      problems_.error(table.at, "missing key 'temperature' in [[particles]]",
+                      "a species given by count needs it; 0 leaves the particles at rest");
+  }
+
+  void vectors(const ValueTable& table, const std::string& key, const std::vector<std::vector<double>>& list) {
+    for (std::size_t n = 0; n < list.size() && dimension_ != 0; ++n)
+      if (list[n].size() != dimension_)
+        problems_.error(
+            table.place(key),
+            "vector " + std::to_string(n) + " (from 0) of '" + key + "' has " + count_of(list[n].size(), "number"),
+            "system.dimension asks for " + std::to_string(dimension_));
+  }
+
+  std::vector<double> numbers(const ValueTable& table, const std::string& key, std::size_t count) {
+    if (const auto* number = table.find<double>(key)) return {*number};
+    const auto* list = table.find<std::vector<double>>(key);
+    if (list == nullptr) return {};
+    if (list->size() != count)
+      problems_.error(table.place(key),
+                      "'" + key + "' has " + count_of(list->size(), "number") + " for " + count_of(count, "particle"),
+                      "give one number for all, or one for each");
+    return *list;
+  }
+
   void placement() {
     PlacementConfig& placement = source_.placement;
     const auto& all = source_.species;
@@ -91,7 +167,7 @@ class Interpreter {
                         "particles given by count, but no [placement]", "add the table with a type: " + join(types()));
     } else {
       placement.at = table->at;
-      if (const auto* seed = table->find<std::int64_t>("seed")) placement.seed = static_cast<std::uint64_t>(*seed);
+      table->read<std::int64_t>("seed", placement.seed);
       if (const auto* fraction = table->find<double>("packing_fraction")) packing(*table, *fraction);
       if (table->variant != nullptr) placement.type = table->variant->name;
       if (!some && !all.empty() && !placement.type.empty())
@@ -117,8 +193,8 @@ class Interpreter {
 
   void compressed(const ValueTable& table, bool mixed) {
     PlacementConfig& placement = source_.placement;
-    if (const auto* rate = table.find<double>("growth_rate")) placement.growth_rate = *rate;
-    if (const auto* most = table.find<double>("max_collisions")) placement.max_collisions = *most;
+    table.read<double>("growth_rate", placement.growth_rate);
+    table.read<double>("max_collisions", placement.max_collisions);
     if (mixed)
       problems_.error(table.place("type"), "compression moves all particles, those with explicit positions too",
                       "take type = \"random\", or give all species by count");
@@ -148,21 +224,98 @@ class Interpreter {
     const ValueTable* table = values_.find("integrator");
     if (table == nullptr || table->variant == nullptr) return;
     deck_.integrator = table->variant->name;
-    deck_.integrator_parameters = parameters_of(*table);
+    deck_.integrator_parameters = table->of_variant();
     source_.step = table->place("step");
     source_.integrator = &find_integrator(deck_.integrator);
-    if (const auto* step = table->find<double>("step")) deck_.plan.step = *step;
+    table->read<double>("step", deck_.plan.step);
+  }
+
+  void interaction(ValueTable& table) {
+    const std::size_t before = problems_.errors();
+    if (table.variant->name == "table") read_points(table);
+    ids_exist(table);
+    species_exist(table);
+    source_.interactions.push_back({.info = &find_interaction(table.variant->name),
+                                    .parameters = table.of_variant(),
+                                    .at = table.at,
+                                    .wrong = table.wrong || problems_.errors() > before});
+  }
+
+  /// Puts the points of a table that is given as a file in the place of `file`, and the last point where there is no
+  /// cutoff: the values say them themselves from now on.
+  void read_points(ValueTable& table) {
+    if (const auto* name = table.find<std::string>("file")) {
+      if (table.given("r") || table.given("value")) {
+        problems_.error(table.place("file"), "'file' and the points themselves exclude each other",
+                        "leave one of them out");
+        return;
+      }
+      const std::filesystem::path file = deck_.file.parent_path() / *name;
+      const auto text = reader_(file);
+      if (!text)
+        throw Error(Failure::file, file.string() + ": error: cannot read the points of a potential; check 'file'");
+      std::vector<double> r, v;
+      for (const auto& row : rows_in(*text, file, 2, "not a point of a potential"))
+        r.push_back(row[0]), v.push_back(row[1]);
+      table.values.erase("file");
+      table.values.set("r", std::move(r));
+      table.values.set("value", std::move(v));
+    }
+    const auto* r = table.find<std::vector<double>>("r");
+    if (r != nullptr && !r->empty() && !table.given("cutoff")) table.values.set("cutoff", r->back());
+  }
+
+  void ids_exist(const ValueTable& table) {
+    const std::size_t n = source_.particles();
+    table.each_key([&](const Parameter& key) {
+      const auto* pairs = table.find<PairList>(key.name);
+      if (pairs == nullptr) return;
+      for (const auto& pair : *pairs) {
+        const std::string text = "[" + std::to_string(pair[0]) + ", " + std::to_string(pair[1]) + "]";
+        for (const std::uint32_t id : pair)
+          if (id >= n)
+            problems_.error(table.place(key.name),
+                            "pair " + text + " names particle " + std::to_string(id) + ", which is not there",
+                            "there are " + count_of(n, "particle") + ", with ids from 0");
+        if (pair[0] == pair[1])
+          problems_.error(table.place(key.name), "pair " + text + " joins a particle to itself", "name two particles");
+      }
+    });
+  }
+
+  void species_exist(const ValueTable& table) {
+    const auto* named = table.find<std::vector<std::string>>("species");
+    if (named == nullptr) return;
+    std::vector<std::string> known;
+    for (const SpeciesConfig& species : source_.species) known.push_back(species.name);
+    for (const std::string& name : *named)
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        problems_.error(table.place("species"), "unknown species '" + name + "'", suggestion(name, known));
+  }
+
+  /// Makes the interactions for a system without positions, where enough is known of the particles and the box.
+  void try_interactions() {
+    const std::size_t axes = source_.boundary.size();
+    const bool box = (dimension_ == 2 || dimension_ == 3) && axes == dimension_ &&
+                     (source_.edges.empty() || source_.edges.size() == axes);
+    const auto known = [](const SpeciesConfig& s) {
+      return s.count > 0 && std::ranges::all_of(std::array{s.mass.size(), s.radius.size(), s.charge.size()},
+                                                [&](std::size_t n) { return n == 1 || n == s.count; });
+    };
+    if (!box || source_.interactions.empty() || !std::ranges::all_of(source_.species, known)) return;
+    const auto attempt = [&](auto&& system) {
+      fill_box(source_, system);
+      make_interactions(source_, system, false, problems_);
+    };
+    dimension_ == 2 ? attempt(System<2>()) : attempt(System<3>());
   }
 
   void run() {
     const ValueTable* table = values_.find("run");
     if (table == nullptr) return;
-    const auto* steps = table->find<std::int64_t>("steps");
-    const auto* collisions = table->find<std::int64_t>("collisions");
-    const auto* end_time = table->find<double>("end_time");
-    if (steps != nullptr) deck_.plan.steps = *steps;
-    if (end_time != nullptr) deck_.plan.end_time = *end_time;
-    if (collisions != nullptr) deck_.plan.collisions = static_cast<std::uint64_t>(*collisions);
+    table->read<std::int64_t>("steps", deck_.plan.steps);
+    table->read<double>("end_time", deck_.plan.end_time);
+    table->read<std::int64_t>("collisions", deck_.plan.collisions);
     if (!table->given("steps") && !table->given("end_time") && !table->given("collisions"))
       problems_.error(table->at, "[run] has no end", "give steps, end_time or collisions");
     if (source_.integrator != nullptr && !source_.integrator->hard_cores && table->given("collisions") &&
@@ -176,24 +329,25 @@ class Interpreter {
     ValueTable* table = values_.find("output");
     if (table == nullptr) return;
     if (!table->given("directory"))
-      table->values.insert_or_assign("directory", (std::filesystem::path("runs") / deck_.file.stem()).string());
+      table->values.set("directory", (std::filesystem::path("runs") / deck_.file.stem()).string());
     if (const auto* directory = table->find<std::string>("directory")) {
       deck_.output.directory = *directory;
       if (directory->empty()) problems_.error(table->place("directory"), "'directory' is empty", "name a folder");
     }
-    if (const auto* interval = table->find<double>("frame_interval")) deck_.plan.frame_interval = *interval;
-    if (const auto* interval = table->find<double>("thermo_interval")) deck_.plan.thermo_interval = *interval;
-    if (const auto* start = table->find<double>("sample_start")) deck_.output.sample_start = *start;
+    table->read<double>("frame_interval", deck_.plan.frame_interval);
+    table->read<double>("thermo_interval", deck_.plan.thermo_interval);
+    table->read<double>("sample_start", deck_.output.sample_start);
+    table->read<bool>("events", deck_.plan.events);
     for (const ObservableInfo& info : observables()) {
       Parameters parameters;
       for (const Parameter& each : info.parameters)
-        copy_value(*table, output_key(info, each.name), parameters, each.name);
+        if (const auto at = table->values.all().find(output_key(info, each.name)); at != table->values.all().end())
+          parameters.set(each.name, at->second);
       if (parameters.has("interval") && parameters.real("interval") > 0)
         deck_.output.observables.push_back({&info, std::move(parameters)});
     }
     if (const auto* units = table->find<std::map<std::string, std::string>>("units"))
       deck_.output.units = {units->at("length"), units->at("time")};
-    if (const auto* events = table->find<bool>("events")) deck_.plan.events = *events;
     if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {
       deck_.output.checkpoint_wall = wall_seconds(*wall);
       if (!deck_.output.checkpoint_wall)
@@ -205,22 +359,23 @@ class Interpreter {
   Deck& deck_;
   Deck::Source& source_;
   DeckValues& values_;
+  const TextReader& reader_;
   Problems& problems_;
   std::size_t dimension_ = 0;  // 0: unknown
 };
 
 }  // namespace
 
-Parameters parameters_of(const ValueTable& table) {
-  Parameters parameters;
-  for (const Key& key : table.variant->keys) copy_value(table, key.name, parameters, key.name);
-  return parameters;
+std::size_t Deck::Source::particles() const {
+  std::size_t n = 0;
+  for (const SpeciesConfig& s : species) n += s.count;
+  return n;
 }
 
-void interpret(DeckValues values, Deck& deck, Problems& problems) {
+void interpret(DeckValues values, const TextReader& reader, Deck& deck, Problems& problems) {
   deck.source = std::make_shared<Deck::Source>();
   deck.source->values = std::move(values);
-  Interpreter(deck, problems).all();
+  Interpreter(deck, reader, problems).all();
 }
 
 }  // namespace carom

@@ -10,7 +10,7 @@
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/compression.h"
 #include "engine/setup/placement.h"
-#include "io/deck/deck_build.h"
+#include "io/deck/deck_source.h"
 
 namespace carom {
 namespace {

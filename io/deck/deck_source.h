@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // What a checked deck says, in the words of a simulation: known to io/deck, and to io/python, which takes the
-// interactions.
+// interactions. A deck is read in three steps: read_values() (deck_values.h), interpret(), build_system() (deck.h).
 
 #include <optional>
 
@@ -36,6 +36,7 @@ struct InteractionConfig {
   const InteractionInfo* info = nullptr;
   Parameters parameters;
   Place at;
+  bool wrong = false;  ///< a problem with it has been reported
 };
 
 struct Deck::Source {
@@ -50,5 +51,34 @@ struct Deck::Source {
 
   std::size_t particles() const;
 };
+
+/// From the values of a deck to what they mean together: lengths of lists, ids that exist, tables that need each other;
+/// what an interaction itself refuses is found by making it. Fills everything of `deck` but toml_text and the positions
+/// of a file. What is wrong goes to `problems`; then the deck is of no use. The reader is called for the points of
+/// potentials, which the values then hold themselves. Throws Error(Failure::file), and Failure::deck for what is wrong
+/// in such a file.
+void interpret(DeckValues values, const TextReader& reader, Deck& deck, Problems& problems);
+
+/// Boundaries, edges (1 where the deck leaves them to the packing fraction) and the names of species.
+template <int D>
+void fill_box(const Deck::Source& source, System<D>& system);
+
+/// Makes every interaction that is not wrong, and tries whether the integrator can carry it; `placed` is whether the
+/// positions are known. What an interaction refuses goes to `problems` with its place.
+template <int D>
+void make_interactions(const Deck::Source& source, System<D>& system, bool placed, Problems& problems);
+
+/// Whether ranks can build their blocks of the initial state, each for itself: lattices of species with particles all
+/// alike.
+bool built_in_blocks(const Deck::Source& source);
+
+/// Positions as [placement] says, for species given by count. Sets the box where the packing fraction does so.
+template <int D>
+void place_particles(const Deck::Source& source, System<D>& system);
+
+/// The rows of a table of numbers: `columns` a line, separated by commas or blanks; # begins a comment, and the first
+/// line may be a heading. Throws Error(Failure::deck), which says that a line is `not_what` it should be.
+std::vector<std::vector<double>> rows_in(const std::string& text, const std::filesystem::path& file,
+                                         std::size_t columns, const std::string& not_what);
 
 }  // namespace carom

@@ -1,58 +1,156 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "io/deck/deck_values.h"
 
-#include <algorithm>
-#include <cmath>
-#include <sstream>
+#include <toml++/toml.h>
 
-#include "io/deck/deck_toml.h"
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <sstream>
+#include <unordered_map>
 
 namespace carom {
 namespace {
 
+/// A deck as TOML: the file parsed, `--set` values put in, and the place of every node known for messages.
+struct DeckToml {
+  std::string file;  ///< as the user wrote it
+  toml::table root;
+  std::unordered_map<const toml::node*, std::string> set;  ///< what came by `--set`, with the key it came by
+
+  Place place(const toml::node& node) const { return place(node.source(), node); }
+  /// Of the key that names `node`.
+  Place place(const toml::key& key, const toml::node& node) const { return place(key.source(), node); }
+
+ private:
+  Place place(const toml::source_region& at, const toml::node& node) const {
+    if (const auto known = set.find(&node); known != set.end()) return {"--set " + known->second};
+    return {file, static_cast<int>(at.begin.line), static_cast<int>(at.begin.column)};
+  }
+};
+
+/// The value of an override: TOML, or a bare word, which stands for itself.
+toml::table parse_value(const std::string& text) {
+  const auto bare = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || std::string_view("_-+./").find(c) != std::string_view::npos;
+  };
+  try {
+    return toml::parse("value = " + text);
+  } catch (const toml::parse_error&) {
+    if (text.empty() || !std::all_of(text.begin(), text.end(), bare)) throw;
+    toml::table table;
+    table.insert("value", text);
+    return table;
+  }
+}
+
+/// Notes that a value came by `--set`, with all that is in it.
+void label(DeckToml& deck, const toml::node& node, const std::string& key) {
+  deck.set[&node] = key;
+  if (const auto* array = node.as_array())
+    for (const toml::node& item : *array) label(deck, item, key);
+  if (const auto* table = node.as_table())
+    for (const auto& [name, item] : *table) label(deck, item, key);
+}
+
+std::vector<std::string> split(std::string path) {
+  std::erase(path, ' ');
+  std::istringstream in(path + '.');
+  std::vector<std::string> parts;
+  for (std::string part; std::getline(in, part, '.');) parts.push_back(part);
+  return parts;
+}
+
+/// The table that a step along the path leads to; makes missing tables; null where the path leads nowhere.
+/// `next` moves on where a list's index is used up.
+toml::table* descend(DeckToml& deck, toml::table& from, const std::vector<std::string>& parts, std::size_t& next,
+                     const std::string& path) {
+  const std::string& name = parts[next++];
+  toml::node* child = from.get(name);
+  if (child == nullptr) {
+    from.insert(name, toml::table{});
+    child = from.get(name);
+    deck.set[child] = path;
+  }
+  toml::array* list = child->as_array();
+  if (list == nullptr) return child->as_table();
+  std::size_t index = 0;
+  const std::string& part = parts[next];
+  const auto [end, failed] = std::from_chars(part.data(), part.data() + part.size(), index);
+  if (failed == std::errc{} && end == part.data() + part.size())
+    ++next;
+  else if (list->size() != 1)
+    return nullptr;
+  return index < list->size() && next < parts.size() ? list->get(index)->as_table() : nullptr;
+}
+
+/// Puts the value of an override in.
+void apply(DeckToml& deck, const std::string& text, Problems& problems) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    problems.error({"--set " + text}, "no value", "write --set table.key=value");
+    return;
+  }
+  const std::string path = text.substr(0, equals);
+  const auto parts = split(path);
+  toml::table* table = &deck.root;
+  std::size_t next = 0;
+  while (table != nullptr && next + 1 < parts.size()) table = descend(deck, *table, parts, next, path);
+  if (table == nullptr) {
+    problems.error({"--set " + path}, "there is no such table",
+                   "count the tables of a list from 0, for instance particles.0.radius");
+    return;
+  }
+  try {
+    toml::table value = parse_value(text.substr(equals + 1));
+    value.get("value")->visit([&](auto& node) { table->insert_or_assign(parts.back(), std::move(node)); });
+    label(deck, *table->get(parts.back()), path);
+  } catch (const toml::parse_error& e) {
+    problems.error({"--set " + path}, "cannot read the value: " + std::string(e.description()),
+                   "write it as in a deck: numbers plain, texts in quotes, lists in brackets");
+  }
+}
+
 /// Reads one node as what its key declares; complains at the innermost node that is wrong.
 class NodeReader {
  public:
-  NodeReader(const Key& key, const DeckToml& deck, Problems& problems) : key_(key), deck_(deck), problems_(problems) {}
+  NodeReader(const Parameter& key, const DeckToml& deck, Problems& problems)
+      : key_(key), deck_(deck), problems_(problems) {}
 
-  std::optional<Value> read(const toml::node& node) {
-    using enum Key::Type;
+  std::optional<ParameterValue> read(const toml::node& node) {
+    const auto as_real = [this](const toml::node& n) { return read_real(n); };
+    const auto as_text = [this](const toml::node& n) { return read_text(n); };
+    using enum Parameter::Type;
     switch (key_.type) {
       case boolean:
-        if (const auto* b = node.as_boolean()) return Value(b->get());
+        if (const auto* b = node.as_boolean()) return b->get();
         return wrong_type(node, "true or false");
       case integer:
-        return wrap(read_integer(node));
-      case real:
-        return wrap(read_real(node));
-      case real_list:
-        return wrap(read_list<double>(node, [this](const toml::node& n) { return read_real(n); }));
-      case text:
-        return wrap(read_text(node));
-      case text_list:
-        return wrap(read_list<std::string>(node, [this](const toml::node& n) { return read_text(n); }));
-      case pair_list:
-        return wrap(read_list<PairList::value_type>(node, [this](const toml::node& n) { return read_pair(n); }));
-      case vector_list:
-        return wrap(read_list<std::vector<double>>(node, [this](const toml::node& n) {
-          return read_list<double>(n, [this](const toml::node& m) { return read_real(m); });
-        }));
+        return read_integer(node);
       case real_or_list:
-        if (!node.is_array()) return wrap(read_real(node));
-        return wrap(read_list<double>(node, [this](const toml::node& n) { return read_real(n); }));
+        if (node.is_array()) return read_list<double>(node, as_real);
+        return read_real(node);
+      case real:
+        return read_real(node);
+      case real_list:
+        return read_list<double>(node, as_real);
+      case text:
+        return read_text(node);
+      case text_list:
+        return read_list<std::string>(node, as_text);
+      case pair_list:
+        return read_list<PairList::value_type>(node, [this](const toml::node& n) { return read_pair(n); });
+      case vector_list:
+        return read_list<std::vector<double>>(node, [&](const toml::node& n) { return read_list<double>(n, as_real); });
       case text_table:
-        return wrap(read_texts(node));
+        return read_texts(node);
     }
     return {};
   }
 
  private:
-  template <class T>
-  static std::optional<Value> wrap(std::optional<T> value) {
-    if (!value) return {};
-    return Value(std::move(*value));
-  }
-
   void complain(const toml::node& node, const std::string& what, const std::string& remedy) {
     problems_.error(deck_.place(node), "'" + key_.name + "' " + what, remedy);
   }
@@ -64,9 +162,9 @@ class NodeReader {
     return std::nullopt;
   }
 
-  bool in_range(const toml::node& node, double value) {
-    const auto error = number_error(value, key_.range, key_.most);
-    if (error) complain(node, error->what, error->remedy);
+  /// Whether there is no error in a value; reports the one that there is.
+  bool good(const toml::node& node, const std::optional<ParameterError>& error, const std::string& word = {}) {
+    if (error) complain(node, error->what, error->remedy.empty() ? suggestion(word, key_.choices) : error->remedy);
     return !error;
   }
 
@@ -78,7 +176,7 @@ class NodeReader {
       value = static_cast<double>(integer->get());
     else
       return wrong_type(node, "a number");
-    if (!in_range(node, value)) return {};
+    if (!good(node, number_error(value, key_))) return {};
     return value;
   }
 
@@ -91,17 +189,10 @@ class NodeReader {
       value = static_cast<std::int64_t>(real->get());
     else
       return wrong_type(node, "an integer");
-    if (!in_range(node, static_cast<double>(value)) || !chosen(node, std::to_string(value))) return {};
+    const std::string word = std::to_string(value);
+    if (!good(node, number_error(static_cast<double>(value), key_)) || !good(node, choice_error(word, key_), word))
+      return {};
     return value;
-  }
-
-  bool chosen(const toml::node& node, const std::string& value) {
-    if (key_.choices.empty() || std::find(key_.choices.begin(), key_.choices.end(), value) != key_.choices.end())
-      return true;
-    for (const auto& [former, remedy] : key_.former)
-      if (value == former) return complain(node, "can no longer be '" + value + "'", std::string(remedy)), false;
-    complain(node, "cannot be '" + value + "'", suggestion(value, key_.choices));
-    return false;
   }
 
   std::optional<std::string> read_text(const toml::node& node) {
@@ -115,7 +206,7 @@ class NodeReader {
     } else {
       return wrong_type(node, "a text");
     }
-    if (!chosen(node, value)) return {};
+    if (!good(node, choice_error(value, key_), value)) return {};
     return value;
   }
 
@@ -141,7 +232,7 @@ class NodeReader {
     if (table == nullptr) return wrong_type(node, "a table");
     std::map<std::string, std::string> texts;
     std::vector<std::string> known;
-    for (const Key& key : key_.keys) {
+    for (const Parameter& key : key_.keys) {
       known.push_back(key.name);
       const toml::node* item = table->get(key.name);
       if (item == nullptr)
@@ -162,45 +253,37 @@ class NodeReader {
     const toml::array* array = node.as_array();
     if (array == nullptr) return wrong_type(node, "a list");
     std::vector<T> items;
-    bool good = true;
+    bool all = true;
     for (const toml::node& item : *array) {
       if (auto value = read_item(item))
         items.push_back(std::move(*value));
       else
-        good = false;
+        all = false;
     }
-    if (!good) return {};
+    if (!all) return {};
     return items;
   }
 
-  const Key& key_;
+  const Parameter& key_;
   const DeckToml& deck_;
   Problems& problems_;
 };
 
-std::string bracketed(const TableSchema& schema) {
-  if (schema.name.empty()) return "the deck";
-  return schema.list ? "[[" + schema.name + "]]" : "[" + schema.name + "]";
-}
-
 /// Values left out get their defaults; those that have none and are needed are reported.
-void complete(ValueTable& table, const DeckToml& deck, Problems& problems) {
-  table.each_key([&](const Key& key) {
+void complete(ValueTable& table, Problems& problems) {
+  table.each_key([&](const Parameter& key) {
     if (table.given(key.name)) return;
     if (key.required())
-      problems.error(table.at, "missing key '" + key.name + "' in " + bracketed(*table.schema),
+      problems.error(table.at, "missing key '" + key.name + "' in " + table.schema->heading(),
                      "add it: " + type_name(key) + (key.meaning.empty() ? "" : ", " + key.meaning));
-    if (!key.has_default()) return;
-    const toml::table fallback = toml::parse("value = " + key.fallback);
-    if (auto value = NodeReader(key, deck, problems).read(*fallback.get("value")))
-      table.values.emplace(key.name, std::move(*value));
+    if (key.has_default()) table.values.set(key.name, default_value(key));
   });
 }
 
 /// What to write instead of a word that the schema does not know.
 std::string remedy(const TableSchema& schema, const std::string& word, const std::vector<std::string>& known) {
   for (const auto& [former, instead] : schema.former)
-    if (former == word) return std::string(instead);
+    if (former == word) return instead;
   return suggestion(word, known);
 }
 
@@ -218,83 +301,96 @@ const Variant* choose_variant(const toml::table& tables, const ValueTable& table
   return nullptr;
 }
 
-ValueTable read_table(const toml::table& from, const TableSchema& schema, const DeckToml& deck, Problems& problems) {
+ValueTable read_table(const toml::table& from, const TableSchema& schema, const DeckToml& deck, bool replace,
+                      Problems& problems) {
+  const std::size_t before = problems.errors();
   ValueTable table;
   table.schema = &schema;
   table.at = deck.place(from);
   if (schema.name.empty()) table.at = {deck.file};
   table.variant = choose_variant(from, table, deck, problems);
   std::vector<std::string> known;
-  table.each_key([&](const Key& key) {
+  table.each_key([&](const Parameter& key) {
     known.push_back(key.name);
     const toml::node* node = from.get(key.name);
     if (node == nullptr) return;
     table.places.emplace(key.name, deck.place(*node));
-    if (auto value = NodeReader(key, deck, problems).read(*node)) table.values.emplace(key.name, std::move(*value));
+    if (auto value = NodeReader(key, deck, problems).read(*node)) table.values.set(key.name, std::move(*value));
   });
   if (schema.name.empty())
     for (const TableSchema& other : deck_schema())
       if (!other.name.empty()) known.push_back(other.name);
   const bool type_unclear = !schema.variants.empty() && table.variant == nullptr;  // then its keys are not known
+  const bool replaced = replace && table.variant != nullptr && deck.set.contains(from.get("type"));
   for (const auto& [key, node] : from) {
     const std::string name(key.str());
-    if (type_unclear || std::find(known.begin(), known.end(), name) != known.end()) continue;
-    problems.error(deck.place(key, node), "unknown key '" + name + "' in " + bracketed(schema),
+    if (type_unclear || std::ranges::find(known, name) != known.end()) continue;
+    if (replaced && !deck.set.contains(&node)) continue;
+    problems.error(deck.place(key, node), "unknown key '" + name + "' in " + schema.heading(),
                    remedy(schema, name, known));
   }
-  complete(table, deck, problems);
+  complete(table, problems);
+  table.wrong = problems.errors() > before;
   return table;
 }
 
-void read_tables(const TableSchema& schema, const DeckToml& deck, DeckValues& values, Problems& problems) {
+void read_tables(const TableSchema& schema, const DeckToml& deck, bool replace, DeckValues& values,
+                 Problems& problems) {
   auto& list = values.tables[schema.name];
   const toml::node* node = schema.name.empty() ? &deck.root : deck.root.get(schema.name);
   if (node == nullptr) {
     if (schema.required)
-      problems.error({deck.file}, "missing table " + bracketed(schema), "add it: " + schema.meaning);
+      problems.error({deck.file}, "missing table " + schema.heading(), "add it: " + schema.meaning);
     else if (schema.name == "output")
-      list.push_back(read_table({}, schema, deck, problems));
+      list.push_back(read_table({}, schema, deck, replace, problems));
     return;
   }
   if (!schema.list && node->is_table()) {
-    list.push_back(read_table(*node->as_table(), schema, deck, problems));
+    list.push_back(read_table(*node->as_table(), schema, deck, replace, problems));
     return;
   }
   const toml::array* array = node->as_array();
   if (!schema.list || array == nullptr) {
     problems.error(deck.place(*node), "'" + schema.name + "' is not a " + (schema.list ? "list of tables" : "table"),
-                   "write " + bracketed(schema) + " above its keys");
+                   "write " + schema.heading() + " above its keys");
     return;
   }
   for (const toml::node& item : *array) {
     if (item.is_table())
-      list.push_back(read_table(*item.as_table(), schema, deck, problems));
+      list.push_back(read_table(*item.as_table(), schema, deck, replace, problems));
     else
       problems.error(deck.place(item), "'" + schema.name + "' must hold tables only",
-                     "write " + bracketed(schema) + " above each");
+                     "write " + schema.heading() + " above each");
   }
   if (schema.required && list.empty())
-    problems.error(deck.place(*node), "no " + bracketed(schema) + " at all", "add one: " + schema.meaning);
+    problems.error(deck.place(*node), "no " + schema.heading() + " at all", "add one: " + schema.meaning);
 }
 
 }  // namespace
 
-std::vector<ValueTable>& DeckValues::list(std::string_view name) { return tables.find(name)->second; }
-const std::vector<ValueTable>& DeckValues::list(std::string_view name) const { return tables.find(name)->second; }
-
-const ValueTable* DeckValues::find(std::string_view name) const {
-  const auto& all = list(name);
-  return all.empty() ? nullptr : &all.front();
-}
-ValueTable* DeckValues::find(std::string_view name) {
-  auto& all = list(name);
-  return all.empty() ? nullptr : &all.front();
+Parameters ValueTable::of_variant() const {
+  Parameters own;
+  for (const Parameter& key : variant->keys)
+    if (const auto value = values.all().find(key.name); value != values.all().end()) own.set(key.name, value->second);
+  return own;
 }
 
-DeckValues read_values(const DeckToml& deck, Problems& problems) {
+DeckValues read_values(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
+                       bool replace, Problems& problems) {
+  DeckToml deck;
+  deck.file = file.string();
+  try {
+    deck.root = toml::parse(text);
+  } catch (const toml::parse_error& e) {
+    const auto& at = e.source().begin;
+    problems.error({deck.file, static_cast<int>(at.line), static_cast<int>(at.column)},
+                   "not valid TOML: " + std::string(e.description()), "correct the syntax here or just before");
+    problems.throw_errors(Failure::deck);
+  }
+  for (const std::string& each : overrides) apply(deck, each, problems);
   DeckValues values;
   values.file = deck.file;
-  for (const TableSchema& schema : deck_schema()) read_tables(schema, deck, values, problems);
+  for (const TableSchema& schema : deck_schema()) read_tables(schema, deck, replace, values, problems);
   return values;
 }
 

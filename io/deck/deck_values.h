@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A deck's values, each checked against its own declaration in the schema and completed by defaults: types, ranges,
-// choices, unknown and missing keys. What keys mean together is checked later (io/deck/deck_interpret.h).
+// choices, unknown and missing keys. What keys mean together is checked later (deck_interpret.cc).
 
+#include <filesystem>
 #include <map>
-#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "io/deck/deck_problems.h"
@@ -15,24 +15,24 @@
 
 namespace carom {
 
-struct DeckToml;
-
-using Value = std::variant<bool, std::int64_t, double, std::vector<double>, std::string, std::vector<std::string>,
-                           PairList, std::vector<std::vector<double>>, std::map<std::string, std::string>>;
-
 /// One table of the deck, read.
 struct ValueTable {
   const TableSchema* schema = nullptr;
   const Variant* variant = nullptr;  ///< chosen by `type`
   Place at;                          ///< of its head
-  std::map<std::string, Value, std::less<>> values;
+  Parameters values;
   std::map<std::string, Place, std::less<>> places;  ///< of the keys that the deck gives
+  bool wrong = false;                                ///< a problem in it has been reported
 
   /// The value, or null where the key was not given and has no default, or was wrong and is reported.
   template <class T>
   const T* find(std::string_view key) const {
-    const auto it = values.find(key);
-    return it == values.end() ? nullptr : std::get_if<T>(&it->second);
+    return values.find<T>(key);
+  }
+  /// Copies the value, if there is one.
+  template <class T>
+  void read(std::string_view key, auto& to) const {
+    if (const T* value = find<T>(key)) to = *value;
   }
   bool given(std::string_view key) const { return places.find(key) != places.end(); }
   /// Of the key, or of the table where the deck doesn't give it.
@@ -43,10 +43,12 @@ struct ValueTable {
   /// Calls visit(key) for the keys of the table and of its variant, in the order of the schema.
   template <class Visit>
   void each_key(Visit&& visit) const {
-    for (const Key& key : schema->keys) visit(key);
+    for (const Parameter& key : schema->keys) visit(key);
     if (variant != nullptr)
-      for (const Key& key : variant->keys) visit(key);
+      for (const Parameter& key : variant->keys) visit(key);
   }
+  /// The values of the variant's own keys, for the code that declared them.
+  Parameters of_variant() const;
 };
 
 /// All tables, by name, in the order of the deck. [output] is always there.
@@ -54,14 +56,18 @@ struct DeckValues {
   std::string file;
   std::map<std::string, std::vector<ValueTable>, std::less<>> tables;
 
-  std::vector<ValueTable>& list(std::string_view name);
-  const std::vector<ValueTable>& list(std::string_view name) const;
+  std::vector<ValueTable>& list(std::string_view name) { return tables.find(name)->second; }
+  const std::vector<ValueTable>& list(std::string_view name) const { return tables.find(name)->second; }
   /// The one table of that name, or null.
-  ValueTable* find(std::string_view name);
-  const ValueTable* find(std::string_view name) const;
+  ValueTable* find(std::string_view name) { return list(name).empty() ? nullptr : &list(name).front(); }
+  const ValueTable* find(std::string_view name) const { return list(name).empty() ? nullptr : &list(name).front(); }
 };
 
-DeckValues read_values(const DeckToml& deck, Problems& problems);
+/// The values of a deck from its text and the overrides (`table.key=value`, `list.0.key=value`). `replace`: where an
+/// override gives a table another type, the keys that this type does not know are left out, instead of being errors.
+/// Throws Error(Failure::deck) where the text is not TOML; all else that is wrong goes to `problems`.
+DeckValues read_values(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
+                       bool replace, Problems& problems);
 
 /// The values as a deck again, in the order of the schema; numbers in the fewest digits that give them back exactly.
 std::string write_deck(const DeckValues& values);

@@ -70,10 +70,10 @@ std::string write_deck(const DeckValues& values) {
   std::string text;
   for (const TableSchema& schema : deck_schema())
     for (const ValueTable& table : values.list(schema.name)) {
-      if (!schema.name.empty()) text += schema.list ? "\n[[" + schema.name + "]]\n" : "\n[" + schema.name + "]\n";
-      table.each_key([&](const Key& key) {
-        const auto at = table.values.find(key.name);
-        if (at == table.values.end()) return;
+      if (!schema.name.empty()) text.append("\n").append(schema.heading()).append("\n");
+      table.each_key([&](const Parameter& key) {
+        const auto at = table.values.all().find(key.name);
+        if (at == table.values.all().end()) return;
         text += key.name + " = " + std::visit([](const auto& value) { return literal(value); }, at->second) + "\n";
       });
     }

@@ -9,28 +9,13 @@
 namespace carom {
 namespace {
 
-using enum Key::Type;
+using enum Parameter::Type;
 using Range = Parameter::Range;
-
-Variant variant(std::string_view name, const std::vector<Parameter>& parameters) {
-  Variant v{std::string(name), {}};
-  for (const Parameter& p : parameters)
-    v.keys.push_back({std::string(p.name),
-                      static_cast<Key::Type>(p.type),
-                      std::string(p.fallback),
-                      std::string(p.unit),
-                      std::string(p.meaning),
-                      p.range,
-                      {p.choices.begin(), p.choices.end()},
-                      p.former,
-                      p.most});
-  return v;
-}
 
 std::vector<Variant> variants_of(const auto& infos) {
   std::vector<Variant> all;
   all.reserve(infos.size());
-  for (const auto& info : infos) all.push_back(variant(info.name, info.parameters));
+  for (const auto& info : infos) all.push_back({std::string(info.name), info.parameters});
   return all;
 }
 
@@ -41,19 +26,20 @@ std::string averages_of_all() {
   return files;
 }
 
-Key units_key() {
+Parameter units_key() {
   const std::vector<std::string> lengths = {"Angstrom", "fm", "pm", "nm", "um", "mm", "m"},
                                  times = {"fs", "ps", "ns", "us", "ms", "s"};
-  Key units = {"units", text_table, "none", "-",
-               "what the trajectory says its lengths and times are in, as { length = \"Angstrom\", time = \"ps\" }, "
-               "for programs that want to know; numbers are written as they are; none: reduced units"};
+  Parameter units = {
+      "units", text_table, "none", "-",
+      "what the trajectory says its lengths and times are in, as { length = \"Angstrom\", time = \"ps\" }, "
+      "for programs that want to know; numbers are written as they are; none: reduced units"};
   units.keys = {{"length", text, "", "-", "the unit of length", Range::any, lengths},
                 {"time", text, "", "-", "the unit of time", Range::any, times}};
   return units;
 }
 
-std::vector<Key> output_keys() {
-  std::vector<Key> keys = {
+std::vector<Parameter> output_keys() {
+  std::vector<Parameter> keys = {
       {"directory", text, "none", "-",
        "where to; relative to the working directory; by default runs/ and the deck's name"},
       {"frame_interval", real, "0.0", "time", "simulated time between frames of the trajectory; 0: first and last only",
@@ -61,9 +47,9 @@ std::vector<Key> output_keys() {
       {"thermo_interval", real, "0.0", "time",
        "simulated time between rows of the table of observables; 0: first and last only", Range::non_negative}};
   for (const ObservableInfo& info : observables())
-    for (Key& key : variant(info.name, info.parameters).keys) {
-      key.name = output_key(info, key.name);
-      keys.push_back(std::move(key));
+    for (const Parameter& parameter : info.parameters) {
+      keys.push_back(parameter);
+      keys.back().name = output_key(info, parameter.name);
     }
   keys.push_back(
       {"sample_start", real, "0.0", "time",
@@ -76,8 +62,8 @@ std::vector<Key> output_keys() {
   return keys;
 }
 
-Key boundary_key() {
-  Key key = {"boundary", text_list, "", "-", "for each axis"};
+Parameter boundary_key() {
+  Parameter key = {"boundary", text_list, "", "-", "for each axis"};
   for (const BoundaryInfo& info : boundaries()) {
     key.meaning += "; " + std::string(info.name) + ": " + std::string(info.meaning);
     key.choices.emplace_back(info.name);
@@ -85,7 +71,7 @@ Key boundary_key() {
   return key;
 }
 
-Key type_key(const std::string& meaning) { return {"type", text, "", "-", meaning}; }
+Parameter type_key(const std::string& meaning) { return {"type", text, "", "-", meaning}; }
 
 std::vector<TableSchema> make_schema() {
   return {
@@ -178,6 +164,11 @@ const Variant* TableSchema::variant(std::string_view type) const {
   return at == variants.end() ? nullptr : &*at;
 }
 
+std::string TableSchema::heading() const {
+  if (name.empty()) return "the deck";
+  return list ? "[[" + name + "]]" : "[" + name + "]";
+}
+
 const std::vector<TableSchema>& deck_schema() {
   static const std::vector<TableSchema> schema = make_schema();
   return schema;
@@ -193,7 +184,7 @@ std::string output_key(const ObservableInfo& info, std::string_view parameter) {
   return std::string(info.name) + "_" + std::string(parameter);
 }
 
-std::string type_name(const Key& key) {
+std::string type_name(const Parameter& key) {
   const std::string range = key.range == Range::positive       ? "positive "
                             : key.range == Range::non_negative ? "non-negative "
                                                                : "";
@@ -218,7 +209,7 @@ std::string type_name(const Key& key) {
       return range + "number, or a list with one for each particle";
     case text_table: {
       std::string names;
-      for (const Key& each : key.keys) names += (names.empty() ? "" : " and ") + each.name;
+      for (const Parameter& each : key.keys) names += (names.empty() ? "" : " and ") + each.name;
       return "table of the texts " + names;
     }
   }

@@ -7,7 +7,6 @@
 // observable.h).
 
 #include <array>
-#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,40 +15,10 @@
 
 namespace carom {
 
-/// One key of a table.
-struct Key {
-  enum class Type {  // first those of Parameter, in its order
-    boolean,
-    integer,  ///< a real number without a fraction (1e6) will do
-    real,     ///< an integer will do
-    real_list,
-    text,
-    text_list,
-    pair_list,
-    vector_list,   ///< one vector of system.dimension numbers for each particle
-    real_or_list,  ///< one number for all, or one for each particle
-    text_table,    ///< an inline table of texts: `keys`
-  };
-  static_assert(static_cast<int>(Type::pair_list) == static_cast<int>(Parameter::Type::pair_list));
-  std::string name;
-  Type type = Type::real;
-  std::string fallback;  ///< the default as TOML text; "" = must be given; "none" = may be left out
-  std::string unit;
-  std::string meaning;
-  Parameter::Range range = Parameter::Range::any;
-  std::vector<std::string> choices{};
-  std::vector<std::array<std::string_view, 2>> former{};  ///< as in Parameter
-  double most = std::numeric_limits<double>::infinity();  ///< as in Parameter
-  std::vector<Key> keys{};                                ///< of a text_table, each of them needed
-
-  bool required() const { return fallback.empty(); }
-  bool has_default() const { return !required() && fallback != "none"; }
-};
-
 /// What `type = "…"` of a table may be, with the keys it brings along.
 struct Variant {
   std::string name;
-  std::vector<Key> keys;
+  std::vector<Parameter> keys;
 };
 
 /// One table of the deck.
@@ -58,12 +27,13 @@ struct TableSchema {
   bool list = false;      ///< [[name]]: any number of times
   bool required = false;  ///< must stand there (a list: at least once)
   std::string meaning;
-  std::vector<Key> keys;
-  std::vector<Variant> variants{};  ///< non-empty: `type` chooses one of them
-  std::vector<std::array<std::string_view, 2>>
-      former{};  ///< types and keys that are no more, and what to write instead
+  std::vector<Parameter> keys;
+  std::vector<Variant> variants{};                   ///< non-empty: `type` chooses one of them
+  std::vector<std::array<std::string, 2>> former{};  ///< types and keys that are no more, and what to write instead
 
   const Variant* variant(std::string_view type) const;
+  /// "[name]" or "[[name]]"; "the deck" for the keys at the top.
+  std::string heading() const;
 };
 
 /// All tables, in the order of the manual and of the resolved deck.
@@ -73,8 +43,8 @@ const TableSchema& table_schema(std::string_view name);
 /// The key in [output] of a parameter of an observable.
 std::string output_key(const ObservableInfo& info, std::string_view parameter);
 
-/// "positive real" and the like, for messages and pages.
-std::string type_name(const Key& key);
+/// "positive number" and similar names, for messages and pages.
+std::string type_name(const Parameter& key);
 
 /// The schema as a page: plain text for a terminal, or Markdown for the manual.
 std::string schema_page(bool markdown);

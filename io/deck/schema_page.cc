@@ -33,19 +33,16 @@ std::string wrapped(const std::string& text, std::size_t indent) {
   return out;
 }
 
-std::string fallback(const Key& key) {
+std::string fallback(const Parameter& key) {
   return key.required() ? "required" : key.has_default() ? "default " + key.fallback : "optional";
 }
 
-std::string meaning(const Key& key) {
+std::string meaning(const Parameter& key) {
   if (key.choices.empty()) return key.meaning;
   return key.meaning + (key.meaning.empty() ? "" : "; ") + "one of: " + join(key.choices);
 }
 
-std::string heading(const TableSchema& table) {
-  if (table.name.empty()) return "Top of the deck";
-  return table.list ? "[[" + table.name + "]]" : "[" + table.name + "]";
-}
+std::string heading(const TableSchema& table) { return table.name.empty() ? "Top of the deck" : table.heading(); }
 
 /// A line about a variant, from the declaration of the integrator or interaction it stands for.
 std::string about(const TableSchema& table, const std::string& variant) {
@@ -54,8 +51,8 @@ std::string about(const TableSchema& table, const std::string& variant) {
   return {};
 }
 
-void plain_keys(std::ostream& out, const std::vector<Key>& keys, std::size_t indent) {
-  for (const Key& key : keys) {
+void plain_keys(std::ostream& out, const std::vector<Parameter>& keys, std::size_t indent) {
+  for (const Parameter& key : keys) {
     const std::string unit = key.unit.empty() || key.unit == "-" ? "" : " [" + key.unit + "]";
     out << std::string(indent, ' ') << key.name << ": " << type_name(key) << unit << ", " << fallback(key) << '\n';
     if (const std::string text = meaning(key); !text.empty())
@@ -69,10 +66,10 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-void markdown_keys(std::ostream& out, const std::vector<Key>& keys) {
+void markdown_keys(std::ostream& out, const std::vector<Parameter>& keys) {
   if (keys.empty()) return;
   out << "| key | type | unit | default | meaning |\n|---|---|---|---|---|\n";
-  for (const Key& key : keys)
+  for (const Parameter& key : keys)
     out << "| `" << key.name << "` | " << type_name(key) << " | " << (key.unit == "-" ? "" : key.unit) << " | "
         << (key.has_default() ? "`" + key.fallback + "`"
             : key.required()  ? "*required*"
@@ -112,7 +109,7 @@ std::string schema_page(bool markdown) {
 
 std::string methods_page() {
   std::ostringstream out;
-  const auto about = [&](const auto& info, const std::vector<Key>& keys) {
+  const auto about = [&](const auto& info, const std::vector<Parameter>& keys) {
     out << "  " << wrapped(std::string(info.documentation), 2) << "\n  parameters:\n";
     plain_keys(out, keys, 4);
     out << "  source: " << wrapped(std::string(info.source), 10) << "\n\n";
@@ -124,9 +121,9 @@ std::string methods_page() {
   }
   for (const ObservableInfo& info : observables()) {
     out << info.name << ".csv – " << info.title << '\n';
-    std::vector<Key> keys;
+    std::vector<Parameter> keys;
     std::ranges::copy_if(table_schema("output").keys, std::back_inserter(keys),
-                         [&](const Key& key) { return key.name.starts_with(std::string(info.name) + "_"); });
+                         [&](const Parameter& key) { return key.name.starts_with(std::string(info.name) + "_"); });
     about(info, keys);
   }
   return out.str();

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 #include <numeric>
 
 #include "io/files/hdf5.h"
+#include "io/files/thermo.h"
 #include "io/files/version.h"
 
 namespace carom {
@@ -171,13 +171,12 @@ struct TrajectoryWriter<D>::Contents {
         ranks(system.decomposition.ranks()) {
     for (std::size_t k = 0; k < 3; ++k)
       edge_rows[4 * k] = static_cast<int>(k) < D ? system.box.edges[static_cast<int>(k)] : 1.0;
-    for (const char* name : {"kinetic_energy", "potential_energy", "total_energy", "shadow_energy", "max_energy_error",
-                             "temperature", "pressure"})
-      observables.emplace(name, Element<double>(file, std::string("observables/") + name));
+    for (const auto& column : scalar_columns<D>())
+      if (column.element) observables.push_back({{file, std::string("observables/") + column.element}, column.of});
     for (auto* element : {&velocity, &edges, &momentum}) element->share_clock(file, position.group);
     image.share_clock(file, position.group);
     collisions.share_clock(file, position.group);
-    for (auto& [name, element] : observables) element.share_clock(file, position.group);
+    for (auto& [element, of] : observables) element.share_clock(file, position.group);
   }
 
   void create(const Deck& deck, const System<D>& system) {
@@ -192,7 +191,7 @@ struct TrajectoryWriter<D>::Contents {
 
   void cut(std::uint64_t frames) {
     for (auto* element : {&position, &velocity, &edges, &momentum}) element->value.cut(frames);
-    for (auto& [name, element] : observables) element.value.cut(frames);
+    for (auto& [element, of] : observables) element.value.cut(frames);
     image.value.cut(frames);
     collisions.value.cut(frames);
     time.cut(frames);
@@ -283,7 +282,11 @@ struct TrajectoryWriter<D>::Contents {
   Handle box;
   Element<double> edges, momentum;
   Element<std::uint64_t> collisions;
-  std::map<std::string, Element<double>> observables;
+  struct Scalar {
+    Element<double> element;
+    double (*of)(const Snapshot<D>&);
+  };
+  std::vector<Scalar> observables;
   std::array<double, 9> edge_rows{};
   Communicator& ranks;
 };
@@ -308,11 +311,7 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   c.edges.value.append(c.edge_rows);
   c.momentum.value.append(three_columns<double>(std::array{s.momentum}, D));
   c.collisions.value.append(s.collisions);
-  const std::map<std::string, double> scalars = {
-      {"kinetic_energy", s.kinetic}, {"potential_energy", s.potential},        {"total_energy", s.total()},
-      {"shadow_energy", s.shadow},   {"max_energy_error", s.max_energy_error}, {"temperature", s.temperature},
-      {"pressure", s.pressure}};
-  for (const auto& [name, value] : scalars) c.observables.at(name).value.append(value);
+  for (auto& [element, of] : c.observables) element.value.append(of(s));
   c.time.append(s.time);
   c.step.append(s.step);
   c.file.flush();

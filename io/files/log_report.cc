@@ -8,6 +8,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -15,6 +16,7 @@
 
 #include "io/files/directory_lock.h"
 #include "io/files/progress.h"
+#include "io/files/thermo.h"
 #include "io/files/version.h"
 
 namespace carom {
@@ -166,9 +168,12 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
 template <int D>
 void ThermoTable<D>::thermo(const Snapshot<D>& s) {
   constexpr std::uint64_t kOfADoubling = 16;
-  if (rows_ == 0)
-    log_.note(fmt::format("{:>12} {:>10} {:>12} {:>14} {:>14} {:>16} {:>10} {:>12} {:>12}", "time", "step",
-                          "collisions", "kinetic", "potential", "total", "max |ΔE|", "temperature", "pressure"));
+  if (rows_ == 0) {
+    std::string head = fmt::format("{:>12} {:>10} {:>12}", "time", "step", "collisions");
+    for (const auto& column : scalar_columns<D>())
+      if (column.heading) head += fmt::format(" {:>{}}", column.heading, std::atoi(column.format));
+    log_.note(head);
+  }
   const std::uint64_t row = rows_++;
   left_out_.reset();
   if (row % std::max<std::uint64_t>(1, std::bit_floor(row) / kOfADoubling) == 0)
@@ -185,9 +190,10 @@ void ThermoTable<D>::finish() {
 
 template <int D>
 void ThermoTable<D>::write(const Snapshot<D>& s) {
-  log_.note(fmt::format("{:>12.6g} {:>10} {:>12} {:>14.8g} {:>14.8g} {:>16.10g} {:>10.2e} {:>12.6g} {:>12.6g}", s.time,
-                        s.step, s.collisions, s.kinetic, s.potential, s.total(), s.max_energy_error, s.temperature,
-                        s.pressure));
+  std::string row = fmt::format("{:>12.6g} {:>10} {:>12}", s.time, s.step, s.collisions);
+  for (const auto& column : scalar_columns<D>())
+    if (column.heading) row += fmt::format(fmt::runtime(std::string(" {:>") + column.format + "}"), column.of(s));
+  log_.note(row);
 }
 
 template class ThermoTable<2>;

@@ -12,6 +12,28 @@
 
 namespace carom {
 
+template <int D>
+const std::vector<ScalarColumn<D>>& scalar_columns() {
+  using S = const Snapshot<D>&;
+  static const auto all = [] {
+    std::vector<ScalarColumn<D>> columns = {
+        {"kinetic", "kinetic_energy", [](S s) { return s.kinetic; }, "kinetic", "14.8g"},
+        {"potential", "potential_energy", [](S s) { return s.potential; }, "potential", "14.8g"},
+        {"total", "total_energy", [](S s) { return s.total(); }, "total", "16.10g"},
+        {"shadow", "shadow_energy", [](S s) { return s.shadow; }},
+        {"max_energy_error", "max_energy_error", [](S s) { return s.max_energy_error; }, "max |ΔE|", "10.2e"},
+        {"momentum_x", nullptr, [](S s) { return s.momentum[0]; }},  // one element of the trajectory, a vector
+        {"momentum_y", nullptr, [](S s) { return s.momentum[1]; }}};
+    if constexpr (D == 3) columns.push_back({"momentum_z", nullptr, [](S s) { return s.momentum[2]; }});
+    columns.push_back({"temperature", "temperature", [](S s) { return s.temperature; }, "temperature", "12.6g"});
+    columns.push_back({"pressure", "pressure", [](S s) { return s.pressure; }, "pressure", "12.6g"});
+    return columns;
+  }();
+  return all;
+}
+template const std::vector<ScalarColumn<2>>& scalar_columns();
+template const std::vector<ScalarColumn<3>>& scalar_columns();
+
 ThermoPoint last_thermo_point(const std::filesystem::path& path) {
   constexpr std::streamoff kMost = 2000;  // bytes, more than two rows have
   if (!std::filesystem::is_regular_file(path)) return {};
@@ -31,17 +53,16 @@ template <int D>
 ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path, const std::optional<FileMark>& mark)
     : file_(path, mark) {
   if (mark) return;
-  file_.append(
-      std::string("time,step,collisions,kinetic,potential,total,shadow,max_energy_error,momentum_x,momentum_y") +
-      (D == 3 ? ",momentum_z" : "") + ",temperature,pressure\n");
+  std::string head = "time,step,collisions";
+  for (const auto& column : scalar_columns<D>()) head += std::string(",") + column.name;
+  file_.append(head + '\n');
 }
 
 template <int D>
 void ThermoWriter<D>::thermo(const Snapshot<D>& s) {
-  std::string row = fmt::format("{},{},{},{},{},{},{},{}", s.time, s.step, s.collisions, s.kinetic, s.potential,
-                                s.total(), s.shadow, s.max_energy_error);
-  for (const double p : s.momentum) row += fmt::format(",{}", p);
-  file_.append(row + fmt::format(",{},{}\n", s.temperature, s.pressure));
+  std::string row = fmt::format("{},{},{}", s.time, s.step, s.collisions);
+  for (const auto& column : scalar_columns<D>()) row += fmt::format(",{}", column.of(s));
+  file_.append(row + '\n');
 }
 
 template class ThermoWriter<2>;

@@ -2,17 +2,31 @@
 #pragma once
 // thermo.csv: one row an output time, each in the file before the run goes on.
 //
-// Columns: time, step, collisions, kinetic, potential, total, shadow, max_energy_error, momentum_x, momentum_y[,
-// momentum_z], temperature, pressure; reduced units; the fewest digits that give the doubles back; `nan` where a
-// method has no shadow energy.
+// Columns: time, step, collisions, then scalar_columns(); reduced units; the fewest digits that give the doubles back;
+// `nan` where a method has no shadow energy.
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "engine/run/simulation.h"
 #include "io/files/text_file.h"
 
 namespace carom {
+
+/// A number about a state that the files of a run show. A new one is declared in thermo.cc, and nowhere else.
+template <int D>
+struct ScalarColumn {
+  const char* name;     ///< in thermo.csv
+  const char* element;  ///< in /observables of the trajectory; null: not there
+  double (*of)(const Snapshot<D>&);
+  const char* heading = nullptr;  ///< in the table of run.log; null: not there
+  const char* format = nullptr;   ///< there, with the width of the column: "14.8g"
+};
+
+/// In the order of thermo.csv.
+template <int D>
+const std::vector<ScalarColumn<D>>& scalar_columns();
 
 /// When a row was written.
 struct ThermoPoint {

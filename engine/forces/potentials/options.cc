@@ -24,7 +24,7 @@ std::vector<Parameter> with_filter(std::vector<Parameter> own) {
 std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view absent_cutoff) {
   using enum Parameter::Type;
   own = with_filter(std::move(own));
-  own.push_back({"cutoff", real, "none", "length", absent_cutoff, Parameter::Range::positive});
+  own.push_back({"cutoff", real, "none", "length", std::string(absent_cutoff), Parameter::Range::positive});
   own.push_back(
       {"cut",
        text,

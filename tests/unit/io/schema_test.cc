@@ -27,14 +27,14 @@ TEST(Schema, KnowsEveryDeclaredParameter) {
   const auto& output = table_schema("output").keys;
   for (const ObservableInfo& info : observables())
     for (const Parameter& parameter : info.parameters)
-      EXPECT_EQ(std::ranges::count(output, output_key(info, parameter.name), &Key::name), 1) << info.name;
+      EXPECT_EQ(std::ranges::count(output, output_key(info, parameter.name), &Parameter::name), 1) << info.name;
 }
 
 TEST(Schema, PagesShowEveryKey) {
   const std::string plain = schema_page(false), markdown = schema_page(true), methods = methods_page();
   for (const TableSchema& table : deck_schema()) {
-    const auto shown = [&](const std::vector<Key>& keys) {
-      for (const Key& key : keys) {
+    const auto shown = [&](const std::vector<Parameter>& keys) {
+      for (const Parameter& key : keys) {
         EXPECT_NE(plain.find(key.name + ": "), std::string::npos) << key.name;
         EXPECT_NE(markdown.find("| `" + key.name + "` |"), std::string::npos) << key.name;
       }
@@ -55,7 +55,7 @@ TEST(Schema, PagesShowEveryKey) {
 
 TEST(Schema, EveryKeyOfItsOwnHasAMeaningOrAUnit) {
   for (const TableSchema& table : deck_schema())
-    for (const Key& key : table.keys) EXPECT_FALSE(key.meaning.empty() && key.unit == "-") << key.name;
+    for (const Parameter& key : table.keys) EXPECT_FALSE(key.meaning.empty() && key.unit == "-") << key.name;
 }
 
 }  // namespace

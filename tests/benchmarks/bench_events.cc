@@ -1,26 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/command/bench.h"
-
 #include <malloc.h>
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>
 
 #include <algorithm>
 #include <fstream>
+#include <numbers>
 #include <string>
 
+#include "bench.h"
 #include "engine/base/error.h"
 #include "engine/integrators/integrator.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/placement.h"
-#include "io/command/bench_forces.h"
-#include "io/command/bench_state.h"
-#include "io/command/bench_table.h"
-#include "io/deck/deck_build.h"
 
-namespace carom {
+namespace carom::bench {
 namespace {
 
-using namespace bench;
+constexpr std::uint64_t kWarmUp = 2;  // epochs of the measured core before it is measured
 
 /// A size in the table of /proc/self/status [bytes]; nothing where there is no such table.
 std::optional<double> process_memory(const std::string& name) {
@@ -56,11 +53,10 @@ class PeakMemory {
   std::optional<double> before_;
 };
 
-/// A stretch of a run.
+/// What a stretch of a run has covered.
 struct Stretch {
   std::uint64_t collisions = 0;
-  double seconds = 0, time = 0;
-  double rate() const { return static_cast<double>(collisions) / seconds; }
+  double time = 0;
 };
 
 /// Free flight in whole epochs.
@@ -76,12 +72,11 @@ class Flow {
 
   /// Runs this many epochs, and more until there have been this many pair collisions.
   Stretch run(std::uint64_t epochs, std::uint64_t collisions) {
-    constexpr std::uint64_t kPatience = 1000;  // epochs, each of forty mean free times
+    constexpr std::uint64_t kVain = 1000;  // epochs, each of forty mean free times
     const std::uint64_t before = counters_.sphere_sphere;
-    const auto start = Clock::now();
     Stretch done;
     for (std::uint64_t k = 0; k < epochs || done.collisions < collisions; ++k) {
-      if (k == kPatience && done.collisions == 0)
+      if (k == kVain && done.collisions == 0)
         throw Error(Failure::numerical, "nothing collides; take more spheres or a higher packing fraction");
       SlabReport<D> report{.counters = counters_};
       integrator_->slab(*system_, {.index = slabs_, .start = static_cast<double>(slabs_) * epoch_, .length = epoch_},
@@ -90,7 +85,6 @@ class Flow {
       done.collisions = counters_.sphere_sphere - before;
       done.time += epoch_;
     }
-    done.seconds = seconds_since(start);
     return done;
   }
 
@@ -121,30 +115,62 @@ double compressibility(const System<D>& system, double virial, double time) {
   return 1 + virial / (time * twice_kinetic);
 }
 
+/// `n` spheres of diameter 1 and mass 1 at temperature 1 on a lattice in the periodic box of this packing fraction: the
+/// simple cubic (2-D: square) lattice where it holds them, since that is unstable and melts at once, else the
+/// face-centred (hexagonal) one, which takes hundreds of collisions a particle to melt near freezing. The box is a cube
+/// (square), but for hexagonal lattices only near one. Throws Error(Failure::initial_state) where spheres overlap.
+template <int D>
+std::unique_ptr<System<D>> lattice_state(std::uint64_t n, double filled) {
+  constexpr const char* text = R"(format = 1
+system = {{ dimension = {}, box = {}, boundary = {} }}
+particles = [{{ name = "sphere", count = {}, radius = 0.5, temperature = 1.0 }}]
+placement = {{ type = "{}", seed = {} }}
+integrator = {{ type = "free-flight" }}
+run = {{ steps = 1 }}
+)";
+  const double sphere = D == 2 ? std::numbers::pi / 4 : std::numbers::pi / 6;
+  for (const bool centred : {false, true}) {
+    const Lattice lattice = centred ? Lattice::centred : Lattice::simple;
+    const char* const name = centred ? (D == 2 ? "hexagonal" : "fcc") : (D == 2 ? "square" : "simple-cubic");
+    const Vec<D> edges = commensurate_edges<D>(lattice, n, static_cast<double>(n) * sphere / filled);
+    Deck deck = deck_of(fmt::format(text, D, std::vector<double>(edges.begin(), edges.end()),
+                                    std::vector<std::string>(D, "periodic"), n, name, kSeed));
+    try {
+      return build_system<D>(deck);
+    } catch (const Error& e) {
+      if (e.failure() != Failure::initial_state) throw;
+    }
+  }
+  throw Error(
+      Failure::initial_state,
+      fmt::format("{} spheres at packing fraction {} overlap on any lattice; lower the packing fraction", n, filled));
+}
+
 /// Equilibrates and measures one state. The core that is measured has not seen the lattice melt, which is hard work.
 template <int D>
-Json measure(std::unique_ptr<System<D>> state, const BenchOptions& options, PeakMemory& memory) {
-  const std::size_t n = state->particles.size();
-  const double filled = packing_fraction<D>(state->box.volume(), state->particles.radius);
+Json measure(std::uint64_t n, double filled, const Options& options) {
+  PeakMemory memory;
+  auto state = lattice_state<D>(n, filled);
+  filled = packing_fraction<D>(state->box.volume(), state->particles.radius);
   Stretch melting;
-  if (options.epochs_before() > 0) {
+  if (options.equilibrate > 0) {
     Flow<D> flow(std::move(state));
-    melting = flow.run(options.epochs_before(), 0);
+    melting = flow.run(options.equilibrate, 0);
     state = flow.release();
   }
-  if (options.save_state) write_state(*options.save_state, *state);
 
   memory.forget();
   Flow<D> flow(std::move(state));
-  flow.run(BenchOptions::kWarmUp, 0);
+  flow.run(kWarmUp, 0);
   const Counters before = flow.counters();
   std::vector<double> rates;
   Json repeats = Json::array();
   Stretch all;
   for (std::uint64_t r = 0; r < options.repeat; ++r) {
-    const Stretch stretch = flow.run(1, options.collisions);
-    rates.push_back(stretch.rate());
-    repeats.push_back({{"collisions", stretch.collisions}, {"seconds", stretch.seconds}});
+    Stretch stretch;
+    const double seconds = timed([&] { stretch = flow.run(1, options.collisions); });
+    rates.push_back(static_cast<double>(stretch.collisions) / seconds);
+    repeats.push_back({{"collisions", stretch.collisions}, {"seconds", seconds}});
     all.collisions += stretch.collisions;
     all.time += stretch.time;
   }
@@ -161,7 +187,7 @@ Json measure(std::unique_ptr<System<D>> state, const BenchOptions& options, Peak
       {"dimension", D},
       {"packing_fraction", filled},
       {"epoch", flow.epoch()},
-      {"equilibration_epochs", options.epochs_before()},
+      {"equilibration_epochs", options.equilibrate},
       {"equilibration_collisions", melting.collisions},
       {"collisions", all.collisions},
       {"collisions_per_second", spread(rates)},
@@ -180,19 +206,7 @@ Json measure(std::unique_ptr<System<D>> state, const BenchOptions& options, Peak
   };
 }
 
-template <int D>
-Json lattice_point(std::uint64_t n, double filled, const BenchOptions& options) {
-  PeakMemory memory;
-  return measure(lattice_state<D>(n, filled, kSeed), options, memory);
-}
-
-template <int D>
-Json file_point(const BenchOptions& options) {
-  PeakMemory memory;
-  return measure(read_state<D>(*options.state), options, memory);
-}
-
-std::string heading(const BenchOptions& options) {
+std::string heading(const Options& options) {
   return title() +
          fmt::format(
              "Hard spheres in a periodic box, free-flight, one core. Equilibrated for {} epochs of about forty mean "
@@ -200,7 +214,7 @@ std::string heading(const BenchOptions& options) {
              "then measured {} times over at least {} collisions (whole epochs). B/part.: peak resident memory above\n"
              "that before the state was made. Z = pV/NkT. Events, predictions and entries scheduled: a collision;\n"
              "cand.: pairs evaluated a prediction; dropped: entries of these that no longer held, a scheduled one.\n\n",
-             options.epochs_before(), options.repeat, options.collisions) +
+             options.equilibrate, options.repeat, options.collisions) +
          fmt::format("{:>8} {:>6} {:>12} {:>21} {:>7} {:>7} {:>9} {:>8} {:>7} {:>7} {:>6} {:>7} {:>7}\n", "N", "phi",
                      "collisions/s", "min .. max", "B/part.", "Z", "crossings", "rebuilds", "stale", "predict", "cand.",
                      "sched.", "dropped");
@@ -220,31 +234,16 @@ std::string row(const Json& point) {
 
 }  // namespace
 
-int bench_command(const BenchOptions& options) {
-  if (options.forces) {
-    bench_forces(options);
-    return 0;
-  }
-  if (options.save_state && !options.state && options.sizes().size() * options.packing_fraction.size() != 1)
-    throw Error(Failure::deck,
-                "--save-state: error: there are several states; give one --n and one --packing-fraction");
-  const int dimension = options.state ? state_dimension(*options.state) : options.dimension;
+void bench_events(const Options& options) {
   Json points = Json::array();
-  const auto add = [&](Json point) {
-    say(row(point));
-    points.push_back(std::move(point));
-    store(options, {{"points", points}});
-  };
   store(options, {{"points", points}});  // a file that cannot be written is better known before an hour of work
   say(heading(options));
-  if (options.state) {
-    add(dimension == 2 ? file_point<2>(options) : file_point<3>(options));
-  } else {
-    for (const std::uint64_t n : options.sizes())
-      for (const double filled : options.packing_fraction)
-        add(dimension == 2 ? lattice_point<2>(n, filled, options) : lattice_point<3>(n, filled, options));
-  }
-  return 0;
+  for (const std::uint64_t n : options.sizes())
+    for (const double filled : options.packing_fraction) {
+      points.push_back(options.dimension == 2 ? measure<2>(n, filled, options) : measure<3>(n, filled, options));
+      say(row(points.back()));
+      store(options, {{"points", points}});
+    }
 }
 
-}  // namespace carom
+}  // namespace carom::bench

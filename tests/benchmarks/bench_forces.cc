@@ -1,25 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/command/bench_forces.h"
-
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <functional>
 
+#include "bench.h"
 #include "engine/base/random.h"
 #include "engine/forces/forces.h"
 #include "engine/forces/simd/pair_kernels.h"
 #include "engine/run/simulation.h"
 #include "engine/slabs/path_hash.h"
-#include "io/command/bench_table.h"
-#include "io/deck/deck.h"
 
-namespace carom {
+namespace carom::bench {
 namespace {
-
-using namespace bench;
 
 constexpr double kDensity = 0.8442;
 constexpr double kDisplacement = 0.15;      // of particles from lattice sites, along each axis, at most
@@ -74,8 +70,7 @@ steps = {6}
 directory = "unused"
 )";
   const double edge = std::cbrt(static_cast<double>(n) / kDensity);
-  std::string deck = fmt::format(text, edge, n / 2, n - n / 2, kSeed, each.name, each.interaction, steps);
-  return read_deck("bench.toml", {}, [&](const std::filesystem::path&) { return std::optional(deck); });
+  return bench::deck_of(fmt::format(text, edge, n / 2, n - n / 2, kSeed, each.name, each.interaction, steps));
 }
 
 /// Each coordinate changed at random by up to `most`.
@@ -95,8 +90,7 @@ std::string checksum(const std::vector<Vec<3>>& vectors) {
 }
 
 /// One potential: passes over its pairs, in each vector width.
-void measure_pairs(const Case& each, std::uint64_t n, const BenchOptions& options,
-                   const std::function<void(Json)>& add) {
+void measure_pairs(const Case& each, std::uint64_t n, const Options& options, const std::function<void(Json)>& add) {
   Deck deck = deck_of(each, n, 1);
   const auto system = build_system<3>(deck);
   auto& x = system->particles.x;
@@ -109,7 +103,7 @@ void measure_pairs(const Case& each, std::uint64_t n, const BenchOptions& option
   MeanForces<3> mean_forces;
   for (const bool mean : {false, true}) {
     const char* const kind = mean ? "mean forces" : "forces";
-    if (options.kind && *options.kind != kind) continue;
+    if (!options.kind.empty() && options.kind != kind) continue;
     for (const PairKernels* kernels : available_pair_kernels()) {
       system->interactions[0]->use(*kernels);
       const auto pass = [&] {
@@ -126,9 +120,9 @@ void measure_pairs(const Case& each, std::uint64_t n, const BenchOptions& option
       std::vector<double> rates;
       Json repeats = Json::array();
       for (std::uint64_t r = 0; r < options.repeat; ++r) {
-        const auto start = Clock::now();
-        for (std::uint64_t k = 0; k < passes; ++k) pass();
-        const double seconds = seconds_since(start);
+        const double seconds = timed([&] {
+          for (std::uint64_t k = 0; k < passes; ++k) pass();
+        });
         rates.push_back(static_cast<double>(passes * pairs) / seconds);
         repeats.push_back({{"passes", passes}, {"seconds", seconds}});
       }
@@ -164,12 +158,13 @@ class StepClock final : public Observer<3> {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
   std::uint64_t steps_;
   std::vector<Clock::time_point> times_;
 };
 
 /// A Lennard-Jones crystal that melts.
-Json measure_steps(std::uint64_t n, const PairKernels& kernels, const BenchOptions& options) {
+Json measure_steps(std::uint64_t n, const PairKernels& kernels, const Options& options) {
   Deck deck = deck_of(kCases[0], n, kMelting + options.repeat * options.steps);
   auto system = build_system<3>(deck);
   system->interactions[0]->use(kernels);
@@ -196,7 +191,7 @@ Json measure_steps(std::uint64_t n, const PairKernels& kernels, const BenchOptio
           {"checksum", checksum(run.system().particles.x)}};
 }
 
-std::string pairs_heading(const BenchOptions& options) {
+std::string pairs_heading(const Options& options) {
   return fmt::format(
              "Forces of pairs within the cutoff 2.5 (wca: 1.12), one core, a periodic box at density {}. Positions: "
              "an\n"
@@ -215,7 +210,7 @@ std::string pairs_row(const Json& entry) {
                      rate["median"].get<double>() / 1e6, range(rate, 1e6));
 }
 
-std::string steps_heading(const BenchOptions& options) {
+std::string steps_heading(const Options& options) {
   return fmt::format(
              "\nA Lennard-Jones melt: verlet with step 0.004 from an fcc lattice at temperature 1.44, density {}, cut "
              "and\nshifted at 2.5, energies at each step. After {} steps measured {} times over {}.\n\n",
@@ -237,7 +232,7 @@ std::vector<std::string> bench_potentials() {
   return names;
 }
 
-void bench_forces(const BenchOptions& options) {
+void bench_forces(const Options& options) {
   pair_kernels();  // throws where CAROM_SIMD asks for what is not there
   Json results = {{"forces", Json::array()}, {"steps", Json::array()}};
   const auto add = [&](const char* table, Json entry, auto&& row) {
@@ -258,4 +253,4 @@ void bench_forces(const BenchOptions& options) {
       add("steps", measure_steps(n, *kernels, options), steps_row);
 }
 
-}  // namespace carom
+}  // namespace carom::bench
