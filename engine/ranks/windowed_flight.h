@@ -25,13 +25,6 @@
 
 namespace carom {
 
-/// When each particle had its last event in an epoch that is left off at `now`.
-struct Instants {
-  double now = 0;                         ///< since the start of the epoch [time]
-  std::vector<double> t;                  ///< of the last event
-  std::vector<std::uint16_t> generation;  ///< of that event
-};
-
 template <int D>
 class WindowedFlight {
  public:
@@ -42,14 +35,7 @@ class WindowedFlight {
                  std::function<double()> window = {});
 
   /// As EventCore::take(), load() and so on. Particles are this rank's block; contacts are reported on rank 0.
-  void take(Particles<D>& particles, const Vec<D>& g, double horizon) { take(particles, g, horizon, nullptr); }
-  /// Goes on in an epoch from what records() gave. Collective.
-  void go_on(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants& instants) {
-    take(particles, g, horizon, &instants);
-  }
-  /// The records of the particles of this rank's block as they are now: positions and velocities at their instants.
-  /// Collective.
-  void records(Particles<D>& particles, Instants& instants) const;
+  void take(Particles<D>& particles, const Vec<D>& g, double horizon);
   double run(double end, const Report& report);
   void fly_to(double time, Particles<D>& copies) const;
   void give_back(double time, Particles<D>& particles);
@@ -61,7 +47,6 @@ class WindowedFlight {
 
  private:
   IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(ranks_.size())}; }
-  void take(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants* instants);
   void make_subdomain(std::size_t subdomains);
   void measure_work();
   void collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const;

@@ -8,7 +8,6 @@
 //   set_hooks(from, deck, simulation, hooks);
 //   simulation.run(hooks);
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,11 +32,9 @@ struct Resumed {
   CheckpointHead head;
   std::string warning;     ///< about a later checkpoint that is damaged
   StepCount count;         ///< by which its steps are counted
-  bool in_epoch = false;   ///< it was left off within an epoch of free flight
   ThermoPoint reached;     ///< how far a run that is continued has come
   std::optional<Deck> of;  ///< of a branch: the deck of the run that it branches off
   bool same_motion = false;
-  std::map<std::string, Bytes> at_the_end;  ///< of a branch: the state at the end of that epoch
 
   bool is_branch() const { return of.has_value(); }
   bool is_continued() const { return !is_branch(); }

@@ -55,10 +55,7 @@ class Keeper {
   typename Simulation<D>::Hooks hooks(const Resumed* from) {
     typename Simulation<D>::Hooks hooks;
     hooks.should_stop = [this] { return should_stop(); };
-    hooks.pause = [this] {
-      asked_ = requests_.now(ranks_);
-      return asked_.checkpoint;
-    };
+    hooks.left = [this] { asked_ = requests_.now(ranks_); };
     hooks.leave = [this] {
       const Requests::Asked now = requests_.now_and_then(ranks_, kCallsWithinSteps);
       if (now.checkpoint) asked_ = now;  // where it need not stop it is written at the step's end
