@@ -10,8 +10,8 @@ namespace carom {
 
 namespace {
 
-constexpr std::size_t kPiece = std::size_t{1} << 30;  // bytes of one message, at most
-constexpr std::size_t kFirst = std::size_t{1} << 15;  // bytes that go with the first message among neighbours
+constexpr std::size_t kMostBytes = std::size_t{1} << 30;  // bytes of one message, at most
+constexpr std::size_t kFirst = std::size_t{1} << 15;      // bytes that go with the first message among neighbours
 enum Tag : int { data, fold, step, first };
 
 int bytes(std::size_t count) { return static_cast<int>(count); }
@@ -19,7 +19,7 @@ int bytes(std::size_t count) { return static_cast<int>(count); }
 /// Starts to send or receive a message in as many pieces as it takes.
 template <class Start>
 void in_pieces(std::size_t size, Start&& start) {
-  for (std::size_t at = 0; at < size; at += kPiece) start(at, bytes(std::min(kPiece, size - at)));
+  for (std::size_t at = 0; at < size; at += kMostBytes) start(at, bytes(std::min(kMostBytes, size - at)));
 }
 
 }  // namespace

@@ -47,11 +47,11 @@ class Guard {
 
  private:
   static void watch(const std::stop_token& over, double silence, const char* what) {
-    constexpr auto kBetweenLooks = std::chrono::milliseconds(100);
+    constexpr auto kTimeBetweenWaits = std::chrono::milliseconds(100);
     std::mutex mutex;
     std::unique_lock lock(mutex);
     for (Patience patience; patience.waited() <= silence;)
-      if (std::condition_variable_any().wait_for(lock, over, kBetweenLooks, [] { return false; });
+      if (std::condition_variable_any().wait_for(lock, over, kTimeBetweenWaits, [] { return false; });
           over.stop_requested())
         return;
     const char* rank = std::getenv("OMPI_COMM_WORLD_RANK");

@@ -20,8 +20,8 @@ namespace carom {
 /// One step of a stepping integrator; an epoch of free flight, or what is left of it.
 struct Slab {
   std::int64_t index = 0;  ///< of the step or epoch
-  double start = 0;   ///< simulated time at its start
-  double length = 0;  ///< > 0
+  double start = 0;        ///< simulated time at its start
+  double length = 0;       ///< > 0
   /// Free flight stops at this many pair collisions (counted by Counters::sphere_sphere from the start of the run).
   std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();
 };

@@ -31,11 +31,8 @@ class Bisection {
 
   /// A place as it is in the box. The others take such.
   Vec<D> wrapped(Vec<D> x) const {
-    for (int k = 0; k < D; ++k) {
-      if (!box_.periodic(k) || (x[k] >= 0 && x[k] < box_.edges[k])) continue;
-      x[k] -= std::floor(x[k] / box_.edges[k]) * box_.edges[k];
-      if (!(x[k] >= 0 && x[k] < box_.edges[k])) x[k] = 0;
-    }
+    Image<D> ignored{};
+    box_.wrap(x, ignored);
     return x;
   }
   /// The subdomain that a place belongs to.

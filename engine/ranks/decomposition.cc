@@ -15,7 +15,7 @@ namespace carom {
 namespace {
 
 constexpr std::int64_t kSlabs = 64;  // between divisions while all are known
-constexpr double kMost = 0.9;        // of all particles; a rank that would know more knows all
+constexpr double kMostKnown = 0.9;   // of all particles; a rank that would know more knows all
 
 }  // namespace
 
@@ -174,7 +174,7 @@ bool Decomposition<D>::migrate_to_those_near(double slab_length) {
   for (const Vec<D>& x : own) bisection.for_each_near(bisection.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
   const std::vector<std::uint64_t> mine = known;
   ranks_->sum(known);
-  if (static_cast<double>(std::ranges::max(known)) > kMost * static_cast<double>(total())) return false;
+  if (static_cast<double>(std::ranges::max(known)) > kMostKnown * static_cast<double>(total())) return false;
 
   const auto messages = ranks_->swap(
       pack(mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); }));

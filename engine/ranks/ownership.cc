@@ -44,7 +44,7 @@ std::vector<Slot> Ownership<D>::own() const {
 template <int D>
 void Ownership<D>::watch(double now) {
   unwatched_ = 0;
-  const double reach = bisection_->reach() + (kSlack + 1) * max_displacement_;
+  const double reach = bisection_->reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
   std::erase_if(watched_, [&](const Watched& each) { return role_[each.slot] != Role::ghost; });
   for (Slot i = 0; i < core_.flights().size(); ++i)
     if (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)

@@ -52,7 +52,7 @@ class Ownership {
 
  private:
   static constexpr double kUnknown = -1;
-  static constexpr double kSlack = 20;                        // windows between searches for spheres at the border
+  static constexpr double kWindowsBetweenSearches = 20;       // windows between searches for spheres at the border
   enum class Role : std::uint8_t { none, own, seen, ghost };  // none: no sphere; seen: own, and a ghost elsewhere
 
   struct Watched {
@@ -85,7 +85,7 @@ class Ownership {
 template <int D>
 template <class Deflected, class Send>
 void Ownership<D>::sort_out(double now, double length, Deflected&& deflected, Send&& send) {
-  if (unwatched_ += max_displacement_; unwatched_ > kSlack * max_displacement_) watch(now);
+  if (unwatched_ += max_displacement_; unwatched_ > kWindowsBetweenSearches * max_displacement_) watch(now);
   std::size_t stay = 0;
   for (Watched each : watched_) {
     const Slot i = each.slot;

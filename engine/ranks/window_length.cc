@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kCollisions = 0.3;                                   // of a sphere in a window, about
 constexpr double kMostDisplacement = 1.0, kLeastDisplacement = 0.02;  // in diameters
-constexpr double kFaster = 1.15;  // factor between the largest speed and the one allowed for
+constexpr double kSpeedFactor = 1.15;  // factor between the largest speed and the one allowed for
 
 /// The time in which a sphere collides kCollisions times, by Enskog's theory.
 template <int D>
@@ -41,7 +41,7 @@ void WindowLength<D>::start(const Box<D>& box, const Sizes& sizes, Communicator&
   for (const Vec<D>& v : block.v) fastest_ = std::max(fastest_, v.norm());
   ranks.largest({&fastest_, 1});
   if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(box, sizes, ranks, block);
-  fastest_ = kFaster * fastest_ + field_;
+  fastest_ = kSpeedFactor * fastest_ + field_;
   max_displacement_ =
       std::clamp(1.05 * pace_ * fastest_, kLeastDisplacement * diameter_, kMostDisplacement * diameter_);
 }
@@ -63,7 +63,7 @@ double WindowLength<D>::first_beyond(Subdomain<D>* subdomain, double now, double
     subdomain->for_each_touched([&](Slot i) { first = std::min(first, beyond_at(*subdomain, i, now, end)); });
   std::array<double, 2> worst{speed, -first};
   ranks.largest(worst);
-  if (worst[0] > fastest_) fastest_ = kFaster * worst[0];
+  if (worst[0] > fastest_) fastest_ = kSpeedFactor * worst[0];
   return -worst[1];
 }
 

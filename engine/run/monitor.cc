@@ -27,6 +27,8 @@ constexpr double kBlownUp = 1e10;
 constexpr double kMostJump = 1e-6;
 /// Depth over contact distance. The methods leave 1e-12; the box may be 10⁹ diameters long.
 constexpr double kDeepest = 1e-6;
+/// In place of an id, where the least of those of all ranks is looked for as the largest negative one.
+constexpr double kNoId = -std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -118,16 +120,15 @@ void Monitor<D>::guard(double energy_before, double magnitude_before) {
 /// Which particle is the fastest, for messages. Collective.
 template <int D>
 std::string Monitor<D>::fastest(const Particles<D>& state) const {
-  constexpr double kNone = -std::numeric_limits<double>::infinity();
-  double speed = -1, id = kNone;
+  double speed = -1, id = kNoId;
   for (Id i = 0; i < state.size(); ++i) {
-    const double each = state.v[i].norm(), finite = std::isfinite(each) ? each : -kNone;
+    const double each = state.v[i].norm(), finite = std::isfinite(each) ? each : -kNoId;
     if (!state.owns(i) || finite <= speed) continue;
     speed = finite;
     id = -static_cast<double>(state.id_of(i));
   }
   const double most = system_.decomposition.largest(speed);
-  id = -system_.decomposition.largest(speed == most ? id : kNone);
+  id = -system_.decomposition.largest(speed == most ? id : kNoId);
   return "particle " + short_text(id, 10) + " is the fastest, with a speed of " + short_text(most);
 }
 
@@ -186,10 +187,9 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest);
     if (deepest > kDeepest) {
       // Of pairs that overlap alike, and of ranks that see them, the one with the lowest ids.
-      constexpr double kNone = -std::numeric_limits<double>::infinity();
-      const double lo = -system_.decomposition.largest(own.depth == deepest ? -static_cast<double>(own.lo) : kNone);
+      const double lo = -system_.decomposition.largest(own.depth == deepest ? -static_cast<double>(own.lo) : kNoId);
       const bool here = own.depth == deepest && static_cast<double>(own.lo) == lo;
-      const double hi = -system_.decomposition.largest(here ? -static_cast<double>(own.hi) : kNone);
+      const double hi = -system_.decomposition.largest(here ? -static_cast<double>(own.hi) : kNoId);
       throw Error(Failure::numerical, "particles " + short_text(lo, 10) + " and " + short_text(hi, 10) +
                                           " overlap, by " + short_text(deepest) +
                                           " of their contact distance, at step " + std::to_string(s.steps) + ", time " +

@@ -17,9 +17,9 @@ constexpr double kLeastInterval = 1e-6;
 /// A flight without any pair collision that ends a run in an open box [longest edge].
 constexpr double kFarApart = 1e4;
 
-/// After so many collisions an epoch of free flight goes on in another slab: what is asked meanwhile, a checkpoint or to
-/// stop, waits for the slab's end. A million collisions take a second or two; to start a slab costs as much as a fifth
-/// of a collision for each particle, so 4 for each make it a twentieth.
+/// After so many collisions an epoch of free flight goes on in another slab: what is asked meanwhile, a checkpoint or
+/// to stop, waits for the slab's end. A million collisions take a second or two; to start a slab costs as much as a
+/// fifth of a collision for each particle, so 4 for each make it a twentieth.
 std::uint64_t most_collisions_a_slab(std::size_t particles) {
   return 4 * std::max<std::uint64_t>(particles, 1'000'000);
 }
@@ -279,9 +279,8 @@ Slab Simulation<D>::next_slab() const {
   slab.start = time_of(slab.index) + within_;
   slab.length = length_from(time_of(slab.index), plan_) - within_;
   if (!info_.stepping)
-    slab.collision_limit =
-        std::min(statistics_.counters.sphere_sphere + most_collisions_a_slab(system_->size()),
-                 plan_.collisions.value_or(std::numeric_limits<std::uint64_t>::max()));
+    slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_a_slab(system_->size()),
+                                    plan_.collisions.value_or(std::numeric_limits<std::uint64_t>::max()));
   return slab;
 }
 

@@ -11,7 +11,8 @@
 namespace carom {
 
 namespace {
-constexpr std::size_t kMostPairs = 10'000'000, kMostPartners = 200;  // a particle; more come from far too long a step
+constexpr std::size_t kMostListed = 10'000'000,
+                      kMostListedPartners = 200;  // a particle; more come from far too long a step
 
 double mean(const std::vector<double>& of) {
   return std::accumulate(of.begin(), of.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, of.size()));
@@ -100,7 +101,7 @@ bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
       if (d.squaredNorm() <= reach * reach) pairs_.push_back({i, j, image});
     });
     std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
-    if (pairs_.size() > kMostPairs + kMostPartners * x.size()) return false;
+    if (pairs_.size() > kMostListed + kMostListedPartners * x.size()) return false;
   }
   return true;
 }

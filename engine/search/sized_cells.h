@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "engine/search/cell_grid.h"
@@ -29,8 +30,7 @@ class SizedCells {
     }
     for (std::size_t o = 0; o < kOctaves; ++o)
       if (members[o] > 0)
-        levels_[o].emplace(largest[o],
-                           CellGrid<D>(box, 2 * largest[o] + skin, {members[o], extent.low, extent.high}));
+        levels_[o].emplace(largest[o], CellGrid<D>(box, 2 * largest[o] + skin, {members[o], extent.low, extent.high}));
   }
 
   void insert(Id i, const Vec<D>& x, double reach) {
@@ -51,7 +51,7 @@ class SizedCells {
  private:
   static constexpr std::size_t kOctaves = 8;  // the last holds all that is smaller
   static constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
-  static constexpr double kMostCells = 1 << 28;  // what a cell number can hold
+  static constexpr double kLargestNumber = 1 << 28;  // what a cell number can hold
 
   struct Level {
     Level(double reach, const CellGrid<D>& cells) : largest(reach), grid(cells), first(cells.cells(), kNobody) {}
@@ -76,7 +76,8 @@ class SizedCells {
     Cell<D> range, row;
     bool inside = true;
     for (int k = 0; k < D; ++k) {
-      range[k] = std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid.edge(k) - 1e-9), kMostCells)));
+      range[k] =
+          std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid.edge(k) - 1e-14), kLargestNumber)));
       row[k] = centre[k] - range[k];
       inside = inside && row[k] >= 0 && centre[k] < grid.count(k) - range[k];
     }

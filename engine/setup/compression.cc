@@ -12,8 +12,8 @@ namespace carom {
 namespace {
 
 constexpr double kFull = 1 + 1e-13;      // the factor aimed at: touching by rounding is not overlapping
-constexpr double kShare = 0.1;           // of the free volume that a slab takes, …
-constexpr double kLongest = 10;          // … and its length at most, in diameters at the thermal speed
+constexpr double kVolumeShare = 0.1;     // of the free volume that a slab takes, …
+constexpr double kLongestSlab = 10;      // … and its length at most, in diameters at the thermal speed
 constexpr double kJammedPressure = 300;  // from here on free-volume theory predicts where the spheres jam …
 constexpr double kTooFar = 5;            // … and a target so many times farther away is out of reach
 
@@ -83,7 +83,7 @@ class Compressor {
     const double diameter = 2 * result_.factor * largest_;
     const double growth = options_.growth_rate / (diameter * result_.reduced_pressure);
     const double to_the_end = (kFull / result_.factor - 1) / growth;
-    const double length = std::min(diameter * std::min(kShare / options_.growth_rate, kLongest), to_the_end);
+    const double length = std::min(diameter * std::min(kVolumeShare / options_.growth_rate, kLongestSlab), to_the_end);
     // Ten times what the last rate predicts: more come where the spheres jam on the way.
     const double expected = 100 + 10 * collision_rate_ * length;
     const double most = n * std::min(expected, 1 + options_.max_collisions - result_.collisions);

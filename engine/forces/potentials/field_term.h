@@ -68,7 +68,7 @@ class FieldTerm final : public Interaction<D> {
     else
       return nullptr;
   }
-  ForceScale scale(double distance) const override { return {kShare * field_.least_force(distance), 0}; }
+  ForceScale scale(double distance) const override { return {kQuantumShare * field_.least_force(distance), 0}; }
   bool keeps_momentum() const override { return false; }
   std::unique_ptr<Interaction<D>> among(const Particles<D>& some) const override {
     return std::make_unique<FieldTerm>(some, field_.among(some));
@@ -77,7 +77,7 @@ class FieldTerm final : public Interaction<D> {
   double reach(const Particles<D>&, Communicator&) const override { return 0; }
 
  private:
-  static constexpr double kShare = 0x1p-8;  // so that accelerations of light particles keep their digits
+  static constexpr double kQuantumShare = 0x1p-8;  // so that accelerations of light particles keep their digits
 
   const Particles<D>& particles_;
   Field field_;

@@ -98,16 +98,16 @@ PairFilter filter(std::string_view type, const Parameters& parameters, const Int
 /// The least contact distance of the pairs between which a term acts [length]; 0 where there are none. Collective.
 template <int D>
 double least_contact(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr double kNoContact = std::numeric_limits<double>::infinity();
   const SpeciesPair species = species_pair(type, parameters, context.species);
   const auto& radius = context.particles.radius;
-  std::array<double, 2> least = {-kNone, -kNone};  // radius of either species, negative
+  std::array<double, 2> least = {-kNoContact, -kNoContact};  // radius of either species, negative
   for (Id i = 0; i < radius.size(); ++i)
     for (std::size_t k = 0; k < 2; ++k)
       if (!species || context.particles.species[i] == (*species)[k]) least[k] = std::max(least[k], -radius[i]);
   if (context.ranks) context.ranks->largest(least);
   const double contact = -least[0] - least[1];
-  return contact < kNone ? contact : 0;
+  return contact < kNoContact ? contact : 0;
 }
 
 /// A term over the pairs of a source, with the scale of the potential before it was cut.

@@ -200,7 +200,7 @@ bool collect(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
 
 /// Adds the words to the sums of both particles.
 template <int W>
-void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums) {
+void scatter(const PairBatch& batch, const std::int64_t (*words)[PairBatch::kReadable], ForceWords* sums) {
   constexpr std::size_t L = W == 2 ? 2 : 4, kParts = 4 / L;  // a record is no wider
   using I = IntegerOf<typename Width<L>::Double>;
   for (unsigned r = 0; r < batch.rows; ++r) {

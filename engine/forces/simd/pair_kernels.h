@@ -46,16 +46,16 @@ struct PairCursor {
 };
 
 struct PairBatch {
-  static constexpr unsigned kCapacity = 256, kRoom = kCapacity + 8;  ///< pairs; numbers that can be read
+  static constexpr unsigned kCapacity = 256, kReadable = kCapacity + 8;  ///< pairs; numbers that can be read
   struct Row {
     std::uint32_t row, begin;  ///< pairs from `begin` to that of the next row have this first particle
   };
 
-  alignas(64) double d[3][kRoom];      ///< separation, first minus second
-  alignas(64) double d_new[3][kRoom];  ///< the new one, or the difference of vectors
-  alignas(64) double weight[kRoom];
-  alignas(64) std::int64_t low[3][kRoom];   ///< force on the first, in quanta
-  alignas(64) std::int64_t high[3][kRoom];  ///< where it took two words
+  alignas(64) double d[3][kReadable];      ///< separation, first minus second
+  alignas(64) double d_new[3][kReadable];  ///< the new one, or the difference of vectors
+  alignas(64) double weight[kReadable];
+  alignas(64) std::int64_t low[3][kReadable];   ///< force on the first, in quanta
+  alignas(64) std::int64_t high[3][kReadable];  ///< where it took two words
   std::uint32_t second[kCapacity + 16];
   Row row[kCapacity + 1];
   unsigned n = 0, rows = 0;
@@ -131,7 +131,7 @@ struct PairKernels {
   /// Fills a batch; false where the list is at its end and the batch empty.
   bool (*collect)(const PairRows&, PairCursor&, PairBatch&);
   /// Adds the words of a batch to the sums of both particles.
-  void (*scatter)(const PairBatch&, const std::int64_t (*words)[PairBatch::kRoom], ForceWords* sums);
+  void (*scatter)(const PairBatch&, const std::int64_t (*words)[PairBatch::kReadable], ForceWords* sums);
   void (*find)(const PartnerSearch&, std::uint32_t begin, std::uint32_t end, PartnersFound&);
   const PairFormula* formulas;  ///< of each of PairPotentials
 };

@@ -93,7 +93,7 @@ TEST(PairSums, AreOfTheKernelsThatAreToBeUsed) {
     };
     const auto expected = forces();
     PairKernels broken = pair_kernels();
-    broken.scatter = [](const PairBatch&, const std::int64_t(*)[PairBatch::kRoom], ForceWords*) {};
+    broken.scatter = [](const PairBatch&, const std::int64_t(*)[PairBatch::kReadable], ForceWords*) {};
     term.use(broken);
     EXPECT_TRUE(forces() == (term.keeps_momentum() ? Quanta<3>(x.size()) : expected));  // fields have no kernels
     for (const PairKernels* kernels : available_pair_kernels()) {
