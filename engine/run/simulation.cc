@@ -18,11 +18,9 @@ constexpr double kLeastInterval = 1e-6;
 constexpr double kFarApart = 1e4;
 
 /// After so many collisions an epoch of free flight goes on in another slab: what is asked meanwhile, a checkpoint or
-/// to stop, waits for the slab's end. A million collisions take a second or two; to start a slab costs as much as a
-/// fifth of a collision for each particle, so 4 for each make it a twentieth.
-std::uint64_t most_collisions_a_slab(std::size_t particles) {
-  return 4 * std::max<std::uint64_t>(particles, 1'000'000);
-}
+/// to stop, waits for the slab's end. Half a million collisions take less than a second. To start a slab costs as much
+/// as a fifth of a collision for each particle, a twentieth of what four collisions for each cost.
+std::uint64_t most_collisions_a_slab(std::size_t particles) { return std::max<std::uint64_t>(500'000, 4 * particles); }
 
 template <int D>
 void check_spheres(const System<D>& system) {
@@ -111,7 +109,6 @@ void Simulation<D>::begin(const Hooks& hooks) {
   const auto divide = [&] { return decomposition.divide(info_.local, plan_.step, info_.hard_cores); };
   const auto make_monitor = [&] {
     monitor_ = std::make_unique<Monitor<D>>(*system_, info_, plan_, observers_, s);
-    system_->fields.add_value("within epoch", within_);
     system_->fields.add_value("quiet since", quiet_since_);
     system_->fields.add_value("step count", count_);
   };
@@ -156,10 +153,11 @@ void Simulation<D>::run(const Hooks& hooks) {
     s.wall_seconds = seconds_before + std::chrono::duration<double>(elapsed).count();
   };
   std::vector<Contact<D>> contacts;
-  const auto show_contacts = [&](double start) {
+  const auto show_contacts = [&](const Slab& slab) {
     if (!plan_.events) return;
     const Stopwatch stopwatch(s.counters.seconds.output);
-    for (auto* observer : observers_) observer->contacts(start, contacts);
+    for (auto& contact : contacts) contact.key.time += count_.within;
+    for (auto* observer : observers_) observer->contacts(time_of(slab.index), contacts);
     contacts.clear();
   };
   for (;;) {
@@ -179,7 +177,7 @@ void Simulation<D>::run(const Hooks& hooks) {
                          .observe = due,
                          .observer =
                              [&](double offset, const Particles<D>& copies) {
-                               show_contacts(slab.start);  // rows and events are written together
+                               show_contacts(slab);  // rows and events are written together
                                monitor_->observe(slab.start + offset, copies);
                              },
                          .watch = &watch};
@@ -188,24 +186,24 @@ void Simulation<D>::run(const Hooks& hooks) {
       if (hooks.left) hooks.left();
       continue;
     }
-    show_contacts(slab.start);
+    show_contacts(slab);
     s.counters.seconds.communicate = system_->decomposition.seconds_waited();
     last_collisions_ = s.counters.sphere_sphere - collisions;
     if (*last_collisions_ > 0) quiet_since_ = slab.start + report.reached;
 
     const double step = length_from(time_of(slab.index), plan_);
     if (report.reached < slab.length) {
-      const double within = within_ + report.reached;
+      const double within = count_.within + report.reached;
       s.end_time = time_of(slab.index) + within;
       if (finished())
         ++s.steps;
       else
-        within_ = within;
+        count_.within = within;
     } else {
       // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
       ++s.steps;
       s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
-      within_ = 0;
+      count_.within = 0;
     }
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
@@ -263,7 +261,7 @@ bool Simulation<D>::is_last_on_the_way() const {
   const Statistics& s = statistics_;
   const Slab next = next_slab();
   // A slab that meets an end may be shorter or longer than a step by rounding alone.
-  const bool whole = s.end_time == next.start && (s.steps == s.start_steps || within_ > 0 ||
+  const bool whole = s.end_time == next.start && (s.steps == s.start_steps || count_.within > 0 ||
                                                   length_from(time_of(s.steps - 1), plan_) == plan_.step);
   if (!whole) return false;
   if (finished() || length_from(time_of(s.steps), plan_) != plan_.step) return true;
@@ -276,8 +274,8 @@ template <int D>
 Slab Simulation<D>::next_slab() const {
   Slab slab;
   slab.index = statistics_.steps;
-  slab.start = time_of(slab.index) + within_;
-  slab.length = length_from(time_of(slab.index), plan_) - within_;
+  slab.start = time_of(slab.index) + count_.within;
+  slab.length = length_from(time_of(slab.index), plan_) - count_.within;
   if (!info_.stepping)
     slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_a_slab(system_->size()),
                                     plan_.collisions.value_or(std::numeric_limits<std::uint64_t>::max()));

@@ -113,6 +113,8 @@ struct Statistics {
 struct StepCount {
   std::int64_t steps = 0;
   double time = 0;
+  /// How far an epoch of free flight has come that took more collisions than one slab may [time].
+  double within = 0;
 };
 
 template <int D>
@@ -202,8 +204,7 @@ class Simulation {
   std::vector<Observer<D>*> observers_;
   Statistics statistics_;
   StepCount count_;
-  double within_ = 0;       // how far an epoch has come that took too many collisions for one slab [time]
-  double quiet_since_ = 0;  // the last slab with pair collisions
+  double quiet_since_ = 0;                        // the last slab with pair collisions
   std::optional<std::uint64_t> last_collisions_;  // of the last slab, where it was flown here
   std::unique_ptr<Monitor<D>> monitor_;           // from the first run() on
   std::size_t first_of_integrator_ = 0;           // its entries among Fields::of_run()

@@ -65,12 +65,12 @@ void check_end(const Deck& deck, const Deck& before, const Resumed& from) {
 /// How far a run has come: its checkpoint, or its last row, which may be later.
 ThermoPoint reached_by(const Checkpoint& checkpoint, const std::filesystem::path& directory) {
   Statistics statistics;
-  double within = 0;
+  StepCount count;
   Archive(checkpoint.read("statistics"))(statistics);
-  Archive(checkpoint.read("within epoch"))(within);
+  Archive(checkpoint.read("step count"))(count);
   const ThermoPoint row = last_thermo_point(directory / run_file::thermo);
   ThermoPoint reached{std::max(row.time, statistics.end_time),
-                      std::max(row.step, statistics.steps + (within > 0 ? 1 : 0)),  // what has begun is completed
+                      std::max(row.step, statistics.steps + (count.within > 0 ? 1 : 0)),  // what has begun is completed
                       std::max(row.collisions, statistics.counters.sphere_sphere)};
   // Free flight would have ended at the last collision, before the state.
   if (!find_integrator(checkpoint.head().integrator).stepping) ++reached.collisions;
@@ -194,8 +194,9 @@ void set_hooks(const Resumed& from, const Deck& deck, Simulation<D>& simulation,
     hooks.restore = [&from, &simulation] { restore_state(simulation.system(), from.reader()); };
   if (from.is_continued()) return;
   const StepCount start{from.head.step, from.head.time}, &count = from.count;
-  const bool counted = deck.plan.step == from.of->plan.step &&
-                       start.time == count.time + static_cast<double>(start.steps - count.steps) * deck.plan.step;
+  const double step = deck.plan.step;
+  const bool counted = step == from.of->plan.step &&
+                       start.time == count.time + static_cast<double>(start.steps - count.steps) * step + count.within;
   hooks.branch = {start, counted ? count : start};
 }
 
