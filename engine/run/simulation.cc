@@ -17,11 +17,6 @@ constexpr double kLeastInterval = 1e-6;
 /// A flight without any pair collision that ends a run in an open box [longest edge].
 constexpr double kFarApart = 1e4;
 
-/// After so many collisions an epoch of free flight goes on in another slab: what is asked meanwhile, a checkpoint or
-/// to stop, waits for the slab's end. Half a million collisions take less than a second. To start a slab costs as much
-/// as a fifth of a collision for each particle, a twentieth of what four collisions for each cost.
-std::uint64_t most_collisions_a_slab(std::size_t particles) { return std::max<std::uint64_t>(500'000, 4 * particles); }
-
 template <int D>
 void check_spheres(const System<D>& system) {
   const auto radii = system.decomposition.radii();
@@ -276,9 +271,11 @@ Slab Simulation<D>::next_slab() const {
   slab.index = statistics_.steps;
   slab.start = time_of(slab.index) + count_.within;
   slab.length = length_from(time_of(slab.index), plan_) - count_.within;
-  if (!info_.stepping)
-    slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_a_slab(system_->size()),
-                                    plan_.collisions.value_or(std::numeric_limits<std::uint64_t>::max()));
+  if (!info_.stepping) {
+    const std::uint64_t most = plan_.slab_collisions.value_or(std::max<std::uint64_t>(500'000, 4 * system_->size()));
+    slab.collision_limit =
+        std::min(statistics_.counters.sphere_sphere + most, plan_.collisions.value_or(slab.collision_limit));
+  }
   return slab;
 }
 

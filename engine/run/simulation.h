@@ -30,6 +30,10 @@ struct Plan {
   double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
   double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
   bool events = false;         ///< pass every contact on to the observers
+  /// After so many collisions an epoch of free flight goes on in another slab: what is asked meanwhile, a checkpoint or
+  /// to stop, waits for the slab's end. Absent: 500 000, which take less than a second, or 4N where that is more. To
+  /// start a slab costs a fifth of a collision for each particle, a twentieth of what four collisions for each cost.
+  std::optional<std::uint64_t> slab_collisions{};
 
   double slack() const { return 1e-9 * step; }  ///< due times and ends are met up to this [time]
 };
