@@ -260,9 +260,9 @@ bool Simulation<D>::is_last_on_the_way() const {
                                                   length_from(time_of(s.steps - 1), plan_) == plan_.step);
   if (!whole) return false;
   if (finished() || length_from(time_of(s.steps), plan_) != plan_.step) return true;
-  // Free flight ends within a slab at its last collision. How many collisions a slab has is known from the last one.
-  if (info_.stepping || !plan_.collisions) return false;
-  return !last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions;
+  // Free flight ends within a slab, at its last collision; how many a slab has is known from the one before.
+  return plan_.collisions && next.collision_limit == *plan_.collisions &&
+         (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
 }
 
 template <int D>

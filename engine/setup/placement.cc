@@ -187,19 +187,10 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
   Overlaps found;
   SizedCells<D> cells(box, radius, Extent<D>(x));
   const GapTolerance tolerance = box.gap_tolerance();
-  double worst = 1;
   for (Id i = 0; i < x.size(); ++i) {
     const auto look = [&](Id j, const Image<D>& image) {
       const double distance = (x[i] - x[j] + box.shift(image)).norm(), contact = radius[i] + radius[j];
-      if (distance >= contact - tolerance(contact)) return;
-      ++found.pairs;
-      const bool tie = distance / contact == worst && found.hi == i && j < found.lo;
-      if (distance / contact >= worst && !tie) return;
-      worst = distance / contact;
-      found.lo = j;
-      found.hi = i;
-      found.distance = distance;
-      found.contact = contact;
+      if (distance < contact - tolerance(contact)) found.add({1, j, i, distance, contact});
     };
     if (beyond.empty() || beyond[i] == 0) cells.for_each_near(x[i], radius[i], look);
     cells.insert(i, x[i], radius[i]);

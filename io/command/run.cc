@@ -44,11 +44,11 @@ constexpr std::uint64_t kCallsWithinSteps = 32;
 
 /// What the ranks do alike while a run goes on: stop or write checkpoints when they are asked to.
 template <int D>
-class Keeper {
+class RunControl {
  public:
   /// `head`: that of the next checkpoint, on rank 0.
-  Keeper(Simulation<D>& simulation, const Deck& deck, Communicator& ranks, Requests& requests,
-         std::function<CheckpointHead()> head)
+  RunControl(Simulation<D>& simulation, const Deck& deck, Communicator& ranks, Requests& requests,
+             std::function<CheckpointHead()> head)
       : simulation_(simulation), deck_(deck), ranks_(ranks), requests_(requests), head_(std::move(head)) {
     requests_.set_interval(deck.output.checkpoint_wall);
   }
@@ -136,7 +136,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     simulation.add(table);
     if (!options.quiet) simulation.add(progress);
     const auto bonds = from ? from->head.bonds : found_bonds(deck, simulation.system());
-    Keeper<D> keeper(simulation, deck, at_work, requests, [&] {
+    RunControl<D> control(simulation, deck, at_work, requests, [&] {
       return CheckpointHead{.deck = deck.toml_text,
                             .deck_file = deck.file.string(),
                             .version = version_string(),
@@ -152,7 +152,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
                             .warnings = deck.warnings,
                             .branched_from = outcome.branched_from};
     });
-    simulation.run(keeper.hooks(from));
+    simulation.run(control.hooks(from));
     progress.end_line();
     table.finish();
     const auto accounts = accounts_of_all(at_work, statistics);
@@ -193,14 +193,14 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
 template <int D>
 int run_beside(Deck& deck, Communicator& at_work, Requests& requests, Resumed* from) {
   auto simulation = simulation_of<D>(deck, at_work, from);
-  std::vector<Onlooker<D>> onlookers;
+  std::vector<SamplingTimes<D>> others;
   for (const auto& [info, parameters] : deck.output.observables)
-    onlookers.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
-  for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
+    others.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
+  for (SamplingTimes<D>& times : others) simulation.add(times);
   BlockSender<D> sender(at_work, simulation.system(), from == nullptr || from->is_branch());
   simulation.add(sender);
-  Keeper<D> keeper(simulation, deck, at_work, requests, {});
-  simulation.run(keeper.hooks(from));
+  RunControl<D> control(simulation, deck, at_work, requests, {});
+  simulation.run(control.hooks(from));
   accounts_of_all(at_work, simulation.statistics());
   return simulation.statistics().stopped_early ? kStoppedEarly : kDone;
 }
