@@ -125,7 +125,11 @@ void Simulation<D>::begin(const Hooks& hooks) {
     if (info_.smooth_forces) divide();
     s.stopped_early = false;
   }
-  if (again) return;
+  if (again) {
+    // The last slab was shortened by the end that the run had.
+    if (s.end_time != next_slab().start) count_ = {s.steps, s.end_time};
+    return;
+  }
   if (hooks.branch) {
     count_ = hooks.branch->from;
     s.start_steps = s.steps = hooks.branch->start.steps;

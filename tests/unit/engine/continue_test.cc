@@ -267,6 +267,35 @@ TEST(Continue, AStateOfAnotherNumberOfParticlesIsRefused) {
     }
 }
 
+/// The same simulation runs again, to a later end.
+TEST(Continue, RunAgain) {
+  for (const Scene<3>& scene : {yukawa("psa"), yukawa("edda"), fluid(), fluid(40)}) {
+    SCOPED_TRACE(scene.method);
+    Plan early = scene.plan, late = scene.plan;
+    early.end_time.reset(), late.end_time.reset();
+    early.steps = 2, late.steps = 5;
+    const auto whole = test::make_run<3>(scene.make(), scene.method, late, scene.given);
+    const auto parts = test::make_run<3>(scene.make(), scene.method, early, scene.given);
+    whole->run();
+    parts->run();
+    EXPECT_EQ(parts->statistics().steps, 2);
+    parts->extend(late);
+    parts->run();
+    EXPECT_EQ(parts->system().particles.x, whole->system().particles.x);
+    EXPECT_EQ(parts->system().particles.v, whole->system().particles.v);
+    test::expect_same(whole->statistics(), parts->statistics());
+    // From an end that no step meets it goes on by steps from there.
+    late.steps.reset(), late.end_time = 6.5 * late.step;
+    parts->extend(late);
+    parts->run();
+    late.end_time = 7.5 * late.step;
+    parts->extend(late);
+    parts->run();
+    EXPECT_EQ(parts->statistics().end_time, late.end_time);
+    EXPECT_EQ(parts->statistics().steps, 8);
+  }
+}
+
 /// A run with a later end goes on as if it had had that end from the start.
 TEST(Continue, ALaterEnd) {
   std::vector<std::pair<Scene<3>, std::array<Plan, 2>>> cases;
