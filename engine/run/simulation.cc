@@ -275,11 +275,9 @@ Slab Simulation<D>::next_slab() const {
   slab.index = statistics_.steps;
   slab.start = time_of(slab.index) + count_.within;
   slab.length = length_from(time_of(slab.index), plan_) - count_.within;
-  if (!info_.stepping) {
-    const std::uint64_t most = plan_.slab_collisions.value_or(std::max<std::uint64_t>(500'000, 4 * system_->size()));
-    slab.collision_limit =
-        std::min(statistics_.counters.sphere_sphere + most, plan_.collisions.value_or(slab.collision_limit));
-  }
+  if (!info_.stepping)
+    slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_,
+                                    plan_.collisions.value_or(slab.collision_limit));
   return slab;
 }
 

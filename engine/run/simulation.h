@@ -8,6 +8,7 @@
 //
 // Observing changes nothing: observers get copies, and no due time cuts a slab.
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -30,10 +31,6 @@ struct Plan {
   double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
   double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
   bool events = false;         ///< pass every contact on to the observers
-  /// After so many collisions an epoch of free flight goes on in another slab: what is asked meanwhile, a checkpoint or
-  /// to stop, waits for the slab's end. Absent: 500 000, which take less than a second, or 4N where that is more. To
-  /// start a slab costs a fifth of a collision for each particle, a twentieth of what four collisions for each cost.
-  std::optional<std::uint64_t> slab_collisions{};
 
   double slack() const { return 1e-9 * step; }  ///< due times and ends are met up to this [time]
 };
@@ -170,6 +167,10 @@ class Simulation {
   void run(const Hooks& hooks);
   void run(const std::function<bool()>& should_stop = {}) { run(Hooks{.should_stop = should_stop}); }
 
+  /// After so many collisions an epoch of free flight goes on in another slab: what is asked meanwhile, a checkpoint or
+  /// to stop, waits for the slab's end. To begin with 500 000, which take less than a second, or 4N where that is more:
+  /// to start a slab costs a fifth of a collision for each particle, a twentieth of what 4N collisions cost.
+  void limit_slabs(std::uint64_t collisions) { most_collisions_ = collisions; }
   /// Another end for the next run(); step and intervals stay those of the first plan.
   void extend(const Plan& end);
 
@@ -208,7 +209,8 @@ class Simulation {
   std::vector<Observer<D>*> observers_;
   Statistics statistics_;
   StepCount count_;
-  double quiet_since_ = 0;                        // the last slab with pair collisions
+  double quiet_since_ = 0;  // the last slab with pair collisions
+  std::uint64_t most_collisions_ = std::max<std::uint64_t>(500'000, 4 * system_->size());  // in a slab of an epoch
   std::optional<std::uint64_t> last_collisions_;  // of the last slab, where it was flown here
   std::unique_ptr<Monitor<D>> monitor_;           // from the first run() on
   std::size_t first_of_integrator_ = 0;           // its entries among Fields::of_run()

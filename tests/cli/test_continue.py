@@ -102,7 +102,7 @@ def test_a_finished_run_ends_at_once(tmp_path):
 
 def spheres(tmp_path, collisions):
     """A deck of free flight with long epochs, in which rows come soon."""
-    text = SPHERES.replace("end_time = 3.0", f"collisions = {collisions}").replace('type = "free-flight"', 'type = "free-flight"\nstep = 1000.0')
+    text = SPHERES.replace("end_time = 3.0", f"collisions = {collisions}").replace('type = "free-flight"', 'type = "free-flight"\nstep = 4000.0')
     return write_deck(tmp_path, text.replace("thermo_interval = 0.1", "thermo_interval = 20.0").replace("frame_interval = 0.5", "frame_interval = 50.0"))
 
 

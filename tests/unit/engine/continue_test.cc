@@ -58,6 +58,13 @@ struct Scene {
   std::string method;
   Plan plan;
   Given given{};
+  std::optional<std::uint64_t> slab_collisions{};
+
+  std::unique_ptr<Simulation<D>> run_of(std::unique_ptr<System<D>> system, const Plan& its) const {
+    auto simulation = test::make_run<D>(std::move(system), method, its, given);
+    if (slab_collisions) simulation->limit_slabs(*slab_collisions);
+    return simulation;
+  }
 };
 
 /// When a run is left off: at the n-th question.
@@ -84,7 +91,7 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
     auto system = scene.make();
     if (ranks > 0) system->decomposition.join(exchange);
     const bool first = exchange.rank() == 0;
-    auto simulation = test::make_run<D>(std::move(system), scene.method, plan, scene.given);
+    auto simulation = scene.run_of(std::move(system), plan);
     System<D>& state_of = simulation->system();
     const auto read = [&](const std::string& name) { return from->at(name); };
     if (from) restore_particles(state_of, read);
@@ -200,12 +207,9 @@ TEST(Continue, MethodsThatCutTheStepOfAll) {
 Scene<3> fluid(std::optional<std::uint64_t> slab_collisions = {}) {
   return {[] { return test::hard_spheres<3>(6, 0.35); },
           "free-flight",
-          {.step = 0.4,
-           .end_time = 2.2,
-           .frame_interval = 0.3,
-           .thermo_interval = 0.11,
-           .events = true,
-           .slab_collisions = slab_collisions}};
+          {.step = 0.4, .end_time = 2.2, .frame_interval = 0.3, .thermo_interval = 0.11, .events = true},
+          {},
+          slab_collisions};
 }
 TEST(Continue, FreeFlightBetweenEpochs) { compare<3>(fluid(), kRanks, {1, 3}); }
 TEST(Continue, FreeFlightWithinEpochs) { compare<3>(fluid(40), kRanks, {1, 3, 5}); }
@@ -274,8 +278,8 @@ TEST(Continue, RunAgain) {
     Plan early = scene.plan, late = scene.plan;
     early.end_time.reset(), late.end_time.reset();
     early.steps = 2, late.steps = 5;
-    const auto whole = test::make_run<3>(scene.make(), scene.method, late, scene.given);
-    const auto parts = test::make_run<3>(scene.make(), scene.method, early, scene.given);
+    const auto whole = scene.run_of(scene.make(), late);
+    const auto parts = scene.run_of(scene.make(), early);
     whole->run();
     parts->run();
     EXPECT_EQ(parts->statistics().steps, 2);
