@@ -2,9 +2,9 @@
 // cdda: the whole step is cut at each collision; each piece is a discrete-gradient step, exact in energy for any
 // length.
 //
-// The collision time τ* is where the piece *of size τ** ends in contact. It is sought as the zero of c(τ) − τ, c(τ) the
-// first contact on the chord of the piece of size τ, by secants inside a bracket: shorter pieces end without a contact,
-// longer ones beyond one. Whatever piece is accepted in the end, its energy is exact; the search decides only the gap.
+// The collision time τ* is the length of the piece that ends in contact. It is the zero of c(τ) − τ, where c(τ) is the
+// first contact on the chord of the piece of length τ. A bracketed secant method finds it: shorter pieces end before
+// the contact, longer ones beyond it. The energy of any accepted piece is exact; the search determines only the gap.
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@
 namespace carom::integrator {
 namespace {
 
-/// A step that would not converge in so many equal pieces ends the run.
+/// A step that does not converge in this many equal pieces ends the run.
 constexpr int kMostPieces = 1 << 14;
 
 template <int D>
@@ -60,7 +60,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
         continue;
       }
       ended = tau == rest;
-      if (!ended && done + tau == done) scan_->count_event(violator_);  // there must be an end to pieces without length
+      if (!ended && done + tau == done) scan_->count_event(violator_);  // limits the number of pieces of length zero
       std::ranges::copy(piece_->x(), p.x.begin());
       std::ranges::copy(piece_->v(), p.v.begin());
       scan_->remember();
@@ -73,14 +73,14 @@ class CollisionDiscreteDerivative : public Integrator<D> {
 
  private:
   /// Leaves in piece_ the longest piece from p, at most `rest`, that ends before or in the first contact; returns its
-  /// length, 0 where the solver does not converge.
+  /// length, or 0 if the solver does not converge.
   double find_piece(const Particles<D>& p, double rest) {
     PieceEnd<D> end = solve(p, rest);
     if (!end.converged) return 0;
     if (!end.violates) return rest;
     double lo = 0, hi = rest, tau = rest, last_tau = 0, last_miss = 0;
     violator_ = end.violator;
-    bool known = false;  // a point for the secant
+    bool known = false;  // last_tau and last_miss are
     for (int iteration = 0; hi - lo > 4 * std::numeric_limits<double>::epsilon() * rest; ++iteration) {
       const double miss = end.contact - tau;
       double next = end.contact;
@@ -106,7 +106,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
         lo = tau;
       }
     }
-    // The bracket has closed on a jump: a grazing contact that comes and goes with τ. The piece before it stands.
+    // The bracket has closed on a jump: a grazing contact that exists for some τ only. The piece before it is accepted.
     if (lo == 0)
       throw Error(Failure::numerical, partners(violator_) +
                                           " meet at once, however short the step; "
@@ -132,7 +132,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   std::optional<ContactScan<D>> scan_;
   std::optional<DiscreteGradient<D>> piece_;
   std::optional<ChordContacts<D>> contacts_;
-  EventKey<D> violator_{};  // of the contact that limits the last piece
+  EventKey<D> violator_{};  // the contact that limits the last piece
   Counters* counters_ = nullptr;
   SlabWatch* watch_ = nullptr;
 };

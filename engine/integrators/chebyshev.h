@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Fixed-point iterations that contract slowly, made faster by what is known of their spectrum.
+// Acceleration of slowly contracting fixed-point iterations with a known spectrum.
 //
-// The sweeps of a discrete-gradient slab of length h are a ← F(a) with F′ ≈ −h²ω²/4 for a mode of frequency ω. Where
+// The sweeps of a discrete-gradient slab of length h are a ← F(a) with F′ ≈ −h²ω²/4 for a mode of frequency ω. If
 // the largest λ = h²ω²/4 is known, Chebyshev's semi-iteration for eigenvalues 1 … 1 + λ of I − F′,
 //
 //   a ← a + Δ,   Δ ← memory · Δ + gain · e,   e = F(a) − a,
 //
-// contracts by (√κ − 1)/(√κ + 1) a sweep, κ = 1 + λ, and converges where plain sweeps do not, λ > 1. It takes no inner
-// products, so all ranks do the same. (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., algorithm 12.1.)
+// contracts by (√κ − 1)/(√κ + 1) per sweep, κ = 1 + λ, and also converges for λ > 1, where plain sweeps diverge. It
+// needs no inner products, so all ranks compute the same numbers. (Saad, Iterative Methods for Sparse Linear Systems,
+// 2nd ed., algorithm 12.1.)
 
 #include <cmath>
 
@@ -16,10 +17,10 @@ namespace carom::integrator {
 
 class Chebyshev {
  public:
-  /// Plain sweeps for small λ, and for NaN.
+  /// For small λ, and for NaN, the sweeps are plain.
   explicit Chebyshev(double lambda = 0) : middle_(1 + lambda / 2), half_(lambda >= kSmall ? lambda / 2 : 0) {}
 
-  /// Gives memory() and gain() for the next sweep.
+  /// Computes memory() and gain() for the next sweep.
   void next() {
     if (plain()) return;
     const double ratio = ratio_ == 0 ? half_ / middle_ : 1 / (2 * middle_ / half_ - ratio_);
@@ -36,7 +37,7 @@ class Chebyshev {
  private:
   static constexpr double kSmall = 0.2;
 
-  double middle_, half_;  // of the spectrum
+  double middle_, half_;  // centre and half width of the spectrum
   double ratio_ = 0, memory_ = 0, gain_ = 1;
 };
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Contacts of discrete-gradient pieces: how does the piece of size τ end, and where might the first contact be?
+// Contacts of discrete-gradient pieces: how a piece of length τ ends, and where the first contact may be.
 //
-// A piece of size τ is judged by its chord, the straight line from x to x'. c(τ) is the time of the first contact on
-// the chords, beyond τ on their prolongation: the piece that ends in contact is a fixed point of c. A pair that touches
-// at the start has the trivial contact τ = 0; it is divided out by looking at gap(τ)/τ ≈ (2 d·v̄ + τ v̄²)/2σ instead,
-// which starts at the departing velocity and falls through zero where the pair meets again.
+// The contacts are those of the chords, the straight lines from x to x'. c(τ) is the time of the first contact on the
+// chords or, beyond τ, on their extension: the piece that ends in contact is a fixed point of c. A pair that touches at
+// the start has the trivial contact τ = 0. The function gap(τ)/τ ≈ (2 d·v̄ + τ v̄²)/2σ does not have this zero: it starts
+// at the velocity of separation and falls through zero where the pair meets again.
 
 #include <algorithm>
 #include <cmath>
@@ -15,14 +15,14 @@
 
 namespace carom::integrator {
 
-/// How a piece of size τ ends.
+/// How a piece of length τ ends.
 template <int D>
 struct PieceEnd {
-  bool converged = true;    ///< of the solver; nothing else is set if it is false
-  bool violates = false;    ///< some sphere has gone into another or a wall, or through it
-  bool touches = false;     ///< some gap is closed to tolerance
+  bool converged = true;    ///< whether the solver converged; if not, nothing else is set
+  bool violates = false;    ///< a sphere overlaps another sphere or a wall, or has passed through it
+  bool touches = false;     ///< a gap is closed to the tolerance
   double contact = kNever;  ///< c(τ)
-  EventKey<D> violator{};   ///< of an overlap
+  EventKey<D> violator{};   ///< the contact that overlaps
 };
 
 template <int D>
@@ -62,9 +62,10 @@ class ChordContacts {
   }
 
  private:
-  /// A piece ends in contact within this share of the tolerance, so that its rounded positions touch too.
+  /// A piece ends in contact within this fraction of the tolerance, so that its rounded positions touch, too.
   static constexpr double kClosed = 0.5;
-  static constexpr double kProlongation = 4;  // contacts are still found this far beyond the end of the chord (squared)
+  static constexpr double kProlongation =
+      4;  // (length of the extended chord / length of the chord)², within which contacts are found
 
   static void violate(const EventKey<D>& key, PieceEnd<D>& end) {
     end.violates = true;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Kick-drift-kick pieces that end at contacts: what cva and mcva share.
+// Kick-drift-kick pieces that end at contacts, for cva and mcva.
 //
 // A piece that starts at (x, v) with a = −M⁻¹∇V(x) carries every particle along x + v s + ½ a s² and ends exactly
 // there, whatever its length; so the first contact on the parabolas limits the length of the piece.
@@ -29,13 +29,13 @@ class VerletPieces {
     scan_.begin_slab(report.counters, report.contacts, &accelerations_.a, length, watch_);
   }
 
-  /// Applies the impulse to whatever touches and approaches; see ContactScan::resolve.
+  /// Applies the impulse to all contacts that approach; see ContactScan::resolve.
   void collide(double time, const std::function<void(const Touch<D>&)>& impulse) {
     scan_.resolve(time, system_.particles.x, system_.particles.v, impulse);
   }
 
-  /// How long until the first contact, at most `rest`. Fixes the accelerations of the piece: a, without what presses
-  /// resting contacts together.
+  /// The time until the first contact, at most `rest`. Sets the accelerations of the piece: a plus the reactions of
+  /// resting contacts.
   double next_contact(double rest) {
     flight_ = accelerations_.a;
     if (!scan_.resting().empty()) scan_.hold(system_.particles.v, flight_, rest);
@@ -44,7 +44,7 @@ class VerletPieces {
     return std::min(rest, contact);
   }
 
-  /// K(τ/2) D(τ) K(τ/2). Call next_contact() before.
+  /// K(τ/2) D(τ) K(τ/2). Call next_contact() first.
   void advance(double tau) {
     auto& p = system_.particles;
     for (std::size_t i = 0; i < p.size(); ++i) {
@@ -60,7 +60,7 @@ class VerletPieces {
   /// −M⁻¹∇V at the present positions.
   const std::vector<Vec<D>>& a() const { return accelerations_.a; }
   const PotentialSums& potential() const { return accelerations_.sums; }
-  /// The accelerations on which the spheres fly from here, fixed by next_contact().
+  /// The accelerations of the piece, set by next_contact().
   const std::vector<Vec<D>>& flight() const { return flight_; }
 
  private:

@@ -57,7 +57,7 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, ContactScan<D>&
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     for (std::size_t i = 0; i < n; ++i) {
       trial_[i] = x_[i] + tau * mean_[i];
-      for (int k = 0; k < D; ++k)  // an iterate far away would meet images without number
+      for (int k = 0; k < D; ++k)  // an iterate far away would meet too many images
         if (box.periodic(k) && !(std::abs(tau * mean_[i][k]) <= 0.5 * box.edges[k])) return give_up();
     }
     evaluate_mean_forces<D>(system_, x_, trial_, force_, counters);
@@ -73,7 +73,7 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, ContactScan<D>&
       speed = std::max({speed, next_[i].squaredNorm(), v_[i].squaredNorm()});
     }
     change = std::sqrt(change);
-    // Below this increments are rounding and their ratios mean nothing.
+    // Smaller increments are rounding errors, and their ratios are meaningless.
     const double floor = 16 * std::numeric_limits<double>::epsilon() * std::sqrt(speed);
     std::swap(mean_, next_);
     if (!std::isfinite(change)) break;

@@ -5,9 +5,9 @@
 //   (x' − x)/τ = (v + v')/2,    M (v' − v)/τ = −∇̄V(x, x'),    ∇̄V·(x' − x) = V(x') − V(x)
 //
 // whatever τ (Gonzalez, J. Nonlinear Sci. 6 (1996) 449). Solved by fixed-point iteration on the mean velocity,
-// v̄ ← v − (τ/2) M⁻¹ ∇̄V(x, x + τ v̄), until the increments stop shrinking: what is left is rounding, and so is the energy
-// error. Order 4 composes five pieces γτ, γτ, (1−4γ)τ, γτ, γτ, γ = 1/(4 − 4^{1/3}) (Suzuki, Phys. Lett. A 146 (1990)
-// 319).
+// v̄ ← v − (τ/2) M⁻¹ ∇̄V(x, x + τ v̄), until the increments stop shrinking: they are rounding errors then, and so is the
+// energy error. Order 4 composes five pieces γτ, γτ, (1−4γ)τ, γτ, γτ, γ = 1/(4 − 4^{1/3}) (Suzuki, Phys. Lett. A 146
+// (1990) 319).
 
 #include "engine/forces/forces.h"
 #include "engine/slabs/contact_scan.h"
@@ -21,7 +21,7 @@ class DiscreteGradient {
   DiscreteGradient(System<D>& system, int order);
 
   /// Computes x() and v() from (x, v) over `tau`. The resting contacts of `scan` are held by reactions λ(d + d'), λ ≥
-  /// 0, that do no work because |d'| = |d|. False where the iteration does not contract well: take a shorter piece.
+  /// 0, that do no work because |d'| = |d|. Returns false if the iteration contracts too slowly: use a shorter piece.
   bool solve(Positions<D> x, Positions<D> v, double tau, ContactScan<D>& scan, Counters& counters);
 
   const std::vector<Vec<D>>& x() const { return x_; }                          ///< x' of the last solve
@@ -35,7 +35,7 @@ class DiscreteGradient {
   const System<D>& system_;
   std::vector<double> fractions_;
   std::vector<std::vector<Vec<D>>>
-      mean_acceleration_;  // of each stage of the last solve: where the next one starts from
+      mean_acceleration_;  // of each stage of the last solve; the next solve starts from them
   std::vector<Vec<D>> x_, v_, chord_, trial_, force_, mean_, next_;
 };
 

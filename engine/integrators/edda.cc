@@ -7,16 +7,16 @@
 //   m_i a_i = −∇̄_i V(x(0), x(h)),
 //
 // the discrete gradient between the slab's two ends, Σ m_i a_i·Δx_i = −(V(x(h)) − V(x(0))), so H is exact. The equation
-// is solved by sweeps: fly on a, evaluate a′ at the ends, go on with a′. What the last sweep leaves, e = a′ − a, is
-// given as a kick, so that momentum is exact; the energy that lacks then,
+// is solved by sweeps: fly on a, evaluate a′ at the ends, continue with a′. The residual of the last sweep, e = a′ − a,
+// is applied as a kick, so that momentum is exact; the energy that is missing then,
 //
 //   r = Σ m [e·(Δx − h v′) − ½ h² e²],   v′ before the kick,
 //
-// is folded into the velocities by a common factor. Where hardly anything moves there is nothing to fold it into: then
-// the sweeps go on to rounding, or the slab is made shorter, and what rounding leaves is kept for the next slab.
+// is folded into the velocities by a common factor. If the kinetic energy is too small for that, the sweeps continue to
+// rounding, or the slab is shortened; the energy that rounding then leaves is carried over to the next slab.
 //
-// Contacts at rest are held by reactions (engine/slabs/resting.h), which belong to m a′; their work, zero once the
-// sweeps have settled, is part of r.
+// Contacts at rest are held by reactions (engine/slabs/resting.h), which are part of m a′; their work, zero once the
+// sweeps have converged, is part of r.
 
 #include <algorithm>
 #include <array>
@@ -37,26 +37,26 @@ namespace carom::integrator {
 namespace {
 
 constexpr int kMostSweeps = 60;
-constexpr int kMostPieces = 1 << 14;      // of a step
-constexpr int kSettledBeforeGrowth = 4;   // pieces in few sweeps, before twice the length is tried
-constexpr int kFewSweeps = 20;            // a third of the most: half the length takes hardly more in all
-constexpr std::uint64_t kFew = 5;         // one particle in so many has changed: only its pairs are evaluated
-constexpr int kSweepsBeforeFreezing = 6;  // sweeps before particles may be frozen
-constexpr int kSwaps = 3;                 // of partners after that, until a particle is frozen
-constexpr int kStart = 4;                 // sweeps after which contraction tells of stiffness
-constexpr double kSlow = 0.04;            // contraction of two sweeps that tells of it
-constexpr double kRoom = 1.1;             // for frequencies above the one found
-constexpr std::int64_t kMeasured = 1000;  // slabs for which it is good
-constexpr std::size_t kSmooth = 3;        // past slabs that the start is extrapolated from
-constexpr double kStalled = 0.1;          // contraction of kSweepsBeforeFreezing sweeps that is too little
-constexpr int kMostStalled = 2;           // times: a shorter slab takes fewer sweeps
-constexpr double kTooStiff = 0.5;         // such a contraction expected: nothing is frozen for stiffness
-constexpr double kMostFolded = 0.1;       // of the kinetic energy
-// Rounding of the positions costs this share of Σ |F| |x| in energy, in any method.
+constexpr int kMostPieces = 1 << 14;             // of a step
+constexpr int kPiecesBeforeGrowth = 4;           // pieces that take few sweeps, before twice the length is tried
+constexpr int kFewSweeps = kMostSweeps / 3;      // two pieces of half the length would take hardly more in all
+constexpr std::uint64_t kPartialUpdate = 5;      // if fewer than one particle in 5 moved, only its pairs are evaluated
+constexpr int kSweepsBeforeFreezing = 6;         // sweeps before particles may be frozen
+constexpr int kSwapsBeforeFreezing = 3;          // swaps of partners after that, until a particle is frozen
+constexpr int kSweepsBeforeStiff = 4;            // sweeps after which slow contraction indicates stiffness
+constexpr double kStiffContraction = 0.2 * 0.2;  // of two sweeps; Chebyshev's iteration is faster beyond it
+constexpr double kFrequencyMargin = 1.1;         // for frequencies above the estimate
+constexpr std::int64_t kSlabsPerFrequency = 1000;  // slabs for which the estimate is used
+constexpr std::size_t kExtrapolated = 3;           // past slabs in the extrapolation of the first accelerations
+constexpr double kStalled = 0.1;                   // contraction of kSweepsBeforeFreezing sweeps that counts as stalled
+constexpr int kMostStalled = 2;                    // stalls before the slab is shortened
+constexpr double kTooStiff = 0.5;                  // if such a contraction is expected, stiffness freezes no particle
+constexpr double kMostFolded = 0.1;                // of the kinetic energy
+// The rounding of positions changes the energy by this fraction of Σ |F| |x|, in any method.
 constexpr double kRoundingOfForces = 16 * std::numeric_limits<double>::epsilon();
-constexpr double kSettled = 0.5;              // of the tolerance: such a particle keeps its path
-constexpr double kSettledInCollision = 0.05;  // the same where it collides: its lack of energy is of first order in e
-constexpr double kForceRounding = 0x1p-43;  // two quanta of the forces: relative increments below it that do not shrink
+constexpr double kConverged = 0.5;              // of the tolerance: a particle with a smaller residual keeps its path
+constexpr double kConvergedInCollision = 0.05;  // the same after a collision: r is then of first order in e
+constexpr double kForceRounding = 0x1p-43;      // two quanta of the forces, relative
 
 template <int D>
 class EventDrivenDiscreteGradient : public Integrator<D> {
@@ -99,7 +99,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     slab_ = slab.index;
     watch_ = report.watch;
     core_->begin_step(report.counters, report.contacts, &past_.last(), slab.length, watch_);
-    found_ = kept_;  // of a step that is done again nothing is known
+    found_ = kept_;  // a step that is repeated forgets what its first attempt found
     advance(system, slab);
     kept_ = found_;
     system.wrap();
@@ -107,20 +107,20 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   }
 
  private:
-  /// What one step finds out and later ones use.
+  /// Results of one step that later steps use.
   struct Found {
-    bool touching = true;                // contacts at the slab's start may need to be resolved
-    double squared_frequency = 0;        // the largest, once it matters
-    std::int64_t measured = -kMeasured;  // the slab in which it was found
-    double longest = kNever;             // piece in which sweeps settle
-    int settled = 0;                     // so many pieces of this length
+    bool touching = true;                         // contacts at the slab's start may have to be resolved
+    double squared_frequency = 0;                 // the largest; 0 as long as the sweeps contract fast
+    std::int64_t measured = -kSlabsPerFrequency;  // the slab in which squared_frequency was estimated
+    double longest = kNever;                      // the longest piece in which the sweeps converge
+    int converged = 0;                            // pieces of this length that took few sweeps
   };
 
   /// The pieces of a step.
   void advance(System<D>& system, const Slab& slab) {
     auto& p = system.particles;
     auto& scan = core_->scan();
-    // What a piece ends with at the latest: sweeps that settle, and a contact at rest that is met or begins.
+    // A piece is no longer than the sweeps converge in, and ends where a contact comes to rest or a resting one is hit.
     double done = 0, contact = kNever;
     double& longest = found_.longest;
     while (done < slab.length) {
@@ -137,9 +137,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         finish(system, piece);
         ++counters_->pieces;
         done = piece == rest ? slab.length : done + piece;
-        if (piece == longest && sweeps_ <= kFewSweeps && ++found_.settled >= kSettledBeforeGrowth) {
+        if (piece == longest && sweeps_ <= kFewSweeps && ++found_.converged >= kPiecesBeforeGrowth) {
           longest = std::max(2 * piece, slab.length / kMostPieces);
-          found_.settled = 0;
+          found_.converged = 0;
         }
         found_.touching = found_.touching || contact < kNever;
         contact = kNever;
@@ -154,7 +154,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       }
       ++counters_->slabs_halved;
       longest = 0.5 * piece;
-      found_.settled = 0;
+      found_.converged = 0;
       contact = kNever;
       if (longest * kMostPieces < slab.length && !end_.complete && end_.too_strong && end_.time > 0)
         throw Error(Failure::numerical,
@@ -163,7 +163,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
                         "th of the step: they have no room between their neighbours or walls; leave gaps between "
                         "spheres that fill a box from wall to wall, or use a smaller integrator.step");
       if (longest * kMostPieces < slab.length)
-        throw Error(Failure::numerical, "the sweeps do not settle even in " + std::to_string(kMostPieces) +
+        throw Error(Failure::numerical, "the sweeps do not converge even in " + std::to_string(kMostPieces) +
                                             " pieces; the forces, strongest on particle " +
                                             std::to_string(p.id_of(most_accelerated())) +
                                             ", are not finite or far too stiff for step = " + short_text(slab.length) +
@@ -171,14 +171,15 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     }
   }
 
-  /// Sweeps over a slab from the present state. True: core_ has the flight on a_, mean_ the accelerations it gives, and
-  /// balance_ what the energy lacks; false: it is to be shorter. `resolved`: what touches now has been seen to.
+  /// Sweeps over a slab from the present state. If it returns true, core_ holds the flight on a_, mean_ the resulting
+  /// accelerations, and balance_ the missing energy; if false, the slab must be shorter. `resolved`: the contacts at
+  /// its start have been handled.
   bool solve(System<D>& system, double h, bool resolved) {
     const Stopwatch watch(counters_->seconds.sweep);
     auto& p = system.particles;
     const std::size_t n = p.size();
     Chebyshev chebyshev(0.25 * h * h * found_.squared_frequency);
-    past_.expect(h, a_, chebyshev.plain() ? kSmooth : 1);  // stiff motion is not smooth from slab to slab
+    past_.expect(h, a_, chebyshev.plain() ? kExtrapolated : 1);  // stiff motion is not smooth from slab to slab
     held_ = true;
     if (resting()) {
       mean_ = a_;
@@ -191,7 +192,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     any_freezes_ = false;
     int times_stalled = 0;
     const double scale = std::max(scales_.speed, h * scales_.strength);
-    double wanted = resting() ? 0 : tolerance_ * scale;  // 0: rounding; else contacts at rest would open
+    double wanted = resting() ? 0 : tolerance_ * scale;  // 0 means rounding; otherwise contacts at rest would open
     std::array<double, kMostSweeps + 1> residual{};      // by sweep
     for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
       if (watch_) watch_->look();
@@ -202,10 +203,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       const double largest = residual[sweep] = h * std::sqrt(squared);
       if (!std::isfinite(largest) || !held_) return false;
       const double rounding = kForceRounding * (resting() ? std::max(scale, pressed_) : scale);
-      const bool settled = largest == 0 || (sweep > 2 && largest <= rounding && largest > 0.25 * residual[sweep - 1]);
-      if (settled || largest <= wanted) {
+      const bool converged = largest == 0 || (sweep > 2 && largest <= rounding && largest > 0.25 * residual[sweep - 1]);
+      if (converged || largest <= wanted) {
         if (balance(system, h)) return true;
-        if (settled || any_freezes_) return false;
+        if (converged || any_freezes_) return false;
         wanted = 0;
       }
       if (sweep >= kSweepsBeforeFreezing && swaps > 0) freeze();
@@ -215,17 +216,17 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         if (++times_stalled > kMostStalled) return false;
         freeze_stalled(largest / h);
       }
-      const bool slow =
-          sweep > kStart && chebyshev.plain() && largest > std::max(10 * wanted, kSlow * residual[sweep - 2]);
-      if (slow && slab_ >= found_.measured + kMeasured) {
+      const bool slow = sweep > kSweepsBeforeStiff && chebyshev.plain() &&
+                        largest > std::max(10 * wanted, kStiffContraction * residual[sweep - 2]);
+      if (slow && slab_ >= found_.measured + kSlabsPerFrequency) {
         found_.measured = slab_;
-        found_.squared_frequency = kRoom * largest_squared_frequency(system);
+        found_.squared_frequency = kFrequencyMargin * largest_squared_frequency(system);
         chebyshev = Chebyshev(0.25 * h * h * found_.squared_frequency);
         ++counters_->fallbacks;
       }
       chebyshev.next();
-      const double small = std::pow(kSettled * wanted / h, 2);
-      const double in_collision = std::pow(kSettledInCollision * wanted / h, 2);
+      const double small = std::pow(kConverged * wanted / h, 2);
+      const double in_collision = std::pow(kConvergedInCollision * wanted / h, 2);
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
         const Vec<D> e = mean_[i] - a_[i];
@@ -238,14 +239,14 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     return false;
   }
 
-  /// The accelerations that the flight gives. Where the ends of few particles have changed only their pairs are
-  /// evaluated again: sums of integers let them be subtracted exactly. Returns the largest |e|² and, above 0, whether
-  /// partners are still swapped, of all particles that are not frozen.
+  /// Computes the accelerations that result from the flight. If the ends of few particles have changed, only their
+  /// pairs are evaluated again: integer sums allow the old terms to be subtracted exactly. Returns, over all particles
+  /// that are not frozen, the largest |e|² and a positive number if partners are still swapped.
   std::array<double, 2> evaluate(const System<D>& system, double h, bool first) {
     const Stopwatch watch(counters_->seconds.force);
     const auto& p = system.particles;
     const auto& x = core_->x();
-    const bool all = first || kFew * core_->all_moved() > system.size();
+    const bool all = first || kPartialUpdate * core_->all_moved() > system.size();
     std::uint64_t pairs =
         all ? forces_.evaluate(system, p.x, x) : forces_.update(system, p.x, core_->last_x(), x, core_->moved().data());
     for (Id i = 0; i < x.size(); ++i) mean_[i] = forces_[i];
@@ -263,12 +264,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     return most;
   }
 
-  /// Particles in collisions, of which the paths do not settle: a grazing contact may turn a small change into a larger
-  /// one.
+  /// Freezes colliding particles whose paths do not converge: a grazing contact may amplify a small change.
   void freeze_stalled(double largest) {
     any_freezes_ = true;
     for (Id i = 0; i < a_.size(); ++i)
-      if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= kStalled * largest) swaps_[i] = kSwaps + 1;
+      if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= kStalled * largest)
+        swaps_[i] = kSwapsBeforeFreezing + 1;
   }
 
   Id most_accelerated() const {
@@ -277,16 +278,16 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   }
 
   Vec<D> centre() const { return Vec<D>(scales_.centre.data()); }
-  bool frozen(Id i) const { return swaps_[i] > kSwaps; }
+  bool frozen(Id i) const { return swaps_[i] > kSwapsBeforeFreezing; }
   static double finite(double value) { return std::isnan(value) ? kNever : value; }
 
-  /// Counts the swaps of partners of each particle. One which swaps again and again keeps its acceleration from then
-  /// on, and where it still swaps, so do its partners.
+  /// Counts the swaps of partners of each particle. A particle that swaps repeatedly keeps its acceleration from then
+  /// on; if it still swaps, its partners are counted as swapping, too.
   void freeze() {
     any_freezes_ = true;
     std::vector<std::pair<Id, Id>> met;  // partners in the last flight, once they matter
     for (const Id i : core_->swapped()) {
-      if (++swaps_[i] <= 2 * kSwaps) continue;
+      if (++swaps_[i] <= 2 * kSwapsBeforeFreezing) continue;
       if (met.empty()) {
         for (const Contact<D>& contact : core_->contacts())
           if (const EventKey<D>& key = contact.key; key.kind == EventKind::pair)
@@ -300,7 +301,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
 
   bool resting() { return !core_->scan().resting().empty(); }
 
-  /// Adds the reactions of resting contacts to the accelerations that forces give, mean_. `first`: no flight is known
+  /// Adds the reactions of resting contacts to mean_, the accelerations caused by forces. `first`: there is no flight
   /// yet.
   void hold(const System<D>& system, double h, bool first) {
     const auto& p = system.particles;
@@ -316,29 +317,30 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       for (const auto& contact : scan.resting()) for_each_body(contact, visit);
     };
     for_each_held([&](Id i) {
-      flown_[i] = first ? p.v[i] : Vec<D>(p.v[i] + (0.5 * h) * a_[i]);  // what rests has no collision in the slab
+      flown_[i] =
+          first ? p.v[i] : Vec<D>(p.v[i] + (0.5 * h) * a_[i]);  // resting particles have no collision in the slab
       w_[i] = p.v[i] + (0.5 * h) * mean_[i];
     });
     held_ = scan.hold_means(p.x, flown_, w_, h);
-    pressed_ = 0;  // what reactions alone would give to one of the bodies
+    pressed_ = 0;  // the largest speed that a single reaction causes
     for (const auto& contact : scan.resting())
       for_each_body(contact, [&](Id i) { pressed_ = std::max(pressed_, h * contact.force / p.mass[i]); });
     for_each_held([&](Id i) { mean_[i] = 2 / h * (w_[i] - p.v[i]); });
   }
 
-  /// The velocities at the slab's end, with the kick h e, and what the energy lacks then. False: it can neither be
-  /// folded into them nor kept as rounding. Collective.
+  /// Computes the velocities at the slab's end, with the kick h e, and the energy that is missing then. Returns false
+  /// if that energy can neither be folded into the velocities nor be carried over as rounding. Collective.
   bool balance(System<D>& system, double h) {
     struct Sums {
-      ExactSum lack, kinetic;
-      void add(const Sums& other) { lack.add(other.lack), kinetic.add(other.kinetic); }
+      ExactSum missing, kinetic;
+      void add(const Sums& other) { missing.add(other.missing), kinetic.add(other.kinetic); }
     };
     const auto& p = system.particles;
     const auto &x = core_->x(), &v = core_->v();
     for (Id i = 0; i < p.size(); ++i) v_end_[i] = v[i] + h * (mean_[i] - a_[i]);
     ExactSeries lack, kinetic;
     double pressing = 0;  // Σ |F| |x| of reactions
-    if (resting()) {      // then all ranks know all
+    if (resting()) {      // then every rank has all particles
       const double lost = core_->scan().slide(x, v_end_);
       if (system.decomposition.ranks().rank() == 0) {
         lack.add(lost);
@@ -358,12 +360,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       kinetic.add(0.5 * p.mass[i] * (v_end_[i] - centre()).squaredNorm());
     }
     const Sums sums = system.decomposition.sum(Sums{lack.sum(), kinetic.sum()});
-    const double lacks = sums.lack.value(), most = kMostFolded * sums.kinetic.value();
-    const bool settles = std::abs(lacks + owed_) <= most, folds = settles || std::abs(lacks) <= most;
-    const double r = settles ? lacks + owed_ : lacks, share = r / sums.kinetic.value();
-    balance_ = {.owed = settles ? 0
-                        : folds ? owed_
-                                : owed_ + lacks,
+    const double missing = sums.missing.value(), most = kMostFolded * sums.kinetic.value();
+    const bool folds_all = std::abs(missing + owed_) <= most, folds = folds_all || std::abs(missing) <= most;
+    const double r = folds_all ? missing + owed_ : missing, share = r / sums.kinetic.value();
+    balance_ = {.owed = folds_all ? 0
+                        : folds   ? owed_
+                                  : owed_ + missing,
                 .folded = folds ? std::abs(r) : 0,
                 .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};
     if (any_freezes_)
@@ -372,10 +374,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     if (folds) return true;
     const double forces = sum_over_all<D>(
         system, [&](Id i) { return p.mass[i] * std::sqrt(mean_[i].squaredNorm() * p.x[i].squaredNorm()); });
-    return std::abs(lacks) <= kRoundingOfForces * (forces + pressing);
+    return std::abs(missing) <= kRoundingOfForces * (forces + pressing);
   }
 
-  /// Moves the particles to the slab's end, with what the energy still lacks.
+  /// Moves the particles to the slab's end and folds in the missing energy.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
     core_->finish(p);
@@ -391,33 +393,33 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   }
 
   std::uint64_t max_events_;
-  double tolerance_;  // what sweeps may leave of h a, relative to the speed scale
+  double tolerance_;  // largest residual h |e|, relative to the speed scale
   struct Scales {
     double speed = 0, strength = 0;  // root mean square velocity and acceleration at the start of the run
-    std::array<double, D> centre{};  // velocity of the centre of mass, where it is kept
+    std::array<double, D> centre{};  // velocity of the centre of mass, if momentum is conserved
   } scales_;
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> past_;
   MeanForces<D> forces_;
-  std::uint64_t pairs_ = 0;        // within reach
-  std::vector<Vec<D>> a_, mean_;   // flown on, and what that gives
-  std::vector<Vec<D>> smooth_;     // where contacts rest: mean_ without reactions
+  std::uint64_t pairs_ = 0;        // within the cutoff
+  std::vector<Vec<D>> a_, mean_;   // accelerations of the flight, and those that result from it
+  std::vector<Vec<D>> smooth_;     // mean_ without reactions, if contacts rest
   std::vector<Vec<D>> flown_, w_;  // mean velocities of particles in contacts at rest
   std::vector<Vec<D>> v_end_;
   struct Balance {
     double owed = 0, folded = 0, stretch = 0;
     std::uint64_t frozen = 0;
   } balance_;                         // of the last slab that was solved
-  double owed_ = 0;                   // energy that could not be folded yet
-  double pressed_ = 0;                // the largest speed that a reaction gives in the slab, which others take away
-  bool held_ = true;                  // reactions were found
+  double owed_ = 0;                   // missing energy that is carried over
+  double pressed_ = 0;                // the largest speed that a single reaction causes in the slab
+  bool held_ = true;                  // the reactions were found
   std::vector<std::uint32_t> swaps_;  // of partners, by particle
   bool any_freezes_ = false;          // on any rank, in this slab
   Found found_, kept_;                // kept_: at the end of the last step
   int sweeps_ = 0;                    // of the last slab
   FlightEnd<D> end_;                  // of the last flight
   std::int64_t slab_ = 0;
-  std::vector<Vec<D>> move_;  // of a_ by the last sweep
+  std::vector<Vec<D>> move_;  // change of a_ in the last sweep
   Counters* counters_ = nullptr;
   SlabWatch* watch_ = nullptr;
 };
@@ -437,15 +439,15 @@ IntegratorInfo edda() {
                       .type = Parameter::Type::real,
                       .fallback = "1e-10",
                       .unit = "-",
-                      .meaning = "what sweeps may leave of a step's impulses, as a velocity and relative to the root "
-                                 "mean square velocity at the start; the energy stays exact: what it lacks is folded "
+                      .meaning = "largest residual of a step's impulses, as a velocity relative to the root mean "
+                                 "square velocity at the start; the energy stays exact: the missing energy is folded "
                                  "into the velocities (energy.folded of summary.json); 0: rounding",
                       .range = Parameter::Range::non_negative},
                      parameter::max_events_per_step()},
       .documentation =
           "Each particle moves under a constant acceleration of its own over the step, through all its collisions; the "
-          "accelerations are the discrete gradient between the step's two ends, found by sweeps that cost a force pass "
-          "and the collisions each. Energy is exact whatever the step and the number of collisions.",
+          "accelerations are the discrete gradient between the step's two ends. Sweeps find them; each sweep costs a "
+          "force pass and the collisions. Energy is exact whatever the step and the number of collisions.",
       .source =
           "this project; relatives: LaBudde, Greenspan, Numer. Math. 25 (1976) 323; Gonzalez, J. Nonlinear Sci. "
           "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 84 (2010) 1085",

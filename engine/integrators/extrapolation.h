@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Mean accelerations of the next slab, extrapolated from those of past slabs: where the sweeps of edda start.
+// Mean accelerations of the next slab, extrapolated from past slabs. The sweeps of edda start from them.
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@ namespace carom::integrator {
 template <int D>
 class Extrapolation {
  public:
-  /// Accelerations at an instant: nothing is past yet.
+  /// Starts from the accelerations at an instant; there are no past slabs yet.
   void start(Fields& fields, const std::vector<Vec<D>>& a) {
     for (std::size_t k = 0; k < past_.size(); ++k) {
       past_[k] = a;
@@ -25,7 +25,7 @@ class Extrapolation {
     fields.add_value("past lengths", length_);
     fields.add_value("past slabs", known_);
   }
-  /// A slab of this length is done, with these accelerations.
+  /// Adds a completed slab of this length with these mean accelerations.
   void pass(double length, const std::vector<Vec<D>>& a) {
     std::rotate(length_.begin(), length_.end() - 1, length_.end());
     std::rotate(past_.begin(), past_.end() - 1, past_.end());
@@ -33,8 +33,8 @@ class Extrapolation {
     past_[0] = a;
     known_ = std::min(known_ + 1, kOrder + 1);
   }
-  /// The accelerations of a slab of this length. The integral of the acceleration is known at the slabs' ends, −s_k
-  /// before now, and continued by Lagrange's polynomial; `most`: of so many slabs.
+  /// Computes the mean accelerations of a slab of this length: Lagrange's polynomial through the integral of the
+  /// acceleration at the ends of the past slabs, at times −s_k, of which it uses at most `most`.
   void expect(double length, Vectors<D> a, std::size_t most = kOrder + 1) {
     if (length > kMostGrowth * length_[0]) known_ = 0;
     const std::size_t known = std::min(known_, most);
@@ -58,11 +58,11 @@ class Extrapolation {
 
  private:
   static constexpr std::size_t kOrder = 2;
-  static constexpr double kMostGrowth = 3;  // of slabs; beyond it only the last one counts
+  static constexpr double kMostGrowth = 3;  // of the length of slabs; beyond it only the last slab is used
 
   std::array<std::vector<Vec<D>>, kOrder + 1> past_;
   std::array<double, kOrder + 1> length_{};
-  std::size_t known_ = 0;  // how many slabs belong together; 0: an acceleration at an instant
+  std::size_t known_ = 0;  // number of successive slabs; 0: an acceleration at an instant
 };
 
 }  // namespace carom::integrator

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What the kick methods share: accelerations a = −M⁻¹∇V at the present positions, and the kick v += s a.
+// The accelerations a = −M⁻¹∇V at the present positions, and the kick v += s a, for verlet, psa, cva and mcva.
 
 #include "engine/forces/forces.h"
 
@@ -11,7 +11,7 @@ struct Accelerations {
   std::vector<Vec<D>> a;  ///< [length/time²]
   PotentialSums sums;     ///< at the positions of the last update
 
-  /// At the start of a run.
+  /// Call this at the start of a run.
   void start(System<D>& system, Counters& counters) {
     system.fields.add("acceleration", a);
     update(system, counters);

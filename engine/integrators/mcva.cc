@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// mcva: CVA with impulses that keep the shadow Hamiltonian S_h = H + h² G instead of H.
+// mcva: cva with impulses that conserve the shadow Hamiltonian S_h = H + h² G instead of H.
 //
 // With n the gradient of the gap, w = M⁻¹n and K = V″, an impulse λn changes S_h by bλ + ½aλ² exactly:
 //   a = nᵀw + (h²/6) wᵀKw,   b = nᵀv + (h²/6) wᵀKv.
-// A piece of size τ ≠ h keeps S_τ, not S_h: it adds (h² − τ²)(G(end) − G(start)) to a debt that the next impulse pays.
+// A piece of length τ ≠ h conserves S_τ, not S_h: the next impulse makes up for (h² − τ²)(G(end) − G(start)).
 
 #include <cmath>
 #include <optional>
@@ -14,7 +14,7 @@
 namespace carom::integrator {
 namespace {
 
-/// Where the shadow impulse would leave less than this share of the approach velocity the elastic one is taken.
+/// If the shadow impulse would leave less than this fraction of the approach velocity, the elastic impulse is used.
 constexpr double kLeastRestitution = 0.5;
 
 template <int D>
@@ -77,8 +77,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     system.wrap();
   }
 
-  /// A full step begins anew after each collision. The motion stands at its last node, up to a step behind the end of
-  /// the slab; what the system shows at the end of the slab is a side copy, carried on by a shorter step.
+  /// A full step begins after each collision. The integration stays at its last node, up to a step before the end of
+  /// the slab; the system at the end of the slab is a copy, advanced by a shorter step.
   void restart_slab(System<D>& system, double length) {
     auto& p = system.particles;
     take_motion(p, node_);
@@ -139,8 +139,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     const double a = nw + sixth * wKw, b = nv + sixth * wKv;
     const double discriminant = b * b - 2 * a * debt_;
     double lambda = a > 0 && b < 0 && discriminant >= 0 ? (std::sqrt(discriminant) - b) / a : -2 * b / a;
-    // An impulse that takes most of a slow pair's normal velocity, contact after contact, would bring it to rest in
-    // contact.
+    // Impulses that remove most of a slow pair's normal velocity, contact after contact, would bring it to rest.
     if (!(a > 0) || !(nv + lambda * nw > -kLeastRestitution * nv)) {
       lambda = -2 * nv / nw;
       ++counters_->fallbacks;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// One line an integrator: the declaration that its own file ends in.
+// One line for each integrator: the declaration of the function at the end of its file.
 
 #include "engine/integrators/integrator.h"
 
@@ -14,7 +14,7 @@ IntegratorInfo mcva();
 IntegratorInfo cdda();
 IntegratorInfo edda();
 
-/// The factory of an integrator template that is made from its parameters.
+/// Makes an integrator from its parameters.
 template <template <int> class T, int D>
 std::unique_ptr<Integrator<D>> make(const Parameters& parameters) {
   return std::make_unique<T<D>>(parameters);

@@ -12,11 +12,12 @@ namespace carom {
 
 namespace {
 
-// Rounds of impulses at one instant: a blow through a row of spheres takes as many as there are spheres, a light sphere
-// between two heavy ones π √(M/m), 3000 with masses of 1 : 10⁶ (Galperin, Regul. Chaotic Dyn. 8 (2003) 375).
+// Rounds of impulses at one instant: an impact on a row of n spheres takes n rounds, a light sphere between two heavy
+// ones π √(M/m), which is 3000 for masses of 1 : 10⁶ (Galperin, Regul. Chaotic Dyn. 8 (2003) 375).
 constexpr std::uint32_t kMostRounds = 30000;
+constexpr double kMostCorrection = 1e-6 / kRounding;  // of an overlap, relative to the rounding of the speeds
 
-/// The partners of a contact alone: what a contact at rest is known by.
+/// The key of a resting contact: its partners alone.
 template <int D>
 EventKey<D> without_time(EventKey<D> key) {
   key.time = 0;
@@ -59,7 +60,7 @@ void ContactScan<D>::note_pressed() {
   }
 }
 
-/// All contacts at x, in the order of their keys.
+/// Finds all contacts at x, in the order of their keys.
 template <int D>
 void ContactScan<D>::find_touching(double time, Positions<D> x) {
   if (box_.pistons())
@@ -93,7 +94,7 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   std::ranges::sort(touching_, {}, &Touch<D>::key);
 }
 
-/// Which of the contacts approach, and which rest.
+/// Sorts the contacts into approaching and resting ones.
 template <int D>
 void ContactScan<D>::sort_out(Positions<D> v) {
   approaching_.clear();
@@ -169,7 +170,7 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
     if (resting_.empty()) return lost;
     if (watch_) watch_->cut();
     lost += stop_rounding(v) + stop_approach(x, v);
-    sort_out(v);  // what has been stopped may have run away from something else
+    sort_out(v);  // a sphere that was stopped may have been moving away from another contact
     if (approaching_.empty()) break;
     count_event(approaching_.front().key);
   }
@@ -177,12 +178,12 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
   return lost;
 }
 
-/// A round of impulses, in key order.
+/// One round of impulses, in key order.
 template <int D>
 void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v,
                                 const std::function<void(const Touch<D>&)>& impulse) {
   for (Touch<D>& touch : approaching_) {
-    // An earlier impulse of this round may have parted them.
+    // An earlier impulse of this round may have separated the spheres.
     if (!(normal_speed(touch, v) < -resting_speed(touch, v))) continue;
     touch.key.generation = generation;
     if (generation > kMostRounds)
@@ -212,8 +213,8 @@ void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>&
   counters_->record(contact, contacts_);
 }
 
-/// Stops bodies of which the speed is rounding of the forces on them: over many steps it would add up. Where momentum
-/// is conserved they go on. Returns the energy that they lose.
+/// Stops spheres with speeds at the rounding level of the forces on them; over many steps these would add up. Where
+/// momentum is conserved they are left alone. Returns the energy that the spheres lose.
 template <int D>
 double ContactScan<D>::stop_rounding(Vectors<D> v) const {
   double lost = 0;
@@ -233,14 +234,14 @@ bool ContactScan<D>::rests(const EventKey<D>& key) const {
   return std::ranges::binary_search(resting_, without_time(key), {}, &RestingContact<D>::key);
 }
 
-/// How much approach of a contact is left to it.
+/// How fast a resting contact may approach before it is solved again, times the length of its normal.
 template <int D>
 double ContactScan<D>::normal_slack(const RestingContact<D>& contact, Positions<D> v) const {
-  constexpr double kShare = 1.0 / 16;  // of what counts as rounding
-  return kShare * rounding_speed(contact.key, v) * contact.normal.norm();
+  constexpr double kFractionOfRounding = 1.0 / 16;  // so that contacts stay well within what counts as rounding
+  return kFractionOfRounding * rounding_speed(contact.key, v) * contact.normal.norm();
 }
 
-/// Finds the reactions, from those of the last time. `force`: that a lambda of 1 stands for along a normal of length 1.
+/// Finds the reactions, starting from the last ones. A lambda of 1 along a normal of length 1 stands for `force`.
 template <int D>
 bool ContactScan<D>::press_apart(Vectors<D> w, double force) {
   for (auto& contact : resting_) contact.lambda = contact.force / (force * contact.normal.norm());
@@ -254,14 +255,15 @@ void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double rest) {
   for (auto& contact : resting_) {
     contact.bound = contact.slack = 0;
     if (contact.key.kind != EventKind::pair) continue;
-    // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `rest`. A pair that turns (u) while it
-    // is braked (u·a < 0) would go in by the second term; u·a is not changed by the reaction, which is normal to u.
+    // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `rest`. For a pair that turns (u) while
+    // it slows down (u·a < 0) the second term would cause an overlap; the reaction, normal to u, does not change u·a.
     const Vec<D> u = v[contact.key.lo] - v[contact.key.hi];
     const double braking = std::max(0.0, -u.dot(a[contact.key.lo] - a[contact.key.hi]));
     contact.bound = braking * rest - u.squaredNorm();
   }
   press_apart(a, 1);
-  std::erase_if(resting_, [](const auto& contact) { return contact.lambda == 0; });  // they leave, and may come back
+  std::erase_if(resting_,
+                [](const auto& contact) { return contact.lambda == 0; });  // these separate, and may meet again
 }
 
 template <int D>
@@ -275,10 +277,15 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     if (pair) contact.normal = 2 * contact.normal + length * (w_before[lo] - w_before[hi]);
     if (length < 0) contact.normal = -contact.normal;
     contact.bound = 0;
-    contact.slack = 0.125 * normal_slack(contact, w_before);  // some 30 roundings: new reactions are hardly better
-    if (std::abs(gap) <= 0.5 * tolerance(sigma)) continue;
-    // Rounding of many pieces has opened or closed the contact; it returns as slowly as what counts as rest.
-    const double speed = 0.5 * rounding_speed(contact.key, w_before);
+    contact.slack = 0.125 * normal_slack(contact, w_before);  // about 30 ε of the speeds, as good as a new solution
+    const double touching = tolerance(sigma);
+    if (std::abs(gap) <= 0.5 * touching) continue;
+    // The rounding of many pieces has opened or closed the contact. It is corrected at a speed that counts as rest. In
+    // short pieces the rounding of positions, ε x, would undo this; so from an overlap beyond the tolerance the contact
+    // returns by a few ε x at once, unless the piece is so short that this takes more than 10⁻⁶ of the speeds: the work
+    // of the reaction, 2 m/h times that speed, is known to ε x only.
+    const double rounding = rounding_speed(contact.key, w_before), at_once = tolerance(0) / std::abs(length);
+    const double speed = gap < -touching && at_once <= kMostCorrection * rounding ? at_once : 0.5 * rounding;
     contact.bound = std::clamp(-gap / std::abs(length), -speed, speed) * contact.normal.norm();
   }
   return press_apart(w, 2 / std::abs(length));
@@ -327,7 +334,7 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   const double path = rest * (std::sqrt(fastest) + 0.5 * rest * std::sqrt(strongest));
   EventKey<D> key;
   auto offer = [&](const Vec<D>& normal) {
-    // At time 0 only resting contacts are left; hold() has seen to those that are pressed together.
+    // Only resting contacts are left at time 0; hold() has handled those under pressure.
     if (key.time > 0 && key < first.key) first = {key, normal};
   };
   for (const auto& pair : list_.cover(x, path)) {
@@ -353,7 +360,7 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
                                    touching ? rounding_speed(key, v) : 0.0);
       if (key.time < kNever) offer(wall.normal());
     }
-  // Pieces that end in a contact without an impulse count too: there must be an end to them.
+  // Pieces that end in a contact without an impulse count too, so that their number is limited.
   if (first.key.time < kNever && events_ == events_at_last_cut_) count_event(first.key);
   events_at_last_cut_ = events_;
   return first;

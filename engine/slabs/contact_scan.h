@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Contacts for the integrators that cut the step of all particles (cva, mcva, cdda): which touch now, which first. The
-// slab core takes its candidates and contacts at rest from here, too.
+// Contacts for the integrators that cut the step of all particles (cva, mcva, cdda): which pairs touch now, and which
+// pair touches first. The slab core gets its candidate pairs and its resting contacts from here, too.
 //
-// Pairs come from a Verlet list with the radii as reach, walls from the box. Keys are those of the event core, so the
-// order of simultaneous impulses is the same everywhere.
+// Pairs come from a Verlet list with the radii as reach, walls from the box. Contacts have the keys of the event core,
+// so the order of simultaneous impulses is the same in all methods.
 
 #include <functional>
 #include <vector>
@@ -19,17 +19,17 @@
 
 namespace carom {
 
-/// A contact at rest and the force that holds it apart.
+/// A resting contact and the force that keeps its spheres apart.
 template <int D>
 struct Reaction {
   EventKey<D> key;   ///< without time and generation
   double force = 0;  ///< on lo along the normal, and its negative on hi [force]
 };
 
-/// A contact met or to come, and its normal: the gradient of the gap, up to a positive factor.
+/// A present or future contact and its normal: the gradient of the gap, up to a positive factor.
 template <int D>
 struct Touch {
-  EventKey<D> key;  ///< key.time: since now for a contact to come
+  EventKey<D> key;  ///< key.time counts from now for a future contact
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
   bool pair() const { return key.kind == EventKind::pair; }
 };
@@ -37,59 +37,58 @@ struct Touch {
 template <int D>
 class ContactScan {
  public:
-  /// `max_events` limits the contacts of one slab. `reactions`: those of the last piece, state of the run that outlives
-  /// the scan.
+  /// `max_events` limits the contacts of one slab. `reactions` are the reactions of the last piece; they are state of
+  /// the run and must outlive the scan.
   ContactScan(const System<D>& system, std::uint64_t max_events, std::vector<Reaction<D>>& reactions);
 
-  /// Starts a slab of this length: counts from zero, and logs to `contacts` (may be null). `a` (may be null, or empty):
-  /// the accelerations that forces give, without reactions; it outlives the slab and may change within it. `watch` (may
-  /// be null): called before each impulse of resolve().
+  /// Starts a slab of this length: counts from zero, and logs to `contacts` (may be null). `a` (may be null, or empty)
+  /// holds the accelerations that forces cause, without reactions; it must outlive the slab and may change within it.
+  /// `watch` (may be null) is called before each impulse of resolve().
   void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
                   SlabWatch* watch = nullptr);
 
-  /// Applies `impulse` to every contact that touches and approaches at x, in key order, again until none approaches,
-  /// and notes which contacts are left at rest. `impulse`
-  /// changes the velocities in `v`. Returns the energy that contacts lost when they came to rest. Throws
-  /// Error(Failure::numerical) beyond max_events.
+  /// Applies `impulse`, which changes the velocities in `v`, to every contact that touches and approaches at x, in key
+  /// order, until no contact approaches, and records which contacts rest. Returns the energy that contacts lost when
+  /// they came to rest. Throws Error(Failure::numerical) beyond max_events.
   double resolve(double time, Positions<D> x, Vectors<D> v, const std::function<void(const Touch<D>&)>& impulse);
 
-  /// Whether nothing touches and approaches, or rests in contact.
+  /// Whether no contact approaches and no contact rests.
   bool quiet(Positions<D> x, Positions<D> v) {
     find_touching(0, x);
     sort_out(v);
     return approaching_.empty() && resting_.empty();
   }
 
-  /// The contacts that the last resolve() found at rest, without any approach left.
+  /// The contacts that the last resolve() found at rest; none of them approaches any more.
   std::span<RestingContact<D>> resting() { return resting_; }
   bool rests(const EventKey<D>& key) const;
 
-  /// Keeps resting contacts from approaching for a time `rest`: accelerations a become those of the held system. Those
-  /// that nothing presses are resting no more.
+  /// Keeps resting contacts from approaching for a time `rest`: adds the reactions to the accelerations a. Contacts
+  /// without a reaction no longer count as resting.
   void hold(Positions<D> v, Vectors<D> a, double rest);
 
   /// Keeps resting contacts from approaching for the mean velocities w = v + ½ length a of a discrete-gradient piece
-  /// from x, which ends at x + length · w_before: the reactions do no work (but for rounding that they take back where
-  /// a contact has opened or closed by it). `length` is negative for a piece back in time. Returns whether reactions
-  /// were found to rounding.
+  /// from x, which ends at x + length · w_before. The reactions do no work, except where they correct a contact that
+  /// rounding has opened or closed. `length` is negative for a piece back in time. Returns whether the reactions were
+  /// found to rounding.
   bool hold_means(Positions<D> x, Positions<D> w_before, Vectors<D> w, double length);
 
-  /// Takes the approach out of resting contacts at new positions; returns the energy that they lose.
+  /// Stops the approach of resting contacts at new positions; returns the energy that they lose.
   double stop_approach(Positions<D> x, Vectors<D> v);
 
   /// The first contact on the parabolas x + v s + a s²/2 within [0, rest); key.time is kNever when there is none.
-  /// Call resolve() before; contacts held at rest are not looked for.
+  /// Call resolve() first; contacts held at rest are not searched for.
   Touch<D> earliest(Positions<D> x, Positions<D> v, Positions<D> a, double rest);
 
-  /// A piece has ended: its reactions are where the next ones start from.
+  /// Call this at the end of a piece: the next solve starts from its reactions.
   void remember();
 
-  /// Turns the velocities of contacts that were held over a piece into the tangents at its end, x, with the same energy
-  /// (what a held piece of finite length leaves along the normal would make the pair bounce at once). Returns what the
-  /// energy lacks after that.
+  /// Makes the velocities of contacts that were held over a piece tangential at its end, x, and conserves their energy
+  /// (the normal velocity that a held piece of finite length leaves would make the pair bounce at once). Returns the
+  /// energy that is missing afterwards.
   double slide(Positions<D> x, Vectors<D> v);
 
-  /// The candidates, for methods that look for contacts themselves.
+  /// The candidate pairs, for methods that search for contacts themselves.
   NeighbourList<D>& list() { return list_; }
 
   double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
@@ -99,29 +98,29 @@ class ContactScan {
     const double reach = sigma + tolerance(sigma);
     return d.squaredNorm() <= reach * reach;
   }
-  /// The least gap a piece may end with, for a contact that touches at its start: one that rounding has left at the
-  /// edge of the tolerance must be able to depart.
+  /// The smallest gap that a piece may end with if the contact touches at its start: a contact that rounding has left
+  /// at the edge of the tolerance must be able to separate.
   double floor(double gap_at_start, double tolerance) const {
     return std::min(-tolerance, gap_at_start - std::numeric_limits<double>::epsilon() * box_.edges.maxCoeff());
   }
   std::span<const Wall<D>> walls() const { return walls_; }
 
-  /// Counts one more contact or empty piece; throws when the slab needs more than max_events.
+  /// Counts one more contact or piece of length zero; throws if the slab needs more than max_events.
   void count_event(const EventKey<D>& key);
 
-  /// Counts and logs contacts that were found and executed elsewhere, since `time` in the slab.
+  /// Counts and logs contacts that the caller has found and executed; their times count from `time` in the slab.
   void commit(double time, std::span<const Contact<D>> executed);
 
-  /// What rounding makes of the normal speed of a contact, at most, by the motion of sphere i and what presses it; of a
-  /// pair the sum of both [length/time].
+  /// Upper bound of the rounding error of a contact's normal speed that the motion of sphere i and the forces on it
+  /// cause; for a pair, add the values of both spheres [length/time].
   double rounding_speed(Id i, const Vec<D>& v) const {
     double speed = v.norm();
     if (a_ && i < a_->size()) speed += length_ * (*a_)[i].norm();
     if (!pressed_.empty()) speed += length_ * pressed_[i];
     return kRounding * speed;
   }
-  /// A contact rests below this normal speed: what rounding makes, or a speed at which what presses the spheres
-  /// together closes the contact again before it has opened by kRestingGap. `normal`: of any length.
+  /// A contact rests below this normal speed: the rounding error, or a speed at which the forces on the spheres close
+  /// the contact again before it has opened by kRestingGap. `normal` may have any length.
   double resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
 
  private:
@@ -158,12 +157,12 @@ class ContactScan {
   const std::vector<Vec<D>>* a_ = nullptr;
   double length_ = 0;
   std::vector<Reaction<D>>& reactions_;
-  std::vector<double> pressed_;  // by particle: the accelerations that its reactions would give one by one, summed up
+  std::vector<double> pressed_;  // by particle: Σ |acceleration| over its reactions
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
 };
 
-/// The elastic impulse: kinetic energy and momentum are kept.
+/// Applies the elastic impulse, which conserves kinetic energy and momentum.
 template <int D>
 void collide_elastically(const Touch<D>& touch, Particles<D>& particles);
 

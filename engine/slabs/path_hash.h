@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What happened to each particle in a slab, in a word: two ranks that have it from the same start agree on all of it.
+// A hash of the events of each particle in a slab: two ranks with equal hashes computed the same events.
 
 #include <bit>
 #include <vector>
@@ -10,13 +10,13 @@
 
 namespace carom {
 
-/// Takes a word into a hash.
+/// Adds a word to a hash.
 inline void add_to_hash(std::uint64_t& hash, std::uint64_t word) {
   hash = (hash ^ word) * 0x9e3779b97f4a7c15;
   hash ^= hash >> 32;
 }
 
-/// Takes an event into a hash, with the ids that all ranks know.
+/// Adds an event to a hash, with the global ids of its particles.
 template <int D>
 void add_to_hash(std::uint64_t& hash, const EventKey<D>& key, const Particles<D>& particles) {
   const bool pair = key.kind == EventKind::pair;
@@ -26,7 +26,7 @@ void add_to_hash(std::uint64_t& hash, const EventKey<D>& key, const Particles<D>
   for (int k = 0; k < D; ++k) add_to_hash(hash, static_cast<std::uint64_t>(key.image[k]));
 }
 
-/// Of the events of each particle, given in their order.
+/// Hashes of the events of all particles; add the events in their order.
 template <int D>
 class PathHashes {
  public:
@@ -35,7 +35,7 @@ class PathHashes {
     add_to_hash(words_[key.lo], key, particles_);
     if (key.kind == EventKind::pair) add_to_hash(words_[key.hi], key, particles_);
   }
-  /// By particle.
+  /// The hashes, by particle.
   const std::vector<std::uint64_t>& words() const { return words_; }
 
  private:

@@ -11,16 +11,16 @@ namespace carom {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-// Added to a diagonal of ones. The first one makes all pivots alike, so that few exchanges find the contacts that are
-// pressed; the last is larger than the rounding of the factors by 10⁶, and small beside the least eigenvalue that
-// matters, so that each repetition takes digits off the error.
+// The proximal terms, added to a diagonal of ones. The first term makes all pivots similar, so that few exchanges find
+// the contacts under pressure; the last is 10⁶ times the rounding of the factors, and small compared with the smallest
+// relevant eigenvalue, so that each repetition reduces the error by several digits.
 constexpr double kFirstProximal = 1e-2, kProximalRatio = 0.03, kLastProximal = 1e-10;
 constexpr int kRepetitions = 40;
 constexpr int kExchanges = 50;
-constexpr int kPatience = 5;                    // exchanges of all wrong contacts that do not make them fewer
-constexpr double kFewRoundings = 8 * kEpsilon;  // of a sum of a few terms
-constexpr double kMostStretched = 0.1;          // of the kinetic energy: more is no turn of a sliding pair
-constexpr int kNone = -1;
+constexpr int kFruitlessExchanges = 5;          // of all wrong contacts, before only one is exchanged at a time
+constexpr double kFewRoundings = 8 * kEpsilon;  // relative error of a sum of a few terms
+constexpr double kMostStretched = 0.1;          // of the kinetic energy: the turn of a sliding pair takes less
+constexpr int kWall = -1;                       // in place of a second body
 
 /// The contacts of a system, with the spheres that they act on.
 template <int D>
@@ -38,14 +38,14 @@ class Problem {
     for (const Id id : ids) bodies_.push_back({id, 1 / mass[id]});
     const auto place = [&](Id id) { return static_cast<int>(std::ranges::lower_bound(ids, id) - ids.begin()); };
     for (const auto& contact : contacts) {
-      Arm arm{place(contact.key.lo), pair(contact) ? place(contact.key.hi) : kNone};
-      const double inverse_mass = bodies_[arm.lo].inverse_mass + (arm.hi == kNone ? 0.0 : bodies_[arm.hi].inverse_mass);
+      Arm arm{place(contact.key.lo), pair(contact) ? place(contact.key.hi) : kWall};
+      const double inverse_mass = bodies_[arm.lo].inverse_mass + (arm.hi == kWall ? 0.0 : bodies_[arm.hi].inverse_mass);
       arm.scale = std::sqrt(contact.normal.squaredNorm() * inverse_mass);
       arms_.push_back(arm);
     }
   }
 
-  /// Solves each cluster that is not solved yet, and moves w.
+  /// Solves each cluster that is not solved yet, and adds the effect of the reactions to w.
   bool solve(double* lost) {
     bool solved = true;
     if (std::vector<int> all = everything(); !settled(all, true)) {
@@ -60,8 +60,9 @@ class Problem {
     return solved;
   }
 
-  /// Solves for velocities, of which the kinetic energy is kept: the motion of a cluster relative to its centre of
-  /// mass is stretched, or relative to the walls that it touches along their axes. Returns what the energy still lacks.
+  /// Solves for velocities and conserves their kinetic energy: the motion of a cluster is rescaled relative to its
+  /// centre of mass, and along the axes of walls that it touches relative to the walls. Returns the energy that is
+  /// still missing.
   double solve_and_stretch() {
     if (settled(everything(), true)) {
       for (const Body& body : bodies_) w_[body.id] += body.shift;
@@ -72,11 +73,11 @@ class Problem {
       if (!settled(cluster, true)) solve(cluster);
       push(cluster);
       std::vector<int> bodies;
-      Vec<D> free = Vec<D>::Ones(), momentum = Vec<D>::Zero();  // free: 0 along axes of walls that it touches
+      Vec<D> free = Vec<D>::Ones(), momentum = Vec<D>::Zero();  // free: 0 along axes of walls that the cluster touches
       for (const int k : cluster) {
-        if (arms_[k].hi == kNone) free[wall_axis(contacts_[k].key.hi)] = 0;
+        if (arms_[k].hi == kWall) free[wall_axis(contacts_[k].key.hi)] = 0;
         for (const int b : {arms_[k].lo, arms_[k].hi})
-          if (b != kNone) bodies.push_back(b);
+          if (b != kWall) bodies.push_back(b);
       }
       std::ranges::sort(bodies);
       bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
@@ -108,12 +109,12 @@ class Problem {
     Id id;
     double inverse_mass;
     Vec<D> shift = Vec<D>::Zero();  // of w, by the reactions
-    double size = 0;                // of the terms of w with it
+    double size = 0;                // Σ |term| of w + shift
     std::vector<int> contacts{};
   };
   struct Arm {
-    int lo, hi;        // places in bodies_; hi: kNone at a wall
-    double scale = 1;  // square root of the diagonal of N M⁻¹ Nᵀ: what the problem is scaled with
+    int lo, hi;        // indices into bodies_; hi: kWall at a wall
+    double scale = 1;  // square root of the diagonal of N M⁻¹ Nᵀ, which the problem is scaled with
   };
 
   std::vector<int> everything() const {
@@ -124,11 +125,11 @@ class Problem {
   static bool pair(const RestingContact<D>& contact) { return contact.key.kind == EventKind::pair; }
   int size() const { return static_cast<int>(contacts_.size()); }
 
-  /// Contacts that are joined by spheres, each ascending.
+  /// The contacts of each cluster that shared spheres connect, ascending.
   std::vector<std::vector<int>> clusters() {
     for (int k = 0; k < size(); ++k)
       for (const int body : {arms_[k].lo, arms_[k].hi})
-        if (body != kNone) bodies_[body].contacts.push_back(k);
+        if (body != kWall) bodies_[body].contacts.push_back(k);
     std::vector<std::vector<int>> found;
     std::vector<char> seen(size(), 0);
     for (int first = 0; first < size(); ++first) {
@@ -137,7 +138,7 @@ class Problem {
       seen[first] = 1;
       for (std::size_t at = 0; at < cluster.size(); ++at)
         for (const int body : {arms_[cluster[at]].lo, arms_[cluster[at]].hi}) {
-          if (body == kNone) continue;
+          if (body == kWall) continue;
           for (const int k : bodies_[body].contacts)
             if (!std::exchange(seen[k], 1)) cluster.push_back(k);
         }
@@ -147,11 +148,11 @@ class Problem {
     return found;
   }
 
-  /// The shifts that the reactions of a cluster give.
+  /// Computes the shifts that the reactions of a cluster cause.
   void push(const std::vector<int>& cluster) {
     const auto each_body = [&](int k, auto&& visit) {
       visit(bodies_[arms_[k].lo], 1.0);
-      if (arms_[k].hi != kNone) visit(bodies_[arms_[k].hi], -1.0);
+      if (arms_[k].hi != kWall) visit(bodies_[arms_[k].hi], -1.0);
     };
     for (const int k : cluster)
       each_body(k, [&](Body& body, double) {
@@ -167,16 +168,16 @@ class Problem {
       });
     }
   }
-  /// What n·(w_lo − w_hi) has more than the bound.
+  /// n·(w_lo − w_hi) less the bound.
   double excess(int k) const {
     const auto& [lo, hi, scale] = arms_[k];
     Vec<D> w = w_[bodies_[lo].id] + bodies_[lo].shift;
-    if (hi != kNone) w -= w_[bodies_[hi].id] + bodies_[hi].shift;
+    if (hi != kWall) w -= w_[bodies_[hi].id] + bodies_[hi].shift;
     return contacts_[k].normal.dot(w) - contacts_[k].bound;
   }
   double tolerance(int k) const {
     const auto& [lo, hi, scale] = arms_[k];
-    const double size = bodies_[lo].size + (hi != kNone ? bodies_[hi].size : 0.0);
+    const double size = bodies_[lo].size + (hi != kWall ? bodies_[hi].size : 0.0);
     return kFewRoundings * (contacts_[k].normal.norm() * size + std::abs(contacts_[k].bound));
   }
   /// Whether the reactions of a cluster solve the problem.
@@ -195,7 +196,7 @@ class Problem {
     return solve(cluster, last, kLastProximal) || solve(cluster, std::vector<double>(m, 0.0), kFirstProximal);
   }
 
-  /// From these reactions; where there are none from all contacts pressed.
+  /// Starts from these reactions; if all are zero, from all contacts under pressure.
   bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal) {
     const int m = static_cast<int>(cluster.size());
     const bool known = std::ranges::any_of(start, [](double lambda) { return lambda > 0; });
@@ -218,20 +219,20 @@ class Problem {
       proximal_ = proximal;
       if (!pivot(cluster, gap, before, reaction)) return false;
       for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
-      // Once more: beside the large terms of a light sphere what a heavy one lacks is not seen.
+      // One more repetition: beside the large terms of a light sphere the error of a heavy one is invisible.
       if (std::exchange(solved, settled(cluster)) && solved) return true;
       proximal = std::max(kProximalRatio * proximal, kLastProximal);
     }
     return false;
   }
 
-  /// Block principal pivoting: (A + δ) λ + gap − δ λ_before is zero where λ > 0, and not negative elsewhere.
+  /// Block principal pivoting: makes (A + δ) λ + gap − δ λ_before zero where λ > 0, and non-negative elsewhere.
   bool pivot(const std::vector<int>& cluster, const Eigen::VectorXd& gap, const Eigen::VectorXd& before,
              Eigen::VectorXd& reaction) {
     const int m = static_cast<int>(cluster.size());
-    // Exchanging all contacts that are wrong takes few rounds but may go round in circles. Where it makes no progress
-    // only the last one is exchanged, which comes to an end (Murty, Linear Algebra Appl. 7 (1974) 65).
-    int fewest = m + 1, patience = kPatience;
+    // Exchanging all wrong contacts takes few rounds but may cycle. Where it makes no progress, only the last wrong
+    // contact is exchanged, which terminates (Murty, Linear Algebra Appl. 7 (1974) 65).
+    int fewest = m + 1, exchanges_left = kFruitlessExchanges;
     std::vector<int> wrong;
     for (int round = 0; round < kExchanges + 4 * m; ++round) {
       if (!factor(cluster)) return false;
@@ -262,8 +263,8 @@ class Problem {
       const int count = static_cast<int>(wrong.size());
       if (count < fewest) {
         fewest = count;
-        patience = kPatience;
-      } else if (patience-- <= 0) {
+        exchanges_left = kFruitlessExchanges;
+      } else if (exchanges_left-- <= 0) {
         wrong.erase(wrong.begin(), wrong.end() - 1);
       }
       for (const int k : wrong) active_[k] ^= 1;
@@ -271,9 +272,9 @@ class Problem {
     return false;
   }
 
-  /// Factors the scaled matrix of the active contacts of a cluster, where that is not done yet.
+  /// Factors the scaled matrix of the active contacts of a cluster, unless it is factored already.
   bool factor(const std::vector<int>& cluster) {
-    std::vector<int> wanted, place(size(), kNone);
+    std::vector<int> wanted, place(size(), kWall);
     for (int k = 0; k < static_cast<int>(cluster.size()); ++k)
       if (active_[k]) {
         place[cluster[k]] = static_cast<int>(wanted.size());
@@ -288,10 +289,10 @@ class Problem {
       entries.emplace_back(row, row, proximal_);
       const int k = cluster[wanted[row]];
       for (const int b : {arms_[k].lo, arms_[k].hi}) {
-        if (b == kNone) continue;
+        if (b == kWall) continue;
         for (const int l : bodies_[b].contacts) {
           const int column = place[l];
-          if (column == kNone || column > row) continue;
+          if (column == kWall || column > row) continue;
           const double sign = (arms_[k].lo == b) == (arms_[l].lo == b) ? 1 : -1;
           const double value = sign * bodies_[b].inverse_mass * contacts_[k].normal.dot(contacts_[l].normal);
           entries.emplace_back(row, column, value / (arms_[k].scale * arms_[l].scale));
@@ -310,8 +311,8 @@ class Problem {
   bool tied_;
   std::vector<Body> bodies_;
   std::vector<Arm> arms_;
-  std::vector<char> active_;   // of the cluster at hand
-  std::vector<int> factored_;  // for these of its contacts
+  std::vector<char> active_;   // by contact of the cluster that is being solved
+  std::vector<int> factored_;  // the contacts that solver_ holds the factors for
   double proximal_ = 0, factored_proximal_ = 0;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
 };

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Resting contacts: pairs that touch, have no normal velocity, and may be pressed together.
+// Resting contacts: pairs that touch, have no normal velocity, and may be pressed together by forces.
 //
-// A pair at rest in contact that something presses would collide without end. It is held instead: a reaction λ ≥ 0
-// along the normal keeps the pair from approaching and does no work; where the pair is drawn apart λ is zero and the
-// pair leaves. For accelerations, velocities and mean velocities alike this is a linear complementarity problem,
+// A pair at rest in contact that forces press together would collide without end. Instead a reaction λ ≥ 0 along the
+// normal keeps the pair from approaching and does no work; where forces pull the pair apart, λ is zero and the pair
+// separates. For accelerations, velocities and mean velocities this is the same linear complementarity problem,
 //   w_lo += λ n/m_lo, w_hi −= λ n/m_hi,   λ ≥ 0,   n·(w_lo − w_hi) ≥ bound,   one of the two with equality.
 //
-// Contacts that share no sphere do not feel each other, so each cluster of contacts is solved by itself: block
+// Contacts that share no sphere are independent, so each cluster of contacts is solved by itself: block
 // principal pivoting on the set of contacts with a reaction (Júdice, Pires, Comput. Oper. Res. 21 (1994) 587), with a
 // sparse LDLᵀ factorisation for each set. In a statically indeterminate cluster (a crystal) the reactions are not
 // unique, though the motion is; there the matrix is singular. The proximal point method (Rockafellar, SIAM J. Control
@@ -20,12 +20,12 @@
 
 namespace carom {
 
-/// Normal speeds below this share of the speeds that two spheres have, or that the forces and reactions on them would
-/// give them one by one within the step, are rounding: four digits above that of one number.
+/// Normal speeds below this fraction of the speeds of two spheres, or of the speeds that each force and reaction on
+/// them would give them within the step, count as rounding: 10⁴ times the rounding of one number.
 inline constexpr double kRounding = 1e-12;
 
-/// A contact that opens by no more than this share of the contact distance, which is what spheres may overlap by, until
-/// what presses it closes it again, and would do so more than this number of times a step, is closed.
+/// A contact counts as closed if, before forces close it again, it opens by no more than kRestingGap contact distances
+/// (the overlap that spheres may have), and if it would do so more than kMostBounces times a step.
 inline constexpr double kRestingGap = 1e-12;
 inline constexpr int kMostBounces = 64;
 
@@ -34,21 +34,21 @@ struct RestingContact {
   EventKey<D> key;    ///< of the pair, or of the sphere and the wall
   Vec<D> normal;      ///< gradient of the gap up to a positive factor, acting on lo and, negated, on hi
   double bound = 0;   ///< see above
-  double slack = 0;   ///< by how much n·(w_lo − w_hi) may miss the bound with the reactions that are known
+  double slack = 0;   ///< by how much n·(w_lo − w_hi) may miss the bound before known reactions are solved again
   double lambda = 0;  ///< the reaction found
-  double force = 0;   ///< the force that it stands for, of the last piece that was held [force]
+  double force = 0;   ///< the force of this reaction in the last piece with the contact held [force]
 };
 
-/// Finds the reactions and adds their effect to w. The lambdas given are the starting point: where they solve the
-/// problem to rounding already they stay as they are. The last bits of the result depend on the order of the contacts:
-/// sort them. `lost`: gets ½ Σ m w² before less that after. False: not solved to rounding.
+/// Finds the reactions and adds their effect to w. The iteration starts from the given lambdas; if they already solve
+/// the problem to rounding, they are left unchanged. The last bits of the result depend on the order of the contacts:
+/// sort them. `lost` receives the decrease of ½ Σ m w². Returns false if the problem was not solved to rounding.
 template <int D>
 bool solve_reactions(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w,
                      double* lost = nullptr);
 
-/// Takes the normal velocity out of contacts that stay closed, in both directions. The tangential motion of each
-/// cluster is stretched so that its kinetic energy and its momentum along axes without walls stay; returns the energy
-/// that could not be given back in this way, because there is hardly any tangential motion.
+/// Removes the normal velocity, of either sign, from contacts that stay closed. The tangential motion of each cluster
+/// is rescaled so that its kinetic energy and its momentum along axes without walls are conserved. Returns the energy
+/// that could not be given back in this way because there is hardly any tangential motion.
 template <int D>
 double keep_tangential(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> v);
 

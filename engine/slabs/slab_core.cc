@@ -13,13 +13,13 @@
 namespace carom {
 
 namespace {
-constexpr double kRoom = 1.25;               // for paths under other accelerations, in parts of the first ones
-constexpr double kWild = 4;                  // mean distances of ½ h² a
-constexpr std::size_t kBetweenLooks = 1024;  // events, planned anew or not
-// Contacts of one particle on parabolas in a slab: a light sphere that heavy ones catch between them collides about
-// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ with masses of 1 : 10⁵. Flights with more are not
-// worth their time before the accelerations are right.
-constexpr std::uint32_t kMostContacts = 1000;
+constexpr double kPathMargin = 1.25;         // paths under later accelerations, relative to the first paths
+constexpr double kMostBend = 4;              // ½ h² a, in mean distances of the particles
+constexpr std::size_t kBetweenLooks = 1024;  // events between two checks for a request to stop
+// Contacts of one particle on parabolas in a slab: a light sphere between two approaching heavy ones collides about
+// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A shorter slab is tried
+// rather than a flight with more contacts, which costs too much as long as the accelerations are not right.
+constexpr std::uint32_t kMostContactsOfParticle = 1000;
 }  // namespace
 
 template <int D>
@@ -28,7 +28,7 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       box_(system.box),
       particles_(system.particles),
       max_events_(max_events),
-      most_bend_(kWild * mean_distance(system)) {
+      most_bend_(kMostBend * mean_distance(system)) {
   if (system.decomposition.joined() && box_.pistons())
     throw Error(Failure::deck, "forces and walls that move together need one rank; take one, or free-flight");
   system.fields.add_value("reactions", reactions_);
@@ -40,7 +40,7 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       });
 }
 
-/// Frees what has an entry for each particle.
+/// Frees all arrays with an entry for each particle.
 template <int D>
 void SlabCore<D>::release() {
   scan_.reset();
@@ -70,24 +70,24 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   margin_ = own_reach_ = 0;
   for (Id i = 0; i < n; ++i) {
     const double straight = length * v[i].norm(), bent = 0.5 * length * length * acceleration(i).norm();
-    reach_[i] = kRoom * (straight + bent);
+    reach_[i] = kPathMargin * (straight + bent);
     margin_ = bent <= most_bend_ ? std::max(margin_, reach_[i]) : kNever;
     if (particles_.owns(i)) own_reach_ = std::max(own_reach_, reach_[i]);
-    largest_bend_[i] = (kRoom - 1) * straight + kRoom * bent;
+    largest_bend_[i] = (kPathMargin - 1) * straight + kPathMargin * bent;
   }
   near_.clear();
   limit_margin();
   if (std::isfinite(margin_)) find_near();
 }
 
-/// Parabolas that may lead through a whole periodic box are too strong: there would be too many images to look at.
+/// Rejects accelerations under which parabolas may cross a whole periodic box: there would be too many images.
 template <int D>
 void SlabCore<D>::limit_margin() {
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k) && !a_.empty() && margin_ > box_.edges[k]) margin_ = kNever;
 }
 
-/// The candidates within margin_, and those of them that first flights may bring together.
+/// Finds the candidate pairs within margin_, and which of them may meet before any other collision.
 template <int D>
 void SlabCore<D>::find_near() {
   const auto& x = particles_.x;
@@ -119,7 +119,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
       end = serve();
     }
     if (!left_ && longest_path_ > 0 && std::isfinite(longest_path_)) {
-      margin_ = kRoom * longest_path_;
+      margin_ = kPathMargin * longest_path_;
       limit_margin();
       if (std::isfinite(margin_))
         find_near();
@@ -141,7 +141,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   }
   if (!shared && (system_.decomposition.joined() ? system_.decomposition.any(left_) : left_)) throw SlabLeft{};
   if (shared)
-    agree(!end.complete || too_many_contacts_ || longest_path_ > 0);
+    compare_ranks(!end.complete || too_many_contacts_ || longest_path_ > 0);
   else if (too_many_contacts_)
     throw_too_many_contacts(max_events_, partners(end.key));
   else if (longest_path_ > 0 && !a_.empty())
@@ -156,7 +156,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   return end;
 }
 
-/// The contacts of first flights.
+/// Predicts the contacts of particles before their first collision.
 template <int D>
 void SlabCore<D>::predict_first() {
   for (const std::uint32_t k : near_) predict_pair(pairs_[k].i, pairs_[k].j, pairs_[k].image);
@@ -167,7 +167,7 @@ void SlabCore<D>::predict_first() {
   std::make_heap(queue_.begin(), queue_.end());
 }
 
-/// Where all particles come without contacts, and which of them may come farther than near_ knows.
+/// Computes where all particles end without contacts, and which of them may leave the range of near_.
 template <int D>
 void SlabCore<D>::plain_ends() {
   const Stopwatch watch(counters_->seconds.predict);
@@ -192,7 +192,7 @@ void SlabCore<D>::plain_ends() {
       note_path(half * a_[i].norm() <= most_bend_ ? far : kNever);
 }
 
-/// Serves the queue until it is empty.
+/// Handles the events of the queue until it is empty.
 template <int D>
 FlightEnd<D> SlabCore<D>::serve() {
   for (std::size_t served = 1; !queue_.empty() && longest_path_ == 0; ++served) {
@@ -208,10 +208,10 @@ FlightEnd<D> SlabCore<D>::serve() {
     if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
     if (resolved_ && !(key.time > 0)) continue;  // rounding
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
-    // A straight flight presses nothing together: what does not approach needs no impulse.
+    // A straight flight presses no spheres together: contacts that do not approach need no impulse.
     if (held || (!a_.empty() && comes_to_rest(key))) return {.complete = false, .time = key.time, .key = key};
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
-    const bool too_strong = !a_.empty() && most >= kMostContacts;
+    const bool too_strong = !a_.empty() && most >= kMostContactsOfParticle;
     too_many_contacts_ = !too_strong && contacts_.size() >= max_events_;
     if (too_strong || too_many_contacts_)
       return {.complete = false, .too_strong = too_strong, .time = key.time, .key = key};
@@ -246,7 +246,7 @@ void SlabCore<D>::predict_all(Id i) {
   predict_walls(i);
 }
 
-/// The next contact of the present flights, looked at from the later of their starts.
+/// Predicts the next contact of the present flights, from the later of their starts.
 template <int D>
 void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
   const double t = std::max(start(i), start(j)), sigma = scan_->contact_distance(i, j), rest = length_ - t;
@@ -283,7 +283,7 @@ void SlabCore<D>::predict_walls(Id i) {
   }
 }
 
-/// Where and how two flights meet, or a flight and a wall.
+/// The geometry of a contact of two flights, or of a flight and a wall.
 template <int D>
 struct SlabCore<D>::Meeting {
   Meeting(const SlabCore& core, const EventKey<D>& key) : v_lo(core.velocity(key.lo, key.time)) {
@@ -300,18 +300,18 @@ struct SlabCore<D>::Meeting {
     sigma = core.scan_->contact_distance(key.lo, key.hi);
   }
   Vec<D> v_lo, v_hi = v_lo, normal;
-  double speed = 0;  // along the normal, negative where they approach
+  double speed = 0;  // along the normal, negative if the gap closes
   double sigma = 0;
 };
 
-/// Whether they meet too slowly for an impact.
+/// Whether the spheres meet too slowly for an impact.
 template <int D>
 bool SlabCore<D>::comes_to_rest(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
   return meeting.speed >= -scan_->resting_speed(key, meeting.normal, meeting.v_lo, meeting.v_hi);
 }
 
-/// When the gap is still a quarter of what counts as touching; 0 where it is so from the start.
+/// The time at which the gap is a quarter of the tolerance; 0 if it is no more than that from the start.
 template <int D>
 double SlabCore<D>::end_before(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
@@ -319,7 +319,7 @@ double SlabCore<D>::end_before(const EventKey<D>& key) const {
   return meeting.speed < 0 ? std::max(0.0, key.time + early / meeting.speed) : key.time;
 }
 
-/// The flight of particle i from this event on, before its impulse.
+/// Starts a new flight of particle i at this event, before the impulse.
 template <int D>
 typename SlabCore<D>::Flight& SlabCore<D>::flight(Id i, const EventKey<D>& key) {
   const Vec<D> x = position(i, key.time), v = velocity(i, key.time);
@@ -340,7 +340,7 @@ typename SlabCore<D>::Flight& SlabCore<D>::flight(Id i, const EventKey<D>& key) 
   return f;
 }
 
-/// The elastic impulse, where the velocities of arrival still approach.
+/// Applies the elastic impulse if the spheres still approach.
 template <int D>
 void SlabCore<D>::collide(const EventKey<D>& key) {
   flight(key.lo, key);
@@ -391,20 +391,19 @@ void SlabCore<D>::compare_sequences() {
     if (swapped_.empty() || swapped_.back() != each.id) swapped_.push_back(each.id);
 }
 
-/// Throws SlabLeft on all ranks where one of them has been asked to stop, HaloTooSmall where a flight failed on one of
-/// them, a copy that matters went another way than the particle at its owner, or a path was longer than what is known
-/// allows. Collective.
+/// Throws on all ranks: SlabLeft if one of them was asked to stop; HaloTooSmall if a flight failed on one of them, if a
+/// relevant copy had other events than its original, or if a path was longer than the halo allows. Collective.
 template <int D>
-void SlabCore<D>::agree(bool failed) {
+void SlabCore<D>::compare_ranks(bool failed) {
   Decomposition<D>& decomposition = system_.decomposition;
   PathHashes<D> events(particles_);
   for (const Contact<D>& contact : contacts_) events.add(contact.key);
   std::vector<std::uint64_t> at_owners = events.words();
   decomposition.update(std::span(at_owners));
-  bool agreed = true;
+  bool equal = true;
   for (Id i = 0; i < at_owners.size(); ++i)
-    if (at_owners[i] != events.words()[i] && decomposition.matters(i)) agreed = false;
-  std::array<double, 4> most = {failed ? 1.0 : 0.0, agreed ? 0.0 : 1.0, own_reach_, left_ ? 1.0 : 0.0};
+    if (at_owners[i] != events.words()[i] && decomposition.matters(i)) equal = false;
+  std::array<double, 4> most = {failed ? 1.0 : 0.0, equal ? 0.0 : 1.0, own_reach_, left_ ? 1.0 : 0.0};
   auto& [any_failed, any_wrong, farthest, any_left] = most;
   for (const Id i : beyond_)
     if (particles_.owns(i)) farthest = std::max(farthest, path(start_v_[i], a_[i], length_));

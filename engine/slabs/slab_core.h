@@ -3,16 +3,17 @@
 // Flies all particles through one slab, each on parabolas under a constant acceleration of its own, event by event.
 //
 //   core.begin(v, a, length);                  // candidate pairs of a slab from the system's positions, once
-//   core.fly(a);                               // to its end: x(), v(), contacts(); again with other accelerations
-//   core.commit(start);                        // the contacts of the last flight count
+//   core.fly(a);                               // to the slab's end: x(), v(), contacts(); may be repeated with other a
+//   core.commit(start);                        // counts and logs the contacts of the last flight
 //
-// A collision changes velocities, never an acceleration. Most particles have no contact in a slab: only pairs which
-// their paths can bring together are predicted, and only particles in a collision are flown in pieces. A contact is a
-// function of two flights alone, so neither list, nor order, nor rank shows in the bits.
+// A collision changes velocities, never an acceleration. Most particles have no contact in a slab: contacts are
+// predicted only for pairs close enough to meet, and only particles that collide are flown in pieces. A contact is a
+// function of two flights alone, so the bits depend on neither the list, nor the order, nor the rank.
 //
-// Where each rank knows only some of the particles (engine/ranks/decomposition.h), a flight is compared: owners send a
-// hash of the events of each particle that others have a copy of. Where a copy that matters went another way, or a path
-// was longer than what is known allows, fly() throws HaloTooSmall on all ranks. Nothing of the system has changed then.
+// Where each rank knows only some of the particles (engine/ranks/decomposition.h), ranks compare their flights: owners
+// send a hash of the events of each particle that other ranks have a copy of. If a relevant copy had other events than
+// its original, or a path was longer than the halo allows, fly() throws HaloTooSmall on all ranks; the system is
+// unchanged then.
 
 #include <algorithm>
 #include <cmath>
@@ -27,11 +28,11 @@ namespace carom {
 template <int D>
 struct FlightEnd {
   bool complete = true;
-  bool too_strong = false;  ///< where it is not: an acceleration bends paths far too much for the slab, or is NaN, or
-                            ///< there are too many contacts to learn anything from their end
-  double time = 0;          ///< else the slab must end here, because a contact comes to rest or a resting one is hit;
-                            ///< the spheres touch then, with a gap that is left for the rounding of other flights
-  EventKey<D> key{};        ///< by this event
+  bool too_strong = false;  ///< if incomplete: an acceleration bends paths far too much for the slab, or is NaN, or
+                            ///< there are so many contacts that the end of the flight would be meaningless
+  double time = 0;          ///< if incomplete otherwise: the slab must end here, because a contact comes to rest or a
+                            ///< resting one is hit; the spheres touch then, with a gap that leaves room for rounding
+  EventKey<D> key{};        ///< the event that made the flight incomplete
 };
 
 template <int D>
@@ -43,7 +44,7 @@ class SlabCore {
   SlabCore(const SlabCore&) = delete;
   SlabCore& operator=(const SlabCore&) = delete;
 
-  /// Starts a step; see ContactScan::begin_slab. `watch` is asked within fly() too.
+  /// Starts a step; see ContactScan::begin_slab. fly() calls `watch` too.
   void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
                   SlabWatch* watch = nullptr) {
     counters_ = &counters;
@@ -53,39 +54,40 @@ class SlabCore {
     scan_->begin_slab(counters, contacts, a, length, watch);
   }
 
-  /// Finds the pairs that may meet in a slab of this length [time] from the system's positions with velocities v, under
-  /// accelerations a or others not much larger. `resolved`: ContactScan::resolve() has seen to what touches now.
+  /// Finds the pairs that may meet in a slab of this length [time], from the system's positions with velocities v,
+  /// under accelerations a or others not much larger. `resolved`: ContactScan::resolve() has handled the contacts at
+  /// the start.
   void begin(Positions<D> v, Positions<D> a, double length, bool resolved = false);
 
-  /// Flies from the start of the slab to its end. Empty `a`: straight. Throws SlabLeft where the run is to stop.
+  /// Flies from the start of the slab to its end, straight if `a` is empty. Throws SlabLeft if the run is to stop.
   FlightEnd<D> fly(Positions<D> a);
 
   const std::vector<Vec<D>>& x() const { return x_; }            ///< positions at the slab's end, not wrapped [length]
-  const std::vector<Vec<D>>& last_x() const { return last_x_; }  ///< the same of the flight before
+  const std::vector<Vec<D>>& last_x() const { return last_x_; }  ///< positions at the end of the flight before
   const std::vector<Vec<D>>& v() const { return v_; }            ///< velocities there [length/time]
-  /// By particle, whether the flight before ended elsewhere; and how many these are on all ranks.
+  /// Whether a particle's end point differs from that of the flight before; and their number on all ranks.
   const std::vector<char>& moved() const { return moved_; }
   std::uint64_t all_moved() const { return all_moved_; }
-  /// Of the last flight, in the order of their keys.
+  /// The contacts of the last flight, in the order of their keys.
   std::span<const Contact<D>> contacts() const { return contacts_; }
 
   /// Whether particle i has a contact in the last flight.
   bool collides(Id i) const { return slot_[i] != 0; }
 
-  /// The particles of which the sequence of partners is another than in the flight before, ascending.
+  /// The particles with another sequence of partners than in the flight before, ascending.
   std::span<const Id> swapped() const { return swapped_; }
 
-  /// Counts and logs the contacts of the last flight; `time`: of the slab's start within the step.
+  /// Counts and logs the contacts of the last flight; the slab starts at `time` within the step.
   void commit(double time);
 
-  /// Moves the particles, and walls that move, to the slab's end.
+  /// Moves the particles, and moving walls, to the slab's end.
   void finish(Particles<D>& particles) {
     particles.x.swap(x_);
     particles.v.swap(v_);
     system_.box = system_.box.after(length_);
   }
 
-  /// Contacts at the slab's start, and those that rest.
+  /// The contacts at the slab's start, and the resting ones.
   ContactScan<D>& scan() { return *scan_; }
 
  private:
@@ -95,12 +97,12 @@ class SlabCore {
     double t;
     Id id;
     std::uint32_t version, generation;
-    std::uint64_t hash;  ///< of its sequence of partners
+    std::uint64_t hash;  ///< of the particle's sequence of partners
   };
   struct Planned {
     EventKey<D> key;
-    std::uint32_t version_lo = 0, version_hi = 0;                           ///< of the flights that it is planned for
-    bool operator<(const Planned& other) const { return other.key < key; }  // the standard heap serves the largest
+    std::uint32_t version_lo = 0, version_hi = 0;                           ///< versions of the two flights
+    bool operator<(const Planned& other) const { return other.key < key; }  // a standard heap has the largest on top
   };
   struct Sequence {
     Id id;
@@ -123,10 +125,10 @@ class SlabCore {
   void collide(const EventKey<D>& key);
   Flight& flight(Id i, const EventKey<D>& key);
   double path(const Vec<D>& v, const Vec<D>& a, double time) const { return time * (v.norm() + 0.5 * time * a.norm()); }
-  /// A particle comes so far.
+  /// Records the length of a path that exceeds margin_.
   void note_path(double path) { longest_path_ = std::isnan(path) ? kNever : std::max(longest_path_, path); }
   void compare_sequences();
-  void agree(bool failed);
+  void compare_ranks(bool failed);
 
   Vec<D> acceleration(Id i) const { return a_.empty() ? Vec<D>(Vec<D>::Zero()) : a_[i]; }
   double start(Id i) const { return slot_[i] == 0 ? 0.0 : flights_[slot_[i] - 1].t; }
@@ -144,25 +146,25 @@ class SlabCore {
   std::optional<ContactScan<D>> scan_;
   std::vector<Wall<D>> walls_;
   std::uint64_t max_events_;
-  double most_bend_;  // path that an acceleration may bend in a slab [length]
+  double most_bend_;  // largest ½ a h² that is tried [length]
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
   SlabWatch* watch_ = nullptr;
   double length_ = 0, margin_ = 0, own_reach_ = 0;
-  double longest_path_ = 0;  // > 0: how far a particle came, beyond margin_, in this flight
+  double longest_path_ = 0;  // of this flight, if beyond margin_; else 0
   bool too_many_contacts_ = false, resolved_ = false;
-  bool left_ = false;         // this rank has been asked to stop, in this flight
-  Positions<D> start_v_, a_;  // of the slab
+  bool left_ = false;         // this rank was asked to stop during this flight
+  Positions<D> start_v_, a_;  // velocities at the slab's start, accelerations
   std::span<const NeighbourPair<D>> pairs_;
-  std::vector<std::uint32_t> near_;   // among the pairs: those that first flights may bring together
-  std::vector<double> reach_;         // by particle: how far first flights may lead for which `near_` holds
-  std::vector<double> largest_bend_;  // by particle: the largest |½ a h²| for which `near_` holds
-  std::vector<Id> beyond_;            // particles with larger ones
-  std::vector<char> held_;            // resting in contact; empty: none are
+  std::vector<std::uint32_t> near_;   // indices of the pairs that may meet before any other collision
+  std::vector<double> reach_;         // by particle: the longest path for which `near_` is complete
+  std::vector<double> largest_bend_;  // by particle: the largest |½ a h²| for which `near_` is complete
+  std::vector<Id> beyond_;            // particles with a larger |½ a h²|
+  std::vector<char> held_;            // by particle: has a resting contact; empty: none has
   std::vector<Vec<D>> x_, last_x_, v_;
   std::vector<char> moved_;
   std::uint64_t all_moved_ = 0;
-  std::vector<std::uint32_t> slot_;  // by particle: 1 + its place in flights_, or 0
+  std::vector<std::uint32_t> slot_;  // by particle: 1 + its index in flights_, or 0
   std::vector<Flight> flights_;
   std::vector<Planned> queue_;  // a heap
   std::vector<Contact<D>> contacts_;

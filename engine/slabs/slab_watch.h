@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A step that takes long can be left before its end, with the state that it started from.
+// Lets a run stop within a long step and restores the state at the start of the step.
 //
-// Between pieces, sweeps and contacts an integrator calls cut() or look(); where the run is to stop they throw SlabLeft
-// on all ranks together. The first cut() of a slab keeps the state in memory, so a slab that is done at one stroke
-// costs no copy. Only what was registered as state of particles, and of the run by the integrator, changes within a
-// slab.
+// Between pieces, sweeps and contacts an integrator calls cut() or look(), which throw SlabLeft on all ranks together
+// if the run is to stop. The first cut() of a slab copies the state, so a slab that is not cut costs no copy. Within a
+// slab only registered state changes: that of the particles, and that which the integrator has registered for the run.
 
 #include <cstring>
 #include <functional>
@@ -16,35 +15,35 @@
 
 namespace carom {
 
-/// Thrown on all ranks together: the slab is not to be ended.
+/// Thrown on all ranks together: the slab is abandoned.
 struct SlabLeft {};
 
 class SlabWatch {
  public:
-  /// `leave`: whether to leave the slab, asked now and then; collective. `leave_here`: the same of this rank alone.
-  /// `first`: what the integrator has of the run stands behind so many entries of the registry.
+  /// `leave` says whether to abandon the slab; it is called now and then and is collective. `leave_here` is the request
+  /// of this rank alone. The integrator's entries in the registry of run state begin at `first`.
   SlabWatch(Fields& fields, std::size_t first, std::function<bool()> leave, std::function<bool()> leave_here)
       : fields_(fields), first_(first), leave_(std::move(leave)), leave_here_(std::move(leave_here)) {}
 
-  // For integrators.
+  // Functions that integrators call.
 
-  /// Before the system changes within a slab that is to go on: keeps the state at its start, and look(). Collective.
+  /// Call this before the system changes within a slab: copies the state at its start once, then look(). Collective.
   void cut() {
     if (!kept_ && leave_) keep();
     look();
   }
-  /// Throws SlabLeft where the run is to stop. Collective.
+  /// Throws SlabLeft if the run is to stop. Collective.
   void look() const {
     if (leave_ && leave_()) throw SlabLeft{};
   }
-  /// Whether this rank has been asked to stop: it may leave off what it does, and has all ranks throw SlabLeft.
+  /// Whether this rank was asked to stop: it may abandon its work, and all ranks will throw SlabLeft.
   bool asked_here() const { return leave_here_ && leave_here_(); }
 
-  // For the run.
+  // Functions that the run calls.
 
-  /// A slab starts, or starts anew.
+  /// Call this when a slab starts, or starts again.
   void begin() { kept_ = false; }
-  /// After SlabLeft: the state is that of the slab's start.
+  /// Call this after SlabLeft: restores the state at the slab's start.
   void restore() {
     if (!kept_) return;
     std::size_t k = 0;

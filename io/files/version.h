@@ -6,7 +6,7 @@
 
 namespace carom {
 
-/// Version and commit, for instance "0.1.0 (git 1a2b3c4)".
+/// Version and commit, for instance "1.0.0 (git 1a2b3c4)".
 std::string version_string();
 
 /// Compiler, build type and flags, one line.
