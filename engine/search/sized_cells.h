@@ -4,9 +4,9 @@
 // would hold thousands of small ones. Built for correctness in any box; the event core has faster cells of its own.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -18,23 +18,27 @@ namespace carom {
 template <int D>
 class SizedCells {
  public:
-  /// For particles with these reaches, which two of them touch from at their sum and `skin` [length]. `extent`: of
-  /// their positions, along open axes. The cells are empty at first.
+  /// Two particles are near each other within the sum of their reaches and `skin` [length]. `extent`: of their
+  /// positions; it matters along open axes. The cells are empty at first.
   SizedCells(const Box<D>& box, std::span<const double> reach, const Extent<D>& extent, double skin = 0)
       : skin_(skin), largest_(reach.empty() ? 0 : *std::ranges::max_element(reach)), places_(reach.size()) {
     std::array<std::size_t, kOctaves> members{};
     std::array<double, kOctaves> largest{};
     for (const double r : reach) {
-      ++members[octave(r)];
-      largest[octave(r)] = std::max(largest[octave(r)], r);
+      const std::size_t o = octave(r);
+      ++members[o];
+      largest[o] = std::max(largest[o], r);
     }
-    for (std::size_t o = 0; o < kOctaves; ++o)
+    for (std::size_t o = 0; o < kOctaves; ++o) {
+      level_[o] = levels_.size();
       if (members[o] > 0)
-        levels_[o].emplace(largest[o], CellGrid<D>(box, 2 * largest[o] + skin, {members[o], extent.low, extent.high}));
+        levels_.emplace_back(largest[o],
+                             CellGrid<D>(box, 2 * largest[o] + skin, {members[o], extent.low, extent.high}));
+    }
   }
 
   void insert(Id i, const Vec<D>& x, double reach) {
-    Level& level = *levels_[octave(reach)];
+    Level& level = levels_[level_[octave(reach)]];
     const Cell<D> cell = level.grid.cell(x);
     std::uint32_t& first = level.first[level.grid.index(cell)];
     places_[i] = {std::exchange(first, i), level.grid.boxes(cell)};
@@ -44,8 +48,7 @@ class SizedCells {
   /// one of this reach at x: that image stands at x_j − shift(image).
   template <class Visit>
   void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
-    for (const auto& level : levels_)
-      if (level) look_into(*level, x, reach + level->largest + skin_, visit);
+    for (const Level& level : levels_) look_into(level, x, reach + level.largest + skin_, visit);
   }
 
  private:
@@ -65,8 +68,8 @@ class SizedCells {
   };
 
   std::size_t octave(double reach) const {
-    return reach > 0 ? std::min<std::size_t>(static_cast<std::size_t>(std::ilogb(largest_ / reach)), kOctaves - 1)
-                     : kOctaves - 1;
+    if (reach > 0.5 * largest_) return 0;
+    return reach > 0 ? std::min(static_cast<std::size_t>(std::ilogb(largest_ / reach)), kOctaves - 1) : kOctaves - 1;
   }
 
   template <class Visit>
@@ -109,8 +112,9 @@ class SizedCells {
   }
 
   double skin_, largest_;
-  std::array<std::optional<Level>, kOctaves> levels_;
-  std::vector<Place> places_;  // by particle
+  std::vector<Level> levels_;
+  std::array<std::size_t, kOctaves> level_;  // of an octave
+  std::vector<Place> places_;                // by particle
 };
 
 }  // namespace carom
