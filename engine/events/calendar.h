@@ -41,7 +41,7 @@ class Calendar {
     chunks_.clear();
     chunks_.reserve(2 * entries / kChunk + kBins);  // growing would copy; unused memory is never touched
     next_.clear();
-    free_ = kNone;
+    free_ = kNoChunk;
     later_ = Bin{};
     present_.clear();
     sorted_.clear();
@@ -112,14 +112,14 @@ class Calendar {
   struct Later {  // boost::heap keeps the largest on top
     bool operator()(const CalendarEntry& a, const CalendarEntry& b) const { return b.time < a.time; }
   };
-  static constexpr std::uint32_t kNone = 0xffffffff;
+  static constexpr std::uint32_t kNoChunk = 0xffffffff;
   static constexpr std::uint32_t kChunk = 16;  // entries of a chunk: three cache lines
   static constexpr int kBins = 2048;
   struct Chunk {
     CalendarEntry entry[kChunk];
   };
   struct Bin {
-    std::uint32_t chunk = kNone;  // the last chunk; between calls it is not full
+    std::uint32_t chunk = kNoChunk;  // the last chunk; between calls it is not full
     std::uint32_t count = 0;
   };
 
@@ -127,12 +127,12 @@ class Calendar {
     const std::uint32_t at = bin.count % kChunk;
     if (at == 0) {
       std::uint32_t fresh = free_;
-      if (fresh != kNone) {
+      if (fresh != kNoChunk) {
         free_ = next_[fresh];
       } else {
         fresh = static_cast<std::uint32_t>(chunks_.size());
         chunks_.emplace_back();
-        next_.push_back(kNone);
+        next_.push_back(kNoChunk);
       }
       next_[fresh] = bin.chunk;
       bin.chunk = fresh;
@@ -145,7 +145,7 @@ class Calendar {
   template <class Visit>
   void empty(Bin& bin, Visit&& visit) {
     std::uint32_t n = in_last(bin);
-    for (std::uint32_t chunk = bin.chunk; chunk != kNone;) {
+    for (std::uint32_t chunk = bin.chunk; chunk != kNoChunk;) {
       for (std::uint32_t k = 0; k < n; ++k) visit(CalendarEntry(chunks_[chunk].entry[k]));
       const std::uint32_t next = next_[chunk];
       next_[chunk] = free_;
@@ -186,7 +186,7 @@ class Calendar {
     current_ = kBins - 1;
     double start = std::numeric_limits<double>::infinity();
     std::uint32_t n = in_last(later_);
-    for (std::uint32_t chunk = later_.chunk; chunk != kNone; chunk = next_[chunk], n = kChunk)
+    for (std::uint32_t chunk = later_.chunk; chunk != kNoChunk; chunk = next_[chunk], n = kChunk)
       for (std::uint32_t k = 0; k < n; ++k)
         if (const CalendarEntry& entry = chunks_[chunk].entry[k]; entry.time < start && holds(entry))
           start = entry.time;
@@ -256,7 +256,7 @@ class Calendar {
   std::vector<Bin> ring_;
   PageVector<Chunk> chunks_;
   std::vector<std::uint32_t> next_;  // by chunk: the previous chunk of its bin, or the next free chunk
-  std::uint32_t free_ = kNone;
+  std::uint32_t free_ = kNoChunk;
   Bin later_;  // entries beyond the ring
 
   std::vector<CalendarEntry> sorted_, scratch_;  // the open bin

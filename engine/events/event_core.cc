@@ -193,7 +193,7 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
 template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = queue_.key_of(i);
-  if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNone, flights_[i], key.hi, generation);
+  if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNoEntry, flights_[i], key.hi, generation);
   const Wall<D> wall = box_.wall(key.hi);
   const Impact<D> impact = flights_.bounce(i, wall, time, generation);
   ++queue_[i].version;

@@ -45,7 +45,7 @@ struct LogFull {};
 template <int D>
 class Trace {
  public:
-  static constexpr std::uint32_t kNone = 0xffffffff;
+  static constexpr std::uint32_t kNoEntry = 0xffffffff;
 
   /// An event of one sphere, or of two, the one with the lower id first.
   struct Event {
@@ -53,15 +53,15 @@ class Trace {
     std::uint32_t generation;
     std::uint32_t partner;  ///< the partner of the first sphere, as in NextEvent
     Id id[2];
-    Slot slot[2];           ///< kNone: a wall
-    std::uint32_t last[2];  ///< the sphere's entry in its previous event, or kNone
+    Slot slot[2];           ///< kNoEntry: a wall
+    std::uint32_t last[2];  ///< the sphere's entry in its previous event, or kNoEntry
   };
   // Sphere k of an event, k = 0 or 1, has the entry number 2·event + k.
 
   /// Removes all events and makes room for this many slots.
   void clear(std::size_t slots) {
     base_ += 2 * static_cast<std::uint32_t>(events_.size());
-    if (base_ > kNone / 4) {
+    if (base_ > kNoEntry / 4) {
       std::fill(latest_.begin(), latest_.end(), 0);
       base_ = 1;
     }
@@ -72,7 +72,7 @@ class Trace {
     most_ = kMaxEvents + kMaxEventsPerSphere * slots;
   }
 
-  /// Call before an event of sphere `i`, and of sphere `j` unless `j` is kNone.
+  /// Call before an event of sphere `i`, and of sphere `j` unless `j` is kNoEntry.
   void begin(Slot i, const Record<D>& a, Slot j, const Record<D>& b, std::uint32_t partner, std::uint32_t generation) {
     if (events_.size() == most_) throw LogFull{};
     Event& event = events_.emplace_back();
@@ -83,7 +83,7 @@ class Trace {
     event.slot[0] = i;
     event.slot[1] = j;
     event.last[0] = new_entry(i, 0);
-    event.last[1] = j == kNone ? kNone : new_entry(j, 1);
+    event.last[1] = j == kNoEntry ? kNoEntry : new_entry(j, 1);
     before_.push_back(a);
     before_.push_back(b);
   }
@@ -104,7 +104,7 @@ class Trace {
   /// The entries of a sphere in order of time; valid until the next call.
   std::span<const std::uint32_t> entries(Slot i) const {
     entries_.clear();
-    for (std::uint32_t entry = has(i) ? latest_[i] - base_ : kNone; entry != kNone;
+    for (std::uint32_t entry = has(i) ? latest_[i] - base_ : kNoEntry; entry != kNoEntry;
          entry = event_of(entry).last[entry % 2])
       entries_.push_back(entry);
     std::reverse(entries_.begin(), entries_.end());
@@ -117,7 +117,7 @@ class Trace {
   static constexpr std::size_t kMaxEvents = 20'000, kMaxEventsPerSphere = 16;
 
   std::uint32_t new_entry(Slot i, std::uint32_t which) {
-    const std::uint32_t last = has(i) ? latest_[i] - base_ : kNone;
+    const std::uint32_t last = has(i) ? latest_[i] - base_ : kNoEntry;
     latest_[i] = base_ + 2 * static_cast<std::uint32_t>(events_.size() - 1) + which;
     return last;
   }

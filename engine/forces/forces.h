@@ -22,9 +22,9 @@ double mean_distance(const System<D>& system) {
 /// Computes the quanta from parameters, masses, charges and box. Collective.
 template <int D>
 Quanta quanta(const System<D>& system) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr double kNoScale = std::numeric_limits<double>::infinity();
   const double distance = mean_distance(system);
-  std::array<double, 4> most = {-kNone, -kNone, 0, 0};  // −smallest force and energy; largest force and energy
+  std::array<double, 4> most = {-kNoScale, -kNoScale, 0, 0};  // −smallest force and energy; largest force and energy
   for (const auto& term : system.interactions) {
     const ForceScale scale = term->scale(distance);
     if (scale.force > 0) most[0] = std::max(most[0], -scale.force);
@@ -33,7 +33,9 @@ Quanta quanta(const System<D>& system) {
     most[3] = std::max(most[3], scale.spread * scale.energy);
   }
   system.decomposition.ranks().largest(most);
-  const auto power = [](double x) { return x < kNone ? std::exp2(std::floor(std::log2(std::max(x, 0x1p-900)))) : 1; };
+  const auto power = [](double x) {
+    return x < kNoScale ? std::exp2(std::floor(std::log2(std::max(x, 0x1p-900)))) : 1;
+  };
   // The second bound lets the largest forces and energies fit.
   return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])),
           std::max(0x1p-46 * power(-most[1]), 0x1p-70 * power(most[3]))};

@@ -17,6 +17,9 @@ namespace carom::integrator {
 
 class Chebyshev {
  public:
+  /// From here on Chebyshev's iteration is faster; plain sweeps contract by λ.
+  static constexpr double kSmall = 0.2;
+
   /// For small λ, and for NaN, the sweeps are plain.
   explicit Chebyshev(double lambda = 0) : middle_(1 + lambda / 2), half_(lambda >= kSmall ? lambda / 2 : 0) {}
 
@@ -35,8 +38,6 @@ class Chebyshev {
   double gain() const { return gain_; }
 
  private:
-  static constexpr double kSmall = 0.2;
-
   double middle_, half_;  // centre and half width of the spectrum
   double ratio_ = 0, memory_ = 0, gain_ = 1;
 };

@@ -37,21 +37,20 @@ namespace carom::integrator {
 namespace {
 
 constexpr int kMostSweeps = 60;
-constexpr int kMostPieces = 1 << 14;             // of a step
-constexpr int kPiecesBeforeGrowth = 4;           // pieces that take few sweeps, before twice the length is tried
-constexpr int kFewSweeps = kMostSweeps / 3;      // two pieces of half the length would take hardly more in all
-constexpr std::uint64_t kPartialUpdate = 5;      // if fewer than one particle in 5 moved, only its pairs are evaluated
-constexpr int kSweepsBeforeFreezing = 6;         // sweeps before particles may be frozen
-constexpr int kSwapsBeforeFreezing = 3;          // swaps of partners after that, until a particle is frozen
-constexpr int kSweepsBeforeStiff = 4;            // sweeps after which slow contraction indicates stiffness
-constexpr double kStiffContraction = 0.2 * 0.2;  // of two sweeps; Chebyshev's iteration is faster beyond it
-constexpr double kFrequencyMargin = 1.1;         // for frequencies above the estimate
-constexpr std::int64_t kSlabsPerFrequency = 1000;  // slabs for which the estimate is used
-constexpr std::size_t kExtrapolated = 3;           // past slabs in the extrapolation of the first accelerations
-constexpr double kStalled = 0.1;                   // contraction of kSweepsBeforeFreezing sweeps that counts as stalled
-constexpr int kMostStalled = 2;                    // stalls before the slab is shortened
-constexpr double kTooStiff = 0.5;                  // if such a contraction is expected, stiffness freezes no particle
-constexpr double kMostFolded = 0.1;                // of the kinetic energy
+constexpr int kMostPieces = 1 << 14;         // of a step
+constexpr int kPiecesBeforeGrowth = 4;       // pieces that take few sweeps, before twice the length is tried
+constexpr int kFewSweeps = kMostSweeps / 3;  // two pieces of half the length would take hardly more in all
+constexpr std::uint64_t kPartialUpdate = 5;  // if fewer than one particle in 5 moved, only its pairs are evaluated
+constexpr int kSweepsBeforeFreezing = 6;     // sweeps before particles may be frozen
+constexpr int kSwapsBeforeFreezing = 3;      // swaps of partners after that, until a particle is frozen
+constexpr int kSweepsBeforeStiff = 4;        // sweeps after which slow contraction indicates stiffness
+constexpr double kStiffContraction = Chebyshev::kSmall * Chebyshev::kSmall;  // of two sweeps
+constexpr double kFrequencyMargin = 1.1;                                     // for frequencies above the estimate
+constexpr std::int64_t kSlabsPerFrequency = 1000;                            // slabs for which the estimate is used
+constexpr double kStalled = 0.1;     // contraction of kSweepsBeforeFreezing sweeps that counts as stalled
+constexpr int kMostStalled = 2;      // stalls before the slab is shortened
+constexpr double kTooStiff = 0.5;    // if such a contraction is expected, stiffness freezes no particle
+constexpr double kMostFolded = 0.1;  // of the kinetic energy
 // The rounding of positions changes the energy by this fraction of Σ |F| |x|, in any method.
 constexpr double kRoundingOfForces = 16 * std::numeric_limits<double>::epsilon();
 constexpr double kConverged = 0.5;              // of the tolerance: a particle with a smaller residual keeps its path
@@ -179,7 +178,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     auto& p = system.particles;
     const std::size_t n = p.size();
     Chebyshev chebyshev(0.25 * h * h * found_.squared_frequency);
-    past_.expect(h, a_, chebyshev.plain() ? kExtrapolated : 1);  // stiff motion is not smooth from slab to slab
+    // Stiff motion is not smooth from slab to slab.
+    past_.expect(h, a_, chebyshev.plain() ? Extrapolation<D>::kOrder + 1 : 1);
     held_ = true;
     if (resting()) {
       mean_ = a_;

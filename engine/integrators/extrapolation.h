@@ -15,6 +15,8 @@ namespace carom::integrator {
 template <int D>
 class Extrapolation {
  public:
+  static constexpr std::size_t kOrder = 2;  ///< from one slab more
+
   /// Starts from the accelerations at an instant; there are no past slabs yet.
   void start(Fields& fields, const std::vector<Vec<D>>& a) {
     for (std::size_t k = 0; k < past_.size(); ++k) {
@@ -57,7 +59,6 @@ class Extrapolation {
   const std::vector<Vec<D>>& last() const { return past_[0]; }
 
  private:
-  static constexpr std::size_t kOrder = 2;
   static constexpr double kMostGrowth = 3;  // of the length of slabs; beyond it only the last slab is used
 
   std::array<std::vector<Vec<D>>, kOrder + 1> past_;

@@ -17,11 +17,11 @@
 
 namespace carom {
 
-/// One step of a stepping integrator, or one epoch of free flight.
+/// One step of a stepping integrator; an epoch of free flight, or what is left of it.
 struct Slab {
-  std::int64_t index = 0;
-  double start = 0;   ///< simulated time at its start
-  double length = 0;  ///< > 0
+  std::int64_t index = 0;  ///< of the step or epoch
+  double start = 0;        ///< simulated time at its start
+  double length = 0;       ///< > 0
   /// Free flight stops at this many pair collisions (counted by Counters::sphere_sphere from the start of the run).
   std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();
 };
@@ -33,12 +33,9 @@ struct SlabReport {
   std::vector<Contact<D>>* contacts = nullptr;  ///< where to put the executed contacts, in key order; null: not wanted
   std::span<const double> observe{};  ///< ascending times within the slab at which to observe (free flight only)
   std::function<void(double, const Particles<D>&)> observer{};  ///< given copies flown to each of these times
-  /// Asked now and then within an epoch of free flight: true, and the integrator leaves off with `paused`. Collective.
-  std::function<bool()> pause{};
   SlabWatch* watch = nullptr;  ///< lets stepping methods leave a slab that takes long; null: it is ended
   double reached =
       0;  ///< set by the integrator: the time within the slab it came to; less than its length only at collision_limit
-  bool paused = false;  ///< the slab is not done: slab() is to be called again with the same slab, which goes on in it
 };
 
 template <int D>
@@ -53,9 +50,6 @@ class Integrator {
   /// Advances the system from the start to the end of the slab; afterwards all particles are at its end, wrapped.
   /// Throws Error(Failure::numerical) with the particles' names where a step cannot be done.
   virtual void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) = 0;
-
-  /// How far it has come in a slab that is paused [time].
-  virtual double paused_at() const { return 0; }
 
   /// The state at which energies are to be measured, where this is not the system itself (mcva, variant restart).
   virtual const Particles<D>* energy_state() const { return nullptr; }

@@ -31,11 +31,8 @@ class Bisection {
 
   /// The position wrapped into the box, as all other functions require.
   Vec<D> wrapped(Vec<D> x) const {
-    for (int k = 0; k < D; ++k) {
-      if (!box_.periodic(k) || (x[k] >= 0 && x[k] < box_.edges[k])) continue;
-      x[k] -= std::floor(x[k] / box_.edges[k]) * box_.edges[k];
-      if (!(x[k] >= 0 && x[k] < box_.edges[k])) x[k] = 0;
-    }
+    Image<D> ignored{};
+    box_.wrap(x, ignored);
     return x;
   }
   /// The subdomain that contains a position.

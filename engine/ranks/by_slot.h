@@ -14,8 +14,8 @@ namespace carom {
 template <class T>
 class BySlot {
  public:
-  void resize(std::size_t slots) { index_.resize(slots, kNone); }
-  bool has(Slot i) const { return index_[i] != kNone; }
+  void resize(std::size_t slots) { index_.resize(slots, kAbsent); }
+  bool has(Slot i) const { return index_[i] != kAbsent; }
   /// The entry of a sphere; it must have one.
   T& at(Slot i) { return items_[index_[i]]; }
   const T& at(Slot i) const { return items_[index_[i]]; }
@@ -29,12 +29,12 @@ class BySlot {
   /// The spheres with entries, in the order in which they were added.
   std::span<const Slot> slots() const { return slots_; }
   void clear() {
-    for (const Slot i : slots_) index_[i] = kNone;
+    for (const Slot i : slots_) index_[i] = kAbsent;
     slots_.clear();
   }
 
  private:
-  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::uint32_t kAbsent = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> index_;  // by slot
   std::vector<Slot> slots_;
   std::deque<T> items_;  // never shrinks, to reuse its memory; entries do not move

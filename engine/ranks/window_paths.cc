@@ -31,7 +31,7 @@ std::vector<Slot> WindowPaths<D>::end() {
   for (const auto& event : trace_.events())
     for (const int which : {0, 1}) {
       const Slot i = event.slot[which];
-      if (i == kNone || event.last[which] != kNone) continue;
+      if (i == kNoEntry || event.last[which] != kNoEntry) continue;
       if (ownership_.is_seen(i)) seen.push_back(i);
       if (ownership_.is_ghost(i)) touched_ghosts_.push_back(i);
     }
@@ -59,7 +59,7 @@ Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, s
   const auto& event = trace_.event_of(entries[k]);
   const auto& [lo, hi] = event.id;
   return {.after = k + 1 < entries.size() ? trace_.before(entries[k + 1]) : flights_[i],
-          .key = event.slot[1] == kNone
+          .key = event.slot[1] == kNoEntry
                      ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
                      : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner)),
           .virial = event.virial,
@@ -161,7 +161,7 @@ ContactTally WindowPaths<D>::tally() const {
   ContactTally tally;
   for (const auto& event : trace_.events())
     if (const Slot lo = event.slot[0]; ownership_.owns(lo) && rewritten_[lo] == 0)
-      tally.add(event.slot[1] != kNone ? EventKind::pair : EventKind::wall, event.virial, event.overlap);
+      tally.add(event.slot[1] != kNoEntry ? EventKind::pair : EventKind::wall, event.virial, event.overlap);
   for (const Slot i : paths_.slots()) {
     if (!ownership_.owns(i) || rewritten_[i] == 0) continue;
     for (const Node<D>& node : paths_.at(i).nodes)

@@ -65,7 +65,7 @@ class WindowPaths {
   ContactTally tally() const;
 
  private:
-  static constexpr std::uint32_t kNone = Trace<D>::kNone;
+  static constexpr std::uint32_t kNoEntry = Trace<D>::kNoEntry;
   struct Path {
     Record<D> start;  // at the start of the window
     Nodes nodes;
@@ -111,7 +111,8 @@ template <class Visit>
 void WindowPaths<D>::for_each_own(Visit&& visit) const {
   for (const auto& event : trace_.events())
     for (const int which : {0, 1})
-      if (const Slot i = event.slot[which]; event.last[which] == kNone && i != kNone && ownership_.owns(i)) visit(i);
+      if (const Slot i = event.slot[which]; event.last[which] == kNoEntry && i != kNoEntry && ownership_.owns(i))
+        visit(i);
   for (std::size_t k = 0; k < paths_.slots().size(); ++k)  // visit() may add paths
     if (const Slot i = paths_.slots()[k]; ownership_.owns(i) && rewritten_[i] != 0 && !trace_.has(i)) visit(i);
 }

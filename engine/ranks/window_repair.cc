@@ -31,7 +31,7 @@ std::vector<Slot> WindowRepair<D>::run() {
   }
   std::vector<Slot> changed;
   for (const Repaired& m : repairs_) {
-    repair_of_[m.slot] = kNone;
+    repair_of_[m.slot] = kNoRepair;
     if (!ownership_.owns(m.slot)) continue;
     const auto now = paths_.path(m.slot).subspan(m.kept);
     if (!std::equal(now.begin(), now.end(), m.old.begin(), m.old.end())) changed.push_back(m.slot);

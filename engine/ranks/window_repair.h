@@ -21,7 +21,7 @@ class WindowRepair {
       : box_(box), core_(core), flights_(core.flights()), ownership_(ownership), paths_(paths) {}
 
   /// Makes room for this many slots.
-  void load(std::size_t slots) { repair_of_.assign(slots, kNone); }
+  void load(std::size_t slots) { repair_of_.assign(slots, kNoRepair); }
   void start(double end) {
     end_ = end;
     fastest_squared_ = 0;
@@ -35,7 +35,7 @@ class WindowRepair {
   std::uint64_t events() const { return events_; }
 
  private:
-  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::uint32_t kNoRepair = std::numeric_limits<std::uint32_t>::max();
 
   /// The repair of one sphere's path.
   struct Repaired {
@@ -61,7 +61,7 @@ class WindowRepair {
     }
   };
 
-  bool repaired(Slot i) const { return repair_of_[i] != kNone; }
+  bool repaired(Slot i) const { return repair_of_[i] != kNoRepair; }
   Repaired& repaired_at(Slot i, const EventKey<D>& key) {
     return repaired(i) ? repairs_[repair_of_[i]] : begin(i, key);
   }
@@ -84,7 +84,7 @@ class WindowRepair {
   WindowPaths<D>& paths_;
   double end_ = 0;  // end of the window
   std::deque<Repaired> repairs_;
-  std::vector<std::uint32_t> repair_of_;  // by slot: index in repairs_, or kNone
+  std::vector<std::uint32_t> repair_of_;  // by slot: index in repairs_, or kNoRepair
   std::priority_queue<Task> tasks_;
   double fastest_squared_ = 0;
   std::uint64_t events_ = 0;

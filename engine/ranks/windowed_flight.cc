@@ -41,25 +41,14 @@ void WindowedFlight<D>::make_subdomain(std::size_t subdomains) {
 }
 
 template <int D>
-void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants* instants) {
+void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) {
   g_ = g;
   horizon_ = horizon;
   events_ = 0;
   length_.start(box_, sizes_, ranks_, particles, g, horizon);
-  const auto record = [&](Id i) {
-    Record<D> r{particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]};
-    if (instants) r.t = instants->t[i], r.generation = instants->generation[i];
-    return r;
-  };
-  std::vector<Vec<D>> places;  // present positions
-  for (Id i = 0; instants && i < particles.size(); ++i) {
-    const double s = instants->now - instants->t[i];
-    Image<D> image{};
-    box_.wrap(places.emplace_back(particles.x[i] + s * particles.v[i] + (0.5 * s * s) * g_), image);
-  }
   const auto divide = [&](std::size_t subdomains) {
-    bisection_.emplace(box_, instants ? places : particles.x, subdomains,
-                       2 * (sizes_.largest_radius() + length_.max_displacement()), ranks_, work_);
+    bisection_.emplace(box_, particles.x, subdomains, 2 * (sizes_.largest_radius() + length_.max_displacement()),
+                       ranks_, work_);
     for (std::uint32_t r = 0; r < subdomains; ++r)
       if (bisection_->neighbours(r).size() > kMaxNeighbours) return false;
     return true;
@@ -68,8 +57,9 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   while (!divide(subdomains)) subdomains -= (subdomains + 7) / 8;  // the box is too small for so many subdomains
   if (subdomains < subdomains_) make_subdomain(subdomains);
   exchange_.start(*bisection_);
-  load(instants ? instants->now : 0, [&](auto&& add) {
-    for (Id i = 0; i < particles.size(); ++i) add(record(i));
+  load(0, [&](auto&& add) {
+    for (Id i = 0; i < particles.size(); ++i)
+      add({particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]});
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
@@ -210,28 +200,6 @@ double WindowedFlight<D>::cut_at(double time) {
 template <int D>
 void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) const {
   collect(time, copies, nullptr);
-}
-
-template <int D>
-void WindowedFlight<D>::records(Particles<D>& particles, Instants& instants) const {
-  const std::size_t here = blocks().first(ranks_.rank() + 1) - blocks().first(ranks_.rank());
-  instants.now = now_;
-  particles.x.resize(here);
-  particles.v.resize(here);
-  instants.t.resize(here);
-  instants.generation.resize(here);
-  to_id_blocks<Record<D>>(
-      blocks(), ranks_,
-      [&](auto&& send) {
-        if (!subdomain_) return;
-        for (const Slot i : subdomain_->own()) send(subdomain_->after(i).id, subdomain_->after(i));
-      },
-      [&](std::size_t place, const Record<D>& r) {
-        particles.x[place] = r.x;
-        particles.v[place] = r.v;
-        instants.t[place] = r.t;
-        instants.generation[place] = r.generation;
-      });
 }
 
 template <int D>

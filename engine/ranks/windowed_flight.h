@@ -25,13 +25,6 @@
 
 namespace carom {
 
-/// The last event of each particle in an epoch that is interrupted at `now`.
-struct Instants {
-  double now = 0;                         ///< since the start of the epoch [time]
-  std::vector<double> t;                  ///< time of the last event
-  std::vector<std::uint16_t> generation;  ///< generation of this event
-};
-
 template <int D>
 class WindowedFlight {
  public:
@@ -42,13 +35,7 @@ class WindowedFlight {
                  std::function<double()> window = {});
 
   /// Functions as in EventCore. `particles` is this rank's block; contacts are reported on rank 0.
-  void take(Particles<D>& particles, const Vec<D>& g, double horizon) { take(particles, g, horizon, nullptr); }
-  /// Continues an epoch from the result of records(). Collective.
-  void go_on(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants& instants) {
-    take(particles, g, horizon, &instants);
-  }
-  /// The present records of this rank's block: positions and velocities at the times in `instants`. Collective.
-  void records(Particles<D>& particles, Instants& instants) const;
+  void take(Particles<D>& particles, const Vec<D>& g, double horizon);
   double run(double end, const Report& report);
   void fly_to(double time, Particles<D>& copies) const;
   void give_back(double time, Particles<D>& particles);
@@ -60,7 +47,6 @@ class WindowedFlight {
 
  private:
   IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(ranks_.size())}; }
-  void take(Particles<D>& particles, const Vec<D>& g, double horizon, const Instants* instants);
   void make_subdomain(std::size_t subdomains);
   void measure_work();
   void collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const;

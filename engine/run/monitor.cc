@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -27,6 +26,8 @@ constexpr double kBlownUp = 1e10;
 constexpr double kMostJump = 1e-6;
 /// Depth over contact distance. The methods leave 1e-12; the box may be 10⁹ diameters long.
 constexpr double kDeepest = 1e-6;
+/// In place of an id, where the least of those of all ranks is looked for as the largest negative one.
+constexpr double kNoId = -std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -118,16 +119,15 @@ void Monitor<D>::guard(double energy_before, double magnitude_before) {
 /// Which particle is the fastest, for messages. Collective.
 template <int D>
 std::string Monitor<D>::fastest(const Particles<D>& state) const {
-  constexpr double kNone = -std::numeric_limits<double>::infinity();
-  double speed = -1, id = kNone;
+  double speed = -1, id = kNoId;
   for (Id i = 0; i < state.size(); ++i) {
-    const double each = state.v[i].norm(), finite = std::isfinite(each) ? each : -kNone;
+    const double each = state.v[i].norm(), finite = std::isfinite(each) ? each : -kNoId;
     if (!state.owns(i) || finite <= speed) continue;
     speed = finite;
     id = -static_cast<double>(state.id_of(i));
   }
   const double most = system_.decomposition.largest(speed);
-  id = -system_.decomposition.largest(speed == most ? id : kNone);
+  id = -system_.decomposition.largest(speed == most ? id : kNoId);
   return "particle " + short_text(id, 10) + " is the fastest, with a speed of " + short_text(most);
 }
 
@@ -181,16 +181,12 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
     s.max_momentum_error =
         std::max(*s.max_momentum_error, (shot_.momentum - Vec<D>(account_.first_momentum.data())).norm());
   if (info_.hard_cores) {
-    const Overlap own = deepest_overlap();
-    const double deepest = system_.decomposition.largest(own.depth);
+    const Overlaps own = overlaps();
+    const double deepest = system_.decomposition.largest(own.depth());
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest);
     if (deepest > kDeepest) {
-      // Of pairs that overlap alike, and of ranks that see them, the one with the lowest ids.
-      constexpr double kNone = -std::numeric_limits<double>::infinity();
-      const double lo = -system_.decomposition.largest(own.depth == deepest ? -static_cast<double>(own.lo) : kNone);
-      const bool here = own.depth == deepest && static_cast<double>(own.lo) == lo;
-      const double hi = -system_.decomposition.largest(here ? -static_cast<double>(own.hi) : kNone);
-      throw Error(Failure::numerical, "particles " + short_text(lo, 10) + " and " + short_text(hi, 10) +
+      const Overlaps all = sum_of_all(system_.decomposition.ranks(), own);
+      throw Error(Failure::numerical, "particles " + std::to_string(all.lo) + " and " + std::to_string(all.hi) +
                                           " overlap, by " + short_text(deepest) +
                                           " of their contact distance, at step " + std::to_string(s.steps) + ", time " +
                                           short_text(s.end_time) + "; use a smaller integrator.step");
@@ -270,20 +266,17 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
   }
 }
 
-/// The deepest overlap of any two spheres that this rank sees: an independent check that no contact was missed. Depth 0
-/// where none overlap; of pairs that overlap alike the one with the lowest ids.
+/// The overlaps of any two spheres that this rank sees: an independent check that no contact was missed.
 template <int D>
-auto Monitor<D>::deepest_overlap() -> Overlap {
-  Overlap deepest;
+Overlaps Monitor<D>::overlaps() {
+  Overlaps found;
   const auto look = [&](NeighbourList<D>& list, const Particles<D>& p) {
     for (const auto& pair : list.cover(p.x)) {
       const double sigma = p.radius[pair.i] + p.radius[pair.j];
       const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
       if (squared >= sigma * sigma) continue;
       const auto [lo, hi] = std::minmax({p.id_of(pair.i), p.id_of(pair.j)});
-      const Overlap found{1 - std::sqrt(squared) / sigma, lo, hi};
-      const auto order = [](const Overlap& o) { return std::tuple(-o.depth, o.lo, o.hi); };
-      if (order(found) < order(deepest)) deepest = found;
+      found.add({1, lo, hi, std::sqrt(squared), sigma});
     }
   };
   const Particles<D>& p = system_.particles;
@@ -295,7 +288,7 @@ auto Monitor<D>::deepest_overlap() -> Overlap {
   } else {
     look(*touching_, p);
   }
-  return deepest;
+  return found;
 }
 
 /// All particles, in a state of this rank's particles; where there are several ranks, on rank 0 only.

@@ -9,6 +9,7 @@
 
 #include "engine/run/simulation.h"
 #include "engine/search/neighbour_list.h"
+#include "engine/setup/placement.h"
 
 namespace carom {
 
@@ -70,12 +71,6 @@ class Monitor {
     Schedule due;
   };
 
-  /// Of two spheres, relative to their contact distance; ids.
-  struct Overlap {
-    double depth = 0;
-    Id lo = 0, hi = 0;
-  };
-
   void sample(double time, const Particles<D>& state);
   Snapshot<D> measure(double time, const Particles<D>& state, const Integrator<D>* integrator, bool with_shadow,
                       bool fresh = true);
@@ -83,7 +78,7 @@ class Monitor {
   void count_from(const Snapshot<D>& shot);
   void guard(double energy_before, double magnitude_before);
   std::string fastest(const Particles<D>& state) const;
-  Overlap deepest_overlap();
+  Overlaps overlaps();
   const Particles<D>& all_particles(const Particles<D>& state);
 
   System<D>& system_;

@@ -47,39 +47,37 @@ void check_interval(double interval, double step) {
     throw Error(Failure::deck,
                 "an output interval is shorter than a millionth of the step; give 0, the step or something longer");
 }
+
+Plan checked(const Plan& plan) {
+  if (!(plan.step > 0)) throw Error(Failure::deck, "the step must be positive");
+  if (!plan.steps && !plan.end_time && !plan.collisions)
+    throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
+  for (const double interval : {plan.frame_interval, plan.thermo_interval}) check_interval(interval, plan.step);
+  return plan;
+}
 }  // namespace
 
 template <int D>
-Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info,
+Simulation<D>::Simulation(std::unique_ptr<System<D>>&& system, const IntegratorInfo& info,
                           std::unique_ptr<Integrator<D>> integrator, Plan plan)
-    : system_(std::move(system)), info_(info), integrator_(std::move(integrator)), plan_(plan) {
-  if (!(plan_.step > 0)) throw Error(Failure::deck, "the step must be positive");
-  if (!plan_.steps && !plan_.end_time && !plan_.collisions)
-    throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
-  for (const double interval : {plan_.frame_interval, plan_.thermo_interval}) check_interval(interval, plan_.step);
-}
+    : plan_(checked(plan)), system_(std::move(system)), info_(info), integrator_(std::move(integrator)) {}
 
 template <int D>
-Simulation<D>::Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan)
-    : Simulation(prepare(std::move(system), info, std::move(given), plan)) {}
-
-template <int D>
-typename Simulation<D>::Prepared Simulation<D>::prepare(std::unique_ptr<System<D>> system, const IntegratorInfo& info,
+typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system, const IntegratorInfo& info,
                                                         Parameters given, Plan plan) {
   const std::string name(info.name);
-  system->check();
-  for (const auto& term : system->interactions)
+  system.check();
+  for (const auto& term : system.interactions)
     if (!info.smooth_forces && !term->common_acceleration())
       throw Error(Failure::deck, name + " knows no forces but a uniform-field; take psa, edda or their relatives");
-  if (info.hard_cores) check_spheres(*system);
+  if (info.hard_cores) check_spheres(system);
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
   if (plan.step != 0) given.set("step", plan.step);
-  if (!given.has("step") && !info.stepping) given.set("step", default_epoch(*system));
+  if (!given.has("step") && !info.stepping) given.set("step", default_epoch(system));
   given = completed(info.name, info.parameters, std::move(given));
   plan.step = given.real("step");
-  auto integrator = info.make<D>(given);
-  return {std::move(system), info, std::move(integrator), plan};
+  return {info.make<D>(given), plan};
 }
 
 template <int D>
@@ -92,32 +90,45 @@ void Simulation<D>::add(Observer<D>& observer) {
 }
 
 template <int D>
-void Simulation<D>::run(const Hooks& hooks) {
-  const auto clock_start = std::chrono::steady_clock::now();
+void Simulation<D>::extend(const Plan& end) {
+  plan_.steps = end.steps;
+  plan_.end_time = end.end_time;
+  plan_.collisions = end.collisions;
+}
+
+/// Registers the state of the run, and sets or measures it: that of the start, of a run to go on with, or of a branch.
+template <int D>
+void Simulation<D>::begin(const Hooks& hooks) {
   Statistics& s = statistics_;
   Decomposition<D>& decomposition = system_->decomposition;
   const auto divide = [&] { return decomposition.divide(info_.local, plan_.step, info_.hard_cores); };
-  if (info_.smooth_forces) {
-    system_->quanta = quanta(*system_);
-    s.counters.divisions += divide();
-  }
-  std::optional<Monitor<D>> monitor;
   const auto make_monitor = [&] {
-    monitor.emplace(*system_, info_, plan_, observers_, s);
-    system_->fields.add_value("paused", paused_);
+    monitor_ = std::make_unique<Monitor<D>>(*system_, info_, plan_, observers_, s);
     system_->fields.add_value("quiet since", quiet_since_);
     system_->fields.add_value("step count", count_);
   };
-  // A branch restores what is registered before, the state of the integrator, and measures anew.
-  if (!hooks.branch) make_monitor();
-  SlabWatch watch(system_->fields, system_->fields.of_run().size(), hooks.leave, hooks.leave_here);
-  integrator_->start(*system_, s.counters);
-  if (hooks.restore) {
+  const bool again = monitor_ != nullptr;
+  if (!again) {
+    if (info_.smooth_forces) {
+      system_->quanta = quanta(*system_);
+      s.counters.divisions += divide();
+    }
+    // A branch restores what is registered before, the state of the integrator, and measures anew.
+    if (!hooks.branch) make_monitor();
+    first_of_integrator_ = system_->fields.of_run().size();
+    integrator_->start(*system_, s.counters);
+  }
+  if (again || hooks.restore) {
     decomposition.to_blocks();
-    hooks.restore();
+    if (hooks.restore) hooks.restore();
     if (decomposition.ranks().rank() > 0) s.counters.seconds = {}, s.counters.events = {}, s.counters.windows = {};
     if (info_.smooth_forces) divide();
     s.stopped_early = false;
+  }
+  if (again) {
+    // The last slab was shortened by the end that the run had.
+    if (s.end_time != next_slab().start) count_ = {s.steps, s.end_time};
+    return;
   }
   if (hooks.branch) {
     count_ = hooks.branch->from;
@@ -126,22 +137,30 @@ void Simulation<D>::run(const Hooks& hooks) {
     make_monitor();
     for (auto* observer : observers_) observer->progress(s);
   }
-  if (hooks.branch || !hooks.restore) monitor->start(*integrator_, !hooks.restore);
+  if (hooks.branch || !hooks.restore) monitor_->start(*integrator_, !hooks.restore);
+}
 
+template <int D>
+void Simulation<D>::run(const Hooks& hooks) {
+  const auto clock_start = std::chrono::steady_clock::now();
+  Statistics& s = statistics_;
+  begin(hooks);
+  SlabWatch watch(system_->fields, first_of_integrator_, hooks.leave, hooks.leave_here);
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
     const auto elapsed = std::chrono::steady_clock::now() - clock_start;
     s.wall_seconds = seconds_before + std::chrono::duration<double>(elapsed).count();
   };
   std::vector<Contact<D>> contacts;
-  const auto show_contacts = [&](double start) {
+  const auto show_contacts = [&](const Slab& slab) {
     if (!plan_.events) return;
     const Stopwatch stopwatch(s.counters.seconds.output);
-    for (auto* observer : observers_) observer->contacts(start, contacts);
+    for (auto& contact : contacts) contact.key.time += count_.within;
+    for (auto* observer : observers_) observer->contacts(time_of(slab.index), contacts);
     contacts.clear();
   };
   for (;;) {
-    const bool done = finished() && !paused_;
+    const bool done = finished();
     take_time();
     if (hooks.should_stop && hooks.should_stop() && !done) {
       s.stopped_early = true;
@@ -149,64 +168,78 @@ void Simulation<D>::run(const Hooks& hooks) {
     }
     if (done) break;
     const Slab slab = next_slab();
-    s.counters.divisions += decomposition.divide_if_due(slab.index, slab.length);
-    const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor->due_within(slab);
+    s.counters.divisions += system_->decomposition.divide_if_due(slab.index, slab.length);
+    const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor_->due_within(slab);
     contacts.clear();
     SlabReport<D> report{.counters = s.counters,
                          .contacts = plan_.events ? &contacts : nullptr,
                          .observe = due,
                          .observer =
                              [&](double offset, const Particles<D>& copies) {
-                               show_contacts(slab.start);  // rows and events are written together
-                               monitor->observe(slab.start + offset, copies);
+                               show_contacts(slab);  // rows and events are written together
+                               monitor_->observe(slab.start + offset, copies);
                              },
-                         .pause = hooks.pause,
                          .watch = &watch};
-    Counters before = s.counters;
-    bool left = false;
-    for (bool complete = false; !complete;) try {
-        watch.begin();
-        integrator_->slab(*system_, slab, report);
-        complete = true;
-      } catch (HaloTooSmall) {
-        decomposition.enlarge_halo(slab.index, slab.length);
-        ++before.slabs_again;
-        before.slabs_by_all += decomposition.knows_all() ? 1 : 0;
-        s.counters = before;
-        contacts.clear();
-      } catch (SlabLeft) {
-        watch.restore();
-        s.counters = before;
-        complete = left = true;
-      } catch (const Error& e) {
-        if (e.failure() != Failure::numerical) throw;
-        throw Error(Failure::numerical, std::string(e.what()) + " (in step " + std::to_string(slab.index + 1) +
-                                            ", from time " + short_text(slab.start) + ")");
-      }
-    if (left) {
-      if (hooks.pause) hooks.pause();
+    const std::uint64_t collisions = s.counters.sphere_sphere;
+    if (!fly(slab, report, watch)) {
+      if (hooks.left) hooks.left();
       continue;
     }
-    show_contacts(slab.start);
-    s.counters.seconds.communicate = decomposition.seconds_waited();
-    if (paused_ = report.paused; paused_) continue;
+    show_contacts(slab);
+    s.counters.seconds.communicate = system_->decomposition.seconds_waited();
+    last_collisions_ = s.counters.sphere_sphere - collisions;
+    if (*last_collisions_ > 0) quiet_since_ = slab.start + report.reached;
 
-    ++s.steps;
-    // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
-    s.end_time = report.reached < slab.length ? slab.start + report.reached
-                 : slab.length == plan_.step  ? time_of(s.steps)
-                                              : *plan_.end_time;
-    if (s.counters.sphere_sphere > before.sphere_sphere) quiet_since_ = s.end_time;
+    const double step = length_from(time_of(slab.index), plan_);
+    if (report.reached < slab.length) {
+      const double within = count_.within + report.reached;
+      s.end_time = time_of(slab.index) + within;
+      if (finished())
+        ++s.steps;
+      else
+        count_.within = within;
+    } else {
+      // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
+      ++s.steps;
+      s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
+      count_.within = 0;
+    }
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
     s.fraction_done = fraction_done();
     take_time();
-    monitor->end_of_slab(report.reached, *integrator_, finished());
+    monitor_->end_of_slab(report.reached, *integrator_, finished());
     for (auto* observer : observers_) observer->progress(s);
   }
-  if (!paused_) monitor->finish();
-  decomposition.to_blocks();
+  monitor_->finish();
+  system_->decomposition.to_blocks();
   take_time();
+}
+
+/// Has the integrator advance the system by a slab, again where the halo is too small; false: the slab was left, and
+/// the state is that of its start.
+template <int D>
+bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
+  Decomposition<D>& decomposition = system_->decomposition;
+  for (Counters before = report.counters;;) try {
+      watch.begin();
+      integrator_->slab(*system_, slab, report);
+      return true;
+    } catch (HaloTooSmall) {
+      decomposition.enlarge_halo(slab.index, slab.length);
+      ++before.slabs_again;
+      before.slabs_by_all += decomposition.knows_all() ? 1 : 0;
+      report.counters = before;
+      if (report.contacts) report.contacts->clear();
+    } catch (SlabLeft) {
+      watch.restore();
+      report.counters = before;
+      return false;
+    } catch (const Error& e) {
+      if (e.failure() != Failure::numerical) throw;
+      throw Error(Failure::numerical, std::string(e.what()) + " (in step " + std::to_string(slab.index + 1) +
+                                          ", from time " + short_text(slab.start) + ")");
+    }
 }
 
 /// Free flight that ends after so many collisions only: throws where spheres have flown apart and will not meet again.
@@ -224,21 +257,27 @@ void Simulation<D>::need_collisions() const {
 
 template <int D>
 bool Simulation<D>::is_last_on_the_way() const {
-  if (paused_) return finished();
   const Statistics& s = statistics_;
+  const Slab next = next_slab();
   // A slab that meets an end may be shorter or longer than a step by rounding alone.
-  const bool whole = s.end_time == time_of(s.steps) &&
-                     (s.steps == s.start_steps || length_from(time_of(s.steps - 1), plan_) == plan_.step);
-  return whole && (finished() || next_slab().length != plan_.step);
+  const bool whole = s.end_time == next.start && (s.steps == s.start_steps || count_.within > 0 ||
+                                                  length_from(time_of(s.steps - 1), plan_) == plan_.step);
+  if (!whole) return false;
+  if (finished() || length_from(time_of(s.steps), plan_) != plan_.step) return true;
+  // Free flight ends within a slab, at its last collision; how many a slab has is known from the one before.
+  return plan_.collisions && next.collision_limit == *plan_.collisions &&
+         (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
 }
 
 template <int D>
 Slab Simulation<D>::next_slab() const {
   Slab slab;
   slab.index = statistics_.steps;
-  slab.start = time_of(slab.index);
-  slab.length = length_from(slab.start, plan_);
-  if (plan_.collisions && !info_.stepping) slab.collision_limit = *plan_.collisions;
+  slab.start = time_of(slab.index) + count_.within;
+  slab.length = length_from(time_of(slab.index), plan_) - count_.within;
+  if (!info_.stepping)
+    slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_,
+                                    plan_.collisions.value_or(slab.collision_limit));
   return slab;
 }
 

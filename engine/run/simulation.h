@@ -8,6 +8,7 @@
 //
 // Observing changes nothing: observers get copies, and no due time cuts a slab.
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -113,22 +114,28 @@ struct Statistics {
 struct StepCount {
   std::int64_t steps = 0;
   double time = 0;
+  /// How far an epoch of free flight has come that took more collisions than one slab may [time].
+  double within = 0;
 };
+
+template <int D>
+class Monitor;
 
 template <int D>
 class Simulation {
  public:
   /// The integrator and its info must belong together.
-  Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator,
+  Simulation(std::unique_ptr<System<D>>&& system, const IntegratorInfo& info, std::unique_ptr<Integrator<D>> integrator,
              Plan plan);
   /// An integrator by its name in the deck, with defaults for the parameters that are not given. The step is given
   /// once, there or in the plan; free flight chooses one by itself. Throws Error(Failure::deck) about parameters,
   /// forces that the integrator does not know and plans, and Error(Failure::initial_state) about the system
-  /// (System::check(), spheres that overlap or are not inside the walls).
-  Simulation(std::unique_ptr<System<D>> system, std::string_view integrator, Parameters given, Plan plan)
+  /// (System::check(), spheres that overlap or are not inside the walls); the caller still has the system then.
+  Simulation(std::unique_ptr<System<D>>&& system, std::string_view integrator, Parameters given, Plan plan)
       : Simulation(std::move(system), find_integrator(integrator), std::move(given), plan) {}
   /// The same by a declaration, which outlives the run.
-  Simulation(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan);
+  Simulation(std::unique_ptr<System<D>>&& system, const IntegratorInfo& info, Parameters given, Plan plan)
+      : Simulation(std::move(system), info, prepare(*system, info, std::move(given), plan)) {}
   ~Simulation();
 
   /// Observers outlive the run. Throws Error(deck) where one wants samples at intervals that cannot be counted.
@@ -136,14 +143,14 @@ class Simulation {
 
   /// What a caller does while a run goes on; all of it is collective.
   struct Hooks {
-    /// Before each slab, within an epoch of free flight where it was paused, and at the end: true stops the run. What
-    /// system().fields holds then is the state of the run, from which it can be continued.
+    /// Before each slab and at the end: true stops the run. What system().fields holds then is the state of the run,
+    /// from which it can be continued.
     std::function<bool()> should_stop{};
-    /// Asked now and then within an epoch of free flight: true has should_stop() asked soon.
-    std::function<bool()> pause{};
     /// Asked now and then within a step that takes long: true has it left, with the state it started from, and
-    /// should_stop() asked. `leave_here` is asked by each rank for itself, and followed by pause().
+    /// should_stop() asked. `leave_here` is asked by each rank for itself.
     std::function<bool()> leave{}, leave_here{};
+    /// A step was left on all ranks; should_stop() comes next.
+    std::function<void()> left{};
     /// Continues a run: sets the state of the system, which is in blocks of ids (engine/run/state.h).
     /// The system has the particles as they were at that state already.
     std::function<void()> restore{};
@@ -155,18 +162,21 @@ class Simulation {
     };
     std::optional<Branch> branch{};
   };
-  /// Runs to the end of the plan, or until it is stopped. Throws Error.
+  /// Runs to the end of the plan, or until it is stopped. May be called again, after extend() to go on, or with
+  /// Hooks::restore to go on from another state of this run. Throws Error.
   void run(const Hooks& hooks);
   void run(const std::function<bool()>& should_stop = {}) { run(Hooks{.should_stop = should_stop}); }
 
-  /// In should_stop(): whether a run with a later end would go on from here as this one has come here, and no longer
-  /// after the next slab, which meets the end, or after the end.
+  /// After so many collisions an epoch of free flight goes on in another slab: what is asked meanwhile, a checkpoint or
+  /// to stop, waits for the slab's end. To begin with 500 000, which take less than a second, or 4N where that is more:
+  /// to start a slab costs a fifth of a collision for each particle, a twentieth of what 4N collisions cost.
+  void limit_slabs(std::uint64_t collisions) { most_collisions_ = collisions; }
+  /// Another end for the next run(); step and intervals stay those of the first plan.
+  void extend(const Plan& end);
+
+  /// In should_stop(): whether a run with a later end would go on from here as this one has come here, and perhaps no
+  /// longer after the next slab, which may meet the end.
   bool is_last_on_the_way() const;
-  /// In should_stop(): whether an epoch of free flight is paused, and the simulated time of the state.
-  bool paused() const { return paused_; }
-  double time() const { return time_of(statistics_.steps) + (paused_ ? integrator_->paused_at() : 0); }
-  /// Where one is paused: the run ends at that time, as though the plan said so, with all particles at it.
-  void end_here() { plan_.end_time = time(); }
 
   const Statistics& statistics() const { return statistics_; }
   const System<D>& system() const { return *system_; }
@@ -175,14 +185,15 @@ class Simulation {
 
  private:
   struct Prepared {
-    std::unique_ptr<System<D>> system;
-    const IntegratorInfo& info;
     std::unique_ptr<Integrator<D>> integrator;
     Plan plan;
   };
-  static Prepared prepare(std::unique_ptr<System<D>> system, const IntegratorInfo& info, Parameters given, Plan plan);
-  explicit Simulation(Prepared p) : Simulation(std::move(p.system), p.info, std::move(p.integrator), p.plan) {}
+  static Prepared prepare(const System<D>& system, const IntegratorInfo& info, Parameters given, Plan plan);
+  Simulation(std::unique_ptr<System<D>>&& system, const IntegratorInfo& info, Prepared p)
+      : Simulation(std::move(system), info, std::move(p.integrator), p.plan) {}
 
+  void begin(const Hooks& hooks);
+  bool fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch);
   double time_of(std::int64_t step) const {
     return count_.time + static_cast<double>(step - count_.steps) * plan_.step;
   }
@@ -191,15 +202,18 @@ class Simulation {
   void need_collisions() const;
   double fraction_done() const;
 
+  Plan plan_;  // checked before the system is taken
   std::unique_ptr<System<D>> system_;
   const IntegratorInfo& info_;
   std::unique_ptr<Integrator<D>> integrator_;
-  Plan plan_;
   std::vector<Observer<D>*> observers_;
   Statistics statistics_;
   StepCount count_;
-  bool paused_ = false;     // within a slab
   double quiet_since_ = 0;  // the last slab with pair collisions
+  std::uint64_t most_collisions_ = std::max<std::uint64_t>(500'000, 4 * system_->size());  // in a slab of an epoch
+  std::optional<std::uint64_t> last_collisions_;  // of the last slab, where it was flown here
+  std::unique_ptr<Monitor<D>> monitor_;           // from the first run() on
+  std::size_t first_of_integrator_ = 0;           // its entries among Fields::of_run()
 };
 
 }  // namespace carom

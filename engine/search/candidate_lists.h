@@ -38,7 +38,7 @@ class CandidateLists {
   void assign(Slot i, std::span<const std::uint32_t> candidates) {
     NextEvent<D>& a = next_events_[i];
     const auto n = static_cast<unsigned>(candidates.size());
-    const unsigned units = (n + kSlack + lanes_ - 1) / lanes_;
+    const unsigned units = (n + kSpareRoom + lanes_ - 1) / lanes_;
     if (n > lanes_ * a.capacity || a.capacity == 0) {
       if (units > std::numeric_limits<std::uint16_t>::max() / lanes_)
         throw Error(Failure::numerical, "a sphere has more than 65 thousand neighbours");
@@ -92,7 +92,7 @@ class CandidateLists {
   }
 
  private:
-  static constexpr unsigned kSlack = 3;  // candidates that a new list has room for, beside those it has
+  static constexpr unsigned kSpareRoom = 3;  // candidates that a new list has room for, beside those it has
 
   bool same_box(std::uint32_t candidate) const { return packing_.linear(candidate) == 0; }
   std::uint32_t take(unsigned units) {

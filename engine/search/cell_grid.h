@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A regular grid of search cells over the box, and a table of the particles in each.
+// A regular grid of search cells over the box.
 //
 // Positions are mapped to *unwrapped* integer cells: a particle outside a periodic box, or an image of one, has its own
 // cell numbers there, and the difference of two unwrapped cells gives the image of a neighbour that is meant. (The
@@ -27,6 +27,11 @@ struct Extent {
   std::size_t particles = 0;
   Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();  ///< of their positions
 
+  Extent() = default;
+  explicit Extent(std::span<const Vec<D>> x) {
+    for (const Vec<D>& p : x) add(p);
+  }
+  Extent(std::size_t n, const Vec<D>& from, const Vec<D>& to) : particles(n), low(from), high(to) {}
   void add(const Vec<D>& x) {
     low = particles == 0 ? x : low.cwiseMin(x).eval();
     high = particles == 0 ? x : high.cwiseMax(x).eval();
@@ -54,12 +59,6 @@ class CellGrid {
     }
     lay_out();
   }
-
-  CellGrid(const Box<D>& box, double smallest, std::span<const Vec<D>> x)
-      : CellGrid(box, smallest, std::accumulate(x.begin(), x.end(), Extent<D>{}, [](Extent<D> all, const Vec<D>& p) {
-                   all.add(p);
-                   return all;
-                 })) {}
 
   /// Of which something can be stored.
   std::size_t cells() const {
@@ -198,72 +197,6 @@ class CellGrid {
   Cell<D> rows_{};                                // so many hold something there; one more is empty
   std::array<std::size_t, D> stride_;
   Vec<D> origin_, edge_, inverse_;
-};
-
-/// The particles of each cell, for one set of positions: built once, by counting, and read.
-template <int D>
-class CellTable {
- public:
-  CellTable(const CellGrid<D>& grid, std::span<const Vec<D>> x)
-      : grid_(grid), start_(grid.cells() + 2), ids_(x.size()), boxes_(x.size()) {
-    std::vector<std::uint32_t> at(x.size());
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      const Cell<D> c = grid.cell(x[i]);
-      at[i] = static_cast<std::uint32_t>(grid.index(c));
-      for (int k = 0; k < D; ++k) boxes_[i][k] = grid.boxes(k, c[k]);
-      ++start_[at[i] + 2];
-    }
-    // While filling, start_[c + 1] is where the next one in cell c goes.
-    for (std::size_t c = 0; c + 1 < start_.size(); ++c) start_[c + 1] += start_[c];
-    for (std::size_t i = 0; i < x.size(); ++i) ids_[start_[at[i] + 1]++] = static_cast<Id>(i);
-  }
-
-  /// Calls visit(j, image) for every particle j (the one at `x` among them) with an image that may lie within `reach`
-  /// of x: that image stands at x_j − shift(image).
-  template <class Visit>
-  void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
-    Cell<D> range;
-    for (int k = 0; k < D; ++k)
-      range[k] = std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid_.edge(k) - 1e-9), kFarthest)));
-    const Cell<D> centre = grid_.cell(x);
-    bool inside = true;
-    for (int k = 0; k < D; ++k) inside = inside && centre[k] >= range[k] && centre[k] < grid_.count(k) - range[k];
-    if (inside) {  // no images, and the cells of a row stand together
-      Cell<D> row;
-      for (int k = 0; k < D; ++k) row[k] = centre[k] - range[k];
-      const auto length = 2 * static_cast<std::size_t>(range[D - 1]) + 1;
-      do {
-        const std::size_t first = grid_.index(row);
-        for (std::uint32_t q = start_[first]; q < start_[first + length]; ++q) visit(ids_[q], boxes_[ids_[q]]);
-      } while (next_row(row, centre, range));
-      return;
-    }
-    grid_.for_each_around(centre, range, [&](std::size_t cell, const Image<D>& away) {
-      for (std::uint32_t q = start_[cell]; q < start_[cell + 1]; ++q) {
-        const Id j = ids_[q];
-        Image<D> image;
-        for (int k = 0; k < D; ++k) image[k] = boxes_[j][k] - away[k];
-        visit(j, image);
-      }
-    });
-  }
-
- private:
-  static constexpr double kFarthest = 1 << 28;  // cells: what an integer holds
-
-  /// Moves on to the next row within `range` of the centre; false after the last.
-  static bool next_row(Cell<D>& row, const Cell<D>& centre, const Cell<D>& range) {
-    for (int k = D - 2; k >= 0; --k) {
-      if (++row[k] <= centre[k] + range[k]) return true;
-      row[k] = centre[k] - range[k];
-    }
-    return false;
-  }
-
-  CellGrid<D> grid_;
-  std::vector<std::uint32_t> start_;
-  std::vector<Id> ids_;
-  std::vector<Image<D>> boxes_;
 };
 
 }  // namespace carom

@@ -41,7 +41,7 @@ class LinkedCells {
 
   /// Before any sphere is inserted: most spheres will stay near these places, and memory for cells elsewhere is saved.
   void confine(std::span<const Vec<D>> places) {
-    grid_.confine(places, kMargin, D - 1);
+    grid_.confine(places, kCellsAround, D - 1);
     lay_out();
   }
 
@@ -159,7 +159,7 @@ class LinkedCells {
   };
   static constexpr std::uint32_t kMore = std::uint32_t{1} << 31;  ///< beside a sphere: another one is behind it
   static constexpr double kCellsAParticle = 8;
-  static constexpr std::int32_t kMargin = 3;  // cells, round those of a part
+  static constexpr std::int32_t kCellsAround = 3;  // cells, round those of a part
 
   std::uint32_t shifted(std::int32_t boxes) const { return static_cast<std::uint32_t>(boxes) << packing_.slot_bits; }
 

@@ -3,30 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 
 #include "engine/base/error.h"
-#include "engine/search/cell_grid.h"
+#include "engine/search/sized_cells.h"
 
 namespace carom {
 
 namespace {
-constexpr std::size_t kMostPairs = 10'000'000, kMostPartners = 200;  // a particle; more come from far too long a step
-}  // namespace
+constexpr std::size_t kMostListed = 10'000'000,
+                      kMostListedPartners = 200;  // a particle; more come from far too long a step
 
-/// Cells for particles of one size.
-template <int D>
-struct SizeClass {
-  SizeClass(const Box<D>& box, double largest_reach, double skin, std::span<const Vec<D>> x, std::vector<Id> members)
-      : largest(largest_reach), table(CellGrid<D>(box, 2 * largest_reach + skin, x), x), ids(std::move(members)) {}
-  Id id(Id member) const { return ids.empty() ? member : ids[member]; }
-  double largest;  ///< reach
-  CellTable<D> table;
-  std::vector<Id> ids;  ///< of the members; empty: all particles
-};
-
-namespace {
 double mean(const std::vector<double>& of) {
   return std::accumulate(of.begin(), of.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, of.size()));
 }
@@ -102,45 +89,21 @@ bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
   built_at_.assign(x.begin(), x.end());
   pairs_.clear();
   partners_.clear();
-  const std::vector<SizeClass<D>> sizes = group(x);
-  for (std::size_t i = 0; i < x.size(); ++i) {
+  SizedCells<D> cells(box_, reach_, Extent<D>(x), skin_.width());
+  for (Id i = 0; i < x.size(); ++i) cells.insert(i, x[i], reach_[i]);
+  for (Id i = 0; i < x.size(); ++i) {
     if (!without_.empty() && without_[i] != 0) continue;
     const std::size_t first = pairs_.size();
-    for (const SizeClass<D>& size : sizes)
-      size.table.for_each_near(x[i], reach_[i] + size.largest + skin_.width(), [&](Id member, const Image<D>& image) {
-        const Id j = size.id(member);
-        if (j <= i) return;
-        const Vec<D> d = x[i] - x[j] + box_.shift(image);
-        const double reach = reach_[i] + reach_[j] + skin_.width();
-        if (d.squaredNorm() <= reach * reach) pairs_.push_back({static_cast<Id>(i), j, image});
-      });
+    cells.for_each_near(x[i], reach_[i], [&](Id j, const Image<D>& image) {
+      if (j <= i) return;
+      const Vec<D> d = x[i] - x[j] + box_.shift(image);
+      const double reach = reach_[i] + reach_[j] + skin_.width();
+      if (d.squaredNorm() <= reach * reach) pairs_.push_back({i, j, image});
+    });
     std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
-    if (pairs_.size() > kMostPairs + kMostPartners * x.size()) return false;
+    if (pairs_.size() > kMostListed + kMostListedPartners * x.size()) return false;
   }
   return true;
-}
-
-/// Particles of similar reach, an octave each, in cells of their own: cells for the largest would hold thousands of
-/// small ones.
-template <int D>
-std::vector<SizeClass<D>> NeighbourList<D>::group(std::span<const Vec<D>> x) const {
-  std::vector<SizeClass<D>> sizes;
-  if (x.empty()) return sizes;
-  const auto [least, most] = std::ranges::minmax_element(reach_);
-  if (!(*least > 0) || *most < 2 * *least) {
-    sizes.emplace_back(box_, *most, skin_.width(), x, std::vector<Id>{});
-    return sizes;
-  }
-  std::map<int, std::vector<Id>> octaves;
-  for (Id i = 0; i < x.size(); ++i) octaves[std::ilogb(*most / reach_[i])].push_back(i);
-  std::vector<Vec<D>> at;
-  for (auto& [octave, ids] : octaves) {
-    at.clear();
-    double largest = 0;
-    for (const Id i : ids) at.push_back(x[i]), largest = std::max(largest, reach_[i]);
-    sizes.emplace_back(box_, largest, skin_.width(), at, std::move(ids));
-  }
-  return sizes;
 }
 
 template class NeighbourList<2>;

@@ -26,9 +26,6 @@ struct NeighbourPair {
 };
 
 template <int D>
-struct SizeClass;  // neighbour_list.cc
-
-template <int D>
 class NeighbourList {
  public:
   /// Lists pairs (i, j) that can come as near as reach(i) + reach(j). `without`: not those with a lower particle that
@@ -49,7 +46,6 @@ class NeighbourList {
 
  private:
   bool build(std::span<const Vec<D>> x);
-  std::vector<SizeClass<D>> group(std::span<const Vec<D>> x) const;
   void follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<Image<D>>& crossed);
 
   const Box<D>& box_;

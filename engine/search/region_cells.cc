@@ -6,9 +6,9 @@
 namespace carom {
 namespace {
 
-constexpr double kPlaces = 1024;     // to a cell, along each axis
-constexpr double kMembers = 4;       // of a cell, at least: fewer would waste its line
-constexpr std::int32_t kMargin = 2;  // cells, round those of a part
+constexpr double kPlaces = 1024;              // to a cell, along each axis
+constexpr double kMembers = 4;                // of a cell, at least: fewer would waste its line
+constexpr std::int32_t kCellsAroundPart = 2;  // cells, round those of a part
 
 }  // namespace
 
@@ -35,7 +35,7 @@ double RegionCells<D>::rounded(double reach) {
 
 template <int D>
 void RegionCells<D>::confine(std::span<const Vec<D>> places) {
-  grid_.confine(places, kMargin);
+  grid_.confine(places, kCellsAroundPart);
 }
 
 template <int D>

@@ -39,7 +39,7 @@ template <int D>
 SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, const Extent<D>& extent,
                              std::span<const double> numbers = {});
 
-/// Contacts of a sphere while a thermal sphere flies the length 1, about (Enskog).
+/// Collisions of a sphere while a thermal sphere flies the length 1, about: Enskog's theory, for `largest` diameters.
 double contacts_a_length(const SearchSituation& situation);
 
 class SearchTuning {

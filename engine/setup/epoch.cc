@@ -5,10 +5,10 @@
 #include <array>
 #include <charconv>
 #include <limits>
-#include <numbers>
 
 #include "engine/base/record.h"
 #include "engine/ranks/id_blocks.h"
+#include "engine/search/search_tuning.h"
 #include "engine/setup/placement.h"
 
 namespace carom {
@@ -33,15 +33,8 @@ double default_epoch(const System<D>& system) {
       });
   const double filled = packing_fraction<D>(system.box.volume(), p.radius, system.decomposition.others());
   if (twice_kinetic == 0) return 1;
-  // Collision rate of a particle by Enskog's theory, with the contact value of Carnahan–Starling (3-D) or Henderson
-  // (2-D).
   const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));
-  const double density = n / system.box.volume();
-  const double empty = std::max(1 - filled, 0.01);
-  const double contact_value =
-      D == 2 ? (1 - 7 * filled / 16) / (empty * empty) : (1 - filled / 2) / (empty * empty * empty);
-  const double cross_section = D == 2 ? 2 * diameter : 4 * diameter * diameter;
-  const double rate = density * cross_section * contact_value * std::sqrt(std::numbers::pi) * thermal_speed;
+  const double rate = thermal_speed * contacts_a_length({D, n / system.box.volume(), filled, diameter, diameter});
   const double farthest = std::min(300 * diameter, 4 * system.box.edges.minCoeff());
   double epoch = std::min(40 / rate, farthest / thermal_speed);
   // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/setup/initial_state.h"
 
-#include <algorithm>
-#include <tuple>
-#include <utility>
-
 #include "engine/ranks/halo.h"
 
 namespace carom {
@@ -27,16 +23,9 @@ Overlaps find_overlaps(const System<D>& system) {
   if (!system.decomposition.joined()) return find_overlaps<D>(system.box, system.particles.x, system.particles.radius);
   const double diameter = 2 * system.decomposition.sizes().largest_radius();
   const Particles<D> halo = halo_of<D>(system.box, diameter, system.decomposition.ranks(), system.particles);
-  Overlaps own = find_overlaps<D>(system.box, halo.x, halo.radius, halo.ghost), all;
+  Overlaps own = find_overlaps<D>(system.box, halo.x, halo.radius, halo.ghost);
   if (own.pairs > 0) own.lo = halo.id[own.lo], own.hi = halo.id[own.hi];
-  for (const Overlaps& found : gather_values<Overlaps>(system.decomposition.ranks(), {&own, 1})) {
-    if (found.pairs == 0) continue;
-    const std::size_t pairs = all.pairs + found.pairs;
-    const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.hi, o.lo); };
-    if (all.pairs == 0 || order(found) < order(all)) all = found;
-    all.pairs = pairs;
-  }
-  return all;
+  return sum_of_all(system.decomposition.ranks(), own);
 }
 
 template Overlaps find_overlaps(const System<2>&);

@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "engine/base/random.h"
-#include "engine/setup/placement_grid.h"
+#include "engine/search/sized_cells.h"
 
 namespace carom {
 namespace {
@@ -153,9 +153,9 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
                              std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries) {
   std::vector<bool> waiting(x.size(), false);
   for (const Id i : ids) waiting[i] = true;
-  PlacementGrid<D> grid(box, radius);
+  SizedCells<D> cells(box, radius, {x.size(), Vec<D>::Zero(), box.edges});
   for (Id i = 0; i < x.size(); ++i)
-    if (!waiting[i]) grid.insert(i, x[i]);
+    if (!waiting[i]) cells.insert(i, x[i], radius[i]);
 
   std::vector<Id> order(ids.begin(), ids.end());
   std::stable_sort(order.begin(), order.end(), [&](Id a, Id b) { return radius[a] > radius[b]; });
@@ -169,13 +169,13 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
         x[i][k] = margin + random.uniform() * (box.edges[k] - 2 * margin);
       }
       free = true;
-      grid.near(x[i], radius[i], [&](Id j, const Vec<D>& shift) {
+      cells.for_each_near(x[i], radius[i], [&](Id j, const Image<D>& image) {
         const double contact = radius[i] + radius[j];
-        if ((x[i] - x[j] - shift).squaredNorm() < contact * contact) free = false;
+        if ((x[i] - x[j] + box.shift(image)).squaredNorm() < contact * contact) free = false;
       });
     }
     if (!free) break;
-    grid.insert(i, x[i]);
+    cells.insert(i, x[i], radius[i]);
     ++placed;
   }
   return placed;
@@ -185,31 +185,15 @@ template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
                        std::span<const char> beyond) {
   Overlaps found;
-  if (x.empty()) return found;
-  PlacementGrid<D> grid(box, radius);
+  SizedCells<D> cells(box, radius, Extent<D>(x));
   const GapTolerance tolerance = box.gap_tolerance();
-  double worst = 1;
   for (Id i = 0; i < x.size(); ++i) {
-    Vec<D> inside = x[i];
-    Image<D> image{};
-    box.wrap(inside, image);
-    const auto look = [&](Id j, const Vec<D>& shift) {
-      Vec<D> other = x[j];
-      Image<D> ignored{};
-      box.wrap(other, ignored);
-      const double distance = (inside - other - shift).norm(), contact = radius[i] + radius[j];
-      if (distance >= contact - tolerance(contact)) return;
-      ++found.pairs;
-      const bool tie = distance / contact == worst && found.hi == i && j < found.lo;
-      if (distance / contact >= worst && !tie) return;
-      worst = distance / contact;
-      found.lo = j;
-      found.hi = i;
-      found.distance = distance;
-      found.contact = contact;
+    const auto look = [&](Id j, const Image<D>& image) {
+      const double distance = (x[i] - x[j] + box.shift(image)).norm(), contact = radius[i] + radius[j];
+      if (distance < contact - tolerance(contact)) found.add({1, j, i, distance, contact});
     };
-    if (beyond.empty() || beyond[i] == 0) grid.near(inside, radius[i], look);
-    grid.insert(i, inside);
+    if (beyond.empty() || beyond[i] == 0) cells.for_each_near(x[i], radius[i], look);
+    cells.insert(i, x[i], radius[i]);
   }
   return found;
 }

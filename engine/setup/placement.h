@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <functional>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "engine/base/box.h"
@@ -62,9 +63,18 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
 /// images; pairs are ignored if `beyond` marks the sphere with the larger index.
 struct Overlaps {
   std::size_t pairs = 0;
-  Id lo = 0, hi = 0;    ///< the pair with the largest overlap relative to its contact distance
-  double distance = 0;  ///< its distance [length]
-  double contact = 0;   ///< its contact distance [length]
+  Id lo = 0, hi = 0;    ///< the pair that overlaps most, relative to its contact distance; of equals the lowest ids
+  double distance = 0;  ///< of that pair [length]
+  double contact = 1;   ///< its contact distance [length]
+
+  /// Of that pair, relative to its contact distance; 0 where there is none.
+  double depth() const { return pairs == 0 ? 0 : 1 - distance / contact; }
+  void add(const Overlaps& other) {
+    const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.hi, o.lo); };
+    const std::size_t all = pairs + other.pairs;
+    if (pairs == 0 || (other.pairs > 0 && order(other) < order(*this))) *this = other;
+    pairs = all;
+  }
 };
 template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,

@@ -19,8 +19,8 @@ extern "C" void note_signal(int number) {
   if (number == SIGINT) std::signal(SIGINT, SIG_DFL);
 }
 
-constexpr double kBetweenLooks = 0.01;  // [s]
-constexpr double kMostCalls = 1e4;      // between looks
+constexpr double kTimeBetweenLooks = 0.01;  // [s]
+constexpr double kMostCalls = 1e4;          // between looks
 
 }  // namespace
 
@@ -41,7 +41,7 @@ Requests::Asked Requests::now(Communicator& ranks) {
   const bool due = first && interval_ && seconds_since(last_checkpoint_) >= *interval_;
   const double calls = static_cast<double>(std::max(calls_, std::uint64_t{1})), elapsed = seconds_since(last_look_);
   std::array<double, 3> asked = {stop_here(ranks) ? 1.0 : 0.0, keep_signal != 0 || due ? 1.0 : 0.0,
-                                 first ? std::clamp(calls * kBetweenLooks / elapsed, 1.0, kMostCalls) : 0.0};
+                                 first ? std::clamp(calls * kTimeBetweenLooks / elapsed, 1.0, kMostCalls) : 0.0};
   ranks.largest(asked);
   between_ = static_cast<std::uint64_t>(asked[2]);
   calls_ = 0;

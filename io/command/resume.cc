@@ -27,37 +27,16 @@ std::string quoted(const std::string& word) {
 void share_head(Resumed& from, Communicator& ranks) {
   const auto archive = [&](Archive& all) {
     from.head.archive(all);
-    all(from.head.deck, from.count, from.in_epoch, from.reached);
+    all(from.head.deck, from.count, from.reached);
   };
   Archive out;
   if (ranks.rank() == 0) {
     from.head = from.checkpoint->head();
     Archive(from.checkpoint->read("step count"))(from.count);
-    Archive(from.checkpoint->read("paused"))(from.in_epoch);
     archive(out);
   }
   Archive in(std::move(ranks.gather(out.bytes())[0]));
   archive(in);
-}
-
-/// Flies a state within an epoch to its end, where all particles are at one time.
-template <int D>
-void end_epoch(Resumed& from, Communicator& ranks) {
-  Deck deck = *from.of;
-  deck.plan = {.step = deck.plan.step, .steps = from.head.step + 1};
-  GivenState given{from.reader(), from.head.bonds};
-  const IntegratorInfo& info = find_integrator(deck.integrator);
-  Simulation<D> simulation(build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, &given), info,
-                           info.make<D>(deck.integrator_parameters), deck.plan);
-  const Statistics& statistics = simulation.statistics();
-  const auto save_at_end = [&] {
-    if (statistics.steps > from.head.step) save_state(simulation.system(), into(from.at_the_end));
-    return false;
-  };
-  simulation.run({.should_stop = save_at_end, .restore = [&] { restore_state(simulation.system(), given.read); }});
-  from.head.step = statistics.steps;
-  from.head.time = statistics.end_time;
-  from.in_epoch = false;
 }
 
 /// Throws where a run that is continued would end before the point that it has reached. `before`: the deck that it had.
@@ -86,14 +65,12 @@ void check_end(const Deck& deck, const Deck& before, const Resumed& from) {
 /// How far a run has come: its checkpoint, or its last row, which may be later.
 ThermoPoint reached_by(const Checkpoint& checkpoint, const std::filesystem::path& directory) {
   Statistics statistics;
-  bool in_epoch = false;
-  double flown = 0;
+  StepCount count;
   Archive(checkpoint.read("statistics"))(statistics);
-  Archive(checkpoint.read("paused"))(in_epoch);
-  if (in_epoch) Archive(checkpoint.read("epoch time"))(flown);
+  Archive(checkpoint.read("step count"))(count);
   const ThermoPoint row = last_thermo_point(directory / run_file::thermo);
-  ThermoPoint reached{std::max(row.time, statistics.end_time + flown),
-                      std::max(row.step, statistics.steps + (in_epoch ? 1 : 0)),  // what has begun is completed
+  ThermoPoint reached{std::max(row.time, statistics.end_time),
+                      std::max(row.step, statistics.steps + (count.within > 0 ? 1 : 0)),  // what has begun is completed
                       std::max(row.collisions, statistics.counters.sphere_sphere)};
   // Free flight would have ended at the last collision, before the state.
   if (!find_integrator(checkpoint.head().integrator).stepping) ++reached.collisions;
@@ -114,10 +91,7 @@ void check_end(const Deck& deck, const CheckpointHead& head) {
 }  // namespace
 
 StateReader Resumed::reader() const {
-  return [this](const std::string& name) {
-    const auto later = at_the_end.find(name);
-    return later == at_the_end.end() ? checkpoint->read(name) : later->second;
-  };
+  return [this](const std::string& name) { return checkpoint->read(name); };
 }
 
 Resumed find_run(const std::filesystem::path& directory, bool take_over, Communicator& ranks) {
@@ -192,8 +166,7 @@ Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks) {
 }
 
 template <int D>
-GivenState state_of(Resumed& from, const Deck& deck, Communicator& ranks) {
-  if (from.is_branch() && from.in_epoch) end_epoch<D>(from, ranks);
+GivenState state_of(Resumed& from, const Deck& deck) {
   if (from.is_branch()) check_end(deck, from.head);
   return {from.reader(), from.head.bonds, from.is_branch()};
 }
@@ -204,13 +177,14 @@ void set_hooks(const Resumed& from, const Deck& deck, Simulation<D>& simulation,
     hooks.restore = [&from, &simulation] { restore_state(simulation.system(), from.reader()); };
   if (from.is_continued()) return;
   const StepCount start{from.head.step, from.head.time}, &count = from.count;
-  const bool counted = deck.plan.step == from.of->plan.step &&
-                       start.time == count.time + static_cast<double>(start.steps - count.steps) * deck.plan.step;
+  const double step = deck.plan.step;
+  const bool counted = step == from.of->plan.step &&
+                       start.time == count.time + static_cast<double>(start.steps - count.steps) * step + count.within;
   hooks.branch = {start, counted ? count : start};
 }
 
-template GivenState state_of<2>(Resumed&, const Deck&, Communicator&);
-template GivenState state_of<3>(Resumed&, const Deck&, Communicator&);
+template GivenState state_of<2>(Resumed&, const Deck&);
+template GivenState state_of<3>(Resumed&, const Deck&);
 template void set_hooks(const Resumed&, const Deck&, Simulation<2>&, Simulation<2>::Hooks&);
 template void set_hooks(const Resumed&, const Deck&, Simulation<3>&, Simulation<3>::Hooks&);
 

@@ -4,11 +4,10 @@
 //
 //   Resumed from = find_run(directory, false, ranks);           Resumed from = find_state(checkpoint, output, ranks);
 //   Deck deck = deck_of(from, options, ranks);
-//   GivenState given = state_of<2>(from, deck, ranks);   // for build_system()
+//   GivenState given = state_of<2>(from, deck);   // for build_system()
 //   set_hooks(from, deck, simulation, hooks);
 //   simulation.run(hooks);
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,11 +29,9 @@ struct Resumed {
   CheckpointHead head;
   std::string warning;     ///< about a later checkpoint that is damaged
   StepCount count;         ///< by which its steps are counted
-  bool in_epoch = false;   ///< it was left off within an epoch of free flight
   ThermoPoint reached;     ///< how far a run that is continued has come
   std::optional<Deck> of;  ///< of a branch: the deck of the run that it branches off
   bool same_motion = false;
-  std::map<std::string, Bytes> at_the_end;  ///< of a branch: the state at the end of that epoch
 
   bool is_branch() const { return of.has_value(); }
   bool is_continued() const { return !is_branch(); }
@@ -51,10 +48,10 @@ Resumed find_state(const std::filesystem::path& checkpoint, const std::filesyste
 /// The deck of a run that is continued, where only the end may be another, or of a branch. Throws Error(Failure::deck).
 Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks);
 
-/// The state that the run of this deck starts from; a branch first flies to the end of the epoch. `from` must outlive
+/// The state that the run of this deck starts from; `from` must outlive
 /// it. Throws Error(Failure::deck) where a branch would have nothing to do. Collective.
 template <int D>
-GivenState state_of(Resumed& from, const Deck& deck, Communicator& ranks);
+GivenState state_of(Resumed& from, const Deck& deck);
 
 /// Sets restore and branch.
 template <int D>

@@ -46,7 +46,7 @@ constexpr std::uint64_t kCallsWithinSteps = 32;
 template <int D>
 Simulation<D> simulation_of(Deck& deck, Communicator& ranks, Resumed* from) {
   std::optional<GivenState> given;
-  if (from) given = state_of<D>(*from, deck, ranks);
+  if (from) given = state_of<D>(*from, deck);
   auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, given ? &*given : nullptr);
   const IntegratorInfo& info = find_integrator(deck.integrator);
   return Simulation<D>(std::move(system), info, info.make<D>(deck.integrator_parameters), deck.plan);
@@ -54,21 +54,18 @@ Simulation<D> simulation_of(Deck& deck, Communicator& ranks, Resumed* from) {
 
 /// What the ranks do alike while a run goes on: stop or write checkpoints when they are asked to.
 template <int D>
-class Keeper {
+class RunControl {
  public:
   /// `head`: that of the next checkpoint, on rank 0.
-  Keeper(Simulation<D>& simulation, const Deck& deck, Communicator& ranks, Requests& requests,
-         std::function<CheckpointHead()> head)
+  RunControl(Simulation<D>& simulation, const Deck& deck, Communicator& ranks, Requests& requests,
+             std::function<CheckpointHead()> head)
       : simulation_(simulation), deck_(deck), ranks_(ranks), requests_(requests), head_(std::move(head)) {
     requests_.set_interval(deck.output.checkpoint_wall);
   }
   typename Simulation<D>::Hooks hooks(const Resumed* from) {
     typename Simulation<D>::Hooks hooks;
     hooks.should_stop = [this] { return should_stop(); };
-    hooks.pause = [this] {
-      asked_ = requests_.now(ranks_);
-      return asked_.checkpoint;
-    };
+    hooks.left = [this] { asked_ = requests_.now(ranks_); };
     hooks.leave = [this] {
       const Requests::Asked now = requests_.now_and_then(ranks_, kCallsWithinSteps);
       if (now.checkpoint) asked_ = now;  // where it need not stop it is written at the step's end
@@ -149,7 +146,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     simulation.add(table);
     if (!options.quiet) simulation.add(progress);
     const auto bonds = from ? from->head.bonds : found_bonds(deck, simulation.system());
-    Keeper<D> keeper(simulation, deck, at_work, requests, [&] {
+    RunControl<D> control(simulation, deck, at_work, requests, [&] {
       return CheckpointHead{.deck = deck.toml_text,
                             .deck_file = deck.file.string(),
                             .version = version_string(),
@@ -165,7 +162,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
                             .warnings = deck.warnings,
                             .branched_from = outcome.branched_from};
     });
-    simulation.run(keeper.hooks(from));
+    simulation.run(control.hooks(from));
     progress.end_line();
     table.finish();
     const auto accounts = accounts_of_all(at_work, statistics);
@@ -206,14 +203,14 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
 template <int D>
 int run_beside(Deck& deck, Communicator& at_work, Requests& requests, Resumed* from) {
   auto simulation = simulation_of<D>(deck, at_work, from);
-  std::vector<Onlooker<D>> onlookers;
+  std::vector<SamplingTimes<D>> others;
   for (const auto& [info, parameters] : deck.output.observables)
-    onlookers.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
-  for (Onlooker<D>& onlooker : onlookers) simulation.add(onlooker);
+    others.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
+  for (SamplingTimes<D>& times : others) simulation.add(times);
   BlockSender<D> sender(at_work, simulation.system(), from == nullptr || from->is_branch());
   simulation.add(sender);
-  Keeper<D> keeper(simulation, deck, at_work, requests, {});
-  simulation.run(keeper.hooks(from));
+  RunControl<D> control(simulation, deck, at_work, requests, {});
+  simulation.run(control.hooks(from));
   accounts_of_all(at_work, simulation.statistics());
   return simulation.statistics().stopped_early ? kStoppedEarly : kDone;
 }

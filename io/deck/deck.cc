@@ -24,7 +24,8 @@ bool same_tables(const Deck& one, const Deck& other, std::string_view name) {
 }  // namespace
 
 std::optional<std::string> read_text(const std::filesystem::path& file) {
-  constexpr std::size_t kPiece = 1 << 20, kMost = std::size_t{1} << 30;  // of what is no file and may have no end
+  constexpr std::size_t kTextPiece = 1 << 20,
+                        kMostText = std::size_t{1} << 30;  // of what is no file and may have no end
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored)) return {};
   const bool ends = std::filesystem::is_regular_file(file, ignored);
@@ -33,14 +34,14 @@ std::optional<std::string> read_text(const std::filesystem::path& file) {
   std::string text;
   for (bool more = true; more;) {
     const std::size_t before = text.size();
-    text.resize(before + kPiece);
-    in.read(text.data() + before, kPiece);
+    text.resize(before + kTextPiece);
+    in.read(text.data() + before, kTextPiece);
     text.resize(before + static_cast<std::size_t>(in.gcount()));
     if (in.bad()) return {};
     if (text.find('\0', before) != std::string::npos)
       throw Error(Failure::file, file.string() + ": error: this is no text, it has zero bytes; check the path");
     more = !in.eof();
-    if (more && !ends && text.size() >= kMost)
+    if (more && !ends && text.size() >= kMostText)
       throw Error(Failure::file, file.string() + ": error: there is no end of this input; give a file");
   }
   return text;

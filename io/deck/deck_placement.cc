@@ -47,11 +47,11 @@ Words words_of(std::string_view line) {
 
 /// A word for messages, of whatever bytes it is.
 std::string shown(std::string_view word) {
-  constexpr std::size_t kMost = 20;
-  std::string text(word.substr(0, kMost));
+  constexpr std::size_t kMostShown = 20;
+  std::string text(word.substr(0, kMostShown));
   std::ranges::replace_if(
       text, [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
-  return "'" + text + (word.size() > kMost ? "…'" : "'");
+  return "'" + text + (word.size() > kMostShown ? "…'" : "'");
 }
 
 template <int D>

@@ -83,7 +83,7 @@ struct SpeciesRadius {
 };
 
 void write_species(File& file, const std::vector<std::string>& names, const std::vector<SpeciesRadius>& radii) {
-  constexpr std::size_t kMost = 15;  // characters of a name in VMD
+  constexpr std::size_t kLongestName = 15;  // characters of a name in VMD
   const Handle group = file.group(vmd_structure::group);
   std::vector<std::int32_t> index;
   std::vector<std::string> name;
@@ -91,7 +91,7 @@ void write_species(File& file, const std::vector<std::string>& names, const std:
   for (std::size_t s = 0; s < names.size(); ++s) {
     if (radii[s].particles == 0) continue;
     index.push_back(static_cast<std::int32_t>(s));
-    name.push_back(names[s].substr(0, kMost));
+    name.push_back(names[s].substr(0, kLongestName));
     radius.push_back(radii[s].mean());
   }
   file.write_array(group, "indexOfSpecies", hdf5::native_type<std::int32_t>(), index.data(), {index.size()});

@@ -19,9 +19,9 @@ namespace carom {
 
 /// Looks at the particles when the files of another rank do, so that all ranks stop at the same times.
 template <int D>
-class Onlooker : public Observer<D> {
+class SamplingTimes : public Observer<D> {
  public:
-  explicit Onlooker(const Sampling& sampling) : sampling_(sampling) {}
+  explicit SamplingTimes(const Sampling& sampling) : sampling_(sampling) {}
   Sampling sampling() const override { return sampling_; }
 
  private:

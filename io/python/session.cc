@@ -170,18 +170,6 @@ Bytes Session<D>::saved(const std::string& name, double interval) const {
   return out.bytes();
 }
 
-/// Throws what a run would that begins with this state. Done on a copy: where a constructor of runs throws, its system
-/// goes, and views of it would point to freed memory.
-template <int D>
-void Session<D>::try_out(const Parameters& parameters, const Plan& plan) {
-  auto copy = std::make_unique<System<D>>();
-  copy->box = box_;
-  copy->species = species_;
-  copy->particles = system_->particles;
-  terms_.make(*copy);
-  Simulation<D>(std::move(copy), *integrator_, parameters, plan);
-}
-
 template <int D>
 void Session<D>::run(Plan plan, const RunHooks& hooks) {
   if (running_) refuse("a run is going on; wait for its end");
@@ -199,10 +187,15 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   parameters.set("step", step_);
   const double interval = plan.thermo_interval;
 
-  if (!begun) try_out(parameters, plan);
-  parameters = completed(integrator_->name, integrator_->parameters, std::move(parameters));
-  plan.step = step_;
-  Simulation<D> run(std::move(system_), *integrator_, integrator_->make<D>(parameters), plan);
+  std::optional<Simulation<D>> made;  // where it throws the session keeps its system
+  if (begun) {
+    parameters = completed(integrator_->name, integrator_->parameters, std::move(parameters));
+    plan.step = step_;
+    made.emplace(std::move(system_), *integrator_, integrator_->make<D>(parameters), plan);
+  } else {
+    made.emplace(std::move(system_), *integrator_, std::move(parameters), plan);
+  }
+  Simulation<D>& run = *made;
   Shown shown(*this, hooks);
   run.add(shown);
   at_work_ = &run.system();
@@ -211,20 +204,16 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   running_ = true;
   std::map<std::string, Bytes> state;
   typename Simulation<D>::Hooks inner;
-  bool ending = false;  // within an epoch, at the time of the state
-  inner.pause = inner.leave = inner.leave_here = [&] { return !ending && hooks.stop && hooks.stop(run.statistics()); };
+  inner.leave = inner.leave_here = [&] { return hooks.stop && hooks.stop(run.statistics()); };
   inner.should_stop = [&] {
-    if (ending) return false;
     const bool stop = hooks.stop && hooks.stop(run.statistics());
     if (stop || run.is_last_on_the_way()) {
       state.clear();
       save_state(*at_work_, into(state));
-      state_time_ = run.time();
+      state_time_ = run.statistics().end_time;
       state_steps_ = run.statistics().steps;
     }
-    ending = stop && run.paused();
-    if (ending) run.end_here();
-    return stop && !ending;
+    return stop;
   };
   if (begun)
     inner.restore = [&] {
@@ -233,9 +222,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     };
   const auto end = [&] {
     statistics_ = *std::exchange(live_, nullptr);
-    // What is due at the very time of a paused epoch is shown when the run goes on.
-    const double until = statistics_.end_time;
-    shown_until_ = std::max(shown_until_, ending ? std::nextafter(until, 0.0) : until);
+    shown_until_ = std::max(shown_until_, statistics_.end_time);
     rest(at_work_->particles);
   };
   try {

@@ -71,7 +71,6 @@ class Session {
   class Shown;
   void change(const char* what);
   void set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what);
-  void try_out(const Parameters& parameters, const Plan& plan);
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);

@@ -70,11 +70,11 @@ Child::Child(const std::vector<std::string>& arguments) {
 }
 
 Child::~Child() {
-  constexpr int kPatience = 5000;  // [ms]
+  constexpr int kTimeToEnd = 5000;  // [ms]
   ::kill(process_, SIGTERM);
   pollfd ended{.fd = output_.number(), .events = 0, .revents = 0};
   int changes = 0;
-  while ((changes = ::poll(&ended, 1, kPatience)) < 0 && errno == EINTR) continue;
+  while ((changes = ::poll(&ended, 1, kTimeToEnd)) < 0 && errno == EINTR) continue;
   if (changes == 0) ::kill(process_, SIGKILL);
   while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) continue;
 }

@@ -34,7 +34,7 @@ using Response = http::response<http::string_body>;
 /// one.
 constexpr std::size_t kMostConnections = 24;
 /// A connection on which no request comes and no byte of an answer goes for this long is closed.
-constexpr std::chrono::seconds kPatience(10);
+constexpr std::chrono::seconds kTimeIdle(10);
 /// The time until the next attempt where no connection can be accepted, as where no descriptor is free.
 constexpr std::chrono::milliseconds kPause(100);
 
@@ -138,13 +138,13 @@ struct PageServer::Sockets {
       beast::flat_buffer buffer;
       for (bool more = true; more;) {
         Request request;
-        connection.stream.expires_after(kPatience);
+        connection.stream.expires_after(kTimeIdle);
         co_await http::async_read(connection.stream, buffer, request, asio::use_awaitable);
         Response response = response_to(request, connection);
         more = response.keep_alive();
         for (http::response_serializer<http::string_body> rest(response); !rest.is_done();) {
           has_moved(connection);
-          connection.stream.expires_after(kPatience);
+          connection.stream.expires_after(kTimeIdle);
           co_await http::async_write_some(connection.stream, rest, asio::use_awaitable);
         }
       }

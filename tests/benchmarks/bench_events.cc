@@ -72,11 +72,11 @@ class Flow {
 
   /// Runs this many epochs, and more until there have been this many pair collisions.
   Stretch run(std::uint64_t epochs, std::uint64_t collisions) {
-    constexpr std::uint64_t kVain = 1000;  // epochs, each of forty mean free times
+    constexpr std::uint64_t kMostEpochs = 1000;  // epochs, each of forty mean free times
     const std::uint64_t before = counters_.sphere_sphere;
     Stretch done;
     for (std::uint64_t k = 0; k < epochs || done.collisions < collisions; ++k) {
-      if (k == kVain && done.collisions == 0)
+      if (k == kMostEpochs && done.collisions == 0)
         throw Error(Failure::numerical, "nothing collides; take more spheres or a higher packing fraction");
       SlabReport<D> report{.counters = counters_};
       integrator_->slab(*system_, {.index = slabs_, .start = static_cast<double>(slabs_) * epoch_, .length = epoch_},

@@ -3,7 +3,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "engine/search/cell_grid.h"
+#include "engine/search/sized_cells.h"
 #include "tests/support/experiments.h"
 
 namespace carom {
@@ -21,7 +21,7 @@ template <int D>
 void cell_of(benchmark::State& state) {
   const auto system = lattice<D>(state);
   const auto& x = system->particles.x;
-  const CellGrid<D> grid(system->box, kDiameter, x);
+  const CellGrid<D> grid(system->box, kDiameter, Extent<D>(x));
   for (auto _ : state)
     for (const auto& place : x) benchmark::DoNotOptimize(grid.index(grid.cell(place)));
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(x.size()));
@@ -34,7 +34,7 @@ template <int D>
 void cells_around(benchmark::State& state) {
   const auto system = lattice<D>(state);
   const auto& x = system->particles.x;
-  const CellGrid<D> grid(system->box, kDiameter, x);
+  const CellGrid<D> grid(system->box, kDiameter, Extent<D>(x));
   Cell<D> range;
   range.fill(1);
   for (auto _ : state)
@@ -49,18 +49,19 @@ BENCHMARK(cells_around<2>)->Arg(64);
 BENCHMARK(cells_around<3>)->Arg(13);
 
 template <int D>
-void cell_table(benchmark::State& state) {
+void sized_cells(benchmark::State& state) {
   const auto system = lattice<D>(state);
   const auto& x = system->particles.x;
-  const CellGrid<D> grid(system->box, kDiameter, x);
+  const std::vector<double> reach(x.size(), kDiameter / 2);
   for (auto _ : state) {
-    const CellTable<D> table(grid, x);
-    benchmark::DoNotOptimize(&table);
+    SizedCells<D> cells(system->box, reach, Extent<D>(x));
+    for (Id i = 0; i < x.size(); ++i) cells.insert(i, x[i], reach[i]);
+    benchmark::DoNotOptimize(&cells);
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(x.size()));
 }
-BENCHMARK(cell_table<2>)->Arg(64);
-BENCHMARK(cell_table<3>)->Arg(13)->Arg(29)->Arg(63);
+BENCHMARK(sized_cells<2>)->Arg(64);
+BENCHMARK(sized_cells<3>)->Arg(13)->Arg(29)->Arg(63);
 
 }  // namespace
 }  // namespace carom

@@ -95,17 +95,17 @@ class ThreadRanks {
   }
   void give_up() {
     const std::lock_guard lock(mutex_);
-    for (std::size_t rank = 0; rank < failures_.size() && first_failed_ == kNone; ++rank)
+    for (std::size_t rank = 0; rank < failures_.size() && first_failed_ == kNoRank; ++rank)
       if (failures_[rank]) first_failed_ = rank;
     all_there_.notify_all();
   }
 
-  static constexpr std::size_t kNone = ~std::size_t{0};
+  static constexpr std::size_t kNoRank = ~std::size_t{0};
 
   std::vector<std::vector<Bytes>> messages_;
   std::mutex mutex_;
   std::condition_variable all_there_;
-  std::size_t waiting_ = 0, first_failed_ = kNone;
+  std::size_t waiting_ = 0, first_failed_ = kNoRank;
   std::uint64_t round_ = 0;
   std::vector<std::exception_ptr> failures_;
 };

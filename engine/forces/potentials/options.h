@@ -98,16 +98,16 @@ PairFilter filter(std::string_view type, const Parameters& parameters, const Int
 /// The smallest contact distance of the pairs on which a term acts [length]; 0 if there are none. Collective.
 template <int D>
 double least_contact(std::string_view type, const Parameters& parameters, const InteractionContext<D>& context) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr double kNoContact = std::numeric_limits<double>::infinity();
   const SpeciesPair species = species_pair(type, parameters, context.species);
   const auto& radius = context.particles.radius;
-  std::array<double, 2> least = {-kNone, -kNone};  // negative radius, for either species
+  std::array<double, 2> least = {-kNoContact, -kNoContact};  // negative radius, for either species
   for (Id i = 0; i < radius.size(); ++i)
     for (std::size_t k = 0; k < 2; ++k)
       if (!species || context.particles.species[i] == (*species)[k]) least[k] = std::max(least[k], -radius[i]);
   if (context.ranks) context.ranks->largest(least);
   const double contact = -least[0] - least[1];
-  return contact < kNone ? contact : 0;
+  return contact < kNoContact ? contact : 0;
 }
 
 /// A term over pairs from this source; its scale is that of `whole`, the potential before it was cut.

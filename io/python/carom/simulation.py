@@ -108,7 +108,7 @@ class Simulation:
         call with a later end goes on, with the bits of one undisturbed run. Without any of them: to the end of the deck.
 
         callback(simulation) is called every so much simulated time, and at the start and the end; what it raises ends the
-        run at the end of the step (in free flight: at the next look within the epoch). So does
+        run at the end of the step (in free flight: after 500 000 collisions of the epoch, or its end). So does
         Ctrl-C, with KeyboardInterrupt; the simulation can be looked at and run on.
         progress: whether to show a line of progress; by default in terminals and notebooks.
         """

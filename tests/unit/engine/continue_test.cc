@@ -58,12 +58,18 @@ struct Scene {
   std::string method;
   Plan plan;
   Given given{};
+  std::optional<std::uint64_t> slab_collisions{};
+
+  std::unique_ptr<Simulation<D>> run_of(std::unique_ptr<System<D>> system, const Plan& its) const {
+    auto simulation = test::make_run<D>(std::move(system), method, its, given);
+    if (slab_collisions) simulation->limit_slabs(*slab_collisions);
+    return simulation;
+  }
 };
 
 /// When a run is left off: at the n-th question.
 struct Leave {
   int at = std::numeric_limits<int>::max();
-  bool within_epochs = false;
   bool at_last = false;  ///< to its end, with the state that is the last on the way of a longer run
   int within_step = std::numeric_limits<int>::max();  ///< at the n-th look from within steps
   int alone = std::numeric_limits<int>::max();        ///< at the n-th look of the last rank for itself
@@ -85,7 +91,7 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
     auto system = scene.make();
     if (ranks > 0) system->decomposition.join(exchange);
     const bool first = exchange.rank() == 0;
-    auto simulation = test::make_run<D>(std::move(system), scene.method, plan, scene.given);
+    auto simulation = scene.run_of(std::move(system), plan);
     System<D>& state_of = simulation->system();
     const auto read = [&](const std::string& name) { return from->at(name); };
     if (from) restore_particles(state_of, read);
@@ -104,11 +110,6 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
       return now && !leave.at_last;
     };
     simulation->run({.should_stop = stop,
-                     .pause =
-                         [&] {
-                           left = left || state_of.decomposition.any(left_here);
-                           return leave.within_epochs;
-                         },
                      .leave = [&] { return left = looks++ == leave.within_step; },
                      .leave_here =
                          [&] {
@@ -117,6 +118,7 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
                            if (left_here) out.knew_all = state_of.decomposition.knows_all();
                            return left_here;
                          },
+                     .left = [&] { left = left || state_of.decomposition.any(left_here); },
                      .restore = from ? [&] { restore_state(state_of, read); } : std::function<void()>()});
     if (exchange.rank() == exchange.size() - 1) out.looks = looks, out.looks_alone = looks_alone;
     if (!first) return;
@@ -148,16 +150,15 @@ void expect_continued(const Outcome<D>& whole, const Outcome<D>& rest) {
 }
 
 template <int D>
-void compare(const Scene<D>& scene, std::vector<std::array<int, 2>> ranks, std::vector<int> leave_at,
-             bool within_epochs = false) {
+void compare(const Scene<D>& scene, std::vector<std::array<int, 2>> ranks, std::vector<int> leave_at) {
   SCOPED_TRACE(scene.method);
   const Outcome<D> whole = run<D>(scene, 0, scene.plan, {});
   for (const auto& [before, after] : ranks)
     for (const int at : leave_at) {
       SCOPED_TRACE(testing::Message() << "left off at " << at << " on " << before << " ranks, taken up by " << after);
-      const Outcome<D> begun = run<D>(scene, before, scene.plan, {.at = at, .within_epochs = within_epochs});
+      const Outcome<D> begun = run<D>(scene, before, scene.plan, {.at = at});
       ASSERT_TRUE(begun.statistics.stopped_early);
-      expect_continued(whole, run<D>(scene, after, scene.plan, {.within_epochs = within_epochs}, &begun.state));
+      expect_continued(whole, run<D>(scene, after, scene.plan, {}, &begun.state));
       if (::testing::Test::HasFailure()) return;
     }
 }
@@ -202,13 +203,16 @@ TEST(Continue, MethodsThatCutTheStepOfAll) {
                                                                                 {"cdda", {{"order", std::int64_t{4}}}}})
     compare<2>(springs(method, given), {{0, 0}, {2, 3}}, {1, 9});
 }
-Scene<3> fluid() {
+/// `slab_collisions`: far fewer than those of an epoch, of which there are about 500 in 2.2 time units.
+Scene<3> fluid(std::optional<std::uint64_t> slab_collisions = {}) {
   return {[] { return test::hard_spheres<3>(6, 0.35); },
           "free-flight",
-          {.step = 0.4, .end_time = 2.2, .frame_interval = 0.3, .thermo_interval = 0.11, .events = true}};
+          {.step = 0.4, .end_time = 2.2, .frame_interval = 0.3, .thermo_interval = 0.11, .events = true},
+          {},
+          slab_collisions};
 }
 TEST(Continue, FreeFlightBetweenEpochs) { compare<3>(fluid(), kRanks, {1, 3}); }
-TEST(Continue, FreeFlightWithinEpochs) { compare<3>(fluid(), kRanks, {1, 3, 5}, true); }
+TEST(Continue, FreeFlightWithinEpochs) { compare<3>(fluid(40), kRanks, {1, 3, 5}); }
 
 /// Left at one look after the other of those from within its steps: it goes on from the step's start.
 template <int D>
@@ -267,6 +271,35 @@ TEST(Continue, AStateOfAnotherNumberOfParticlesIsRefused) {
     }
 }
 
+/// The same simulation runs again, to a later end.
+TEST(Continue, RunAgain) {
+  for (const Scene<3>& scene : {yukawa("psa"), yukawa("edda"), fluid(), fluid(40)}) {
+    SCOPED_TRACE(scene.method);
+    Plan early = scene.plan, late = scene.plan;
+    early.end_time.reset(), late.end_time.reset();
+    early.steps = 2, late.steps = 5;
+    const auto whole = scene.run_of(scene.make(), late);
+    const auto parts = scene.run_of(scene.make(), early);
+    whole->run();
+    parts->run();
+    EXPECT_EQ(parts->statistics().steps, 2);
+    parts->extend(late);
+    parts->run();
+    EXPECT_EQ(parts->system().particles.x, whole->system().particles.x);
+    EXPECT_EQ(parts->system().particles.v, whole->system().particles.v);
+    test::expect_same(whole->statistics(), parts->statistics());
+    // From an end that no step meets it goes on by steps from there.
+    late.steps.reset(), late.end_time = 6.5 * late.step;
+    parts->extend(late);
+    parts->run();
+    late.end_time = 7.5 * late.step;
+    parts->extend(late);
+    parts->run();
+    EXPECT_EQ(parts->statistics().end_time, late.end_time);
+    EXPECT_EQ(parts->statistics().steps, 8);
+  }
+}
+
 /// A run with a later end goes on as if it had had that end from the start.
 TEST(Continue, ALaterEnd) {
   std::vector<std::pair<Scene<3>, std::array<Plan, 2>>> cases;
@@ -278,7 +311,7 @@ TEST(Continue, ALaterEnd) {
     }
     return plans;
   };
-  for (const Scene<3>& scene : {yukawa("psa"), fluid()}) {
+  for (const Scene<3>& scene : {yukawa("psa"), fluid(), fluid(40)}) {
     cases.push_back({scene, ends(scene.plan, [](Plan& p, bool short_) { p.steps = short_ ? 2 : 5; })});
     cases.push_back(
         {scene, ends(scene.plan, [](Plan& p, bool short_) { p.end_time = (short_ ? 2.5 : 5.1) * p.step; })});
@@ -286,19 +319,19 @@ TEST(Continue, ALaterEnd) {
     cases.push_back(
         {scene, ends(scene.plan, [](Plan& p, bool short_) { p.end_time = (short_ ? 3.0 : 5.1) * p.step; })});
   }
-  cases.push_back({fluid(), ends(fluid().plan, [](Plan& p, bool short_) { p.collisions = short_ ? 500 : 1500; })});
+  for (const Scene<3>& scene : {fluid(), fluid(40)})
+    cases.push_back({scene, ends(scene.plan, [](Plan& p, bool short_) { p.collisions = short_ ? 500 : 1500; })});
   for (const auto& [scene, plans] : cases)
     for (const int ranks : {0, 2}) {
       SCOPED_TRACE(scene.method + " on " + std::to_string(ranks) + " ranks");
-      const auto whole = run<3>(scene, 0, plans[1], {.within_epochs = true});
-      const auto begun = run<3>(scene, ranks, plans[0], {.within_epochs = true, .at_last = true});
+      const auto whole = run<3>(scene, 0, plans[1], {});
+      const auto begun = run<3>(scene, ranks, plans[0], {.at_last = true});
       ASSERT_FALSE(begun.state.empty());
-      expect_continued(whole, run<3>(scene, ranks, plans[1], {.within_epochs = true}, &begun.state));
+      expect_continued(whole, run<3>(scene, ranks, plans[1], {}, &begun.state));
       // With the same end it ends as it has ended, if it ended within an epoch.
       if (!plans[0].collisions) continue;
-      const auto ended = run<3>(scene, 0, plans[0], {.within_epochs = true});
-      test::expect_same(ended.statistics,
-                        run<3>(scene, ranks, plans[0], {.within_epochs = true}, &begun.state).statistics);
+      const auto ended = run<3>(scene, 0, plans[0], {});
+      test::expect_same(ended.statistics, run<3>(scene, ranks, plans[0], {}, &begun.state).statistics);
     }
 }
 

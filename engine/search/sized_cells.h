@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// Cells for particles of very different sizes: a grid for each factor of two in reach, because cells for the largest
+// would hold thousands of small ones. Built for correctness in any box; the event core has faster cells of its own.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "engine/search/cell_grid.h"
+
+namespace carom {
+
+template <int D>
+class SizedCells {
+ public:
+  /// Two particles are near each other within the sum of their reaches and `skin` [length]. `extent`: of their
+  /// positions; it matters along open axes. The cells are empty at first.
+  SizedCells(const Box<D>& box, std::span<const double> reach, const Extent<D>& extent, double skin = 0)
+      : skin_(skin), largest_(reach.empty() ? 0 : *std::ranges::max_element(reach)), places_(reach.size()) {
+    std::array<std::size_t, kOctaves> members{};
+    std::array<double, kOctaves> largest{};
+    for (const double r : reach) {
+      const std::size_t o = octave(r);
+      ++members[o];
+      largest[o] = std::max(largest[o], r);
+    }
+    for (std::size_t o = 0; o < kOctaves; ++o) {
+      level_[o] = levels_.size();
+      if (members[o] > 0)
+        levels_.emplace_back(largest[o],
+                             CellGrid<D>(box, 2 * largest[o] + skin, {members[o], extent.low, extent.high}));
+    }
+  }
+
+  void insert(Id i, const Vec<D>& x, double reach) {
+    Level& level = levels_[level_[octave(reach)]];
+    const Cell<D> cell = level.grid.cell(x);
+    std::uint32_t& first = level.first[level.grid.index(cell)];
+    places_[i] = {std::exchange(first, i), level.grid.boxes(cell)};
+  }
+
+  /// Calls visit(j, image) for every particle j in the cells (the one at `x` among them) with an image that may touch
+  /// one of this reach at x: that image stands at x_j − shift(image).
+  template <class Visit>
+  void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
+    for (const Level& level : levels_) look_into(level, x, reach + level.largest + skin_, visit);
+  }
+
+ private:
+  static constexpr std::size_t kOctaves = 8;  // the last holds all that is smaller
+  static constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
+  static constexpr double kLargestNumber = 1 << 28;  // what a cell number can hold
+
+  struct Level {
+    Level(double reach, const CellGrid<D>& cells) : largest(reach), grid(cells), first(cells.cells(), kNobody) {}
+    double largest;
+    CellGrid<D> grid;
+    std::vector<std::uint32_t> first;  // of each cell
+  };
+  struct Place {
+    std::uint32_t next;  // in the cell
+    Image<D> boxes;      // from the box that holds the origin
+  };
+
+  std::size_t octave(double reach) const {
+    if (reach > 0.5 * largest_) return 0;
+    return reach > 0 ? std::min(static_cast<std::size_t>(std::ilogb(largest_ / reach)), kOctaves - 1) : kOctaves - 1;
+  }
+
+  template <class Visit>
+  void look_into(const Level& level, const Vec<D>& x, double reach, Visit&& visit) const {
+    const CellGrid<D>& grid = level.grid;
+    const Cell<D> centre = grid.cell(x);
+    Cell<D> range, row;
+    bool inside = true;
+    for (int k = 0; k < D; ++k) {
+      range[k] =
+          std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid.edge(k) - 1e-14), kLargestNumber)));
+      row[k] = centre[k] - range[k];
+      inside = inside && row[k] >= 0 && centre[k] < grid.count(k) - range[k];
+    }
+    if (inside) {  // no images, and the cells of a row stand together
+      const auto length = 2 * static_cast<std::size_t>(range[D - 1]) + 1;
+      do {
+        const std::uint32_t* const first = level.first.data() + grid.index(row);
+        for (const std::uint32_t* cell = first; cell < first + length; ++cell)
+          for (std::uint32_t j = *cell; j != kNobody; j = places_[j].next) visit(j, places_[j].boxes);
+      } while (next_row(row, centre, range));
+      return;
+    }
+    grid.for_each_around(centre, range, [&](std::size_t cell, const Image<D>& away) {
+      for (std::uint32_t j = level.first[cell]; j != kNobody; j = places_[j].next) {
+        Image<D> image = places_[j].boxes;
+        for (int k = 0; k < D; ++k) image[k] -= away[k];
+        visit(j, image);
+      }
+    });
+  }
+
+  /// Moves on to the next row within `range` of the centre; false after the last.
+  static bool next_row(Cell<D>& row, const Cell<D>& centre, const Cell<D>& range) {
+    for (int k = D - 2; k >= 0; --k) {
+      if (++row[k] <= centre[k] + range[k]) return true;
+      row[k] = centre[k] - range[k];
+    }
+    return false;
+  }
+
+  double skin_, largest_;
+  std::vector<Level> levels_;
+  std::array<std::size_t, kOctaves> level_;  // of an octave
+  std::vector<Place> places_;                // by particle
+};
+
+}  // namespace carom
