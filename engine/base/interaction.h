@@ -102,7 +102,7 @@ class Interaction {
   /// this rank's particles.
   virtual ForceScale scale(double distance) const = 0;
 
-  /// Takes these kernels instead of pair_kernels(). The sums are the same to the bit; fields have none.
+  /// Takes these kernels instead of the widest of this machine. The sums are the same to the bit; fields have none.
   virtual void use(const PairKernels&) {}
 
   /// Whether the term is invariant under translation, so that it keeps the total momentum.

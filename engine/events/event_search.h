@@ -25,7 +25,7 @@ class EventSearch {
         queue_(queue),
         sizes_(sizes),
         options_(options),
-        kernels_(scan_kernels()),
+        kernels_(widest_kernels<ScanKernels>()),
         tuning_(options) {}
 
   /// Slots are about to change: forgets which spheres are near which.

@@ -110,7 +110,7 @@ void measure_pairs(const Case& each, std::uint64_t n, const BenchOptions& option
   for (const bool mean : {false, true}) {
     const char* const kind = mean ? "mean forces" : "forces";
     if (options.kind && *options.kind != kind) continue;
-    for (const PairKernels* kernels : available_pair_kernels()) {
+    for (const PairKernels* kernels : available_kernels<PairKernels>()) {
       system->interactions[0]->use(*kernels);
       const auto pass = [&] {
         if (mean)
@@ -238,7 +238,7 @@ std::vector<std::string> bench_potentials() {
 }
 
 void bench_forces(const BenchOptions& options) {
-  pair_kernels();  // throws where CAROM_SIMD asks for what is not there
+  vector_widths();  // throws where CAROM_SIMD asks for what is not there
   Json results = {{"forces", Json::array()}, {"steps", Json::array()}};
   const auto add = [&](const char* table, Json entry, auto&& row) {
     say(row(entry));
@@ -254,7 +254,7 @@ void bench_forces(const BenchOptions& options) {
   if (options.steps == 0) return;
   say(steps_heading(options));
   for (const std::uint64_t n : options.sizes())
-    for (const PairKernels* kernels : available_pair_kernels())
+    for (const PairKernels* kernels : available_kernels<PairKernels>())
       add("steps", measure_steps(n, *kernels, options), steps_row);
 }
 

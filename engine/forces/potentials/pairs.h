@@ -8,7 +8,7 @@
 //   id(place)                   the particle that a batch means
 //   low(sums), high(sums)       words to which the forces of a batch are added; pass_on(sums) comes last
 //   most_partners()             of any particle in these batches, or more
-//   use(kernels)                instead of pair_kernels()
+//   use(kernels)                instead of the widest of this machine
 // and
 //   reach(x), reach(block, ranks)           how far apart partners are at most; infinite: no end
 //   among(some)                             itself for some of the particles, if they are enough
@@ -223,7 +223,7 @@ class AllPairs {
   const Box<D>& box_;
   std::size_t particles_;
   PairFilter filter_;
-  const PairKernels* kernels_ = &pair_kernels();
+  const PairKernels* kernels_ = &widest_kernels<PairKernels>();
   // Caches: their state never shows in the sums.
   mutable PairRecords<D> records_;
   mutable std::vector<char> ghost_;
@@ -262,7 +262,7 @@ class PairsWithinCutoff {
   const Box<D>& box_;
   double cutoff_;
   PairFilter filter_;
-  const PairKernels* kernels_ = &pair_kernels();
+  const PairKernels* kernels_ = &widest_kernels<PairKernels>();
   // Caches: their state never shows in the sums.
   mutable CutoffList<D> list_;
   mutable PairRecords<D>* records_ = nullptr;

@@ -8,9 +8,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "engine/base/force_words.h"
+#include "engine/base/vector_width.h"
 
 namespace carom {
 
@@ -135,13 +135,5 @@ struct PairKernels {
   void (*find)(const PartnerSearch&, std::uint32_t begin, std::uint32_t end, PartnersFound&);
   const PairFormula* formulas;  ///< of each of PairPotentials
 };
-
-/// Those that this machine has, the widest first; only what CAROM_SIMD says, where it does: sse2, avx2 or avx512.
-std::vector<const PairKernels*> available_pair_kernels();
-/// The first of these. Throws Error(Failure::deck) where there is none.
-const PairKernels& pair_kernels();
-namespace kernels {
-extern const PairKernels pairs_sse2, pairs_avx2, pairs_avx512;
-}
 
 }  // namespace carom
