@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# 64-bit ARM from another machine, by Debian's cross-compiler; programs run in qemu's user-mode emulation. CAROM_ROOT: a folder with
-# Debian's arm64 packages unpacked, for the whole program (engine/README.md); headers of the library are those of this machine.
+# 64-bit ARM from another machine, by Debian's cross-compiler; programs run in qemu's user-mode emulation.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
 set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A number here is an unevaluated sum of two doubles, good to about 100 bits; series are summed to about 72. Each step is then
-// rounded to 64 bits, as it was when the x87 long double computed the deviates: a seed still means the same velocities.
+// rounded to 64 bits, as it was when the x87 unit computed the deviates: a seed still means the same velocities.
 #include "engine/base/normal_deviates.h"
 
 #include <cmath>
