@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A number here is an unevaluated sum of two doubles, good to about 100 bits; series are summed to about 72. Each step is then
-// rounded to 64 bits, as it was when the x87 unit computed the deviates: a seed still means the same velocities.
+// A number here is an unevaluated sum of two doubles, good to about 100 bits; series are summed to about 72. Each step
+// is then rounded to 64 bits, as it was when the x87 unit computed the deviates: a seed still means the same
+// velocities.
 #include "engine/base/normal_deviates.h"
 
 #include <cmath>
@@ -36,7 +37,8 @@ Number square_root(Number a) {
 /// The nearest number of 64 bits.
 Number rounded(Number x) {
   const auto exponent = __builtin_bit_cast(unsigned long long, x.hi) & 0x7ff0000000000000ULL;
-  const double grid = 0x1.8p-11 * __builtin_bit_cast(double, exponent);  // its last bit counts 2^-63 of the power of two
+  const double grid =
+      0x1.8p-11 * __builtin_bit_cast(double, exponent);  // its last bit counts 2^-63 of the power of two
   return two_sum(x.hi, (x.lo + grid) - grid);
 }
 
@@ -62,9 +64,9 @@ constexpr Number inverse_factorial(int n) {  // with the sign of the series of s
   for (int k = 2; k <= n; ++k) product = product * Number{k % 2 == 0 ? -double(k) : double(k), 0};
   return Number{1, 0} / product;
 }
-constexpr Series<15> kArtanh([](int k) { return Number{2, 0} / Number{2 * k + 1.0, 0}; });   // 2 artanh(s)/s of s²
-constexpr Series<12> kSine([](int k) { return inverse_factorial(2 * k + 1); });              // sin(r)/r of r²
-constexpr Series<12> kCosine([](int k) { return inverse_factorial(2 * k); });                // cos(r) of r²
+constexpr Series<15> kArtanh([](int k) { return Number{2, 0} / Number{2 * k + 1.0, 0}; });  // 2 artanh(s)/s of s²
+constexpr Series<12> kSine([](int k) { return inverse_factorial(2 * k + 1); });             // sin(r)/r of r²
+constexpr Series<12> kCosine([](int k) { return inverse_factorial(2 * k); });               // cos(r) of r²
 constexpr Number kLn2{0x1.62e42fefa39efp-1, 0x1.abc9e3b39803fp-56};
 constexpr Number kHalfPi{0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
 constexpr Number kTwoPi{0x1.921fb54442d18p+2, 0x1.1a8p-52};  // of 64 bits

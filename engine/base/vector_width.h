@@ -49,7 +49,8 @@ std::vector<const Kernels*> available_kernels() {
   [&]<std::size_t... width>(std::index_sequence<width...>) {
     const Kernels* const all[] = {&kernels_of<Kernels, kVectorWidths[width].lanes>()...};
     for (const std::size_t each : vector_widths()) found.push_back(all[each]);
-  }(std::make_index_sequence<std::size(kVectorWidths)>());
+  }
+  (std::make_index_sequence<std::size(kVectorWidths)>());
   return found;
 }
 template <class Kernels>

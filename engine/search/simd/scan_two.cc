@@ -5,8 +5,8 @@
 namespace carom {
 template <>
 const ScanKernels& kernels_of<ScanKernels, 2>() {
-  static constexpr ScanKernels kernels{
-      4, {scan<2, 2>, scan<3, 2>}, {scan_two<2, 2>, scan_two<3, 2>}, near, compare, heads};
+  static constexpr ScanKernels kernels{4,    {scan<2, 2>, scan<3, 2>}, {scan_two<2, 2>, scan_two<3, 2>}, near, compare,
+                                       heads};
   return kernels;
 }
 }  // namespace carom
