@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/search/region_cells.h"
-#include "engine/base/elementary.h"
 
 #include <cmath>
+
+#include "engine/base/elementary.h"
 
 namespace carom {
 namespace {

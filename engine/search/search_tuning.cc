@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/search/search_tuning.h"
-#include "engine/base/elementary.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "engine/base/elementary.h"
 
 namespace carom {
 namespace {
@@ -107,7 +108,8 @@ void SearchTuning::adapt_skin(const SearchSituation& s, double predictions, doub
   for (const double factor : {0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4}) {
     const double skin = skin_ * factor, reach = s.largest + 2 * skin;
     if (skin > kLargestSkin * s.mean || skin < kSmallestSkin * s.mean) continue;
-    const double cost = predictions * kPrediction + candidates * elementary::pow(reach / now, s.dimension) * kCandidate +
+    const double cost = predictions * kPrediction +
+                        candidates * elementary::pow(reach / now, s.dimension) * kCandidate +
                         rebuilds * elementary::pow(factor, -1.7) * kRenewal;
     if (cost < 0.99 * least) least = cost, best = skin;
   }

@@ -62,7 +62,8 @@ std::size_t sites_a_cell(Lattice lattice) {
 template <int D>
 LatticeCells<D> fit_lattice(Lattice lattice, const Box<D>& box, std::size_t count, double margin) {
   const std::size_t basis = sites_a_cell<D>(lattice);
-  const double cell_edge = elementary::pow(box.volume() * static_cast<double>(basis) / static_cast<double>(count), 1.0 / D);
+  const double cell_edge =
+      elementary::pow(box.volume() * static_cast<double>(basis) / static_cast<double>(count), 1.0 / D);
   std::array<int, D> most{};
   for (int k = 0; k < D; ++k)
     most[k] = static_cast<int>(std::min(2 * box.edges[k] / cell_edge, static_cast<double>(count))) + 2;
@@ -120,7 +121,8 @@ std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_
 
 template <int D>
 Vec<D> commensurate_edges(Lattice lattice, std::size_t count, double volume) {
-  if (lattice == Lattice::simple || D == 3) return Vec<D>::Constant(D == 2 ? std::sqrt(volume) : elementary::cbrt(volume));
+  if (lattice == Lattice::simple || D == 3)
+    return Vec<D>::Constant(D == 2 ? std::sqrt(volume) : elementary::cbrt(volume));
   // Hexagonal: nx by ny cells of a by a√3. Few vacancies come first, a box near the square second.
   const double square = std::sqrt(static_cast<double>(count) * std::numbers::sqrt3 / 2);
   const int least = std::max(1, static_cast<int>(square / 1.5)), most = static_cast<int>(square * 1.5) + 1;

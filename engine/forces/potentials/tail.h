@@ -33,7 +33,8 @@ Tail tail_correction(const Cut<P>& cut, double pairs, double volume) {
   const double end = std::sqrt(cut.cutoff_squared());
   const double scale = (D == 3 ? 4 : 2) * std::numbers::pi * pairs / volume;
   const double beyond = scale * cut.whole().tail(end, D);
-  if (!cut.switched()) return {beyond, D * beyond + scale * elementary::pow(end, D) * cut.whole().value(cut.cutoff_squared())};
+  if (!cut.switched())
+    return {beyond, D * beyond + scale * elementary::pow(end, D) * cut.whole().value(cut.cutoff_squared())};
   const double start = std::sqrt(cut.switch_from_squared());
   constexpr int panels = 200;  // of three Gauss points: errors below 1e-13
   const double half = 0.5 * (end - start) / panels;

@@ -80,7 +80,8 @@ TEST(RandomStream, NormalNumbersAreThoseOfBoxAndMuller) {
   }
   for (const double u : {0x1p-53, 0.5, std::sqrt(0.5), 1 - 0x1p-53})
     for (int eighth = 0; eighth <= 8; ++eighth)
-      for (const double off : {-0x1p-52, 0.0, 0x1p-52}) expect_pair(u, std::clamp(eighth / 8.0 + off, 0x1p-53, 1 - 0x1p-53));
+      for (const double off : {-0x1p-52, 0.0, 0x1p-52})
+        expect_pair(u, std::clamp(eighth / 8.0 + off, 0x1p-53, 1 - 0x1p-53));
 }
 
 TEST(RandomStream, UniformNumbersStayInsideTheOpenInterval) {
