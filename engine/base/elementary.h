@@ -22,6 +22,8 @@ double log(double x);
 double log1p(double x);
 /// x^y for x > 0 (NaN for negative x; 0^y is 0, 1 or infinity).
 double pow(double x, double y);
+/// Cube root for 2^-900 < x < 2^900 and for 0; below 0.51 ulp, so that cubes have exact roots.
+double cbrt(double x);
 /// Complementary error function, 2/√π ∫_x^∞ e^(−t²) dt, in full relative precision until it underflows near x = 27.2.
 double erfc(double x);
 

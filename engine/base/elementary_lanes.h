@@ -26,21 +26,21 @@ struct Sum {
 };
 
 template <class T>
-[[gnu::always_inline]] inline Sum<T> two_sum(T a, T b) {
+[[gnu::always_inline]] constexpr Sum<T> two_sum(T a, T b) {
   const T s = a + b;
   const T b_part = s - a;
   return {s, (a - (s - b_part)) + (b - b_part)};
 }
 
 template <class T>
-[[gnu::always_inline]] inline Sum<T> split(T a) {
+[[gnu::always_inline]] constexpr Sum<T> split(T a) {
   const T c = 0x1.0000002p+27 * a;
   const T hi = c - (c - a);
   return {hi, a - hi};
 }
 
 template <class T>
-[[gnu::always_inline]] inline Sum<T> two_product(T a, T b) {
+[[gnu::always_inline]] constexpr Sum<T> two_product(T a, T b) {
   const T p = a * b;
   const Sum<T> x = split(a), y = split(b);
   return {p, ((x.hi * y.hi - p) + x.hi * y.lo + x.lo * y.hi) + x.lo * y.lo};

@@ -39,7 +39,7 @@ class ForceSums {
   /// Makes room for at most this many forces on any particle; returns how large each may be.
   ForceLimits make_room(std::size_t forces) {
     const double count = static_cast<double>(forces < 1 ? 1 : forces);
-    const auto half = [&](double room) { return std::exp2(std::floor(std::log2(room / 2 / count))); };
+    const auto half = [&](double room) { return std::ldexp(1.0, std::ilogb(room / 2 / count)); };
     const ForceLimits limits{std::fmin(kMaxLowWord, half(kMaxWordSum)),
                              std::fmin(kMaxHighWord, half(kMaxWordSum - used_high_))};
     const double low = count * std::fmax(limits.low, 0x1p39);

@@ -103,7 +103,7 @@ class Interaction {
   /// particles.
   virtual ForceScale scale(double distance) const = 0;
 
-  /// Replaces pair_kernels() by these kernels, which give the same bits. Fields use no kernels.
+  /// Uses these kernels, which give the same bits, instead of the widest of this machine. Fields use no kernels.
   virtual void use(const PairKernels&) {}
 
   /// Whether the term is invariant under translation, so that it conserves the total momentum.

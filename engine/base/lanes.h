@@ -79,7 +79,7 @@ CAROM_INLINE void store(void* at, V lanes) {
 /// The sign bit of each lane, one bit a lane, for lanes of 32 or 64 bits.
 template <class M>
 CAROM_INLINE unsigned bits(M mask) {
-  constexpr bool kHalf = sizeof mask[0] == 4;
+  [[maybe_unused]] constexpr bool kHalf = sizeof mask[0] == 4;
 #if defined(__AVX512DQ__)
   if constexpr (!kHalf && sizeof mask == 64) return _mm512_movepi64_mask((__m512i)mask);
 #endif
@@ -90,13 +90,10 @@ CAROM_INLINE unsigned bits(M mask) {
 #if defined(__SSE2__)
   if constexpr (!kHalf && sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_pd((__m128d)mask));
   if constexpr (kHalf && sizeof mask == 16) return static_cast<unsigned>(_mm_movemask_ps((__m128)mask));
-  if constexpr (kHalf && sizeof mask == 32)
-    return bits(__builtin_shufflevector(mask, mask, 0, 1, 2, 3)) | bits(__builtin_shufflevector(mask, mask, 4, 5, 6, 7))
-                                                                       << 4;
 #endif
   unsigned all = 0;
   for (unsigned l = 0; l < sizeof mask / sizeof mask[0]; ++l)
-    all |= static_cast<unsigned>(mask[l] >> (8 * sizeof mask[0] - 1) & 1) << l;
+    all += static_cast<unsigned>(mask[l] >> (8 * sizeof mask[0] - 1) & 1) << l;  // a sum: NEON adds lanes
   return all;
 }
 

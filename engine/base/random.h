@@ -9,9 +9,9 @@
 // Philox 4x32 with ten rounds (Salmon, Moraes, Dror, Shaw, SC11 (2011), doi 10.1145/2063384.2063405).
 
 #include <array>
-#include <cmath>
 #include <cstdint>
-#include <numbers>
+
+#include "engine/base/normal_deviates.h"
 
 namespace carom {
 
@@ -63,13 +63,10 @@ class RandomStream {
     }
   }
 
-  /// Two independent normal numbers of mean 0 and variance 1 (Box, Muller, Ann. Math. Stat. 29 (1958) 610). Evaluated
-  /// in long double: the C library chooses its double log and cos by CPU, and their last bits would change the results.
+  /// Two independent normal numbers of mean 0 and variance 1.
   std::array<double, 2> normal_pair() {
-    const long double u = uniform(), turn = uniform();
-    const long double length = std::sqrt(-2 * std::log(u));
-    const long double angle = 2 * std::numbers::pi_v<long double> * turn;
-    return {static_cast<double>(length * std::cos(angle)), static_cast<double>(length * std::sin(angle))};
+    const double u = uniform(), turn = uniform();
+    return normal_deviates(u, turn);
   }
 
  private:

@@ -26,7 +26,7 @@ class EventSearch {
         queue_(queue),
         sizes_(sizes),
         options_(options),
-        kernels_(scan_kernels()),
+        kernels_(widest_kernels<ScanKernels>()),
         tuning_(options) {}
 
   /// Discards lists and cells; call it before slots change.

@@ -14,7 +14,7 @@ int main(int count, char** arguments) {
   const std::size_t n = count > 1 ? std::strtoul(arguments[1], nullptr, 10) : 500;
   auto system = std::make_unique<carom::System<3>>();
   carom::Box<3>& box = system->box;
-  box.edges.setConstant(std::cbrt(static_cast<double>(n) / 0.6));
+  box.edges.setConstant(carom::elementary::cbrt(static_cast<double>(n) / 0.6));
   box.boundary.fill(carom::Boundary::periodic);
 
   // A crystal that melts, with Maxwell–Boltzmann velocities.
@@ -24,7 +24,7 @@ int main(int count, char** arguments) {
   std::vector<carom::Id> all(n);
   std::iota(all.begin(), all.end(), 0u);
   carom::draw_velocities<3>(system->particles, all, std::vector<double>(n, 1.5), /*seed*/ 1);
-  add_interaction(*system, "yukawa", {{"amplitude", -std::exp(1.8)}, {"kappa", 1.8}, {"cutoff", 3.0}});
+  add_interaction(*system, "yukawa", {{"amplitude", -carom::elementary::exp(1.8)}, {"kappa", 1.8}, {"cutoff", 3.0}});
 
   carom::Simulation<3> run(std::move(system), "edda", {{"step", 0.01}}, {.end_time = 3, .thermo_interval = 0.1});
   carom::RadialDistribution<3> rdf(run.system(), {.sampling = {.interval = 0.05, .start = 1}, .range = 3, .bins = 60});

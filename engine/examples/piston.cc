@@ -20,8 +20,10 @@ constexpr double kLong = 40, kWide = 10;
 /// Centres stay half a diameter from the two walls.
 double adiabat(double edge) {
   const auto filled = [](double length) { return kSpheres * std::numbers::pi / 6 / ((length - 1) * kWide * kWide); };
-  const auto integral = [](double f) { return std::log(f) + (4 * f - 3 * f * f) / ((1 - f) * (1 - f)); };  // ∫ Z df/f
-  return std::exp(2.0 / 3 * (integral(filled(edge)) - integral(filled(kLong))));
+  const auto integral = [](double f) {
+    return carom::elementary::log(f) + (4 * f - 3 * f * f) / ((1 - f) * (1 - f));
+  };  // ∫ Z df/f
+  return carom::elementary::exp(2.0 / 3 * (integral(filled(edge)) - integral(filled(kLong))));
 }
 
 class Rows : public carom::Observer<3> {

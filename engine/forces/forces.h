@@ -9,6 +9,7 @@
 #include <span>
 
 #include "engine/base/counters.h"
+#include "engine/base/elementary.h"
 #include "engine/ranks/system.h"
 
 namespace carom {
@@ -16,7 +17,7 @@ namespace carom {
 /// The mean distance (V/N)^(1/D) [length].
 template <int D>
 double mean_distance(const System<D>& system) {
-  return std::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, system.size())), 1.0 / D);
+  return elementary::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, system.size())), 1.0 / D);
 }
 
 /// Computes the quanta from parameters, masses, charges and box. Collective.
@@ -33,9 +34,7 @@ Quanta quanta(const System<D>& system) {
     most[3] = std::max(most[3], scale.spread * scale.energy);
   }
   system.decomposition.ranks().largest(most);
-  const auto power = [](double x) {
-    return x < kNoScale ? std::exp2(std::floor(std::log2(std::max(x, 0x1p-900)))) : 1;
-  };
+  const auto power = [](double x) { return x < kNoScale ? std::ldexp(1.0, std::ilogb(std::max(x, 0x1p-900))) : 1; };
   // The second bound lets the largest forces and energies fit.
   return {std::max(0x1p-44 * power(-most[0]), 0x1p-66 * power(most[2])),
           std::max(0x1p-46 * power(-most[1]), 0x1p-70 * power(most[3]))};
@@ -115,7 +114,7 @@ void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions
   most = system.decomposition.largest(most);
   // Particles are displaced by a fraction of their mean distance; the quantum of forces is scaled by it.
   const double share = most > 0 && std::isfinite(most) ? most / mean_distance(system) : 1;
-  ForceSums<D> sums(x.size(), quanta_of(system).force * std::exp2(std::floor(std::log2(share)) + 2));
+  ForceSums<D> sums(x.size(), std::ldexp(quanta_of(system).force, std::ilogb(share) + 2));
   force_pass<D>(system, out, sums, counters, [&](const auto& term) { term.add_hessian_product(x, w, sums); });
 }
 

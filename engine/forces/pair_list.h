@@ -42,7 +42,7 @@ class CutoffList {
   Skin skin_;
   std::shared_ptr<double> shared_width_ = std::make_shared<double>(0);  // skin width, common to lists made like this
   PairFilter filter_;
-  const PairKernels* kernels_ = &pair_kernels();
+  const PairKernels* kernels_ = &widest_kernels<PairKernels>();
   std::vector<char> ghost_;
   std::size_t particles_ = 0;  // at the last build
   bool made_ = false;

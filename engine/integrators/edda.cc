@@ -25,6 +25,7 @@
 #include <optional>
 #include <utility>
 
+#include "engine/base/elementary.h"
 #include "engine/base/error.h"
 #include "engine/forces/forces.h"
 #include "engine/forces/stiffness.h"
@@ -210,7 +211,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         wanted = 0;
       }
       if (sweep >= kSweepsBeforeFreezing && swaps > 0) freeze();
-      const double stalled = std::max(kStalled, 2 * std::pow(chebyshev.rate(), kSweepsBeforeFreezing));
+      const double stalled = std::max(kStalled, 2 * elementary::pow(chebyshev.rate(), kSweepsBeforeFreezing));
       if (sweep > kSweepsBeforeFreezing && sweep % kSweepsBeforeFreezing == 0 && stalled < kTooStiff &&
           largest > stalled * residual[sweep - kSweepsBeforeFreezing]) {
         if (++times_stalled > kMostStalled) return false;
@@ -225,14 +226,13 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         ++counters_->fallbacks;
       }
       chebyshev.next();
-      const double small = std::pow(kConverged * wanted / h, 2);
-      const double in_collision = std::pow(kConvergedInCollision * wanted / h, 2);
+      const double small = kConverged * wanted / h, in_collision = kConvergedInCollision * wanted / h;
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
         const Vec<D> e = mean_[i] - a_[i];
         if (!chebyshev.plain())
           a_[i] += move_[i] = chebyshev.memory() * move_[i] + chebyshev.gain() * e;
-        else if (e.squaredNorm() > (core_->collides(i) ? in_collision : small))
+        else if (e.squaredNorm() > (core_->collides(i) ? in_collision * in_collision : small * small))
           a_[i] = mean_[i];
       }
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/run/radial_distribution.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +9,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "engine/base/elementary.h"
 #include "engine/base/error.h"
 #include "engine/search/cell_grid.h"
 
@@ -86,7 +87,7 @@ double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bo
       for (int p = D; p > 0; --p) c[p] -= c[p - 1] / edges[k];
   double volume = 0;
   for (int p = 0; p <= D; ++p)
-    volume += c[p] * (p == 0 ? 1.0 : mean[p - 1]) * (std::pow(b, D + p) - std::pow(a, D + p)) / (D + p);
+    volume += c[p] * (p == 0 ? 1.0 : mean[p - 1]) * (elementary::pow(b, D + p) - elementary::pow(a, D + p)) / (D + p);
   return (D == 2 ? 2 * pi : 4 * pi) * volume;
 }
 
@@ -313,11 +314,13 @@ std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::s
     const double s = (r[k] - contact) / contact, weight = static_cast<double>(counts[k]);
     const Eigen::Vector3d powers(1, s, s * s);
     normal += weight * powers * powers.transpose();
-    right += weight * std::log(value[k]) * powers;
+    right += weight * elementary::log(value[k]) * powers;
     ++used;
   }
   if (used < 4) return {};
-  return std::exp(normal.ldlt().solve(right)[0]);
+  // The first unknown by Cramer's rule: LDLT takes fused multiply-adds on processors that have them.
+  const Eigen::Vector3d minors = normal.col(1).cross(normal.col(2));
+  return elementary::exp(right.dot(minors) / normal.col(0).dot(minors));
 }
 
 template <int D>

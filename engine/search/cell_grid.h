@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "engine/base/box.h"
+#include "engine/base/elementary.h"
 
 namespace carom {
 
@@ -46,7 +47,7 @@ class CellGrid {
   /// about so many cells a particle.
   CellGrid(const Box<D>& box, double smallest, const Extent<D>& extent, double cells_a_particle = 2) : box_(box) {
     const double most =
-        std::max(1.0, std::floor(std::pow(cells_a_particle * static_cast<double>(extent.particles), 1.0 / D)));
+        std::max(1.0, std::floor(elementary::pow(cells_a_particle * static_cast<double>(extent.particles), 1.0 / D)));
     for (int k = 0; k < D; ++k) {
       const bool open = !box.bounded(k);
       const double low = open ? extent.low[k] : 0, high = open ? extent.high[k] : box.edges[k];

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "engine/base/elementary.h"
+
 namespace carom {
 namespace {
 
@@ -24,7 +26,7 @@ template <int D>
 double RegionCells<D>::edge(const Box<D>& box, const Extent<D>& extent, double spheres, double reach) {
   double volume = 1;
   for (int k = 0; k < D; ++k) volume *= box.bounded(k) ? box.edges[k] : extent.high[k] - extent.low[k];
-  return std::max(rounded(reach), std::pow(kMembers * volume / std::max(spheres, 1.0), 1.0 / D));
+  return std::max(rounded(reach), elementary::pow(kMembers * volume / std::max(spheres, 1.0), 1.0 / D));
 }
 
 /// With room for places that are rounded: two of them may come out nearer or farther by one in each direction.

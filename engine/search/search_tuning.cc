@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/base/elementary.h"
+
 namespace carom {
 namespace {
 
@@ -23,8 +25,8 @@ double dense(int dimension) { return dimension == 2 ? 0.55 : 0.32; }
 double best_cell(const SearchSituation& s) {
   const double around = s.dimension == 2 ? 9 : 27, ahead = around / 3;
   double best = s.largest, least = std::numeric_limits<double>::infinity();
-  for (double edge = s.largest; s.density * std::pow(edge, s.dimension) < 3; edge *= 1.1) {
-    const double inside = s.density * std::pow(edge, s.dimension);
+  for (double edge = s.largest; s.density * elementary::pow(edge, s.dimension) < 3; edge *= 1.1) {
+    const double inside = s.density * elementary::pow(edge, s.dimension);
     const double predictions = 1.1 * contacts_a_length(s),
                  crossings = s.dimension * std::sqrt(2 / std::numbers::pi) / edge;
     const double cost = predictions * (kPrediction + around * (kCellHead + kCellCandidate * inside)) +
@@ -54,7 +56,7 @@ SearchSituation situation_of(const Box<D>& box, std::span<const double> radii, c
     const double r = radii[k], number = numbers.empty() ? each : numbers[k];
     largest = std::max(largest, r);
     sum += number * r;
-    sum_of_powers += number * std::pow(r, D);
+    sum_of_powers += number * elementary::pow(r, D);
   }
   double volume = 1;
   for (int k = 0; k < D; ++k) {
@@ -93,7 +95,7 @@ void SearchTuning::choose_first(const SearchSituation& s) {
                ? s.filled > dense(s.dimension) || s.largest > 1.0001 * s.mean
                : options_.method == SearchOptions::Method::lists;
   // The room that spheres have beside a close packing of theirs, about.
-  const double room = s.mean * (std::pow(0.74 / std::clamp(s.filled, 0.01, 0.73), 1.0 / s.dimension) - 1);
+  const double room = s.mean * (elementary::pow(0.74 / std::clamp(s.filled, 0.01, 0.73), 1.0 / s.dimension) - 1);
   skin_ = options_.skin > 0 ? options_.skin : std::clamp(2 * room, 0.1 * s.mean, 0.4 * s.mean);
   cell_ = options_.cell > 0 ? options_.cell : best_cell(s);
 }
@@ -106,8 +108,9 @@ void SearchTuning::adapt_skin(const SearchSituation& s, double predictions, doub
   for (const double factor : {0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4}) {
     const double skin = skin_ * factor, reach = s.largest + 2 * skin;
     if (skin > kLargestSkin * s.mean || skin < kSmallestSkin * s.mean) continue;
-    const double cost = predictions * kPrediction + candidates * std::pow(reach / now, s.dimension) * kCandidate +
-                        rebuilds * std::pow(factor, -1.7) * kRenewal;
+    const double cost = predictions * kPrediction +
+                        candidates * elementary::pow(reach / now, s.dimension) * kCandidate +
+                        rebuilds * elementary::pow(factor, -1.7) * kRenewal;
     if (cost < 0.99 * least) least = cost, best = skin;
   }
   skin_ = best;

@@ -27,7 +27,7 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
 
 template <int D>
 std::uint8_t SkinLists<D>::octave(double largest, double radius) {
-  return static_cast<std::uint8_t>(std::clamp(std::floor(std::log2(largest / radius)), 0.0, 30.0));
+  return static_cast<std::uint8_t>(std::clamp(std::ilogb(largest / radius), 0, 30));
 }
 
 template <int D>

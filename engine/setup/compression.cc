@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "engine/base/elementary.h"
 #include "engine/events/event_core.h"
 #include "engine/setup/placement.h"
 
@@ -50,7 +51,7 @@ class Compressor {
     std::iota(all.begin(), all.end(), Id{0});
     constexpr double dilute = D == 2 ? 0.2 : 0.1, least = 1e-3;
     const double filled = packing_fraction<D>(box_.volume(), radius_);
-    result_.factor = std::min(0.8, D == 2 ? std::sqrt(dilute / filled) : std::cbrt(dilute / filled));
+    result_.factor = std::min(0.8, D == 2 ? std::sqrt(dilute / filled) : elementary::cbrt(dilute / filled));
     for (const double first = result_.factor; !insert(all); result_.factor *= 0.8)
       if (result_.factor < least * first) return false;
     draw_velocities<D>(particles_, all, std::vector<double>(radius_.size(), 1.0), options_.seed,

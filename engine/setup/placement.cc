@@ -5,6 +5,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "engine/base/elementary.h"
 #include "engine/base/random.h"
 #include "engine/search/sized_cells.h"
 
@@ -46,7 +47,7 @@ double site_distance(Lattice lattice, const std::array<Planes, D>& p) {
   for (int k = 0; k < D; ++k) {
     nearest = std::min(nearest, p[k].step(lattice == Lattice::centred ? 2 : 1));
     for (int l = 0; l < k && lattice == Lattice::centred; ++l)
-      nearest = std::min(nearest, std::hypot(p[k].step(1), p[l].step(1)));
+      nearest = std::min(nearest, std::sqrt(p[k].step(1) * p[k].step(1) + p[l].step(1) * p[l].step(1)));
   }
   return nearest;
 }
@@ -61,7 +62,8 @@ std::size_t sites_a_cell(Lattice lattice) {
 template <int D>
 LatticeCells<D> fit_lattice(Lattice lattice, const Box<D>& box, std::size_t count, double margin) {
   const std::size_t basis = sites_a_cell<D>(lattice);
-  const double cell_edge = std::pow(box.volume() * static_cast<double>(basis) / static_cast<double>(count), 1.0 / D);
+  const double cell_edge =
+      elementary::pow(box.volume() * static_cast<double>(basis) / static_cast<double>(count), 1.0 / D);
   std::array<int, D> most{};
   for (int k = 0; k < D; ++k)
     most[k] = static_cast<int>(std::min(2 * box.edges[k] / cell_edge, static_cast<double>(count))) + 2;
@@ -119,7 +121,8 @@ std::vector<Vec<D>> lattice_sites(Lattice lattice, const Box<D>& box, std::size_
 
 template <int D>
 Vec<D> commensurate_edges(Lattice lattice, std::size_t count, double volume) {
-  if (lattice == Lattice::simple || D == 3) return Vec<D>::Constant(D == 2 ? std::sqrt(volume) : std::cbrt(volume));
+  if (lattice == Lattice::simple || D == 3)
+    return Vec<D>::Constant(D == 2 ? std::sqrt(volume) : elementary::cbrt(volume));
   // Hexagonal: nx by ny cells of a by a√3, with few vacancies first, a nearly square box second.
   const double square = std::sqrt(static_cast<double>(count) * std::numbers::sqrt3 / 2);
   const int least = std::max(1, static_cast<int>(square / 1.5)), most = static_cast<int>(square * 1.5) + 1;
@@ -128,7 +131,7 @@ Vec<D> commensurate_edges(Lattice lattice, std::size_t count, double volume) {
     const std::size_t row = 2 * static_cast<std::size_t>(nx), ny = (count + row - 1) / row;
     const double vacancies = static_cast<double>(row * ny) / static_cast<double>(count) - 1;
     const double aspect = static_cast<double>(nx) / (static_cast<double>(ny) * std::numbers::sqrt3);
-    const double cost = vacancies + 0.2 * std::abs(std::log(aspect));
+    const double cost = vacancies + 0.2 * std::abs(elementary::log(aspect));
     if (cost >= best_cost) continue;
     best_cost = cost;
     best_aspect = aspect;

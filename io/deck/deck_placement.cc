@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "engine/base/elementary.h"
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/compression.h"
 #include "engine/setup/placement.h"
@@ -107,7 +108,7 @@ void place_by_compression(const Deck::Source& source, System<D>& system) {
     remedy << "enlarge the box or make the spheres smaller";
   } else {
     what << (done.end == End::jammed ? "the spheres jammed" : "compression gave up") << " at packing fraction "
-         << wanted * std::pow(done.factor, D) << ", short of " << wanted << " (reduced pressure "
+         << wanted * elementary::pow(done.factor, D) << ", short of " << wanted << " (reduced pressure "
          << done.reduced_pressure << ", " << std::round(done.collisions) << " collisions a particle)";
     if (done.end == End::too_many_collisions) remedy << "raise placement.max_collisions, or ";
     remedy << "take a lower packing fraction, a smaller placement.growth_rate (is " << placement.growth_rate

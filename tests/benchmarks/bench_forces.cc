@@ -104,7 +104,7 @@ void measure_pairs(const Case& each, std::uint64_t n, const Options& options, co
   for (const bool mean : {false, true}) {
     const char* const kind = mean ? "mean forces" : "forces";
     if (!options.kind.empty() && options.kind != kind) continue;
-    for (const PairKernels* kernels : available_pair_kernels()) {
+    for (const PairKernels* kernels : available_kernels<PairKernels>()) {
       system->interactions[0]->use(*kernels);
       const auto pass = [&] {
         if (mean)
@@ -233,7 +233,7 @@ std::vector<std::string> bench_potentials() {
 }
 
 void bench_forces(const Options& options) {
-  pair_kernels();  // throws where CAROM_SIMD asks for what is not there
+  vector_widths();  // throws if CAROM_SIMD asks for a width that is not available
   Json results = {{"forces", Json::array()}, {"steps", Json::array()}};
   const auto add = [&](const char* table, Json entry, auto&& row) {
     say(row(entry));
@@ -249,7 +249,7 @@ void bench_forces(const Options& options) {
   if (options.steps == 0) return;
   say(steps_heading(options));
   for (const std::uint64_t n : options.sizes())
-    for (const PairKernels* kernels : available_pair_kernels())
+    for (const PairKernels* kernels : available_kernels<PairKernels>())
       add("steps", measure_steps(n, *kernels, options), steps_row);
 }
 

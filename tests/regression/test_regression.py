@@ -12,7 +12,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import regression
 
 STORED = {
-    "platform": "g++ 12.2.0, x86_64", "sha256": "ab",
+    "sha256": "ab",
     "values": {"steps": 10, "end_time": 1.0, "sphere_sphere": 3, "energy_final": 2.0, "energy_reference": 2.0,
                "energy_error": 1e-3, "shadow_energy_error": None},
     "summary": {"pressure": 0.5, "sweeps": 7, "momentum.max_abs_error": None, "status": "done"},
@@ -22,7 +22,7 @@ STORED = {
 
 
 def changed(**changes):
-    """The stored result with some entries changed: platform, sha256, a value by its name, or x of particle 1."""
+    """The stored result with some entries changed: sha256, a value by its name, or x of particle 1."""
     new = copy.deepcopy(STORED)
     for name, value in changes.items():
         if name == "x":
@@ -37,8 +37,8 @@ def test_the_same_is_the_same():
 
 
 @pytest.mark.parametrize("deviation", [
-    {"sha256": "cd"}, {"x": 1e-7}, {"steps": 11}, {"sphere_sphere": 4}, {"end_time": 1.0 + 1e-7},
-    {"energy_final": 2.0 + 1e-7}, {"energy_error": 1.01e-3}, {"shadow_energy_error": 1e-3},
+    {"sha256": "cd"}, {"x": 1e-15}, {"steps": 11}, {"sphere_sphere": 4}, {"end_time": 1.0 + 1e-15},
+    {"energy_final": 2.0 + 1e-15}, {"energy_error": 1.00001e-3}, {"shadow_energy_error": 1e-3},
     {"pressure": 0.5 + 1e-15}, {"sweeps": 8}, {"momentum.max_abs_error": 0.0}, {"status": "failed"}, {"temperature": 1.6}, {"shadow": 1.0}])
 def test_a_deviation_is_noticed(deviation):
     assert len(regression.differences(STORED, changed(**deviation))) == 1
@@ -49,21 +49,6 @@ def test_a_new_entry_is_no_deviation_but_a_lost_one_is():
     new["summary"]["colour"] = 1
     assert regression.differences(STORED, new) == []
     assert regression.differences(new, STORED) == ["colour: is no more"]
-
-
-def test_another_platform_may_round_otherwise():
-    new = changed(platform="clang 19, aarch64", sha256="cd", x=1e-12, end_time=1.0 + 1e-12, energy_error=1.0000001e-3,
-                  pressure=0.5 + 1e-15, sweeps=8)
-    assert regression.differences(STORED, new) == []
-    assert len(regression.differences(STORED, changed(platform="clang 19, aarch64", pressure=0.5001, status="failed"))) == 2
-    assert regression.differences(STORED, changed(platform="clang 19, aarch64", sha256="cd", x=1e-7)) != []
-
-
-def test_energy_errors_at_rounding_level_are_equal():
-    stored = copy.deepcopy(STORED)
-    stored["values"]["energy_error"] = 1e-15
-    assert regression.differences(stored, changed(energy_error=1.5e-12)) == []
-    assert regression.differences(stored, changed(energy_error=1e-11)) != []
 
 
 def test_every_deck_has_a_result():

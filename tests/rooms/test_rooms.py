@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every room includes only what stands below it."""
+"""Every room includes only what stands below it, and no result of the engine depends on the C library."""
 
 import pathlib
 import re
@@ -31,13 +31,15 @@ def room(path):
     return parts[0] if parts[0] == "parallel" else "/".join(parts[:2])
 
 
+def sources(*folders):
+    return [file for folder in folders for file in sorted((ROOT / folder).rglob("*"))
+            if file.suffix in (".h", ".cc", ".cpp")]
+
+
 def includes():
-    for folder in ("engine", "parallel", "io"):
-        for file in sorted((ROOT / folder).rglob("*")):
-            if file.suffix not in (".h", ".cc", ".cpp"):
-                continue
-            for included in re.findall(r'#include "((?:engine|parallel|io)/[^"]+)"', file.read_text()):
-                yield file.relative_to(ROOT).as_posix(), included
+    for file in sources("engine", "parallel", "io"):
+        for included in re.findall(r'#include "((?:engine|parallel|io)/[^"]+)"', file.read_text()):
+            yield file.relative_to(ROOT).as_posix(), included
 
 
 def test_includes_run_downwards():
@@ -46,3 +48,14 @@ def test_includes_run_downwards():
     upwards = [f"{file} includes {included}" for file, included in pairs
                if room(file) != room(included) and FLOOR[room(file)] <= FLOOR[room(included)]]
     assert not upwards, "\n".join(upwards)
+
+
+def test_no_result_depends_on_the_c_library():
+    """The last bits of these functions, and what a long double is, differ between processors and libraries: elementary.h
+    has functions whose bits are always the same."""
+    functions = ("pow exp exp2 expm1 log log2 log10 log1p sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh cbrt "
+                 "hypot tgamma lgamma erf erfc fma normal_distribution exponential_distribution")
+    banned = re.compile(rf"(?:std::|\b__builtin_)(?:{functions.replace(' ', '|')})f?\b|long double")
+    found = [f"{file.relative_to(ROOT)}: {use}" for file in sources("engine", "parallel", "io/deck")
+             for use in banned.findall(file.read_text())]
+    assert not found, "\n".join(found)

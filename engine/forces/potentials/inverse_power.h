@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/base/elementary.h"
 #include "engine/forces/potentials/potential.h"
 
 namespace carom {
@@ -49,7 +50,7 @@ class InversePower {
   /// ∫_r^∞ V r^(D−1) dr = V r^D/(p − D), infinite for p ≤ D
   double tail(double r, int dimension) const {
     if (2 * n_ <= dimension) return std::numeric_limits<double>::infinity();
-    return value(r * r) * std::pow(r, dimension) / (2 * n_ - dimension);
+    return value(r * r) * elementary::pow(r, dimension) / (2 * n_ - dimension);
   }
 
  private:

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "engine/base/elementary.h"
 #include "engine/forces/potentials/potential.h"
 
 namespace carom {
@@ -44,7 +45,7 @@ class LennardJones {
   /// ∫_r^∞ V r^(D−1) dr = 4ε r^D [u²/(12 − D) − u/(6 − D)]
   double tail(double r, int dimension) const {
     const double u = cube(sigma2_ / (r * r));
-    return 4 * epsilon_ * std::pow(r, dimension) * u * (u / (12 - dimension) - 1.0 / (6 - dimension));
+    return 4 * epsilon_ * elementary::pow(r, dimension) * u * (u / (12 - dimension) - 1.0 / (6 - dimension));
   }
 
  private:

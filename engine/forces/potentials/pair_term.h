@@ -198,7 +198,7 @@ class PairTerm final : public Interaction<D> {
   Pairs pairs_;
   std::function<ForceScale(double)> scale_;
   Tail tail_;
-  const PairKernels* kernels_ = &pair_kernels();
+  const PairKernels* kernels_ = &widest_kernels<PairKernels>();
   std::unique_ptr<PairBatch> batch_;
 };
 

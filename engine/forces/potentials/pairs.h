@@ -8,7 +8,7 @@
 //   id(place)                   the particle with this number in a batch
 //   low(sums), high(sums)       words to which the forces of a batch are added; flush_to(sums) comes last
 //   most_partners()             upper bound for any particle in these batches
-//   use(kernels)                replaces pair_kernels()
+//   use(kernels)                replaces the widest kernels of this machine
 // and
 //   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
 //   among(some)                             the source for a subset of the particles, or nothing if partners are
@@ -224,7 +224,7 @@ class AllPairs {
   const Box<D>& box_;
   std::size_t particles_;
   PairFilter filter_;
-  const PairKernels* kernels_ = &pair_kernels();
+  const PairKernels* kernels_ = &widest_kernels<PairKernels>();
   // Caches, which do not affect the sums.
   mutable PairRecords<D> records_;
   mutable std::vector<char> ghost_;
@@ -262,7 +262,7 @@ class PairsWithinCutoff {
   const Box<D>& box_;
   double cutoff_;
   PairFilter filter_;
-  const PairKernels* kernels_ = &pair_kernels();
+  const PairKernels* kernels_ = &widest_kernels<PairKernels>();
   // Caches, which do not affect the sums.
   mutable CutoffList<D> list_;
   mutable PairRecords<D>* records_ = nullptr;

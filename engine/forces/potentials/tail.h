@@ -15,6 +15,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/base/elementary.h"
 #include "engine/base/interaction.h"
 #include "engine/forces/potentials/cut.h"
 
@@ -32,7 +33,8 @@ Tail tail_correction(const Cut<P>& cut, double pairs, double volume) {
   const double end = std::sqrt(cut.cutoff_squared());
   const double scale = (D == 3 ? 4 : 2) * std::numbers::pi * pairs / volume;
   const double beyond = scale * cut.whole().tail(end, D);
-  if (!cut.switched()) return {beyond, D * beyond + scale * std::pow(end, D) * cut.whole().value(cut.cutoff_squared())};
+  if (!cut.switched())
+    return {beyond, D * beyond + scale * elementary::pow(end, D) * cut.whole().value(cut.cutoff_squared())};
   const double start = std::sqrt(cut.switch_from_squared());
   constexpr int panels = 200;  // each with three Gauss points: errors below 1e-13
   const double half = 0.5 * (end - start) / panels;
@@ -41,7 +43,7 @@ Tail tail_correction(const Cut<P>& cut, double pairs, double volume) {
     for (const int node : {-1, 0, 1}) {
       const double r = start + half * (2 * panel + 1 + node * std::sqrt(0.6));
       const double weight = half * (node == 0 ? 8.0 : 5.0) / 9;
-      within += weight * (cut.whole().value(r * r) - cut.value(r * r)) * std::pow(r, D - 1);
+      within += weight * (cut.whole().value(r * r) - cut.value(r * r)) * elementary::pow(r, D - 1);
     }
   const double energy = scale * within + beyond;
   return {energy, D * energy};

@@ -266,8 +266,8 @@ struct Formulas {
 };
 
 template <int W, class... P>
-constexpr PairKernels kernels_of(const char* name, PotentialList<P...>) {
-  return {name, collect<W>, scatter<W>, find_partners<W>, Formulas<W, P...>::kAll};
+constexpr PairKernels pair_kernels_of(PotentialList<P...>) {
+  return {width_name(W), collect<W>, scatter<W>, find_partners<W>, Formulas<W, P...>::kAll};
 }
 
 }  // namespace

@@ -8,9 +8,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "engine/base/force_words.h"
+#include "engine/base/vector_width.h"
 
 namespace carom {
 
@@ -135,14 +135,5 @@ struct PairKernels {
   void (*find)(const PartnerSearch&, std::uint32_t begin, std::uint32_t end, PartnersFound&);
   const PairFormula* formulas;  ///< for each of PairPotentials
 };
-
-/// The kernels available on this machine, the widest first; only the width in CAROM_SIMD (sse2, avx2, avx512) if it is
-/// set.
-std::vector<const PairKernels*> available_pair_kernels();
-/// The first available kernels. Throws Error(Failure::deck) if there are none.
-const PairKernels& pair_kernels();
-namespace kernels {
-extern const PairKernels pairs_sse2, pairs_avx2, pairs_avx512;
-}
 
 }  // namespace carom

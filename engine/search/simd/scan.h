@@ -4,10 +4,12 @@
 //
 // `scan` finds the first contact of one sphere among its candidates, several at a time and without branches; `near`
 // finds the spheres around a place in the cells of region_cells.h. All widths give the same bits: the same operations
-// in the same order in every lane. The environment variable CAROM_SIMD (sse2, avx2 or avx512) forces a width.
+// in the same order in every lane.
 
 #include <cstddef>
 #include <cstdint>
+
+#include "engine/base/vector_width.h"
 
 namespace carom {
 
@@ -88,7 +90,6 @@ struct Heads {
 
 /// The kernels of one vector width.
 struct ScanKernels {
-  const char* name;
   unsigned lanes;  ///< candidates looked at together: their lists are padded to a multiple of it
   /// The first contact of a sphere with one of its candidates. `latest`: none of their records is of a later time than
   /// its own. By dimension − 2.
@@ -105,13 +106,5 @@ struct ScanKernels {
   /// Writes the first sphere of each cell, as seen from the sphere of the task; there must be room for four more.
   Heads (*heads)(const HeadsTask&, std::uint32_t* candidates);
 };
-
-/// The widest kernels this machine has, or those that CAROM_SIMD names. Throws Error(Failure::deck) where it names what
-/// the machine does not have.
-const ScanKernels& scan_kernels();
-
-namespace kernels {
-extern const ScanKernels sse2, avx2, avx512;
-}
 
 }  // namespace carom

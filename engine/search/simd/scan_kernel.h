@@ -199,8 +199,13 @@ void scan_two(const ScanSetting& s, const ScanTask* task, ScanResult* result) {
   for (int k = 0; k < 2; ++k) result[k] = first_of<W>(times[k], task[k].n, best[k]);
 }
 
-using Ints = Width<8>::Int;
-typedef float Floats __attribute__((vector_size(32)));
+#if defined(__AVX__)
+constexpr unsigned kInts = 8;
+#else
+constexpr unsigned kInts = 4;
+#endif
+using Ints = Width<kInts>::Int;
+typedef float Floats __attribute__((vector_size(4 * kInts)));
 
 [[maybe_unused]] unsigned near(const NearTask& task, std::uint32_t* slots, std::int32_t* away) {
   const Floats scale_x = Floats{} + task.scale[0], scale_y = Floats{} + task.scale[1],
@@ -214,11 +219,15 @@ typedef float Floats __attribute__((vector_size(32)));
   } places[8];
   unsigned lines = 0;
   const auto within = [&](const Place& at, const CellLine& line) {
-    const Ints place = load<Ints>(line.place), slot = load<Ints>(line.slot);
-    const Floats x = __builtin_convertvector(place & 1023, Floats) * scale_x + at.x;
-    const Floats y = __builtin_convertvector(place >> 10 & 1023, Floats) * scale_y + at.y;
-    const Floats z = __builtin_convertvector(place >> 20, Floats) * scale_z + at.z;
-    return bits((x * x + y * y + z * z < limit) & (slot != -1));
+    unsigned inside = 0;
+    for (unsigned first = 0; first < 8; first += kInts) {
+      const Ints place = load<Ints>(line.place + first), slot = load<Ints>(line.slot + first);
+      const Floats x = __builtin_convertvector(place & 1023, Floats) * scale_x + at.x;
+      const Floats y = __builtin_convertvector(place >> 10 & 1023, Floats) * scale_y + at.y;
+      const Floats z = __builtin_convertvector(place >> 20, Floats) * scale_z + at.z;
+      inside |= bits((x * x + y * y + z * z < limit) & (slot != -1)) << first;
+    }
+    return inside;
   };
   const auto take = [&](std::uint32_t slot, std::int32_t boxes) {
     slots[found] = slot;
@@ -266,8 +275,8 @@ typedef float Floats __attribute__((vector_size(32)));
   for (unsigned q = 0; q < n; ++q) {
     const Ints one = Ints{} + static_cast<int>(candidates[q]);
     unsigned hit = 0;
-    for (unsigned p = 0; p < length; p += 8) {
-      const unsigned inside = length - p < 8 ? (1u << (length - p)) - 1 : 0xff;
+    for (unsigned p = 0; p < length; p += kInts) {
+      const unsigned inside = (1u << (length - p < kInts ? length - p : kInts)) - 1;
       const unsigned same = bits(load<Ints>(list + p) == one) & inside;
       hit |= same;
       kept[p / 64] |= static_cast<std::uint64_t>(same) << (p % 64);

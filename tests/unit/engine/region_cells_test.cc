@@ -16,7 +16,11 @@ constexpr double kReach = 1.2;
 template <int D>
 struct Centres {
   Centres(const Box<D>& box_, std::size_t n, unsigned seed)
-      : box(box_), packing(n, n), x(n), boxes(n), cells(box, packing, scan_kernels(), extent(n), double(n), 1, kReach) {
+      : box(box_),
+        packing(n, n),
+        x(n),
+        boxes(n),
+        cells(box, packing, widest_kernels<ScanKernels>(), extent(n), double(n), 1, kReach) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(0, 1);
     for (std::size_t i = 0; i < n; ++i)

@@ -27,16 +27,6 @@ class Environment {
   const char* name_;
 };
 
-bool machine_has(const char* simd) {
-  const Environment environment("CAROM_SIMD", simd);
-  try {
-    scan_kernels();
-    return true;
-  } catch (const Error&) {
-    return false;
-  }
-}
-
 template <int D>
 Outcome<D> run(const Case<D>& c, const SearchOptions& options, const char* simd = nullptr) {
   const Environment environment("CAROM_SIMD", simd);
@@ -78,8 +68,8 @@ void expect_the_same_whatever_the_search(const Case<D>& c, std::size_t at_least)
       expect_same(reference, run(c, {.method = method, .sort_interval = sort}), "sort " + std::to_string(sort));
   for (const Method method : {Method::lists, Method::cells})
     expect_same(reference, run(c, {.method = method, .in_cache = 0}), "as if there were no cache");
-  for (const char* simd : {"sse2", "avx2", "avx512"}) {
-    if (!machine_has(simd)) continue;
+  for (const std::size_t width : vector_widths()) {
+    const char* const simd = kVectorWidths[width].name;
     expect_same(reference, run(c, {.method = Method::lists}, simd), simd);
     expect_same(reference, run(c, {.method = Method::cells}, simd), simd);
   }
@@ -189,7 +179,7 @@ TEST(SearchTuning, TakesListsForDenseFluidsAndForMixtures) {
 
 TEST(Search, AWidthThisMachineLacksIsAnError) {
   const Environment environment("CAROM_SIMD", "mmx");
-  EXPECT_THROW(scan_kernels(), Error);
+  EXPECT_THROW(vector_widths(), Error);
 }
 
 /// One sphere and 30 others at random, some of them in other boxes.
@@ -257,7 +247,7 @@ void expect_all_widths_agree(bool plain) {
     const ScanTask task{0, candidates.data(), n, 0};
     const ScanResult results[] = {scan<D, 2>(s.setting, task, false), scan<D, 4>(s.setting, task, false),
                                   scan<D, 8>(s.setting, task, false),
-                                  scan_kernels().scan[D - 2](s.setting, task, false)};
+                                  widest_kernels<ScanKernels>().scan[D - 2](s.setting, task, false)};
     for (const ScanResult& result : results) {
       EXPECT_EQ(result.time, first) << n;
       if (std::isfinite(first)) {

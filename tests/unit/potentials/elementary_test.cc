@@ -93,6 +93,13 @@ TEST(Elementary, PowKeepsItsDigitsAtLargeExponents) {
         << "y = " << y;
 }
 
+TEST(Elementary, CbrtIsHardlyMoreThanHalfAnUlpOff) {
+  std::vector<double> positive = arguments(0.01, 30);
+  for (const double x : arguments(-890, 890, 1000)) positive.push_back(std::exp2(x));
+  EXPECT_LE(worst_error(positive, elementary::cbrt, [](const Precise& x) { return Precise(cbrt(x)); }), 0.51);
+  for (int n = 0; n < 2000; ++n) EXPECT_EQ(elementary::cbrt(static_cast<double>(n) * n * n), n);
+}
+
 TEST(Elementary, ErfcIsWithinOnePointTwoUlps) {
   const auto exact = [](const Precise& x) { return boost::math::erfc(x); };
   EXPECT_LE(worst_error(arguments(0, 26.5, 2000), elementary::erfc, exact), 1.2);

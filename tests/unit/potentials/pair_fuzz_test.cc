@@ -193,7 +193,7 @@ void try_system(Dice& dice, Tally& tally) {
   }
   std::vector<Law> laws;
   std::string description = std::to_string(D) + "-D, " + (periodic ? "periodic" : "walled");
-  const auto widths = available_pair_kernels();
+  const auto widths = available_kernels<PairKernels>();
   do {
     laws.push_back(random_law(dice, n, edge, periodic));
     description += ", " + laws.back().type;

@@ -31,7 +31,7 @@ using test::Scene;
 /// The vector widths of this machine.
 std::vector<std::string> widths() {
   std::vector<std::string> found;
-  for (const PairKernels* kernels : available_pair_kernels()) found.emplace_back(kernels->name);
+  for (const PairKernels* kernels : available_kernels<PairKernels>()) found.emplace_back(kernels->name);
   return found;
 }
 
@@ -60,7 +60,7 @@ TEST(PairSums, AreTheSameInEveryVectorWidth) {
 /// Kernels read up to eight partners behind a run: these must be places in the list, whatever a list of more particles
 /// has left there.
 TEST(CutoffList, HasPlacesBehindTheLastPartnerToo) {
-  for (const PairKernels* kernels : available_pair_kernels()) {
+  for (const PairKernels* kernels : available_kernels<PairKernels>()) {
     SCOPED_TRACE(kernels->name);
     Box<2> box;
     box.edges = {10, 10};
@@ -92,11 +92,11 @@ TEST(PairSums, AreOfTheKernelsThatAreToBeUsed) {
       return quanta(sums);
     };
     const auto expected = forces();
-    PairKernels broken = pair_kernels();
+    PairKernels broken = widest_kernels<PairKernels>();
     broken.scatter = [](const PairBatch&, const std::int64_t(*)[PairBatch::kPaddedCapacity], ForceWords*) {};
     term.use(broken);
     EXPECT_TRUE(forces() == (term.keeps_momentum() ? Quanta<3>(x.size()) : expected));  // fields have no kernels
-    for (const PairKernels* kernels : available_pair_kernels()) {
+    for (const PairKernels* kernels : available_kernels<PairKernels>()) {
       term.use(*kernels);
       EXPECT_TRUE(forces() == expected) << kernels->name;
     }
@@ -211,7 +211,7 @@ TEST(PairSums, OfAPotentialThatIsNotListedAreTheSame) {
         "own", OwnYukawa(2.0, 1.1), PairWeight::charges, parameters,
         {.box = scene.box, .particles = scene.particles, .species = scene.species, .bonds = nullptr});
     const Outcome<3> expected = outcome(*scene.make("yukawa", given), scene.particles.x, x_new);
-    for (const PairKernels* kernels : available_pair_kernels()) {
+    for (const PairKernels* kernels : available_kernels<PairKernels>()) {
       own->use(*kernels);
       EXPECT_TRUE(outcome(*own, scene.particles.x, x_new) == expected) << kernels->name;
     }

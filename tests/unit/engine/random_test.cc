@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <boost/math/constants/constants.hpp>
+
+#include "tests/unit/potentials/precise.h"
+
 namespace carom {
 namespace {
 
@@ -54,6 +59,29 @@ TEST(RandomStream, NormalNumbersHaveTheMomentsOfANormalDistribution) {
   EXPECT_NEAR(squares / n, 1, 5 * std::sqrt(2 / n));
   EXPECT_NEAR(fourth / n, 3, 5 * std::sqrt(96 / n));
   EXPECT_NEAR(product / pairs, 0, 5 / std::sqrt(pairs));
+}
+
+TEST(RandomStream, NormalNumbersAreThoseOfBoxAndMuller) {
+  using test::Precise;
+  RandomStream random(11, RandomPurpose::probe, 0);
+  const auto expect_pair = [](double u, double turn) {
+    const auto computed = normal_deviates(u, turn);
+    const Precise length = sqrt(-2 * log(Precise(u)));
+    const Precise angle = 2 * boost::math::constants::pi<Precise>() * turn;
+    const Precise exact[] = {length * cos(angle), length * sin(angle)};
+    for (int k = 0; k < 2; ++k) {
+      const double ulp = std::abs(std::nextafter(computed[k], 10 * computed[k]) - computed[k]);
+      EXPECT_LE(abs(computed[k] - exact[k]), 0.502 * ulp + length * 0x1p-61) << u << ' ' << turn;
+    }
+  };
+  for (int n = 0; n < 2000; ++n) {
+    const double u = random.uniform(), turn = random.uniform();
+    expect_pair(u, turn);
+  }
+  for (const double u : {0x1p-53, 0.5, std::sqrt(0.5), 1 - 0x1p-53})
+    for (int eighth = 0; eighth <= 8; ++eighth)
+      for (const double off : {-0x1p-52, 0.0, 0x1p-52})
+        expect_pair(u, std::clamp(eighth / 8.0 + off, 0x1p-53, 1 - 0x1p-53));
 }
 
 TEST(RandomStream, UniformNumbersStayInsideTheOpenInterval) {

@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/forces/simd/pair_kernel.h"
+
+namespace carom {
+template <>
+const PairKernels& kernels_of<PairKernels, 8>() {
+  static constexpr PairKernels kernels = pair_kernels_of<8>(PairPotentials{});
+  return kernels;
+}
+}  // namespace carom

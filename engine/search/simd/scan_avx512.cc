@@ -1,7 +1,0 @@
-// SPDX-License-Identifier: BSD-3-Clause
-// See scan_kernel.h.
-#include "engine/search/simd/scan_kernel.h"
-
-namespace carom::kernels {
-const ScanKernels avx512{"avx512", 8, {scan<2, 8>, scan<3, 8>}, {scan_two<2, 8>, scan_two<3, 8>}, near, compare, heads};
-}

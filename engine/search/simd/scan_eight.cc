@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// See scan_kernel.h.
+#include "engine/search/simd/scan_kernel.h"
+
+namespace carom {
+template <>
+const ScanKernels& kernels_of<ScanKernels, 8>() {
+  static constexpr ScanKernels kernels{8,    {scan<2, 8>, scan<3, 8>}, {scan_two<2, 8>, scan_two<3, 8>}, near, compare,
+                                       heads};
+  return kernels;
+}
+}  // namespace carom

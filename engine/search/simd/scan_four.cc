@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// See scan_kernel.h.
+#include "engine/search/simd/scan_kernel.h"
+
+namespace carom {
+template <>
+const ScanKernels& kernels_of<ScanKernels, 4>() {
+  static constexpr ScanKernels kernels{4,    {scan<2, 4>, scan<3, 4>}, {scan_two<2, 4>, scan_two<3, 4>}, near, compare,
+                                       heads};
+  return kernels;
+}
+}  // namespace carom
