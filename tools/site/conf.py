@@ -8,12 +8,13 @@ import re
 import carom
 
 project = "Carom"
-author = "The Carom authors"
+author = copyright = "The Carom authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_heading_anchors = 4
 html_theme = "furo"
 html_title = "Carom"
 html_copy_source = False
+smartquotes = False
 html_show_sphinx = False
 suppress_warnings = ["myst.header"]
 exclude_patterns = ["**/figures"]
