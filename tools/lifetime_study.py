@@ -36,7 +36,7 @@ except ImportError as missing:
 from carom_files import one_line
 from carom_plot import panels
 
-RUNS = "edda:0.05,edda:0.02,edda:0.01,psa:0.02,psa:0.01,psa:0.005,psa:0.0025:20,psa:0.001:12,cva:0.01:12,mcva:0.01:12,soft:0.002:4"
+RUNS = "edda:0.05,edda:0.02,edda:0.01,psa:0.02,psa:0.01,psa:0.005,psa:0.0025:30,psa:0.001:20,cva:0.01:24,mcva:0.01:24,soft:0.002:4"
 COLUMNS = ["run", "start", "lifetime", "evaporated", "temperature", "energy_change", "collisions", "seconds"]
 APART = 5.0    # two groups of particles farther apart than this do not come together again
 MELTED = 10.0  # temperatures are averaged from this time on
@@ -50,7 +50,7 @@ def parse_arguments(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("deck", type=pathlib.Path)
     parser.add_argument("--runs", default=RUNS, help=f"default: {RUNS}")
-    parser.add_argument("--starts", type=int, default=30, help="of each run that does not say how many; default: 30")
+    parser.add_argument("--starts", type=int, default=60, help="of each run that does not say how many; default: 60")
     parser.add_argument("--energy", type=float, help="of every start; default: the deck's")
     parser.add_argument("--end-time", type=float, default=6000.0, help="of a start that does not evaporate; default: 6000")
     parser.add_argument("--seed", type=int, default=20110901)
@@ -163,8 +163,8 @@ def draw(lives, options):
     title = "An isolated cluster of 13 attractive hard spheres"
     with panels(options.output / "lifetimes.png",
                 {"xlabel": "time", "ylabel": "fraction of the clusters that still live", "xscale": "log", "title": title},
-                {"xlabel": "processor seconds of 1000 units of time", "ylabel": "mean lifetime", "xscale": "log", "yscale": "log",
-                 "title": "What a method finds, and what it costs"}) as (left, right):
+                {"xlabel": "processor seconds of 1000 units of time", "ylabel": "mean lifetime", "yscale": "log",
+                 "title": "Mean lifetime against cost, with the step"}) as (left, right):
         for name, colour in colours.items():
             for dash, run in zip(dashes, of(name)):
                 one = lives[run]
@@ -176,8 +176,9 @@ def draw(lives, options):
                 each = [lives[run] for run in of(name)]
                 right.errorbar([one.cost for one in each], [one.mean for one in each], [one.error for one in each], color=colour,
                                marker="o", linestyle=":" if len(each) > 1 else "", capsize=3, label=name)
-                for run, one in zip(of(name), each):
-                    right.annotate(run.split(":")[1], (one.cost, one.mean), xytext=(6, -10), textcoords="offset points", fontsize=7)
+                for k, (run, one) in enumerate(zip(of(name), each)):
+                    right.annotate(run.split(":")[1], (one.cost, one.mean), xytext=(5, -11 if k % 2 else 7), textcoords="offset points",
+                                   fontsize=8, color=colour)
         if of("edda"):
             mean, error = pooled(lives, of("edda"))
             right.axhspan(mean - error, mean + error, color=colours["edda"], alpha=0.2, label=f"edda, all steps: {mean:.0f} ± {error:.0f}")
