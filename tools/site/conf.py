@@ -13,6 +13,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_heading_anchors = 4
 html_theme = "furo"
 html_title = "Carom"
+html_static_path, html_css_files = ["site.css"], ["site.css"]
 html_copy_source = False
 smartquotes = False
 html_show_sphinx = False
