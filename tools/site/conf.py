@@ -10,6 +10,7 @@ import carom
 project = "Carom"
 author = copyright = "The Carom authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
+myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
 html_theme = "furo"
 html_title = "Carom"
