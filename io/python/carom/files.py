@@ -19,6 +19,7 @@ import zlib
 
 import numpy as np
 
+from carom import notebook, page
 from carom.errors import FileError
 
 TRAJECTORY = "trajectory.h5md"
@@ -215,6 +216,22 @@ class Run:
 
     def __repr__(self):
         return f"<run in {self.directory}>"
+
+    def _repr_html_(self):
+        rows = {"directory": str(self.directory), "integrator": self.deck["integrator"]["type"]}
+        if (self.directory / "summary.json").exists():
+            s = self.summary
+            rows |= {"status": s["status"], "particles": f"{s['particles']} in {s['dimension']} dimensions",
+                     "time": f"{s['end_time']:.6g}, step {s['steps']}", "collisions": str(s["events"]["sphere_sphere"]),
+                     "energy": f"{s['energy']['final']:.10g}, largest error {s['energy']['max_abs_error']:.1e}"}
+        return notebook.table("carom.Run", rows)
+
+    def view(self, port=0, browser=None, export=None):
+        """A page that shows the run in a browser, in a notebook in place; export: one file that works without a server
+        instead. See carom.page.Page. Needs the compiled part of the package."""
+        if export is not None:
+            return page.export([self.directory], export)
+        return page.Page([self.directory], port, browser)
 
     def __reduce__(self):  # a copy reads the files again
         return Run, (self.directory,)
