@@ -143,6 +143,13 @@ class Trajectory:
             return self._group["charge"][:]
 
     @property
+    def bonds(self):
+        """The pairs that any interaction joins by bonds, (bonds, 2) ids."""
+        with reading(self.path):
+            ends = [self._file.get(f"parameters/vmd_structure/bond_{end}") for end in ("from", "to")]
+            return np.empty((0, 2), int) if ends[0] is None else np.column_stack([end[:] for end in ends]).astype(int) - 1
+
+    @property
     def periodic(self):
         return np.array([rule == "periodic" for rule in self.boundary])
 
@@ -278,21 +285,19 @@ class Run:
         """Its frames: frames[-1].position."""
         return Frames(self.trajectory)
 
+    @functools.cached_property
+    def bonds(self):
+        """The pairs that any interaction joins by bonds, (bonds, 2) ids."""
+        return self.trajectory.bonds
+
     def universe(self):
-        """The trajectory as an MDAnalysis Universe, in the units of the deck, with masses, charges, radii, and species as
-        names and types. Two-dimensional runs have z = 0."""
+        """The trajectory as an MDAnalysis Universe, in the units of the deck, with masses, charges, radii, bonds, and species
+        as names and types. Two-dimensional runs have z = 0. See carom.mdanalysis."""
         import MDAnalysis
 
-        trajectory = self.trajectory
-        n = len(trajectory.mass)
-        universe = MDAnalysis.Universe.empty(n, trajectory=True)
-        names = [trajectory.species_names[kind - min(trajectory.species)] for kind in trajectory.species]
-        for name, values in (("names", names), ("types", names), ("masses", trajectory.mass),
-                             ("charges", trajectory.charge), ("radii", trajectory.radius)):
-            universe.add_TopologyAttr(name, values)
-        with reading(trajectory.path):
-            universe.load_new(str(trajectory.path), format="H5MD", convert_units=False)
-        return universe
+        from carom import mdanalysis  # noqa: F401, makes files of Carom known to MDAnalysis
+        with reading(self.trajectory.path):
+            return MDAnalysis.Universe(str(self.trajectory.path), format="H5MD", topology_format="H5MD", convert_units=False)
 
 
 def open(directory):

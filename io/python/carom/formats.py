@@ -137,15 +137,14 @@ def read(kind_of_simulation, file, frame, radius, boundary):
         raise FileError(f"{file}: cannot read it: {error}") from error
     if np.any(found["tilt"]):
         raise UsageError(f"{file}: the box is not rectangular; Carom has rectangular ones only")
-    flat = found["flat"] or (boundary is None and not found["periodic"][2] and not np.any(found["position"][:, 2])
-                             and found["edges"][2] == 1)
+    flat = found["flat"] or (not found["periodic"][2] and not np.any(found["position"][:, 2]) and found["edges"][2] == 1)
     columns = 2 if flat else 3
     rules = boundary or ["periodic" if each else "open" for each in found["periodic"][:columns]]
     simulation = kind_of_simulation(box=found["edges"][:columns], boundary=rules)
     order = np.argsort(found["kind"], kind="stable")
     given = {"mass": found["mass"], "charge": found["charge"], "radius": found["radius"] if radius is None else radius}
     if given["radius"] is None:
-        raise UsageError(f"{file}: there are no radii in it; give radius=…, 0 for points")
+        raise UsageError(f"{file}: there are no radii in it; give radius=…")
     for kind in np.unique(found["kind"]):
         rows = order[found["kind"][order] == kind]
         each = {name: np.broadcast_to(np.asarray(values, dtype=float), len(order))[rows]

@@ -17,7 +17,7 @@ class Page:
 
     def __init__(self, runs, port=0, browser=None):
         from carom import _carom  # noqa: F401, an ImportError here is clearer than one in the other process
-        package = pathlib.Path(__file__).resolve().parents[1]
+        package = pathlib.Path(__file__).absolute().parents[1]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])}
         browser = not in_notebook() if browser is None else browser
         self._process = subprocess.Popen(
