@@ -68,7 +68,7 @@ class Simulation:
 
     def _start(self, session, title=""):
         self._session, self.title, self.warnings = session, title, []
-        self._edges_known, self._counted, self.bonds = True, [], {}
+        self._edges_known, self._counted, self.bonds = True, [], np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
         self.warnings = list(texts)
