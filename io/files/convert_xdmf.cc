@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// XDMF (xdmf.org): points at each time; their numbers stay in the trajectory, which the file refers to. How it refers to
-// one row of a series differs: readers of XDMF 3 take a selection behind the name of the data set (start : stride :
+// XDMF (xdmf.org): points at each time; their numbers stay in the trajectory, which the file refers to. How it refers
+// to one row of a series differs: readers of XDMF 3 take a selection behind the name of the data set (start : stride :
 // count : dimensions), readers of XDMF 2 an item of type HyperSlab, and neither knows the other's way.
 
 #include <spdlog/fmt/fmt.h>

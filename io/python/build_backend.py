@@ -22,31 +22,51 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 
 
+def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
+    project, version = project_and_version()
+    folder = pathlib.Path(metadata_directory) / f"carom-{version}.dist-info"
+    folder.mkdir()
+    for name, content in about(project, version).items():
+        (folder.parent / name).write_bytes(content)
+    return folder.name
+
+
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    project = tomllib.loads((HERE / "pyproject.toml").read_text())["project"]
-    version = re.search(r"project\(carom VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+    project, version = project_and_version()
     files = {f"carom/{name}": content for name, content in built_package().items()}
-    data = f"carom-{version}.data/scripts"
-    files[f"{data}/carom"] = (build_folder() / "io" / "carom").read_bytes()
-    info = f"carom-{version}.dist-info"
-    tag = "cp{0}{1}-cp{0}{1}-{2}".format(*sys.version_info[:2], re.sub(r"\W", "_", sysconfig.get_platform()))
-    files[f"{info}/METADATA"] = metadata(project, version).encode()
-    files[f"{info}/WHEEL"] = f"Wheel-Version: 1.0\nGenerator: carom\nRoot-Is-Purelib: false\nTag: {tag}\n".encode()
-    files[f"{info}/LICENSE"] = (ROOT / "LICENSE").read_bytes()
+    scripts = f"carom-{version}.data/scripts/"
+    files[f"{scripts}carom"] = (build_folder() / "io" / "carom").read_bytes()
+    files |= about(project, version)
     record = "".join(f"{name},sha256={digest(content)},{len(content)}\n" for name, content in files.items())
-    files[f"{info}/RECORD"] = (record + f"{info}/RECORD,,\n").encode()
-    name = f"carom-{version}-{tag}.whl"
+    files[f"carom-{version}.dist-info/RECORD"] = (record + f"carom-{version}.dist-info/RECORD,,\n").encode()
+    name = f"carom-{version}-{tag()}.whl"
     with zipfile.ZipFile(pathlib.Path(wheel_directory) / name, "w", zipfile.ZIP_DEFLATED) as wheel:
         for path, content in files.items():
             entry = zipfile.ZipInfo(path)
             entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = (0o100755 if path.startswith(data) else 0o100644) << 16
+            entry.external_attr = (0o100755 if path.startswith(scripts) else 0o100644) << 16
             wheel.writestr(entry, content)
     return name
 
 
 def build_sdist(sdist_directory, config_settings=None):
     raise NotImplementedError("the sources of carom are more than this folder; clone the repository, and pip install ./io/python")
+
+
+def project_and_version():
+    project = tomllib.loads((HERE / "pyproject.toml").read_text())["project"]
+    return project, re.search(r"project\(carom VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+
+
+def tag():
+    return "cp{0}{1}-cp{0}{1}-{2}".format(*sys.version_info[:2], re.sub(r"\W", "_", sysconfig.get_platform()))
+
+
+def about(project, version):
+    """The files of the dist-info but RECORD."""
+    info = f"carom-{version}.dist-info"
+    return {f"{info}/METADATA": metadata(project, version).encode(), f"{info}/LICENSE": (ROOT / "LICENSE").read_bytes(),
+            f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: carom\nRoot-Is-Purelib: false\nTag: {tag()}\n".encode()}
 
 
 def build_folder():

@@ -236,9 +236,8 @@ py::tuple opened(Deck& deck, auto&&... from) {
 /// The simulation of a deck, given as a file, or as the text of such a file.
 py::tuple from_deck(const std::string& file, const std::vector<std::string>& set,
                     const std::optional<std::string>& text) {
-  Deck deck = read_deck(file, set, [&](const std::filesystem::path& path) {
-    return text && path == file ? text : read_text(path);
-  });
+  Deck deck = read_deck(
+      file, set, [&](const std::filesystem::path& path) { return text && path == file ? text : read_text(path); });
   return opened(deck);
 }
 
@@ -253,8 +252,8 @@ py::tuple from_run(const std::string& directory, bool take_over) {
 }
 
 /// The page of runs, until the process that serves it is asked to end: view/view.h.
-void serve_page(const std::vector<std::string>& runs, const std::optional<std::string>& file, std::uint16_t port, bool browser,
-          bool led) {
+void serve_page(const std::vector<std::string>& runs, const std::optional<std::string>& file, std::uint16_t port,
+                bool browser, bool led) {
   ViewOptions options;
   options.runs = {runs.begin(), runs.end()};
   options.port = port;

@@ -141,8 +141,9 @@ template <int D>
 void Session<D>::set_velocity(std::span<const double> v) {
   if (running_ && showing_) {
     if (!at_step_end_)
-      refuse("velocities: an epoch of free flight is going on; choose epochs that end where the callback comes: "
-             "integrator(\"free-flight\", step=every)");
+      refuse(
+          "velocities: an epoch of free flight is going on; choose epochs that end where the callback comes: "
+          "integrator(\"free-flight\", step=every)");
     pushed_.resize(size_);
     for (std::size_t i = 0; i < size_; ++i) pushed_[i] = vector_at<D>(v, i);
     need_finite<D>(pushed_, "velocities");

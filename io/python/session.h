@@ -31,8 +31,8 @@ struct Columns {
 /// What the caller of run() does meanwhile.
 struct RunHooks {
   std::function<bool(const Statistics&)> stop;  ///< before each step; true: the run ends there
-  std::function<void()> show;         ///< at the intervals of the plan; the session then is at that time
-  std::function<std::string()> deck;  ///< the present state as a deck, where the run is to leave files
+  std::function<void()> show;                   ///< at the intervals of the plan; the session then is at that time
+  std::function<std::string()> deck;            ///< the present state as a deck, where the run is to leave files
 };
 
 /// The averages that a run takes, by name.

@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-import carom
 from scenes import five_springs, gas
 
 pytest.importorskip("MDAnalysis")
