@@ -196,11 +196,11 @@ def test_a_page_shows_the_run(tmp_path):
     with sim.view(browser=False) as page:
         assert re.match(r"http://127\.0\.0\.1:\d+/", page.address) and page.address in page._repr_html_()
         assert "<!doctype html>" in urllib.request.urlopen(page.address).read().decode()
+        with pytest.raises(carom.Error, match="port"):
+            sim.view(port=int(page.address.split(":")[2].split("/")[0]), browser=False)
         state = urllib.request.urlopen(page.address + "runs").read().decode()
         assert '"frames":11' in state.replace(" ", "")
     with pytest.raises(OSError):
         urllib.request.urlopen(page.address, timeout=5)
     sim.open().view(export=tmp_path / "page.html")
     assert "<!doctype html>" in (tmp_path / "page.html").read_text()
-    with pytest.raises(carom.FileError, match="nothing"):
-        carom.page.Page([tmp_path / "nothing"])
