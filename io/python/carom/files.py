@@ -45,7 +45,11 @@ def reading(path):
 
 def open_hdf5(path):
     """A file of HDF5, opened for reading; a flush that a kill has interrupted is completed first."""
-    import h5py
+    try:
+        import h5py
+    except ImportError as error:
+        raise ImportError("reading the files of a run needs the Python package h5py: install Debian's python3-h5py, or pip install h5py") \
+            from error
 
     complete_flush(path)
     return h5py.File(path, "r")
