@@ -179,6 +179,7 @@ def test_velocities_set_at_a_shortened_end_hold(tmp_path):
     for each in (sim, later):
         each.run(time=1)
     assert same_state(sim, later) and sim.energy_error < 1e-13 and sim.energy < 1
+    assert sim.step == 21 + 80  # steps are counted from the shortened one on
 
 
 def test_a_velocity_that_is_no_number_is_refused_in_a_callback():
