@@ -25,6 +25,7 @@ class AverageWriter : public Observer<D> {
   /// The average up to now. Throws Error(Failure::file).
   void close() const;
   const Observable<D>& average() const { return *average_; }
+  const std::filesystem::path& path() const { return path_; }
 
  private:
   std::filesystem::path path_;

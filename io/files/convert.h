@@ -35,6 +35,8 @@ std::string write_gsd(const TrajectoryReader& trajectory, std::span<const std::u
                       const std::filesystem::path& file);
 std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
                               const std::filesystem::path& file);
+std::string write_xdmf2(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
+                        const std::filesystem::path& file);
 std::string write_xdmf(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
                        const std::filesystem::path& file);
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// XDMF 3 (xdmf.org): points at each time; their numbers stay in the trajectory, which the file refers to.
+// XDMF (xdmf.org): points at each time; their numbers stay in the trajectory, which the file refers to. How it refers
+// to one row of a series differs: readers of XDMF 3 take a selection behind the name of the data set (start : stride :
+// count : dimensions), readers of XDMF 2 an item of type HyperSlab, and neither knows the other's way.
 
 #include <spdlog/fmt/fmt.h>
 
@@ -19,9 +21,14 @@ struct Numbers {
   std::string file;        // the trajectory, as the XML names it
   std::uint64_t rows = 0;  // that its series have
   std::size_t particles = 0;
+  int version = 3;  // of XDMF
 
   /// One row of a series of vectors.
   std::string row(const std::string& name, std::string_view type, int bytes, std::uint64_t index) const {
+    if (version == 3)
+      return fmt::format(
+          R"(<DataItem Dimensions="{0} 3" NumberType="{3}" Precision="{4}" Format="HDF">{5}:/particles/trajectory/{6}/value|{1} 0 0:1 1 1:1 {0} 3:{2} {0} 3</DataItem>)",
+          particles, index, rows, type, bytes, file, name);
     return fmt::format(
         R"(<DataItem ItemType="HyperSlab" Dimensions="{0} 3">
           <DataItem Dimensions="3 3" NumberType="Int" Format="XML">{1} 0 0 1 1 1 1 {0} 3</DataItem>
@@ -36,19 +43,17 @@ struct Numbers {
   }
 };
 
-}  // namespace
-
-std::string write_xdmf(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& file,
-                       const std::filesystem::path& path) {
+std::string write(int version, const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames,
+                  TextFile& file, const std::filesystem::path& path) {
   const auto folder = std::filesystem::absolute(path).parent_path();
   const Numbers numbers{escaped(std::filesystem::proximate(trajectory.path(), folder).string()), trajectory.frames(),
-                        trajectory.particles()};
+                        trajectory.particles(), version};
   file.append(fmt::format(R"(<?xml version="1.0"?>
-<Xdmf Version="3.0">
+<Xdmf Version="{}.0">
 <Domain>
 <Grid Name="{}" GridType="Collection" CollectionType="Temporal">
 )",
-                          escaped(trajectory.title)));
+                          version, escaped(trajectory.title)));
   for (const std::uint64_t index : frames) {
     std::string grid =
         fmt::format(R"(<Grid Name="particles" GridType="Uniform">
@@ -73,6 +78,18 @@ std::string write_xdmf(const TrajectoryReader& trajectory, std::span<const std::
   }
   file.append("</Grid>\n</Domain>\n</Xdmf>\n");
   return "It refers to " + trajectory.path().string() + ": keep the two where they are to each other";
+}
+
+}  // namespace
+
+std::string write_xdmf(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& file,
+                       const std::filesystem::path& path) {
+  return write(3, trajectory, frames, file, path);
+}
+
+std::string write_xdmf2(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& file,
+                        const std::filesystem::path& path) {
+  return write(2, trajectory, frames, file, path);
 }
 
 }  // namespace carom

@@ -67,6 +67,12 @@ class RunFiles {
   /// The same for a run that has failed: each file is closed as well as it can be.
   void close_after_failure();
 
+  /// Calls action(name, average) for each average; those without a sample are left out.
+  void for_each_average(auto&& action) const {
+    for (const auto& one : averages_)
+      if (one.average().samples() > 0) action(one.path().stem().string(), one.average());
+  }
+
   /// What the averages say of species, for the summary.
   std::vector<SpeciesValue> species_values() const;
 

@@ -20,24 +20,33 @@ import numpy.typing as npt
 from carom.errors import Error as Error, FileError as FileError, InitialStateError as InitialStateError
 from carom.errors import NumericalError as NumericalError, UsageError as UsageError
 from carom.files import Run as Run, open as open
+from carom.page import Page
+from carom.potentials import Sampled
 
 version: str
 def describe(name: str | None = None) -> str: ...
 
 '''
 PATHS = "str | os.PathLike[str]"
-ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]", "position": "npt.ArrayLike",
-             "velocity": "npt.ArrayLike | None", "radius": "npt.ArrayLike", "mass": "npt.ArrayLike",
-             "charge": "npt.ArrayLike", "species": "str", "deck": PATHS, "file": PATHS, "set": "Mapping[str, Any] | None",
-             "time": "float | None", "steps": "int | None", "collisions": "int | None", "every": "float | None",
-             "callback": "Callable[[Simulation], object] | None", "progress": "bool | None"}
-RESULTS = {"__init__": "None", "from_deck": "Simulation", "add_particles": "range", "run": "None", "write_deck": "None", "__len__": "int",
-           "__repr__": "str"}
+# Of arguments whose default is None the type is this or None.
+ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]", "dimension": "Literal[2, 3]",
+             "position": "npt.ArrayLike", "velocity": "npt.ArrayLike", "radius": "npt.ArrayLike", "mass": "npt.ArrayLike",
+             "charge": "npt.ArrayLike", "species": "str", "count": "int", "temperature": "float",
+             "deck": f"{PATHS} | Mapping[str, Any]", "file": PATHS, "set": "Mapping[str, Any]", "directory": PATHS,
+             "take_over": "bool", "frame": "int", "time": "float", "steps": "int", "collisions": "int", "every": "float",
+             "callback": "Callable[[Simulation], object]", "progress": "bool", "type": "str", "packing_fraction": "float",
+             "seed": "int", "parameters": "Any", "thermo_interval": "float", "keys": "Any", "port": "int", "browser": "bool",
+             "expression": "str | Callable[..., Any]", "start": "float", "cutoff": "float", "tolerance": "float",
+             "options": "Mapping[str, Any]", "constants": "Any"}
+RESULTS = {"__init__": "None", "from_deck": "Simulation", "from_run": "Simulation", "from_file": "Simulation",
+           "add_particles": "range", "place": "range", "thermalize": "None", "add_potential": "Sampled", "output": "None",
+           "open": "Run", "view": "Page", "run": "None", "write_deck": "None", "__len__": "int", "__repr__": "str"}
 PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np.float64]",
               "image": "npt.NDArray[np.int32]", "unwrapped": "npt.NDArray[np.float64]", "mass": "npt.NDArray[np.float64]",
               "radius": "npt.NDArray[np.float64]", "charge": "npt.NDArray[np.float64]",
               "species": "npt.NDArray[np.uint16]", "momentum": "npt.NDArray[np.float64]", "species_names": "list[str]",
-              "box": "list[float]", "boundary": "list[str]", "step": "int", "collisions": "int"}
+              "box": "list[float]", "boundary": "list[str]", "step": "int", "collisions": "int", "directory": "str | None",
+              "averages": "dict[str, dict[str, npt.NDArray[np.float64]]]"}
 VALUES = {"list[float]": "npt.ArrayLike", "list[str]": "Sequence[str]", "list[tuple[int, int]]": "npt.ArrayLike"}
 
 
@@ -70,7 +79,11 @@ def overloads(method, declared):
 def signature(name, member):
     parts = []
     for each in inspect.signature(member).parameters.values():
-        part = each.name + (f": {ARGUMENTS[each.name]}" if each.name not in ("self", "cls") else "")
+        if each.name in ("self", "cls"):
+            parts.append(each.name)
+            continue
+        kind = ARGUMENTS[each.name] + (" | None" if each.default is None else "")
+        part = f"{'**' if each.kind is each.VAR_KEYWORD else ''}{each.name}: {kind}"
         parts.append(part if each.default is each.empty else f"{part} = {each.default!r}")
     return f"    def {name}({', '.join(parts)}) -> {RESULTS[name]}:"
 
@@ -84,6 +97,7 @@ def lines():
     yield from text_of(simulation.Simulation.__doc__, "    ")
     yield "    title: str"
     yield "    warnings: list[str]"
+    yield "    bonds: npt.NDArray[np.int64]"
     for name, member in vars(simulation.Simulation).items():
         if isinstance(member, property):
             kind = PROPERTIES.get(name, "float")

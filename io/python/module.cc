@@ -10,10 +10,12 @@
 #include <utility>
 
 #include "engine/base/boundary.h"
+#include "engine/forces/potentials/table.h"
 #include "io/files/version.h"
 #include "io/python/python_lock.h"
 #include "io/python/session.h"
 #include "io/python/values.h"
+#include "io/view/view.h"
 
 namespace carom::python {
 namespace {
@@ -52,7 +54,9 @@ Plan plan_of(const py::dict& ends, double every) {
 /// A run for Python: its signals and callbacks. A callback that raises ends the run at the end of the step, the end of
 /// Python likewise.
 template <int D>
-void run(Session<D>& session, const Plan& plan, const py::object& callback, const py::object& progress) {
+void run(Session<D>& session, const Plan& plan, const py::object& callback, const py::object& progress,
+         const py::object& deck) {
+  const std::string text = session.needs_deck() ? deck().cast<std::string>() : "";
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kBetweenLooks(50);
   std::optional<py::error_already_set> raised;
@@ -65,6 +69,7 @@ void run(Session<D>& session, const Plan& plan, const py::object& callback, cons
   auto last_look = Clock::now();
   bool cut = false;
   RunHooks hooks;
+  hooks.deck = [&] { return text; };
   hooks.stop = [&](const Statistics& statistics) {
     cut = cut || python_is_ending();
     if (cut || raised) return true;
@@ -118,14 +123,36 @@ void bind(py::module_& module, const char* name) {
              session.set_integrator(type, parameters_of(info.name, info.parameters, given));
            })
       .def("run",
-           [](S& session, const py::dict& ends, const py::object& callback, const py::object& progress) {
+           [](S& session, const py::dict& ends, const py::object& callback, const py::object& progress,
+              const py::object& deck) {
              Plan plan = plan_of(ends, session.plan().thermo_interval);
              if (!plan.end_time && !plan.steps && !plan.collisions) {
                plan.end_time = session.plan().end_time;
                plan.steps = session.plan().steps;
                plan.collisions = session.plan().collisions;
              }
-             run(session, plan, callback, progress);
+             run(session, plan, callback, progress, deck);
+           })
+      .def("set_output", &S::set_output)
+      .def("forget_run", &S::forget_run)
+      .def("drawn_velocities",
+           [](S& session, const Array& temperature, std::uint64_t seed) {
+             const auto v = session.drawn_velocities(span_of(temperature), seed);
+             Array all({static_cast<py::ssize_t>(v.size()), static_cast<py::ssize_t>(D)});
+             for (std::size_t i = 0; i < v.size(); ++i) std::copy_n(v[i].begin(), D, all.mutable_data(i));
+             return all;
+           })
+      .def("averages",
+           [](const S& session) {
+             py::dict all;
+             for (const auto& [average, table] : session.averages()) {
+               py::dict columns;
+               for (const TableColumn& column : table)
+                 columns[py::str(column.name)] =
+                     Array(static_cast<py::ssize_t>(column.values.size()), column.values.data());
+               all[py::str(average)] = columns;
+             }
+             return all;
            })
       .def("position",
            [](const py::object& self) {
@@ -171,6 +198,8 @@ void bind(py::module_& module, const char* name) {
       .def_property_readonly("wall_seconds", number([](S& s) { return s.statistics().wall_seconds; }))
       .def_property_readonly("interval", [](const S& s) { return s.plan().thermo_interval; })
       .def_property_readonly("size", &S::size)
+      .def_property_readonly("directory", &S::directory)
+      .def_property_readonly("warnings", &S::warnings)
       .def_property_readonly("species", &S::species)
       .def_property_readonly("method",
                              [](const S& s) { return std::string(s.integrator() ? s.integrator()->name : ""); })
@@ -194,15 +223,57 @@ void bind(py::module_& module, const char* name) {
       });
 }
 
-/// The deck's simulation, and its warnings.
-py::tuple from_deck(const std::string& file, const std::vector<std::string>& set) {
-  Deck deck = read_deck(file, set);
+/// A session, what there is to warn of, and the title.
+py::tuple opened(Deck& deck, auto&&... from) {
   py::object session;
   if (deck.dimension == 2)
-    session = py::cast(std::make_unique<Session<2>>(deck));
+    session = py::cast(std::make_unique<Session<2>>(deck, from...));
   else
-    session = py::cast(std::make_unique<Session<3>>(deck));
+    session = py::cast(std::make_unique<Session<3>>(deck, from...));
   return py::make_tuple(session, deck.warnings, deck.title);
+}
+
+/// The simulation of a deck, given as a file, or as the text of such a file.
+py::tuple from_deck(const std::string& file, const std::vector<std::string>& set,
+                    const std::optional<std::string>& text) {
+  Deck deck = read_deck(
+      file, set, [&](const std::filesystem::path& path) { return text && path == file ? text : read_text(path); });
+  return opened(deck);
+}
+
+/// The simulation of a run that is to be continued.
+py::tuple from_run(const std::string& directory, bool take_over) {
+  Communicator alone;
+  Resumed from = find_run(directory, take_over, alone);
+  RunOptions options;
+  options.go_on = directory;
+  Deck deck = deck_of(from, options, alone);
+  return opened(deck, from);
+}
+
+/// The page of runs, until the process that serves it is asked to end: view/view.h.
+void serve_page(const std::vector<std::string>& runs, const std::optional<std::string>& file, std::uint16_t port,
+                bool browser, bool led) {
+  ViewOptions options;
+  options.runs = {runs.begin(), runs.end()};
+  options.port = port;
+  options.browser = browser;
+  options.led = led;
+  if (file) options.export_to = *file;
+  const py::gil_scoped_release released;
+  view_command(options);
+}
+
+/// V and dV/dr at distances, of the spline that a table makes of points.
+py::tuple spline(const Array& r, const Array& value, const Array& slope, const Array& at) {
+  const Table table(span_of(r), span_of(value), span_of(slope));
+  Array v(at.size()), derivative(at.size());
+  for (py::ssize_t k = 0; k < at.size(); ++k) {
+    const double distance = at.data()[k], rho = distance * distance;
+    v.mutable_data()[k] = table.value(rho);
+    derivative.mutable_data()[k] = 2 * distance * table.derivative(rho);
+  }
+  return py::make_tuple(v, derivative);
 }
 
 py::dict descriptors() {
@@ -254,6 +325,9 @@ PYBIND11_MODULE(_carom, module) {
   bind<2>(module, "Session2");
   bind<3>(module, "Session3");
   module.def("from_deck", from_deck);
+  module.def("from_run", from_run);
+  module.def("view", serve_page);
+  module.def("spline", spline);
   module.def("descriptors", descriptors);
   module.attr("version") = carom::version_string();
 }

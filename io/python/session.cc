@@ -2,6 +2,7 @@
 #include "io/python/session.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "engine/run/measurement.h"
@@ -10,6 +11,9 @@
 
 namespace carom::python {
 namespace {
+
+using Clock = std::chrono::steady_clock;
+double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 [[noreturn]] void refuse(const std::string& what_and_remedy) { throw Error(Failure::deck, what_and_remedy); }
 
@@ -21,6 +25,14 @@ double value_of(std::span<const double> values, std::size_t i, double fallback) 
 template <int D>
 Vec<D> vector_at(std::span<const double> values, std::size_t i) {
   return Eigen::Map<const Vec<D>>(values.data() + i * D);
+}
+
+template <int D>
+void need_finite(std::span<const Vec<D>> rows, const char* what) {
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (!rows[i].allFinite())
+      throw Error(Failure::initial_state, std::string(what) + ": those of particle " + std::to_string(i) +
+                                              " are not finite; give finite numbers");
 }
 
 }  // namespace
@@ -57,6 +69,8 @@ Session<D>::Session(Deck& deck) {
   integrator_ = &find_integrator(deck.integrator);
   parameters_ = deck.integrator_parameters;
   terms_ = Terms<D>(deck, *system_);
+  text_ = deck.toml_text;
+  file_ = deck.file.string();
   views_.rest(system_->particles);
 }
 
@@ -69,6 +83,11 @@ void Session<D>::change(const char* what) {
   shot_.reset();
   statistics_ = {};
   shown_until_ = -1;
+  text_.clear();
+  if (output_ && output_->empty()) output_.reset();  // the files of a run that was continued
+  deck_.reset();
+  checkpoint_.reset();
+  averages_.clear();
 }
 
 template <int D>
@@ -120,17 +139,26 @@ void Session<D>::set_position(std::span<const double> x) {
 
 template <int D>
 void Session<D>::set_velocity(std::span<const double> v) {
+  if (running_ && showing_) {
+    if (!at_step_end_)
+      refuse(
+          "velocities: an epoch of free flight is going on; choose epochs that end where the callback comes: "
+          "integrator(\"free-flight\", step=every)");
+    pushed_.resize(size_);
+    for (std::size_t i = 0; i < size_; ++i) pushed_[i] = vector_at<D>(v, i);
+    need_finite<D>(pushed_, "velocities");
+    return;
+  }
   set(&Particles<D>::v, v, "velocities");
 }
 
 template <int D>
 void Session<D>::set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what) {
   change(("set " + std::string(what)).c_str());
-  for (std::size_t i = 0; i < size_; ++i)
-    if (!vector_at<D>(values, i).allFinite())
-      throw Error(Failure::initial_state, std::string(what) + ": those of particle " + std::to_string(i) +
-                                              " are not finite; give finite numbers");
-  for (std::size_t i = 0; i < size_; ++i) (system_->particles.*member)[i] = vector_at<D>(values, i);
+  std::vector<Vec<D>> rows(size_);
+  for (std::size_t i = 0; i < size_; ++i) rows[i] = vector_at<D>(values, i);
+  need_finite<D>(rows, what);
+  std::ranges::copy(rows, (system_->particles.*member).begin());
 }
 
 template <int D>
@@ -163,6 +191,7 @@ bool Session<D>::reached(const Plan& plan) const {
 /// A part of the saved state, with what is due next where the interval is another than before.
 template <int D>
 Bytes Session<D>::saved(const std::string& name, double interval) const {
+  if (checkpoint_) return checkpoint_->read(name);
   if ((name != "next frame" && name != "next row") || interval == interval_ || interval == 0) return state_.at(name);
   auto next = static_cast<std::int64_t>(std::floor((state_time_ + 1e-9 * step_) / interval)) + 1;
   Archive out;
@@ -182,6 +211,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     refuse("the run is at time " + short_text(statistics_.end_time) + ", step " + std::to_string(statistics_.steps) +
            " already; give a later end, or change something to start anew");
   terms_.complete(*system_);
+  if (output_) describe(plan, begun, hooks);
   Parameters parameters = parameters_;
   if (!begun) step_ = parameters.has("step") ? parameters.real("step") : default_epoch(*system_);
   parameters.set("step", step_);
@@ -197,21 +227,25 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   }
   Simulation<D>& run = *made;
   Shown shown(*this, hooks);
-  run.add(shown);
+  std::optional<RunRecord<D>> record;
   at_work_ = &run.system();
   live_ = &run.statistics();
   views_.lend(at_work_->particles);
   running_ = true;
   std::map<std::string, Bytes> state;
+  auto last_checkpoint = Clock::now();
   typename Simulation<D>::Hooks inner;
   inner.leave = inner.leave_here = [&] { return hooks.stop && hooks.stop(run.statistics()); };
   inner.should_stop = [&] {
+    const bool pushed = !pushed_.empty();
+    if (pushed) push(run);
     const bool stop = hooks.stop && hooks.stop(run.statistics());
-    if (stop || run.is_last_on_the_way()) {
-      state.clear();
-      save_state(*at_work_, into(state));
-      state_time_ = run.statistics().end_time;
-      state_steps_ = run.statistics().steps;
+    // After a push at the very end the state of before the last, shortened step is of no use.
+    if (stop || run.is_last_on_the_way() || (pushed && run.statistics().fraction_done >= 1))
+      save(run, state, record ? &*record : nullptr);
+    else if (record && deck_->output.checkpoint_wall && since(last_checkpoint) >= *deck_->output.checkpoint_wall) {
+      record->checkpoint();
+      last_checkpoint = Clock::now();
     }
     return stop;
   };
@@ -219,20 +253,36 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     inner.restore = [&] {
       restore_state(*at_work_, [&](const std::string& name) { return saved(name, interval); });
       state_.clear();
+      checkpoint_.reset();
     };
   const auto end = [&] {
     statistics_ = *std::exchange(live_, nullptr);
     shown_until_ = std::max(shown_until_, statistics_.end_time);
+    averages_ = averages();
+    record_ = nullptr;
+    pushed_.clear();
     rest(at_work_->particles);
   };
+  bool started = false;
   try {
+    if (deck_) record_ = &record.emplace(*deck_, run, begun ? &head_ : nullptr);
+    run.add(shown);
+    started = true;
     run.run(inner);
+    if (record) record->close();
   } catch (const std::exception& e) {
+    if (record) record->fail(e.what());
+    if (!started) {
+      record_ = nullptr, live_ = nullptr;
+      rest(at_work_->particles);
+      throw;
+    }
     failure_ = e.what();
     end();
     throw;
   }
   end();
+  if (record) warnings_ = record->warnings();
   state_ = std::move(state);
   interval_ = interval;
 }
@@ -253,8 +303,11 @@ template <int D>
 void Session<D>::show(const Snapshot<D>& shot, const RunHooks& hooks) {
   shot_ = shot;
   shot_->particles = nullptr;
+  at_step_end_ = shot.particles == &at_work_->particles;
   views_.show(*shot.particles);
+  showing_ = true;
   if (hooks.show && shot.time > shown_until_) hooks.show();
+  showing_ = false;
   views_.hide();
 }
 
@@ -269,6 +322,10 @@ const Snapshot<D>& Session<D>::shot() {
                                      evaluate_energy<D>(system, system.particles.x), tail_of(system));
   shot_ = now.shot;
   shot_->pressure = pressure_of(now.virial, box_);
+  shot_->time = statistics_.end_time;
+  shot_->step = statistics_.steps;
+  shot_->collisions = statistics_.counters.sphere_sphere;
+  shot_->max_energy_error = statistics_.max_energy_error;
   return *shot_;
 }
 

@@ -7,14 +7,15 @@ import subprocess
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGES = sorted((ROOT / "inputs" / "tutorials").glob("[0-9]*.md")) + [ROOT / "tools" / "site" / "gallery.md"]
+TUTORIALS = sorted((ROOT / "inputs" / "tutorials").glob("[0-9]*.md")) + sorted((ROOT / "inputs" / "tutorials" / "python").glob("[0-9]*.md"))
+PAGES = TUTORIALS + [ROOT / "tools" / "site" / "gallery.md"]
 
 
 def run_page(page):
     return subprocess.run(["/usr/bin/python3", ROOT / "tools" / "run_page.py", page], capture_output=True, text=True, timeout=300)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
 def test_a_page_prints_what_it_says(page):
     done = run_page(page)
     assert done.returncode == 0, done.stdout + done.stderr

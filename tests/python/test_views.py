@@ -117,7 +117,7 @@ def test_what_was_not_viewed_before_is_there_in_callbacks_only():
     def look():
         assert begun.wait(60)
         try:
-            time.sleep(0.05)  # the callback has returned
+            time.sleep(0.5)  # the callback has returned, and something has collided
             sim.velocity
         except carom.UsageError as error:
             told.append(str(error))

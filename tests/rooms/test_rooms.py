@@ -20,7 +20,8 @@ parallel
 io/deck
 io/files
 io/view
-io/command io/python
+io/command
+io/python
 """
 FLOOR = {room: n for n, line in enumerate(FLOORS.split("\n")) for room in line.split()}
 

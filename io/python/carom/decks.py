@@ -38,26 +38,45 @@ def _is_table(value):
     return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
 
 
-def write_deck(sim, file, ends, every):
-    """The deck of Simulation.write_deck()."""
+def deck_of(sim, of, ends):
+    """The present state, forces and integrator of a simulation, and the end of a run, as a deck. Images are not in it."""
     if not sim._session.method:
-        raise UsageError("write_deck: there is no integrator; call integrator(name, step=…) first")
-    if all(end is None for end in ends.values()):
-        raise UsageError("write_deck: the deck has no end; give time or steps")
-    kinds = sim.species
-    if np.any(np.diff(kinds.astype(int)) < 0):
-        raise UsageError("write_deck: the particles of a species do not follow one another, which a deck needs; add species "
-                         "after species")
-    columns = {name: getattr(sim, name) for name in ("position", "velocity", "radius", "mass", "charge")}
-    deck = {"format": 1, "title": sim.title, "system": {"dimension": len(sim.box), "box": sim.box, "boundary": sim.boundary},
-            "particles": [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
-                          for kind, name in enumerate(sim.species_names)]}
+        raise UsageError(f"{of}: there is no integrator; call integrator(name, step=…) first")
+    deck = {"format": 1, "title": sim.title, "system": system_of(sim), "particles": species_of(sim, of)}
     if sim._session.forces:
         deck["interaction"] = [{"type": name} | given for name, given in sim._session.forces]
     deck["integrator"] = {"type": sim._session.method} | sim._session.method_parameters
     deck["run"] = {name: end for name, end in ends.items() if end is not None}
+    return deck
+
+
+def system_of(sim):
+    return {"dimension": len(sim.box), "box": sim.box, "boundary": sim.boundary}
+
+
+def species_of(sim, of):
+    """The particles as the [[particles]] of a deck, one table for each species."""
+    kinds = sim.species
+    if np.any(np.diff(kinds.astype(int)) < 0):
+        raise UsageError(f"{of}: the particles of a species do not follow one another, which a deck needs; add species "
+                         "after species")
+    columns = {name: getattr(sim, name) for name in ("position", "velocity", "radius", "mass", "charge")}
+    return [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
+            for kind, name in enumerate(sim.species_names)]
+
+
+def write_deck(sim, file, ends, every):
+    """The deck of Simulation.write_deck()."""
+    if all(end is None for end in ends.values()):
+        raise UsageError("write_deck: the deck has no end; give time or steps")
+    deck = deck_of(sim, "write_deck", ends)
     deck["output"] = {"frame_interval": float(every), "thermo_interval": float(every)}
     try:
         pathlib.Path(file).write_text(toml_text(deck))
     except OSError as error:
         raise FileError(f"{file}: cannot write the deck: {error.strerror}; check the path") from error
+
+
+def overrides(values):
+    """Values as `--set` gives them to the command; a text stands for itself."""
+    return [f"{key}={value if isinstance(value, str) else toml_value(value)}" for key, value in values.items()]

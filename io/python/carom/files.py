@@ -19,6 +19,7 @@ import zlib
 
 import numpy as np
 
+from carom import notebook, page
 from carom.errors import FileError
 
 TRAJECTORY = "trajectory.h5md"
@@ -44,7 +45,11 @@ def reading(path):
 
 def open_hdf5(path):
     """A file of HDF5, opened for reading; a flush that a kill has interrupted is completed first."""
-    import h5py
+    try:
+        import h5py
+    except ImportError as error:
+        raise ImportError("reading the files of a run needs the Python package h5py: install Debian's python3-h5py, or pip install h5py") \
+            from error
 
     complete_flush(path)
     return h5py.File(path, "r")
@@ -142,6 +147,13 @@ class Trajectory:
             return self._group["charge"][:]
 
     @property
+    def bonds(self):
+        """The pairs that any interaction joins by bonds, (bonds, 2) ids."""
+        with reading(self.path):
+            ends = [self._file.get(f"parameters/vmd_structure/bond_{end}") for end in ("from", "to")]
+            return np.empty((0, 2), int) if ends[0] is None else np.column_stack([end[:] for end in ends]).astype(int) - 1
+
+    @property
     def periodic(self):
         return np.array([rule == "periodic" for rule in self.boundary])
 
@@ -216,6 +228,22 @@ class Run:
     def __repr__(self):
         return f"<run in {self.directory}>"
 
+    def _repr_html_(self):
+        rows = {"directory": str(self.directory), "integrator": self.deck["integrator"]["type"]}
+        if (self.directory / "summary.json").exists():
+            s = self.summary
+            rows |= {"status": s["status"], "particles": f"{s['particles']} in {s['dimension']} dimensions",
+                     "time": f"{s['end_time']:.6g}, step {s['steps']}", "collisions": str(s["events"]["sphere_sphere"]),
+                     "energy": f"{s['energy']['final']:.10g}, largest error {s['energy']['max_abs_error']:.1e}"}
+        return notebook.table("carom.Run", rows)
+
+    def view(self, port=0, browser=None, export=None):
+        """A page that shows the run in a browser, in a notebook in place; export: one file that works without a server
+        instead. See carom.page.Page. Needs the compiled part of the package."""
+        if export is not None:
+            return page.export([self.directory], export)
+        return page.Page([self.directory], port, browser)
+
     def __reduce__(self):  # a copy reads the files again
         return Run, (self.directory,)
 
@@ -261,21 +289,19 @@ class Run:
         """Its frames: frames[-1].position."""
         return Frames(self.trajectory)
 
+    @functools.cached_property
+    def bonds(self):
+        """The pairs that any interaction joins by bonds, (bonds, 2) ids."""
+        return self.trajectory.bonds
+
     def universe(self):
-        """The trajectory as an MDAnalysis Universe, in the units of the deck, with masses, charges, radii, and species as
-        names and types. Two-dimensional runs have z = 0."""
+        """The trajectory as an MDAnalysis Universe, in the units of the deck, with masses, charges, radii, bonds, and species
+        as names and types. Two-dimensional runs have z = 0. See carom.mdanalysis."""
         import MDAnalysis
 
-        trajectory = self.trajectory
-        n = len(trajectory.mass)
-        universe = MDAnalysis.Universe.empty(n, trajectory=True)
-        names = [trajectory.species_names[kind - min(trajectory.species)] for kind in trajectory.species]
-        for name, values in (("names", names), ("types", names), ("masses", trajectory.mass),
-                             ("charges", trajectory.charge), ("radii", trajectory.radius)):
-            universe.add_TopologyAttr(name, values)
-        with reading(trajectory.path):
-            universe.load_new(str(trajectory.path), format="H5MD", convert_units=False)
-        return universe
+        from carom import mdanalysis  # noqa: F401, makes files of Carom known to MDAnalysis
+        with reading(self.trajectory.path):
+            return MDAnalysis.Universe(str(self.trajectory.path), format="H5MD", topology_format="H5MD", convert_units=False)
 
 
 def open(directory):

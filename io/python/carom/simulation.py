@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulations: arrays and keywords checked here, everything else by the engine, with its texts."""
 
+import collections.abc
 import os
 import warnings
 
 import numpy as np
 
-from carom.decks import toml_value, write_deck
+from carom import files, formats, notebook, page, potentials
+from carom.checks import name_of, numbers, one_or_each, refuse_masked
+from carom.decks import deck_of, overrides, species_of, system_of, toml_text, toml_value, write_deck
 from carom.errors import UsageError
 from carom.progress import Progress
 
@@ -48,46 +51,97 @@ class Simulation:
     begins a new run, at time 0, from the present state.
     """
 
-    def __init__(self, box, boundary="wall"):
-        edges = _numbers("Simulation", "box", box)
+    def __init__(self, box=None, boundary="wall", dimension=None):
+        if box is None and dimension not in (2, 3):
+            raise UsageError("Simulation: there is no 'box'; give its edges, or dimension=2 or 3 where place() is to choose them")
+        edges = numbers("Simulation", "box", np.ones(dimension) if box is None else box)
         if edges.shape not in ((2,), (3,)):
             raise UsageError(f"Simulation: 'box' has shape {edges.shape}; give 2 or 3 edges")
+        if dimension not in (None, len(edges)):
+            raise UsageError(f"Simulation: 'dimension' is {dimension!r}, but 'box' has {len(edges)} edges; leave one of them out")
         rules = [boundary] if isinstance(boundary, str) else list(boundary)
         if not all(isinstance(rule, str) for rule in rules) or len(rules) not in (1, len(edges)):
             raise UsageError(f"Simulation: 'boundary' is {boundary!r}; give one name, or one for each of {len(edges)} axes")
         kind = _carom.Session2 if len(edges) == 2 else _carom.Session3
-        self._session = kind(list(edges), rules)
-        self.title, self.warnings = "", []
+        self._start(kind(list(edges), rules))
+        self._edges_known = box is not None
+
+    def _start(self, session, title=""):
+        self._session, self.title, self.warnings = session, title, []
+        self._edges_known, self._counted, self.bonds = True, [], np.empty((0, 2), int)
+
+    def _warn(self, texts, level=3):
+        self.warnings = list(texts)
+        for text in texts:
+            warnings.warn(text, stacklevel=level)
 
     @classmethod
     def from_deck(cls, deck, set=None):
-        """The simulation that a deck describes, with some of its values changed: set={"integrator.step": 0.02}."""
+        """The simulation that a deck describes, with some of its values changed: set={"integrator.step": 0.02}.
+
+        deck: the path of a file, or its tables as a dictionary, such as tomllib.load() reads them.
+        """
         self = cls.__new__(cls)
-        _refuse_masked("from_deck", set or {})
-        changes = [f"{key}={value if isinstance(value, str) else toml_value(value)}" for key, value in (set or {}).items()]
-        self._session, self.warnings, self.title = _carom.from_deck(os.fspath(deck), changes)
-        for text in self.warnings:
-            warnings.warn(text, stacklevel=2)
+        refuse_masked("from_deck", set or {})
+        text = toml_text(deck) if isinstance(deck, collections.abc.Mapping) else None
+        session, texts, title = _carom.from_deck("deck" if text else os.fspath(deck), overrides(set or {}), text)
+        self._start(session, title)
+        self._warn(texts)
         return self
 
-    def add_particles(self, position, velocity=None, radius=0.5, mass=1.0, charge=0.0, species="particle"):
+    @classmethod
+    def from_run(cls, directory, take_over=False):
+        """The simulation that left its files in a directory, by output() or by the command, as its last checkpoint has it.
+
+        The next run(), to a later end, goes on with its files and with the bits of an undisturbed run. A change of
+        particles, forces or integrator instead begins a new run from that state, at time 0 and without files.
+        take_over: as in `carom run --continue`. Raises FileError where there is no checkpoint.
+
+            sim = carom.Simulation.from_run("runs/fluid")
+            sim.run(time=200)
+        """
+        self = cls.__new__(cls)
+        session, _, title = _carom.from_run(os.fspath(directory), take_over)
+        self._start(session, title)
+        return self
+
+    @classmethod
+    def from_file(cls, file, frame=-1, radius=None, boundary=None):
+        """The particles of a GSD, extended XYZ or LAMMPS data file; see carom.formats.read()."""
+        return formats.read(cls, file, frame, radius, boundary)
+
+    def add_particles(self, position=None, velocity=None, radius=0.5, mass=1.0, charge=0.0, species="particle", count=None,
+                      temperature=None):
         """Adds N particles; returns their ids, a range.
 
         position, velocity: arrays of shape (N, D) [length, length/time]; velocities are 0 where there are none.
         radius, mass, charge: one number for all, or N. species: a name, for forces between species.
+        count, temperature: instead of positions and velocities; place() then finds them, and returns all ids.
+
+            sim.add_particles(position=[[1, 1], [3, 1]], velocity=[[0, 0], [0.5, 0]], radius=0.5)
+            sim.add_particles(count=500, temperature=1.0, radius=0.5, species="solvent")
         """
+        if count is not None:
+            return self._count(count, position, velocity, temperature,
+                               {"name": species, "radius": radius, "mass": mass, "charge": charge})
+        if position is None:
+            raise UsageError("add_particles: there is no 'position'; give one of shape (N, D), or a count for place()")
+        if temperature is not None:
+            raise UsageError("add_particles: 'temperature' goes with 'count'; call thermalize() after particles with positions")
+        if not self._edges_known:
+            raise UsageError("add_particles: explicit positions need the 'box' of the simulation; give its edges")
         dimension = len(self.box)
-        x = _numbers("add_particles", "position", position)
+        x = numbers("add_particles", "position", position)
         if x.shape == (dimension,):
             x = x.reshape(1, dimension)
         if x.ndim != 2 or x.shape[1] != dimension or len(x) == 0:
             raise UsageError(f"add_particles: 'position' has shape {x.shape}; give one of shape (N, {dimension}), "
                              "a row for each particle")
-        v = np.empty(0) if velocity is None else _numbers("add_particles", "velocity", velocity).reshape(-1)
+        v = np.empty(0) if velocity is None else numbers("add_particles", "velocity", velocity).reshape(-1)
         if v.size not in (0, x.size) or (velocity is not None and np.shape(velocity) not in (x.shape, (dimension,))):
             raise UsageError(f"add_particles: 'velocity' has shape {np.shape(velocity)}; give the shape of 'position', "
                              f"{x.shape}")
-        others = [_one_or_each("add_particles", name, values, len(x))
+        others = [one_or_each("add_particles", name, values, len(x))
                   for name, values in (("radius", radius), ("mass", mass), ("charge", charge))]
         if not isinstance(species, str):
             raise UsageError(f"add_particles: 'species' is {species!r}; give one name, and call again for other species")
@@ -95,21 +149,135 @@ class Simulation:
         self._session.add_particles(x, v, *others, species)
         return range(first, self._session.size)
 
+    def _count(self, count, position, velocity, temperature, table):
+        if position is not None or velocity is not None:
+            raise UsageError("add_particles: 'count' excludes 'position' and 'velocity'; leave it out, or them")
+        if temperature is None:
+            raise UsageError("add_particles: 'count' needs a 'temperature'; 0 leaves the particles at rest")
+        first = self._session.size + sum(one["count"] for one in self._counted)
+        for name in ("radius", "mass", "charge"):
+            values = one_or_each("add_particles", name, table[name], count)
+            table[name] = float(values[0]) if len(values) == 1 else values
+        self._counted.append(table | {"count": int(count), "temperature": float(temperature)})
+        return range(first, first + int(count))
+
+    def place(self, type, packing_fraction=None, seed=1, **parameters):
+        """Places the particles that add_particles() was given by count, and draws their velocities; returns all ids.
+
+        type: "fcc", "simple-cubic", "hexagonal", "square", "random" or "compressed", as in the [placement] of decks, with
+        its parameters. packing_fraction: sets the box, where the simulation was made without one.
+        Raises InitialStateError where there is no room.
+
+            sim = carom.Simulation(dimension=3, boundary="periodic")
+            sim.add_particles(count=500, temperature=1.0, radius=0.5)
+            sim.place("fcc", packing_fraction=0.3, seed=1)
+        """
+        if not self._counted:
+            raise UsageError("place: no particles were given by count; call add_particles(count=…, temperature=…) first")
+        old = self._session
+        system = system_of(self)
+        if not self._edges_known:
+            del system["box"]
+        deck = {"format": 1, "system": system, "particles": (species_of(self, "place") if old.size else []) + self._counted,
+                "placement": {"type": name_of("place", type), "seed": seed} | parameters,
+                "integrator": {"type": "free-flight"}, "run": {"collisions": 1}}
+        if packing_fraction is not None:
+            deck["placement"]["packing_fraction"] = packing_fraction
+        session, texts, _ = _carom.from_deck("place", [], toml_text(deck))
+        session.forget_run()
+        for name, given in old.forces:
+            session.add_force(name, given)
+        if old.method:
+            session.set_integrator(old.method, old.method_parameters)
+        self._session, self._edges_known, self._counted = session, True, []
+        self._warn(texts)
+        return range(len(self))
+
+    def thermalize(self, temperature, seed=1, species=None):
+        """Draws velocities of Maxwell and Boltzmann, of exactly this temperature [energy] and without total momentum.
+
+        species: the name of the only one that gets them. In a callback, too: see `velocity`.
+        """
+        each = np.full(len(self), np.nan)
+        if species is not None and species not in self.species_names:
+            raise UsageError(f"thermalize: there is no species '{species}'; give one of: {', '.join(self.species_names)}")
+        chosen = slice(None) if species is None else self.species == self.species_names.index(species)
+        each[chosen] = temperature
+        self._session.set_velocity(self._session.drawn_velocities(each, seed))
+
     def add_force(self, type, **parameters):
         """Adds a term of V by its name in decks; see carom.describe(type). Ids and species in it must be there already."""
-        self._session.add_force(_name("add_force", type), _refuse_masked(type, parameters))
+        self._session.add_force(name_of("add_force", type), refuse_masked(type, parameters))
+
+    def add_potential(self, expression, start, cutoff, tolerance=1e-8, options=None, **constants):
+        """Adds a pair potential given as an expression of r; returns the points of its table, with the errors.
+
+        expression: a text such as "epsilon*exp(-(r/sigma)**2)", with functions of numpy and constants by keyword, or a
+        function of r [length] that returns V [energy]. start: from this distance on it is sampled; no pair should come
+        nearer. cutoff: where it ends. tolerance: the largest error of V, relative to the largest |V|. options: other
+        parameters of "table", such as {"species": ["a", "b"], "cut": "shifted"}.
+        Raises UsageError where the tolerance cannot be met.
+
+            print(sim.add_potential("epsilon*exp(-r**2)", start=0.2, cutoff=3.0, epsilon=2.0))
+        """
+        points = potentials.sample(expression, start, cutoff, tolerance, **constants)
+        slope = {"slope": points.slope} if len(points.slope) else {}
+        self.add_force("table", r=points.r, value=points.value, cutoff=cutoff, **slope, **(options or {}))
+        return points
+
+    def output(self, directory, thermo_interval=0, **keys):
+        """From the next run on, files are written to a directory, as the command writes them: see carom.open().
+
+        thermo_interval: time between rows of thermo.csv; callbacks then come with each row. Other keys are those of
+        [output] in decks: frame_interval, events, rdf_interval, msd_interval, profile_interval, sample_start,
+        checkpoint_wall, units, … (`carom schema`). Each run() ends with a checkpoint, from which from_run() and
+        `carom run --continue` go on. Begins a new run, at time 0; the files of an earlier run in the directory are moved
+        to its backup.N.
+
+            sim.output("runs/fluid", thermo_interval=0.1, frame_interval=1.0, rdf_interval=0.1)
+            sim.run(time=100)
+            print(sim.averages["rdf"]["g"].max(), len(sim.open().frames))
+        """
+        given = {"directory": os.path.abspath(os.fspath(directory)), "thermo_interval": thermo_interval} | keys
+        refuse_masked("output", given)
+        self._session.set_output([f"output.{key}={toml_value(value)}" for key, value in given.items()], float(thermo_interval))
+
+    @property
+    def directory(self):
+        """Where the files of the run are; None where it leaves none."""
+        return self._session.directory or None
+
+    def open(self):
+        """What the run has left in its directory, a carom.Run."""
+        return files.open(self._need_directory("open"))
+
+    def view(self, port=0, browser=None):
+        """A page that shows the run in a browser, also while it goes on; in a notebook, in place. See carom.page.Page."""
+        return page.Page([self._need_directory("view")], port, browser)
+
+    def _need_directory(self, of):
+        if self.directory is None:
+            raise UsageError(f"{of}: the run leaves no files; call output(directory, frame_interval=…) and run() first")
+        return self.directory
+
+    @property
+    def averages(self):
+        """The averages up to now, by name and column: ["rdf"]["g"]; those that output() has asked for by an interval. New
+        arrays, also in callbacks."""
+        return self._session.averages()
 
     def integrator(self, type, **parameters):
         """Chooses the integrator by its name in decks; see carom.describe(type)."""
-        self._session.set_integrator(_name("integrator", type), _refuse_masked(type, parameters))
+        self._session.set_integrator(name_of("integrator", type), refuse_masked(type, parameters))
 
     def run(self, time=None, steps=None, collisions=None, every=None, callback=None, progress=None):
         """Runs to a time, a number of steps, or a number of pair collisions, counted from the start of the run: a later
         call with a later end goes on, with the bits of one undisturbed run. Without any of them: to the end of the deck.
 
+        time [time], steps, collisions: where the run ends; the first that is reached.
         callback(simulation) is called every so much simulated time, and at the start and the end; what it raises ends the
         run at the end of the step (in free flight: after 500 000 collisions of the epoch, or its end). So does
-        Ctrl-C, with KeyboardInterrupt; the simulation can be looked at and run on.
+        Ctrl-C, with KeyboardInterrupt; the simulation can be looked at and run on. A callback may set velocities.
         progress: whether to show a line of progress; by default in terminals and notebooks.
         """
         if callback is not None and not callable(callback):
@@ -117,12 +285,16 @@ class Simulation:
         if callback is not None and every is None and self._session.interval == 0:
             raise UsageError("run: a callback needs 'every', the time between two calls; give the step for every step")
         line = Progress() if (Progress.wanted() if progress is None else progress) else None
-        ends = _refuse_masked("run", {"time": time, "steps": steps, "collisions": collisions, "every": every})
+        ends = refuse_masked("run", {"time": time, "steps": steps, "collisions": collisions, "every": every})
+        if self._counted:
+            raise UsageError("run: particles that were given by count have no positions; call place() first")
         try:
-            self._session.run(ends, callback and (lambda: callback(self)), line)
+            self._session.run(ends, callback and (lambda: callback(self)), line,
+                              lambda: toml_text(deck_of(self, "run", {"steps": 1})))
         finally:
             if line:
                 line.close()
+            self._warn(self._session.warnings)
 
     def write_deck(self, file, time=None, steps=None, every=None):
         """Writes a deck that `carom run` and from_deck() take: the present state, forces, integrator and this end, with
@@ -141,7 +313,9 @@ class Simulation:
 
     @property
     def velocity(self):
-        """Velocities, (N, D) [length/time]; like position."""
+        """Velocities, (N, D) [length/time]; like position. Assigned in a callback, they hold from then on, and the run goes on
+        at its time: what this adds to H is no part of energy_error. In free flight the callback must come at the end of
+        an epoch: integrator("free-flight", step=every)."""
         return self._session.velocity()
 
     @velocity.setter
@@ -194,42 +368,11 @@ class Simulation:
         return (f"<carom.Simulation: {session.size} particles in {len(session.box)} dimensions, forces: "
                 f"{', '.join(name for name, _ in session.forces) or 'none'}, integrator: {session.method or 'none'}>")
 
+    def _repr_html_(self):
+        return notebook.table_of(self)
+
     def _rows(self, name, values):
-        array, shape = _numbers("Simulation", name, values), (len(self), len(self.box))
+        array, shape = numbers("Simulation", name, values), (len(self), len(self.box))
         if array.shape != shape:
             raise UsageError(f"Simulation: '{name}' has shape {array.shape}; give {shape}")
         return array
-
-
-def _numbers(of, name, values):
-    """Numbers as an array of doubles without gaps; one that is so already is not copied."""
-    _refuse_masked(of, {name: values})
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise UsageError(f"{of}: '{name}' has rows of different lengths; give each the same number of entries") from error
-    if array.dtype.kind not in "iuf":
-        raise UsageError(f"{of}: '{name}' has entries of type {array.dtype}; give real numbers")
-    return np.asarray(array, dtype=np.float64, order="C")
-
-
-def _refuse_masked(of, given):
-    """The given values by name; numpy would take what stands below a mask, too."""
-    for name, values in given.items():
-        rows = values if isinstance(values, (list, tuple)) else [values]
-        if any(isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row) for row in rows):
-            raise UsageError(f"{of}: '{name}' has masked entries; fill them, or leave out their rows, and give a plain array")
-    return given
-
-
-def _one_or_each(of, name, values, n):
-    array = _numbers(of, name, values)
-    if array.shape not in ((), (1,), (n,)):
-        raise UsageError(f"{of}: '{name}' has shape {array.shape}; give one number, or {n}, one for each particle")
-    return array.reshape(-1)
-
-
-def _name(of, type):
-    if not isinstance(type, str):
-        raise UsageError(f"{of}: the first argument is {type!r}; give a name, see carom.describe()")
-    return type

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pair potentials given as expressions, sampled into the points of a table with a known error."""
+
+import math
+
+import numpy as np
+
+from carom.errors import UsageError
+
+LARGEST = 8192  # points
+FUNCTIONS = {name: getattr(np, name) for name in (
+    "exp", "expm1", "log", "log1p", "sqrt", "cbrt", "sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh",
+    "minimum", "maximum", "where", "abs", "pi", "e")}
+FUNCTIONS |= {name: np.vectorize(getattr(math, name), otypes=[float]) for name in ("erf", "erfc", "gamma", "lgamma")}
+
+
+class Sampled:
+    """The points of a table: r, value (N,) [length, energy], slope at both ends, and how far the spline through them is
+    from the expression: error [energy] and force_error [energy/length], the largest between `start` and `cutoff`."""
+
+    def __init__(self, r, value, slope, error, force_error):
+        self.r, self.value, self.slope, self.error, self.force_error = r, value, slope, error, force_error
+
+    def __repr__(self):
+        return (f"<{len(self.r)} points from r = {self.r[0]:g} to {self.r[-1]:g}; the spline errs by {self.error:.1e} in V, "
+                f"by {self.force_error:.1e} in the force>")
+
+
+def function_of(expression, constants):
+    """V(r) of arrays, from an expression of r and constants, or from a function of r."""
+    if callable(expression):
+        return lambda r: np.broadcast_to(np.asarray(expression(r, **constants), dtype=float), np.shape(r))
+    if not isinstance(expression, str):
+        raise UsageError(f"potential: the expression is {expression!r}; give a text such as '4*(r**-12 - r**-6)', or a function of r")
+    try:
+        code = compile(expression, "potential", "eval")
+    except SyntaxError as error:
+        raise UsageError(f"potential: '{expression}' is no expression: {error.msg}") from error
+    names = set(code.co_names)
+    unknown = names - set(FUNCTIONS) - set(constants) - {"r"}
+    if unknown:
+        raise UsageError(f"potential: unknown name '{min(unknown)}' in '{expression}'; give it as a keyword, or use r and "
+                         f"{', '.join(FUNCTIONS)}")
+    known = {"__builtins__": {}} | FUNCTIONS | constants
+
+    def value(r):
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(np.asarray(eval(code, known | {"r": r}), dtype=float), np.shape(r))
+    return value
+
+
+def derivative(value, r):
+    """dV/dr by central differences of sixth order."""
+    h = 2e-3 * r
+    weights = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}
+    return sum(weight * (value(r + n * h) - value(r - n * h)) for n, weight in weights.items()) / h
+
+
+def sample(expression, start, cutoff, tolerance=1e-8, **constants):
+    """The points of a table for V(r) between start and cutoff, as many as the tolerance takes.
+
+    expression: a text with r, the functions of numpy (exp, sqrt, …) and constants given by keyword, or a function of r.
+    start, cutoff: from and to which distance [length]; below start the table goes on as a parabola. tolerance: the
+    largest error of the spline, relative to the largest |V| there. Raises UsageError where 8192 points do not suffice.
+
+        sample("epsilon*exp(-(r/sigma)**2)", start=0.2, cutoff=3.0, epsilon=2.0, sigma=1.0)
+    """
+    from carom import _carom
+
+    if not 0 < start < cutoff:
+        raise UsageError(f"potential: start is {start} and cutoff {cutoff}; give 0 < start < cutoff")
+    value = function_of(expression, constants)
+    points = 16
+    while True:
+        r = np.linspace(start, cutoff, points)
+        at = np.linspace(start, cutoff, 8 * (points - 1) + 1)
+        exact = value(at)
+        if not np.all(np.isfinite(exact)):
+            wrong = at[~np.isfinite(exact)][0]
+            raise UsageError(f"potential: V is not finite at r = {wrong:.6g}; give a larger start, or another expression")
+        ends = derivative(value, np.array([start, cutoff]))
+        slope = ends if np.all(np.isfinite(ends)) else np.empty(0)
+        found, found_slope = _carom.spline(r, value(r), slope, at)
+        scale = np.max(np.abs(exact)) or 1.0
+        error = np.max(np.abs(found - exact))
+        if error <= tolerance * scale:
+            inner = at[1:-1]
+            force_error = np.nanmax(np.abs(found_slope[1:-1] - derivative(value, inner)))
+            return Sampled(r, value(r), slope, float(error), float(force_error))
+        if points >= LARGEST:
+            raise UsageError(f"potential: {points} points leave an error of {error / scale:.1e} of the largest |V|, more than the "
+                             f"tolerance of {tolerance:g}; give a larger start, a larger tolerance, or an expression without corners")
+        points *= 2

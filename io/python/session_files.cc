@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The files of a session's runs: the deck that they are a run of, their state, the averages.
+
+#include "engine/setup/placement.h"
+#include "io/deck/deck_source.h"
+#include "io/python/session.h"
+
+namespace carom::python {
+namespace {
+
+[[noreturn]] void refuse(const std::string& what_and_remedy) { throw Error(Failure::deck, what_and_remedy); }
+
+/// Gives the run of a deck another end; the resolved deck says so too.
+void set_ends(Deck& deck, const Plan& plan) {
+  deck.plan.steps = plan.steps;
+  deck.plan.end_time = plan.end_time;
+  deck.plan.collisions = plan.collisions;
+  auto& values = deck.source->values.find("run")->values;
+  for (const char* key : {"steps", "end_time", "collisions"}) values.erase(key);
+  if (plan.steps) values.set("steps", *plan.steps);
+  if (plan.end_time) values.set("end_time", *plan.end_time);
+  if (plan.collisions) values.set("collisions", static_cast<std::int64_t>(*plan.collisions));
+  deck.toml_text = write_deck(deck.source->values);
+}
+
+/// Changes a value of a run's state by its name.
+template <class T>
+void change_value(const Fields& fields, const std::string& name, const std::function<void(T&)>& change) {
+  for (const Fields::OfRun& entry : fields.of_run()) {
+    if (entry.name != name) continue;
+    Archive out;
+    entry.archive(out);
+    Archive in(out.bytes());
+    T value{};
+    in(value);
+    change(value);
+    Archive changed;
+    changed(value);
+    Archive back(changed.bytes());
+    entry.archive(back);
+  }
+}
+
+}  // namespace
+
+template <int D>
+Session<D>::Session(Deck& deck, Resumed& from) {
+  const GivenState given{from.reader(), from.head.bonds};
+  system_ = build_system<D>(deck, nullptr, &given);
+  plan_ = deck.plan;
+  box_ = system_->box;
+  species_ = system_->species;
+  size_ = system_->size();
+  integrator_ = &find_integrator(deck.integrator);
+  parameters_ = deck.integrator_parameters;
+  terms_ = Terms<D>(deck, *system_);
+  system_->quanta = {};
+  views_.rest(system_->particles);
+
+  Archive(from.checkpoint->read("statistics"))(statistics_);
+  checkpoint_ = std::make_shared<Checkpoint>(std::move(*from.checkpoint));
+  head_ = from.head;
+  state_time_ = shown_until_ = statistics_.end_time;
+  state_steps_ = statistics_.steps;
+  step_ = deck.plan.step;
+  interval_ = deck.plan.thermo_interval;
+  output_.emplace();
+  deck_ = deck;
+}
+
+template <int D>
+void Session<D>::set_output(std::vector<std::string> set, double thermo_interval) {
+  const std::string text = text_;
+  change("choose the output");
+  text_ = text;  // still the deck of these particles
+  output_ = std::move(set);
+  plan_.thermo_interval = thermo_interval;
+}
+
+/// Makes the deck of the run that is about to begin or to go on, and gives the plan what the deck says of files.
+template <int D>
+void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
+  if (!begun) {
+    const std::filesystem::path file = text_.empty() ? "simulation.py" : file_;
+    const std::string text = text_.empty() ? hooks.deck() : text_;
+    Deck deck = read_deck(file, *output_, [&](const std::filesystem::path& path) {
+      return path == file ? std::optional(text) : read_text(path);
+    });
+    set_ends(deck, plan);
+    build_system<D>(deck);
+    deck_ = std::move(deck);
+  } else {
+    set_ends(*deck_, plan);
+  }
+  const Plan& of = deck_->plan;
+  if (hooks.show && plan.thermo_interval > 0 && plan.thermo_interval != of.thermo_interval)
+    refuse("run: 'every' is " + short_text(plan.thermo_interval) + ", but the rows of thermo.csv come every " +
+           short_text(of.thermo_interval) +
+           "; the callback is called with each row: leave 'every' out, or give output() that thermo_interval");
+  plan.frame_interval = of.frame_interval;
+  plan.thermo_interval = of.thermo_interval;
+  plan.events = of.events;
+}
+
+/// Gives the particles of a run the velocities that a callback has set, between two steps. The energy that this adds is
+/// work, like that of walls which move, and no error of H; the error of momentum is unknown from then on. After a step
+/// that was shortened, steps are counted from there.
+template <int D>
+void Session<D>::push(const Simulation<D>& run) {
+  Particles<D>& p = at_work_->particles;
+  change_value<Statistics>(at_work_->fields, "statistics", [&](Statistics& s) {
+    for (Id i = 0; i < p.size(); ++i)
+      s.counters.wall_work.add(0.5 * p.mass[i] * (pushed_[i].squaredNorm() - p.v[i].squaredNorm()));
+    s.max_momentum_error.reset();
+  });
+  p.v = std::exchange(pushed_, {});
+  const StepCount now{run.statistics().steps, run.statistics().end_time};
+  change_value<StepCount>(at_work_->fields, "step count", [&](StepCount& count) {
+    if (count.time + static_cast<double>(now.steps - count.steps) * step_ + count.within != now.time) count = now;
+  });
+}
+
+/// Saves the state to go on from, in memory and with the files.
+template <int D>
+void Session<D>::save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record) {
+  state.clear();
+  save_state(*at_work_, into(state));
+  state_time_ = run.statistics().end_time;
+  state_steps_ = run.statistics().steps;
+  if (record) head_ = record->checkpoint();
+}
+
+template <int D>
+Averages Session<D>::averages() const {
+  if (running_ && record_ == nullptr) return {};
+  if (record_ == nullptr) return averages_;
+  Averages all;
+  record_->files().for_each_average(
+      [&](const std::string& name, const Observable<D>& average) { all[name] = average.table(); });
+  return all;
+}
+
+template <int D>
+std::vector<Vec<D>> Session<D>::drawn_velocities(std::span<const double> temperature, std::uint64_t seed) {
+  const auto mass = views_.constants().mass;
+  Particles<D> p;
+  p.mass.assign(mass.begin(), mass.end());
+  const auto v = views_.velocity();
+  p.v.assign(v.begin(), v.end());
+  p.x.resize(p.v.size());
+  std::vector<Id> chosen;
+  std::vector<double> each;
+  for (Id i = 0; i < p.v.size(); ++i) {
+    if (std::isnan(temperature[i])) continue;
+    if (!(temperature[i] >= 0) || std::isinf(temperature[i]))
+      refuse("thermalize: the temperature of particle " + std::to_string(i) + " is " + short_text(temperature[i]) +
+             "; give 0 or more");
+    chosen.push_back(i);
+    each.push_back(temperature[i]);
+  }
+  draw_velocities<D>(p, chosen, each, seed);
+  return std::move(p.v);
+}
+
+template class Session<2>;
+template class Session<3>;
+
+}  // namespace carom::python

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs from Python that leave files, go on from them, and whose velocities a callback sets."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+
+import numpy as np
+import pytest
+
+import carom
+from scenes import ROOT, five_springs, gas, run_command, same_state
+
+OUTPUT = {"thermo_interval": 0.1, "frame_interval": 0.5, "rdf_interval": 0.1, "msd_interval": 0.1, "events": True}
+SET = [part for key, value in OUTPUT.items() for part in ("--set", f"output.{key}={str(value).lower()}")]
+DECKS = [("five-springs.toml", {}), ("hard-sphere-fluid.toml", {"particles.0.count": 108})]
+
+
+def same_files(one, other):
+    done = subprocess.run(["/usr/bin/python3", ROOT / "tools/compare.py", one, other], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for name in ("thermo.csv", "rdf.csv", "msd.csv"):
+        assert (one / name).read_bytes() == (other / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("deck, change", DECKS)
+def test_the_files_are_those_of_the_command_which_goes_on_with_them(tmp_path, deck, change):
+    deck, by_command, by_python = ROOT / "inputs" / deck, tmp_path / "command", tmp_path / "python"
+    run_command(deck, by_command, "--set", "run.end_time=2", *SET,
+                *[part for key, value in change.items() for part in ("--set", f"{key}={value}")])
+    sim = carom.Simulation.from_deck(deck, set=change)
+    sim.output(by_python, **OUTPUT)
+    sim.run(time=0.9)
+    sim.run(time=2)
+    same_files(by_command, by_python)
+    assert sim.open().summary["status"] == "done" and len(sim.open().frames) == 5 and sim.directory == str(by_python)
+    for name, table in sim.open().averages.items():
+        assert sim.averages[name].keys() == table.keys()
+        assert all(np.array_equal(values, sim.averages[name][column]) for column, values in table.items())
+    for directory in (by_command, by_python):
+        done = subprocess.run([os.environ["CAROM"], "run", "--continue", directory, "--set", "run.end_time=3", "--quiet"])
+        assert done.returncode == 0
+    same_files(by_command, by_python)
+
+
+@pytest.mark.parametrize("make", [five_springs, gas])
+def test_another_python_goes_on(tmp_path, make):
+    undisturbed, first = make(), make()
+    for sim, name in ((undisturbed, "one"), (first, "two")):
+        sim.output(tmp_path / name, **OUTPUT)
+    undisturbed.run(time=4)
+    first.run(time=1.005)
+    later = carom.Simulation.from_run(tmp_path / "two")
+    assert later.title == first.title and len(later) == len(first)
+    later.run(time=4)
+    assert same_state(later, undisturbed)
+    same_files(tmp_path / "one", tmp_path / "two")
+
+
+def test_a_change_of_a_continued_run_begins_another_without_files(tmp_path):
+    sim = five_springs()
+    sim.output(tmp_path / "run", thermo_interval=0.5)
+    sim.run(time=1)
+    later = carom.Simulation.from_run(tmp_path / "run")
+    later.integrator("psa", step=0.001)
+    assert later.time == 0 and later.directory is None
+    before = (tmp_path / "run" / "thermo.csv").read_bytes()
+    later.run(time=0.1)
+    assert (tmp_path / "run" / "thermo.csv").read_bytes() == before
+    with pytest.raises(carom.UsageError, match="leaves no files; call output"):
+        later.open()
+
+
+def test_a_killed_python_is_continued(tmp_path):
+    """The run checkpoints all the time, and is killed after the second."""
+    script = ("import sys; sys.path.insert(0, sys.argv[1]); from scenes import five_springs; s = five_springs();"
+              "s.output(sys.argv[2], thermo_interval=0.1, frame_interval=0.5, rdf_interval=0.1, msd_interval=0.1, events=True,"
+              " checkpoint_wall='0.01'); s.run(time=100000)")
+    killed = subprocess.Popen([sys.executable, "-c", script, ROOT / "tests/python", tmp_path / "killed"])
+    while not (tmp_path / "killed/checkpoint.previous.h5").exists():
+        assert killed.poll() is None
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    later, undisturbed = carom.Simulation.from_run(tmp_path / "killed"), five_springs()
+    end = np.ceil(carom.open(tmp_path / "killed").thermo["time"][-1] + 1)
+    undisturbed.output(tmp_path / "undisturbed", **OUTPUT)
+    for sim in (later, undisturbed):
+        sim.run(time=end)
+    assert same_state(later, undisturbed)
+    same_files(tmp_path / "killed", tmp_path / "undisturbed")
+
+
+def test_averages_can_be_looked_at_during_the_run(tmp_path):
+    sim, pairs = five_springs(), []
+    sim.output(tmp_path / "run", thermo_interval=1, rdf_interval=0.5)
+    sim.run(time=5, callback=lambda s: pairs.append(s.averages["rdf"]["g"].sum()))
+    assert len(pairs) == 6 and len(set(pairs)) > 3 and sim.averages["rdf"]["g"].sum() == pairs[-1]
+
+
+def test_what_output_refuses(tmp_path):
+    sim = five_springs()
+    sim.output(tmp_path / "run", thermo_interval=0.1, frame_intervall=1)
+    with pytest.raises(carom.UsageError, match="frame_intervall.*frame_interval"):
+        sim.run(time=1)
+    sim.output(tmp_path / "run", thermo_interval=0.1)
+    with pytest.raises(carom.UsageError, match="'every' is 0.3, but the rows of thermo.csv come every 0.1"):
+        sim.run(time=1, every=0.3, callback=print)
+    sim.run(time=1)
+    (tmp_path / "run" / "thermo.csv").write_text("another\n")
+    with pytest.raises(carom.FileError, match="thermo.csv"):
+        sim.run(time=2)
+    with pytest.raises(carom.FileError, match="checkpoint"):
+        carom.Simulation.from_run(tmp_path)
+
+
+def test_an_earlier_run_is_kept_and_said(tmp_path):
+    for sim in (five_springs(), five_springs()):
+        sim.output(tmp_path / "run", thermo_interval=0.5)
+        last = sim
+        if (tmp_path / "run").exists():
+            with pytest.warns(UserWarning, match="are now in .*backup.1"):
+                sim.run(time=1)
+        else:
+            sim.run(time=1)
+    assert (tmp_path / "run/backup.1/thermo.csv").exists() and last.time == 1
+
+
+@pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "edda"])
+def test_a_callback_sets_velocities_and_the_clock_goes_on(method):
+    def slow(s):
+        if s.step in (0, 50, 100):
+            s.velocity = 0.5 * s.velocity
+
+    sim, by_hand = five_springs(), five_springs()
+    for each in (sim, by_hand):
+        each.integrator(method, step=0.01)
+    sim.run(time=1, every=0.5, callback=slow)
+    sim.run(time=1.5)
+    for _ in range(3):
+        by_hand.velocity = 0.5 * by_hand.velocity
+        by_hand.run(time=0.5)
+    assert sim.time == 1.5 and sim.step == 150
+    assert np.allclose(sim.position, by_hand.position, rtol=0, atol=1e-3 if method in ("psa", "mcva", "cva") else 1e-11)
+    exact = method in ("cdda", "edda")
+    assert sim.energy_error < (1e-13 if exact else 0.02) and sim.energy == pytest.approx(by_hand.energy, rel=1e-9 if exact else 0.02)
+    assert sim.energy < 0.2 * five_springs().energy
+
+
+def test_a_thermostat_of_free_flight_needs_epochs_that_end_with_the_callback():
+    sim, seen = gas(), []
+    with pytest.raises(carom.UsageError, match="epoch of free flight is going on.*step=every"):
+        sim.run(time=2, every=0.5, callback=lambda s: s.thermalize(1.0, seed=s.step) if s.time == 0.5 else None)
+    sim = gas(step=0.5)
+
+    def heat(s):
+        seen.append(s.temperature)
+        s.thermalize(1 + s.time, seed=s.step + 1)
+
+    sim.run(time=2, every=0.5, callback=heat)
+    assert sim.time == 2 and sim.step == 4 and sim.collisions > 0
+    assert np.allclose(seen[1:], [1, 1.5, 2, 2.5]) and sim.energy_error < 1e-13
+
+
+def test_velocities_set_at_a_shortened_end_hold(tmp_path):
+    sim = five_springs()
+    sim.output(tmp_path / "run", thermo_interval=0.205)
+    rest = np.zeros((5, 2))
+
+    def stop(s):
+        if s.time == 0.205:
+            s.velocity = rest
+
+    sim.run(time=0.205, callback=stop)
+    later = carom.Simulation.from_run(tmp_path / "run")
+    assert np.array_equal(later.velocity, rest) and later.time == 0.205
+    for each in (sim, later):
+        each.run(time=1)
+    assert same_state(sim, later) and sim.energy_error < 1e-13 and sim.energy < 1
+    assert sim.step == 21 + 80  # steps are counted from the shortened one on
+
+
+def test_a_velocity_that_is_no_number_is_refused_in_a_callback():
+    sim = five_springs()
+    with pytest.raises(carom.InitialStateError, match="particle 0 are not finite"):
+        sim.run(time=1, every=0.5, callback=lambda s: setattr(s, "velocity", np.full((5, 2), np.nan)))
+
+
+def test_a_page_shows_the_run(tmp_path):
+    sim = five_springs()
+    with pytest.raises(carom.UsageError, match="leaves no files"):
+        sim.view()
+    sim.output(tmp_path / "run", thermo_interval=0.1, frame_interval=0.1)
+    sim.run(time=1)
+    with sim.view(browser=False) as page:
+        assert re.match(r"http://127\.0\.0\.1:\d+/", page.address) and page.address in page._repr_html_()
+        assert "<!doctype html>" in urllib.request.urlopen(page.address).read().decode()
+        with pytest.raises(carom.Error, match="port"):
+            sim.view(port=int(page.address.split(":")[2].split("/")[0]), browser=False)
+        state = urllib.request.urlopen(page.address + "runs").read().decode()
+        assert '"frames":11' in state.replace(" ", "")
+    with pytest.raises(OSError):
+        urllib.request.urlopen(page.address, timeout=5)
+    sim.open().view(export=tmp_path / "page.html")
+    assert "<!doctype html>" in (tmp_path / "page.html").read_text()

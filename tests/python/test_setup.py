@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Placement, temperatures, potentials from expressions."""
+
+import numpy as np
+import pytest
+
+import carom
+from scenes import five_springs, gas
+
+
+def test_particles_are_placed_as_in_decks():
+    sim = carom.Simulation(dimension=3, boundary="periodic")
+    assert sim.add_particles(count=100, temperature=0.5, radius=0.5, species="a") == range(100)
+    assert sim.add_particles(count=8, temperature=2.0, radius=0.25, mass=3.0, species="b") == range(100, 108)
+    assert sim.place("fcc", packing_fraction=0.3, seed=7) == range(108)
+    deck = {"format": 1, "system": {"dimension": 3, "boundary": ["periodic"] * 3},
+            "particles": [{"name": "a", "count": 100, "temperature": 0.5, "radius": 0.5},
+                          {"name": "b", "count": 8, "temperature": 2.0, "radius": 0.25, "mass": 3.0}],
+            "placement": {"type": "fcc", "packing_fraction": 0.3, "seed": 7},
+            "integrator": {"type": "free-flight"}, "run": {"collisions": 1000}}
+    same = carom.Simulation.from_deck(deck)
+    for name in ("position", "velocity", "mass", "radius", "species"):
+        assert np.array_equal(getattr(sim, name), getattr(same, name)), name
+    assert sim.box == same.box and np.sum(np.pi / 6 * (2 * sim.radius) ** 3) / np.prod(sim.box) == pytest.approx(0.3)
+    with pytest.raises(carom.UsageError, match="there is no integrator"):
+        sim.run(time=1)
+    sim.integrator("free-flight")
+    with pytest.raises(carom.UsageError, match="no end"):
+        sim.run()
+    sim.run(collisions=10)
+    same.run(collisions=10)
+    assert np.array_equal(sim.position, same.position) and sim.temperature == pytest.approx((100 * 0.5 + 8 * 2) / 108)
+
+
+def test_particles_are_placed_between_others_that_have_bonds():
+    sim = five_springs()
+    sim.add_particles(count=6, temperature=0.0, radius=0.3, species="gas")
+    with pytest.raises(carom.UsageError, match="call place"):
+        sim.run(time=1)
+    sim.place("random", seed=3)
+    assert len(sim) == 11 and np.array_equal(sim.position[:5], five_springs().position) and not sim.velocity[5:].any()
+    sim.run(time=1)
+    assert sim.energy == pytest.approx(five_springs().energy) and sim.energy_error < 1e-13
+
+
+@pytest.mark.parametrize("call, message", [
+    (lambda s: s.place("fcc"), "no particles were given by count"),
+    (lambda s: s.add_particles(count=3), "needs a 'temperature'"),
+    (lambda s: s.add_particles(count=3, temperature=1, position=[[1, 1]]), "'count' excludes"),
+    (lambda s: s.add_particles(temperature=1, position=[[1, 1]]), "call thermalize"),
+    (lambda s: s.add_particles(), "there is no 'position'"),
+    (lambda s: (s.add_particles(count=3, temperature=1, species="b"), s.place("fcc")), "'fcc' is a lattice of 3 dimensions"),
+    (lambda s: carom.Simulation(), "give its edges, or dimension"),
+    (lambda s: carom.Simulation(dimension=2).add_particles([[1, 1]]), "need the 'box'"),
+])
+def test_mistakes_of_placement(call, message):
+    with pytest.raises(carom.UsageError, match=message):
+        call(five_springs())
+
+
+def test_no_room():
+    sim = carom.Simulation(box=[4, 4])
+    sim.add_particles(count=100, temperature=1.0, radius=0.5)
+    with pytest.raises(carom.InitialStateError, match="random insertion found no place"):
+        sim.place("random")
+
+
+def test_temperatures_are_exact_and_of_one_species():
+    sim = gas()
+    sim.thermalize(2.5, seed=4)
+    assert sim.temperature == pytest.approx(2.5, rel=1e-14) and np.abs(sim.momentum).max() < 1e-12
+    drawn = sim.velocity.copy()
+    sim.thermalize(2.5, seed=5)
+    assert not np.allclose(drawn, sim.velocity)
+    sim = carom.Simulation(box=[9, 9])
+    sim.add_particles([[1, 1], [3, 3]], species="a")
+    sim.add_particles([[5, 5], [7, 7]], species="b", mass=4)
+    sim.thermalize(3.0, species="b")
+    assert not sim.velocity[:2].any() and 0.5 * 4 * (sim.velocity[2:] ** 2).sum() == pytest.approx(2 * 3.0)
+    for bad in (-1.0, np.inf):
+        with pytest.raises(carom.UsageError, match="give 0 or more"):
+            sim.thermalize(bad)
+    with pytest.raises(carom.UsageError, match="no species 'c'; give one of: a, b"):
+        sim.thermalize(1.0, species="c")
+
+
+def pair(expression, **given):
+    """Two particles in a periodic box at a distance that can be set; what adding the potential returned."""
+    sim = carom.Simulation(box=[20, 20, 20], boundary="periodic")
+    sim.add_particles([[5, 5, 5], [6, 5, 5]], radius=0.1)
+    return sim, sim.add_potential(expression, **given)
+
+
+@pytest.mark.parametrize("expression, constants", [
+    ("epsilon*exp(-(r/sigma)**2)", {"epsilon": 2.0, "sigma": 1.0}), (lambda r, q: q / r * np.exp(-r), {"q": -3.0}),
+    ("4*(r**-12 - r**-6)", {}), ("erfc(r)/r", {})])
+def test_a_table_is_as_near_the_expression_as_it_says(expression, constants):
+    start, cutoff = 0.8, 3.0
+    sim, points = pair(expression, start=start, cutoff=cutoff, tolerance=1e-7, options={"cut": "shifted"}, **constants)
+    value = carom.potentials.function_of(expression, constants)
+    off = []
+    for r in np.random.default_rng(1).uniform(start, cutoff, 200):
+        sim.position = [[5, 5, 5], [5 + r, 5, 5]]
+        off.append(sim.potential - (value(r) - value(cutoff)))
+    scale = np.abs(value(np.linspace(start, cutoff, 99))).max()
+    assert 0.01 * points.error < np.abs(off).max() <= 2.2 * points.error + 1e-15 * scale and points.error <= 1e-7 * scale
+    assert f"{points.error:.1e}" in repr(points) and points.force_error < 1e-3 * scale
+
+
+def test_an_expression_keeps_its_energy():
+    sim = gas(packing=0.05)
+    sim.add_potential("epsilon*exp(-r**2)", start=0.5, cutoff=2.0, epsilon=1.5)
+    sim.integrator("edda", step=0.01)
+    sim.run(time=1)
+    assert sim.energy_error < 1e-12 and sim.potential > 0
+
+
+@pytest.mark.parametrize("expression, given, message", [
+    ("epsilon*r", {}, "unknown name 'epsilon' in 'epsilon\\*r'"), ("r.__class__", {}, "unknown name '__class__'"),
+    ("r +", {}, "is no expression"), ("log(r - 1)", {}, "not finite at r = 0.5"), (3, {}, "give a text such as"),
+    ("abs(r - 1.234)", {"tolerance": 1e-9}, "8192 points leave an error of"), ("r", {"start": 0}, "give 0 < start < cutoff"),
+])
+def test_mistakes_in_expressions(expression, given, message):
+    with pytest.raises(carom.UsageError, match=message):
+        pair(expression, **({"start": 0.5, "cutoff": 2.0} | given))
