@@ -79,7 +79,7 @@ void export_page(const ViewOptions& options) {
     if (const auto rdf = run.answer("rdf")) stored[prefix + "rdf"] = rdf->body;
     state["frames"] = kept;
     state["thermo"] = thermo.size();
-    state["status"] = "export";
+    if (state["status"] == "running") state["status"] = "running when exported";
     states.push_back(state);
     notes += fmt::format("{}: {} of {} frames{}\n", options.runs[k].string(), kept, frames,
                          kept < frames ? ", what --max-size takes" : "");

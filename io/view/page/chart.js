@@ -81,6 +81,9 @@ class Chart {
   draw(now) {
     const canvas = this.canvas, ratio = window.devicePixelRatio || 1, pen = canvas.getContext("2d");
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    const drawn = [now, width, height, ratio, ...this.curves.flatMap((curve) => [curve.name, curve.x.length, curve.every])].join();
+    if (drawn === this.drawn) return;
+    this.drawn = drawn;
     [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
     pen.scale(ratio, ratio);
     pen.font = "11px system-ui, sans-serif";
@@ -101,7 +104,8 @@ class Chart {
     for (const tick of Chart.round(x0, x1)) {
       pen.strokeRect(px(tick), top, 0, bottom - top);
       pen.textAlign = "center";
-      pen.fillText(String(+tick.toPrecision(4)), px(tick), bottom + 13);
+      const text = String(+tick.toPrecision(4));
+      pen.fillText(text, Math.min(px(tick), width - 2 - pen.measureText(text).width / 2), bottom + 13);
     }
     pen.textAlign = "right";
     pen.fillText(this.xLabel, right, height - 1);

@@ -100,11 +100,11 @@ class Spheres {
     };
     this.drawSpheres(width, height, coarse);
     this.drawBonds();
-    for (const [name, colour] of [["box", GREY], ["cut", GREY], ["path", PATH]]) {
-      gl.uniform4fv(this.use("lines", name, [3], 0).colour, colour);
-      gl.drawArrays(gl.LINES, 0, this.corners[name]);
-    }
+    for (const name of ["box", "cut"]) this.drawLines(name, GREY);
     this.drawWalls();
+    gl.disable(gl.DEPTH_TEST);  // no sphere hides the path
+    this.drawLines("path", PATH);
+    gl.enable(gl.DEPTH_TEST);
   }
   drawSpheres(width, height, coarse) {
     const { gl, visible } = this;
@@ -115,6 +115,10 @@ class Spheres {
     if (visible.points) gl.drawArrays(gl.POINTS, 0, visible.points);
     gl.uniform1i(this.use("spheres", "spheres", [4, 1], 1, visible.first).squares, 1);
     if (visible.squares) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, visible.squares);
+  }
+  drawLines(name, colour) {
+    this.gl.uniform4fv(this.use("lines", name, [3], 0).colour, colour);
+    this.gl.drawArrays(this.gl.LINES, 0, this.corners[name]);
   }
   // A bond across a periodic boundary is drawn as two halves, each towards the nearest image of the other end.
   drawBonds() {
@@ -128,6 +132,7 @@ class Spheres {
       const image = edges.map((edge, axis) => (this.boundary[axis] === "periodic" ? edge * Math.round((b[axis] - a[axis]) / edge) : 0));
       if (!image.some((shift) => shift)) { numbers.push(...a, ...b, thickness); continue; }
       const half = [0, 1, 2].map((axis) => (b[axis] - image[axis] - a[axis]) / 2);
+      if (Math.hypot(...half) < 1.3 * this.size * Math.max(radii[i], radii[j])) continue;  // it would barely leave the sphere
       numbers.push(...a, ...a.map((x, axis) => x + half[axis]), thickness, ...b.map((x, axis) => x - half[axis]), ...b, thickness);
     }
     this.strips = numbers.length / 7;
