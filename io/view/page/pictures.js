@@ -73,17 +73,22 @@ async function saveFilm() {
   const canvas = document.createElement("canvas"), pause = 1000 / element("speed").value, parts = [];
   goTo(0);
   compose(canvas);
-  const stream = canvas.captureStream(0), recorder = new MediaRecorder(stream, { mimeType: type, videoBitsPerSecond: 8e6 });
+  const stream = canvas.captureStream(), recorder = new MediaRecorder(stream, { mimeType: type, videoBitsPerSecond: 8e6 });
   recorder.ondataavailable = (event) => parts.push(event.data);
   const ended = new Promise((done) => { recorder.onstop = done; });
-  recorder.start();
+  recorder.start(200);
   for (let k = 0; k < frames() && filming; k++) {
     const start = performance.now();
     wanted = k;
     await Promise.all(panels.map((panel) => panel.show(k)));
     compose(canvas);
-    stream.getVideoTracks()[0].requestFrame();
+    await new Promise(requestAnimationFrame);
     await new Promise((done) => setTimeout(done, Math.max(0, pause - (performance.now() - start))));
+  }
+  const recorded = () => parts.reduce((sum, part) => sum + part.size, 0) > 1000;
+  for (const end = performance.now() + 20000; !recorded() && performance.now() < end;) {  // a slow encoder has not begun yet
+    compose(canvas);
+    await new Promise((done) => setTimeout(done, 200));
   }
   recorder.stop();
   await ended;

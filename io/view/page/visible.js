@@ -21,7 +21,7 @@ class Visible {
     for (let k = 0; k < all; k++) {
       const i = this.seen ? this.leaders[k] : k, x = positions[3 * i], y = positions[3 * i + 1], z = positions[3 * i + 2];
       const r = radii[i] * scene.size, depth = -(c0 * x + c1 * y + c2 * z + s2);
-      if (n0 * x + n1 * y + n2 * z > limit || depth <= near) continue;
+      if (n0 * x + n1 * y + n2 * z > limit || depth <= Math.max(near, r)) continue;
       const q = scale / depth, px = Math.abs(q * (a0 * x + a1 * y + a2 * z + s0)), py = Math.abs(q * (b0 * x + b1 * y + b2 * z + s1));
       const reach = depth > 2 * r ? 2 * q * r : Infinity;  // no less than half the width of its picture
       if (px - reach > right || py - reach > top) continue;
@@ -52,7 +52,7 @@ class Visible {
     farthest.fill(Infinity);
     const put = (i) => {
       const x = positions[3 * i], y = positions[3 * i + 1], z = positions[3 * i + 2], depth = -(c0 * x + c1 * y + c2 * z + s2);
-      if (depth <= near || n0 * x + n1 * y + n2 * z > limit) return;
+      if (depth <= Math.max(near, radii[i] * scene.size) || n0 * x + n1 * y + n2 * z > limit) return;
       const q = scale / depth, r = q * radii[i] * scene.size, px = cx + q * (a0 * x + a1 * y + a2 * z + s0), py = cy - q * (b0 * x + b1 * y + b2 * z + s1);
       const left = Math.max(0, Math.ceil(px - r)), right = Math.min(w - 1, Math.floor(px + r));
       const low = Math.max(0, Math.ceil(py - r)), high = Math.min(h - 1, Math.floor(py + r));
