@@ -42,8 +42,10 @@ def chromium(width=1200, height=640):
 
 
 def resize(browser, width, height):
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
-                            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
+    """Makes the page, without the frame of its window, so large."""
+    frame = browser.execute_script("return [outerWidth - innerWidth, outerHeight - innerHeight]")
+    browser.set_window_size(width + frame[0], height + frame[1])
+    wait_for(browser, f"innerWidth === {width} && innerHeight === {height}")
 
 
 def wait_for(browser, condition, seconds=60):

@@ -151,7 +151,7 @@ class Panel {
     this.spheres.draw(coarse);
     const walls = (state.boundary || []).map((kind, axis) => (kind === "wall" ? "xyz"[axis] : "")).join("");
     const lines = [state.title, frame ? `${counted(state.particles, this.noun)}, ${counted(frame.collisions, "collision")}` : "",
-                   walls ? `walls along ${[...walls].join(", ")}` : "", state.status];
+                   [walls && `walls along ${[...walls].join(", ")}`, state.status].filter(Boolean).join("; ")];
     this.label.replaceChildren(Object.assign(document.createElement("b"), { textContent: state.integrator || state.name || "" }),
       ...lines.filter((line) => line).map((line) => `\n${line}`));
   }

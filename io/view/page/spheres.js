@@ -4,7 +4,7 @@
 const rgb = (hex) => [0, 8, 16].map((shift) => ((hex >> (16 - shift)) & 255) / 255);
 const VIRIDIS = [0x440154, 0x46327e, 0x365c8d, 0x277f8e, 0x1fa187, 0x4ac16d, 0xa0da39, 0xfde725];
 const KINDS = [0x4e9af1, 0xf28e2b, 0x59c16a, 0xe15759, 0xb07aa1, 0xedc948, 0x76d7d0, 0xff9da7];
-const GREY = [0.55, 0.6, 0.68, 1], BOND = [0.83, 0.8, 0.72, 1], WALL = [0.62, 0.66, 0.74, 0.6], PATH = [1, 0.8, 0.3, 1];
+const GREY = [0.55, 0.6, 0.68, 1], BOND = [0.83, 0.8, 0.72, 1], WALL = [0.62, 0.66, 0.74], PATH = [1, 0.8, 0.3, 1];
 
 class Spheres {
   constructor(canvas, camera) {
@@ -149,8 +149,8 @@ class Spheres {
     if (!numbers.length) return;
     this.fill("walls", new Float32Array(numbers));
     const uniforms = this.use("walls", "walls", [3], 0);
-    gl.uniform4fv(uniforms.colour, WALL);
-    gl.uniform1f(uniforms.spacing, Math.max(...this.edges) / (this.flat ? 60 : 30));
+    gl.uniform4fv(uniforms.colour, [...WALL, this.flat ? 0.6 : 0.22]);
+    gl.uniform1f(uniforms.spacing, Math.max(...this.edges) / (this.flat ? 60 : 12));
     gl.enable(gl.BLEND);
     gl.depthMask(false);
     gl.drawArrays(gl.TRIANGLES, 0, numbers.length / 3);
