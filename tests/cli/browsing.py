@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the tests of the page of `carom view` do with a browser: look at it, press keys, click."""
 
+import base64
 import contextlib
 import io
 import subprocess
@@ -18,12 +19,17 @@ BACKGROUND = np.array([20, 22, 26])
 
 
 def picture(browser, selector=".panel canvas", settled=True):
-    """What is to be seen of the first such element: its pixels, once all that is new is drawn, unless it never is."""
+    """The pixels of the first such element, once everything new is drawn unless `settled` is false. Those of a canvas are read from the
+    page: a screenshot of a page that draws all the time may take longer on a busy machine than the driver waits."""
     from PIL import Image
     from selenium.webdriver.common.by import By
     if settled:
         wait_for(browser, "!dirty && panels.every(p => p.shown === Math.min(Math.floor(wanted), p.state.frames - 1))")
-    image = browser.find_element(By.CSS_SELECTOR, selector).screenshot_as_png
+    if selector.endswith("canvas"):
+        address = browser.execute_script("drawAll(false); return document.querySelector(arguments[0]).toDataURL('image/png')", selector)
+        image = base64.b64decode(address.split(",")[1])
+    else:
+        image = browser.find_element(By.CSS_SELECTOR, selector).screenshot_as_png
     return np.asarray(Image.open(io.BytesIO(image)).convert("RGB")).astype(int)
 
 
