@@ -96,9 +96,8 @@ void RunSource::look() {
              {"boundary", hdf5::texts(file, "/parameters/boundary")},
              {"species", hdf5::texts(file, "/parameters/species")},
              {"particles", particles_},
-             {"bonds", hdf5::exists(file, vmd_structure::bond_from)
-                           ? hdf5::shape(file, vmd_structure::bond_from).at(0)
-                           : 0}};
+             {"bonds",
+              hdf5::exists(file, vmd_structure::bond_from) ? hdf5::shape(file, vmd_structure::bond_from).at(0) : 0}};
     counts_.clear();
   });
   seen_ = now.version;
@@ -140,7 +139,8 @@ std::optional<Answer> RunSource::answer(std::string_view question) {
     const std::size_t slash = question.rfind('/');
     const auto particle = number_behind(question.substr(0, slash), "path/");
     const auto first = number_behind(question.substr(slash), "/");
-    if (particle && first && *particle < particles_ && *first < frames_) return Answer{kBinary, path(*particle, *first)};
+    if (particle && first && *particle < particles_ && *first < frames_)
+      return Answer{kBinary, path(*particle, *first)};
   }
   if (const auto number = number_behind(question, "frame/"); number && *number < frames_)
     return Answer{kBinary, frame(*number)};
