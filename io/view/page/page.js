@@ -41,13 +41,14 @@ async function poll() {
 // The server ends with the run: what the runs do is no longer known.
 function lost() {
   message("carom has ended");
+  if (running()) dirty = true;
   for (const { state } of panels) if (["running", "awaited"].includes(state.status)) state.status = "ended";
-  dirty = true;
 }
+const failed = (error) => (error instanceof TypeError ? lost() : message(error.message));
 
 async function keepPolling() {
   for (let first = true; ; first = false) {
-    await poll().catch((error) => (error instanceof TypeError ? lost() : message(error.message)));
+    await poll().catch(failed);
     if (!source.live || (first && !running())) play(true);
     if (!source.live) return;
     await new Promise((done) => setTimeout(done, running() ? 250 : 2000));
@@ -78,7 +79,10 @@ async function animate() {
     const now = await new Promise(requestAnimationFrame);
     advance(Math.min(0.2, (now - before) / 1000));
     before = now;
-    if (!filming) await Promise.all(panels.map((panel) => panel.show(Math.floor(wanted)))).catch((error) => message(error.message));
+    if (!filming) await Promise.all(panels.map((panel) => panel.show(Math.floor(wanted)))).catch(async (error) => {
+      failed(error);
+      await new Promise((done) => setTimeout(done, 250));
+    });
     const rests = !playing && now - lastMove > 250;
     if (!dirty && !(coarse && rests)) continue;
     dirty = false;
