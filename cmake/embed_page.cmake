@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Writes OUTPUT, C++ with the page of `carom view` and the deck of `carom demo` as texts.
 # cmake -DPAGE=folder -DDECK=file -DOUTPUT=… -P embed_page.cmake
-foreach(script source spheres chart page)
-  file(READ ${PAGE}/${script}.js ${script})
+foreach(script source camera visible shaders spheres chart panel controls pictures page)  # page.js starts all
+  file(READ ${PAGE}/${script}.js text)
+  string(APPEND scripts "${text}")
 endforeach()
 file(READ ${PAGE}/view.css css)
 configure_file(${PAGE}/index.html ${OUTPUT}.html @ONLY)

@@ -4,6 +4,7 @@
 
     tools/view_cost.py                  # all three, about five minutes
     tools/view_cost.py --minutes 10     # the page is left open for so long
+    tools/view_cost.py --drawing        # only the frames drawn a second
 
 Chromium runs without a window and draws by the processor (SwiftShader). Needs what tools/test-packages.txt names.
 """
@@ -23,21 +24,23 @@ from view_picture import chromium, wait_for
 
 DECK = pathlib.Path(__file__).resolve().parent.parent / "inputs" / "hard-sphere-fluid.toml"
 DRAW = """
-const n = arguments[0], spheres = panels[0].spheres, edge = Math.cbrt(n / 0.6), pixel = new Uint8Array(4);
-const x = new Float32Array(3 * n).map(() => edge * Math.random());
+const [n, distance] = arguments, spheres = panels[0].spheres, edge = Math.cbrt(n / 0.6), pixel = new Uint8Array(4);
+const x = new Float32Array(3 * n).map(() => edge * Math.random()), edges = [edge, edge, edge];
+Object.assign(panels[0].frame, { edges });
 spheres.setRadii(new Float32Array(n).fill(0.5));
 spheres.setPositions(x);
 spheres.setValues(x.subarray(0, n), [0, edge]);
-camera.fit([edge, edge, edge], false);
-const times = [];
-for (let k = 0; k < 3; k++) {
-  const start = performance.now();
-  camera.turn(20, 0);
-  spheres.draw();
+spheres.setBox(edges, ["periodic", "periodic", "periodic"], false);
+camera.fit(edges, false, 1);
+camera.zoom(distance);
+let start, drawn = -2;
+for (start = performance.now(); drawn < 10; drawn++) {
+  if (drawn === 0) start = performance.now();
+  camera.turn(3, 0);
+  drawAll(true);
   spheres.gl.readPixels(0, 0, 1, 1, spheres.gl.RGBA, spheres.gl.UNSIGNED_BYTE, pixel);
-  times.push(performance.now() - start);
 }
-return 1000 / times.sort((a, b) => a - b)[1];
+return (performance.now() - start) / drawn;
 """
 
 
@@ -98,8 +101,34 @@ def memory_of_a_page(carom, folder, n, minutes):
             frames = browser.execute_script("return frames()")
             print(f"page of a run of {n} spheres after {minute} min: {heap / 1e6:.1f} MB of JavaScript, {frames} frames", flush=True)
             time.sleep(60 if minute < minutes else 0)
-        for count in (100000, 1000000):
-            print(f"{count} spheres: {browser.execute_script(DRAW, count):.1f} frames a second", flush=True)
+
+
+def processor_seconds(pid):
+    """Of a process and all its descendants."""
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    children = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True).stdout.split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") + sum(map(processor_seconds, children))
+
+
+def drawing(carom, folder):
+    """Frames a second while the camera turns about spheres at random places, seen from outside and from near."""
+    settings = {"particles__0__count": 108, "run__end_time": 0.1}
+    subprocess.run(command(carom, folder / "small", **settings), check=True)
+    page = folder / "page.html"
+    subprocess.run([str(carom), "view", str(folder / "small"), "--export", str(page)], check=True, stdout=subprocess.DEVNULL)
+    for width, height in ((1200, 640), (2560, 1300)):
+        with chromium(width, height) as browser:
+            browser.set_script_timeout(600)
+            browser.get(page.as_uri())
+            wait_for(browser, "panels.length && panels[0].frame")
+            browser.execute_script("play(false); advance = () => {}; element('follow').checked = false")
+            for count in (100000, 1000000):
+                for distance in (1, 0.5):
+                    before = processor_seconds(browser.service.process.pid)
+                    milliseconds = browser.execute_script(DRAW, count, distance)
+                    used = (processor_seconds(browser.service.process.pid) - before) / 12
+                    print(f"{count} spheres, window of {width} by {height}, distance {distance}: {1000 / milliseconds:.1f} frames a second, "
+                          f"at most {1000 * used:.0f} ms of processor time each", flush=True)
 
 
 @one_line
@@ -107,12 +136,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=int, default=3)
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--drawing", action="store_true", help="measure only how many frames are drawn a second")
     parser.add_argument("--carom")
     arguments = parser.parse_args()
     carom = find_carom(arguments.carom)
     with tempfile.TemporaryDirectory() as name:
-        cost_of_a_run(carom, pathlib.Path(name), 108000, arguments.repeats)
-        memory_of_a_page(carom, pathlib.Path(name), 10976, arguments.minutes)
+        if not arguments.drawing:
+            cost_of_a_run(carom, pathlib.Path(name), 108000, arguments.repeats)
+            memory_of_a_page(carom, pathlib.Path(name), 10976, arguments.minutes)
+        drawing(carom, pathlib.Path(name))
 
 
 if __name__ == "__main__":

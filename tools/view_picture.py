@@ -4,6 +4,7 @@
 
     tools/view_picture.py runs/five-springs -o five-springs.png
     tools/view_picture.py --demo -o io/view/demo.png        # the picture in io/view/README.md
+    tools/view_picture.py runs/melt -o melt.png --width 500 --height 700 --then "panels[0].choose(17)"
 
 Needs Debian's chromium, chromium-driver and python3-selenium (tools/test-packages.txt), and python3-matplotlib's Pillow.
 """
@@ -24,7 +25,7 @@ from carom_files import find_carom, one_line
 
 @contextlib.contextmanager
 def chromium(width=1200, height=640):
-    """A browser as an object of selenium; WebGL is computed by the processor."""
+    """A browser as an object of selenium, with a page of this size in pixels; WebGL is computed by the processor."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
     options = webdriver.ChromeOptions()
@@ -34,9 +35,17 @@ def chromium(width=1200, height=640):
     options.set_capability("goog:loggingPrefs", {"performance": "ALL", "browser": "ALL"})
     browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
     try:
+        resize(browser, width, height)
         yield browser
     finally:
         browser.quit()
+
+
+def resize(browser, width, height):
+    """Makes the page, without the frame of its window, so large."""
+    frame = browser.execute_script("return [outerWidth - innerWidth, outerHeight - innerHeight]")
+    browser.set_window_size(width + frame[0], height + frame[1])
+    wait_for(browser, f"innerWidth === {width} && innerHeight === {height}")
 
 
 def wait_for(browser, condition, seconds=60):
@@ -56,6 +65,9 @@ def main():
     parser.add_argument("--demo", action="store_true", help="show carom demo instead, when it has come half of the way")
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True)
     parser.add_argument("--frame", type=int, default=-1, help="-1 is the last")
+    parser.add_argument("--width", type=int, default=1200)
+    parser.add_argument("--height", type=int, default=640)
+    parser.add_argument("--then", default="", help="JavaScript to run before the picture is taken")
     parser.add_argument("--carom")
     arguments = parser.parse_args()
     carom = str(find_carom(arguments.carom))
@@ -70,15 +82,15 @@ def main():
             demo.wait()
             runs = [str(summary.parent) for summary in summaries]
         page = pathlib.Path(folder) / "page.html"
-        if subprocess.run([carom, "view", *runs, "--export", str(page)], stdout=subprocess.DEVNULL).returncode:
+        if subprocess.run([carom, "view", *runs, "--export", str(page), "--max-size", "200"], stdout=subprocess.DEVNULL).returncode:
             sys.exit(1)
-        with chromium() as browser:
+        with chromium(arguments.width, arguments.height) as browser:
             browser.get(page.as_uri())
             wait_for(browser, "panels.length && panels.every(p => p.frame)")
-            browser.execute_script("play(false); wanted = (arguments[0] + frames()) % frames()", arguments.frame)
+            browser.execute_script(f"play(false); wanted = (arguments[0] + frames()) % frames(); {arguments.then}", arguments.frame)
             wait_for(browser, "panels.every(p => p.shown === Math.min(wanted, p.state.frames - 1)) && !dirty")
             picture = Image.open(io.BytesIO(browser.get_screenshot_as_png()))
-            picture.convert("P", palette=Image.Palette.ADAPTIVE, colors=128).save(arguments.output, optimize=True)
+            picture.convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE).save(arguments.output, optimize=True)
 
 
 if __name__ == "__main__":

@@ -209,10 +209,11 @@ std::string text(const File& file, const std::string& dataset);
 /// All numbers of a data set, the last axis fastest.
 template <class T>
 std::vector<T> numbers(const File& file, const std::string& dataset);
-/// So many rows of a data set, from `first` on, the last axis fastest; of the second axis `most` entries.
+/// `count` rows of a data set, from row `first` on, the last axis fastest; of the second axis at most `most` entries,
+/// from entry `column` on.
 template <class T>
 std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first, hsize_t count,
-                    hsize_t most = HSIZE_UNDEF);
+                    hsize_t most = HSIZE_UNDEF, hsize_t column = 0);
 /// A data set as it is stored.
 std::vector<std::byte> bytes(const File& file, const std::string& dataset);
 std::vector<std::string> texts(const File& file, const std::string& dataset);

@@ -131,7 +131,8 @@ template std::vector<std::int32_t> numbers(const File&, const std::string&);
 template std::vector<std::uint32_t> numbers(const File&, const std::string&);
 
 template <class T>
-std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first, hsize_t n, hsize_t most) {
+std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first, hsize_t n, hsize_t most,
+                    hsize_t column) {
   const Handle set = open_set(file, dataset);
   const Handle space(H5Dget_space(set.id()), H5Sclose);
   std::vector<hsize_t> count = shape_of_space(space.id()), start(count.size(), 0);
@@ -139,7 +140,10 @@ std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first,
     throw Error(Failure::file, file.path().string() + ": " + dataset + " is shorter than the other data sets");
   start[0] = first;
   count[0] = n;
-  if (count.size() > 1) count[1] = std::min(count[1], most);
+  if (count.size() > 1) {
+    start[1] = std::min(count[1], column);
+    count[1] = std::min(count[1] - start[1], most);
+  }
   std::vector<T> values(product(count));
   if (values.empty()) return values;
   const Handle memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
@@ -148,10 +152,10 @@ std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first,
              "read " + dataset);
   return values;
 }
-template std::vector<float> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t);
-template std::vector<double> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t);
-template std::vector<std::int32_t> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t);
-template std::vector<std::uint32_t> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t);
+template std::vector<float> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t, hsize_t);
+template std::vector<double> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t, hsize_t);
+template std::vector<std::int32_t> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t, hsize_t);
+template std::vector<std::uint32_t> rows(const File&, const std::string&, hsize_t, hsize_t, hsize_t, hsize_t);
 
 std::vector<std::byte> bytes(const File& file, const std::string& dataset) {
   const Handle set = open_set(file, dataset);

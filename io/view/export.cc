@@ -56,11 +56,12 @@ void export_page(const ViewOptions& options) {
     Json state = run.state();
     const auto frames = state.at("frames").get<std::uint64_t>();
     if (frames == 0) throw Error(Failure::file, options.runs[k].string() + ": no frame has been written yet");
-    const std::string thermo = thinned_thermo(run, 4000), particles = base64(run.answer("particles")->body);
+    const std::string thermo = thinned_thermo(run, 4000), particles = base64(run.answer("particles")->body),
+                      bonds = base64(run.answer("bonds")->body);
     const auto frame_of = [&](std::uint64_t number) {
       return run.answer("frame/" + std::to_string(number)).value().body;
     };
-    const double fixed = static_cast<double>(thermo.size() + particles.size()) + 2e5;
+    const double fixed = static_cast<double>(thermo.size() + particles.size() + bonds.size()) + 2e5;
     const double frame_bytes = 4.0 / 3.0 * static_cast<double>(frame_of(0).size()) + 32;
     if (share < fixed + frame_bytes)
       throw Error(Failure::deck,
@@ -74,10 +75,11 @@ void export_page(const ViewOptions& options) {
           base64(frame_of(kept == 1 ? frames - 1 : n * (frames - 1) / (kept - 1)));
     stored[prefix + "thermo/0"] = thermo;
     stored[prefix + "particles"] = particles;
+    stored[prefix + "bonds"] = bonds;
     if (const auto rdf = run.answer("rdf")) stored[prefix + "rdf"] = rdf->body;
     state["frames"] = kept;
     state["thermo"] = thermo.size();
-    state["status"] = "export";
+    if (state["status"] == "running") state["status"] = "running when exported";
     states.push_back(state);
     notes += fmt::format("{}: {} of {} frames{}\n", options.runs[k].string(), kept, frames,
                          kept < frames ? ", what --max-size takes" : "");

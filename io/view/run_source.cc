@@ -13,6 +13,7 @@
 #include "engine/base/error.h"
 #include "io/deck/deck.h"
 #include "io/files/directory_lock.h"
+#include "io/files/h5md.h"
 #include "io/files/hdf5.h"
 #include "io/files/journal.h"
 #include "io/files/output_directory.h"
@@ -94,7 +95,9 @@ void RunSource::look() {
              {"dimension", static_cast<int>(hdf5::number_at(file, "/parameters/dimension", 0))},
              {"boundary", hdf5::texts(file, "/parameters/boundary")},
              {"species", hdf5::texts(file, "/parameters/species")},
-             {"particles", particles_}};
+             {"particles", particles_},
+             {"bonds",
+              hdf5::exists(file, vmd_structure::bond_from) ? hdf5::shape(file, vmd_structure::bond_from).at(0) : 0}};
     counts_.clear();
   });
   seen_ = now.version;
@@ -131,6 +134,14 @@ std::optional<Answer> RunSource::answer(std::string_view question) {
   look();
   if (frames_ == 0) return {};
   if (question == "particles") return Answer{kBinary, fixed_values()};
+  if (question == "bonds") return Answer{kBinary, bonds()};
+  if (question.starts_with("path/")) {
+    const std::size_t slash = question.rfind('/');
+    const auto particle = number_behind(question.substr(0, slash), "path/");
+    const auto first = number_behind(question.substr(slash), "/");
+    if (particle && first && *particle < particles_ && *first < frames_)
+      return Answer{kBinary, path(*particle, *first)};
+  }
   if (const auto number = number_behind(question, "frame/"); number && *number < frames_)
     return Answer{kBinary, frame(*number)};
   return {};
@@ -141,9 +152,40 @@ std::string RunSource::fixed_values() const {
   hdf5::read_between_flushes(trajectory_, [&] {
     const auto file = hdf5::File::open_unlocked(trajectory_);
     bytes.clear();
-    for (const char* name : {"/radius", "/species"})
+    for (const char* name : {"/radius", "/species", "/mass", "/charge"})
       append<float>(bytes, hdf5::rows<float>(file, kParticles + name, 0, particles_));
   });
+  return bytes;
+}
+
+std::string RunSource::bonds() const {
+  std::vector<std::uint32_t> ids;
+  hdf5::read_between_flushes(trajectory_, [&] {
+    ids.clear();
+    const auto file = hdf5::File::open_unlocked(trajectory_);
+    if (!hdf5::exists(file, vmd_structure::bond_from)) return;
+    const auto from = hdf5::numbers<std::uint32_t>(file, vmd_structure::bond_from);
+    const auto to = hdf5::numbers<std::uint32_t>(file, vmd_structure::bond_to);
+    for (std::size_t k = 0; k < std::min(from.size(), to.size()); ++k) {
+      if (std::min(from[k], to[k]) < 1 || std::max(from[k], to[k]) > particles_)
+        throw Error(Failure::file, trajectory_.string() + ": holds a bond of no particle: it is damaged");
+      ids.insert(ids.end(), {from[k] - 1, to[k] - 1});
+    }
+  });
+  std::string bytes;
+  append<std::uint32_t>(bytes, ids);
+  return bytes;
+}
+
+std::string RunSource::path(std::uint64_t particle, std::uint64_t first) const {
+  std::vector<float> x;
+  hdf5::read_between_flushes(trajectory_, [&] {
+    const auto file = hdf5::File::open_unlocked(trajectory_);
+    const auto frames = std::min<std::uint64_t>(2000, frames_ - first);
+    x = hdf5::rows<float>(file, kParticles + "/position/value", first, frames, 1, particle);
+  });
+  std::string bytes;
+  append<float>(bytes, x);
   return bytes;
 }
 

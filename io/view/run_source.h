@@ -3,9 +3,11 @@
 // What the page asks of a run, answered from the run's files, which may be growing.
 //
 //   state         JSON: what the run is, how many frames there are, whether it goes on
-//   particles     32-bit floats, little-endian: the radii [length], then the species
+//   particles     32-bit floats, little-endian: N radii [length], N species, N masses [mass], N charges [charge]
+//   bonds         32-bit integers: the two ids of each bond, which count from 0
 //   frame/K       eight doubles (time, step, collisions, the three edges of the box, whether counts follow, 0), then
 //                 floats: N positions of three columns [length], N speeds [velocity], N numbers of collisions so far
+//   path/I/K      floats: the positions of particle I in frame K and those that follow, at most 2000 frames
 //   thermo/B      thermo.csv from its byte B on, whole rows, at most 4 MiB
 //   rdf           rdf.csv
 
@@ -40,6 +42,8 @@ class RunSource {
  private:
   void look();
   std::string fixed_values() const;
+  std::string bonds() const;
+  std::string path(std::uint64_t particle, std::uint64_t first) const;
   std::string frame(std::uint64_t number);
   void count_collisions(double until);
 

@@ -245,8 +245,14 @@ def test_frames_are_those_of_the_trajectory(shown, finished):
     file = h5py.File(finished / "trajectory.h5md")
     group, events = file["particles/trajectory"], h5py.File(finished / "events.h5")["events"]
     assert (state["frames"], state["particles"], state["status"], state["dimension"]) == (7, 108, "done", 3)
-    fixed = np.frombuffer(get(port, path + "0/particles")[1], "<f4").reshape(2, 108)
-    assert np.array_equal(fixed[0], group["radius"][:].astype("f4")) and np.array_equal(fixed[1], group["species"][:])
+    fixed = np.frombuffer(get(port, path + "0/particles")[1], "<f4").reshape(4, 108)
+    for values, name in zip(fixed, ("radius", "species", "mass", "charge")):
+        assert np.array_equal(values, group[name][:].astype("f4")), name
+    for particle, first in ((0, 0), (107, 2), (5, 6)):
+        assert np.array_equal(np.frombuffer(get(port, f"{path}0/path/{particle}/{first}")[1], "<f4").reshape(-1, 3),
+                              group["position/value"][first:, particle].astype("f4"))
+    for nowhere in ("108/0", "0/7", "0", "/0", "0/-1", "0/0/0"):
+        assert get(port, f"{path}0/path/{nowhere}")[0] == 404
     for frame in (3, 6, 1):  # forwards and backwards: counts of collisions too
         body = get(port, path + f"0/frame/{frame}")[1]
         time_, _, collisions, *edges, counted, _ = struct.unpack("<8d", body[:64])
@@ -261,6 +267,15 @@ def test_frames_are_those_of_the_trajectory(shown, finished):
     thermo = (finished / "thermo.csv").read_bytes()
     assert get(port, path + "0/thermo/0")[1] == thermo and get(port, path + "0/thermo/100")[1] == thermo[100:]
     assert get(port, path + "0/rdf")[1] == (finished / "rdf.csv").read_bytes()
+
+
+def test_bonds_are_those_of_the_trajectory(tmp_path):
+    run(write_deck(tmp_path, SPRINGS), tmp_path / "run")
+    with page("view", tmp_path / "run", "--no-browser") as (_, port, path):
+        pairs = np.frombuffer(get(port, path + "0/bonds")[1], "<u4").reshape(-1, 2)
+        group = h5py.File(tmp_path / "run" / "trajectory.h5md")["parameters/vmd_structure"]
+        assert len(pairs) and np.array_equal(pairs + 1, np.column_stack([group["bond_from"], group["bond_to"]]))
+        assert json.loads(get(port, path + "runs")[1])[0]["bonds"] == len(pairs)
 
 
 def test_a_run_that_is_shown_while_it_goes_on_is_the_same_run(tmp_path):

@@ -1,55 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of `carom view` in a real browser: Chromium without a window, where it is installed (tools/test-packages.txt)."""
+"""The page of `carom view` in a real browser: spheres that move, curves that grow. Its controls: test_view_controls.py."""
 
 import contextlib
-import io
-import os
 import pathlib
-import shutil
 import subprocess
-import sys
 import time
 
 import numpy as np
-import pytest
 
+from browsing import colour_by, differing, label, lit, picture, wait_for
 from runs import CAROM, ROOT, SPHERES, needs_carom, run, write_deck
 from test_view import page
 
-sys.path.insert(0, str(ROOT / "tools"))
-
-MISSING = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
-from view_picture import chromium, wait_for
-
 pytestmark = needs_carom
-BACKGROUND = np.array([20, 22, 26])
-
-
-@pytest.fixture(scope="module")
-def browser():
-    if MISSING and not os.environ.get("CI"):
-        pytest.exit(f"skipped: {' and '.join(MISSING)} not installed; tools/test installs tools/test-packages.txt", returncode=77)
-    with chromium(1000, 600) as window:
-        yield window
-
-
-def picture(browser, selector=".panel canvas", settled=True):
-    """What is to be seen of the first such element: its pixels, once all that is new is drawn, unless it never is."""
-    from PIL import Image
-    from selenium.webdriver.common.by import By
-    if settled:
-        wait_for(browser, "!dirty && panels.every(p => p.shown === Math.min(Math.floor(wanted), p.state.frames - 1))")
-    image = browser.find_element(By.CSS_SELECTOR, selector).screenshot_as_png
-    return np.asarray(Image.open(io.BytesIO(image)).convert("RGB")).astype(int)
-
-
-def lit(pixels):
-    """The part of the pixels that are not background."""
-    return (abs(pixels - BACKGROUND).max(axis=2) > 40).mean()
-
-
-def differing(one, other):
-    return (abs(one - other).max(axis=2) > 40).mean()
 
 
 def points(browser, curve):
@@ -66,11 +29,6 @@ def running(tmp_path, *overrides):
     sets = [part for override in overrides for part in ("--set", override)]
     with page("run", deck, "-o", tmp_path / "run", "--view", "--no-browser", "--quiet", *sets) as (_, port, path):
         yield f"http://127.0.0.1:{port}{path}"
-
-
-def colour_by(browser, name):
-    browser.execute_script("element('colour').value = arguments[0]; element('colour').dispatchEvent(new Event('change'))", name)
-    wait_for(browser, "!dirty")
 
 
 def requested(browser):
@@ -101,6 +59,7 @@ def test_a_run_is_seen_while_it_goes_on(browser, tmp_path):
         start = picture(browser)
         time.sleep(1)
         assert differing(start, picture(browser)) == 0
+        assert "0 collisions" in label(browser)
         assert "frame 1 of" in browser.execute_script("return element('time').textContent")
 
         # Colours: nothing moves, every sphere is of one kind, then none has collided yet.
@@ -122,7 +81,8 @@ def test_a_run_is_seen_while_it_goes_on(browser, tmp_path):
     asked = requested(browser)
     assert asked and all(url.startswith(address) for url in asked if not url.endswith("/favicon.ico")), asked
     assert all(url.startswith("http://127.0.0.1") for url in asked)
-    wait_for(browser, "element('message').textContent === 'carom has ended'")
+    wait_for(browser, "element('message').textContent === 'carom has ended' && !dirty")
+    assert browser.execute_script("return panels[0].label.textContent.split('\\n').at(-1)") == "ended", "it does not run any more"
 
 
 def test_a_wrong_token_gets_nothing(browser, tmp_path):
@@ -157,6 +117,7 @@ def test_discs_in_two_dimensions(browser, tmp_path):
         wait_for(browser, "panels.length && panels[0].frame")
         browser.execute_script("play(false); wanted = 0")
         colour_by(browser, "species")
+        browser.execute_script("panels[0].key.hidden = true")
         pixels = picture(browser)
         blue = (pixels[:, :, 2] > pixels[:, :, 0] + 60)
         columns = np.flatnonzero(np.diff(np.concatenate([[0], blue.any(axis=0).astype(int)])) == 1)

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 "use strict";
-// A curve that grows: when it has too many points, each two become one, of the larger values where `largest`.
+const element = (id) => document.getElementById(id);
+
+// A curve that grows: when it has too many points, pairs of them are merged into one, with the mean of the two values or, where
+// `largest` is set, the larger one.
 class Curve {
   constructor(name, colour, largest) { Object.assign(this, { name, colour, largest, x: [], y: [], every: 1, waiting: [] }); }
   add(x, y) {
@@ -22,7 +25,7 @@ class Curve {
 }
 Curve.most = 4000;
 
-// Curves over one axis. `log`: decades; what is zero lies on the floor.
+// Curves over one axis. `log`: the other axis is logarithmic, and zeros are drawn at its lower end.
 class Chart {
   constructor(parent, title, xLabel, log) {
     Object.assign(this, { title, xLabel, log, curves: [], canvas: document.createElement("canvas") });
@@ -47,18 +50,40 @@ class Chart {
     for (const curve of this.curves)
       for (let k = 0; k < curve.x.length; k++) {
         const y = this.log ? Math.log10(curve.y[k]) : curve.y[k];
-        if (!isFinite(y)) continue;
-        [x0, x1, y0, y1] = [Math.min(x0, curve.x[k]), Math.max(x1, curve.x[k]), Math.min(y0, y), Math.max(y1, y)];
+        if (!isNaN(y)) [x0, x1] = [Math.min(x0, curve.x[k]), Math.max(x1, curve.x[k])];
+        if (isFinite(y)) [y0, y1] = [Math.min(y0, y), Math.max(y1, y)];
       }
+    if (isFinite(x0) && !(y1 >= y0)) [y0, y1] = this.log ? [-16, -15] : [0, 0];  // zeros only
     if (this.log) [y0, y1] = [Math.floor(y0), Math.max(Math.floor(y0) + 1, Math.ceil(y1))];
     if (!(x1 > x0)) [x0, x1] = [x0 - 0.5, x0 + 0.5];
-    // What is constant but for rounding is drawn as a line.
+    // A quantity that is constant up to rounding is drawn as a straight line.
     const margin = this.log ? 0 : Math.max(0.05 * (y1 - y0), 1e-3 * Math.max(Math.abs(y0), Math.abs(y1))) || 1;
     return [x0, x1, y0 - margin, y1 + margin];
+  }
+  // The names of the curves, beside the title if there is room, otherwise in lines below it; returns where the diagram begins.
+  legend(pen, left, right) {
+    const gap = 12, widths = this.curves.map((curve) => pen.measureText(curve.name).width + gap), all = widths.reduce((a, b) => a + b, 0);
+    const beside = left + pen.measureText(this.title).width + gap + all <= right + gap;
+    let [x, y] = beside ? [right + gap - all, 14] : [left, 28];
+    this.names = this.curves.map((curve, k) => {
+      if (x > left && x + widths[k] > right + gap) [x, y] = [left, y + 14];
+      const place = { x, y, width: widths[k] - gap };
+      x += widths[k];
+      return place;
+    });
+    pen.textAlign = "left";
+    this.curves.forEach((curve, k) => {
+      pen.fillStyle = curve.colour;
+      pen.fillText(curve.name, this.names[k].x, this.names[k].y, right - this.names[k].x);
+    });
+    return (this.curves.length ? y : 14) + 10;
   }
   draw(now) {
     const canvas = this.canvas, ratio = window.devicePixelRatio || 1, pen = canvas.getContext("2d");
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    const drawn = [now, width, height, ratio, ...this.curves.flatMap((curve) => [curve.name, curve.x.length, curve.every])].join();
+    if (drawn === this.drawn) return;
+    this.drawn = drawn;
     [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
     pen.scale(ratio, ratio);
     pen.font = "11px system-ui, sans-serif";
@@ -66,7 +91,7 @@ class Chart {
     pen.fillText(this.title, 52, 14);
     const [x0, x1, y0, y1] = this.range();
     if (!isFinite(x0)) return;
-    const [left, right, top, bottom] = [52, width - 10, 24, height - 24];
+    const [left, right, bottom] = [52, width - 10, height - 24], top = this.legend(pen, left, right);
     const px = (x) => left + ((x - x0) / (x1 - x0)) * (right - left);
     const py = (y) => bottom - ((y - y0) / (y1 - y0)) * (bottom - top);
     pen.strokeStyle = "#2a2e35";
@@ -79,15 +104,13 @@ class Chart {
     for (const tick of Chart.round(x0, x1)) {
       pen.strokeRect(px(tick), top, 0, bottom - top);
       pen.textAlign = "center";
-      pen.fillText(String(+tick.toPrecision(4)), px(tick), bottom + 13);
+      const text = String(+tick.toPrecision(4));
+      pen.fillText(text, Math.min(px(tick), width - 2 - pen.measureText(text).width / 2), bottom + 13);
     }
     pen.textAlign = "right";
     pen.fillText(this.xLabel, right, height - 1);
-    let legend = right;
-    for (const curve of [...this.curves].reverse()) {
-      pen.strokeStyle = pen.fillStyle = curve.colour;
-      pen.fillText(curve.name, legend, 14);
-      legend -= pen.measureText(curve.name).width + 10;
+    for (const curve of this.curves) {
+      pen.strokeStyle = curve.colour;
       pen.beginPath();
       curve.x.forEach((x, k) => {
         const y = this.log ? Math.max(y0, Math.log10(curve.y[k])) : curve.y[k];

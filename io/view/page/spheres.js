@@ -1,122 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 "use strict";
-// Spheres by WebGL 2, all by one call: a square for each, turned towards the eye; the fragment shader meets the ray with the sphere.
-const VERTEX = `#version 300 es
-precision highp float;
-uniform mat4 view, projection;
-uniform highp sampler2D positions, radii, values;
-const vec2 corners[6] = vec2[](vec2(-1, -1), vec2(1, -1), vec2(-1, 1), vec2(-1, 1), vec2(1, -1), vec2(1, 1));
-out vec3 ray;
-flat out vec3 centre;
-flat out float r, shade;
-void main() {
-  ivec2 at = ivec2((gl_VertexID / 6) % 2048, gl_VertexID / 6 / 2048);
-  vec2 corner = corners[gl_VertexID % 6];
-  centre = (view * vec4(texelFetch(positions, at, 0).xyz, 1.0)).xyz;
-  r = texelFetch(radii, at, 0).x;
-  shade = texelFetch(values, at, 0).x;
-  float d2 = dot(centre, centre), behind = step(-r, centre.z);
-  vec3 ahead = centre * inversesqrt(d2);
-  vec3 right = normalize(cross(ahead, vec3(0.0, 1.0, 0.0))), up = cross(right, ahead);
-  float half_width = r * sqrt(d2 / max(d2 - r * r, 1e-3 * r * r));  // what the cone around the sphere spans at its centre
-  ray = centre + half_width * (corner.x * right + corner.y * up);
-  gl_Position = mix(projection * vec4(ray, 1.0), vec4(2.0, 2.0, 2.0, 1.0), behind);
-}`;
-const FRAGMENT = `#version 300 es
-precision highp float;
-uniform mat4 projection;
-uniform vec3 palette[8];
-uniform vec2 range;
-uniform bool categories;
-in vec3 ray;
-flat in vec3 centre;
-flat in float r, shade;
-out vec4 colour;
-void main() {
-  vec3 along = normalize(ray);
-  float t = dot(along, centre);
-  vec3 nearest = t * along - centre;
-  float h2 = r * r - dot(nearest, nearest);
-  if (h2 < 0.0) discard;
-  vec3 hit = (t - sqrt(h2)) * along, normal = (hit - centre) / r;
-  float depth = (projection[2].z * hit.z + projection[3].z) / -hit.z;
-  gl_FragDepth = 0.5 * depth + 0.5;
-  float x = 7.0 * clamp((shade - range.x) / max(range.y - range.x, 1e-30), 0.0, 1.0);
-  vec3 base = categories ? palette[int(mod(shade, 8.0))] : mix(palette[int(x)], palette[min(int(x) + 1, 7)], fract(x));
-  float light = max(dot(normal, normalize(vec3(-0.3, 0.5, 0.8))), 0.0);
-  colour = vec4(base * (0.35 + 0.65 * light) + 0.25 * pow(light, 40.0), 1.0);
-}`;
-const LINE_VERTEX = `#version 300 es
-uniform mat4 view, projection;
-layout(location = 0) in vec3 position;
-void main() { gl_Position = projection * view * vec4(position, 1.0); }`;
-const LINE_FRAGMENT = `#version 300 es
-precision highp float;
-out vec4 colour;
-void main() { colour = vec4(0.55, 0.6, 0.68, 1.0); }`;
-
+// Draws the spheres of a run, their bonds, the box with its walls, and the path of a sphere, with WebGL 2.
 const rgb = (hex) => [0, 8, 16].map((shift) => ((hex >> (16 - shift)) & 255) / 255);
-const VIRIDIS = [0x440154, 0x46327e, 0x365c8d, 0x277f8e, 0x1fa187, 0x4ac16d, 0xa0da39, 0xfde725].flatMap(rgb);
-const KINDS = [0x4e9af1, 0xf28e2b, 0x59c16a, 0xe15759, 0xb07aa1, 0xedc948, 0x76d7d0, 0xff9da7].flatMap(rgb);
-
-// The eye, for all panels: `centre` it looks at, angles [rad], distance.
-class Camera {
-  constructor() { this.fitted = false; }
-  fit(edges, flat) {
-    this.home = { centre: edges.map((edge, k) => (flat && k === 2 ? 0 : edge / 2)), yaw: flat ? 0 : 0.6, pitch: flat ? 0 : -0.35,
-                  distance: 1.35 * Math.hypot(...edges.slice(0, flat ? 2 : 3)) };
-    this.reset();
-    this.fitted = true;
-  }
-  reset() { Object.assign(this, this.home, { centre: [...this.home.centre] }); }
-  axes() {  // of the eye: right, up, backwards
-    const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
-    return [[cy, 0, -sy], [sy * sp, cp, cy * sp], [sy * cp, -sp, cy * cp]];
-  }
-  view() {
-    const axes = this.axes();
-    const shift = axes.map((axis) => -axis.reduce((sum, a, k) => sum + a * this.centre[k], 0));
-    shift[2] -= this.distance;
-    return [0, 1, 2].flatMap((k) => [axes[0][k], axes[1][k], axes[2][k], 0]).concat([...shift, 1]);
-  }
-  projection(aspect) {
-    const f = (aspect < 1 ? aspect : 1) / Math.tan(0.35), near = this.distance / 100, far = this.distance * 100;
-    return [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (near + far) / (near - far), -1, 0, 0, (2 * near * far) / (near - far), 0];
-  }
-  turn(dx, dy) {
-    this.yaw -= 0.006 * dx;
-    this.pitch = Math.max(-1.55, Math.min(1.55, this.pitch - 0.006 * dy));
-  }
-  move(dx, dy, height) {
-    const [right, up] = this.axes(), scale = (2 * this.distance * Math.tan(0.35)) / height;
-    for (let k = 0; k < 3; k++) this.centre[k] += scale * (dy * up[k] - dx * right[k]);
-  }
-}
+const VIRIDIS = [0x440154, 0x46327e, 0x365c8d, 0x277f8e, 0x1fa187, 0x4ac16d, 0xa0da39, 0xfde725];
+const KINDS = [0x4e9af1, 0xf28e2b, 0x59c16a, 0xe15759, 0xb07aa1, 0xedc948, 0x76d7d0, 0xff9da7];
+const GREY = [0.55, 0.6, 0.68, 1], BOND = [0.83, 0.8, 0.72, 1], WALL = [0.62, 0.66, 0.74], PATH = [1, 0.8, 0.3, 1];
 
 class Spheres {
   constructor(canvas, camera) {
-    this.canvas = canvas;
-    this.camera = camera;
+    Object.assign(this, { canvas, camera, positions: null, radii: null, values: null, count: 0, size: 1, chosen: -1, range: null,
+                          plane: [0, 0, 0, 1], bonds: new Uint32Array(0), walls: [], flat: false });
     const gl = this.gl = canvas.getContext("webgl2", { antialias: false, powerPreference: "high-performance" });
     if (!gl) throw new Error("this browser has no WebGL 2, which the spheres need");
-    this.spheres = this.program(VERTEX, FRAGMENT);
-    this.lines = this.program(LINE_VERTEX, LINE_FRAGMENT);
-    this.array = gl.createVertexArray();
-    this.textures = [0, 1, 2].map((unit) => {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-      for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
-      return gl.getUniformLocation(this.spheres.program, ["positions", "radii", "values"][unit]);
-    });
-    this.lineArray = gl.createVertexArray();
-    gl.bindVertexArray(this.lineArray);
-    this.lineBuffer = gl.createBuffer();
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.lineBuffer);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+    this.visible = new Visible();
+    this.largest = Math.min(256, gl.getParameter(gl.ALIASED_POINT_SIZE_RANGE)[1]);
+    this.programs = { spheres: this.program(SPHERE_VERTEX, SPHERE_FRAGMENT), bonds: this.program(BOND_VERTEX, BOND_FRAGMENT),
+                      lines: this.program(LINE_VERTEX, LINE_FRAGMENT), walls: this.program(LINE_VERTEX, WALL_FRAGMENT) };
+    this.buffers = Object.fromEntries(["spheres", "bonds", "box", "walls", "path", "cut"].map((name) => [name, gl.createBuffer()]));
+    this.corners = { box: 0, path: 0, cut: 0 };  // vertices in the buffers of lines
     gl.enable(gl.DEPTH_TEST);
-    this.count = 0;
-    this.corners = 0;
+    gl.depthFunc(gl.LEQUAL);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
   }
   program(vertex, fragment) {
     const gl = this.gl, program = gl.createProgram();
@@ -128,57 +32,152 @@ class Spheres {
       gl.attachShader(program, shader);
     }
     gl.linkProgram(program);
-    const place = (name) => gl.getUniformLocation(program, name);
-    return { program, view: place("view"), projection: place("projection"), palette: place("palette"), range: place("range"),
-             categories: place("categories") };
+    const uniforms = {};
+    for (let k = 0; k < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); k++) {
+      const name = gl.getActiveUniform(program, k).name;
+      uniforms[name.replace("[0]", "")] = gl.getUniformLocation(program, name);
+    }
+    return { program, uniforms };
   }
-  // Numbers of all spheres as a texture, in rows of 2048.
-  load(unit, values, columns) {
-    const gl = this.gl, rows = Math.ceil(values.length / columns / 2048), all = new Float32Array(rows * 2048 * columns);
-    all.set(values);
-    gl.activeTexture(gl.TEXTURE0 + unit);
-    const [stored, format] = columns === 3 ? [gl.RGB32F, gl.RGB] : [gl.R32F, gl.RED];
-    gl.texImage2D(gl.TEXTURE_2D, 0, stored, 2048, rows, 0, format, gl.FLOAT, all);
+  setRadii(radii) { this.radii = radii; }
+  setPositions(positions) { Object.assign(this, { positions, count: positions.length / 3 }); }
+  // `range`: the values at the two ends of the colours, or { kinds: true } where values are numbers of species.
+  setValues(values, range) { Object.assign(this, { values, range }); }
+  // `pairs`: two ids for each bond.
+  setBonds(pairs) { this.bonds = pairs; }
+  // `boundary`: wall, periodic or open, for each axis.
+  setBox(edges, boundary, flat) {
+    const corner = (bits) => edges.map((edge, k) => (bits & (1 << k) ? edge : 0)), ends = [], dimension = flat ? 2 : 3;
+    for (let bits = 0; bits < 1 << dimension; bits++)
+      for (let k = 0; k < dimension; k++) if (!(bits & (1 << k))) ends.push(...corner(bits), ...corner(bits | (1 << k)));
+    if (flat) for (let k = 2; k < ends.length; k += 3) ends[k] = 0;
+    this.lines("box", ends);
+    Object.assign(this, { edges, boundary, flat, walls: wallsOf(edges, boundary, flat) });
   }
-  setRadii(radii) { this.load(1, radii, 1); }
-  setPositions(positions) {
-    this.load(0, positions, 3);
-    this.count = positions.length / 3;
+  // `ends`: the two ends of each line, three coordinates each.
+  lines(name, ends) {
+    this.fill(name, new Float32Array(ends));
+    this.corners[name] = ends.length / 3;
   }
-  // `range`: the values of the ends of the colours, or nothing where values are numbers of kinds.
-  setValues(values, range) {
-    this.load(2, values, 1);
-    this.range = range;
+  fill(name, numbers) {
+    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffers[name]);
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, numbers, this.gl.DYNAMIC_DRAW);
   }
-  setBox(edges, flat) {
-    const corner = (bits) => edges.map((edge, k) => (bits & (1 << k) ? edge : 0)), ends = [];
-    for (let bits = 0; bits < (flat ? 4 : 8); bits++)
-      for (let k = 0; k < (flat ? 2 : 3); k++)
-        if (!(bits & (1 << k))) ends.push(...corner(bits), ...corner(bits | (1 << k)));
-    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.lineBuffer);
-    this.gl.bufferData(this.gl.ARRAY_BUFFER, new Float32Array(ends), this.gl.DYNAMIC_DRAW);
-    this.corners = ends.length / 3;
+  // A program with its uniforms set, and the columns of the buffer that it reads; `divisor` 1: a row for each instance.
+  use(name, buffer, columns, divisor, first = 0) {
+    const gl = this.gl, { program, uniforms } = this.programs[name], stride = 4 * columns.reduce((a, b) => a + b, 0);
+    gl.useProgram(program);
+    for (const [uniform, set] of Object.entries(this.frameUniforms)) if (uniforms[uniform]) set(uniforms[uniform]);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[buffer]);
+    let at = first * stride;
+    for (let k = 0; k < 3; k++) {
+      if (k >= columns.length) { gl.disableVertexAttribArray(k); continue; }
+      gl.enableVertexAttribArray(k);
+      gl.vertexAttribPointer(k, columns[k], gl.FLOAT, false, stride, at);
+      gl.vertexAttribDivisor(k, divisor);
+      at += 4 * columns[k];
+    }
+    return uniforms;
   }
-  draw() {
-    const gl = this.gl, canvas = this.canvas, ratio = window.devicePixelRatio || 1;
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.max(1, Math.round(size * ratio)));
+  pixels() {
+    const ratio = window.devicePixelRatio || 1;
+    return [this.canvas.clientWidth, this.canvas.clientHeight].map((size) => Math.max(1, Math.round(size * ratio)));
+  }
+  // `coarse`: among very many spheres, slivers of one or two pixels may be missing.
+  draw(coarse) {
+    const { gl, canvas, camera } = this, [width, height] = this.pixels();
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     gl.viewport(0, 0, width, height);
     gl.clearColor(0.078, 0.086, 0.102, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    if (!this.count || !this.camera.fitted || !this.range) return;
-    const view = this.camera.view(), projection = this.camera.projection(width / height);
-    for (const [use, array] of [[this.spheres, this.array], [this.lines, this.lineArray]]) {
-      gl.useProgram(use.program);
-      gl.uniformMatrix4fv(use.view, false, view);
-      gl.uniformMatrix4fv(use.projection, false, projection);
-      gl.bindVertexArray(array);
-      if (use === this.lines) { gl.drawArrays(gl.LINES, 0, this.corners); continue; }
-      gl.uniform3fv(use.palette, this.range.kinds ? KINDS : VIRIDIS);
-      gl.uniform2fv(use.range, this.range.kinds ? [0, 1] : this.range);
-      gl.uniform1i(use.categories, this.range.kinds ? 1 : 0);
-      this.textures.forEach((place, unit) => gl.uniform1i(place, unit));
-      gl.drawArrays(gl.TRIANGLES, 0, 6 * this.count);
+    if (!this.count || !camera.fitted || !this.range) return;
+    const [view, projection] = [camera.view(), camera.projection(width, height)], kinds = Boolean(this.range.kinds);
+    this.frameUniforms = {
+      view: (at) => gl.uniformMatrix4fv(at, false, view), projection: (at) => gl.uniformMatrix4fv(at, false, projection),
+      half_size: (at) => gl.uniform2f(at, width / 2, height / 2), flat_: (at) => gl.uniform1i(at, this.flat ? 1 : 0),
+      palette: (at) => gl.uniform3fv(at, (kinds ? KINDS : VIRIDIS).flatMap(rgb)), categories: (at) => gl.uniform1i(at, kinds ? 1 : 0),
+      range: (at) => gl.uniform2fv(at, kinds ? [0, 1] : this.range), colour: (at) => gl.uniform4fv(at, GREY),
+    };
+    this.drawSpheres(width, height, coarse);
+    this.drawBonds();
+    for (const name of ["box", "cut"]) this.drawLines(name, GREY);
+    this.drawWalls();
+    gl.disable(gl.DEPTH_TEST);  // no sphere hides the path
+    this.drawLines("path", PATH);
+    gl.enable(gl.DEPTH_TEST);
+  }
+  drawSpheres(width, height, coarse) {
+    const { gl, visible } = this;
+    visible.choose(this, this.camera, width, height, this.plane, this.largest, coarse);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.spheres);
+    gl.bufferData(gl.ARRAY_BUFFER, visible.data, gl.STREAM_DRAW);
+    gl.uniform1i(this.use("spheres", "spheres", [4, 1], 0).squares, 0);
+    if (visible.points) gl.drawArrays(gl.POINTS, 0, visible.points);
+    gl.uniform1i(this.use("spheres", "spheres", [4, 1], 1, visible.first).squares, 1);
+    if (visible.squares) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, visible.squares);
+  }
+  drawLines(name, colour) {
+    this.gl.uniform4fv(this.use("lines", name, [3], 0).colour, colour);
+    this.gl.drawArrays(this.gl.LINES, 0, this.corners[name]);
+  }
+  // A bond across a periodic boundary is drawn as two halves, each towards the nearest image of the other end.
+  drawBonds() {
+    const { gl, bonds, positions, edges, plane, radii } = this, { seen } = this.visible, numbers = [];
+    const gone = (i) => plane[0] * positions[3 * i] + plane[1] * positions[3 * i + 1] + plane[2] * positions[3 * i + 2] > plane[3];
+    for (let k = 0; k < bonds.length; k += 2) {
+      const i = bonds[k], j = bonds[k + 1];
+      if ((seen && !seen[i] && !seen[j]) || gone(i) || gone(j)) continue;
+      const a = [0, 1, 2].map((axis) => positions[3 * i + axis]), b = [0, 1, 2].map((axis) => positions[3 * j + axis]);
+      const thickness = 0.3 * Math.min(radii[i], radii[j]) * Math.min(1, this.size);
+      const image = edges.map((edge, axis) => (this.boundary[axis] === "periodic" ? edge * Math.round((b[axis] - a[axis]) / edge) : 0));
+      if (!image.some((shift) => shift)) { numbers.push(...a, ...b, thickness); continue; }
+      const half = [0, 1, 2].map((axis) => (b[axis] - image[axis] - a[axis]) / 2);
+      if (Math.hypot(...half) < 1.3 * this.size * Math.max(radii[i], radii[j])) continue;  // it would barely leave the sphere
+      numbers.push(...a, ...a.map((x, axis) => x + half[axis]), thickness, ...b.map((x, axis) => x - half[axis]), ...b, thickness);
+    }
+    this.strips = numbers.length / 7;
+    if (!numbers.length) return;
+    this.fill("bonds", new Float32Array(numbers));
+    gl.uniform4fv(this.use("bonds", "bonds", [3, 3, 1], 1).colour, BOND);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.strips);
+  }
+  // Only walls behind the particles are drawn, hatched and translucent.
+  drawWalls() {
+    const gl = this.gl, eye = this.camera.position(), numbers = [];
+    for (const { axis, at, inward, corners } of this.walls) if (this.flat || (eye[axis] - at) * inward > 0) numbers.push(...corners.flat());
+    this.facing = numbers.length / 18;
+    if (!numbers.length) return;
+    this.fill("walls", new Float32Array(numbers));
+    const uniforms = this.use("walls", "walls", [3], 0);
+    gl.uniform4fv(uniforms.colour, [...WALL, this.flat ? 0.6 : 0.22]);
+    gl.uniform1f(uniforms.spacing, Math.max(...this.edges) / (this.flat ? 60 : 12));
+    gl.enable(gl.BLEND);
+    gl.depthMask(false);
+    gl.drawArrays(gl.TRIANGLES, 0, numbers.length / 3);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+  }
+}
+
+// The walls of a box, as two triangles each: faces of the box, or in two dimensions a band along the outside of an edge.
+function wallsOf(edges, boundary, flat) {
+  const walls = [], band = 0.02 * Math.max(edges[0], edges[1]);
+  for (let axis = 0; axis < (flat ? 2 : 3); axis++) {
+    if (boundary[axis] !== "wall") continue;
+    const [u, v] = flat ? [1 - axis, axis] : [(axis + 1) % 3, (axis + 2) % 3];
+    for (const upper of [0, 1]) {
+      const at = upper * edges[axis];
+      const corner = (s, t) => {
+        const x = [0, 0, 0];
+        x[axis] = at;
+        x[u] = flat ? (s ? edges[u] + band : -band) : s * edges[u];
+        if (flat) x[axis] += t * (upper ? band : -band);
+        else x[v] = t * edges[v];
+        return x;
+      };
+      walls.push({ axis, at, inward: upper ? -1 : 1,
+                   corners: [[0, 0], [1, 0], [0, 1], [0, 1], [1, 0], [1, 1]].map(([s, t]) => corner(s, t)) });
     }
   }
+  return walls;
 }

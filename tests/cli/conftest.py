@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import os
+import shutil
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium without a window, where it is installed (tools/test-packages.txt)."""
+    import browsing  # noqa: F401, finds the tools
+    from view_picture import chromium
+    missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
+    if missing and not os.environ.get("CI"):
+        pytest.exit(f"skipped: {' and '.join(missing)} not installed; tools/test installs tools/test-packages.txt", returncode=77)
+    with chromium(1000, 600) as window:
+        yield window
