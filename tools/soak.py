@@ -137,6 +137,9 @@ def random_deck(dice, seconds):
     for average in ("rdf", "msd", "profile"):
         if dice.random() < 0.5:
             output[average + "_interval"] = end / dice.uniform(5, 50)
+    if method == "verlet":
+        for species in particles:
+            species["display_radius"] = species.pop("radius")
     return {"format": 1, "system": {"dimension": dimension, "boundary": boundary}, "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
             "interaction": random_forces(dice, method, dimension, boundary, [each["name"] for each in particles]),

@@ -70,7 +70,7 @@ struct Overlaps {
   /// Of that pair, relative to its contact distance; 0 where there is none.
   double depth() const { return pairs == 0 ? 0 : 1 - distance / contact; }
   void add(const Overlaps& other) {
-    const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.hi, o.lo); };
+    const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.lo, o.hi); };
     const std::size_t all = pairs + other.pairs;
     if (pairs == 0 || (other.pairs > 0 && order(other) < order(*this))) *this = other;
     pairs = all;

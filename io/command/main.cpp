@@ -19,6 +19,7 @@
 #include "io/command/command.h"
 #include "io/command/convert.h"
 #include "io/command/run.h"
+#include "io/deck/deck_problems.h"
 #include "io/deck/options.h"
 #include "io/deck/schema.h"
 #include "io/files/info.h"
@@ -55,7 +56,8 @@ int print(const std::string& page) {
 void add_page(CLI::App& command, std::uint16_t& port, bool& browser, CLI::Option* needs = nullptr) {
   auto* at = command.add_option("--port", port, "Of the page: this port of 127.0.0.1, instead of any free one");
   at->type_name("PORT")->check(CLI::Range(0, 65535));
-  auto* none = command.add_flag("!--no-browser", browser, "Of the page: say its address, open no browser");
+  auto* none = command.add_flag_callback(
+      "--no-browser", [&] { browser = false; }, "Print the address of the page, open no browser");
   if (needs != nullptr) at->needs(needs), none->needs(needs);
 }
 
@@ -83,6 +85,20 @@ struct Views {
     add_page(*demo, options.port, options.browser);
   }
 };
+
+/// What is wrong with the first word if it names no command; else empty.
+std::string unknown_command(CLI::App& app, int argc, char** argv) {
+  const std::string_view word = argc > 1 ? argv[1] : "";
+  if (word.empty() || word[0] == '-') return {};
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->get_name() == word) return {};
+    if (!command->get_group().empty()) names.push_back(command->get_name());
+  }
+  std::string text = "there is no command '";
+  text.append(word).append("'; ").append(carom::suggestion(word, names));
+  return text;
+}
 
 /// One process does it, however many a launcher has started.
 int once(const std::function<int()>& work) { return carom::World().on_first(work); }
@@ -142,8 +158,9 @@ int carom_main(int argc, char** argv) {
   schema.add_flag("--markdown", markdown, "As Markdown");
   CLI::App& methods =
       *app.add_subcommand("methods", "Every integrator: order, conserved quantities, parameters, source; the averages");
-  CLI::App& info = *app.add_subcommand("info", "What is in a trajectory, a file of events or a checkpoint");
-  info.add_option("file", file, "The file")->required()->type_name("FILE");
+  CLI::App& info =
+      *app.add_subcommand("info", "What is in a trajectory, a file of events, a checkpoint or the directory of a run");
+  info.add_option("file", file, "The file or directory")->required()->type_name("FILE");
 
   carom::ConvertOptions to;
   CLI::App& convert = *app.add_subcommand("convert", "Frames of a run in a format of other programs");
@@ -160,6 +177,8 @@ int carom_main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
+    const std::string unknown = unknown_command(app, argc, argv);
+    if (!unknown.empty()) return once([&]() -> int { throw carom::Error(carom::Failure::deck, unknown); });
     return once([&] { return app.exit(e) == 0 ? 0 : usage_error; });
   }
 

@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/base/error.h"
 #include "io/files/output_directory.h"
@@ -72,8 +73,9 @@ ThermoPoint reached_by(const Checkpoint& checkpoint, const std::filesystem::path
   ThermoPoint reached{std::max(row.time, statistics.end_time),
                       std::max(row.step, statistics.steps + (count.within > 0 ? 1 : 0)),  // what has begun is completed
                       std::max(row.collisions, statistics.counters.sphere_sphere)};
-  // Free flight would have ended at the last collision, before the state.
+  // Free flight would have ended at the last collision, before the state, and at its time before that collision.
   if (!find_integrator(checkpoint.head().integrator).stepping) ++reached.collisions;
+  if (count.within > 0 && reached.time == statistics.end_time) reached.time = std::nextafter(reached.time, std::numeric_limits<double>::infinity());
   return reached;
 }
 

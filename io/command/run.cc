@@ -38,6 +38,7 @@ constexpr int kDone = 0, kStoppedEarly = 75;
 
 /// Forces on fewer particles than these cost less than sending them.
 constexpr std::size_t kFewestToShare = 64;
+constexpr std::size_t kFewPerRank = 500;  // most events are run twice then (parallel/README.md)
 
 /// From look to look within a step: of pieces, sweeps or contacts, as long as many particles make them.
 constexpr std::uint64_t kCallsWithinSteps = 32;
@@ -126,6 +127,10 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     log.warn(
         fmt::format("warning: {} particles under forces are too few to be shared; one rank works, the other {} wait",
                     outcome.particles, ranks - 1));
+  else if (ranks > 1 && outcome.particles < kFewPerRank * static_cast<std::size_t>(ranks))
+    log.say(
+        fmt::format("hint: {} particles on {} ranks are few for each; fewer ranks may be faster (parallel/README.md)",
+                    outcome.particles, ranks));
   if (!lock->warning().empty()) log.warn(lock->warning());
   if (backup) log.warn("warning: the files of an earlier run in this directory are now in " + backup->string());
   const std::string origin =

@@ -27,6 +27,7 @@ class Interpreter {
     for (const ValueTable& table : values_.list("particles")) species(table);
     placement();
     integrator();
+    cores();
     for (ValueTable& table : values_.list("interaction"))
       if (table.variant != nullptr) interaction(table);
     try_interactions();
@@ -83,11 +84,29 @@ class Interpreter {
     positions(table, species);
     velocities(table, species);
     if (species.count > 0) {
-      species.radius = numbers(table, "radius", species.count);
+      for (const char* key : {"display_radius", "radius"})
+        if (table.given(key)) species.radius = numbers(table, key, species.count);
+      if (species.radius.empty()) species.radius = {0.5};
       species.mass = numbers(table, "mass", species.count);
       species.charge = numbers(table, "charge", species.count);
     }
     source_.species.push_back(std::move(species));
+  }
+
+  /// Spheres have a radius, and points have none.
+  void cores() {
+    if (source_.integrator == nullptr) return;
+    for (const ValueTable& table : values_.list("particles")) {
+      if (source_.integrator->hard_cores && !table.given("radius"))
+        problems_.error(table.at, "missing key 'radius' in [[particles]]", "give the radius of the hard core");
+      if (source_.integrator->hard_cores && table.given("display_radius"))
+        problems_.error(table.place("display_radius"), "'display_radius' is for points, which only 'verlet' has",
+                        "leave it out: pictures show 'radius'");
+      if (!source_.integrator->hard_cores && table.given("radius"))
+        problems_.error(table.place("radius"),
+                        "'" + deck_.integrator + "' treats particles as points and would ignore 'radius'",
+                        "take psa or edda, where spheres collide, or write display_radius for the size in pictures");
+    }
   }
 
   void positions(const ValueTable& table, SpeciesConfig& species) {
@@ -346,6 +365,11 @@ class Interpreter {
       if (parameters.has("interval") && parameters.real("interval") > 0)
         deck_.output.observables.push_back({&info, std::move(parameters)});
     }
+    const std::string& start = source_.placement.type;
+    const bool lattice = !start.empty() && start != "random" && start != "compressed" && start != "file";
+    if (lattice && !deck_.output.observables.empty() && deck_.output.sample_start == 0)
+      problems_.warning(table->at, "the averages include the initial lattice, on which g(r) has sharp peaks",
+                        "set sample_start to a time at which the lattice has melted");
     if (const auto* units = table->find<std::map<std::string, std::string>>("units"))
       deck_.output.units = {units->at("length"), units->at("time")};
     if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {

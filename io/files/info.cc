@@ -9,6 +9,7 @@
 #include "io/deck/deck_problems.h"
 #include "io/files/checkpoint.h"
 #include "io/files/hdf5.h"
+#include "io/files/output_directory.h"
 #include "io/files/trajectory_reader.h"
 
 namespace carom {
@@ -78,6 +79,19 @@ std::string describe_checkpoint(const std::filesystem::path& path) {
 }  // namespace
 
 std::string describe_file(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) {
+    std::string all;
+    for (const char* name : {run_file::trajectory, run_file::events, run_file::checkpoint})
+      if (std::filesystem::exists(path / name)) {
+        if (!all.empty()) all += '\n';
+        all += describe_file(path / name);
+      }
+    if (all.empty())
+      throw Error(Failure::file, path.string() +
+                                     ": the directory holds no trajectory.h5md, events.h5 or checkpoint.h5; " +
+                                     "name the directory of a run, or a file");
+    return all;
+  }
   const std::string head = line("file", path.string());
   if (is_checkpoint(path)) return head + describe_checkpoint(path);
   const hdf5::File file = hdf5::File::open(path);

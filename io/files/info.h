@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// `carom info FILE`: what is in a trajectory or in a file of events.
+// `carom info FILE`: what is in a trajectory, a file of events, a checkpoint or the directory of a run.
 
 #include <filesystem>
 #include <string>
 
 namespace carom {
 
-/// The answer as text for the terminal. Throws Error(Failure::file) for anything that is not such a file.
+/// The description as text for the terminal; for a directory, of each of these files in it. Throws Error(Failure::file)
+/// if there is nothing to describe.
 std::string describe_file(const std::filesystem::path& file);
 
 /// Prints it and returns the exit code.

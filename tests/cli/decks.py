@@ -77,7 +77,7 @@ def changed(old, new, deck=GOOD):
 def lennard_jones(more):
     return changed("[integrator]\ntype = \"free-flight\"",
                    f'[[interaction]]\ntype = "lennard-jones"\nepsilon = 1\nsigma = 1\n{more}\n[integrator]\ntype = "verlet"\nstep = 0.1',
-                   FLUID)
+                   FLUID.replace("radius", "display_radius"))
 
 
 def table(more):

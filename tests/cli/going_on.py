@@ -51,7 +51,7 @@ def box(method, dimension, steps, **more):
     return toml_text({
         "format": 1, "title": "continued",
         "system": {"dimension": dimension, "boundary": ["periodic" if points else "wall"] + (dimension - 1) * ["periodic"]},
-        "particles": [{"name": name, "count": 32, "temperature": 1.0, "radius": 0.5, "mass": mass}
+        "particles": [{"name": name, "count": 32, "temperature": 1.0, "display_radius" if points else "radius": 0.5, "mass": mass}
                       for name, mass in (("light", 1.0), ("heavy", 3.0))],
         "placement": {"type": "square" if dimension == 2 else "simple-cubic", "packing_fraction": 0.5 if dimension == 2 else 0.3, "seed": 5},
         "interaction": ([] if points else [field]) + ([] if free else forces),

@@ -218,8 +218,21 @@ def test_touching_spheres_are_no_overlap(tmp_path):
 
 def test_points_may_overlap(tmp_path):
     deck = changed("[5.0, 5.0]]", "[2.8, 5.0]]").replace('"cdda"', '"verlet"').replace('["wall", "wall"]', '["open", "open"]')
-    answer = validate(tmp_path, deck)
+    answer = validate(tmp_path, deck.replace("radius", "display_radius"))
     assert (answer.returncode, answer.stderr) == (0, "")
+    cores = validate(tmp_path, deck)
+    assert cores.returncode == 2
+    assert ": 'verlet' treats particles as points and would ignore 'radius'; take psa or edda, where spheres collide, or write display_radius" in cores.stderr
+    pictures = validate(tmp_path, changed("radius", "display_radius"))
+    assert pictures.returncode == 2
+    assert "missing key 'radius' in [[particles]]" in pictures.stderr and "'display_radius' is for points" in pictures.stderr
+
+
+def test_averages_of_the_initial_lattice(tmp_path):
+    """They are warned of, unless the samples start later."""
+    sampled = FLUID + "\n[output]\nrdf_interval = 1.0\n"
+    assert "the averages include the initial lattice" in validate(tmp_path, sampled).stderr
+    assert "lattice" not in validate(tmp_path, sampled + "sample_start = 2.0\n").stderr
 
 
 def test_warnings(tmp_path):

@@ -127,7 +127,7 @@ def test_within_an_epoch(before, after, tmp_path):
 
 @pytest.mark.parametrize("number", ["TERM", "INT", "HUP", "USR2", "USR1"])
 def test_signals(number, tmp_path):
-    deck, out = spheres(tmp_path, 900000), tmp_path / "out"
+    deck, out = spheres(tmp_path, 2500000), tmp_path / "out"
     job = subprocess.Popen(command(deck, out), stderr=subprocess.PIPE, text=True)
     wait_for_rows(job, out)
     assert not (out / "checkpoint.h5").exists()
@@ -197,7 +197,7 @@ def test_max_wall_again_and_again(tmp_path):
 
 def test_the_script_for_slurm(tmp_path):
     """With stand-ins for Slurm and mpirun: it asks to be queued again until the run is done, but not where it was cancelled."""
-    deck, whole, out, queue = spheres(tmp_path, 600000), tmp_path / "whole", tmp_path / "out", tmp_path / "queue"
+    deck, whole, out, queue = spheres(tmp_path, 2500000), tmp_path / "whole", tmp_path / "out", tmp_path / "queue"
     run(deck, whole)
     for name, text in {"mpirun": 'exec "$@"', "scontrol": f'echo "$@" >>{queue}', "sbatch": f'echo "$@" >>{queue}'}.items():
         (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")

@@ -148,7 +148,7 @@ def test_a_file_is_synced_before_it_takes_its_name(killer, place):
         assert calls[n + 1][:2] == ("sync", "."), (name, calls[n + 1])
         renamed[name] = renamed.get(name, 0) + 1
     assert set(renamed) == {"carom.lock", "deck.toml", "summary.json", "rdf.csv", "trajectory.h5md", "events.h5", "checkpoint.h5"}
-    assert renamed["checkpoint.h5"] > 2
+    assert renamed["checkpoint.h5"] > 1
     # The last checkpoint keeps its name until the next one is on the disk, whose signature, the first block, is written last.
     for n, (what, name, _, _) in enumerate(calls):
         if what == "rename" and name == "checkpoint.previous.h5":

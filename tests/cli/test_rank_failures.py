@@ -119,7 +119,7 @@ def test_an_error_of_all_ranks_is_reported_once(change, code, words, tmp_path):
 APART = {
     "format": 1, "title": "an error that one rank meets",
     "system": {"dimension": 2, "box": [80.0, 40.0], "boundary": ["periodic", "periodic"]},
-    "particles": [{"name": "disc", "radius": 0.5, "velocity": [[0.0, 0.0]] * 800,
+    "particles": [{"name": "disc", "display_radius": 0.5, "velocity": [[0.0, 0.0]] * 800,
                    "position": [[1 + 2.0 * (k // 20), 1 + 2.0 * (k % 20)] for k in range(800)]}],
     "interaction": [{"type": "lennard-jones", "epsilon": 1.0, "sigma": 1.0, "cutoff": 1.5}],
     "integrator": {"type": "verlet", "step": 0.01},
@@ -161,8 +161,8 @@ def test_an_error_of_one_rank_ends_all(spoil, words, of_one, tmp_path):
 def test_an_epoch_is_too_long_on_any_number_of_ranks(tmp_path):
     """64 spheres cross more boxes than an image on ranks has room for, though in one core there is room for more."""
     deck = write_deck(tmp_path, SPHERES.replace("108", "64").replace("fcc", "simple-cubic"))
-    sets = ["placement.packing_fraction=0.2", "placement.seed=1", "integrator.step=1e4", "run.end_time=1e4",
-            "output.frame_interval=0.0", "output.thermo_interval=1000"]
+    sets = ["placement.packing_fraction=0.001", "placement.seed=1", "integrator.step=2e5", "run.end_time=2e5",
+            "output.frame_interval=0.0", "output.thermo_interval=20000"]
     words = "too many periodic boxes in one epoch"
     assert words in run(deck, tmp_path / "plain", sets, code=4).stderr
     assert words in mpirun(2, command(deck, tmp_path / "ranks", sets), code=4).stderr

@@ -142,7 +142,8 @@ def test_observing_changes_nothing(method, tmp_path):
     always = {"free-flight": [], "collisions": ["run.collisions=333"],
               "end_time": ["run.end_time=5.013", "integrator.type=\"cva\""]}.get(
                   method, [f"integrator.type=\"{method}\""])
-    deck = write_deck(tmp_path, SPHERES if method in ("free-flight", "collisions") else SPRINGS)
+    springs = SPRINGS.replace("radius", "display_radius") if method == "verlet" else SPRINGS
+    deck = write_deck(tmp_path, SPHERES if method in ("free-flight", "collisions") else springs)
     ways = [["output.frame_interval=0.0", "output.thermo_interval=0.0"],
             ["output.frame_interval=0.037", "output.thermo_interval=0.0"],
             ["output.frame_interval=0.0", "output.thermo_interval=0.0113", "output.events=true"],

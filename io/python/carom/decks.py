@@ -43,6 +43,9 @@ def deck_of(sim, of, ends):
     if not sim._session.method:
         raise UsageError(f"{of}: there is no integrator; call integrator(name, step=…) first")
     deck = {"format": 1, "title": sim.title, "system": system_of(sim), "particles": species_of(sim, of)}
+    if sim._session.method == "verlet":
+        for species in deck["particles"]:
+            species["display_radius"] = species.pop("radius")
     if sim._session.forces:
         deck["interaction"] = [{"type": name} | given for name, given in sim._session.forces]
     deck["integrator"] = {"type": sim._session.method} | sim._session.method_parameters

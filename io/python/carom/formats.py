@@ -152,6 +152,7 @@ def read(kind_of_simulation, file, frame, radius, boundary):
         velocity = None if found["velocity"] is None else np.asarray(found["velocity"], dtype=float)[rows, :columns]
         simulation.add_particles(position=np.asarray(found["position"], dtype=float)[rows, :columns], velocity=velocity,
                                  species=found["names"][kind], **each)
+    simulation._cores = radius is not None
     new = np.empty(len(order), int)
     new[order] = np.arange(len(order))
     simulation.bonds = new[found["bonds"]] if len(found["bonds"]) else np.empty((0, 2), int)

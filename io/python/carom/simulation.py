@@ -68,6 +68,7 @@ class Simulation:
 
     def _start(self, session, title=""):
         self._session, self.title, self.warnings = session, title, []
+        self._cores = False  # a radius was given
         self._edges_known, self._counted, self.bonds = True, [], np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
@@ -110,17 +111,19 @@ class Simulation:
         """The particles of a GSD, extended XYZ or LAMMPS data file; see carom.formats.read()."""
         return formats.read(cls, file, frame, radius, boundary)
 
-    def add_particles(self, position=None, velocity=None, radius=0.5, mass=1.0, charge=0.0, species="particle", count=None,
+    def add_particles(self, position=None, velocity=None, radius=None, mass=1.0, charge=0.0, species="particle", count=None,
                       temperature=None):
         """Adds N particles; returns their ids, a range.
 
         position, velocity: arrays of shape (N, D) [length, length/time]; velocities are 0 where there are none.
-        radius, mass, charge: one number for all, or N. species: a name, for forces between species.
+        radius, mass, charge: one number for all, or N; the radius is 0.5 if it is left out, as it is for verlet. species: a name, for forces between species.
         count, temperature: instead of positions and velocities; place() then finds them, and returns all ids.
 
             sim.add_particles(position=[[1, 1], [3, 1]], velocity=[[0, 0], [0.5, 0]], radius=0.5)
             sim.add_particles(count=500, temperature=1.0, radius=0.5, species="solvent")
         """
+        self._cores |= radius is not None
+        radius = 0.5 if radius is None else radius
         if count is not None:
             return self._count(count, position, velocity, temperature,
                                {"name": species, "radius": radius, "mass": mass, "charge": charge})
@@ -288,6 +291,9 @@ class Simulation:
         ends = refuse_masked("run", {"time": time, "steps": steps, "collisions": collisions, "every": every})
         if self._counted:
             raise UsageError("run: particles that were given by count have no positions; call place() first")
+        if self._cores and self._session.method == "verlet":
+            raise UsageError("run: verlet treats particles as points and would ignore 'radius'; take psa or edda, where spheres collide, "
+                             "or leave radius out")
         try:
             self._session.run(ends, callback and (lambda: callback(self)), line,
                               lambda: toml_text(deck_of(self, "run", {"steps": 1})))
