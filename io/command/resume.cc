@@ -57,8 +57,10 @@ void check_end(const Deck& deck, const Deck& before, const Resumed& from) {
   const ThermoPoint& reached = from.reached;
   if (plan.steps && plan.steps != old.steps && *plan.steps < reached.step)
     refuse("steps", "step", *plan.steps, reached.step);
-  if (plan.end_time && plan.end_time != old.end_time && *plan.end_time < reached.time - plan.slack())
-    refuse("end_time", "time", *plan.end_time, reached.time);
+  // Within an epoch the last collision is at the time of the state, and a run that ends at that time omits it.
+  const double time = reached.time + (from.count.within > 0 ? 2 * plan.slack() : 0);
+  if (plan.end_time && plan.end_time != old.end_time && *plan.end_time < time - plan.slack())
+    refuse("end_time", "time", *plan.end_time, time);
   if (plan.collisions && plan.collisions != old.collisions && *plan.collisions < reached.collisions)
     refuse("collisions", "collision", *plan.collisions, reached.collisions);
 }
@@ -73,9 +75,8 @@ ThermoPoint reached_by(const Checkpoint& checkpoint, const std::filesystem::path
   ThermoPoint reached{std::max(row.time, statistics.end_time),
                       std::max(row.step, statistics.steps + (count.within > 0 ? 1 : 0)),  // what has begun is completed
                       std::max(row.collisions, statistics.counters.sphere_sphere)};
-  // Free flight would have ended at the last collision, before the state, and at its time before that collision.
+  // Free flight would have ended at the last collision, before the state.
   if (!find_integrator(checkpoint.head().integrator).stepping) ++reached.collisions;
-  if (count.within > 0 && reached.time == statistics.end_time) reached.time = std::nextafter(reached.time, std::numeric_limits<double>::infinity());
   return reached;
 }
 

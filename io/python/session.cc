@@ -139,7 +139,7 @@ void Session<D>::set_position(std::span<const double> x) {
 
 template <int D>
 void Session<D>::set_velocity(std::span<const double> v) {
-  if (running_ && showing_) {
+  if (running_ && showing_ && std::this_thread::get_id() == runner_) {
     if (!at_step_end_)
       refuse(
           "velocities: an epoch of free flight is going on; choose epochs that end where the callback comes: "
@@ -232,6 +232,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   live_ = &run.statistics();
   views_.lend(at_work_->particles);
   running_ = true;
+  runner_ = std::this_thread::get_id();
   std::map<std::string, Bytes> state;
   auto last_checkpoint = Clock::now();
   typename Simulation<D>::Hooks inner;

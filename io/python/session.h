@@ -11,6 +11,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "engine/run/simulation.h"
@@ -120,6 +121,7 @@ class Session {
   System<D>* at_work_ = nullptr;
   std::size_t size_ = 0;
   std::atomic<bool> running_ = false;
+  std::thread::id runner_;  // the thread in run(), in which callbacks may set velocities
   ParticleViews<D> views_;
   std::string failure_;  // of the last run
 

@@ -127,18 +127,25 @@ APART = {
     "output": {"directory": "unused", "frame_interval": 0.05, "thermo_interval": 0.05}}
 
 
+def spheres(deck):
+    """Gives the points of the deck a core."""
+    disc = deck["particles"][0]
+    disc["radius"] = disc.pop("display_radius")
+    return deck
+
+
 def on_each_other(deck):
     deck["particles"][0]["position"][797] = deck["particles"][0]["position"][796][:]
 
 
 def far_apart(deck):
-    deck["integrator"]["type"] = "edda"
+    spheres(deck)["integrator"]["type"] = "edda"
     deck["particles"][0]["velocity"][785:795] = [[0.0, -8.0]] + 8 * [[0.0, 0.0]] + [[0.0, 8.0]]
     deck["interaction"] = [{"type": "harmonic-bond", "pairs": [[785, 794]], "stiffness": 1e-3, "rest_length": 18.0}]
 
 
 def too_many_collisions(deck):
-    deck["integrator"] = {"type": "edda", "step": 0.5, "max_events_per_step": 1}
+    spheres(deck)["integrator"] = {"type": "edda", "step": 0.5, "max_events_per_step": 1}
     deck["particles"][0]["velocity"][794:798] = 2 * [[0.0, 3.0], [0.0, -3.0]]
 
 
