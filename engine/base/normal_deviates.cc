@@ -46,7 +46,7 @@ Number rounded(Number x) {
 template <int N>
 struct Series {
   Number c[N];
-  constexpr explicit Series(auto&& coefficient) {
+  constexpr explicit Series(auto coefficient) {
     for (int k = 0; k < N; ++k) c[k] = coefficient(k);
   }
   /// Its sum for |z| ≤ 0.617: what the lower half of a number adds to the terms from z^4 on is below 2^-71.
@@ -83,7 +83,7 @@ Number logarithm(double u) {
 std::array<double, 2> normal_deviates(double u, double turn) {
   const Number length = rounded(square_root(Number{-2, 0} * rounded(logarithm(u))));
   const Number angle = rounded(kTwoPi * Number{turn, 0});
-  const int quadrant = static_cast<int>(4 * turn + 0.5);
+  const int quadrant = static_cast<int>(std::floor(4 * turn + 0.5));
   const Number r = angle + -(kHalfPi * Number{static_cast<double>(quadrant), 0}), squared = r * r;
   const Number sine = r * kSine.at(squared), cosine = kCosine.at(squared);
   const Number x = quadrant % 2 == 0 ? cosine : sine, y = quadrant % 2 == 0 ? sine : cosine;
