@@ -43,7 +43,7 @@ struct Sum {
   std::uint32_t crc = 0;
 };
 
-/// Of all behind the block.
+/// The checksum of everything after the block.
 Sum sum_of(const std::filesystem::path& path, const Descriptor& file) {
   Sum sum;
   std::vector<unsigned char> piece(1 << 16);
@@ -62,7 +62,7 @@ std::array<char, kBlock> block_of(const Sum& sum) {
   return block;
 }
 
-/// Throws unless the block is that of what follows it.
+/// Throws unless the block matches the contents that follow it.
 void verify(const std::filesystem::path& path) {
   const Descriptor file = open_file(path, O_RDONLY);
   std::array<char, kBlock> block{};
@@ -94,11 +94,11 @@ hid_t type_of(Fields::Scalar scalar) {
   return H5T_NATIVE_UINT8;
 }
 
-/// The file is complete: signs it, and puts it in the place of the last one.
+/// Signs a complete file and replaces the last checkpoint by it.
 void sign_and_rename(const std::filesystem::path& aside, const std::filesystem::path& directory) {
   {
     const Descriptor file = open_file(aside, O_RDWR);
-    ::sync_file_range(file.number(), 0, 0, SYNC_FILE_RANGE_WRITE);  // the disk writes while the sum is taken
+    ::sync_file_range(file.number(), 0, 0, SYNC_FILE_RANGE_WRITE);  // the disk writes while the sum is computed
     const auto block = block_of(sum_of(aside, file));
     if (::pwrite(file.number(), block.data(), kBlock, 0) != static_cast<ssize_t>(kBlock) || ::fsync(file.number()) != 0)
       refuse_with_reason(aside);

@@ -8,7 +8,7 @@ namespace carom {
 
 namespace {
 
-/// One column: what waits in memory, and what is in the file.
+/// One column: the rows that wait in memory, and the data set in the file.
 template <class T>
 struct Column {
   std::vector<T> waiting;
@@ -39,7 +39,7 @@ struct EventWriter<D>::Contents {
     file.flush();
   }
 
-  /// Does something to every column.
+  /// Calls the action for every column.
   template <class Action>
   void each(Action action) {
     for (auto* column : {&time, &time_in_slab, &x_lo, &x_hi, &impulse}) action(*column);

@@ -9,7 +9,7 @@ namespace carom::hdf5 {
 
 namespace {
 
-/// Chunks of about 8 kB for small rows, and of at most 43,000 entries (about 1 MiB of positions) of large ones.
+/// Chunks of about 8 kB for small rows, and of at most 43,000 entries (about 1 MiB of positions) for large rows.
 std::vector<hsize_t> chunk_of(const std::vector<hsize_t>& shape, std::uint64_t row_bytes) {
   constexpr hsize_t kMostEntries = 43000, kSmallChunk = 8192;
   std::vector<hsize_t> chunk = shape;

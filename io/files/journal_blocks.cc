@@ -38,7 +38,7 @@ bool blocks_fit(const Bytes& journal) {
   return at == journal.size();
 }
 
-/// Calls take(first, last) for the stretches of `data` that differ from as many others, in steps of a cache line.
+/// Calls take(first, last) for the ranges in which `data` differs from an equally long array, in steps of a cache line.
 template <class Take>
 void for_each_difference(std::span<const std::byte> data, std::span<const std::byte> others, Take take) {
   constexpr std::size_t kStep = 64;

@@ -22,7 +22,7 @@ const std::vector<ScalarColumn<D>>& scalar_columns() {
         {"total", "total_energy", [](S s) { return s.total(); }, "total", "16.10g"},
         {"shadow", "shadow_energy", [](S s) { return s.shadow; }},
         {"max_energy_error", "max_energy_error", [](S s) { return s.max_energy_error; }, "max |ΔE|", "10.2e"},
-        {"momentum_x", nullptr, [](S s) { return s.momentum[0]; }},  // one element of the trajectory, a vector
+        {"momentum_x", nullptr, [](S s) { return s.momentum[0]; }},  // in the trajectory one element, a vector
         {"momentum_y", nullptr, [](S s) { return s.momentum[1]; }}};
     if constexpr (D == 3) columns.push_back({"momentum_z", nullptr, [](S s) { return s.momentum[2]; }});
     columns.push_back({"temperature", "temperature", [](S s) { return s.temperature; }, "temperature", "12.6g"});
