@@ -71,8 +71,8 @@ void give_velocities(const Deck::Source& source, System<D>& system) {
                      system.decomposition.others());
 }
 
-/// Writes the values that depend on the initial state into the deck. Throws if [output] asks for something that has no
-/// meaning in this box.
+/// Writes the values that depend on the initial state into the deck. Reports parameters of [output] that are not valid
+/// in this box.
 template <int D>
 void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
   Deck::Source& source = *deck.source;

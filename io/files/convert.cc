@@ -10,7 +10,7 @@ namespace carom {
 
 namespace {
 
-constexpr std::size_t kPiece = 1 << 20;  // bytes written at a time
+constexpr std::size_t kBytesPerWrite = 1 << 20;  // bytes written at a time
 
 /// The chemical symbols, by atomic number from 1.
 constexpr std::array<std::string_view, 118> kElements = {
@@ -86,7 +86,7 @@ std::string write_extxyz(const TrajectoryReader& trajectory, std::span<const std
       fmt::format_to(out, "{} {} {} {} {} {} {} {} {} {} {} {} {}\n",
                      symbols[static_cast<std::size_t>(trajectory.species[i])], x[0], x[1], x[2], v[0], v[1], v[2],
                      trajectory.radius[i], trajectory.mass[i], trajectory.charge[i], image[0], image[1], image[2]);
-      if (text.size() < kPiece) continue;
+      if (text.size() < kBytesPerWrite) continue;
       file.append({text.data(), text.size()});
       text.clear();
     }
@@ -131,7 +131,7 @@ std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<cons
 
   // 3. The particles.
   const auto write = [&](bool all) {
-    if (!all && text.size() < kPiece) return;
+    if (!all && text.size() < kBytesPerWrite) return;
     file.append({text.data(), text.size()});
     text.clear();
   };

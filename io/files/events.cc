@@ -25,7 +25,7 @@ struct Column {
 
 template <int D>
 struct EventWriter<D>::Contents {
-  static constexpr std::size_t kBatch = 16384;  // rows
+  static constexpr std::size_t kRowsPerWrite = 16384;  // rows
   explicit Contents(hdf5::File at) : file(std::move(at)) {}
 
   void create(const Deck& deck) {
@@ -101,7 +101,7 @@ EventWriter<D>::~EventWriter() = default;
 template <int D>
 void EventWriter<D>::contacts(double slab_start, std::span<const Contact<D>> contacts) {
   for (const Contact<D>& c : contacts) contents_->add(slab_start, c);
-  if (contents_->time.waiting.size() >= Contents::kBatch) contents_->write();
+  if (contents_->time.waiting.size() >= Contents::kRowsPerWrite) contents_->write();
 }
 
 template <int D>

@@ -205,12 +205,12 @@ std::vector<std::int32_t> attribute_numbers(const File& file, const std::string&
 }
 
 FileMark mark(const File& file, std::span<const char* const> datasets, hsize_t length) {
-  constexpr hsize_t kMostEntries = 1000;  // entries of a row
+  constexpr hsize_t kMostSummedEntries = 1000;  // entries of a row
   const std::string deck = text(file, "parameters/deck");
   std::uint32_t sum = libdeflate_crc32(0, deck.data(), deck.size());
   for (const char* name : datasets) {
     if (length == 0) continue;
-    const auto row = rows<double>(file, name, length - 1, 1, kMostEntries);
+    const auto row = rows<double>(file, name, length - 1, 1, kMostSummedEntries);
     sum = libdeflate_crc32(sum, row.data(), row.size() * sizeof(double));
   }
   return {length, sum};

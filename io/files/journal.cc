@@ -152,8 +152,8 @@ struct Journaled : H5FD_t {
       is_new = false;
       if (!open_journal()) return fail();
     } else if (!waiting.empty()) {
-      constexpr std::byte kNone[8] = {};
-      if (!write_all(journal, kNone, sizeof kNone, 0)) return fail();
+      constexpr std::byte kEmptyHead[8] = {};
+      if (!write_all(journal, kEmptyHead, sizeof kEmptyHead, 0)) return fail();
     }
     if (durable) next_sync = Clock::now() + 20 * (Clock::now() - start);
     last = std::exchange(waiting, {});
@@ -162,9 +162,9 @@ struct Journaled : H5FD_t {
   }
 
   bool open_journal() {
-    constexpr std::uint64_t kRoom = 1 << 18;  // also for the summary and log of a run that has filled its disk
+    constexpr std::uint64_t kSpareBytes = 1 << 18;  // also for the summary and log of a run that has filled its disk
     journal = ::open(journal_of(path).c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    return journal >= 0 && set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kRoom);
+    return journal >= 0 && set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kSpareBytes);
   }
 
   bool write_journal(bool durable) {

@@ -35,10 +35,10 @@ template const std::vector<ScalarColumn<2>>& scalar_columns();
 template const std::vector<ScalarColumn<3>>& scalar_columns();
 
 ThermoPoint last_thermo_point(const std::filesystem::path& path) {
-  constexpr std::streamoff kTail = 2000;  // bytes, more than two rows have
+  constexpr std::streamoff kTailBytes = 2000;  // bytes, more than two rows have
   if (!std::filesystem::is_regular_file(path)) return {};
   std::ifstream in(path, std::ios::ate);
-  in.seekg(std::max<std::streamoff>(0, in.tellg() - kTail));
+  in.seekg(std::max<std::streamoff>(0, in.tellg() - kTailBytes));
   std::string end{std::istreambuf_iterator<char>(in), {}};
   end.resize(end.rfind('\n') + 1);  // a kill may have left a part of a row
   ThermoPoint point;
