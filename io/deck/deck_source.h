@@ -59,7 +59,7 @@ struct Deck::Source {
 /// points.
 void interpret(DeckValues values, const TextReader& reader, Deck& deck, Problems& problems);
 
-/// Boundaries, edges (1 where the deck leaves them to the packing fraction) and the names of species.
+/// Boundaries, edges (1 if they follow from the packing fraction) and the names of species.
 template <int D>
 void fill_box(const Deck::Source& source, System<D>& system);
 
