@@ -18,7 +18,7 @@ namespace {
                                  "; give a number (7, -1 for the last) or a slice first:behind:stride (0:100:10)");
 }
 
-/// The parts between colons; nothing where a part is empty.
+/// The parts between colons; an empty part is nullopt.
 std::vector<std::optional<std::int64_t>> parts_of(const std::string& choice) {
   std::vector<std::optional<std::int64_t>> parts;
   for (std::string_view rest = choice;;) {

@@ -16,7 +16,7 @@ struct ConvertOptions {
   std::string frames;                           ///< "7", "-1", "0:100:10" as slices in Python; empty: all, or the last
 };
 
-/// The indices that a choice means among so many frames. Throws Error(Failure::deck) where it is none or means none.
+/// The indices of the chosen frames. Throws Error(Failure::deck) if the choice is malformed or selects no frame.
 std::vector<std::uint64_t> chosen_frames(const std::string& choice, std::uint64_t frames);
 
 /// Writes the file, says on stdout what it wrote, and returns the exit code. Throws Error.

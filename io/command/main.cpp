@@ -30,7 +30,7 @@ namespace {
 
 constexpr int usage_error = 2;
 
-/// What were commands once, and what to do instead.
+/// Former commands, and what to do instead.
 constexpr const char* kFormer[][2] = {
     {"bench",
      "carom bench is a program of its own now; from the sources: cmake --build build/release --target carom_bench && "
@@ -41,7 +41,7 @@ constexpr const char* kFormer[][2] = {
     {"manual", "the manual page is installed with carom: man carom; from the sources: io/about/carom.1 in the build"},
 };
 
-/// Each --set takes one value; what has commas or brackets in it is not split.
+/// Each --set takes one value, which is not split at commas or brackets.
 void add_set(CLI::App& command, std::vector<std::string>& set) {
   command.add_option("--set", set, "Change a value of the deck: table.key=value, list.0.key=value; may be repeated")
       ->type_name("KEY=VALUE")
@@ -86,7 +86,7 @@ struct Views {
   }
 };
 
-/// What is wrong with the first word if it names no command; else empty.
+/// The error message if the first word names no command; else empty.
 std::string unknown_command(CLI::App& app, int argc, char** argv) {
   const std::string_view word = argc > 1 ? argv[1] : "";
   if (word.empty() || word[0] == '-') return {};
@@ -100,7 +100,7 @@ std::string unknown_command(CLI::App& app, int argc, char** argv) {
   return text;
 }
 
-/// One process does it, however many a launcher has started.
+/// Runs `work` on rank 0 only, however many processes a launcher has started.
 int once(const std::function<int()>& work) { return carom::World().on_first(work); }
 
 int carom_main(int argc, char** argv) {
@@ -185,7 +185,7 @@ int carom_main(int argc, char** argv) {
   if (run.parsed() && options.deck.empty() && !options.go_on)
     return once([&] { return app.exit(CLI::RequiredError("DECK, or --continue DIR,")) == 0 ? 0 : usage_error; });
 
-  // 3. Do it.
+  // 3. Run it.
   if (run.parsed() || branch.parsed()) return carom::run_command(options);
   return once([&] {
     if (validate.parsed()) return carom::validate_command(deck, set);

@@ -32,7 +32,7 @@ Requests::Requests(std::optional<double> most) : most_(most) {
     sigemptyset(&action.sa_mask);
     struct sigaction before {};
     sigaction(number, nullptr, &before);
-    if (before.sa_handler != SIG_IGN) sigaction(number, &action, nullptr);  // nohup stays as it is
+    if (before.sa_handler != SIG_IGN) sigaction(number, &action, nullptr);  // keeps the effect of nohup
   }
 }
 

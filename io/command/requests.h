@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What is asked of a run from outside while it goes on: signals and the wall clock.
+// Requests to a running simulation from outside: signals and the wall clock.
 //
 //   TERM, INT, HUP   write a checkpoint and stop; a second INT ends the process at once
-//   USR1             write a checkpoint and go on
-//   USR2             write a checkpoint and stop (mpirun passes USR1 and USR2 on to its ranks)
+//   USR1             write a checkpoint and continue
+//   USR2             write a checkpoint and stop (mpirun forwards USR1 and USR2 to its ranks)
 //
-// Handlers only set a flag. All ranks look at it together: a signal to any of them counts for all.
+// Handlers only set a flag. All ranks check it together: a signal to any rank applies to all.
 
 #include <chrono>
 #include <cstdint>
@@ -19,20 +19,20 @@ namespace carom {
 
 class Requests {
  public:
-  /// Takes the signals over. `most`: wall time until the run is to stop; `between`: checkpoints [s].
+  /// Installs the signal handlers. `most`: wall time after which the run is to stop [s].
   explicit Requests(std::optional<double> most);
 
-  /// Wall time between checkpoints [s]; nothing: none but when the run ends or is stopped.
+  /// Wall time between checkpoints [s]; nullopt: only when the run ends or is stopped.
   void set_interval(std::optional<double> seconds) { interval_ = seconds; }
 
   struct Asked {
     bool checkpoint = false, stop = false;
   };
-  /// What has been asked by now, on any rank; rank 0's clock counts. Collective.
+  /// The requests so far, on any rank, by the clock of rank 0. Collective.
   Asked now(Communicator& ranks);
-  /// The same, looked at only now and then where calls come fast, but at every `most`-th call at least. Collective.
+  /// Like now(), but checks less often if calls are frequent; at least at every `most`-th call. Collective.
   Asked now_and_then(Communicator& ranks, std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
-  /// Whether this rank knows that the run is to stop.
+  /// Whether this rank has received a request to stop.
   bool stop_here(const Communicator& ranks) const;
   /// A checkpoint has been written.
   void checkpoint_is_written();
@@ -46,7 +46,7 @@ class Requests {
   }
   std::optional<double> most_, interval_;
   Clock::time_point start_ = Clock::now(), last_checkpoint_ = start_, last_look_ = start_;
-  std::uint64_t calls_ = 0, between_ = 1;  // of now_and_then(): since the last look; from look to look
+  std::uint64_t calls_ = 0, between_ = 1;  // calls of now_and_then(): since the last check; between two checks
 };
 
 }  // namespace carom

@@ -12,7 +12,7 @@
 namespace carom {
 namespace {
 
-/// A word as a shell takes it.
+/// A word quoted for a shell.
 std::string quoted(const std::string& word) {
   const auto plain = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
@@ -24,7 +24,7 @@ std::string quoted(const std::string& word) {
   return all + "'";
 }
 
-/// Gives what rank 0 has read of its checkpoint to all.
+/// Sends what rank 0 has read from its checkpoint to all ranks.
 void share_head(Resumed& from, Communicator& ranks) {
   const auto archive = [&](Archive& all) {
     from.head.archive(all);
@@ -40,7 +40,7 @@ void share_head(Resumed& from, Communicator& ranks) {
   archive(in);
 }
 
-/// Throws where a run that is continued would end before the point that it has reached. `before`: the deck that it had.
+/// Throws if a continued run would end before the point that it has reached. `before`: the deck that it had.
 void check_end(const Deck& deck, const Deck& before, const Resumed& from) {
   const auto refuse = [&](const std::string& key, const std::string& unit, auto end, auto reached) {
     const std::string set = fmt::format("--set run.{}=", key);
@@ -72,15 +72,16 @@ ThermoPoint reached_by(const Checkpoint& checkpoint, const std::filesystem::path
   Archive(checkpoint.read("statistics"))(statistics);
   Archive(checkpoint.read("step count"))(count);
   const ThermoPoint row = last_thermo_point(directory / run_file::thermo);
-  ThermoPoint reached{std::max(row.time, statistics.end_time),
-                      std::max(row.step, statistics.steps + (count.within > 0 ? 1 : 0)),  // what has begun is completed
-                      std::max(row.collisions, statistics.counters.sphere_sphere)};
+  ThermoPoint reached{
+      std::max(row.time, statistics.end_time),
+      std::max(row.step, statistics.steps + (count.within > 0 ? 1 : 0)),  // a step that has begun is completed
+      std::max(row.collisions, statistics.counters.sphere_sphere)};
   // Free flight would have ended at the last collision, before the state.
   if (!find_integrator(checkpoint.head().integrator).stepping) ++reached.collisions;
   return reached;
 }
 
-/// Throws where a branch has nothing to do.
+/// Throws if a branch has nothing to do.
 void check_end(const Deck& deck, const CheckpointHead& head) {
   const auto refuse = [&](const std::string& key, const std::string& is) {
     throw Error(Failure::deck, "run." + key + " = " + is + ": the branch starts at step " + std::to_string(head.step) +

@@ -36,11 +36,11 @@ namespace {
 
 constexpr int kDone = 0, kStoppedEarly = 75;
 
-/// Forces on fewer particles than these cost less than sending them.
+/// Computing the forces on fewer particles than this costs less than sending them.
 constexpr std::size_t kFewestToShare = 64;
-constexpr std::size_t kFewPerRank = 500;  // most events are run twice then (parallel/README.md)
+constexpr std::size_t kFewPerRank = 500;  // below this, most events are run twice (parallel/README.md)
 
-/// From look to look within a step: of pieces, sweeps or contacts, as long as many particles make them.
+/// Calls between two checks for requests within a step (one call per piece, sweep or contact) in large systems.
 constexpr std::uint64_t kCallsWithinSteps = 32;
 
 /// The run of a deck, from its initial state or from a checkpoint. Throws Error. Collective.
@@ -53,11 +53,11 @@ Simulation<D> simulation_of(Deck& deck, Communicator& ranks, Resumed* from) {
   return Simulation<D>(std::move(system), info, info.make<D>(deck.integrator_parameters), deck.plan);
 }
 
-/// What the ranks do alike while a run goes on: stop or write checkpoints when they are asked to.
+/// What all ranks do during a run: stop or write checkpoints on request.
 template <int D>
 class RunControl {
  public:
-  /// `head`: that of the next checkpoint, on rank 0.
+  /// `head`: the head of the next checkpoint, on rank 0.
   RunControl(Simulation<D>& simulation, const Deck& deck, Communicator& ranks, Requests& requests,
              std::function<CheckpointHead()> head)
       : simulation_(simulation), deck_(deck), ranks_(ranks), requests_(requests), head_(std::move(head)) {
@@ -69,7 +69,7 @@ class RunControl {
     hooks.left = [this] { asked_ = requests_.now(ranks_); };
     hooks.leave = [this] {
       const Requests::Asked now = requests_.now_and_then(ranks_, kCallsWithinSteps);
-      if (now.checkpoint) asked_ = now;  // where it need not stop it is written at the step's end
+      if (now.checkpoint) asked_ = now;  // without a stop the checkpoint is written at the step's end
       return now.stop;
     };
     hooks.leave_here = [this] { return requests_.stop_here(ranks_); };
@@ -96,7 +96,7 @@ class RunControl {
   Requests::Asked asked_;
 };
 
-/// Runs a deck in D dimensions and writes its files. `at_work`: the ranks that share the work, of all that there are.
+/// Runs a deck in D dimensions and writes its files. `at_work`: the ranks that share the work.
 template <int D>
 int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
              Resumed* from) {
@@ -106,7 +106,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
   const Statistics& statistics = simulation.statistics();
   const auto lock = continued ? std::move(continued->lock) : std::make_unique<DirectoryLock>(directory);
   const auto backup = continued ? std::nullopt : prepare_output_directory(directory);
-  // The next checkpoint takes the place of one that is damaged, not of the one that is good.
+  // The next checkpoint replaces the damaged one, not the good one.
   if (const auto last = directory / run_file::checkpoint; continued && continued->checkpoint->file() != last)
     rename_file(continued->checkpoint->file(), last);
   RunLog log(directory / run_file::log, options.quiet, continued ? std::optional(continued->head.log) : std::nullopt);
@@ -188,7 +188,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     log.close();
     summary();
   } catch (const std::exception& e) {
-    // Files first: closing them gives back the room they had reserved on a disk that may be full.
+    // Files first: closing them frees the space they had reserved on a disk that may be full.
     progress.end_line();
     outcome.status = "failed";
     outcome.error = e.what();
@@ -204,7 +204,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
   return statistics.stopped_early ? kStoppedEarly : kDone;
 }
 
-/// The same run on a rank other than 0, which shows nothing of it.
+/// Runs the deck on a rank other than 0, without any output.
 template <int D>
 int run_beside(Deck& deck, Communicator& at_work, Requests& requests, Resumed* from) {
   auto simulation = simulation_of<D>(deck, at_work, from);
@@ -231,7 +231,7 @@ int run_on_rank(Deck& deck, const RunOptions& options, Communicator& at_work, in
 
 int run_command(const RunOptions& options) {
   Requests requests(options.max_wall_seconds);
-  // A file that grows beyond its limit and a reader of stdout that goes away are errors to report, and do not end the
+  // A file that exceeds its size limit and a closed pipe on stdout are reported as errors instead of killing the
   // process.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);

@@ -10,12 +10,12 @@
 namespace carom {
 namespace {
 
-/// Whether the tables of this name say the same about how particles move.
+/// Whether the tables of this name in two decks describe the same motion of particles.
 bool same_tables(const Deck& one, const Deck& other, std::string_view name) {
   const auto values = [&](const Deck& deck) {
     std::vector<std::map<std::string, ParameterValue, std::less<>>> all;
     for (const ValueTable& table : deck.source->values.list(name)) all.push_back(table.values.all());
-    for (auto& each : all) each.erase("max_events_per_step");  // which moves nothing
+    for (auto& each : all) each.erase("max_events_per_step");  // it affects no motion
     return all;
   };
   return values(one) == values(other);
@@ -25,7 +25,8 @@ bool same_tables(const Deck& one, const Deck& other, std::string_view name) {
 
 std::optional<std::string> read_text(const std::filesystem::path& file) {
   constexpr std::size_t kTextPiece = 1 << 20,
-                        kMostText = std::size_t{1} << 30;  // of what is no file and may have no end
+                        kMostText = std::size_t{1}
+                                    << 30;  // limit for input that is not a regular file and may never end
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored)) return {};
   const bool ends = std::filesystem::is_regular_file(file, ignored);
@@ -50,7 +51,7 @@ std::optional<std::string> read_text(const std::filesystem::path& file) {
 TextReader reader_for(Communicator& ranks) {
   return [&ranks](const std::filesystem::path& file) -> std::optional<std::string> {
     auto text = ranks.rank() == 0 ? read_text(file) : std::nullopt;
-    if (text) text->push_back('.');  // it can be read, and may be empty
+    if (text) text->push_back('.');  // marks a readable text, which may be empty
     const auto bytes = std::as_bytes(std::span(text ? std::string_view(*text) : std::string_view()));
     const Bytes received = std::move(ranks.gather({bytes.begin(), bytes.end()})[0]);
     if (received.empty()) return {};

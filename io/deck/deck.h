@@ -27,20 +27,20 @@ struct ObservableConfig {
   Parameters parameters;  ///< complete after build_system()
 };
 
-/// What the numbers of a trajectory are said to be in; no number depends on it.
+/// The units that a trajectory declares; no number depends on them.
 struct Units {
   std::string length, time;
 };
 
 struct OutputConfig {
   std::filesystem::path directory;
-  std::optional<double> checkpoint_wall;      ///< wall time between checkpoints [s]; else none but at the end
+  std::optional<double> checkpoint_wall;      ///< wall time between checkpoints [s]; nullopt: only at the end
   double sample_start = 0;                    ///< simulated time of the first sample of the observables
-  std::vector<ObservableConfig> observables;  ///< those with an interval
-  std::optional<Units> units;                 ///< else none: reduced
+  std::vector<ObservableConfig> observables;  ///< the observables with an interval
+  std::optional<Units> units;                 ///< nullopt: reduced units
 };
 
-/// The deck as a value; `toml_text` is the resolved deck, which gives the same run when it is run again.
+/// The deck as a value; `toml_text` is the resolved deck, which reproduces the run.
 struct Deck {
   std::filesystem::path file;
   std::string title, description;
@@ -56,45 +56,47 @@ struct Deck {
   std::shared_ptr<Source> source;
 };
 
-/// How the texts are read of which a run is made: the deck, and the positions it may name. Nothing: it cannot be read.
+/// Reads the input texts of a run: the deck, and the positions it may name. Returns nullopt if the file cannot be read.
 using TextReader = std::function<std::optional<std::string>(const std::filesystem::path&)>;
 
 /// Reads a whole file.
 std::optional<std::string> read_text(const std::filesystem::path& file);
-/// Reads a file on rank 0, for all: the others may not see it. Collective.
+/// Reads a file on rank 0 for all ranks, which may have no access to it. Collective.
 TextReader reader_for(Communicator& ranks);
 
 /// Reads, applies `table.key=value` overrides, validates against the schema, resolves defaults. The reader is called
-/// for the deck, then for the positions. `replace`: where an override gives a table another type, the keys that this
-/// does not know go, instead of being errors.
+/// for the deck, then for the positions. `replace`: if an override changes the type of a table, keys that the new type
+/// does not know are dropped instead of being errors.
 Deck read_deck(const std::filesystem::path& file, std::span<const std::string> overrides,
                const TextReader& reader = read_text, bool replace = false);
 
-/// The resolved deck of a run, with overrides, for another one that starts from its particles. `same_motion`: they go
-/// on moving as they did, under the same forces and by the same integrator. Throws Error(Failure::deck), also where an
-/// override would change particles or box. The reader is called for the same file again.
+/// The resolved deck of a run, with overrides, for a branch that starts from its particles. `same_motion`: whether
+/// forces and integrator stay as they were. Throws Error(Failure::deck), also if an override would change particles or
+/// box. The reader is called for the file of positions again.
 Deck read_branch(const Deck& of, std::span<const std::string> overrides, const TextReader& reader, bool& same_motion);
 
-/// Puts the results elsewhere than the deck says; the resolved deck says so too.
+/// Sets the output directory, in the resolved deck too.
 void set_output_directory(Deck& deck, const std::filesystem::path& directory);
 
-/// How many particles it has.
+/// The number of particles of a deck.
 std::size_t particle_count(const Deck& deck);
 
-/// A state to go on from, instead of the initial one that the deck describes.
+/// A state to start from, instead of the initial state that the deck describes.
 struct GivenState {
-  StateReader read;             ///< called on rank 0
-  std::vector<PairList> bonds;  ///< of each interaction that finds them in the initial state, in their order
-  bool branch = false;          ///< of another deck: what it leaves open is completed, and the state is checked
+  StateReader read;  ///< called on rank 0
+  std::vector<PairList>
+      bonds;  ///< for each interaction that finds its bonds in the initial state, in the order of the deck
+  bool branch =
+      false;  ///< the state belongs to another deck: this deck's defaults are completed, and the state is checked
 };
 
-/// Of each interaction of the deck that finds its bonds in the initial state, in their order.
+/// The bonds of each interaction that finds them in the initial state, in the order of the deck.
 template <int D>
 std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system);
 
 /// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
-/// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards. With a given
-/// state it is that instead of the initial one, and of a run that is continued nothing is checked or warned of anew.
+/// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards. A given state
+/// replaces the initial one; for a continued run nothing is checked and no warning repeated.
 template <int D>
 std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks = nullptr, const GivenState* given = nullptr);
 

@@ -12,7 +12,7 @@
 namespace carom {
 namespace {
 
-/// Masses, radii and charges; of this rank's block, where there are `ranks` and built_in_blocks().
+/// Masses, radii and charges; only of this rank's block, if there are `ranks` and built_in_blocks() is true.
 template <int D>
 void fill_particles(const Deck::Source& source, System<D>& system, Communicator* ranks) {
   Particles<D>& all = system.particles;
@@ -71,8 +71,8 @@ void give_velocities(const Deck::Source& source, System<D>& system) {
                      system.decomposition.others());
 }
 
-/// Writes what was left to the initial state into the values of the deck, so that they say it themselves from now on.
-/// What [output] requires must have a meaning in the box.
+/// Writes the values that depend on the initial state into the deck. Reports parameters of [output] that are not valid
+/// in this box.
 template <int D>
 void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
   Deck::Source& source = *deck.source;
@@ -97,7 +97,7 @@ void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
   deck.toml_text = write_deck(source.values);
 }
 
-/// Gives the interactions that find their bonds in the initial state those that they have found there.
+/// Gives the bonds found in the initial state to the interactions that search for them there.
 void take_bonds(Deck::Source& source, const std::vector<PairList>& bonds) {
   std::size_t n = 0;
   for (InteractionConfig& config : source.interactions)
@@ -149,7 +149,7 @@ void make_interactions(const Deck::Source& source, System<D>& system, bool place
                        "it knows no forces but a uniform-field; leave the interaction out, or take psa, edda or "
                        "their relatives");
       terms[n] = std::move(term);
-    } catch (const Error& e) {  // its message has the form "what; what to do"
+    } catch (const Error& e) {  // the message of e has the form "what; what to do"
       const std::string message = e.what();
       const std::size_t cut = std::min(message.find("; "), message.size());
       problems.error(config.at, message.substr(0, cut),

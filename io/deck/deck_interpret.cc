@@ -260,8 +260,7 @@ class Interpreter {
                                     .wrong = table.wrong || problems_.errors() > before});
   }
 
-  /// Puts the points of a table that is given as a file in the place of `file`, and the last point where there is no
-  /// cutoff: the values say them themselves from now on.
+  /// Replaces the `file` of a table by its points, and sets a missing cutoff to the last point.
   void read_points(ValueTable& table) {
     if (const auto* name = table.find<std::string>("file")) {
       if (table.given("r") || table.given("value")) {
@@ -312,7 +311,7 @@ class Interpreter {
         problems_.error(table.place("species"), "unknown species '" + name + "'", suggestion(name, known));
   }
 
-  /// Makes the interactions for a system without positions, where enough is known of the particles and the box.
+  /// Makes the interactions for a system without positions, if enough is known about the particles and the box.
   void try_interactions() {
     const std::size_t axes = source_.boundary.size();
     const bool box = (dimension_ == 2 || dimension_ == 3) && axes == dimension_ &&

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where the particles stand at the start.
+// The initial positions of the particles.
 
 #include <algorithm>
 #include <charconv>
@@ -16,12 +16,12 @@
 namespace carom {
 namespace {
 
-/// The words of one line up to the first that is no finite number.
+/// The words of one line up to the first word that is not a finite number.
 struct Words {
   std::vector<double> numbers;
-  std::string_view wrong;  // that word; empty: there is none
-  std::size_t column = 1;  // of it, from 1
-  bool a_number = false;   // it is one, but not finite
+  std::string_view wrong;  // the word that is not a finite number; empty: none
+  std::size_t column = 1;  // column of `wrong`, from 1
+  bool a_number = false;   // `wrong` is a number, but not finite
 };
 
 Words words_of(std::string_view line) {
@@ -46,7 +46,7 @@ Words words_of(std::string_view line) {
   return words;
 }
 
-/// A word for messages, of whatever bytes it is.
+/// A word for messages; it may contain arbitrary bytes.
 std::string shown(std::string_view word) {
   constexpr std::size_t kMostShown = 20;
   std::string text(word.substr(0, kMostShown));
@@ -121,7 +121,7 @@ void place_by_compression(const Deck::Source& source, System<D>& system) {
   problems.throw_errors(Failure::initial_state);
 }
 
-/// Every species takes its sites in the order of their coordinates; which sites those are is drawn.
+/// The sites of each species are drawn; its particles fill them in the order of their coordinates.
 template <int D>
 void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& system) {
   std::vector<std::size_t> counts;
@@ -134,7 +134,7 @@ void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& sy
   std::vector<Id> next(counts.size());  // of each species
   for (std::size_t s = 1; s < counts.size(); ++s) next[s] = next[s - 1] + static_cast<Id>(counts[s - 1]);
   const std::size_t sites = fit_lattice(lattice, system.box, n, margin).sites;
-  // A species that takes all needs no drawing.
+  // A single species that fills all sites needs no drawing.
   const std::vector<int> owner =
       counts.size() > 1 || sites > n ? distribute(sites, counts, source.placement.seed) : std::vector<int>{};
   const Id first = p.size() > 0 ? p.id_of(0) : 0;
@@ -156,7 +156,7 @@ std::vector<std::vector<double>> rows_in(const std::string& text, const std::fil
   std::vector<std::vector<double>> rows;
   Problems problems;
   std::string line;
-  constexpr std::size_t kMostErrors = 10;  // reported of one file
+  constexpr std::size_t kMostErrors = 10;  // reported per file
   bool begins = true;
   for (int number = 1; problems.errors() < kMostErrors && std::getline(in, line); ++number) {
     const Words words = words_of(line);

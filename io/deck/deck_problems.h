@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Collects what is wrong with a deck, so that all of it can be reported at once.
+// Collects what is wrong with a deck, so that all errors can be reported at once.
 //
 //   problems.error(place, "radius must be positive (is -1)", "give a number above 0");
 //   problems.throw_errors(Failure::deck);
@@ -13,7 +13,7 @@
 
 namespace carom {
 
-/// Where in a deck: a file with line and column (0 = the file as a whole), or a `--set` option.
+/// A place in a deck: a file with line and column (0 = the file as a whole), or a `--set` option.
 struct Place {
   std::string source;
   int line = 0, column = 0;
@@ -29,7 +29,7 @@ class Problems {
   std::size_t errors() const { return errors_.size(); }
   /// Throws an Error with all errors, one a line, in the order of their places, if there are any.
   void throw_errors(Failure failure) const;
-  /// `place: warning: what; remedy`, in the order they came.
+  /// `place: warning: what; remedy`, in the order of their calls.
   std::vector<std::string> warnings() const;
 
  private:
@@ -40,11 +40,11 @@ class Problems {
   std::vector<Problem> errors_, warnings_;
 };
 
-/// The candidate that is most like `word`, or "" if none is near: Damerau–Levenshtein distance up to a third of the
+/// The candidate closest to `word`, or "" if none is close: Damerau–Levenshtein distance up to a third of the
 /// length, at least 2.
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates);
 
-/// "; did you mean 'x'?" as a remedy, or the whole choice where nothing is near.
+/// "; did you mean 'x'?" as a remedy, or all candidates if none is close.
 std::string suggestion(std::string_view word, const std::vector<std::string>& candidates);
 
 /// "a, b, c"

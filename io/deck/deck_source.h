@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What a checked deck says, in the words of a simulation: known to io/deck, and to io/python, which takes the
-// interactions. A deck is read in three steps: read_values() (deck_values.h), interpret(), build_system() (deck.h).
+// The contents of a checked deck as a simulation needs them. Used by io/deck, and by io/python for the interactions. A
+// deck is read in three steps: read_values() (deck_values.h), interpret(), build_system() (deck.h).
 
 #include <optional>
 
@@ -28,7 +28,7 @@ struct PlacementConfig {
   std::optional<double> packing_fraction;
   std::uint64_t seed = 1;
   std::filesystem::path file;
-  std::vector<std::vector<double>> positions;  ///< those of the file
+  std::vector<std::vector<double>> positions;  ///< from the file
   double growth_rate = 0, max_collisions = 0;  ///< compressed: engine/setup/compression.h
 };
 
@@ -52,27 +52,26 @@ struct Deck::Source {
   std::size_t particles() const;
 };
 
-/// From the values of a deck to what they mean together: lengths of lists, ids that exist, tables that need each other;
-/// what an interaction itself refuses is found by making it. Fills everything of `deck` but toml_text and the positions
-/// of a file. What is wrong goes to `problems`; then the deck is of no use. The reader is called for the points of
-/// potentials, which the values then hold themselves. Throws Error(Failure::file), and Failure::deck for what is wrong
-/// in such a file.
+/// Checks the values of a deck against each other: lengths of lists, ids that exist, tables that need each other; the
+/// checks of an interaction itself run by making it. Fills all of `deck` but toml_text and the positions in a file.
+/// Errors go to `problems`; the deck must not be used then. The reader is called for files with points of potentials,
+/// and the points are stored in the values. Throws Error(Failure::file), and Failure::deck for errors in a file of
+/// points.
 void interpret(DeckValues values, const TextReader& reader, Deck& deck, Problems& problems);
 
-/// Boundaries, edges (1 where the deck leaves them to the packing fraction) and the names of species.
+/// Boundaries, edges (1 if they follow from the packing fraction) and the names of species.
 template <int D>
 void fill_box(const Deck::Source& source, System<D>& system);
 
-/// Makes every interaction that is not wrong, and tries whether the integrator can carry it; `placed` is whether the
-/// positions are known. What an interaction refuses goes to `problems` with its place.
+/// Makes every interaction that has no error yet, and checks that the integrator supports it; `placed`: whether the
+/// positions are known. Errors of an interaction go to `problems` with its place.
 template <int D>
 void make_interactions(const Deck::Source& source, System<D>& system, bool placed, Problems& problems);
 
-/// Whether ranks can build their blocks of the initial state, each for itself: lattices of species with particles all
-/// alike.
+/// Whether each rank can build its own block of the initial state: lattices of species with identical particles.
 bool built_in_blocks(const Deck::Source& source);
 
-/// Positions as [placement] says, for species given by count. Sets the box where the packing fraction does so.
+/// Positions as [placement] says, for species given by count. Sets the box if it follows from the packing fraction.
 template <int D>
 void place_particles(const Deck::Source& source, System<D>& system);
 

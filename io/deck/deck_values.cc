@@ -14,14 +14,14 @@
 namespace carom {
 namespace {
 
-/// A deck as TOML: the file parsed, `--set` values put in, and the place of every node known for messages.
+/// A deck as TOML: the file parsed, `--set` values put in, and the place of every node for messages.
 struct DeckToml {
   std::string file;  ///< as the user wrote it
   toml::table root;
-  std::unordered_map<const toml::node*, std::string> set;  ///< what came by `--set`, with the key it came by
+  std::unordered_map<const toml::node*, std::string> set;  ///< nodes set by `--set`, with their keys
 
   Place place(const toml::node& node) const { return place(node.source(), node); }
-  /// Of the key that names `node`.
+  /// The place of the key that names `node`.
   Place place(const toml::key& key, const toml::node& node) const { return place(key.source(), node); }
 
  private:
@@ -46,7 +46,7 @@ toml::table parse_value(const std::string& text) {
   }
 }
 
-/// Notes that a value came by `--set`, with all that is in it.
+/// Records that a value and everything in it were set by `--set`.
 void label(DeckToml& deck, const toml::node& node, const std::string& key) {
   deck.set[&node] = key;
   if (const auto* array = node.as_array())
@@ -63,8 +63,8 @@ std::vector<std::string> split(std::string path) {
   return parts;
 }
 
-/// The table that a step along the path leads to; makes missing tables; null where the path leads nowhere.
-/// `next` moves on where a list's index is used up.
+/// The table that a step along the path leads to; makes missing tables; null if the path leads nowhere.
+/// `next` advances if the step consumes the index of a list.
 toml::table* descend(DeckToml& deck, toml::table& from, const std::vector<std::string>& parts, std::size_t& next,
                      const std::string& path) {
   const std::string& name = parts[next++];
@@ -86,7 +86,7 @@ toml::table* descend(DeckToml& deck, toml::table& from, const std::vector<std::s
   return index < list->size() && next < parts.size() ? list->get(index)->as_table() : nullptr;
 }
 
-/// Puts the value of an override in.
+/// Applies an override to the deck.
 void apply(DeckToml& deck, const std::string& text, Problems& problems) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
@@ -113,7 +113,7 @@ void apply(DeckToml& deck, const std::string& text, Problems& problems) {
   }
 }
 
-/// Reads one node as what its key declares; complains at the innermost node that is wrong.
+/// Reads one node as the type that its key declares; reports an error at the innermost wrong node.
 class NodeReader {
  public:
   NodeReader(const Parameter& key, const DeckToml& deck, Problems& problems)
@@ -162,7 +162,7 @@ class NodeReader {
     return std::nullopt;
   }
 
-  /// Whether there is no error in a value; reports the one that there is.
+  /// Reports the error in a value, if any; returns whether there is none.
   bool good(const toml::node& node, const std::optional<ParameterError>& error, const std::string& word = {}) {
     if (error) complain(node, error->what, error->remedy.empty() ? suggestion(word, key_.choices) : error->remedy);
     return !error;
@@ -269,7 +269,7 @@ class NodeReader {
   Problems& problems_;
 };
 
-/// Values left out get their defaults; those that have none and are needed are reported.
+/// Sets missing values to their defaults; reports required values that are missing.
 void complete(ValueTable& table, Problems& problems) {
   table.each_key([&](const Parameter& key) {
     if (table.given(key.name)) return;
@@ -280,7 +280,7 @@ void complete(ValueTable& table, Problems& problems) {
   });
 }
 
-/// What to write instead of a word that the schema does not know.
+/// A remedy for a word that the schema does not know.
 std::string remedy(const TableSchema& schema, const std::string& word, const std::vector<std::string>& known) {
   for (const auto& [former, instead] : schema.former)
     if (former == word) return instead;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A deck's values, each checked against its own declaration in the schema and completed by defaults: types, ranges,
-// choices, unknown and missing keys. What keys mean together is checked later (deck_interpret.cc).
+// choices, unknown and missing keys. Values are checked against each other later (deck_interpret.cc).
 
 #include <filesystem>
 #include <map>
@@ -19,12 +19,12 @@ namespace carom {
 struct ValueTable {
   const TableSchema* schema = nullptr;
   const Variant* variant = nullptr;  ///< chosen by `type`
-  Place at;                          ///< of its head
+  Place at;                          ///< the place of its head
   Parameters values;
-  std::map<std::string, Place, std::less<>> places;  ///< of the keys that the deck gives
+  std::map<std::string, Place, std::less<>> places;  ///< places of the keys that the deck gives
   bool wrong = false;                                ///< a problem in it has been reported
 
-  /// The value, or null where the key was not given and has no default, or was wrong and is reported.
+  /// The value, or null if the key is missing and has no default, or was reported as wrong.
   template <class T>
   const T* find(std::string_view key) const {
     return values.find<T>(key);
@@ -35,7 +35,7 @@ struct ValueTable {
     if (const T* value = find<T>(key)) to = *value;
   }
   bool given(std::string_view key) const { return places.find(key) != places.end(); }
-  /// Of the key, or of the table where the deck doesn't give it.
+  /// The place of the key, or of the table if the deck does not give the key.
   const Place& place(std::string_view key) const {
     const auto it = places.find(key);
     return it == places.end() ? at : it->second;
@@ -58,18 +58,18 @@ struct DeckValues {
 
   std::vector<ValueTable>& list(std::string_view name) { return tables.find(name)->second; }
   const std::vector<ValueTable>& list(std::string_view name) const { return tables.find(name)->second; }
-  /// The one table of that name, or null.
+  /// The first table of that name, or null.
   ValueTable* find(std::string_view name) { return list(name).empty() ? nullptr : &list(name).front(); }
   const ValueTable* find(std::string_view name) const { return list(name).empty() ? nullptr : &list(name).front(); }
 };
 
-/// The values of a deck from its text and the overrides (`table.key=value`, `list.0.key=value`). `replace`: where an
-/// override gives a table another type, the keys that this type does not know are left out, instead of being errors.
-/// Throws Error(Failure::deck) where the text is not TOML; all else that is wrong goes to `problems`.
+/// The values of a deck from its text and the overrides (`table.key=value`, `list.0.key=value`). `replace`: if an
+/// override changes the type of a table, keys that the new type does not know are dropped instead of being errors.
+/// Throws Error(Failure::deck) if the text is not TOML; all other errors go to `problems`.
 DeckValues read_values(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
                        bool replace, Problems& problems);
 
-/// The values as a deck again, in the order of the schema; numbers in the fewest digits that give them back exactly.
+/// The values as a deck again, in the order of the schema; numbers have the fewest digits that reproduce them exactly.
 std::string write_deck(const DeckValues& values);
 
 }  // namespace carom

@@ -14,15 +14,15 @@
 namespace carom {
 namespace {
 
-/// Of pairs within a cutoff, a partner of a pair each; several images of a particle count each.
+/// Bytes for lists of pairs within a cutoff: one partner per pair, each image of a particle counted separately.
 template <int D>
 double memory_of_pairs(double particles, double cutoff, const Box<D>& box) {
-  double share = 1;  // of the particles that are within a cutoff of one along each axis
+  double share = 1;  // fraction of the particles within a cutoff of a particle along each axis
   for (int k = 0; k < D; ++k) {
     const double within = 2 * cutoff / box.edges[k];
     share *= box.periodic(k) ? within : std::min(1.0, within);
   }
-  constexpr double kSphere = D == 2 ? 0.785 : 0.524;  // of its square or cube
+  constexpr double kSphere = D == 2 ? 0.785 : 0.524;  // volume over that of its square or cube
   return 0.5 * particles * particles * kSphere * share * sizeof(std::uint32_t);
 }
 

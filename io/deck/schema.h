@@ -2,7 +2,7 @@
 #pragma once
 // The declared schema of a deck: every table and every key with type, unit, range, default and meaning, once.
 //
-// Reading and checking, `carom schema`, and the resolved deck are all made from it. The keys of integrators,
+// Reading, checking, `carom schema` and the resolved deck all use it. The keys of integrators,
 // interactions and observables come from their own declarations (engine/integrators/integrator.h, interaction.h,
 // observable.h).
 
@@ -15,7 +15,7 @@
 
 namespace carom {
 
-/// What `type = "…"` of a table may be, with the keys it brings along.
+/// One value of `type = "…"` of a table, with the keys that it adds.
 struct Variant {
   std::string name;
   std::vector<Parameter> keys;
@@ -25,11 +25,11 @@ struct Variant {
 struct TableSchema {
   std::string name;       ///< "" = the keys at the top
   bool list = false;      ///< [[name]]: any number of times
-  bool required = false;  ///< must stand there (a list: at least once)
+  bool required = false;  ///< must be given (a list: at least once)
   std::string meaning;
   std::vector<Parameter> keys;
   std::vector<Variant> variants{};                   ///< non-empty: `type` chooses one of them
-  std::vector<std::array<std::string, 2>> former{};  ///< types and keys that are no more, and what to write instead
+  std::vector<std::array<std::string, 2>> former{};  ///< removed types and keys, and what to write instead
 
   const Variant* variant(std::string_view type) const;
   /// "[name]" or "[[name]]"; "the deck" for the keys at the top.
@@ -49,7 +49,7 @@ std::string type_name(const Parameter& key);
 /// The schema as a page: plain text for a terminal, or Markdown for the manual.
 std::string schema_page(bool markdown);
 
-/// Every integrator with order, conserved quantities, parameters and source, and every observable with its own.
+/// Every integrator with order, conserved quantities, parameters and source, and every observable with its parameters.
 std::string methods_page();
 
 }  // namespace carom

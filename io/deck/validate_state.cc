@@ -26,7 +26,7 @@ std::string plural(std::size_t n, const std::string& one, const std::string& man
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
-/// Where the deck says the positions of this particle.
+/// The place in the deck that gives the position of this particle.
 const Place& place_of(const Deck::Source& source, Id id) {
   const SpeciesConfig* config = source.species.data();
   for (std::size_t end = config->count; end <= id; end += config->count) ++config;

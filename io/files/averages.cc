@@ -12,7 +12,7 @@ namespace carom {
 
 namespace {
 
-/// A name in the head of a table: in quotes where it could be taken for several.
+/// A name in the head of a table: in quotes if it could be read as several names.
 std::string quoted(const std::string& name) {
   if (name.find_first_of(",\"\n") == std::string::npos) return name;
   std::string text = "\"";

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// rdf.csv and its like: what is averaged while a run goes on (engine/run/observable.h) instead of being written frame
-// by frame. Reduced units; numbers in the fewest digits that give them back exactly.
+// rdf.csv and similar files: averages computed during a run (engine/run/observable.h) instead of written frame by
+// frame. Units are reduced; numbers have the fewest digits that reproduce them exactly.
 //
-// A file is put in place anew as a whole, whenever the number of samples has doubled, and at the end: after a kill at
-// least half of the samples are there.
+// The whole file is replaced whenever the number of samples has doubled, and at the end: after a kill it holds at least
+// half of the samples.
 
 #include <filesystem>
 #include <memory>

@@ -22,7 +22,7 @@
 namespace carom {
 namespace {
 
-constexpr std::size_t kBlock = 512;  // before HDF5's own bytes
+constexpr std::size_t kHeadBlock = 512;  // before HDF5's own bytes
 constexpr int kFormat = 4;
 constexpr std::string_view kBegin = "carom checkpoint ";
 
@@ -43,12 +43,12 @@ struct Sum {
   std::uint32_t crc = 0;
 };
 
-/// Of all behind the block.
+/// The checksum of everything after the block.
 Sum sum_of(const std::filesystem::path& path, const Descriptor& file) {
   Sum sum;
   std::vector<unsigned char> piece(1 << 16);
   for (;;) {
-    const ssize_t got = ::pread(file.number(), piece.data(), piece.size(), static_cast<off_t>(kBlock + sum.bytes));
+    const ssize_t got = ::pread(file.number(), piece.data(), piece.size(), static_cast<off_t>(kHeadBlock + sum.bytes));
     if (got < 0) refuse_with_reason(path);
     if (got == 0) return sum;
     sum.crc = libdeflate_crc32(sum.crc, piece.data(), static_cast<std::size_t>(got));
@@ -56,17 +56,17 @@ Sum sum_of(const std::filesystem::path& path, const Descriptor& file) {
   }
 }
 
-std::array<char, kBlock> block_of(const Sum& sum) {
-  std::array<char, kBlock> block{};
-  fmt::format_to_n(block.data(), kBlock, "{}{}\nbytes {}\ncrc32 {:08x}\n", kBegin, kFormat, sum.bytes, sum.crc);
+std::array<char, kHeadBlock> block_of(const Sum& sum) {
+  std::array<char, kHeadBlock> block{};
+  fmt::format_to_n(block.data(), kHeadBlock, "{}{}\nbytes {}\ncrc32 {:08x}\n", kBegin, kFormat, sum.bytes, sum.crc);
   return block;
 }
 
-/// Throws unless the block is that of what follows it.
+/// Throws unless the block matches the contents that follow it.
 void verify(const std::filesystem::path& path) {
   const Descriptor file = open_file(path, O_RDONLY);
-  std::array<char, kBlock> block{};
-  const ssize_t got = ::pread(file.number(), block.data(), kBlock, 0);
+  std::array<char, kHeadBlock> block{};
+  const ssize_t got = ::pread(file.number(), block.data(), kHeadBlock, 0);
   if (got < 0) refuse_with_reason(path);
   const std::string_view text(block.data(), static_cast<std::size_t>(got));
   if (!text.starts_with(kBegin)) refuse(path, "not a checkpoint of carom");
@@ -74,7 +74,7 @@ void verify(const std::filesystem::path& path) {
   if (std::sscanf(block.data() + kBegin.size(), "%d", &format) == 1 && format != kFormat)
     refuse(path, fmt::format("a checkpoint of format {}, written by {} carom; this one reads format {}", format,
                              format > kFormat ? "a newer" : "an older", kFormat));
-  if (static_cast<std::size_t>(got) < kBlock || block != block_of(sum_of(path, file)))
+  if (static_cast<std::size_t>(got) < kHeadBlock || block != block_of(sum_of(path, file)))
     refuse(path, "the checkpoint is damaged or cut off: its checksum is not that of its contents");
 }
 
@@ -94,13 +94,14 @@ hid_t type_of(Fields::Scalar scalar) {
   return H5T_NATIVE_UINT8;
 }
 
-/// The file is complete: signs it, and puts it in the place of the last one.
+/// Signs a complete file and replaces the last checkpoint by it.
 void sign_and_rename(const std::filesystem::path& aside, const std::filesystem::path& directory) {
   {
     const Descriptor file = open_file(aside, O_RDWR);
-    ::sync_file_range(file.number(), 0, 0, SYNC_FILE_RANGE_WRITE);  // the disk writes while the sum is taken
+    ::sync_file_range(file.number(), 0, 0, SYNC_FILE_RANGE_WRITE);  // the disk writes while the sum is computed
     const auto block = block_of(sum_of(aside, file));
-    if (::pwrite(file.number(), block.data(), kBlock, 0) != static_cast<ssize_t>(kBlock) || ::fsync(file.number()) != 0)
+    if (::pwrite(file.number(), block.data(), kHeadBlock, 0) != static_cast<ssize_t>(kHeadBlock) ||
+        ::fsync(file.number()) != 0)
       refuse_with_reason(aside);
   }
   const auto last = directory / run_file::checkpoint;
@@ -128,7 +129,7 @@ void write_checkpoint(const std::filesystem::path& directory, CheckpointHead hea
       [&](const std::string& name, const Bytes& bytes) { write(*run, name, H5T_NATIVE_UINT8, bytes, {bytes.size()}); }};
   try {
     if (system.decomposition.ranks().rank() == 0) {
-      file.emplace(hdf5::File::create_plain(aside, kBlock));
+      file.emplace(hdf5::File::create_plain(aside, kHeadBlock));
       particles.emplace(file->group("particles"));
       run.emplace(file->group("run"));
       const hdf5::Handle origin = file->group("origin");

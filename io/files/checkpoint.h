@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// checkpoint.h5: the state of a run, from which `carom run --continue` goes on with the same bits.
+// checkpoint.h5: the state of a run, from which `carom run --continue` continues bit for bit.
 //
-// A checkpoint is written aside, synced, and renamed; the one before it stays as checkpoint.previous.h5. So at whatever
-// instant a run is killed, one good checkpoint remains. The file is HDF5 behind a block of 512 bytes, which says the
-// format, the length and the CRC-32 of all that follows; nothing of a file that does not have them is used.
+// A checkpoint is written under another name, synced, and renamed; the previous one stays as checkpoint.previous.h5. So
+// one good checkpoint remains whenever a run is killed. The file is HDF5 behind a block of 512 bytes, which says the
+// format, the length and the CRC-32 of all that follows; a file that does not match them is not used.
 //
 //   /origin/deck          the deck as resolved, TOML
 //   /origin/head          the rest of CheckpointHead, as bytes (engine/base/archive.h)
 //   /particles/NAME       a field of particles, in the order of ids (engine/base/fields.h)
-//   /run/NAME             what there is one of a run, as bytes
+//   /run/NAME             a value of the run as a whole, as bytes
 
 #include <filesystem>
 #include <memory>
@@ -25,21 +25,22 @@ namespace hdf5 {
 class File;
 }
 
-/// What a checkpoint says beside the state.
+/// The contents of a checkpoint besides the state.
 struct CheckpointHead {
   std::string deck;        ///< as resolved, TOML
-  std::string deck_file;   ///< that the run was started with
-  std::string version;     ///< of the program that wrote it
+  std::string deck_file;   ///< the deck file that the run was started with
+  std::string version;     ///< version of the program that wrote it
   std::string integrator;  ///< its name
   std::int32_t dimension = 0;
   std::uint64_t particles = 0;
   std::int64_t step = 0;  ///< slabs completed
   double time = 0;        ///< simulated time of the last slab's end
-  FileMarks files{};      ///< where the files of the run stood
+  FileMarks files{};      ///< positions in the files of the run
   FileMark log{};
   std::uint64_t log_rows = 0;
-  std::vector<PairList> bonds;        ///< of each interaction that finds them in the initial state, in their order
-  std::vector<std::string> warnings;  ///< of the deck, issued when the run began
+  std::vector<PairList>
+      bonds;  ///< for each interaction that finds its bonds in the initial state, in the order of the deck
+  std::vector<std::string> warnings;  ///< warnings of the deck when the run began
   std::string branched_from;          ///< the checkpoint that a branch started from; else empty
 
   void archive(Archive& archive) {
@@ -48,21 +49,21 @@ struct CheckpointHead {
   }
 };
 
-/// Writes the state of the run to the directory; the head of rank 0 counts. To be called in
-/// Simulation::Hooks::should_stop. Throws Error(Failure::file), and the checkpoints that were there stay. Collective.
+/// Writes the state of the run to the directory, with the head of rank 0. To be called in
+/// Simulation::Hooks::should_stop. Throws Error(Failure::file); the earlier checkpoints then stay. Collective.
 template <int D>
 void write_checkpoint(const std::filesystem::path& directory, CheckpointHead head, System<D>& system);
 
 class Checkpoint {
  public:
-  /// Throws Error(Failure::file) with the reason where it cannot be used.
+  /// Throws Error(Failure::file) with the reason if the file cannot be used.
   explicit Checkpoint(const std::filesystem::path& file);
   Checkpoint(Checkpoint&&) noexcept;
   ~Checkpoint();
 
   const std::filesystem::path& file() const { return path_; }
   const CheckpointHead& head() const { return head_; }
-  /// A field or what there is one of a run. Throws Error(Failure::file) where it is missing.
+  /// A field, or a value of the run as a whole. Throws Error(Failure::file) if it is missing.
   Bytes read(const std::string& name) const;
 
  private:
@@ -72,7 +73,7 @@ class Checkpoint {
 };
 
 /// The last good checkpoint in a directory; `warning` says what is wrong with a later one. Throws Error(Failure::file)
-/// where there is none.
+/// if there is no good one.
 Checkpoint last_checkpoint(const std::filesystem::path& directory, std::string& warning);
 
 /// Whether a file begins like a checkpoint.

@@ -10,7 +10,7 @@ namespace carom {
 
 namespace {
 
-constexpr std::size_t kPiece = 1 << 20;  // bytes written at a time
+constexpr std::size_t kBytesPerWrite = 1 << 20;  // bytes written at a time
 
 /// The chemical symbols, by atomic number from 1.
 constexpr std::array<std::string_view, 118> kElements = {
@@ -22,7 +22,7 @@ constexpr std::array<std::string_view, 118> kElements = {
     "Rn", "Fr", "Ra", "Ac", "Th", "Pa", "U",  "Np", "Pu", "Am", "Cm", "Bk", "Cf", "Es", "Fm", "Md", "No",
     "Lr", "Rf", "Db", "Sg", "Bh", "Hs", "Mt", "Ds", "Rg", "Cn", "Nh", "Fl", "Mc", "Lv", "Ts", "Og"};
 
-/// The species by chemical symbols, which ASE insists on: their names where all are such, else symbols in their place.
+/// The species as chemical symbols, which ASE requires: their names if all are symbols, else substitutes.
 std::vector<std::string_view> symbols_of(const std::vector<std::string>& names) {
   std::vector<std::string_view> symbols;
   const bool chemical =
@@ -86,7 +86,7 @@ std::string write_extxyz(const TrajectoryReader& trajectory, std::span<const std
       fmt::format_to(out, "{} {} {} {} {} {} {} {} {} {} {} {} {}\n",
                      symbols[static_cast<std::size_t>(trajectory.species[i])], x[0], x[1], x[2], v[0], v[1], v[2],
                      trajectory.radius[i], trajectory.mass[i], trajectory.charge[i], image[0], image[1], image[2]);
-      if (text.size() < kPiece) continue;
+      if (text.size() < kBytesPerWrite) continue;
       file.append({text.data(), text.size()});
       text.clear();
     }
@@ -97,7 +97,7 @@ std::string write_extxyz(const TrajectoryReader& trajectory, std::span<const std
 
 std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& file,
                               const std::filesystem::path& path) {
-  // 1. What the input script has to say: the boundaries, and what each atom has.
+  // 1. What the input script must declare: the boundaries, and the properties of each atom.
   const TrajectoryFrame f = trajectory.frame(frames.front());
   const bool charged = std::ranges::any_of(trajectory.charge, [](double q) { return q != 0; });
   const bool bonded = !trajectory.bonds.empty(), flat = trajectory.dimension == 2;
@@ -111,7 +111,7 @@ std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<cons
   const std::string script = "units lj; dimension " + std::to_string(trajectory.dimension) + "; boundary" + boundary +
                              "; atom_style " + styles + "; read_data " + path.filename().string();
 
-  // 2. The box: in a direction without boundaries as far as there are particles.
+  // 2. The box: along an open axis it spans the particles.
   fmt::memory_buffer text;
   const auto out = fmt::appender(text);
   const std::size_t n = trajectory.particles();
@@ -131,7 +131,7 @@ std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<cons
 
   // 3. The particles.
   const auto write = [&](bool all) {
-    if (!all && text.size() < kPiece) return;
+    if (!all && text.size() < kBytesPerWrite) return;
     file.append({text.data(), text.size()});
     text.clear();
   };

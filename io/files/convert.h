@@ -2,7 +2,7 @@
 #pragma once
 // Frames of a trajectory in the formats of other programs.
 //
-// In each of them numbers are those of the trajectory, in the fewest digits that give them back; GSD has single
+// All formats hold the numbers of the trajectory, text in the fewest digits that reproduce them; GSD has single
 // precision and its origin in the middle of the box.
 
 #include <filesystem>
@@ -17,11 +17,11 @@
 namespace carom {
 
 struct ExportFormat {
-  std::string_view name;       ///< as the command takes it
-  std::string_view extension;  ///< of the file
+  std::string_view name;       ///< the name on the command line
+  std::string_view extension;  ///< of the file name
   bool one_frame;              ///< holds a single frame only
-  /// Writes the frames (indices, at least one) to `out`, which will have the name `file`; returns what to say about it,
-  /// or nothing. Throws Error(Failure::file).
+  /// Writes the frames (indices, at least one) to `out`, which will have the name `file`; returns a message for the
+  /// user, or "". Throws Error(Failure::file).
   std::string (*write)(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& out,
                        const std::filesystem::path& file);
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // GSD, version 2 (gsd.readthedocs.io, "File layer specification" and "HOOMD schema"): a header, the index of all
-// chunks, their names, then the chunks, all in the byte order of the machine. Sizes are known beforehand, so that the
-// file is written from its beginning to its end.
+// chunks, their names, then the chunks, all in the byte order of the machine. All sizes are known beforehand, so the
+// file is written sequentially.
 
 #include <algorithm>
 #include <array>
@@ -32,7 +32,7 @@ struct Entry {
 };
 static_assert(sizeof(Entry) == 32);
 
-constexpr std::uint64_t kNameEntry = 64;  // bytes that the header counts the list of names in
+constexpr std::uint64_t kNameEntry = 64;  // bytes; the unit in which the header counts the list of names
 
 /// The code of a type: unsigned integers from 1, signed ones from 5, by size; single precision.
 template <class T>
@@ -43,7 +43,7 @@ constexpr std::uint8_t type_of() {
 
 std::vector<float> single(std::span<const double> values) { return {values.begin(), values.end()}; }
 
-/// Visits every chunk of a frame of the file: chunk(name, rows of so many columns).
+/// Visits every chunk of a frame of the file: chunk(name, rows, number of columns).
 template <class Chunk>
 void each_chunk(const TrajectoryReader& t, std::uint64_t number, const TrajectoryFrame& f, Chunk&& chunk) {
   const bool flat = t.dimension == 2;
@@ -62,7 +62,7 @@ void each_chunk(const TrajectoryReader& t, std::uint64_t number, const Trajector
   chunk("particles/position", position, 3);
   chunk("particles/velocity", single(f.velocity), 3);
   chunk("particles/image", f.image, 3);
-  if (number > 0) return;  // what follows never changes, and readers take it from the first frame
+  if (number > 0) return;  // the chunks below never change, and readers take them from the first frame
   chunk("configuration/dimensions", std::vector{static_cast<std::uint8_t>(t.dimension)}, 1);
   const auto names = [&](const std::string& name, const std::vector<std::string>& all) {
     std::size_t width = 1;
@@ -100,7 +100,7 @@ std::string_view as_text(const Data& data) {
 
 std::string write_gsd(const TrajectoryReader& trajectory, std::span<const std::uint64_t> frames, TextFile& file,
                       const std::filesystem::path& /*path*/) {
-  // 1. What chunks there are. All frames but the first have the same of the same sizes.
+  // 1. The list of chunks. All frames but the first have equal lists and sizes.
   std::vector<std::string> names;
   std::vector<Entry> index;
   std::int64_t end = 0;
@@ -118,7 +118,7 @@ std::string write_gsd(const TrajectoryReader& trajectory, std::span<const std::u
   for (const std::string& name : names) list += name + '\0';
   list.resize((list.size() / kNameEntry + 1) * kNameEntry);
 
-  // 2. Where they stand. In the index they are in the order of frames and names, in the file in that of each_chunk.
+  // 2. Their positions. The index is in the order of frames and names, the file in the order of each_chunk.
   const std::size_t chunks = kinds[0].size() + (frames.size() - 1) * kinds[1].size();
   Header header;
   header.names_location = sizeof(Header);

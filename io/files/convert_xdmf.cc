@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// XDMF (xdmf.org): points at each time; their numbers stay in the trajectory, which the file refers to. How it refers
-// to one row of a series differs: readers of XDMF 3 take a selection behind the name of the data set (start : stride :
-// count : dimensions), readers of XDMF 2 an item of type HyperSlab, and neither knows the other's way.
+// XDMF (xdmf.org): points at each time; the numbers stay in the trajectory, to which the file refers. How it refers
+// to one row of a series differs: readers of XDMF 3 take a selection after the name of the data set (start : stride :
+// count : dimensions), readers of XDMF 2 an item of type HyperSlab, and neither reader supports the other notation.
 
 #include <spdlog/fmt/fmt.h>
 
@@ -19,9 +19,9 @@ std::string escaped(const std::string& text) {
 
 struct Numbers {
   std::string file;        // the trajectory, as the XML names it
-  std::uint64_t rows = 0;  // that its series have
+  std::uint64_t rows = 0;  // of its series
   std::size_t particles = 0;
-  int version = 3;  // of XDMF
+  int version = 3;  // version of XDMF
 
   /// One row of a series of vectors.
   std::string row(const std::string& name, std::string_view type, int bytes, std::uint64_t index) const {

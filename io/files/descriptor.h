@@ -9,13 +9,13 @@
 
 namespace carom {
 
-/// Bytes to give to the system at once: with ext4 of Linux 6.18 a large write to a new file takes several times as long
-/// as the same in pieces.
+/// Most bytes in one write: on ext4 of Linux 6.18 one large write to a new file takes several times as long as the same
+/// bytes in pieces.
 constexpr std::size_t kLargestWrite = 1 << 20;
 
 class Descriptor {
  public:
-  /// What ::open() returned; negative: there is none.
+  /// `number`: the result of ::open(); negative: no file.
   explicit Descriptor(int number) : number_(number) {}
   Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
   Descriptor& operator=(Descriptor&& other) noexcept {

@@ -34,8 +34,8 @@ std::string contents(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// When a process began, in clock ticks since the machine did: the 22nd field of Linux's /proc/…/stat. Empty: unknown.
-/// "ended" of one whose exit status has not been collected yet (the third field is its state).
+/// The start time of a process in clock ticks since boot: the 22nd field of Linux's /proc/…/stat. Empty: unknown.
+/// "ended": a zombie, whose exit status has not been collected yet (the third field is its state).
 std::string began(const std::string& process) {
   const std::string all = contents("/proc/" + process + "/stat");
   const auto name_ends = all.rfind(')');
@@ -57,7 +57,7 @@ std::map<std::string, std::string> entries(const std::string& text) {
   return found;
 }
 
-/// What a lock says; "unknown" where it does not.
+/// The entries of a lock; "unknown" for missing ones.
 std::map<std::string, std::string> read_lock(const fs::path& path) {
   auto lock = entries(contents(path));
   for (const char* key : {"host", "process", "started", "ticks"}) lock.try_emplace(key, "unknown");
@@ -95,7 +95,7 @@ DirectoryLock::DirectoryLock(const fs::path& directory, bool take_over) : path_(
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   const Descriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.is_open())
-    ::flock(folder.number(), LOCK_EX);  // where that can't be had, two runs must start at the same instant to fail
+    ::flock(folder.number(), LOCK_EX);  // without this lock, only two runs that start at the same instant can conflict
 
   if (fs::exists(fs::symlink_status(path_))) {
     auto lock = read_lock(path_);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// One run at a time in a directory: the file carom.lock with the host, process and start of the run that is at work.
+// One run at a time in a directory: the file carom.lock holds the host, process and start time of the active run.
 //
-// It is looked at and written while the directory itself is locked (flock), so that of two runs that start at once one
-// gets it. A process is the one that is named if it has that number and began at that time: numbers come again.
+// It is read and written while the directory itself is locked (flock), so that only one of two simultaneous starts gets
+// it. A process is identified by its number and its start time, since numbers are reused.
 
 #include <filesystem>
 #include <string>
@@ -13,20 +13,21 @@ namespace carom {
 /// The name of this machine.
 std::string host_name();
 
-/// Whether a run is at work in a directory, as its lock says; one that stands there for another host counts.
+/// Whether a run is active in a directory, according to its lock; a lock of another host counts as active.
 bool run_is_at_work(const std::filesystem::path& directory);
 
 class DirectoryLock {
  public:
-  /// Makes the directory where it is missing. Throws Error(Failure::file) if another run is at work there, or one on
-  /// another host has left its lock: whether that has ended cannot be told from here. `take_over`: it has.
+  /// Makes the directory if it is missing. Throws Error(Failure::file) if another run is active there, or if there is a
+  /// lock of another host, whose processes cannot be checked from here. `take_over`: the user says that the run there
+  /// has ended.
   explicit DirectoryLock(const std::filesystem::path& directory, bool take_over = false);
-  /// Takes the lock away.
+  /// Removes the lock.
   ~DirectoryLock();
   DirectoryLock(const DirectoryLock&) = delete;
   DirectoryLock& operator=(const DirectoryLock&) = delete;
 
-  /// Where a run has ended without taking its lock away, and was replaced: a warning that says so; else empty.
+  /// A warning if the lock of a run that ended without removing it was replaced; else empty.
   const std::string& warning() const { return warning_; }
 
  private:

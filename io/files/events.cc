@@ -8,7 +8,7 @@ namespace carom {
 
 namespace {
 
-/// One column: what waits in memory, and what is in the file.
+/// One column: the rows that wait in memory, and the data set in the file.
 template <class T>
 struct Column {
   std::vector<T> waiting;
@@ -25,7 +25,7 @@ struct Column {
 
 template <int D>
 struct EventWriter<D>::Contents {
-  static constexpr std::size_t kBatch = 16384;  // rows
+  static constexpr std::size_t kRowsPerWrite = 16384;  // rows
   explicit Contents(hdf5::File at) : file(std::move(at)) {}
 
   void create(const Deck& deck) {
@@ -39,7 +39,7 @@ struct EventWriter<D>::Contents {
     file.flush();
   }
 
-  /// Does something to every column.
+  /// Calls the action for every column.
   template <class Action>
   void each(Action action) {
     for (auto* column : {&time, &time_in_slab, &x_lo, &x_hi, &impulse}) action(*column);
@@ -101,7 +101,7 @@ EventWriter<D>::~EventWriter() = default;
 template <int D>
 void EventWriter<D>::contacts(double slab_start, std::span<const Contact<D>> contacts) {
   for (const Contact<D>& c : contacts) contents_->add(slab_start, c);
-  if (contents_->time.waiting.size() >= Contents::kBatch) contents_->write();
+  if (contents_->time.waiting.size() >= Contents::kRowsPerWrite) contents_->write();
 }
 
 template <int D>

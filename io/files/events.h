@@ -2,7 +2,7 @@
 #pragma once
 // events.h5: every collision of a run, exactly as it was executed, in the order of the event keys.
 //
-// One group /events of data sets, a row a collision:
+// The group /events has data sets with one row per collision:
 //   time          simulated time (slab start + time_in_slab, rounded)
 //   slab          number of the slab or epoch, from 0
 //   time_in_slab  the exact time, since the start of the slab
@@ -10,9 +10,9 @@
 //   kind          0 pair, 1 wall
 //   lo, hi        lower and higher id; at a wall: the particle, and 2·axis + (0 lower, 1 upper)
 //   image         [D] how many box edges `hi` is shifted by
-//   x_lo, x_hi    [D] centres at contact, x_hi shifted to that image; at a wall: the point touched
+//   x_lo, x_hi    [D] centres at contact, x_hi shifted to that image; at a wall: the point of contact
 //   impulse       [D] given to lo, taken from hi
-// /parameters holds the resolved deck. Rows are gathered and written in batches, at the latest with the next frame or
+// /parameters holds the resolved deck. Rows are buffered and written in batches, at the latest with the next frame or
 // thermo row.
 
 #include <filesystem>
@@ -25,19 +25,19 @@
 
 namespace carom {
 
-/// Where events.h5 stands.
+/// The position in events.h5.
 struct EventMark {
   FileMark rows{};
   std::int64_t slabs = 0;  ///< done
 };
 
-/// What tells the rows of two runs from each other.
+/// The data sets that distinguish the rows of two runs.
 inline constexpr const char* kEventRows[] = {"events/time", "events/lo", "events/hi", "events/x_lo"};
 
 template <int D>
 class EventWriter : public Observer<D> {
  public:
-  /// Creates the file, or opens it again to go on from the mark. Throws Error(Failure::file).
+  /// Creates the file, or opens it again and continues from the mark. Throws Error(Failure::file).
   EventWriter(const std::filesystem::path& path, const Deck& deck, const std::optional<EventMark>& mark = {});
   ~EventWriter() override;
 
@@ -46,9 +46,9 @@ class EventWriter : public Observer<D> {
   void thermo(const Snapshot<D>&) override;
   void progress(const Statistics& statistics) override;
 
-  /// Writes what is left, and says where the file then stands. Throws Error(Failure::file).
+  /// Writes the buffered rows and returns the position in the file. Throws Error(Failure::file).
   EventMark mark();
-  /// Writes what is left and closes. Throws Error(Failure::file).
+  /// Writes the buffered rows and closes. Throws Error(Failure::file).
   void close();
 
  private:

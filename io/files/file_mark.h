@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// How far a file of a run has come, to go on from there.
+// A position in a file of a run, from which a continued run writes on.
 
 #include <cstdint>
 #include <filesystem>
@@ -16,7 +16,7 @@ struct FileMark {
   std::uint64_t length = 0, sum = 0;
 };
 
-/// The error of a run that cannot be continued because a file `is` not what the run has left.
+/// The error of a run that cannot be continued because a file differs from what the run wrote; `is`: how.
 [[noreturn]] inline void refuse_to_go_on(const std::filesystem::path& file, const std::string& is) {
   throw Error(Failure::file, file.string() + ": " + is +
                                  "; put back the file that the run has written, or start a new run from the "

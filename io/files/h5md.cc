@@ -20,7 +20,7 @@ using hdf5::File;
 using hdf5::Handle;
 using hdf5::Series;
 
-/// Vectors as rows of three columns, zero where there is no such axis.
+/// Vectors as rows of three columns, with zeros for a missing axis.
 template <class T, class Vectors>
 std::vector<T> three_columns(const Vectors& vectors, int dimension) {
   std::vector<T> rows(3 * vectors.size(), T{});
@@ -29,7 +29,7 @@ std::vector<T> three_columns(const Vectors& vectors, int dimension) {
   return rows;
 }
 
-/// Arrays as a message, one after the other.
+/// Packs arrays into a message, one after the other.
 template <class... Arrays>
 Bytes packed(const Arrays&... arrays) {
   Bytes bytes;
@@ -39,7 +39,7 @@ Bytes packed(const Arrays&... arrays) {
   return bytes;
 }
 
-/// The next `n` of a message.
+/// Unpacks the next `n` values of a message.
 template <class T>
 std::span<const T> next(Reader& message, std::size_t n) {
   return {reinterpret_cast<const T*>(message.skip(n * sizeof(T))), n};
@@ -71,7 +71,7 @@ void write_parameters(File& file, const Deck& deck, const System<D>& system) {
   file.write_texts(group, "species", system.species);
 }
 
-/// The radius of a species: the mean of its particles, exactly their own where all have the same.
+/// The radius of a species: the mean of its particles, exact if all have the same radius.
 struct SpeciesRadius {
   double first = 0, excess = 0;
   std::size_t particles = 0;
@@ -100,7 +100,7 @@ void write_species(File& file, const std::vector<std::string>& names, const std:
   file.write_array(group, "radius", hdf5::native_type<double>(), radius.data(), {radius.size()});
 }
 
-/// Each pair that any term joins, once.
+/// Each pair that any term joins, listed once.
 template <int D>
 void write_bonds(File& file, const System<D>& system) {
   PairList bonds;
@@ -120,7 +120,7 @@ void write_bonds(File& file, const System<D>& system) {
     file.write_array(group, name, hdf5::native_type<std::int32_t>(), ends->data(), {ends->size()});
 }
 
-/// As the H5MD module `units` says, by texts of variable length.
+/// Writes the H5MD module `units`, which uses texts of variable length.
 void write_units(File& file, const Units& units) {
   const Handle type(H5Tcopy(H5T_C_S1), H5Tclose), scalar(H5Screate(H5S_SCALAR), H5Sclose);
   H5Tset_size(type.id(), H5T_VARIABLE);
@@ -242,7 +242,8 @@ struct TrajectoryWriter<D>::Contents {
     write_species(file, system.species, species_radii);
   }
 
-  /// Writes what changes of the particles: a row of all that there are, from one state or from the blocks of all ranks.
+  /// Writes the variable data of the particles: one row of all particles, from one state or from the blocks of all
+  /// ranks.
   void write_particles(const Particles<D>& p) {
     for (auto* element : {&position, &velocity}) element->value.append_row();
     image.value.append_row();
@@ -261,7 +262,7 @@ struct TrajectoryWriter<D>::Contents {
             write_part(first, x, v, next<Image<D>>(reader, n));
             first += n;
           });
-    } catch (...) {  // a rank is lost: there is no such frame
+    } catch (...) {  // a rank is lost: the frame is dropped
       for (auto* element : {&position, &velocity}) element->value.drop_row();
       image.value.drop_row();
       throw;

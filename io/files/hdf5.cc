@@ -13,7 +13,7 @@ namespace carom::hdf5 {
 
 namespace {
 
-/// The innermost entry of HDF5's error stack, or the operating system's words in it.
+/// The innermost entry of HDF5's error stack, or the operating system's message in it.
 std::string reason() {
   std::string innermost;
   H5Ewalk2(
@@ -46,7 +46,7 @@ Handle fixed_text_type(std::size_t length) {
   return type;
 }
 
-/// `limit`: up to which shape it grows; empty: not at all.
+/// `limit`: the largest shape to which it can grow; empty: fixed.
 Handle space_of(const std::vector<hsize_t>& shape, const std::vector<hsize_t>& limit = {}) {
   if (shape.empty()) return Handle(H5Screate(H5S_SCALAR), H5Sclose);
   const hsize_t* most = limit.empty() ? nullptr : limit.data();
@@ -144,7 +144,7 @@ void File::flush() { check(H5Fflush(file_.id(), H5F_SCOPE_LOCAL), "flush the fil
 void File::close() {
   try {
     flush();
-  } catch (const Error&) {  // closed all the same: that gives back the room of what could not be written
+  } catch (const Error&) {  // closed anyway, to free the space of what could not be written
     H5Fclose(file_.release());
     throw;
   }

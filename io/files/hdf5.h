@@ -11,7 +11,7 @@
 //
 // Every failure throws Error(Failure::file) that names the file and holds the reason from HDF5's error stack.
 //
-// What is written goes through a journal (journal.h): whenever the process ends, the file has the state of a flush.
+// Writes go through a journal (journal.h): whenever the process ends, the file has the state of a flush.
 
 #include <hdf5.h>
 
@@ -27,7 +27,7 @@
 namespace carom::hdf5 {
 
 /// Starts the library: no printing to stderr, no work of its own when the process ends. To be called before MPI starts:
-/// otherwise HDF5 closes all files once more in MPI_Finalize, and crashes there if one could not be written.
+/// otherwise HDF5 closes all files again in MPI_Finalize, and crashes there if a file could not be written.
 void start_library();
 
 /// Owns one identifier, closed by the function that belongs to its kind.
@@ -69,21 +69,22 @@ hid_t native_type() {
 /// A file of HDF5, written by this process alone.
 class File {
  public:
-  /// A new, empty file; an old one of that name is replaced.
+  /// A new, empty file, which replaces an existing file of that name.
   static File create(const std::filesystem::path& path);
-  /// The same without a journal, behind a block of so many bytes that are not HDF5's: to be renamed once it is closed.
+  /// A new file without a journal, after a user block of `block` bytes; to be renamed once it is closed.
   static File create_plain(const std::filesystem::path& path, std::uint64_t block);
   /// An existing file, to be changed; its groups and series are opened where they would be created.
   static File append(const std::filesystem::path& path);
   /// An existing file, to be read.
   static File open(const std::filesystem::path& path);
-  /// The same without locks, while another process may be writing it: through read_between_flushes (journal.h).
+  /// An existing file, read without locks while another process may be writing it: to be used in read_between_flushes
+  /// (journal.h).
   static File open_unlocked(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const { return path_; }
   hid_t id() const { return file_.id(); }
 
-  /// A group, created where it is missing, like those on the way to it.
+  /// A group; creates it and the groups on its path if they are missing.
   Handle group(const std::string& name);
   /// Throws Error(Failure::file) with the reason from HDF5 if `result` (an identifier or status) is a failure; else
   /// returns it.
@@ -92,9 +93,9 @@ class File {
     if (result < 0) fail(action);
     return result;
   }
-  /// Hands everything to the operating system: from now on it survives the end of this process.
+  /// Passes all data to the operating system: they then survive the end of this process.
   void flush();
-  /// Flushes and closes, also what is open in the file. The destructor does so too, but cannot report errors.
+  /// Flushes and closes the file and every object open in it. The destructor does too, but cannot report errors.
   void close();
 
   /// Attributes and small data sets of a group or of the file; texts are stored with fixed length.
@@ -110,14 +111,14 @@ class File {
   }
   void write_array(const Handle& where, const std::string& name, hid_t type, const void* data,
                    const std::vector<hsize_t>& shape);
-  /// Writes `count` entries along each axis, from `start` on, of a data set that is there.
+  /// Writes `count` entries along each axis, from `start` on, of an existing data set.
   void write_part(const Handle& set, hid_t type, const void* data, const std::vector<hsize_t>& start,
                   const std::vector<hsize_t>& count, const std::string& action) const;
-  /// A new data set: of this shape, or, where `chunk` says in which parts it is stored, with a first axis that grows.
-  /// The time of its creation is not kept, so that equal runs write equal bytes.
+  /// A new data set of this shape; if `chunk` gives the shape of its chunks, its first axis can grow. Its creation time
+  /// is not stored, so that equal runs write equal bytes.
   Handle create_data_set(const Handle& where, const std::string& name, hid_t type, const std::vector<hsize_t>& shape,
                          const std::vector<hsize_t>& chunk = {}) const;
-  /// Makes `alias` a second name of the data set `name`, unless there is one.
+  /// Makes `alias` a second name of the data set `name`, unless `alias` exists.
   void link(const Handle& from, const std::string& name, const Handle& to, const std::string& alias);
 
  private:
@@ -138,7 +139,7 @@ class File {
 class SeriesBase {
  public:
   std::uint64_t rows() const { return rows_; }
-  /// Cuts off all rows behind the first so many. Throws Error(Failure::file) where there are fewer.
+  /// Keeps the first `rows` rows. Throws Error(Failure::file) if there are fewer.
   void cut(std::uint64_t rows);
 
  protected:
@@ -152,15 +153,15 @@ class SeriesBase {
  private:
   void extend(std::uint64_t rows);
 
-  std::string label_;  // of what is done, for messages
+  std::string label_;  // what is being done, for messages
   const File* file_;
   Handle dataset_;
   std::vector<hsize_t> shape_;  // of one row, with a leading axis for the rows
   std::uint64_t row_elements_ = 1, rows_ = 0;
 };
 
-/// A data set with a first axis that grows: one row an append, or several. One that is there is opened, and goes on
-/// behind its last row. The file must outlive it and not move.
+/// A data set with a first axis that grows by one or more rows per append. An existing one is opened and continued
+/// after its last row. The file must outlive it and not move.
 template <class T>
 class Series : public SeriesBase {
  public:
@@ -169,8 +170,7 @@ class Series : public SeriesBase {
   /// `values`: whole rows, the last axis fastest.
   void append(std::span<const T> values) { SeriesBase::append(native_type<T>(), values.data(), values.size()); }
   void append(T value) { SeriesBase::append(native_type<T>(), &value, 1); }
-  /// The same in parts: a row of nothing yet, and what stands in it from place `first` of its first axis on; or the row
-  /// is taken back.
+  /// Writing in parts: appends an empty row, writes into it from index `first` of its first axis on, or drops the row.
   using SeriesBase::append_row;
   using SeriesBase::drop_row;
   void write_part(std::size_t first, std::span<const T> values) {
@@ -178,7 +178,7 @@ class Series : public SeriesBase {
   }
 };
 
-/// A data set of so many numbers, to be written in parts. The file must outlive it and not move.
+/// A data set of a fixed number of values, to be written in parts. The file must outlive it and not move.
 template <class T>
 class Array {
  public:
@@ -196,8 +196,8 @@ class Array {
   Handle set_;
 };
 
-/// Reading; throws Error(Failure::file) where the name is missing, of another kind, or claims more than the file can
-/// hold.
+/// Reading; throws Error(Failure::file) if the object is missing, of another kind, or claims more data than the file
+/// can hold.
 bool exists(const File& file, const std::string& path);
 std::vector<hsize_t> shape(const File& file, const std::string& dataset);
 std::vector<hsize_t> shape(const File& file, const std::string& dataset, std::size_t axes);
@@ -218,12 +218,12 @@ std::vector<T> rows(const File& file, const std::string& dataset, hsize_t first,
 std::vector<std::byte> bytes(const File& file, const std::string& dataset);
 std::vector<std::string> texts(const File& file, const std::string& dataset);
 std::vector<std::string> attribute_texts(const File& file, const std::string& object, const std::string& name);
-/// So many numbers, or more.
+/// The numbers of an attribute, which must have at least `count`.
 std::vector<std::int32_t> attribute_numbers(const File& file, const std::string& object, const std::string& name,
                                             std::size_t count);
 
-/// So many rows of some data sets, and the CRC-32 of the deck and of the last of these rows, of a long one of its
-/// beginning.
+/// The number of rows of some data sets, and the CRC-32 of the deck and of their last row (of a long row, its
+/// beginning).
 FileMark mark(const File& file, std::span<const char* const> datasets, hsize_t rows);
 /// Throws Error(Failure::file) unless the file is there and its rows begin with those at the mark.
 void check_rows(const std::filesystem::path& path, std::span<const char* const> datasets, const FileMark& mark);

@@ -33,13 +33,13 @@ void expect_axes(const File& file, const std::string& name, std::size_t found, s
   if (found != axes) refuse(file, name + " has " + std::to_string(found) + " axes, not " + std::to_string(axes));
 }
 
-/// The number of elements of a data set or attribute, each of so many bytes in the file. Throws where the file cannot
-/// hold them: a damaged one may claim any number.
+/// The number of elements of a data set or attribute, each of the given size in the file. Throws if the file cannot
+/// hold them: a damaged file may claim any number.
 std::size_t elements_of(const File& file, const std::string& name, const Handle& space, std::size_t bytes) {
   const std::vector<hsize_t> shape = shape_of_space(space.id());
   const hsize_t elements = product(shape);
   if (std::find(shape.begin(), shape.end(), 0) != shape.end()) return 0;
-  hsize_t size = 0;  // by the open file: a checkpoint may be renamed meanwhile
+  hsize_t size = 0;  // of the open file, since a checkpoint may be renamed meanwhile
   file.check(H5Fget_filesize(file.id(), &size), "measure");
   hsize_t room = bytes == 0 ? 0 : size / bytes;
   for (const hsize_t n : shape) room /= n;
@@ -205,12 +205,12 @@ std::vector<std::int32_t> attribute_numbers(const File& file, const std::string&
 }
 
 FileMark mark(const File& file, std::span<const char* const> datasets, hsize_t length) {
-  constexpr hsize_t kMostEntries = 1000;  // entries of a row
+  constexpr hsize_t kMostSummedEntries = 1000;  // entries of a row
   const std::string deck = text(file, "parameters/deck");
   std::uint32_t sum = libdeflate_crc32(0, deck.data(), deck.size());
   for (const char* name : datasets) {
     if (length == 0) continue;
-    const auto row = rows<double>(file, name, length - 1, 1, kMostEntries);
+    const auto row = rows<double>(file, name, length - 1, 1, kMostSummedEntries);
     sum = libdeflate_crc32(sum, row.data(), row.size() * sizeof(double));
   }
   return {length, sum};
@@ -225,7 +225,8 @@ void check_rows(const std::filesystem::path& path, std::span<const char* const> 
     now.length = shape(file, datasets[0]).at(0);
     if (now.length >= then.length) now = mark(file, datasets, then.length);
   } catch (const Error& e) {
-    refuse_to_go_on(path, std::string(e.what()).substr(path.string().size() + 2));  // which begins with its name
+    refuse_to_go_on(path,
+                    std::string(e.what()).substr(path.string().size() + 2));  // without the file name at its beginning
   }
   if (now.length < then.length)
     refuse_to_go_on(path, "has " + std::to_string(now.length) + " rows, and had " + std::to_string(then.length) +

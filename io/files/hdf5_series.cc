@@ -9,12 +9,12 @@ namespace carom::hdf5 {
 
 namespace {
 
-/// Chunks of about 8 kB for small rows, and of at most 43,000 entries (about 1 MiB of positions) of large ones.
+/// Chunks of about 8 kB for small rows, and of at most 43,000 entries (about 1 MiB of positions) for large rows.
 std::vector<hsize_t> chunk_of(const std::vector<hsize_t>& shape, std::uint64_t row_bytes) {
-  constexpr hsize_t kMostEntries = 43000, kSmallChunk = 8192;
+  constexpr hsize_t kMostChunkEntries = 43000, kSmallChunk = 8192;
   std::vector<hsize_t> chunk = shape;
   chunk[0] = std::max<hsize_t>(1, kSmallChunk / std::max<hsize_t>(1, row_bytes));
-  for (std::size_t k = 1; k < chunk.size(); ++k) chunk[k] = std::clamp<hsize_t>(chunk[k], 1, kMostEntries);
+  for (std::size_t k = 1; k < chunk.size(); ++k) chunk[k] = std::clamp<hsize_t>(chunk[k], 1, kMostChunkEntries);
   return chunk;
 }
 

@@ -18,7 +18,7 @@ namespace {
 
 std::string line(const char* name, const std::string& value) { return fmt::format("{:<14}{}\n", name, value); }
 
-/// "from 0 to 12.5" of a data set that ascends.
+/// "from 0 to 12.5" for an ascending data set.
 std::string range_of(const hdf5::File& file, const std::string& dataset, hsize_t rows) {
   if (rows == 0) return "none";
   return fmt::format("{:g} to {:g}", hdf5::number_at(file, dataset, 0), hdf5::number_at(file, dataset, rows - 1));

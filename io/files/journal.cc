@@ -29,7 +29,7 @@ namespace {
 
 std::filesystem::path journal_of(const std::filesystem::path& file) { return behind_links(file) += ".journal"; }
 
-/// Calls again what a signal has interrupted.
+/// Repeats a system call that a signal has interrupted.
 template <class Call>
 auto uninterrupted(Call call) {
   auto result = call();
@@ -37,7 +37,7 @@ auto uninterrupted(Call call) {
   return result;
 }
 
-/// Whether all could be written; else errno says why.
+/// Writes all bytes; returns false if that failed, with the reason in errno.
 bool write_all(int descriptor, const std::byte* data, std::size_t size, std::uint64_t at) {
   while (size > 0) {
     const ssize_t n = uninterrupted(
@@ -51,7 +51,7 @@ bool write_all(int descriptor, const std::byte* data, std::size_t size, std::uin
   return true;
 }
 
-/// Up to `size` bytes; how many there are.
+/// Reads up to `size` bytes; returns how many were read.
 std::optional<std::size_t> read_up_to(int descriptor, std::byte* data, std::size_t size, std::uint64_t at) {
   std::size_t done = 0;
   while (done < size) {
@@ -68,7 +68,7 @@ bool resize(int descriptor, std::uint64_t size) {
   return uninterrupted([&] { return ::ftruncate(descriptor, static_cast<off_t>(size)); }) == 0;
 }
 
-/// Room on the disk. File systems that cannot set it aside are taken to have it.
+/// Reserves space on the disk. File systems that cannot reserve space count as having it.
 bool set_aside(int descriptor, int mode, std::uint64_t start, std::uint64_t length) {
   const auto call = [&] {
     return ::fallocate(descriptor, mode, static_cast<off_t>(start), static_cast<off_t>(length));
@@ -80,7 +80,7 @@ bool sync(int descriptor) {
   return uninterrupted([&] { return ::fdatasync(descriptor); }) == 0 || errno == EINVAL;
 }
 
-/// Whether no other process has the lock; file systems without locks have none to give.
+/// Acquires a lock; false if another process has it. File systems without locks count as unlocked.
 bool lock(int descriptor, int kind) { return ::flock(descriptor, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK; }
 
 /// A file that the driver has open.
@@ -94,8 +94,8 @@ struct Journaled : H5FD_t {
   std::uint64_t flushed = 0;  // of the file, by the last flush
   Blocks waiting, last;       // to be written by the next flush; written by the last one
   Bytes buffer;               // the journal of the last flush
-  // Once something could not be written, nothing is any more: HDF5 may close the file undisturbed, which then has the
-  // state of the last flush, or a complete journal, if that is what could not be written to the file.
+  // After a failed write nothing more is written: HDF5 can close the file, which then has the state of the last flush,
+  // or a complete journal if the copy of the journal to the file failed.
   bool failed = false, torn = false;
   using Clock = std::chrono::steady_clock;
   Clock::time_point next_sync{};
@@ -105,7 +105,7 @@ struct Journaled : H5FD_t {
     return is_new ? name += ".part" : name;
   }
 
-  /// Puts the reason onto HDF5's stack of errors.
+  /// Puts the reason on HDF5's error stack.
   herr_t fail() {
     failed = true;
     H5Epush2(H5E_DEFAULT, __FILE__, __func__, __LINE__, H5E_ERR_CLS, H5E_VFL, H5E_WRITEERROR, "%s",
@@ -152,8 +152,8 @@ struct Journaled : H5FD_t {
       is_new = false;
       if (!open_journal()) return fail();
     } else if (!waiting.empty()) {
-      constexpr std::byte kNone[8] = {};
-      if (!write_all(journal, kNone, sizeof kNone, 0)) return fail();
+      constexpr std::byte kEmptyHead[8] = {};
+      if (!write_all(journal, kEmptyHead, sizeof kEmptyHead, 0)) return fail();
     }
     if (durable) next_sync = Clock::now() + 20 * (Clock::now() - start);
     last = std::exchange(waiting, {});
@@ -162,9 +162,9 @@ struct Journaled : H5FD_t {
   }
 
   bool open_journal() {
-    constexpr std::uint64_t kRoom = 1 << 18;  // also for the summary and log of a run that has filled its disk
+    constexpr std::uint64_t kSpareBytes = 1 << 18;  // also for the summary and log of a run that has filled its disk
     journal = ::open(journal_of(path).c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    return journal >= 0 && set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kRoom);
+    return journal >= 0 && set_aside(journal, FALLOC_FL_KEEP_SIZE, 0, kSpareBytes);
   }
 
   bool write_journal(bool durable) {
@@ -181,7 +181,7 @@ struct Journaled : H5FD_t {
 
   herr_t close() {
     herr_t result = flush();
-    if (failed && !torn) resize(file, flushed);  // gives back the room of what is behind the last flush
+    if (failed && !torn) resize(file, flushed);  // frees the space after the last flush
     if (!failed && !sync(file)) result = fail();
     std::error_code ignored;
     if (!torn && journal >= 0) std::filesystem::remove(journal_of(path), ignored);
@@ -193,7 +193,7 @@ struct Journaled : H5FD_t {
   }
 };
 
-/// An exception must not pass through HDF5: no memory, or a new file that cannot be put in place.
+/// Catches exceptions, which must not pass through HDF5: no memory, or a new file that cannot be renamed.
 template <class Action>
 herr_t guarded(Journaled& file, Action action) {
   try {
@@ -224,7 +224,7 @@ H5FD_t* open_file(const char* name, unsigned flags, hid_t, haddr_t) {
   return nullptr;
 }
 
-herr_t query(const H5FD_t*, unsigned long* flags) {  // those of the library's own driver for such files
+herr_t query(const H5FD_t*, unsigned long* flags) {  // the flags of the library's own driver for regular files
   *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
            H5FD_FEAT_AGGREGATE_SMALLDATA | H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
   return 0;
@@ -234,7 +234,7 @@ H5FD_class_t driver_class() {
   H5FD_class_t driver{};
   driver.name = "carom.journal";
   driver.maxaddr = (haddr_t{1} << 63) - 1;
-  driver.fc_degree = H5F_CLOSE_STRONG;  // closing a file ends what is open in it: it must really be closed
+  driver.fc_degree = H5F_CLOSE_STRONG;  // closing a file closes all objects in it, so that it is really closed
   driver.open = open_file;
   driver.close = [](H5FD_t* file) { return of(file).close(); };
   driver.query = query;
@@ -280,7 +280,7 @@ void replay_journal(const std::filesystem::path& path) {
   Descriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC));
   const int not_writable = file.is_open() ? 0 : errno;
   if (not_writable != 0) file = Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!file.is_open()) return;  // opening the file itself gives the reason
+  if (!file.is_open()) return;  // opening the file itself reports the reason
   if (!lock(file.number(), LOCK_SH))
     throw Error(Failure::file, path.string() + ": a process is writing this file; wait for its end, or copy the file");
   const Descriptor journal(::open(beside.c_str(), O_RDONLY | O_CLOEXEC));
@@ -301,7 +301,7 @@ void replay_journal(const std::filesystem::path& path) {
 }
 
 void read_between_flushes(const std::filesystem::path& path, const std::function<void()>& read) {
-  // The head of the journal changes with each flush, and begins with zeros but while there is one.
+  // The head of the journal changes with each flush, and begins with zeros except during a flush.
   using Head = std::array<std::byte, kJournalHead>;
   const auto head = [&] {
     Head bytes{};

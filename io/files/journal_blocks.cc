@@ -38,17 +38,17 @@ bool blocks_fit(const Bytes& journal) {
   return at == journal.size();
 }
 
-/// Calls take(first, last) for the stretches of `data` that differ from as many others, in steps of a cache line.
+/// Calls take(first, last) for the ranges in which `data` differs from an equally long array, in steps of a cache line.
 template <class Take>
 void for_each_difference(std::span<const std::byte> data, std::span<const std::byte> others, Take take) {
-  constexpr std::size_t kStep = 64;
+  constexpr std::size_t kCompareStep = 64;
   const auto same = [&](std::size_t at) {
-    return std::memcmp(&data[at], &others[at], std::min(kStep, data.size() - at)) == 0;
+    return std::memcmp(&data[at], &others[at], std::min(kCompareStep, data.size() - at)) == 0;
   };
-  for (std::size_t at = 0; at < data.size(); at += kStep) {
+  for (std::size_t at = 0; at < data.size(); at += kCompareStep) {
     if (same(at)) continue;
     const std::size_t first = at;
-    while (at < data.size() && !same(at)) at += kStep;
+    while (at < data.size() && !same(at)) at += kCompareStep;
     take(first, std::min(at, data.size()));
   }
 }

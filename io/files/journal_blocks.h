@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Blocks of a file that wait to be written, and how they stand in a journal (journal.h has its format).
+// Blocks of a file that wait to be written, and their form in a journal (the format is in journal.h).
 
 #include <cstddef>
 #include <cstdint>
@@ -16,12 +16,12 @@ namespace carom::hdf5 {
 /// Blocks that do not overlap, by their addresses.
 class Blocks {
  public:
-  /// Takes the place of what is there; blocks that touch become one.
+  /// Adds a block, which replaces earlier data at these addresses; adjacent blocks are merged.
   void put(std::uint64_t address, std::span<const std::byte> data);
-  /// Lays what is there in [address, address + its size) over `data`.
+  /// Copies the stored bytes in [address, address + its size) over `data`.
   void overlay(std::uint64_t address, std::span<std::byte> data) const;
-  /// All of them as a journal of a file that then has so many bytes. Of blocks that are known to stand in the file what
-  /// is the same is left out: HDF5 writes a whole chunk for each new row.
+  /// All blocks as a journal of a file that then has `file_size` bytes. Bytes equal to the blocks `there`, which are in
+  /// the file already, are left out: HDF5 writes a whole chunk for each new row.
   Bytes journal(std::uint64_t file_size, const Blocks& there) const;
   bool empty() const { return blocks_.empty(); }
 
@@ -31,10 +31,10 @@ class Blocks {
   std::map<std::uint64_t, Bytes> blocks_;
 };
 
-/// The size of the file, if the journal that `bytes` begin with is complete; what is behind it is cut off.
+/// The size of the file, if `bytes` begin with a complete journal; the bytes after it are removed.
 std::optional<std::uint64_t> complete_journal(Bytes& bytes);
 
-/// What stands before each block of a journal.
+/// The header of each block of a journal.
 struct BlockHead {
   std::uint64_t address, length;
 };

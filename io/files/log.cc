@@ -11,7 +11,7 @@
 namespace carom {
 namespace {
 
-/// A terminal that is gone is no error of the run.
+/// A closed terminal is not an error of the run.
 void show(std::FILE* to, std::string_view text) {
   std::fwrite(text.data(), 1, text.size(), to);
   std::fputc('\n', to);

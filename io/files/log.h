@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// run.log and what a run says on the terminal.
+// run.log, and the messages of a run on the terminal.
 //
-// Every line of the log is in the file before the run goes on. A log that cannot be written is an error like that of
-// any other file: each member throws Error(Failure::file).
+// Every line of the log is in the file before the run continues. A log that cannot be written is an error, as for any
+// other file: each member throws Error(Failure::file).
 
 #include <cstdint>
 #include <filesystem>
@@ -16,7 +16,7 @@ namespace carom {
 
 class RunLog {
  public:
-  /// Creates the file, or opens it again to go on from the mark. `quiet`: nothing but warnings and errors goes to the
+  /// Creates the file, or opens it again and continues from the mark. `quiet`: only warnings and errors go to the
   /// terminal.
   RunLog(const std::filesystem::path& path, bool quiet, const std::optional<FileMark>& mark = {})
       : file_(path, mark), quiet_(quiet) {}
@@ -26,7 +26,7 @@ class RunLog {
   void warn(std::string_view text);   ///< to the file and to stderr; the text itself says that it is a warning
   void error(std::string_view text);  ///< to the file, as an error; the command prints it when it ends
   const FileMark& mark() const { return file_.mark(); }
-  /// Puts everything on the disk.
+  /// Syncs the file to the disk and closes it.
   void close() { file_.close(); }
 
  private:

@@ -41,7 +41,7 @@ std::array<double, 9> parts_of(const RankAccount& rank) {
   return parts;
 }
 
-/// Shares are of the mean.
+/// Percentages refer to the mean.
 std::string breakdown_text(std::span<const RankAccount> ranks) {
   constexpr std::array names = {"predict",     "queue",  "collide", "force", "sweep",
                                 "communicate", "output", "other",   "total"};
@@ -66,7 +66,7 @@ std::string breakdown_text(std::span<const RankAccount> ranks) {
   return text;
 }
 
-/// What agreement between subdomains took; nothing where there is one rank.
+/// The cost of agreement between subdomains; empty for one rank.
 std::string windows_text(std::span<const RankAccount> ranks) {
   WindowCounts all;
   std::uint64_t most = 0;
@@ -123,9 +123,9 @@ std::optional<std::string> energy_warning(const Statistics& s, const IntegratorI
   const auto share = [](double error, double of) { return of > 0 ? error / of : 0; };
   const double later = share(s.max_energy_error, s.energy_reference),
                first = share(std::abs(s.energy_after_first_step - s.energy_initial), s.energy_scale);
-  constexpr double kRounding = 1e-12;  // what the exact methods promise, of the reference energy
+  constexpr double kExactErrorBound = 1e-12;  // the bound of the exact methods, relative to the reference energy
   if (std::max(first, later) <= 1) {
-    if (!method.exact || std::max(first, later) <= kRounding) return {};
+    if (!method.exact || std::max(first, later) <= kExactErrorBound) return {};
     return fmt::format(
         "warning: rounding has added up to {:.2g} of the reference energy, though {} is exact but for rounding: "
         "forces, "

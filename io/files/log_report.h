@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What stands in run.log beside the warnings: the banner, the thermo table, the final report with the timing breakdown.
+// The contents of run.log besides the warnings: the banner, the thermo table, the final report with the timing
+// breakdown.
 
 #include <optional>
 #include <span>
@@ -17,32 +18,32 @@ namespace carom {
 /// Version, libraries, host, deck and method of a run. `particles`: their number; `ranks`: of MPI.
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 
-/// The warning of a run with energy errors beyond the energy itself, from a step far too long, or beyond 1e-12 of it
-/// with an exact method; else nothing.
+/// A warning if the energy error exceeds the energy itself (the step is far too long), or 1e-12 of it with an exact
+/// method.
 std::optional<std::string> energy_warning(const Statistics& statistics, const IntegratorInfo& method);
 
-/// How the run ended, what it found and where the time of the ranks went: of several, least, mean and most.
+/// How the run ended, its results, and the time spent by part: least, mean and most of several ranks.
 std::string report_text(const Deck& deck, const Statistics& statistics, std::span<const RankAccount> ranks);
 
-/// Writes thermo rows into the log as a table for people: the first 32, then 16 of each doubling of their number
-/// (a million rows leave 270), and the last. The choice depends on the number of a row alone, so that a run that was
-/// interrupted has the same table.
+/// Writes thermo rows into the log as a readable table: the first 32, then 16 of each doubling of their number
+/// (a million rows leave 270), and the last. The choice depends only on the index of a row, so that an interrupted and
+/// continued run has an identical table.
 template <int D>
 class ThermoTable : public Observer<D> {
  public:
-  /// `rows`: so many have been shown to the table before.
+  /// `rows`: the number of rows passed to the table before.
   explicit ThermoTable(RunLog& log, std::uint64_t rows = 0) : log_(log), rows_(rows) {}
   void thermo(const Snapshot<D>& snapshot) override;
-  /// How many have been shown to it.
+  /// The number of rows passed to the table.
   std::uint64_t rows() const { return rows_; }
-  /// Writes the last row, unless it is there.
+  /// Writes the last row, unless it is in the table already.
   void finish();
 
  private:
   void write(const Snapshot<D>& snapshot);
   RunLog& log_;
   std::uint64_t rows_;
-  std::optional<Snapshot<D>> left_out_;  // the last row, where it was
+  std::optional<Snapshot<D>> left_out_;  // the last row, if it was left out
 };
 
 }  // namespace carom

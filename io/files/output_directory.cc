@@ -32,7 +32,7 @@ std::optional<fs::path> prepare_output_directory(const fs::path& directory) try 
       run_file::deck,    run_file::trajectory, run_file::thermo,     run_file::events,
       run_file::summary, run_file::log,        run_file::checkpoint, run_file::previous_checkpoint};
   for (const ObservableInfo& info : observables()) names.push_back(run_file::averages(info));
-  // What a kill leaves: the journal belongs to its file, and parts of files that were never finished go with them.
+  // What a kill leaves: journals and unfinished `.part` files move with their files.
   const std::size_t files = names.size();
   for (std::size_t n = 0; n < files; ++n)
     for (const char* left : {".journal", ".part"}) names.push_back(names[n] + left);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The directory of a run: made where it is missing, and cleared of an earlier run without losing it. (One run at a
+// The directory of a run: created if it is missing; the files of an earlier run are moved, never lost. (One run at a
 // time: directory_lock.h.)
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace carom {
 
-/// The files a run leaves there.
+/// The files that a run writes.
 namespace run_file {
 inline constexpr const char* deck = "deck.toml";
 inline constexpr const char* trajectory = "trajectory.h5md";
@@ -25,10 +25,10 @@ inline constexpr const char* lock = "carom.lock";
 inline std::string averages(const ObservableInfo& info) { return std::string(info.name) + ".csv"; }
 }  // namespace run_file
 
-/// Creates the directory if need be. Throws Error(Failure::file).
+/// Creates the directory if it is missing. Throws Error(Failure::file).
 void make_output_directory(const std::filesystem::path& directory);
 
-/// The directory is there. If files of these names are there, moves them into its subdirectory `backup.1`, or
+/// Requires that the directory exists. If it has files of these names, moves them into its subdirectory `backup.1`, or
 /// the next number that is free, and returns that. Throws Error(Failure::file).
 std::optional<std::filesystem::path> prepare_output_directory(const std::filesystem::path& directory);
 

@@ -44,7 +44,7 @@ template <int D>
 void Progress<D>::progress(const Statistics& s) {
   constexpr double kTerminal = 0.2, kFirstPlain = 10, kRarestPlain = 600;  // seconds between lines
   const double wall = std::chrono::duration<double>(Clock::now() - start_).count();
-  if (next_ == 0) {  // the first slab: from here on rates are known
+  if (next_ == 0) {  // the first slab: rates are known from here on
     rates_.add(wall, s.fraction_done, s.counters.sphere_sphere);
     next_ = wall + (terminal_ ? kTerminal : kFirstPlain);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The progress of a run: one line that renews itself on a terminal, plain lines now and then elsewhere.
+// The progress of a run: one line that is updated in place on a terminal, occasional plain lines elsewhere.
 
 #include <chrono>
 #include <cstdint>
@@ -13,14 +13,14 @@
 
 namespace carom {
 
-/// Rates over a recent window of wall time, so that an estimate follows a run that grows faster or slower.
+/// Rates over a recent window of wall time, so that the estimate follows a run that speeds up or slows down.
 class RecentRates {
  public:
   explicit RecentRates(double window_seconds = 30) : window_(window_seconds) {}
 
   /// The state of the run after `wall` seconds; called with growing times.
   void add(double wall, double fraction_done, std::uint64_t collisions);
-  /// Wall seconds until the end; nothing while it is unknown.
+  /// Wall seconds until the end; nullopt while unknown.
   std::optional<double> seconds_left() const;
   double collisions_per_second() const;
 

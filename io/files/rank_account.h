@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What each rank sends to rank 0 at the end of a run: the time of its parts, and its memory.
+// What each rank sends to rank 0 at the end of a run: the times of its parts, and its memory.
 
 #include <cstdint>
 #include <span>
@@ -18,12 +18,12 @@ struct RankAccount {
   std::uint64_t peak_memory_bytes = 0;
 };
 
-/// Collective: the accounts of all ranks at work, by rank.
+/// Collective: the accounts of all ranks in use, by rank.
 std::vector<RankAccount> accounts_of_all(Communicator& at_work, const Statistics& mine);
 
 /// Largest resident memory of this process so far [bytes].
 std::uint64_t peak_memory_bytes();
-/// The largest of all.
+/// The largest value of all accounts.
 std::uint64_t peak_memory_bytes(std::span<const RankAccount> accounts);
 
 }  // namespace carom

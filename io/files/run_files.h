@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The files that grow while a run goes on, opened and closed together.
+// The files that grow during a run, opened and closed together.
 
 #include <exception>
 #include <filesystem>
@@ -17,7 +17,7 @@
 
 namespace carom {
 
-/// Looks at the particles when the files of another rank do, so that all ranks stop at the same times.
+/// An observer due at the times of the files on another rank, so that all ranks stop at these times.
 template <int D>
 class SamplingTimes : public Observer<D> {
  public:
@@ -28,7 +28,7 @@ class SamplingTimes : public Observer<D> {
   Sampling sampling_;
 };
 
-/// Does something that may fail while another failure is being reported: only the first one counts.
+/// Runs an action and ignores its errors, while another error is being reported.
 void at_best(auto&& action) {
   try {
     action();
@@ -36,44 +36,44 @@ void at_best(auto&& action) {
   }
 }
 
-/// Where the files of a run stand: what is needed to cut them back and to go on.
+/// Positions in the files of a run, for cutting them back and continuing.
 struct FileMarks {
   FileMark frames{}, thermo{};
   EventMark events{};
   void archive(Archive& archive) { archive(frames, thermo, events); }
 };
 
-/// Throws Error(Failure::file), which names the file, unless the files of a run are there and have what they had at the
-/// marks. Changes nothing.
+/// Throws Error(Failure::file), which names the file, unless the files of a run exist and match the marks. Changes
+/// nothing.
 void check_files(const Deck& deck, const FileMarks& marks, const FileMark& log);
 
 template <int D>
 class RunFiles {
  public:
-  /// Creates them in deck.output.directory, or opens those of the same run again and cuts off what is behind the marks.
+  /// Creates them in deck.output.directory, or opens the files of the same run again and cuts them back to the marks.
   /// Throws Error(Failure::file).
   RunFiles(const Deck& deck, const System<D>& system, const std::optional<FileMarks>& marks = {});
 
-  /// Writes what waits; the files then hold what has been shown to them, and survive the end of the process. Throws
+  /// Writes all buffered data, which then survive the end of the process; returns the positions. Throws
   /// Error(Failure::file).
   FileMarks mark();
 
-  /// Adds them as observers to the run. They must outlive it.
+  /// Adds the files as observers to the run. They must outlive it.
   void add_to(Simulation<D>& simulation);
 
-  /// Writes what is left and closes. Throws Error(Failure::file).
+  /// Writes all buffered data and closes. Throws Error(Failure::file).
   void close();
 
-  /// The same for a run that has failed: each file is closed as well as it can be.
+  /// close() for a failed run: closes each file and ignores further errors.
   void close_after_failure();
 
-  /// Calls action(name, average) for each average; those without a sample are left out.
+  /// Calls action(name, average) for each average; averages without a sample are left out.
   void for_each_average(auto&& action) const {
     for (const auto& one : averages_)
       if (one.average().samples() > 0) action(one.path().stem().string(), one.average());
   }
 
-  /// What the averages say of species, for the summary.
+  /// The values of the averages per species, for the summary.
   std::vector<SpeciesValue> species_values() const;
 
  private:
@@ -81,7 +81,7 @@ class RunFiles {
 
   TrajectoryWriter<D> trajectory_;
   ThermoWriter<D> thermo_;
-  std::unique_ptr<EventWriter<D>> events_;  // null where without output.events
+  std::unique_ptr<EventWriter<D>> events_;  // null without output.events
   std::vector<AverageWriter<D>> averages_;
 };
 

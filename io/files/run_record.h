@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// All that a run leaves in its directory, from its lock to its summary, written while it goes on.
+// Everything that a run writes to its directory, from its lock to its summary.
 //
 //   RunRecord<D> record(deck, simulation, {});
 //   simulation.run({.should_stop = [&] { record.checkpoint(); return false; }});
-//   record.close();                                            // or fail(error), where the run has thrown
+//   record.close();                                            // or fail(error) if the run has thrown
 
 #include <memory>
 #include <string>
@@ -19,25 +19,25 @@
 
 namespace carom {
 
-/// The record of a run on one rank that says nothing on the terminal.
+/// The record of a run on one rank, without messages on the terminal.
 template <int D>
 class RunRecord {
  public:
-  /// Locks the directory and creates the files, or opens those of the same run again to go on from a checkpoint; then
-  /// nothing is changed where a file is not that of the run. Adds the files to the observers of the run. All arguments
+  /// Locks the directory and creates the files, or opens the files of the same run again to continue from a checkpoint;
+  /// if a file belongs to another run, nothing is changed. Adds the files to the observers of the run. All arguments
   /// but the deck outlive the record. Throws Error(Failure::file).
   RunRecord(Deck deck, Simulation<D>& simulation, const CheckpointHead* continued);
 
-  /// Writes checkpoint.h5, from which the command or another record can go on. To be called in
+  /// Writes checkpoint.h5, from which the command or another record can continue. To be called in
   /// Simulation::Hooks::should_stop. Throws Error(Failure::file).
   CheckpointHead checkpoint();
-  /// Ends the record of a run that has come to its end or was stopped. Throws Error(Failure::file).
+  /// Ends the record of a run that has finished or was stopped. Throws Error(Failure::file).
   void close();
-  /// Ends the record of a run that has failed, as well as it can be done.
+  /// Ends the record of a failed run and ignores further errors.
   void fail(const std::string& why);
 
   const RunFiles<D>& files() const { return *files_; }
-  /// Those about the directory, and those about the run once it is closed.
+  /// Warnings about the directory, and about the run once the record is closed.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:

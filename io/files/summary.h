@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// summary.json: the outcome of a run, for scripts and tests. Written at the end, also of a run that failed or was
+// summary.json: the outcome of a run, for scripts and tests. Written at the end, also for a run that failed or was
 // stopped.
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace carom {
 
-/// What the run's statistics do not know.
+/// Data for the summary that are not in the run's statistics.
 struct RunOutcome {
   std::string status;                   ///< "done", "interrupted" (on request; can be continued), "failed"
   std::string error{};                  ///< why it failed; empty otherwise
@@ -21,10 +21,10 @@ struct RunOutcome {
   std::size_t particles = 0;
   int ranks = 1;
   std::vector<SpeciesValue> species_values{};  ///< of the averages
-  std::uint64_t peak_memory_bytes = 0;         ///< of a rank, at most; 0: of this one
+  std::uint64_t peak_memory_bytes = 0;         ///< largest of all ranks; 0: that of this process
 };
 
-/// The summary as JSON text; names as in the manual. What a method does not have is null.
+/// The summary as JSON text; names as in the manual. Values that a method does not have are null.
 std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Statistics& statistics);
 
 }  // namespace carom

@@ -60,7 +60,7 @@ void TextFile::fail(int error_number) const {
 }
 
 void check_text(const fs::path& path, const FileMark& mark) {
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));  // a pipe is not waited for
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));  // does not wait for a pipe
   if (!file.is_open()) refuse_to_go_on(path, std::string("cannot be read: ") + std::strerror(errno));
   std::vector<char> piece(1 << 16);
   FileMark there;
@@ -116,7 +116,7 @@ void write_aside(const fs::path& path, const std::function<void(TextFile&)>& wri
   std::error_code ignored;
   const fs::path target = behind_links(path);
   const fs::file_status is = fs::status(path, ignored);
-  // What a link in /proc/self/fd says need not be a name: then the file is there, but not under that name.
+  // The target of a link in /proc/self/fd need not be a path: the file can then exist without that path.
   const bool replace =
       is.type() == fs::file_type::not_found || (fs::is_regular_file(is) && fs::equivalent(path, target, ignored));
   fs::path aside = target;

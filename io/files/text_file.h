@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A text file written piece by piece, each piece handed to the operating system at once and checked.
+// A text file written piece by piece, each piece passed to the operating system at once and checked.
 //
-// What has been appended survives the end of the process. A piece goes in as a whole or not at all: if the disk fills
-// up in the middle of one, its beginning is taken back. All failures throw Error(Failure::file) with the file's name.
+// Appended text survives the end of the process. A piece is written completely or not at all: if the disk fills up in
+// the middle of a piece, its beginning is removed. All failures throw Error(Failure::file) with the file's name.
 
 #include <cstdint>
 #include <filesystem>
@@ -17,7 +17,7 @@ namespace carom {
 
 class TextFile {
  public:
-  /// A new, empty file, or one that was there at the mark, from which it goes on: what is behind the mark is cut off.
+  /// A new, empty file; or, with a mark, an existing file, which is cut back to the mark and continued.
   explicit TextFile(std::filesystem::path path, const std::optional<FileMark>& mark = {});
   ~TextFile();
   TextFile(const TextFile&) = delete;
@@ -25,7 +25,7 @@ class TextFile {
 
   void append(std::string_view piece);
   const FileMark& mark() const { return mark_; }
-  /// Puts everything on the disk and closes; network file systems report a full disk only here.
+  /// Syncs to the disk and closes; network file systems report a full disk only here.
   void close();
 
  private:
@@ -35,25 +35,25 @@ class TextFile {
   FileMark mark_;
 };
 
-/// Throws Error(Failure::file) unless the file is there and has, up to the mark, what was written to it.
+/// Throws Error(Failure::file) unless the file exists and matches the mark.
 void check_text(const std::filesystem::path& path, const FileMark& mark);
 
 /// Renames a file; a file or a link of that name is replaced. Throws Error(Failure::file).
 void rename_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Gives a finished file its name, in place of an older one, so that this survives a power failure too. Throws
-/// Error(Failure::file).
+/// Renames a finished file to its final name, replacing an older file, so that the result survives a power failure.
+/// Throws Error(Failure::file).
 void put_in_place(const std::filesystem::path& aside, const std::filesystem::path& path);
 
-/// The file that a name stands for: where a chain of symbolic links ends, whether a file is there or not.
+/// The end of a chain of symbolic links, whether or not a file exists there.
 std::filesystem::path behind_links(std::filesystem::path path);
 
-/// Whether a name leads to where standard output goes.
+/// Whether a path refers to the file of standard output.
 bool is_standard_output(const std::filesystem::path& path);
 
-/// Writes a file so that a reader sees the old one or the new one, never a part: aside, then renamed. Where the name is
-/// a symbolic link, this happens beside the file that it leads to, and the link stays. What is no file but a pipe or a
-/// device is written to.
+/// Writes a file under another name and renames it, so that a reader sees the old or the new file, never a part. If the
+/// path is a symbolic link, the file it points to is replaced, and the link stays. Pipes and devices are written to
+/// directly.
 void write_aside(const std::filesystem::path& path, const std::function<void(TextFile&)>& write);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 

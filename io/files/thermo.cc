@@ -22,7 +22,7 @@ const std::vector<ScalarColumn<D>>& scalar_columns() {
         {"total", "total_energy", [](S s) { return s.total(); }, "total", "16.10g"},
         {"shadow", "shadow_energy", [](S s) { return s.shadow; }},
         {"max_energy_error", "max_energy_error", [](S s) { return s.max_energy_error; }, "max |ΔE|", "10.2e"},
-        {"momentum_x", nullptr, [](S s) { return s.momentum[0]; }},  // one element of the trajectory, a vector
+        {"momentum_x", nullptr, [](S s) { return s.momentum[0]; }},  // in the trajectory one element, a vector
         {"momentum_y", nullptr, [](S s) { return s.momentum[1]; }}};
     if constexpr (D == 3) columns.push_back({"momentum_z", nullptr, [](S s) { return s.momentum[2]; }});
     columns.push_back({"temperature", "temperature", [](S s) { return s.temperature; }, "temperature", "12.6g"});
@@ -35,10 +35,10 @@ template const std::vector<ScalarColumn<2>>& scalar_columns();
 template const std::vector<ScalarColumn<3>>& scalar_columns();
 
 ThermoPoint last_thermo_point(const std::filesystem::path& path) {
-  constexpr std::streamoff kTail = 2000;  // bytes, more than two rows have
+  constexpr std::streamoff kTailBytes = 2000;  // bytes, more than two rows have
   if (!std::filesystem::is_regular_file(path)) return {};
   std::ifstream in(path, std::ios::ate);
-  in.seekg(std::max<std::streamoff>(0, in.tellg() - kTail));
+  in.seekg(std::max<std::streamoff>(0, in.tellg() - kTailBytes));
   std::string end{std::istreambuf_iterator<char>(in), {}};
   end.resize(end.rfind('\n') + 1);  // a kill may have left a part of a row
   ThermoPoint point;

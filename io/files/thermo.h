@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// thermo.csv: one row an output time, each in the file before the run goes on.
+// thermo.csv: one row per output time, each in the file before the run continues.
 //
-// Columns: time, step, collisions, then scalar_columns(); reduced units; the fewest digits that give the doubles back;
-// `nan` where a method has no shadow energy.
+// Columns: time, step, collisions, then scalar_columns(); reduced units; the fewest digits that reproduce the doubles;
+// `nan` if a method has no shadow energy.
 
 #include <filesystem>
 #include <optional>
@@ -14,41 +14,41 @@
 
 namespace carom {
 
-/// A number about a state that the files of a run show. A new one is declared in thermo.cc, and nowhere else.
+/// A number about a state that the files of a run show. A new column is declared in thermo.cc, and nowhere else.
 template <int D>
 struct ScalarColumn {
   const char* name;     ///< in thermo.csv
-  const char* element;  ///< in /observables of the trajectory; null: not there
+  const char* element;  ///< name in /observables of the trajectory; null: left out
   double (*of)(const Snapshot<D>&);
-  const char* heading = nullptr;  ///< in the table of run.log; null: not there
-  const char* format = nullptr;   ///< there, with the width of the column: "14.8g"
+  const char* heading = nullptr;  ///< heading in the table of run.log; null: left out
+  const char* format = nullptr;   ///< format in that table, with the width of the column: "14.8g"
 };
 
-/// In the order of thermo.csv.
+/// All columns, in the order of thermo.csv.
 template <int D>
 const std::vector<ScalarColumn<D>>& scalar_columns();
 
-/// When a row was written.
+/// The point of the run at which a row was written.
 struct ThermoPoint {
   double time = 0;
   std::int64_t step = 0;
   std::uint64_t collisions = 0;
 };
 
-/// The point of the last whole row of a file; zeros where there is none.
+/// The point of the last whole row of a file; zeros if there is none.
 ThermoPoint last_thermo_point(const std::filesystem::path& path);
 
 template <int D>
 class ThermoWriter : public Observer<D> {
  public:
-  /// Creates the file with its header, or opens it again to go on from the mark. Throws Error(Failure::file).
+  /// Creates the file with its header, or opens it again and continues from the mark. Throws Error(Failure::file).
   explicit ThermoWriter(const std::filesystem::path& path, const std::optional<FileMark>& mark = {});
 
   /// Appends a row. Throws Error(Failure::file).
   void thermo(const Snapshot<D>& snapshot) override;
 
   const FileMark& mark() const { return file_.mark(); }
-  /// Puts everything on the disk. Throws Error(Failure::file).
+  /// Syncs the file to the disk and closes it. Throws Error(Failure::file).
   void close() { file_.close(); }
 
  private:

@@ -24,12 +24,12 @@ struct TrajectoryFrame {
   std::vector<std::int32_t> image;
 };
 
-/// Throws Error(Failure::file) where an HDF5 file is something else than a trajectory.
+/// Throws Error(Failure::file) if an HDF5 file is not a trajectory.
 void need_trajectory(const hdf5::File& file);
 
 class TrajectoryReader {
  public:
-  /// `path`: the file, or the directory of its run. Throws Error(Failure::file) for anything else than a trajectory.
+  /// `path`: the file, or the directory of its run. Throws Error(Failure::file) if it is not a trajectory.
   explicit TrajectoryReader(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const { return file_.path(); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What this build is: for --version, the banner of a log and the files a run leaves.
+// A description of this build for --version, the banner of a log and the files of a run.
 
 #include <string>
 
@@ -12,7 +12,7 @@ std::string version_string();
 /// Compiler, build type and flags, one line.
 std::string compiler_string();
 
-/// The libraries at work with their versions, one line.
+/// The libraries in use with their versions, one line.
 std::string library_versions();
 
 }  // namespace carom

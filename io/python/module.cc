@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// carom._carom: sessions of two and three dimensions, and the declarations of what they can be given. The package in
-// carom/ makes the interface of it.
+// carom._carom: sessions in two and three dimensions, and the declarations of their parameters. The package in carom/
+// builds the public interface on it.
 
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
@@ -24,7 +24,7 @@ using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 std::span<const double> span_of(const Array& array) { return {array.data(), static_cast<std::size_t>(array.size())}; }
 
-/// A view of numbers that `owner` keeps, read-only: of so many columns, or 0 for one axis.
+/// A read-only view of numbers that `owner` keeps alive; `columns` 0: an array with one axis.
 template <class T>
 py::array view(const void* data, std::size_t rows, int columns, const py::object& owner) {
   std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(rows)};
@@ -51,14 +51,14 @@ Plan plan_of(const py::dict& ends, double every) {
   return plan;
 }
 
-/// A run for Python: its signals and callbacks. A callback that raises ends the run at the end of the step, the end of
-/// Python likewise.
+/// A run for Python: its signals and callbacks. An exception in a callback ends the run at the end of the step, as does
+/// the end of Python.
 template <int D>
 void run(Session<D>& session, const Plan& plan, const py::object& callback, const py::object& progress,
          const py::object& deck) {
   const std::string text = session.needs_deck() ? deck().cast<std::string>() : "";
   using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::milliseconds kBetweenLooks(50);
+  constexpr std::chrono::milliseconds kTimeBetweenChecks(50);
   std::optional<py::error_already_set> raised;
   std::optional<Unlocked> unlocked(std::in_place);
   const auto in_python = [&](auto&& succeeds) {
@@ -73,7 +73,7 @@ void run(Session<D>& session, const Plan& plan, const py::object& callback, cons
   hooks.stop = [&](const Statistics& statistics) {
     cut = cut || python_is_ending();
     if (cut || raised) return true;
-    if (const auto now = Clock::now(); now - last_look >= kBetweenLooks) {
+    if (const auto now = Clock::now(); now - last_look >= kTimeBetweenChecks) {
       last_look = now;
       in_python([&] {
         return PyErr_CheckSignals() == 0 &&
@@ -223,7 +223,7 @@ void bind(py::module_& module, const char* name) {
       });
 }
 
-/// A session, what there is to warn of, and the title.
+/// A session, its warnings, and the title.
 py::tuple opened(Deck& deck, auto&&... from) {
   py::object session;
   if (deck.dimension == 2)
@@ -233,7 +233,7 @@ py::tuple opened(Deck& deck, auto&&... from) {
   return py::make_tuple(session, deck.warnings, deck.title);
 }
 
-/// The simulation of a deck, given as a file, or as the text of such a file.
+/// The simulation of a deck, given as a file or as text.
 py::tuple from_deck(const std::string& file, const std::vector<std::string>& set,
                     const std::optional<std::string>& text) {
   Deck deck = read_deck(
@@ -241,7 +241,7 @@ py::tuple from_deck(const std::string& file, const std::vector<std::string>& set
   return opened(deck);
 }
 
-/// The simulation of a run that is to be continued.
+/// The simulation of a run to be continued.
 py::tuple from_run(const std::string& directory, bool take_over) {
   Communicator alone;
   Resumed from = find_run(directory, take_over, alone);
@@ -251,7 +251,7 @@ py::tuple from_run(const std::string& directory, bool take_over) {
   return opened(deck, from);
 }
 
-/// The page of runs, until the process that serves it is asked to end: view/view.h.
+/// Serves the page of runs until a signal ends the process (view/view.h).
 void serve_page(const std::vector<std::string>& runs, const std::optional<std::string>& file, std::uint16_t port,
                 bool browser, bool led) {
   ViewOptions options;
@@ -264,7 +264,7 @@ void serve_page(const std::vector<std::string>& runs, const std::optional<std::s
   view_command(options);
 }
 
-/// V and dV/dr at distances, of the spline that a table makes of points.
+/// V and dV/dr at the distances `at`, from the spline of a table potential through the given points.
 py::tuple spline(const Array& r, const Array& value, const Array& slope, const Array& at) {
   const Table table(span_of(r), span_of(value), span_of(slope));
   Array v(at.size()), derivative(at.size());
@@ -301,7 +301,7 @@ py::dict descriptors() {
   return all;
 }
 
-/// Raises the class of carom.errors that belongs to the failure, with the same text.
+/// Raises the exception of carom.errors for the failure, with the text of the error.
 void raise(const Error& error) {
   const py::object errors = py::module_::import("carom.errors");
   const py::object type = errors.attr("of_exit_code")(error.exit_code());

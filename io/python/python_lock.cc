@@ -14,9 +14,9 @@ namespace carom::python {
 namespace {
 
 std::atomic<std::thread::id> ending;  // the thread in which Python is about to end
-int working = 0;                      // threads in the engine without the lock, which guards this number
+int working = 0;                      // threads in the engine without the lock; the lock guards this number
 
-/// Ends the runs of other threads; returns when none of these is in the engine.
+/// Ends the runs of all other threads; returns when none of them is in the engine.
 void stop_runs() {
   ending = std::this_thread::get_id();
   while (working > 0) {
@@ -25,7 +25,7 @@ void stop_runs() {
   }
 }
 
-/// What the action returns; it calls the interpreter and nothing else. A thread that Python ends there sleeps.
+/// Returns the result of the action, which only calls the interpreter. If Python ends this thread there, it sleeps.
 template <class Action>
 auto unless_python_ends(Action&& action) {
   try {
@@ -39,7 +39,8 @@ auto unless_python_ends(Action&& action) {
 
 void stop_runs_at_exit() {
   py::module_::import("atexit").attr("register")(py::cpp_function(stop_runs));
-  ::pthread_atfork(nullptr, nullptr, [] { working = 0; });  // the thread that forks is in Python; no other follows
+  ::pthread_atfork(nullptr, nullptr,
+                   [] { working = 0; });  // only the forking thread, which is in Python, exists in the child
 }
 
 bool python_is_ending() {

@@ -17,7 +17,7 @@ double since(Clock::time_point start) { return std::chrono::duration<double>(Clo
 
 [[noreturn]] void refuse(const std::string& what_and_remedy) { throw Error(Failure::deck, what_and_remedy); }
 
-/// One value for all, or one each.
+/// One value for all particles, or one per particle.
 double value_of(std::span<const double> values, std::size_t i, double fallback) {
   return values.empty() ? fallback : values[values.size() == 1 ? 0 : i];
 }
@@ -37,7 +37,7 @@ void need_finite(std::span<const Vec<D>> rows, const char* what) {
 
 }  // namespace
 
-/// Shows the session what the run shows.
+/// Forwards the run's snapshots to the session.
 template <int D>
 class Session<D>::Shown : public Observer<D> {
  public:
@@ -74,7 +74,7 @@ Session<D>::Session(Deck& deck) {
   views_.rest(system_->particles);
 }
 
-/// To be called before anything is changed.
+/// To be called before any change.
 template <int D>
 void Session<D>::change(const char* what) {
   if (running_) refuse("a run is going on; " + std::string(what) + " before it or after it");
@@ -84,7 +84,7 @@ void Session<D>::change(const char* what) {
   statistics_ = {};
   shown_until_ = -1;
   text_.clear();
-  if (output_ && output_->empty()) output_.reset();  // the files of a run that was continued
+  if (output_ && output_->empty()) output_.reset();  // no overrides: the files are of a continued run
   deck_.reset();
   checkpoint_.reset();
   averages_.clear();
@@ -179,7 +179,7 @@ void Session<D>::set_integrator(std::string_view name, Parameters given) {
   parameters_ = std::move(complete);
 }
 
-/// Whether the state that a run would go on from is at this end already.
+/// Whether the state that a run would continue from is at this end already.
 template <int D>
 bool Session<D>::reached(const Plan& plan) const {
   const Statistics& s = statistics_;
@@ -188,7 +188,7 @@ bool Session<D>::reached(const Plan& plan) const {
          (plan.collisions && s.counters.sphere_sphere >= *plan.collisions);
 }
 
-/// A part of the saved state, with what is due next where the interval is another than before.
+/// A part of the saved state, with the next due times recomputed if the interval has changed.
 template <int D>
 Bytes Session<D>::saved(const std::string& name, double interval) const {
   if (checkpoint_) return checkpoint_->read(name);
@@ -217,7 +217,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   parameters.set("step", step_);
   const double interval = plan.thermo_interval;
 
-  std::optional<Simulation<D>> made;  // where it throws the session keeps its system
+  std::optional<Simulation<D>> made;  // if this throws, the session keeps its system
   if (begun) {
     parameters = completed(integrator_->name, integrator_->parameters, std::move(parameters));
     plan.step = step_;
@@ -241,7 +241,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     const bool pushed = !pushed_.empty();
     if (pushed) push(run);
     const bool stop = hooks.stop && hooks.stop(run.statistics());
-    // After a push at the very end the state of before the last, shortened step is of no use.
+    // After a velocity change at the very end, the state before the last, shortened step is useless.
     if (stop || run.is_last_on_the_way() || (pushed && run.statistics().fraction_done >= 1))
       save(run, state, record ? &*record : nullptr);
     else if (record && deck_->output.checkpoint_wall && since(last_checkpoint) >= *deck_->output.checkpoint_wall) {
@@ -288,10 +288,10 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   interval_ = interval;
 }
 
-/// The system as it is between runs.
+/// The system between runs.
 template <int D>
 void Session<D>::rest(Particles<D>& particles) {
-  for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // where free flight has failed
+  for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // if free flight has failed
   system_ = std::make_unique<System<D>>();
   system_->box = box_;
   system_->species = species_;

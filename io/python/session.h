@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A simulation that is made, run, looked at and run on step by step: what the Python module offers, without Python.
+// A simulation that is built, run, inspected and continued step by step: the Python module's simulation, without
+// Python.
 //
 // Between runs the session has a system at rest; Simulation::run() advances it to an end, and saves the state from
-// which a later run() goes on with the bits of one undisturbed run (engine/run/state.h). A change of particles, forces
-// or integrator drops that state: then a new run begins at time 0.
+// which a later run() continues bit for bit like one undisturbed run (engine/run/state.h). A change of particles,
+// forces or integrator drops that state: then a new run begins at time 0.
 
 #include <atomic>
 #include <functional>
@@ -23,20 +24,21 @@
 
 namespace carom::python {
 
-/// What add_particles() takes of N particles: N·D numbers for x; as many or none for v; N, one or none for the others.
+/// The data of N particles for add_particles(): N·D numbers for x; N·D or none for v; N, one or none for the other
+/// columns.
 struct Columns {
   std::span<const double> x, v, radius, mass, charge;
   std::string species;
 };
 
-/// What the caller of run() does meanwhile.
+/// Callbacks of run().
 struct RunHooks {
   std::function<bool(const Statistics&)> stop;  ///< before each step; true: the run ends there
-  std::function<void()> show;                   ///< at the intervals of the plan; the session then is at that time
-  std::function<std::string()> deck;            ///< the present state as a deck, where the run is to leave files
+  std::function<void()> show;                   ///< at the intervals of the plan; the session then shows that time
+  std::function<std::string()> deck;            ///< the present state as a deck, if the run writes files
 };
 
-/// The averages that a run takes, by name.
+/// The averages that a run computes, by name.
 using Averages = std::map<std::string, std::vector<TableColumn>>;
 
 template <int D>
@@ -45,24 +47,24 @@ class Session {
   /// All members throw Error.
   Session(std::span<const double> edges, const std::vector<std::string>& boundary);
   explicit Session(Deck& deck);
-  /// A run that left its files in a directory, as its last checkpoint has it; the next run() goes on with it and them.
+  /// The last checkpoint of a run that wrote files to a directory; the next run() continues the run and its files.
   Session(Deck& deck, Resumed& from);
 
   // Changes.
   void add_particles(const Columns& columns);
   void set_position(std::span<const double> x);
-  /// In RunHooks::show, at the end of a step, without a new beginning: then they hold from the return on.
+  /// In RunHooks::show at the end of a step this begins no new run: the velocities apply when show returns.
   void set_velocity(std::span<const double> v);
-  /// Velocities of Maxwell and Boltzmann for the particles that have a temperature (not NaN) [energy], N of them; the
-  /// present ones for the rest.
+  /// N velocities, drawn from the Maxwell–Boltzmann distribution for particles with a temperature (not NaN) [energy];
+  /// the present velocities for the rest.
   std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
   void add_force(std::string_view type, Parameters given);
   void set_integrator(std::string_view name, Parameters given);
-  /// From the next run on there are files: `set` overrides the [output] of decks, directory and all; rows of thermo,
-  /// and with them RunHooks::show, come at this interval.
+  /// Makes later runs write files: `set` overrides [output] of a deck, including the directory; thermo rows and calls
+  /// of RunHooks::show come at this interval.
   void set_output(std::vector<std::string> set, double thermo_interval);
 
-  /// What a deck said of the run and its integrator is to be said anew.
+  /// Drops the settings of a deck for the run and its integrator, which must be set again.
   void forget_run() {
     plan_ = {};
     integrator_ = nullptr;
@@ -71,14 +73,14 @@ class Session {
   }
   /// Whether run() will call RunHooks::deck.
   bool needs_deck() const { return output_ && text_.empty() && shown_until_ < 0; }
-  /// To the end of the plan, in the time and steps of the whole run, so that a later end goes on. The step of the plan
-  /// is ignored.
+  /// Runs to the end of the plan, counted in the time and steps of the whole run, so that a later end continues the
+  /// run. The step of the plan is ignored.
   void run(Plan plan, const RunHooks& hooks);
 
-  // What there is now: in RunHooks::show at the time shown, else at the end of the last run.
+  // The present state: in RunHooks::show at the time shown, else at the end of the last run.
   const Snapshot<D>& shot();
   const Statistics& statistics() const { return live_ ? *live_ : statistics_; }
-  /// Views of all particles; they stay good while the session lives.
+  /// Views of all particles, valid during the life of the session.
   std::span<const Vec<D>> position() { return views_.position(); }
   std::span<const Vec<D>> velocity() { return views_.velocity(); }
   std::span<const Image<D>> image() { return views_.image(); }
@@ -89,13 +91,13 @@ class Session {
   const IntegratorInfo* integrator() const { return integrator_; }
   const Parameters& integrator_parameters() const { return parameters_; }
   const std::vector<Force>& forces() const { return terms_.all(); }
-  /// While a run goes on: in RunHooks::show.
+  /// During a run: only in RunHooks::show.
   Averages averages() const;
-  /// Of the last run: about its files.
+  /// Warnings of the last run about its files.
   const std::vector<std::string>& warnings() const { return warnings_; }
-  /// Where the files are; empty: there are none.
+  /// The directory of the files; empty: no files.
   std::string directory() const { return deck_ ? deck_->output.directory.string() : std::string(); }
-  /// The plan of the deck; without one there is no end in it.
+  /// The plan of the deck; without a deck it has no end.
   const Plan& plan() const { return plan_; }
 
  private:
@@ -127,22 +129,22 @@ class Session {
 
   std::optional<Snapshot<D>> shot_;
   Statistics statistics_;               // of the last run
-  const Statistics* live_ = nullptr;    // of the one that is going on
-  std::map<std::string, Bytes> state_;  // to go on from
+  const Statistics* live_ = nullptr;    // of the active run
+  std::map<std::string, Bytes> state_;  // to continue from
   std::int64_t state_steps_ = 0;
   double state_time_ = 0, interval_ = 0, step_ = 0;
   double shown_until_ = -1;
 
-  bool showing_ = false;        // RunHooks::show is at work
-  bool at_step_end_ = false;    // and shows the particles between two steps
-  std::vector<Vec<D>> pushed_;  // velocities that are to hold from now on
+  bool showing_ = false;        // RunHooks::show is running
+  bool at_step_end_ = false;    // RunHooks::show is called between two steps
+  std::vector<Vec<D>> pushed_;  // new velocities, set by a callback
 
-  std::optional<std::vector<std::string>> output_;  // overrides; else there are no files
-  std::string text_, file_;                         // of the deck that the particles came from, and its name
-  std::optional<Deck> deck_;                        // of the run that leaves files
-  CheckpointHead head_;                             // where its files were at the state to go on from
-  std::shared_ptr<Checkpoint> checkpoint_;          // which has that state, until the first run
-  const RunRecord<D>* record_ = nullptr;            // of the run that is going on
+  std::optional<std::vector<std::string>> output_;  // overrides of [output]; nullopt: no files
+  std::string text_, file_;                         // the deck that the particles came from, and its file
+  std::optional<Deck> deck_;                        // of the run that writes files
+  CheckpointHead head_;                             // positions in its files at the state to continue from
+  std::shared_ptr<Checkpoint> checkpoint_;          // holds that state until the first run
+  const RunRecord<D>* record_ = nullptr;            // of the active run
   Averages averages_;
   std::vector<std::string> warnings_;
 };

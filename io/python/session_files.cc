@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The files of a session's runs: the deck that they are a run of, their state, the averages.
+// The files of a session's runs: their deck, their state, the averages.
 
 #include "engine/setup/placement.h"
 #include "io/deck/deck_source.h"
@@ -10,7 +10,7 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& what_and_remedy) { throw Error(Failure::deck, what_and_remedy); }
 
-/// Gives the run of a deck another end; the resolved deck says so too.
+/// Changes the end of a deck's run, in the resolved deck too.
 void set_ends(Deck& deck, const Plan& plan) {
   deck.plan.steps = plan.steps;
   deck.plan.end_time = plan.end_time;
@@ -77,7 +77,7 @@ void Session<D>::set_output(std::vector<std::string> set, double thermo_interval
   plan_.thermo_interval = thermo_interval;
 }
 
-/// Makes the deck of the run that is about to begin or to go on, and gives the plan what the deck says of files.
+/// Makes the deck of the run that is about to begin or continue, and sets the plan's output intervals from the deck.
 template <int D>
 void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   if (!begun) {
@@ -102,9 +102,9 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   plan.events = of.events;
 }
 
-/// Gives the particles of a run the velocities that a callback has set, between two steps. The energy that this adds is
-/// work, like that of walls which move, and no error of H; the error of momentum is unknown from then on. After a step
-/// that was shortened, steps are counted from there.
+/// Sets the velocities from a callback, between two steps. The added energy counts as work, like that of moving walls,
+/// not as an error of H; the error of momentum is unknown from then on. After a shortened step, steps are counted from
+/// there.
 template <int D>
 void Session<D>::push(const Simulation<D>& run) {
   Particles<D>& p = at_work_->particles;
@@ -120,7 +120,7 @@ void Session<D>::push(const Simulation<D>& run) {
   });
 }
 
-/// Saves the state to go on from, in memory and with the files.
+/// Saves the state to continue from, in memory and with the files.
 template <int D>
 void Session<D>::save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record) {
   state.clear();

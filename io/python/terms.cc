@@ -40,7 +40,7 @@ void Terms<D>::make(System<D>& system) {
   system.interactions.clear();
   system.quanta = {};
   try {
-    for (const bool bonded : {true, false})  // bonds first, which other terms may leave out
+    for (const bool bonded : {true, false})  // bonds first, since other terms may exclude bonded pairs
       for (Force& force : all_) {
         if ((force.info->kind == InteractionInfo::Kind::bonded) != bonded) continue;
         add_interaction(system, *force.info, force.parameters);

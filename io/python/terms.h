@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The terms of V that a simulation from Python was given.
+// The terms of V of a simulation in Python.
 
 #include <vector>
 
@@ -11,23 +11,23 @@ namespace carom::python {
 
 struct Force {
   const InteractionInfo* info;
-  Parameters parameters;  ///< complete; bonds that were found within a distance stand as `pairs`
+  Parameters parameters;  ///< complete; bonds found within a distance are stored as `pairs`
 };
 
-/// Makes them for the particles that a system has. What is found for the first system stays for the others.
+/// Makes the terms for the particles of a system. Bonds found in the first system are kept for later systems.
 template <int D>
 class Terms {
  public:
   Terms() = default;
-  /// Those of a deck, which the system has.
+  /// The terms of a deck, which the system has already.
   Terms(const Deck& deck, const System<D>& system);
 
   const std::vector<Force>& all() const { return all_; }
-  /// One more, to the system, too. Without it where it throws.
+  /// Adds a term, to the system too; if this throws, the term is not added.
   void add(const InteractionInfo& info, Parameters complete, System<D>& system);
-  /// In place of those that the system has; it has none where this throws.
+  /// Replaces the terms of the system, which has none if this throws.
   void make(System<D>& system);
-  /// Where the system has not got them yet.
+  /// Adds the terms to a system that does not have them yet.
   void complete(System<D>& system) {
     if (system.interactions.size() != all_.size()) make(system);
   }

@@ -11,7 +11,8 @@ namespace carom::python {
 namespace {
 
 /// In the order of Parameter::Type.
-constexpr std::array kTypes = {"bool", "int", "float", "list[float]", "str", "list[str]", "list[tuple[int, int]]"};
+constexpr std::array kPythonTypes = {
+    "bool", "int", "float", "list[float]", "str", "list[str]", "list[tuple[int, int]]"};
 
 [[noreturn]] void refuse(std::string_view of, std::string_view name, const std::string& what) {
   throw Error(Failure::deck, std::string(of) + ": '" + std::string(name) + "' " + what);
@@ -26,12 +27,12 @@ std::int64_t whole(std::string_view of, std::string_view name, const py::handle&
   return number;
 }
 
-/// Of lists and arrays: texts, numbers, or pairs of ids.
+/// The value of a list or array: texts, numbers, or pairs of ids.
 ParameterValue list_of(std::string_view of, const Parameter* declared, std::string_view name, const py::handle& value) {
   py::array all;
   try {
     all = py::module_::import("numpy").attr("asarray")(value);
-  } catch (const py::error_already_set&) {  // ragged
+  } catch (const py::error_already_set&) {  // rows of different lengths
     refuse(of, name, "has rows of different lengths; give each the same number of entries");
   }
   const char kind = all.dtype().kind();
@@ -65,7 +66,7 @@ ParameterValue list_of(std::string_view of, const Parameter* declared, std::stri
     shape += (axis == 0 ? "" : ", ") + std::to_string(all.shape(axis));
   refuse(of, name,
          "is an array of shape (" + shape + ") and type " + py::str(all.dtype()).cast<std::string>() + "; give a " +
-             kTypes[static_cast<std::size_t>(type)] +
+             kPythonTypes[static_cast<std::size_t>(type)] +
              (type == Parameter::Type::pair_list ? ", of shape (bonds, 2)" : ""));
 }
 
@@ -110,7 +111,7 @@ py::list described(std::span<const Parameter> declared) {
   for (const Parameter& each : declared) {
     py::dict one;
     one["name"] = each.name;
-    one["type"] = kTypes[static_cast<std::size_t>(each.type)];
+    one["type"] = kPythonTypes[static_cast<std::size_t>(each.type)];
     one["default"] = each.fallback;
     one["unit"] = each.unit;
     one["meaning"] = each.meaning;

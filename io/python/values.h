@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Values of Python as parameters, and declarations as dictionaries of Python.
+// Converts Python values to parameters, and declarations to Python dictionaries.
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -11,11 +11,11 @@ namespace carom::python {
 
 namespace py = pybind11;
 
-/// Keyword arguments for what is declared so; those that are None are left out. Throws Error(Failure::deck) about what
-/// is no value of any parameter; types and ranges are checked by completed().
+/// Converts keyword arguments to the declared parameters; arguments that are None are left out. Throws
+/// Error(Failure::deck) for a value that no parameter can have; completed() checks types and ranges.
 Parameters parameters_of(std::string_view of, std::span<const Parameter> declared, const py::dict& given);
 
-/// By name.
+/// The parameters as a dictionary by name.
 py::dict values_of(const Parameters& parameters);
 
 /// [{"name", "type", "default", "unit", "meaning", "choices"}, …], in the order of the manual.

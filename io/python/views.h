@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Arrays of particles that others look at: these keep their addresses while runs swap and free arrays of their own.
+// Arrays of particles for viewers: they keep their addresses while runs swap and free their own arrays.
 
 #include <list>
 #include <mutex>
@@ -17,36 +17,36 @@ struct Constants {
   std::span<const std::uint16_t> species;
 };
 
-/// The views of a simulation's particles. What has been viewed stands aside during a run, as shown last. Any thread may
-/// look.
+/// The views of a simulation's particles. During a run, viewed arrays are kept apart, as last shown. Any thread may
+/// read them.
 template <int D>
 class ParticleViews {
  public:
-  /// Of all particles. During a run an array that has not been viewed before is there while one is shown only; else
-  /// these throw Error.
+  /// Views of all particles. During a run, an array that has not been viewed before is available only between show()
+  /// and hide(); otherwise these functions throw Error.
   std::span<const Vec<D>> position();
   std::span<const Vec<D>> velocity();
   std::span<const Image<D>> image();
   Constants constants();
 
-  /// The particles, at rest from now on; they stay where they are.
+  /// Views the particles in place, which no run changes from now on.
   void rest(const Particles<D>& particles) { particles_ = &particles; }
-  /// The same of particles that have been in a run.
+  /// rest() for particles that come back from a run.
   void rest(Particles<D>&& of_run, Particles<D>& particles);
   /// A run begins, with these particles.
   void lend(Particles<D>& particles);
   /// Renews the views of a run's particles, which are shown until hide().
   void show(const Particles<D>& particles);
   void hide();
-  /// To be called before the number of the particles at rest changes: they get new arrays, and views go on to show
-  /// what they showed.
+  /// To be called before the number of particles changes between runs: the particles get new arrays, and existing views
+  /// keep their contents.
   void detach(Particles<D>& particles);
 
  private:
   /// An array that a run changes.
   template <class T>
   struct Kept {
-    std::vector<T> values;  ///< during a run: as shown last
+    std::vector<T> values;  ///< during a run: as last shown
     bool viewed = false;
   };
   template <class T>
@@ -57,7 +57,7 @@ class ParticleViews {
   Kept<Image<D>> image_;
   bool constants_viewed_ = false, lent_ = false;
   const Particles<D>*particles_ = nullptr, *shown_ = nullptr;
-  std::list<Particles<D>> detached_;  // of which there are views
+  std::list<Particles<D>> detached_;  // old arrays that still have views
   std::mutex mutex_;
 };
 

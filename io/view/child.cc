@@ -26,7 +26,7 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
   return all;
 }
 
-/// The environment without what makes a process one of an MPI job.
+/// The environment without the variables of an MPI job.
 std::vector<std::string> plain_environment() {
   std::vector<std::string> kept;
   for (char** entry = environ; *entry != nullptr; ++entry)
@@ -89,7 +89,7 @@ std::string open_in_browser(const std::string& address) {
   if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return {};
   const char* folder = std::getenv("XDG_RUNTIME_DIR");
   std::string name = std::string(folder != nullptr ? folder : "/tmp") + "/carom-XXXXXX.html";
-  const Descriptor file(::mkostemps(name.data(), 5, O_CLOEXEC));  // which others cannot read
+  const Descriptor file(::mkostemps(name.data(), 5, O_CLOEXEC));  // which other users cannot read
   const std::string text = "<!doctype html><meta http-equiv=refresh content=\"0;url=" + address + "\">\n";
   if (!file.is_open() || ::write(file.number(), text.data(), text.size()) != static_cast<ssize_t>(text.size()))
     return {};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Another `carom` that works beside this one.
+// Another `carom` process beside this one.
 
 #include <spawn.h>
 
@@ -11,17 +11,19 @@
 
 namespace carom {
 
-/// This program started again with other arguments, outside of any MPI job. It ends with the object that has it.
+/// This program, started again with other arguments outside any MPI job. The process ends with this object.
 class Child {
  public:
-  /// Its standard input ends with this process; its standard output is first_line()'s. Throws Error(Failure::file).
+  /// The child's standard input closes when this process ends; first_line() reads its standard output. Throws
+  /// Error(Failure::file).
   explicit Child(const std::vector<std::string>& arguments);
-  /// Sends SIGTERM and waits; SIGKILL to a process that is still there after five seconds, as one that is stopped.
+  /// Sends SIGTERM and waits; sends SIGKILL if the process (for example a stopped one) is still there after five
+  /// seconds.
   ~Child();
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  /// What it says first; empty if it ends without.
+  /// The first line of its output; empty if it ends without output.
   std::string first_line() const;
 
  private:
@@ -29,8 +31,8 @@ class Child {
   pid_t process_ = 0;
 };
 
-/// Opens an address in the desktop's browser where there is one; returns the file that leads there, to be removed at
-/// the end: an address on a command line could be read by other users.
+/// Opens an address in the desktop's browser if there is one; returns the file that redirects to the address, to be
+/// removed at the end: an address on a command line could be read by other users.
 std::string open_in_browser(const std::string& address);
 
 }  // namespace carom

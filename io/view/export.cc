@@ -31,7 +31,7 @@ std::string base64(std::string_view bytes) {
   return text;
 }
 
-/// All rows of thermo.csv, or so many of them at equal distances and the last one.
+/// All rows of thermo.csv, or at most about `most` of them at equal distances, with the last one.
 std::string thinned_thermo(RunSource& run, std::size_t most) {
   std::string all;
   for (std::string part; !(part = run.answer("thermo/" + std::to_string(all.size()))->body).empty();) all += part;

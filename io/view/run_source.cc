@@ -32,7 +32,7 @@ const std::string kParticles = "/particles/trajectory";
 
 struct FileStatus {
   bool exists = false;
-  std::string identity, version;  // which file; which state of it
+  std::string identity, version;  // identity and version of the file
   std::uint64_t size = 0;
 };
 
@@ -58,13 +58,13 @@ std::optional<std::uint64_t> number_behind(std::string_view question, std::strin
   return number;
 }
 
-/// The whole rows of a table from a byte of it on.
+/// The complete rows of a table from byte `first` on.
 std::string rows_from(const std::filesystem::path& path, std::uint64_t first) {
-  constexpr std::size_t kMost = 4 << 20;
+  constexpr std::size_t kMostThermoBytes = 4 << 20;
   std::ifstream in(path, std::ios::binary);
-  std::string text(kMost, '\0');
+  std::string text(kMostThermoBytes, '\0');
   in.seekg(static_cast<std::streamoff>(first));
-  in.read(text.data(), kMost);
+  in.read(text.data(), kMostThermoBytes);
   text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount())));
   text.resize(text.rfind('\n') + 1);
   return text;
@@ -105,7 +105,7 @@ void RunSource::look() {
 }
 
 Json RunSource::state() {
-  // First whether it is at work: what a run has written before it ended is then seen, too.
+  // Checks first whether the run is active, so that its last writes before its end are seen, too.
   const bool at_work = run_is_at_work(directory_);
   look();
   Json state = head_;
@@ -221,7 +221,7 @@ void RunSource::count_collisions(double until) {
     counted_ = 0;
   }
   counted_until_ = until;
-  constexpr std::uint64_t kBatch = 1 << 16;
+  constexpr std::uint64_t kEventsPerRead = 1 << 16;
   bool more = true;
   while (more) {
     std::vector<double> time;
@@ -229,7 +229,7 @@ void RunSource::count_collisions(double until) {
     hdf5::read_between_flushes(events, [&] {
       const auto file = hdf5::File::open_unlocked(events);
       const std::uint64_t all = hdf5::shape(file, "/events/time").at(0);
-      const std::uint64_t n = counted_ < all ? std::min(kBatch, all - counted_) : 0;
+      const std::uint64_t n = counted_ < all ? std::min(kEventsPerRead, all - counted_) : 0;
       time = hdf5::rows<double>(file, "/events/time", counted_, n);
       kind = hdf5::rows<std::uint32_t>(file, "/events/kind", counted_, n);
       lo = hdf5::rows<std::uint32_t>(file, "/events/lo", counted_, n);
@@ -241,7 +241,7 @@ void RunSource::count_collisions(double until) {
       if (kind[k] == 0) ++counts_.at(hi[k]);
     }
     counted_ += now;
-    more = now == kBatch;
+    more = now == kEventsPerRead;
   }
 }
 

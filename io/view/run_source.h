@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What the page asks of a run, answered from the run's files, which may be growing.
+// Answers the page's requests about a run from the run's files, which may be growing.
 //
-//   state         JSON: what the run is, how many frames there are, whether it goes on
+//   state         JSON: what the run is, how many frames there are, whether it is active
 //   particles     32-bit floats, little-endian: N radii [length], N species, N masses [mass], N charges [charge]
 //   bonds         32-bit integers: the two ids of each bond, which count from 0
 //   frame/K       eight doubles (time, step, collisions, the three edges of the box, whether counts follow, 0), then
 //                 floats: N positions of three columns [length], N speeds [velocity], N numbers of collisions so far
-//   path/I/K      floats: the positions of particle I in frame K and those that follow, at most 2000 frames
-//   thermo/B      thermo.csv from its byte B on, whole rows, at most 4 MiB
+//   path/I/K      floats: the positions of particle I from frame K on, at most 2000 frames
+//   thermo/B      thermo.csv from its byte B on, complete rows, at most 4 MiB
 //   rdf           rdf.csv
 
 #include <cstdint>
@@ -28,11 +28,11 @@ struct Answer {
 
 class RunSource {
  public:
-  /// `awaited`: the run is about to start, its files may be missing. Else throws Error(Failure::file) where the
-  /// directory holds no trajectory that can be read.
+  /// `awaited`: the run is about to start, its files may be missing. Otherwise throws Error(Failure::file) if the
+  /// directory holds no readable trajectory.
   RunSource(std::filesystem::path directory, bool awaited);
 
-  /// The answer, or nothing where there is no such thing. Throws Error(Failure::file).
+  /// The answer, or nullopt for an unknown question. Throws Error(Failure::file).
   std::optional<Answer> answer(std::string_view question);
 
   /// The answer to `state`.
@@ -48,8 +48,8 @@ class RunSource {
   void count_collisions(double until);
 
   std::filesystem::path directory_, trajectory_;
-  nlohmann::json head_;          // what does not change while the trajectory is the same file
-  std::string seen_, identity_;  // of the trajectory: when it was looked at last; which file it is
+  nlohmann::json head_;          // the constant data of the trajectory file
+  std::string seen_, identity_;  // of the trajectory file: version at the last check; identity
   std::uint64_t particles_ = 0, frames_ = 0;
   std::vector<std::uint32_t> counts_;  // collisions of each particle among the first `counted_` events
   std::uint64_t counted_ = 0;

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-// What Boost 1.74's awaitable.hpp leaves out stands above.
+// The headers above are missing in Boost 1.74's awaitable.hpp.
 #include <boost/asio.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
@@ -30,21 +30,21 @@ using asio::ip::tcp;
 using Request = http::request<http::empty_body>;
 using Response = http::response<http::string_body>;
 
-/// A browser keeps six connections, each with at most one answer in memory; a client that needs more loses the stillest
-/// one.
+/// A browser keeps six connections, each with at most one answer in memory; beyond the limit the longest idle
+/// connection is closed.
 constexpr std::size_t kMostConnections = 24;
 /// A connection on which no request comes and no byte of an answer goes for this long is closed.
 constexpr std::chrono::seconds kTimeIdle(10);
-/// The time until the next attempt where no connection can be accepted, as where no descriptor is free.
-constexpr std::chrono::milliseconds kPause(100);
+/// The time until the next attempt if no connection can be accepted, for example without a free descriptor.
+constexpr std::chrono::milliseconds kAcceptRetry(100);
 
 struct Connection {
   beast::tcp_stream stream;
   bool trusted = false;  ///< a request on it had the token
 };
 
-/// Whether a Host header names this machine, with any port (ssh forwards from another one). Any other name has been
-/// made to lead here, and its page would then be of the same origin for the browser.
+/// Whether a Host header names this machine, with any port (ssh forwards from another one). Any other name may be an
+/// attacker's that resolves to this machine, whose page would have the same origin for the browser.
 bool names_this_machine(std::string_view host) {
   const auto is_port = [](std::string_view text) {
     return text.empty() || (text[0] == ':' && text.find_first_not_of("0123456789", 1) == text.npos);
@@ -76,7 +76,7 @@ struct PageServer::Sockets {
   tcp::acceptor acceptor{context};
   asio::posix::stream_descriptor input{context};
   std::array<char, 64> ignored{};
-  std::vector<Connection*> open{};  // that which has been still for longest comes first
+  std::vector<Connection*> open{};  // the longest idle connection comes first
 
   Response response_to(const Request& request, Connection& connection) const {
     Response response(http::status::ok, request.version());
@@ -114,11 +114,11 @@ struct PageServer::Sockets {
     }
     if (!connection.trusted) response.keep_alive(false);
     response.prepare_payload();
-    if (head) response.body().clear();  // its headers are those of GET
+    if (head) response.body().clear();  // with the headers of GET
     return response;
   }
 
-  /// Makes a connection the last of those that are to be closed where there are too many.
+  /// Marks a connection as active: it becomes the last to be closed if there are too many.
   void has_moved(const Connection& connection) {
     if (const auto at = std::ranges::find(open, &connection); at != open.end()) std::rotate(at, at + 1, open.end());
   }
@@ -161,7 +161,7 @@ struct PageServer::Sockets {
       if (!error) {
         asio::co_spawn(context, talk(std::move(socket)), asio::detached);
       } else {
-        pause.expires_after(kPause);
+        pause.expires_after(kAcceptRetry);
         co_await pause.async_wait(asio::use_awaitable);
       }
     }

@@ -17,10 +17,10 @@ namespace carom {
 
 class PageServer {
  public:
-  /// The answer to a path behind the token, or nothing where there is no such thing. May throw: the page is shown why.
+  /// The answer to a path behind the token, or nullopt for an unknown path. May throw: the page then shows the error.
   using Answers = std::function<std::optional<Answer>(std::string_view path)>;
 
-  /// Listens from now on; `port` 0: any free one. Throws Error(Failure::deck) where the port is taken.
+  /// Listens from now on; `port` 0: any free one. Throws Error(Failure::deck) if the port is taken.
   PageServer(std::uint16_t port, Answers answers);
   ~PageServer();
   PageServer(const PageServer&) = delete;
@@ -29,8 +29,8 @@ class PageServer {
   /// `http://127.0.0.1:PORT/TOKEN/`
   const std::string& address() const { return address_; }
 
-  /// Answers until SIGINT or SIGTERM; `led`: until SIGTERM, or standard input ends, as it does with the process that
-  /// has the other end of it, while SIGINT and SIGHUP are left to that.
+  /// Answers until SIGINT or SIGTERM; `led`: until SIGTERM, or standard input ends, which happens when the parent
+  /// process ends; SIGINT and SIGHUP are left to the parent.
   void serve(bool led);
 
  private:

@@ -27,7 +27,7 @@ void say(const std::string& text) {
   if (std::fflush(stdout) != 0) throw Error(Failure::file, "standard output: cannot write to it");
 }
 
-/// A page of these runs: `runs` is a list of their states, `K/…` what the run of that number answers.
+/// A page of these runs: `runs` answers with a list of their states, `K/…` with the answer of run K.
 class Page {
  public:
   explicit Page(const ViewOptions& options) {
@@ -53,7 +53,7 @@ class Page {
   std::vector<RunSource> runs_;
 };
 
-/// Serves a page, and says where.
+/// Serves a page, and prints its address.
 void show(const ViewOptions& options) {
   Page page(options);
   PageServer server(options.port, [&](std::string_view path) { return page.answer(path); });
