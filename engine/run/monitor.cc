@@ -19,13 +19,13 @@ constexpr std::size_t kShadowAtEveryStep = 100;
 // Limits at which a run fails, because it is no longer a motion of the deck's system.
 
 /// |H| relative to its scale at the start. Inexact methods with far too long steps can reach 1e4 and recover.
-constexpr double kBlownUp = 1e10;
+constexpr double kLargestEnergyGrowth = 1e10;
 /// The change of H in a slab relative to K + Σ|V|, for methods that conserve H to rounding. Positions are rounded to
 /// 1e-16 of the box; potentials 10⁴ times steeper than the box is long make 1e-12 of this. The limit is six digits
 /// above this, and still far below the error of a second-order method.
-constexpr double kMostJump = 1e-6;
+constexpr double kLargestEnergyJump = 1e-6;
 /// Depth relative to the contact distance. The methods leave 1e-12; the box may be 10⁹ diameters long.
-constexpr double kDeepest = 1e-6;
+constexpr double kDeepestOverlap = 1e-6;
 /// Replaces an id if there is none; the smallest id of all ranks is found as the largest negative one.
 constexpr double kNoId = -std::numeric_limits<double>::infinity();
 
@@ -108,10 +108,10 @@ void Monitor<D>::guard(double energy_before, double magnitude_before) {
   };
   const double energy = std::abs(account_.energy), jump = std::abs(account_.energy - energy_before);
   // If the particles were almost at rest at the start, both energies may be rounding errors.
-  if (energy > kBlownUp * s.energy_scale && energy > 0.5 * account_.magnitude)
+  if (energy > kLargestEnergyGrowth * s.energy_scale && energy > 0.5 * account_.magnitude)
     fail("the run has blown up: the energy, " + short_text(s.energy_initial) + " at the start, is " +
          short_text(account_.energy));
-  if (info_.exact && jump > kMostJump * std::max({s.energy_reference, magnitude_before, account_.magnitude}))
+  if (info_.exact && jump > kLargestEnergyJump * std::max({s.energy_reference, magnitude_before, account_.magnitude}))
     fail("the energy, which " + std::string(info_.name) + " keeps to rounding, jumped by " + short_text(jump) + " to " +
          short_text(account_.energy));
 }
@@ -184,7 +184,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
     const Overlaps own = overlaps();
     const double deepest = system_.decomposition.largest(own.depth());
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest);
-    if (deepest > kDeepest) {
+    if (deepest > kDeepestOverlap) {
       const Overlaps all = sum_of_all(system_.decomposition.ranks(), own);
       throw Error(Failure::numerical, "particles " + std::to_string(all.lo) + " and " + std::to_string(all.hi) +
                                           " overlap, by " + short_text(deepest) +

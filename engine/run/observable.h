@@ -75,8 +75,7 @@ template <int D>
 struct ObservableMaker {
   /// Sets the parameters that are not given and depend on the system; returns an error if a parameter does not fit it.
   std::optional<ParameterError> (*complete)(Parameters&, const System<D>&) = nullptr;
-  /// Makes the observable from complete parameters; the first sample is due at time `start`. The system must outlive
-  /// it.
+  /// Makes one from complete parameters; the first sample is due at time `start`. The system must outlive it.
   std::unique_ptr<Observable<D>> (*make)(const System<D>&, const Parameters&, double start) = nullptr;
 };
 
