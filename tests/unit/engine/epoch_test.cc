@@ -22,7 +22,7 @@ TEST(Epoch, IsFortyMeanFreeTimesInAnyDimension) {
   EXPECT_NEAR(spheres * 4 * sphere * at_sphere * speed, 40, 0.05 * 40);
 }
 
-/// Along periodic axes the images of the fastest particle, and of the lightest in equilibrium, must fit into their bits.
+/// On periodic axes the images of the fastest particle, and of the lightest in equilibrium, must fit into their bits.
 TEST(Epoch, EndsBeforeAParticleHasComeThroughTooManyBoxes) {
   const auto usual = test::hard_spheres<3>(4, 0.3);
   const double boxes = Packing<3>(1, usual->size()).largest();
