@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decks that an earlier version hung on, gave up, or got wrong: contacts at rest, unequal masses, long steps, loose tolerances.
+"""Decks on which an earlier version hung, failed, or gave wrong results: contacts at rest, unequal masses, long steps, loose tolerances.
 
 Each keeps its energy and overlaps to rounding, but for one that cannot run and says why.
 """
