@@ -28,7 +28,7 @@ from studies import (parse, processor_seconds, read_deck, relative_error, run_de
 
 COLUMNS = ["method", "particles", "step", "steps", "collisions", "passes_per_step", "seconds", "seconds_most", "seconds_per_step",
            "energy_error", "position_error"]
-LONG = 20.0  # [s] longer runs are not repeated
+LONGEST_REPEATED = 20.0  # [s] longer runs are not repeated
 
 
 def parse_arguments(arguments=None):
@@ -58,7 +58,7 @@ def measure(options, deck, method, step, exact=None, overrides=()):
     """The method's row of the table; None if it fails."""
     times = []
     try:
-        while len(times) < options.repeats and sum(times) < LONG:
+        while len(times) < options.repeats and sum(times) < LONGEST_REPEATED:
             summary, positions, seconds = run_once(options, deck, method, step, overrides)
             times.append(seconds)
     except RunFailed as failure:

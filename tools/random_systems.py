@@ -9,8 +9,8 @@ Touching spheres touch to rounding. No radius and no mass is larger than 1.
 import math
 
 EDGE = 24.0  # the longest box: positions are rounded to 1e-13 of the smallest contact distance
-CHANCES = 60  # attempts to place a sphere
-SURE = 1e-6  # relative gap of spheres that must not touch
+ATTEMPTS = 60  # attempts to place a sphere
+CLEAR_GAP = 1e-6  # relative gap of spheres that must not touch
 
 
 def log_uniform(dice, least, most):
@@ -43,12 +43,12 @@ class Spheres:
         for each, edge, kind in zip(x, self.edges, self.boundary):
             if kind != "open" and not 0 <= each <= edge or kind == "wall" and not radius <= each <= edge - radius:
                 return False
-            if kind == "wall" and 0 < min(each - radius, edge - radius - each) < SURE * radius:
+            if kind == "wall" and 0 < min(each - radius, edge - radius - each) < CLEAR_GAP * radius:
                 return False
         for j, (y, other) in enumerate(zip(self.position, self.radius)):
             contact = radius + other
             distance, rounding = math.hypot(*self.separation(x, y)), max(5e-14 * contact, 2 * math.ulp(max(self.edges)))
-            if distance < contact * (1 + SURE) and (j not in partners or abs(distance - contact) > rounding):
+            if distance < contact * (1 + CLEAR_GAP) and (j not in partners or abs(distance - contact) > rounding):
                 return False
         return True
 
@@ -87,7 +87,7 @@ class Spheres:
 
     def place(self, radius, touching):
         """Puts one more sphere anywhere or, with this probability, in contact; False: there is no room."""
-        for _ in range(CHANCES):
+        for _ in range(ATTEMPTS):
             partners = []
             if self.dice.random() < touching and self.position:
                 if not (found := self.beside(radius)):

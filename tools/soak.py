@@ -46,12 +46,12 @@ from carom_files import Error, find_carom, one_line, read_summary, read_thermo, 
 from compare import compare, summary_differences
 from random_systems import random_system
 
-LEAST_DISTANCE = 1e-9  # allowed overlap of spheres
+LARGEST_OVERLAP = 1e-9  # allowed overlap of spheres
 EXACT = {"free-flight": 1e-9, "cdda": 1e-9, "edda": 1e-9}  # largest error of H, over its reference
 ROUNDING = 1e-12  # largest error of H over its scale, and overlap over the contact distance, of a hard system
 MOST_ERRORS = 0.02  # fraction of hard systems that may end in an error
-PATIENCE = 120  # [s], for one process
-ALONE = 10  # [s] that mpirun may run longer than its ranks
+TIME_LIMIT = 120  # [s], for one process
+MPIRUN_EXTRA = 10  # [s] that mpirun may run longer than its ranks
 
 
 class Found(Exception):
@@ -189,7 +189,7 @@ class Run:
         except ProcessLookupError:  # it has ended
             pass
 
-    def end(self, job, codes, most=PATIENCE):
+    def end(self, job, codes, most=TIME_LIMIT):
         """Waits for a process; its exit code must be one of these. Also kills the ranks that a killed mpirun leaves in MPI_Init, and an
         mpirun without ranks: if a rank was killed, Open MPI 4.1.4 with PMIx 4.2.2 may wait for a mutex in memory that it has freed."""
         until = alone = time.monotonic() + most
@@ -201,7 +201,7 @@ class Run:
             except subprocess.TimeoutExpired:
                 now, left = time.monotonic(), self.processes()
                 late = now > until
-                alone = now + ALONE if left else min(alone, now + ALONE)
+                alone = now + MPIRUN_EXTRA if left else min(alone, now + MPIRUN_EXTRA)
                 if late or job.poll() == -signal.SIGKILL:
                     for process in left:
                         self.kill(process, signal.SIGKILL)
@@ -242,7 +242,7 @@ def soak(carom, deck, seconds, where, ranks, dice):
     error = summary["energy"]["max_abs_error"] / (summary["energy"]["reference"] or 1)
     if error > EXACT.get(method, float("inf")):
         raise Found(f"the energy is wrong by {error:.1e}")
-    if method != "verlet" and summary["max_overlap"] > LEAST_DISTANCE:
+    if method != "verlet" and summary["max_overlap"] > LARGEST_OVERLAP:
         raise Found(f"spheres overlap by {summary['max_overlap']:.1e}")
 
     run = Run(carom, file, where / "continued", dice)

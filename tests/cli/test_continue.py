@@ -89,7 +89,7 @@ def test_a_later_end(end, method, tmp_path):
 
 
 def test_a_finished_run_ends_at_once(tmp_path):
-    """A later end gives the files of an undisturbed run, whether the first run ended within an epoch or between steps."""
+    """Its files are those of an undisturbed run, whether it ended within an epoch or between steps."""
     for n, (text, change) in enumerate([(box("free-flight", 3, 5), []), (box("free-flight", 2, 50), ["run.collisions=200"]),
                                         (box("edda", 3, 21), []), (box("verlet", 2, 21), ["run.end_time=0.333"])]):
         deck, whole, again = write_deck(tmp_path, text), tmp_path / f"whole{n}", tmp_path / f"again{n}"

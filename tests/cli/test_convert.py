@@ -323,7 +323,7 @@ def test_an_open_box_and_mixed_radii(tmp_path):
 
 
 def test_links_and_pipes_are_written_to(trajectory, tmp_path):
-    """`convert -o` and `view --export` print their messages; if the file goes to standard output, messages go to stderr."""
+    """`convert -o` and `view --export` write to links and pipes; if the file goes to standard output, messages go to stderr."""
     plain, target, link, pipe = (tmp_path / name for name in ("plain", "target", "link", "pipe"))
     export = [CAROM, "view", str(trajectory.path.parent), "--export"]
     commands = [[CAROM, "convert", str(trajectory.path), "--to", to, "-o"] for to in ("extxyz", "gsd")] + [export]

@@ -186,7 +186,7 @@ def test_the_journal_is_synced_before_the_file_is_changed(killer, place):
 
 
 def test_an_incomplete_journal_is_discarded(tmp_path):
-    """Also refuses a journal whose bytes have changed."""
+    """A complete journal with a wrong checksum is discarded, too."""
     run(deck(tmp_path), tmp_path / "out")
     path = tmp_path / "out" / "trajectory.h5md"
     journal = path.with_name(path.name + ".journal")

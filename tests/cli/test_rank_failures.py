@@ -203,7 +203,7 @@ def test_a_stopped_rank(tmp_path):
 @pytest.mark.kills_mpirun
 @pytest.mark.parametrize("stopped", [0, 1])
 def test_a_rank_that_is_stopped_before_it_starts(stopped, tmp_path):
-    """A rank is lost while the other waits in MPI, which does not detect it."""
+    """A rank is stopped while the other waits in MPI, which does not detect it."""
     out = tmp_path / "out"
     first = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = {stopped} ]; then kill -STOP $$; fi; exec "$@"', "sh"]
     done = mpirun(2, first + command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--silence", "2")), code=70)
@@ -214,7 +214,7 @@ def test_a_rank_that_is_stopped_before_it_starts(stopped, tmp_path):
 @pytest.mark.kills_mpirun
 @needs_compiler
 def test_a_rank_that_is_stopped_at_the_end(tmp_path):
-    """A rank fails after everything has been written."""
+    """A rank is stopped after everything has been written."""
     (tmp_path / "stop.c").write_text("#include <signal.h>\nint MPI_Finalize(void) { return raise(SIGSTOP); }\n")
     subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "stop.so", tmp_path / "stop.c"], check=True)
     last = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = 1 ]; then export LD_PRELOAD={tmp_path}/stop.so; fi; exec "$@"', "sh"]

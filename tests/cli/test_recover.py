@@ -36,7 +36,7 @@ def killed(killer, deck, out, at, overrides, go=False, where=""):
 @needs_compiler
 @pytest.mark.parametrize("method", ["free-flight", "psa"])
 def test_killed_at_its_writes(method, killer, tmp_path):
-    """Also while checkpoints are written, and while a run is being continued. CAROM_KILLS is a factor on the number of kills."""
+    """Kills a run also while it writes checkpoints, and while it is being continued. CAROM_KILLS sets the number of kills."""
     dice, kills = random.Random(7), int(os.environ.get("CAROM_KILLS", "12"))
     deck, whole, out = write_deck(tmp_path, box(method, 3, 200 if method == "psa" else 60)), tmp_path / "whole", tmp_path / "out"
     run(deck, whole, ALL_OUTPUT)
