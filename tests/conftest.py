@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the tests in Python have their directories: in memory, where there is room, since syncs take no time there."""
+"""The directories of the tests in Python are in memory if there is space, because syncs take no time there."""
 
 import os
 import shutil
 import tempfile
 
 MEMORY = "/dev/shm"
-ROOM = 4 << 30  # bytes; what is written stays there while the tests of a file run
+FREE_BYTES = 4 << 30  # files stay there while the tests of a file run
 
 if "TMPDIR" not in os.environ and os.access(MEMORY, os.W_OK):
     there = os.statvfs(MEMORY)
-    if there.f_bavail * there.f_frsize > ROOM and not there.f_flag & os.ST_NOEXEC:  # libraries are built there too
+    if there.f_bavail * there.f_frsize > FREE_BYTES and not there.f_flag & os.ST_NOEXEC:  # libraries are built there too
         tempfile.tempdir = MEMORY
 
 
@@ -20,6 +20,6 @@ def pytest_configure(config):
 
 
 def pytest_sessionfinish(session, exitstatus):
-    """What is left in memory is there no longer, but for that of tests that have failed."""
+    """Removes the directories in memory, except those of failed tests."""
     if exitstatus == 0 and tempfile.tempdir == MEMORY:
         shutil.rmtree(session.config._tmp_path_factory.getbasetemp(), ignore_errors=True)

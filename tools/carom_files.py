@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tools share: the readers of the package carom, from the sources beside them, and starting runs.
+"""Common functions of the tools: the readers of the package carom, from the source tree, and functions that start runs.
 
     from carom_files import Trajectory, one_line, read_thermo, run_carom
     run_carom(find_carom(), "deck.toml", "runs/here")
     with Trajectory("runs/here") as trajectory:
         trajectory.position(-1)        # [particles, dimension]
 
-Needs Debian's python3-h5py and python3-numpy. Everything is in the reduced units of the deck.
+Needs Debian's python3-h5py and python3-numpy. All numbers are in the reduced units of the deck.
 """
 
 import functools
@@ -27,7 +27,7 @@ __all__ = ["Error", "TRAJECTORY", "RunFailed", "Trajectory", "as_text", "complet
 
 
 class RunFailed(Exception):
-    """`carom run` ended with an exit code other than 0; carries its code and its last words."""
+    """`carom run` ended with an exit code other than 0; has the code and the last line of the output."""
 
     def __init__(self, code, message):
         super().__init__(f"carom run ended with exit code {code}: {message}")
@@ -35,7 +35,7 @@ class RunFailed(Exception):
 
 
 def one_line(main):
-    """A main() that what goes wrong with a file, or a run of the command, ends with one line that names it, and exit code 1."""
+    """A main() that reports errors of files and of runs in one line with the name, and ends with exit code 1."""
     @functools.wraps(main)
     def ending(*arguments):
         try:
@@ -48,7 +48,7 @@ def one_line(main):
 
 
 def find_carom(given=None):
-    """The carom command: the one given, $CAROM, the build of tools/run, or what is on the PATH."""
+    """The carom command: the given one, $CAROM, the build of tools/run, or the one on the PATH."""
     if given := given or os.environ.get("CAROM"):
         if not pathlib.Path(given).exists():
             raise SystemExit(f"{given}: there is no such command.")
@@ -63,7 +63,7 @@ def find_carom(given=None):
 
 
 def run_carom(carom, deck, directory, overrides=(), launcher=(), environment=None):
-    """Runs a deck, by a launcher such as mpirun where one is given, and returns its summary. Raises RunFailed."""
+    """Runs a deck, with a launcher such as mpirun if one is given, and returns its summary. Raises RunFailed."""
     command = [*launcher, str(carom), "run", str(deck), "-o", str(directory), "--quiet"]
     for override in overrides:
         command += ["--set", override]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The look that the pictures of tools/ share.
+"""The common style of the pictures of tools/.
 
     with picture("msd.png", xlabel="lag", ylabel="msd", title="...") as axes:
         axes.loglog(lag, msd)
@@ -18,17 +18,17 @@ import matplotlib.pyplot as plt
 
 
 def caption(figure, columns):
-    """The command that draws the figure, below it, in so many columns of text."""
+    """Writes the command that draws the figure below it, in `columns` columns of text."""
     words = [f"tools/{pathlib.Path(sys.argv[0]).name}", *sys.argv[1:]]
-    # Where it goes is not what it shows.
+    # The output file does not change the figure.
     command = shlex.join(word for before, word in zip(["", *words], words) if not {before, word} & {"-o", "--output"})
     figure.supxlabel(textwrap.fill(command, columns), fontsize=6, family="monospace", color="grey")
 
 
 @contextlib.contextmanager
 def panels(file, *labels):
-    """Axes side by side, one for each dictionary of labels; written at the end, with a legend where anything has a label,
-    below the command that draws them."""
+    """Axes side by side, one for each dictionary of labels; the picture is written at the end, with a legend if there are labels and
+    the command that draws it."""
     figure, row = plt.subplots(ncols=len(labels), figsize=(6.4 * len(labels), 4.8), squeeze=False)
     yield row[0]
     for axes, named in zip(row[0], labels):
@@ -40,7 +40,7 @@ def panels(file, *labels):
     figure.tight_layout()
     try:
         figure.savefig(file, dpi=150 / len(labels))
-    except ValueError as error:  # a format that is not known
+    except ValueError as error:  # an unknown format
         raise SystemExit(f"{file}: {error}") from error
     plt.close(figure)
 

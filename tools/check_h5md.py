@@ -1,15 +1,15 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Is a trajectory a sound H5MD 1.1 file, and does it keep Carom's own rules?
+"""Is a trajectory a valid H5MD 1.1 file, and does it follow Carom's own rules?
 
     tools/check_h5md.py runs/five-springs
     tools/check_h5md.py runs/five-springs/trajectory.h5md --no-mdanalysis
 
 Prints every violation and ends with exit code 1 if there is one. Besides the format
-(https://www.nongnu.org/h5md/h5md.html, version 1.1) it checks what keeps the file readable by MDAnalysis and VMD: one group
+(https://www.nongnu.org/h5md/h5md.html, version 1.1) it checks the requirements of MDAnalysis and VMD: one group
 of particles, positions in three columns, a time-dependent box that shares step and time with the positions, units of length and
-time where the deck names them (output.units) and no others, fixed-length strings,
-an old superblock. Then the contents: finite numbers, times that rise, centres inside the box, and
+time if the deck names them (output.units) and no other units, fixed-length strings,
+an old superblock. It also checks the contents: finite numbers, increasing times, centres inside the box, and
 that MDAnalysis reads the same positions.
 """
 
@@ -25,14 +25,14 @@ import numpy as np
 from carom_files import TRAJECTORY, as_text, one_line, open_hdf5, reading
 
 PARTICLES = "particles/trajectory"
-# What has a unit where the deck names units, by its place in the group of particles.
+# The elements with units if the deck names units, by their paths in the group of particles.
 UNITS = {"position/value": "length", "box/edges/value": "length", "radius": "length", "velocity/value": "velocity"}
 UNITS |= {f"{clock}/time": "time" for clock in ("position", "velocity", "image", "box/edges")}
-OVERHANG = 1e-12  # how far a sphere may stand over a wall, relative to the edge
+OVERHANG = 1e-12  # how far a sphere may extend beyond a wall, relative to the edge
 
 
 class Checker:
-    """Collects violations; each check_… looks at one part and may rely on those before it."""
+    """Collects violations; each check_… checks one part and may rely on the earlier checks."""
 
     def __init__(self, file):
         self.file = file
@@ -173,7 +173,7 @@ class Checker:
         return dimension if self.expect(dimension in (2, 3), "/parameters/dimension: must be 2 or 3") else None
 
     def check_contents(self, dimension):
-        """`dimension`: the true one, None if unknown."""
+        """`dimension` is the true dimension, None if unknown."""
         group = self.file[PARTICLES]
         boundary = [as_text(name) for name in np.atleast_1d(group["box"].attrs.get("boundary", []))]
         if dimension == 2:
@@ -191,7 +191,7 @@ class Checker:
                         f"position: outside [0, edge) along the periodic axis {'xyz'[axis]}")
 
     def check_walls(self):
-        """No sphere may stand over a wall; for verlet, which knows no walls, there is nothing to check."""
+        """No sphere may extend beyond a wall; verlet ignores walls, so there is nothing to check."""
         names = [f"{PARTICLES}/radius", "parameters/boundary", "parameters/integrator"]
         if not all(name in self.file for name in names):
             return
@@ -216,7 +216,7 @@ class Checker:
                 universe.load_new(str(path), format="H5MD", convert_units=False)
                 read = [np.array(frame.positions) for frame in universe.trajectory]
                 universe.trajectory.close()
-            except Exception as error:  # whatever it says is the violation
+            except Exception as error:  # its message is the violation
                 self.violations.append(f"MDAnalysis can't read it: {error}")
                 return
         frames = len(self.file[f"{PARTICLES}/position/step"])
@@ -226,7 +226,7 @@ class Checker:
 
 
 def violations(path, with_mdanalysis=True):
-    """All violations of a trajectory (the file or its run's directory), one line each. One that can't be read ends the program."""
+    """All violations of a trajectory (the file or its run's directory), one line each. A file that cannot be read ends the program."""
     path = pathlib.Path(path)
     path = path / TRAJECTORY if path.is_dir() else path
     with reading(path), open_hdf5(path) as file:

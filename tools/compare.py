@@ -1,14 +1,14 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Are two runs the same? Bit for bit, or within a tolerance.
+"""Are two runs equal, bit for bit or within a tolerance?
 
     tools/compare.py runs/a runs/b                      # every frame and every thermo row, bit for bit
     tools/compare.py runs/a runs/b --tolerance 1e-9     # largest absolute difference of positions, velocities, thermo
     tools/compare.py runs/a runs/b --last               # only the final records: for runs with other output intervals
-    tools/compare.py runs/a runs/b --summary            # summary.json too, but for wall clock, memory and ranks
+    tools/compare.py runs/a runs/b --summary            # summary.json too, except for wall clock, memory and ranks
 
-Compared are all data sets of /particles and /observables of the trajectory, thermo.csv, and events.h5 and averages where both
-have them; the resolved deck is not, nor are times of the wall clock. Exit code 0: the same; 1: they differ.
+The tool compares all data sets of /particles and /observables of the trajectory, thermo.csv, and events.h5 and averages if both runs
+have them, but not the resolved decks and the times of the wall clock. Exit code 0: equal; 1: different.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import numpy as np
 from carom_files import TRAJECTORY, one_line, open_hdf5, read_summary, read_table, read_thermo, reading
 
 TABLES = ["rdf.csv", "msd.csv", "profile.csv"]
-# What the summary says of the machine and the place, not of the run.
+# The fields of the summary that describe the machine and the directory, not the run.
 OF_THE_MACHINE = {"deck", "version", "ranks", "wall_seconds", "collisions_per_second", "peak_memory_bytes"}
 
 
@@ -43,7 +43,7 @@ def _data_sets(file, groups):
 
 
 def last_frame(sets):
-    """What a trajectory says about its final records: step, time and the last frame of each value."""
+    """The final records of a trajectory: step, time and the last frame of each value."""
     frames = {name: value[-1] for name, value in sets.items()
               if name.startswith("/particles") and name.rsplit("/", 1)[-1] in ("value", "step", "time")}
     fixed = {name: value for name, value in sets.items() if name.startswith("/particles") and name not in frames}
@@ -73,14 +73,14 @@ def differences(a, b, tolerance):
 
 
 def summary_differences(a, b):
-    """One line for each field of two summaries that differs, but for those of the machine."""
+    """One line for each field of two summaries that differs, except for the fields of the machine."""
     a, b = read_summary(a), read_summary(b)
     return [f"summary.json, {name}: {a.get(name)} against {b.get(name)}"
             for name in sorted((a.keys() | b.keys()) - OF_THE_MACHINE) if a.get(name) != b.get(name)]
 
 
 def compare(a, b, tolerance=None, last=False):
-    """What is different between two runs, one line each; empty: nothing."""
+    """The differences between two runs, one line each; empty if there are none."""
     a, b = pathlib.Path(a), pathlib.Path(b)
     sets = [data_sets(run / TRAJECTORY, ("particles", "observables")) for run in (a, b)]
     if last:

@@ -1,13 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What accuracy costs, and what size costs: time and force passes of the methods.
+"""The costs of accuracy and of system size: time and force passes of the methods.
 
     tools/cost_study.py inputs/five-springs.toml --end-time 6 --steps 0.1,0.03,0.01,0.003,0.001
     tools/cost_study.py inputs/spring-lattice.toml --counts 64,256,1024,4096 --methods cva,cdda,edda --end-time 1
     tools/cost_study.py inputs/yukawa-fluid.toml --set particles.count=256 --end-time 0.5 --steps 0.02,0.01,0.005
 
 Without --counts: errors at the end time, of the energy (the largest |H - H1| / E_ref on the way) and of the positions (the
-largest difference of a coordinate from --reference at a fifth of the smallest step), against the time the run took. With
+largest difference of a coordinate from --reference at a fifth of the smallest step), against the time of the run. With
 --counts: time and force passes of a step against the number of particles of the deck's only species, at the largest of
 --steps. Times are the processor's, of the run's loop with its measuring: at most what the clock says of the loop and what the
 system says of the command, so the lesser of both is taken, and the least of --repeats runs one after the other (of fewer where
@@ -28,7 +28,7 @@ from studies import (parse, processor_seconds, read_deck, relative_error, run_de
 
 COLUMNS = ["method", "particles", "step", "steps", "collisions", "passes_per_step", "seconds", "seconds_most", "seconds_per_step",
            "energy_error", "position_error"]
-LONG = 20.0  # [s] what has taken so much is not repeated
+LONGEST_REPEATED = 20.0  # [s] longer runs are not repeated
 
 
 def parse_arguments(arguments=None):
@@ -55,10 +55,10 @@ def run_once(options, deck, method, step, overrides=()):
 
 
 def measure(options, deck, method, step, exact=None, overrides=()):
-    """The method's row of the table; None where it fails."""
+    """The method's row of the table; None if it fails."""
     times = []
     try:
-        while len(times) < options.repeats and sum(times) < LONG:
+        while len(times) < options.repeats and sum(times) < LONGEST_REPEATED:
             summary, positions, seconds = run_once(options, deck, method, step, overrides)
             times.append(seconds)
     except RunFailed as failure:
@@ -79,7 +79,7 @@ def draw(rows, x, columns, labels, file):
         for axes, column in zip(row, columns):
             for method, marker in with_markers(list(dict.fromkeys(entry["method"] for entry in rows))):
                 mine = [entry for entry in rows if entry["method"] == method]
-                # Of each number that is a time: how far above it the slowest run was.
+                # For each time, the difference to the slowest run.
                 late = {"seconds": [[0 for _ in mine], [entry["seconds_most"] - entry["seconds"] for entry in mine]]}
                 late["seconds_per_step"] = late["seconds"] / np.array([entry["steps"] for entry in mine])
                 axes.errorbar([entry[x] for entry in mine], [entry[column] for entry in mine], late.get(column), late.get(x),

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""How well methods keep the energy, against the step: runs the sweep and draws the thesis figure.
+"""The energy errors of methods against the step: runs the sweep and draws the thesis figure.
 
     tools/energy_study.py inputs/five-springs.toml --methods psa,cva,mcva,cdda --steps 0.3,0.1,0.03,0.01,0.003,0.001
     tools/energy_study.py inputs/nine-gravity.toml --methods cva,mcva:variant=restart,cdda:order=4
@@ -27,7 +27,7 @@ from carom_files import RunFailed, one_line
 from carom_plot import picture
 from studies import parse, read_deck, relative_error, run_deck, study_parser, variant, with_markers, write_table
 
-ROUNDING = 1e-11  # relative to E_ref: below, an error is called rounding and given no order
+ROUNDING = 1e-11  # relative to E_ref: smaller errors are rounding and have no order
 COLUMNS = ["method", "step", "start", "max_abs_energy_error", "energy_reference", "relative_energy_error",
            "max_abs_shadow_energy_error", "max_overlap", "sphere_sphere", "sphere_wall", "steps", "passes_per_step",
            "wall_seconds", "status"]
@@ -114,7 +114,7 @@ def fitted_order(steps, errors, below):
 
 
 def describe(rows, method, options):
-    """The method's line in the legend: its order, or how close to rounding it stays."""
+    """The method's line in the legend: its order, or its distance from rounding."""
     worst = max((float(row["relative_energy_error"]) for row in rows
                  if row["method"] == method and row["relative_energy_error"] != ""), default=np.nan)
     if worst < ROUNDING:
@@ -122,7 +122,7 @@ def describe(rows, method, options):
     order = fitted_order(*curve(rows, method), options.fit_below)
     if not np.isfinite(order):
         return method
-    # With a number of steps the run grows longer with the step, and so does its error.
+    # With a fixed number of steps the run is longer for larger steps, and its error larger.
     return f"{method}: order {order:.2f}" if options.end_time else f"{method}: error ~ step$^{{{order:.2f}}}$"
 
 

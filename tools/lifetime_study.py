@@ -1,15 +1,15 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""How long an isolated cluster lives, by one method and another: runs many starts until the first particle evaporates.
+"""The lifetime of an isolated cluster with different methods: runs many starts until the first particle evaporates.
 
     tools/python tools/lifetime_study.py inputs/evaporating-cluster.toml -o runs/lifetimes
     tools/python tools/lifetime_study.py inputs/evaporating-cluster.toml --runs edda:0.02,psa:0.01,psa:0.005 --starts 10
     tools/python tools/lifetime_study.py inputs/evaporating-cluster.toml --energy -23 --runs edda:0.02,psa:0.005
 
---runs lists METHOD:STEP, each with a number of starts of its own where it is METHOD:STEP:STARTS. The method "soft" is velocity
+--runs lists METHOD:STEP, or METHOD:STEP:STARTS for another number of starts. The method "soft" is velocity
 Verlet with a steep Mie 50-49 core of depth 0.2 in place of the hard core, which is what a program without hard spheres would use.
 
-A start has the positions of the deck and velocities drawn anew, without momentum and angular momentum, scaled so that the energy is
+A start has the positions of the deck and new random velocities, without momentum and angular momentum, scaled so that the energy is
 exactly that of the deck (or --energy). Every unit of time the script looks whether the cluster has come apart: whether its particles
 form two groups that are farther than 5 from each other. The mean lifetime is the total time of all starts over the number of
 evaporations, its standard error that over the root of this number; a start that reaches --end-time counts with its time only.
@@ -28,7 +28,7 @@ import time
 import numpy as np
 
 try:
-    import carom  # before the tools, which would take its sources, without the compiled part
+    import carom  # before the tools, which would import its sources without the compiled part
     carom.Simulation
 except ImportError as missing:
     raise SystemExit("This study needs the built Python module: tools/python tools/lifetime_study.py DECK") from missing
@@ -66,7 +66,7 @@ def parse_arguments(arguments=None):
 
 
 def simulation(deck, run):
-    """The cluster of the deck under the method and step of a run."""
+    """The cluster of the deck with the method and step of a run."""
     method, step = run.split(":")
     if method != "soft":
         return carom.Simulation.from_deck(deck, set={"integrator.type": method, "integrator.step": float(step)})
@@ -127,7 +127,7 @@ def live_case(case):
 
 
 class Lives:
-    """What the starts of one run have in common."""
+    """The settings that all starts of one run share."""
 
     def __init__(self, rows):
         column = {name: np.array([float(row[name] or "nan") for row in rows]) for name in COLUMNS[2:]}
@@ -136,7 +136,7 @@ class Lives:
         self.mean = total / max(self.events, 1)
         self.error = self.mean / np.sqrt(max(self.events, 1))
         temperature = column["temperature"][np.isfinite(column["temperature"])]
-        if len(temperature) == 0:  # all have evaporated while they melted
+        if len(temperature) == 0:  # all clusters evaporated while they melted
             temperature = np.array([np.nan])
         self.temperature, self.temperature_error = temperature.mean(), temperature.std() / np.sqrt(max(len(temperature) - 1, 1))
         self.heating = column["energy_change"].sum() / total
@@ -149,7 +149,7 @@ class Lives:
 
 
 def read(file):
-    """The rows of the table by run and start; none where there is no table yet."""
+    """The rows of the table by run and start; empty if there is no table yet."""
     if not file.exists():
         return {}
     with open(file, newline="") as stream:
@@ -172,7 +172,7 @@ def draw(lives, options):
                     times, alive = one.survival(options.end_time)
                     left.step(np.append(1.0, times), np.append(1.0, alive), where="post", color=colour, linestyle=dash,
                               label=f"{name}, step {run.split(':')[1]}")
-            if of(name) and name != "soft":  # programs made for soft cores are faster at them than this engine
+            if of(name) and name != "soft":  # programs for soft cores are faster than this engine here
                 each = [lives[run] for run in of(name)]
                 right.errorbar([one.cost for one in each], [one.mean for one in each], [one.error for one in each], color=colour,
                                marker="o", linestyle=":" if len(each) > 1 else "", capsize=3, label=name)
@@ -197,7 +197,7 @@ def main(arguments=None):
     options.output.mkdir(parents=True, exist_ok=True)
     table = options.output / "lifetimes.csv"
     rows = read(table)
-    # The first start of every run, then the second: what slows the machine for a while slows all of them.
+    # The first start of every run, then the second, so that a slow period of the machine affects all runs.
     cases = [(options, run, start) for start in range(max(options.starts_of.values()))
              for run, starts in options.starts_of.items() if start < starts and (run, start) not in rows]
     with open(table, "a", newline="") as stream, multiprocessing.Pool(options.jobs) as pool:

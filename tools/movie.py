@@ -6,8 +6,8 @@
     tools/movie.py runs/nine-gravity -o nine.mp4 --frames-per-second 25 --every 2
     tools/movie.py runs/bound-cluster-3d --along y
 
-Writes a GIF, or an MP4 where the name ends so and ffmpeg is installed. Walls are drawn solid, periodic edges dashed, open
-ones dotted, with their lengths at the axes; a disc that reaches over a periodic edge is drawn on both sides. Spheres farther away are paler.
+Writes a GIF, or an MP4 if the name ends with .mp4 and ffmpeg is installed. Walls are drawn solid, periodic edges dashed, open
+ones dotted, with their lengths at the axes; a disc that extends beyond a periodic edge is drawn on both sides. Spheres farther away are paler.
 """
 
 import argparse
@@ -28,7 +28,7 @@ LINE = {"wall": "-", "periodic": "--", "open": ":"}
 
 
 def with_images(x, radius, edges, periodic):
-    """The indices and positions of all discs to draw: those over a periodic edge once more on the other side."""
+    """The indices and positions of all discs to draw: discs over a periodic edge appear again on the other side."""
     index, x = np.arange(len(x)), x.copy()
     for axis in np.flatnonzero(periodic):
         below = x[:, axis] < radius[index]
@@ -57,7 +57,7 @@ class Scene:
         self.discs = None
 
     def _window(self):
-        """What is shown: the box, and all of the motion along open axes."""
+        """The visible region: the box, and the whole motion along open axes."""
         low, high = np.zeros(2), self.edges.copy()
         is_open = np.array([self.trajectory.boundary[axis] == "open" for axis in self.plane])
         if is_open.any():
@@ -100,7 +100,7 @@ class Scene:
         self.axes.set_frame_on(False)
         self.axes.set_title("title\ntime", fontsize=10)
         caption(self.figure, 80)
-        self.figure.tight_layout()  # once: frames must not move
+        self.figure.tight_layout()  # only once: frames must not move
         style = [LINE[self.trajectory.boundary[axis]] for axis in self.plane]
         for end in (0.0, 1.0):
             self.axes.plot(np.full(2, end * self.edges[0]), [0, self.edges[1]], style[0], color="black", linewidth=1.5)

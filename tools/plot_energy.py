@@ -5,8 +5,8 @@
     tools/plot_energy.py runs/five-springs
     tools/plot_energy.py runs/cva runs/mcva runs/cdda --relative --logarithmic -o energy.png
 
-Drawn is H - H1, H1 the energy after the first step, and dashed, where the method has one, the same for the shadow energy
-S_h. --relative divides by E_ref = max(|H1|, K1 + sum |V|) of summary.json.
+The picture shows H - H1, with H1 the energy after the first step, and dashed, if the method has a shadow energy S_h, S_h minus its
+first value. --relative divides by E_ref = max(|H1|, K1 + sum |V|) of summary.json.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from carom_plot import picture
 
 
 def energy_errors(directory, relative=False):
-    """Time, H - H1, and S_h minus its first value (None where the method has no shadow energy)."""
+    """Time, H - H1, and S_h minus its first value (None if the method has no shadow energy)."""
     thermo, summary = read_thermo(directory), read_summary(directory)
     with reading(directory):
         energy, shadow = summary["energy"], thermo["shadow"]

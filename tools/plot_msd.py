@@ -4,7 +4,7 @@
 
     tools/plot_msd.py runs/hard-sphere-fluid
     tools/plot_msd.py runs/hard-discs --fit 5,20 -o msd.png
-    tools/plot_msd.py runs/hard-discs/msd.csv --dimension 2   # what the run itself has averaged (output.msd_interval)
+    tools/plot_msd.py runs/hard-discs/msd.csv --dimension 2   # averages of the run itself (output.msd_interval)
 
 Averaged over particles and over all time origins, with displacements followed through periodic boundaries. Needs frames
 at equal times. D = slope / (2 d) of a line through the lags of --fit, by default from a twentieth to an eighth of the length of
@@ -30,7 +30,7 @@ BLOCKS = 4        # parts of the run, for the error
 
 
 def regular_frames(times):
-    """How many frames stand at equal intervals, from the first on: the last one of a run may come early."""
+    """The number of frames at equal intervals, from the first on: the last frame of a run may come early."""
     if len(times) < 3:
         return len(times)
     gaps = np.diff(times)
@@ -58,12 +58,12 @@ def mean_squared_displacement(trajectory):
 
 
 def relative_errors(windows, particles, dimension):
-    """Of a mean squared displacement whose components are Gaussian."""
+    """The error of a mean squared displacement whose components are Gaussian."""
     return np.sqrt(2 / (dimension * particles * windows))
 
 
 def fitted(lag, windows, msd, between=None):
-    """Which lags enter the fit."""
+    """The lags of the fit."""
     length = np.max(lag * windows)
     low, high = between or (length / FROM, length / TO)
     return (lag >= low * (1 - 1e-9)) & (lag <= high * (1 + 1e-9)) & (msd > 0)
@@ -78,7 +78,7 @@ def diffusion_coefficient(lag, windows, msd, dimension, between=None):
 
 
 def error_of_blocks(lag, windows, of_blocks, dimension, between=None):
-    """The standard error of D from parts of the run; NaN of fewer than two."""
+    """The standard error of D from parts of the run; NaN for fewer than two."""
     each = [diffusion_coefficient(lag, windows, msd, dimension, between) for msd in of_blocks]
     each = [value for value in each if np.isfinite(value)]
     return np.std(each, ddof=1) / np.sqrt(len(each)) if len(each) > 1 else np.nan

@@ -4,13 +4,13 @@
 
     tools/plot_rdf.py runs/hard-sphere-fluid
     tools/plot_rdf.py runs/primitive-electrolyte --species cation,anion --bins 200 --first-frame 20 -o rdf.png
-    tools/plot_rdf.py runs/hard-sphere-fluid/rdf.csv          # what the run itself has averaged (output.rdf_interval)
+    tools/plot_rdf.py runs/hard-sphere-fluid/rdf.csv          # averages of the run itself (output.rdf_interval)
 
 Periodic axes use the nearest image, so r ends at half the shortest periodic edge. Along walls the count expected of an
 ideal gas is the exact one of the region the centres can reach (the average over directions u of the product over the
 walled axes of 1 - r |u_k| / L_k), so that g = 1 without correlations up to the walls (for unequal radii: nearly). The band
 is one standard error, from four parts of the run, each averaged alone; the run's own rdf.csv, which has no parts, is drawn without.
-A CSV with r, g, error stands beside the picture, rdf-frames.csv by default. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
+A CSV with r, g, error is written beside the picture, rdf-frames.csv by default. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
 """
 
 import argparse
@@ -37,7 +37,7 @@ def directions(dimension):
 
 
 def ideal_fraction(radii, edges, periodic):
-    """For each shell [radii[k], radii[k+1]): the share of the region's volume that an ideal gas has there."""
+    """For each shell [radii[k], radii[k+1]): the fraction of the region's volume in which an ideal gas has partners."""
     dimension = len(edges)
     shell = {2: np.pi, 3: 4 / 3 * np.pi}[dimension] * np.diff(radii**dimension) / np.prod(edges)
     middle = 0.5 * (radii[1:] + radii[:-1])
@@ -65,7 +65,7 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
     chosen = [every[trajectory.species == trajectory.species_names.index(name)] for name in species or []]
     chosen = chosen or [every, every]
     walled = ~trajectory.periodic
-    # Centres keep a radius away from a wall.
+    # Centres stay a radius away from a wall.
     margin = np.where(walled, min(trajectory.radius[np.concatenate(chosen)]), 0.0)
     edges = trajectory.edges() - 2 * margin
     largest = largest or min(np.where(trajectory.periodic, edges / 2, edges))
@@ -83,7 +83,7 @@ def radial_distribution(trajectory, bins=150, largest=None, species=None, first_
 
 
 def error_of_blocks(g):
-    """The standard error of the mean over frames, from parts of the run; NaN of fewer frames than these."""
+    """The standard error of the mean over frames, from parts of the run; NaN if there are fewer frames than parts."""
     if len(g) < BLOCKS:
         return np.full(g.shape[1], np.nan)
     means = [block.mean(axis=0) for block in np.array_split(g, BLOCKS)]
@@ -91,7 +91,7 @@ def error_of_blocks(g):
 
 
 def curves_of_table(file, species=None):
-    """What a run's rdf.csv holds: r, and g by name; all of it, or that of two species."""
+    """The contents of a run's rdf.csv: r, and g by name, for all particles or for two species."""
     columns = read_table(file)
     with reading(file):
         r = columns.pop("r")
@@ -105,7 +105,7 @@ def curves_of_table(file, species=None):
 
 
 def _into(x, edges, periodic):
-    """Rounding may put a wrapped coordinate on the edge itself, which the tree refuses."""
+    """Moves coordinates off the edge itself, where rounding may put them and which the tree refuses."""
     return np.where(periodic & (x >= edges), x - edges, x)
 
 

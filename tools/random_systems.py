@@ -3,14 +3,14 @@
 
     deck = random_system(random.Random("1 17"))       # a deck of edda as a dictionary, for any method with hard cores
 
-Spheres that touch do so to rounding. No radius and no mass is larger than 1.
+Touching spheres touch to rounding. No radius and no mass is larger than 1.
 """
 
 import math
 
 EDGE = 24.0  # the longest box: positions are rounded to 1e-13 of the smallest contact distance
-CHANCES = 60  # of a sphere to find a place
-SURE = 1e-6  # gap of spheres that are not to touch, relative
+ATTEMPTS = 60  # attempts to place a sphere
+CLEAR_GAP = 1e-6  # relative gap of spheres that must not touch
 
 
 def log_uniform(dice, least, most):
@@ -18,7 +18,7 @@ def log_uniform(dice, least, most):
 
 
 def unit_vector(dice, dimension):
-    """Any direction; now and then one along an axis."""
+    """A random direction; sometimes one along an axis."""
     if dice.random() < 0.3:
         along = [0.0] * dimension
         along[dice.randrange(dimension)] = dice.choice([-1.0, 1.0])
@@ -43,17 +43,17 @@ class Spheres:
         for each, edge, kind in zip(x, self.edges, self.boundary):
             if kind != "open" and not 0 <= each <= edge or kind == "wall" and not radius <= each <= edge - radius:
                 return False
-            if kind == "wall" and 0 < min(each - radius, edge - radius - each) < SURE * radius:
+            if kind == "wall" and 0 < min(each - radius, edge - radius - each) < CLEAR_GAP * radius:
                 return False
         for j, (y, other) in enumerate(zip(self.position, self.radius)):
             contact = radius + other
             distance, rounding = math.hypot(*self.separation(x, y)), max(5e-14 * contact, 2 * math.ulp(max(self.edges)))
-            if distance < contact * (1 + SURE) and (j not in partners or abs(distance - contact) > rounding):
+            if distance < contact * (1 + CLEAR_GAP) and (j not in partners or abs(distance - contact) > rounding):
                 return False
         return True
 
     def beside(self, radius):
-        """A place in contact with one sphere, with a sphere and a wall, or with two spheres; and the spheres."""
+        """A position in contact with one sphere, with a sphere and a wall, or with two spheres; and these spheres."""
         dice, dimension = self.dice, len(self.edges)
         j = dice.randrange(len(self.position))
         y, reach = self.position[j], radius + self.radius[j]
@@ -87,7 +87,7 @@ class Spheres:
 
     def place(self, radius, touching):
         """Puts one more sphere anywhere or, with this probability, in contact; False: there is no room."""
-        for _ in range(CHANCES):
+        for _ in range(ATTEMPTS):
             partners = []
             if self.dice.random() < touching and self.position:
                 if not (found := self.beside(radius)):
@@ -108,8 +108,8 @@ class Spheres:
 
 
 def on_lattice(dice, dimension, count, boundary):
-    """Spheres of radius 1 on sites of a square lattice: all neighbours and the lower walls are touched, exactly. The box is longer than
-    the rows are, for elastic spheres that fill it from end to end have no motion: their collisions never end."""
+    """Spheres of radius 1 on sites of a square lattice: all neighbours and the lower walls touch exactly. The box is longer than
+    the rows are, because elastic spheres that fill it from end to end have no motion: their collisions never end."""
     rows = max(3, math.ceil((count / dice.uniform(0.3, 1))**(1 / dimension)))
     sites = [[1.0 + 2 * (site // rows**k % rows) for k in range(dimension)] for site in range(rows**dimension)]
     spheres = Spheres(dice, [2.0 * rows + dice.uniform(0.1, 1) for _ in range(dimension)], boundary)
@@ -153,7 +153,7 @@ def random_forces(dice, boundary, spheres, mass):
         elif kind == "inverse-power":
             signed, exponent = dice.choice([-1, 1]) * strength, dice.choice([1.0, 3.0, 6.0]) if steep else 1.0
             add(strength / (median * most**2), type="inverse-power", epsilon=signed, sigma=most, exponent=exponent, **cut)
-        elif kind == "bonds" and spheres.touching and not periodic:  # they would stretch to half the box
+        elif kind == "bonds" and spheres.touching and not periodic:  # bonds would stretch to half the box
             stiffness = log_uniform(dice, 0.1, 1e4)
             pairs = dice.sample(spheres.touching, dice.randint(1, len(spheres.touching)))
             add(stiffness / median, type="harmonic-bond", pairs=pairs, stiffness=stiffness, rest_length=most * dice.uniform(0.5, 1.2))

@@ -1,24 +1,24 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What to expect of many ranks: counts of runs with many ranks, and a model of the efficiency fitted to them.
+"""The performance of many ranks: counts of runs with many ranks, and a model of the efficiency fitted to them.
 
     tools/rank_study.py
     tools/rank_study.py --ranks 8,64 --per-rank 500,2000 --collisions 20 --rate 1e6
 
 Measured, for a deck of free flight on so many ranks: windows, rounds a window, events run twice at borders, events redone,
 and the imbalance of the whole run, as in run.log. Where there are more ranks than cores, `. tools/mpi-env.sh` first. Spheres
-start at random places (--placement): cut between the layers of a crystal, ranks get unequal shares until they are made anew.
+start at random places (--placement): cut between the layers of a crystal, ranks get unequal shares until the box is divided again.
 
 Fitted to the runs with ranks that have neighbours on all sides, with s = (spheres a rank)^(-1/D):
 events run twice (1 + h s)^D - 1, a shell around a cube; events redone r s, a surface; rounds a window a + b log2(spheres
 at all borders), a chain of repairs that gets longer by one with a probability. In the picture runs with fewer ranks, which
-are not in the fit, are hollow; bars are standard errors of the counts, were events independent.
+are not in the fit, are hollow; bars are standard errors of the counts if events are independent.
 
 Modelled from that: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a rank.
 The work is its collisions by --rate. The imbalance is that of independent events, sqrt(2 ln P / events), times
 --imbalance. Messages: a window has rounds + 1 exchanges and rounds + 3 reductions; a reduction takes
-log2 P times --latency, an exchange --latency and --overhead for each of 3^D - 1 neighbours. Left out: volume of data,
-bookkeeping of windows, and starts and ends of epochs and frames, at which ranks exchange all they have.
+log2 P times --latency, an exchange --latency and --overhead for each of 3^D - 1 neighbours. The model neglects the volume of data,
+the bookkeeping of windows, and starts and ends of epochs and frames, at which ranks exchange all their data.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def counts_of(log):
 
 
 def run(options, deck, particles, collisions, **how):
-    """Summary, run.log and seconds of a run of which only the end is written."""
+    """Summary, run.log and seconds of a run that writes only its end."""
     plan = {"end_time": 1e9, "collisions": int(collisions)}
     deck = deck | {"run": plan, "output": {"frame_interval": 0.0, "thermo_interval": 0.0}}
     before = processor_seconds()
@@ -109,12 +109,12 @@ def measured_rate(options, deck):
 
 
 def border(ranks, per_rank, dimension):
-    """About how many spheres are at borders, as a logarithm."""
+    """The logarithm of the approximate number of spheres at borders."""
     return np.log2(ranks * per_rank ** (1 - 1 / dimension))
 
 
 def fit(rows, dimension, imbalance=None):
-    """What the model takes from the counts."""
+    """The inputs of the model from the counts."""
     inner = [row for row in rows if row["ranks"] >= 2**dimension]
     if len({border(row["ranks"], row["per_rank"], dimension) for row in inner}) < 2:
         raise SystemExit(f"The fit needs two runs of {2**dimension} or more ranks.")
@@ -144,7 +144,7 @@ def modelled(fitted, options, ranks, per_rank):
 
 
 def counting_error(row, name):
-    """The standard error of a share of the events, were they independent."""
+    """The standard error of a fraction of the events if they are independent."""
     return np.sqrt(row[name] / (row["events"] * row["windows"] * row["ranks"]))
 
 

@@ -1,17 +1,17 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the code blocks of a Markdown page, top to bottom, and compares what they print with the page.
+"""Runs the code blocks of a Markdown page, top to bottom, and compares their output with the page.
 
-    tools/run_page.py inputs/tutorials/1-equation-of-state.md             # in a directory that is thrown away
+    tools/run_page.py inputs/tutorials/1-equation-of-state.md             # in a temporary directory
     tools/run_page.py PAGE -o build/page                                  # in this one; pictures stay there
-    tools/run_page.py --renew PAGE                                        # writes what was printed into the page
+    tools/run_page.py --renew PAGE                                        # writes the output into the page
 
 Blocks marked `sh` are run by bash, those marked `python` by python3, both with the command, the tools and `import carom` at hand; a block
-marked `toml` is written to the file that its first line names (`# deck.toml`). A block marked `text` holds what the block before it
-printed, exactly. The decks in inputs/ are there.
+marked `toml` is written to the file that its first line names (`# deck.toml`). A block marked `text` holds the exact output of the block
+before it. The decks in inputs/ are there.
 
-Exit codes: 0 as the page says; 1 something was printed otherwise, or a block failed; 2 usage. The command is build/release/io/carom, or what
-CAROM in the environment says.
+Exit codes: 0 all output as on the page; 1 different output, or a block failed; 2 usage. The command is build/release/io/carom, or the
+value of the environment variable CAROM.
 """
 
 import argparse
@@ -39,7 +39,7 @@ def environment():
 
 
 def run(kind, code, folder):
-    """What a block prints; exits where it fails."""
+    """The output of a block; exits if the block fails."""
     if kind == "toml":
         first = code.splitlines()[0]
         (folder / first.removeprefix("# ")).write_text(code)

@@ -1,30 +1,30 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Random decks, killed and continued at random instants: is the end that of an undisturbed run, bit for bit?
+"""Random decks, killed and continued at random instants: is the result that of an undisturbed run, bit for bit?
 
     tools/soak.py --minutes 30
     tools/soak.py --count 100 --seed 7 --ranks 1,2,3,4
-    tools/soak.py --only 17 --seed 7 --count 100       # deck 17 of these alone, when something was found
+    tools/soak.py --only 17 --seed 7 --count 100       # only deck 17 of these, after an error
     tools/soak.py --jumps tests/regression/decks/*.toml inputs/*.toml --count 50 --seed 3
     tools/soak.py --systems --count 1000
     tools/soak.py --systems cdda,psa,cva,mcva --count 1000 --only 17
 
 Each deck draws a method, forces, boundaries, a dimension, sizes and outputs. It runs once undisturbed, then again on other
 numbers of ranks, with checkpoints a few hundredths of a second apart, while it is killed (KILL to the process, a rank, or
-mpirun), told to stop (USR2, TERM, INT, HUP, --max-wall), or given a nearer end first. After each it goes on with `carom run
---continue`, or from the start where there was no checkpoint yet. Compared are all files and the summary. Spheres must not overlap,
-and free-flight, cdda and edda must keep the energy. Exit code 0: nothing found; 1: something; its files are left in --output.
+mpirun), told to stop (USR2, TERM, INT, HUP, --max-wall), or given a nearer end first. After each it continues with `carom run
+--continue`, or from the start if there was no checkpoint yet. All files and the summary are compared. Spheres must not overlap,
+and free-flight, cdda and edda must conserve the energy. Exit code 0: no error; 1: an error; its files remain in --output.
 
---jumps measures instead how far the energy jumps in a slab, at most, of the exact methods, relative to what energy errors are
-relative to: in the decks given, where they are of free-flight with their method, else with cdda and edda, and in the random
-ones. A run that takes long is stopped.
+--jumps measures instead the largest change of the energy in a slab with the exact methods, relative to the reference of energy
+errors: in the given decks, with their own method if it is free-flight, otherwise with cdda and edda, and in the random
+decks. A run that takes long is stopped.
 
 --systems runs random systems that are hard (random_systems.py) by edda or the methods named, each once and undisturbed. A run is
-ok where the energy of cdda and edda is right to 1e-12 of the largest K + |V| at all steps, the first included, and no spheres overlap
-by more than 1e-12 of their contact distance; warned where the energy is not right to that but the run says so; an error where it ends
-with exit code 4 and a message of one line; wrong where it ends with 0 but is neither; slow where it takes more than --patience seconds
-of processor time; else a crash. Exit code 1: a run is wrong, slow or a crash, or more than 2 % of the runs of cdda or edda are errors.
-What is not ok is left in --output.
+ok if the energy of cdda and edda is right to 1e-12 of the largest K + |V| at all steps, the first included, and no spheres overlap
+by more than 1e-12 of their contact distance; warned if the energy error is larger and the run warns of it; an error if it ends
+with exit code 4 and a message of one line; wrong if it ends with 0 but is neither; slow if it takes more than --patience seconds
+of processor time; otherwise a crash. Exit code 1: a run is wrong, slow or a crash, or more than 2 % of the runs of cdda or edda are errors.
+The files of runs that are not ok remain in --output.
 """
 
 import argparse
@@ -46,16 +46,16 @@ from carom_files import Error, find_carom, one_line, read_summary, read_thermo, 
 from compare import compare, summary_differences
 from random_systems import random_system
 
-LEAST_DISTANCE = 1e-9  # that spheres may overlap by
+LARGEST_OVERLAP = 1e-9  # allowed overlap of spheres
 EXACT = {"free-flight": 1e-9, "cdda": 1e-9, "edda": 1e-9}  # largest error of H, over its reference
 ROUNDING = 1e-12  # largest error of H over its scale, and overlap over the contact distance, of a hard system
-MOST_ERRORS = 0.02  # share of hard systems that may end in an error
-PATIENCE = 120  # [s], for one process
-ALONE = 10  # [s] that mpirun may go on after its ranks
+MOST_ERRORS = 0.02  # fraction of hard systems that may end in an error
+TIME_LIMIT = 120  # [s], for one process
+MPIRUN_EXTRA = 10  # [s] that mpirun may run longer than its ranks
 
 
 class Found(Exception):
-    """Something that should not be."""
+    """An error that was found."""
 
 
 def mpi_environment():
@@ -99,7 +99,7 @@ def random_forces(dice, method, dimension, boundary, species):
 
 
 def random_deck(dice, seconds):
-    """A deck that takes about so long; many of them can't run."""
+    """A deck that takes about this long; many cannot run."""
     method = dice.choice(["free-flight", "free-flight", "verlet", "psa", "psa", "cva", "mcva", "cdda", "edda", "edda"])
     dimension = dice.choice([2, 3])
     boundary = ["periodic"] * dimension
@@ -156,14 +156,14 @@ def words(deck):
 # Runs
 
 class Run:
-    """A run in a directory, in one process after the other."""
+    """A run in a directory by consecutive processes."""
 
     def __init__(self, carom, deck, output, dice):
         self.carom, self.deck, self.output, self.dice = str(carom), deck, output, dice
         self.begun = self.continued = 0
 
     def start(self, ranks, arguments):
-        """Goes on where a checkpoint is, else from the start."""
+        """Continues if there is a checkpoint, otherwise starts again."""
         launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
         go_on = any((self.output / name).exists() for name in ("checkpoint.h5", "checkpoint.previous.h5"))
         what = ["--continue", self.output] if go_on else [self.deck, "-o", self.output]
@@ -174,7 +174,7 @@ class Run:
                                 stderr=subprocess.PIPE, text=True)
 
     def processes(self):
-        """Those of the command that are at work here."""
+        """The processes of the command that run here."""
         found = []
         for process in pathlib.Path("/proc").glob("[0-9]*"):
             try:
@@ -192,9 +192,9 @@ class Run:
         except ProcessLookupError:  # it has ended
             pass
 
-    def end(self, job, codes, most=PATIENCE):
-        """Waits for it; its exit code must be one of these. What a killed mpirun leaves in MPI_Init is killed too, and an mpirun
-        that goes on alone: when a rank was killed, Open MPI 4.1.4 with PMIx 4.2.2 may wait for a mutex in memory that it has freed."""
+    def end(self, job, codes, most=TIME_LIMIT):
+        """Waits for a process; its exit code must be one of these. Also kills the ranks that a killed mpirun leaves in MPI_Init, and an
+        mpirun without ranks: if a rank was killed, Open MPI 4.1.4 with PMIx 4.2.2 may wait for a mutex in memory that it has freed."""
         until = alone = time.monotonic() + most
         late = False
         while True:
@@ -204,13 +204,13 @@ class Run:
             except subprocess.TimeoutExpired:
                 now, left = time.monotonic(), self.processes()
                 late = now > until
-                alone = now + ALONE if left else min(alone, now + ALONE)
+                alone = now + MPIRUN_EXTRA if left else min(alone, now + MPIRUN_EXTRA)
                 if late or job.poll() == -signal.SIGKILL:
                     for process in left:
                         self.kill(process, signal.SIGKILL)
                 if late or now > alone:
                     job.kill()
-        for _ in range(1000):  # mpirun does not wait for those it kills
+        for _ in range(1000):  # mpirun does not wait for processes that it kills
             if not self.processes():
                 break
             time.sleep(0.01)
@@ -221,31 +221,31 @@ class Run:
         return job.returncode
 
     def disturb(self, ranks, seconds):
-        """Starts it, and ends it before its end, perhaps."""
+        """Starts a process, and may end it early."""
         how = self.dice.choice(["KILL", "KILL", "KILL", "USR2", "TERM", "INT", "HUP", "--max-wall"])
         if how == "--max-wall":
             self.end(self.start(ranks, ["--max-wall", f"{seconds:.3f}"]), (0, 75))
             return
-        if ranks > 1 and how in ("TERM", "INT", "HUP"):  # mpirun has its own ways with these
+        if ranks > 1 and how in ("TERM", "INT", "HUP"):  # mpirun handles these signals itself
             how = "USR2"
         job = self.start(ranks, [])
         time.sleep(seconds)
         number = getattr(signal, "SIG" + how)
         at = [job.pid, *self.processes()] if how == "KILL" and ranks > 1 else [job.pid]
         self.kill(self.dice.choice(at), number)
-        # A signal may come before the command, or mpirun, is ready for it, or after it; a killed rank has codes of its own.
+        # A signal may come before the command, or mpirun, is ready for it, or after it; a killed rank has other exit codes.
         self.end(job, range(-64, 256) if how == "KILL" else (0, 75, -number, 128 + number))
 
 
 def soak(carom, deck, seconds, where, ranks, dice):
-    """One deck, of which an undisturbed run is there; what happened, in words. Raises Found."""
+    """Tests one deck that has an undisturbed run; returns what happened, in words. Raises Found."""
     file = where / "deck.toml"
     summary = read_summary(where / "undisturbed")
     method = deck["integrator"]["type"]
     error = summary["energy"]["max_abs_error"] / (summary["energy"]["reference"] or 1)
     if error > EXACT.get(method, float("inf")):
         raise Found(f"the energy is wrong by {error:.1e}")
-    if method != "verlet" and summary["max_overlap"] > LEAST_DISTANCE:
+    if method != "verlet" and summary["max_overlap"] > LARGEST_OVERLAP:
         raise Found(f"spheres overlap by {summary['max_overlap']:.1e}")
 
     run = Run(carom, file, where / "continued", dice)
@@ -262,7 +262,7 @@ def soak(carom, deck, seconds, where, ranks, dice):
 
 
 def draw(carom, dice, seconds, where, ranks):
-    """A deck that can run, and has; and how long that took [s]."""
+    """A deck that has run, and its time [s]."""
     while True:
         shutil.rmtree(where, ignore_errors=True)
         where.mkdir(parents=True)
@@ -282,7 +282,7 @@ def draw(carom, dice, seconds, where, ranks):
 # Jumps of the energy
 
 def largest_jump(carom, file, method, where, seconds):
-    """Of a run with a row each slab: the largest |H − H of the row before|, relative; None: it does not run."""
+    """The largest relative |H − H of the row before| of a run with a row for each slab; None if it does not run."""
     shutil.rmtree(where, ignore_errors=True)
     deck = tomllib.loads(file.read_text())
     interval = deck.get("output", {}).get("thermo_interval", 1.0) if method == "free-flight" else deck["integrator"]["step"]
@@ -334,7 +334,7 @@ def jumps(carom, decks, options):
 # Hard systems
 
 def run_system(carom, method, number, options):
-    """One system by a method: what became of it, in a word and in words; (None, "") where the deck is refused."""
+    """Runs one system with a method: the result, in a word and in words; (None, "") if the deck is refused."""
     where = options.output.resolve() / f"{number}-{method}"
     shutil.rmtree(where, ignore_errors=True)
     where.mkdir(parents=True)

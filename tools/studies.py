@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What energy_study.py, cost_study.py and rank_study.py share: options, a deck for each run, runs, tables.
+"""Common functions of energy_study.py, cost_study.py and rank_study.py: options, a deck for each run, runs, tables.
 
     parser = study_parser(__doc__, "psa,cva,mcva,cdda")
     parser.add_argument(...)
@@ -17,7 +17,7 @@ from carom_files import RunFailed, find_carom, reading, run_carom, toml_text
 
 
 def study_parser(description, methods):
-    """A parser of the options of every study; `methods` are the ones that it compares by default."""
+    """A parser of the options of every study; `methods` are the default methods to compare."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("deck", type=pathlib.Path)
     parser.add_argument("--methods", default=methods, help="names, each with keys: cdda:order=4")
@@ -30,7 +30,7 @@ def study_parser(description, methods):
 
 
 def parse(parser, arguments, study):
-    """The options, lists split; steps fall."""
+    """The options, with lists split and steps in descending order."""
     options = parser.parse_args(arguments)
     options.methods = options.methods.split(",")
     steps = options.steps.split(",") if options.steps else [read_deck(options)["integrator"]["step"]]
@@ -64,14 +64,14 @@ def integrator_table(method, step):
 
 
 def variant(deck, method, step, plan):
-    """The deck with another method and [run], and nothing written but its ends."""
+    """The deck with another method and [run], and output only at start and end."""
     return deck | {"integrator": integrator_table(method, step), "run": plan,
                    "output": {"frame_interval": 0.0, "thermo_interval": 0.0}}
 
 
 def run_deck(options, deck, file, directory, overrides=(), **how):
-    """Writes a deck to a file and runs it; returns the summary. A run that fails numerically raises RunFailed; where the
-    question was wrong the study ends. `how`: launcher and environment, as for run_carom."""
+    """Writes a deck to a file and runs it; returns the summary. Raises RunFailed if the run fails numerically; the study
+    ends if the deck is wrong. `how`: launcher and environment, as for run_carom."""
     pathlib.Path(file).write_text(toml_text(deck))
     try:
         return run_carom(find_carom(options.carom), file, directory, [*options.set, *overrides], **how)
@@ -82,7 +82,7 @@ def run_deck(options, deck, file, directory, overrides=(), **how):
 
 
 def processor_seconds():
-    """Of all commands run so far."""
+    """The time of all commands run so far."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
 

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What `carom view` costs: processor time of a run that is shown, memory of a page left open, frames drawn a second.
+"""The costs of `carom view`: processor time of a run that is shown, memory of an open page, frames drawn per second.
 
     tools/view_cost.py                  # all three, about five minutes
-    tools/view_cost.py --minutes 10     # the page is left open for so long
-    tools/view_cost.py --drawing        # only the frames drawn a second
+    tools/view_cost.py --minutes 10     # the page is open for this time
+    tools/view_cost.py --drawing        # only the frames drawn per second
 
-Chromium runs without a window and draws by the processor (SwiftShader). Needs what tools/test-packages.txt names.
+Chromium runs without a window and draws by the processor (SwiftShader). Needs the packages in tools/test-packages.txt.
 """
 
 import argparse
@@ -104,14 +104,14 @@ def memory_of_a_page(carom, folder, n, minutes):
 
 
 def processor_seconds(pid):
-    """Of a process and all its descendants."""
+    """The memory of a process and all its descendants."""
     fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     children = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True).stdout.split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") + sum(map(processor_seconds, children))
 
 
 def drawing(carom, folder):
-    """Frames a second while the camera turns about spheres at random places, seen from outside and from near."""
+    """Frames per second while the camera turns about spheres at random positions, seen from outside and from near."""
     settings = {"particles__0__count": 108, "run__end_time": 0.1}
     subprocess.run(command(carom, folder / "small", **settings), check=True)
     page = folder / "page.html"

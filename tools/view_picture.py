@@ -42,7 +42,7 @@ def chromium(width=1200, height=640):
 
 
 def resize(browser, width, height):
-    """Makes the page, without the frame of its window, so large."""
+    """Sets the size of the page, without the frame of its window."""
     frame = browser.execute_script("return [outerWidth - innerWidth, outerHeight - innerHeight]")
     browser.set_window_size(width + frame[0], height + frame[1])
     wait_for(browser, f"innerWidth === {width} && innerHeight === {height}")

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A number here is an unevaluated sum of two doubles, good to about 100 bits; series are summed to about 72. Each step
-// is then rounded to 64 bits, as it was when the x87 unit computed the deviates: a seed still means the same
+// A number here is an unevaluated sum of two doubles, accurate to about 100 bits; series are summed to about 72. Each
+// step is then rounded to 64 bits, as the x87 unit did in earlier versions, so that a seed still gives the same
 // velocities.
 #include "engine/base/normal_deviates.h"
 
@@ -34,22 +34,21 @@ Number square_root(Number a) {
   return two_sum(root, (a + -two_product(root, root)).hi / (2 * root));
 }
 
-/// The nearest number of 64 bits.
+/// Rounds to the nearest number of 64 bits.
 Number rounded(Number x) {
   const auto exponent = __builtin_bit_cast(unsigned long long, x.hi) & 0x7ff0000000000000ULL;
-  const double grid =
-      0x1.8p-11 * __builtin_bit_cast(double, exponent);  // its last bit counts 2^-63 of the power of two
+  const double grid = 0x1.8p-11 * __builtin_bit_cast(double, exponent);  // its last bit is 2^-63 of the power of two
   return two_sum(x.hi, (x.lo + grid) - grid);
 }
 
-/// A power series to z^(N − 1), of which `coefficient(k)` is that of z^k.
+/// A power series to z^(N − 1); `coefficient(k)` is the coefficient of z^k.
 template <int N>
 struct Series {
   Number c[N];
   constexpr explicit Series(auto coefficient) {
     for (int k = 0; k < N; ++k) c[k] = coefficient(k);
   }
-  /// Its sum for |z| ≤ 0.617: what the lower half of a number adds to the terms from z^4 on is below 2^-71.
+  /// The sum for |z| ≤ 0.617: the lower half of a number changes the terms from z^4 on by less than 2^-71.
   Number at(Number z) const {
     double high = c[N - 1].hi;
     for (int k = N - 2; k > 3; --k) high = high * z.hi + c[k].hi;

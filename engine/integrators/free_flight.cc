@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// free-flight: no forces but a uniform field, exact from event to event.
+// free-flight: no forces except a uniform field; exact from event to event.
 //
-// The slab is an epoch: at its end all records are flown to one time and wrapped, so that times stay small and their
-// last digits fine. Between events x(t) = x + v s + ½ g s² holds exactly; there is no step and no truncation error.
+// The slab is an epoch: at its end all records are moved to one time and wrapped, so that times stay small and keep
+// their last digits. Between events x(t) = x + v s + ½ g s² holds exactly; there is no step and no truncation error.
 
 #include <algorithm>
 #include <optional>
@@ -48,7 +48,7 @@ class FreeFlight : public Integrator<D> {
   }
 
  private:
-  /// `flight`: an EventCore, or WindowedFlight.
+  /// `flight` is an EventCore or a WindowedFlight.
   template <class Flight>
   void fly(Flight& flight, System<D>& system, const Slab& slab, SlabReport<D>& report, std::uint64_t most) {
     {
@@ -60,7 +60,7 @@ class FreeFlight : public Integrator<D> {
       flight.give_back(time, system.particles);
       system.box = start.after(time);
     };
-    // Flies to `end`, or to the collision limit; false: not to `end`.
+    // Runs to `end` or to the collision limit; returns whether it reached `end`.
     const auto run = [&](double end) {
       const Stopwatch watch(report.counters.seconds.queue);
       report.reached = flight.run(end, {report.counters, report.contacts, slab.collision_limit, most});
@@ -90,10 +90,10 @@ class FreeFlight : public Integrator<D> {
 
   std::uint64_t max_events_;
   Vec<D> g_ = Vec<D>::Zero();
-  std::optional<EventCore<D>> core_;  // one of the two
+  std::optional<EventCore<D>> core_;  // one of these two is used
   std::optional<WindowedFlight<D>> windowed_;
   std::int64_t epoch_ = -1;
-  std::uint64_t contacts_ = 0;  // in the epoch, up to the slab
+  std::uint64_t contacts_ = 0;  // in the epoch before this slab
   Particles<D> copies_;
 };
 

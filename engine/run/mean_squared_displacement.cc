@@ -34,7 +34,7 @@ void MeanSquaredDisplacement<D>::add_sample(double time, const Particles<D>& par
       add(decades_[n].lag[lag], time, decades_[n]);
       return;
     }
-    // The window is over. It is one lag of the next decade: the first windows of both began at the same time.
+    // The window ends. It is one lag of the next decade: the first windows of both began at the same time.
     if (n + 1 == decades_.size()) decades_.push_back({decades_[n].origin_time, std::move(decades_[n].origin), {}});
     decades_[n].origin_time = time;
     decades_[n].origin = now_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What is measured of one state of a system.
+// Measures one state of a system.
 
 #include "engine/forces/forces.h"
 #include "engine/run/simulation.h"
@@ -26,7 +26,7 @@ Tail tail_of(const System<D>& system) {
   return sum;
 }
 
-/// The momentum is that of `state`, the rest that of `at`, of which `sums` are, too. Collective.
+/// Measures the momentum of `state` and everything else of `at`, to which `sums` must belong. Collective.
 template <int D>
 Measurement<D> measure(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
                        const PotentialSums& sums, const Tail& tail) {
@@ -45,7 +45,7 @@ Measurement<D> measure(const System<D>& system, const Particles<D>& state, const
   return found;
 }
 
-/// Of a virial [energy].
+/// The pressure for a virial [energy].
 template <int D>
 double pressure_of(double virial, const Box<D>& box) {
   return virial / (D * box.volume());

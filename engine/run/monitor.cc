@@ -13,20 +13,20 @@
 namespace carom {
 
 namespace {
-/// S_h costs two passes over all pairs. Systems larger than this are measured at thermo rows and frames only.
+/// S_h costs two passes over all pairs: for larger systems it is computed at thermo rows and frames only.
 constexpr std::size_t kShadowAtEveryStep = 100;
 
-// What ends a run while it goes on: it is no motion of the deck's system any more.
+// Limits at which a run fails, because it is no longer a motion of the deck's system.
 
-/// |H| over its scale at the start. Inexact methods with steps far too long reach 1e4 and come back.
-constexpr double kBlownUp = 1e10;
-/// |H − H of the last slab|, of a method that keeps it to rounding, over K + Σ|V|. Positions are rounded to 1e-16 of
-/// the box, which potentials 10⁴ times steeper than the box is long turn into 1e-12: that leaves six digits before a
-/// bound which is still far below what a method of second order loses.
-constexpr double kMostJump = 1e-6;
-/// Depth over contact distance. The methods leave 1e-12; the box may be 10⁹ diameters long.
-constexpr double kDeepest = 1e-6;
-/// In place of an id, where the least of those of all ranks is looked for as the largest negative one.
+/// |H| relative to its scale at the start. Inexact methods with far too long steps can reach 1e4 and recover.
+constexpr double kLargestEnergyGrowth = 1e10;
+/// The change of H in a slab relative to K + Σ|V|, for methods that conserve H to rounding. Positions are rounded to
+/// 1e-16 of the box; potentials 10⁴ times steeper than the box is long make 1e-12 of this. The limit is six digits
+/// above this, and still far below the error of a second-order method.
+constexpr double kLargestEnergyJump = 1e-6;
+/// Depth relative to the contact distance. The methods leave 1e-12; the box may be 10⁹ diameters long.
+constexpr double kDeepestOverlap = 1e-6;
+/// Replaces an id if there is none; the smallest id of all ranks is found as the largest negative one.
 constexpr double kNoId = -std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -88,7 +88,7 @@ void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
   show(shot_, true);
 }
 
-/// Energy errors count from this state on.
+/// Makes this state the reference of energy errors.
 template <int D>
 void Monitor<D>::count_from(const Snapshot<D>& shot) {
   statistics_.energy_after_first_step = shot.total();
@@ -98,7 +98,7 @@ void Monitor<D>::count_from(const Snapshot<D>& shot) {
   if (statistics_.energy_scale == 0) statistics_.energy_scale = statistics_.energy_reference;
 }
 
-/// Throws where the run has blown up. What is looked at is the same on all ranks.
+/// Throws if the run has failed. The compared numbers are equal on all ranks.
 template <int D>
 void Monitor<D>::guard(double energy_before, double magnitude_before) {
   const Statistics& s = statistics_;
@@ -107,16 +107,16 @@ void Monitor<D>::guard(double energy_before, double magnitude_before) {
                                         "; " + fastest(system_.particles) + "; use a smaller integrator.step");
   };
   const double energy = std::abs(account_.energy), jump = std::abs(account_.energy - energy_before);
-  // Where the start was all but at rest its energy is rounding, and so may be the energy now.
-  if (energy > kBlownUp * s.energy_scale && energy > 0.5 * account_.magnitude)
+  // If the particles were almost at rest at the start, both energies may be rounding errors.
+  if (energy > kLargestEnergyGrowth * s.energy_scale && energy > 0.5 * account_.magnitude)
     fail("the run has blown up: the energy, " + short_text(s.energy_initial) + " at the start, is " +
          short_text(account_.energy));
-  if (info_.exact && jump > kMostJump * std::max({s.energy_reference, magnitude_before, account_.magnitude}))
+  if (info_.exact && jump > kLargestEnergyJump * std::max({s.energy_reference, magnitude_before, account_.magnitude}))
     fail("the energy, which " + std::string(info_.name) + " keeps to rounding, jumped by " + short_text(jump) + " to " +
          short_text(account_.energy));
 }
 
-/// Which particle is the fastest, for messages. Collective.
+/// Names the fastest particle, for messages. Collective.
 template <int D>
 std::string Monitor<D>::fastest(const Particles<D>& state) const {
   double speed = -1, id = kNoId;
@@ -152,7 +152,7 @@ void Monitor<D>::observe(double time, const Particles<D>& copies) {
   if (std::min(frames_.due(), rows_.due()) <= time + plan_.slack()) show(measure(time, copies, nullptr, false), false);
 }
 
-/// Shows the particles to observers that look at times of their own.
+/// Passes the particles to observers whose own sampling times are due.
 template <int D>
 void Monitor<D>::sample(double time, const Particles<D>& state) {
   for (Sampler& sampler : samplers_) {
@@ -184,7 +184,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
     const Overlaps own = overlaps();
     const double deepest = system_.decomposition.largest(own.depth());
     s.counters.max_overlap = std::max(s.counters.max_overlap, deepest);
-    if (deepest > kDeepest) {
+    if (deepest > kDeepestOverlap) {
       const Overlaps all = sum_of_all(system_.decomposition.ranks(), own);
       throw Error(Failure::numerical, "particles " + std::to_string(all.lo) + " and " + std::to_string(all.hi) +
                                           " overlap, by " + short_text(deepest) +
@@ -194,7 +194,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   }
   account_.virial_time += elapsed * account_.virial;
   if (const double time = s.end_time - s.start_time; time > 0) {
-    if (system_.box.pistons()) account_.virial_time = std::numeric_limits<double>::quiet_NaN();  // no one volume
+    if (system_.box.pistons()) account_.virial_time = std::numeric_limits<double>::quiet_NaN();  // the volume varies
     s.mean_pressure = (account_.virial_time + s.counters.collision_virial.value()) / (time * D * system_.box.volume());
     s.collision_rate =
         2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * time);
@@ -208,7 +208,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   show(shot_, false);
 }
 
-/// `integrator`: null where the particles are not its own.
+/// `integrator` is null if the particles are not its state.
 template <int D>
 Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Integrator<D>* integrator,
                                 bool with_shadow, bool fresh) {
@@ -223,7 +223,7 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   shot.step = statistics_.steps;
   shot.collisions = statistics_.counters.sphere_sphere;
   shot.particles = &state;
-  // Of the spheres and of the walls that move: these have lost what work they did.
+  // The energy of the spheres and of the moving walls, which have lost the work they did.
   account_.energy = shot.kinetic + sums.energy.value() - statistics_.counters.wall_work.value();
   account_.magnitude = found.magnitude;
   account_.virial = found.virial;
@@ -249,7 +249,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
   const double collision_virial = statistics_.counters.collision_virial.value();
   const double collisions = account_.last_row >= 0 && shot.time > account_.last_row
                                 ? (collision_virial - account_.last_row_virial) / (shot.time - account_.last_row)
-                                : 0;  // nothing has collided before the start
+                                : 0;  // no collisions before the start
   shot.pressure = pressure_of(account_.virial + collisions, system_.box);
   shot.max_energy_error = statistics_.max_energy_error;
   if (row) {
@@ -291,7 +291,7 @@ Overlaps Monitor<D>::overlaps() {
   return found;
 }
 
-/// All particles, in a state of this rank's particles; where there are several ranks, on rank 0 only.
+/// All particles, from a state of this rank's particles; with several ranks on rank 0 only.
 template <int D>
 const Particles<D>& Monitor<D>::all_particles(const Particles<D>& state) {
   Decomposition<D>& ranks = system_.decomposition;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What is averaged while a run goes on, and the declaration that makes it known by its name.
+// Averages that are taken during a run, and the declarations by which they are found by name.
 //
 //   const auto rdf = make_observable<3>("rdf", run.system(), {{"interval", 0.1}, {"range", 3.0}});
 //   run.add(*rdf);
 //   run.run();
 //   for (const TableColumn& column : rdf->table()) use(column.name, column.values);
 //
-// From the declarations come the keys of [output] (rdf_interval, rdf_range …), their checks and manual, the files
-// (rdf.csv) and the entries of the summary.
+// The keys of [output] (rdf_interval, rdf_range …), their checks and manual, the files (rdf.csv) and the entries of the
+// summary are generated from the declarations.
 
 #include <memory>
 #include <optional>
@@ -22,13 +22,13 @@
 
 namespace carom {
 
-/// One of a table; all columns of a table are of equal length.
+/// A column of a table; all columns of a table have equal length.
 struct TableColumn {
   std::string name;
   std::vector<double> values;
 };
 
-/// A number about some species, for the summary: there `"name": [{"species": ["a", "b"], "symbol": value}, …]`.
+/// A number about one or more species for the summary: `"name": [{"species": ["a", "b"], "symbol": value}, …]`.
 struct SpeciesValue {
   std::string_view name;
   std::vector<std::string> species;
@@ -52,37 +52,38 @@ class Observable : public Observer<D> {
                          sums(archive);
                        }});
   }
-  /// How many have been taken.
+  /// The number of samples taken.
   std::uint64_t samples() const { return samples_; }
 
-  /// The averages up to now; called after the first sample.
+  /// The averages of the samples so far; called only after the first sample.
   virtual std::vector<TableColumn> table() const = 0;
   virtual std::vector<SpeciesValue> species_values() const { return {}; }
 
  private:
-  /// Gives the archive everything that a sample changes and a later one or a table reads, always in the same order.
+  /// Passes to the archive, in a fixed order, everything that a sample changes and a later sample or a table reads.
   virtual void sums(Archive& archive) = 0;
-  /// samples() have been added before. All particles, in the order of their ids; on several ranks on rank 0 only.
+  /// Adds a sample; samples() have been added before. `particles` are all particles in the order of their ids. With
+  /// several ranks, called on rank 0 only.
   virtual void add_sample(double time, const Particles<D>& particles) = 0;
 
   Sampling sampling_;
   std::uint64_t samples_ = 0;
 };
 
-/// What a declaration says of D dimensions.
+/// The functions of a declaration for D dimensions.
 template <int D>
 struct ObservableMaker {
-  /// Sets what is left open and depends on the system; says what is wrong in it.
+  /// Sets the parameters that are not given and depend on the system; returns an error if a parameter does not fit it.
   std::optional<ParameterError> (*complete)(Parameters&, const System<D>&) = nullptr;
-  /// From complete parameters; the first sample is due at the time `start`. The system outlives it.
+  /// Makes one from complete parameters; the first sample is due at time `start`. The system must outlive it.
   std::unique_ptr<Observable<D>> (*make)(const System<D>&, const Parameters&, double start) = nullptr;
 };
 
 /// The declaration of an observable; engine/run/observables.cc lists them all.
 struct ObservableInfo {
-  std::string_view name;  ///< of its file and of its keys: `profile` is averaged into profile.csv
+  std::string_view name;  ///< of the file and of the keys: `profile` writes profile.csv
   std::string_view title;
-  std::vector<Parameter> parameters;  ///< `interval` (parameter::interval) among them
+  std::vector<Parameter> parameters;  ///< must include `interval` (parameter::interval)
   std::string_view documentation;     ///< a paragraph for the manual
   std::string_view source;            ///< papers
   ObservableMaker<2> in_2d;
@@ -97,19 +98,19 @@ struct ObservableInfo {
   }
 };
 
-/// Every observable there is, in the order of the manual.
+/// All observables, in the order of the manual.
 const std::vector<ObservableInfo>& observables();
 
-/// The one of that name; throws Error(Failure::deck), which lists the names.
+/// The observable with this name; throws Error(Failure::deck) with a list of the names if there is none.
 const ObservableInfo& find_observable(std::string_view name);
 
-/// It, made with these parameters and defaults for those left out. Throws Error(Failure::deck).
+/// Makes an observable; parameters that are not given have their defaults. Throws Error(Failure::deck).
 template <int D>
 std::unique_ptr<Observable<D>> make_observable(std::string_view name, const System<D>& system, Parameters given,
                                                double start = 0);
 
 namespace parameter {
-/// The time between two samples; 0: none.
+/// The time between two samples; 0: no samples.
 Parameter interval(std::string_view meaning);
 }  // namespace parameter
 
@@ -120,7 +121,7 @@ std::optional<ParameterError> nothing_to_complete(Parameters&, const System<D>&)
   return {};
 }
 
-/// Of an observable template with a constructor from system, parameters and start.
+/// The functions for an observable template T with a constructor from system, parameters and start.
 template <template <int> class T, int D>
 ObservableMaker<D> maker(std::optional<ParameterError> (*complete)(Parameters&,
                                                                    const System<D>&) = nothing_to_complete) {

@@ -4,7 +4,7 @@
 
 namespace carom {
 
-namespace observable {  // declared at the end of their own files
+namespace observable {  // declared at the ends of their own files
 ObservableInfo rdf(), msd(), profile();
 }
 

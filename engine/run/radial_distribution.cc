@@ -17,18 +17,18 @@ namespace carom {
 
 namespace {
 
-/// Cells of half the range: measured the fastest of 1/1 to 1/4 for ranges of three and four diameters.
+/// Cells of half the range are the fastest, measured from 1/1 to 1/4 for ranges of three and four diameters.
 constexpr int kCellsInRange = 2;
 
-/// A run of particles in neighbouring cells of one row, and what to add to x_i − x_j for the image of the row.
+/// A contiguous range of particles in neighbouring cells of a row, and the shift of x_i − x_j for the row's image.
 template <int D>
 struct Run {
   std::uint32_t begin, end;
   Vec<D> shift;
 };
 
-/// The runs of all cells that come after `centre` in the order of unwrapped cells and may hold partners: each pair of
-/// cells is met from one side only. What is left of the cell itself is its caller's.
+/// Lists the ranges of all cells after `centre` in the order of unwrapped cells that may hold partners, so that each
+/// pair of cells is visited once. The caller handles pairs within the cell.
 template <int D>
 void list_runs(const CellGrid<D>& grid, const std::vector<std::uint32_t>& start, const Cell<D>& centre,
                const Cell<D>& reach, double range, std::vector<Run<D>>& runs) {
@@ -36,7 +36,7 @@ void list_runs(const CellGrid<D>& grid, const std::vector<std::uint32_t>& start,
   constexpr int last = D - 1;
   const auto row = [&](const Cell<D>& offset, std::int32_t from) {
     Vec<D> shift = Vec<D>::Zero();
-    std::size_t first = 0;  // cell of the row
+    std::size_t first = 0;  // first cell of the row
     double squared_gap = 0;
     typename CellGrid<D>::Step to;
     for (int k = 0; k < last; ++k) {
@@ -74,14 +74,14 @@ void list_runs(const CellGrid<D>& grid, const std::vector<std::uint32_t>& start,
   }
 }
 
-/// The volume in which an ideal gas finds a partner at distances from a to b, on average over the region of these
-/// edges; along the axes that are walled there is none beyond the edge.
+/// The volume in which an ideal gas has a partner at distances from a to b, averaged over a region with these edges;
+/// there are no partners beyond walled edges.
 template <int D>
 double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bool, D>& walled) {
   // Averages of |u_x|, |u_x u_y|, |u_x u_y u_z| over directions u.
   constexpr double pi = std::numbers::pi;
   constexpr std::array<double, 3> mean = {D == 2 ? 2 / pi : 0.5, D == 2 ? 1 / pi : 2 / (3 * pi), 1 / (4 * pi)};
-  std::array<double, D + 1> c{1};  // of the average of Π (1 − r|u_k|/L_k) as a polynomial in r
+  std::array<double, D + 1> c{1};  // coefficients of the average of Π (1 − r|u_k|/L_k) as a polynomial in r
   for (int k = 0; k < D; ++k)
     if (walled[k])
       for (int p = D; p > 0; --p) c[p] -= c[p - 1] / edges[k];
@@ -91,7 +91,7 @@ double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bo
   return (D == 2 ? 2 * pi : 4 * pi) * volume;
 }
 
-/// Why there is no g(r) up to `range` in this system.
+/// The error if g(r) up to `range` is not defined in this system.
 template <int D>
 std::optional<ParameterError> error_of(const System<D>& system, double range) {
   if (!system.box.closed())
@@ -107,7 +107,7 @@ std::optional<ParameterError> error_of(const System<D>& system, double range) {
   return ParameterError{"range", what.str(), remedy.str()};
 }
 
-/// The range where it is left open.
+/// Sets the range if it is not given.
 template <int D>
 std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
   if (!parameters.has("range")) parameters.set("range", RadialDistribution<D>::usual_range(system));
@@ -179,7 +179,7 @@ void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& part
     farthest += (reach[k] + 1) * grid.edge(k) * (reach[k] + 1) * grid.edge(k);
   }
 
-  // Sorts the particles in the order of the cells, so that a row of cells is a run of particles.
+  // Sort the particles in the order of the cells, so that a row of cells is a contiguous range.
   start_.assign(grid.cells() + 1, 0);
   cell_.resize(n);
   species_.resize(n);
@@ -198,7 +198,7 @@ void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& part
     species_[at] = particles.species[i];
   }
 
-  // All partners that are looked at are counted, without a branch; those beyond the range are left out in the end.
+  // All visited partners are counted, without a branch; counts beyond the range are dropped at the end.
   const double shells = static_cast<double>(bins) / options_.range;
   const double last = std::floor(std::sqrt(farthest) * shells) + 1;
   const std::size_t kinds = number_.size(), all = static_cast<std::size_t>(last) + 1;
@@ -207,7 +207,7 @@ void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& part
   for (std::size_t a = 0; a < kinds; ++a)
     for (std::size_t b = 0; b < kinds; ++b) histogram[a * kinds + b] = &counted[pair_index(a, b) * all];
   std::vector<Run<D>> runs;
-  std::array<Eigen::ArrayXd, D> partner;  // those that may be near the particles of a cell: themselves first
+  std::array<Eigen::ArrayXd, D> partner;  // the particles of the cell, then possible partners
   std::vector<std::uint16_t> kind;
   Eigen::ArrayXd squared;
   Eigen::ArrayXi shell;
@@ -235,7 +235,7 @@ void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& part
         const Eigen::Index rest = size - (i + 1);
         squared.head(rest).setZero();
         for (int k = 0; k < D; ++k) squared.head(rest) += (partner[k].segment(i + 1, rest) - partner[k][i]).square();
-        // (std::sqrt sets errno, which keeps compilers from doing two at once.)
+        // (std::sqrt sets errno, which prevents vector code.)
         shell.head(rest) = (squared.head(rest).sqrt() * shells).min(last).template cast<std::int32_t>();
         std::uint64_t* const* const of = &histogram[species_[begin + i] * kinds];
         if (kinds == 1)
@@ -262,7 +262,7 @@ double RadialDistribution<D>::pairs_between(std::size_t a, std::size_t b) const 
   return a == b ? number_[a] * (number_[a] - 1) / 2 : number_[a] * number_[b];
 }
 
-/// Counts over those of an ideal gas of so many pairs. `margin`: the radius that centres keep from walls.
+/// Divides counts by those of an ideal gas with `pairs` pairs; `margin` is the radius that centres keep from walls.
 template <int D>
 std::vector<double> RadialDistribution<D>::normalised(const std::vector<std::uint64_t>& counts, double pairs,
                                                       double margin) const {
@@ -304,7 +304,7 @@ std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::s
   const double contact = smallest_[a] + smallest_[b], width = options_.range / options_.bins;
   const auto r = radii(), value = g(a, b);
   const std::uint64_t* counts = &counts_[pair_index(a, b) * static_cast<std::size_t>(options_.bins)];
-  // Shells from the contact distance on, and rounding must not lose the first.
+  // Start at the contact distance; rounding must not lose the first shell.
   const auto first = static_cast<std::size_t>(std::ceil(contact / width * (1 - 1e-9)));
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -318,7 +318,7 @@ std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::s
     ++used;
   }
   if (used < 4) return {};
-  // The first unknown by Cramer's rule: LDLT takes fused multiply-adds on processors that have them.
+  // Cramer's rule gives the first unknown: LDLT uses fused multiply-adds on processors that have them.
   const Eigen::Vector3d minors = normal.col(1).cross(normal.col(2));
   return elementary::exp(right.dot(minors) / normal.col(0).dot(minors));
 }

@@ -12,9 +12,9 @@
 namespace carom {
 
 namespace {
-/// Output intervals shorter than this share of a step are refused: there would be no end to counting them.
+/// Output intervals shorter than this fraction of a step are refused: counting them would take too long.
 constexpr double kLeastInterval = 1e-6;
-/// A flight without any pair collision that ends a run in an open box [longest edge].
+/// Flight distance without any pair collision after which a run in an open box ends [longest edge].
 constexpr double kFarApart = 1e4;
 
 template <int D>
@@ -36,7 +36,7 @@ void check_spheres(const System<D>& system) {
                                             short_text(overlaps.distance) + "; move them apart");
 }
 
-/// How long the slab that starts then is: to the end, where that is nearer than a step.
+/// The length of the slab that starts then: to the end of the run, if this is less than a step.
 double length_from(double start, const Plan& plan) {
   const bool last = plan.end_time && start + plan.step > *plan.end_time - plan.slack();
   return last ? *plan.end_time - start : plan.step;
@@ -96,7 +96,7 @@ void Simulation<D>::extend(const Plan& end) {
   plan_.collisions = end.collisions;
 }
 
-/// Registers the state of the run, and sets or measures it: that of the start, of a run to go on with, or of a branch.
+/// Registers the state of the run, and sets or measures it: at the start, to continue, or for a branch.
 template <int D>
 void Simulation<D>::begin(const Hooks& hooks) {
   Statistics& s = statistics_;
@@ -113,7 +113,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
       system_->quanta = quanta(*system_);
       s.counters.divisions += divide();
     }
-    // A branch restores what is registered before, the state of the integrator, and measures anew.
+    // A branch restores the state that is registered before, the integrator's, and measures again.
     if (!hooks.branch) make_monitor();
     first_of_integrator_ = system_->fields.of_run().size();
     integrator_->start(*system_, s.counters);
@@ -126,7 +126,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
     s.stopped_early = false;
   }
   if (again) {
-    // The last slab was shortened by the end that the run had.
+    // The last slab was shortened to meet the previous end of the run.
     if (s.end_time != next_slab().start) count_ = {s.steps, s.end_time};
     return;
   }
@@ -199,7 +199,8 @@ void Simulation<D>::run(const Hooks& hooks) {
       else
         count_.within = within;
     } else {
-      // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: no rounding piles up.
+      // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: rounding does not
+      // accumulate.
       ++s.steps;
       s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
       count_.within = 0;
@@ -216,8 +217,8 @@ void Simulation<D>::run(const Hooks& hooks) {
   take_time();
 }
 
-/// Has the integrator advance the system by a slab, again where the halo is too small; false: the slab was left, and
-/// the state is that of its start.
+/// Advances the system by a slab, and repeats it with a wider halo if needed; false: the slab was abandoned, and the
+/// state is that of its start.
 template <int D>
 bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
   Decomposition<D>& decomposition = system_->decomposition;
@@ -242,7 +243,7 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
     }
 }
 
-/// Free flight that ends after so many collisions only: throws where spheres have flown apart and will not meet again.
+/// For free flight that ends only after a number of collisions: throws if the spheres have separated for good.
 template <int D>
 void Simulation<D>::need_collisions() const {
   if (system_->box.closed()) return;
@@ -259,12 +260,12 @@ template <int D>
 bool Simulation<D>::is_last_on_the_way() const {
   const Statistics& s = statistics_;
   const Slab next = next_slab();
-  // A slab that meets an end may be shorter or longer than a step by rounding alone.
+  // A slab that meets an end may differ from a step by rounding alone.
   const bool whole = s.end_time == next.start && (s.steps == s.start_steps || count_.within > 0 ||
                                                   length_from(time_of(s.steps - 1), plan_) == plan_.step);
   if (!whole) return false;
   if (finished() || length_from(time_of(s.steps), plan_) != plan_.step) return true;
-  // Free flight ends within a slab, at its last collision; how many a slab has is known from the one before.
+  // Free flight ends within a slab at its last collision; the slab before predicts the number of collisions.
   return plan_.collisions && next.collision_limit == *plan_.collisions &&
          (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
 }

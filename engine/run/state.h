@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The state of a run as bytes, field by field: what a checkpoint holds, on any number of ranks.
+// Stores the state of a run as bytes, field by field, as in a checkpoint; independent of the number of ranks.
 
 #include <algorithm>
 #include <functional>
@@ -13,13 +13,13 @@
 
 namespace carom {
 
-/// Where a state goes: fields of particles, whole and in the order of ids, and what there is one of a run.
+/// Receives a state: fields of all particles in the order of ids, and the entries that exist once per run.
 struct StateWriter {
   std::function<void(const Fields::Field&, std::span<const std::byte>)> field;
   std::function<void(const std::string& name, const Bytes&)> of_run;
 };
 
-/// Keeps a state in memory, by names.
+/// Stores a state in memory by names.
 inline StateWriter into(std::map<std::string, Bytes>& state) {
   return {[&state](const Fields::Field& field, auto bytes) {
             state[field.name] = {bytes.begin(), bytes.end()};
@@ -27,7 +27,8 @@ inline StateWriter into(std::map<std::string, Bytes>& state) {
           [&state](const std::string& name, const Bytes& bytes) { state[name] = bytes; }};
 }
 
-/// Gives rank 0's writer the state of a run: in Simulation::Hooks::should_stop all that it needs to go on. Collective.
+/// Passes the state of a run to rank 0's writer; in Simulation::Hooks::should_stop, this is all that is needed to
+/// continue. Collective.
 template <int D>
 void save_state(System<D>& system, const StateWriter& writer) {
   Communicator& ranks = system.decomposition.ranks();
@@ -50,11 +51,10 @@ void save_state(System<D>& system, const StateWriter& writer) {
   }
 }
 
-/// Where a state comes from; called on rank 0 only.
+/// Returns a part of a state by its name; called on rank 0 only.
 using StateReader = std::function<Bytes(const std::string& name)>;
 
-/// Sets a field of a system that is in blocks of ids. Throws Error(Failure::file) where the length is wrong.
-/// Collective.
+/// Sets a field of a system that is in blocks of ids. Throws Error(Failure::file) if the length is wrong. Collective.
 template <int D>
 void restore_field(System<D>& system, Fields::Field& field, const StateReader& read) {
   Communicator& ranks = system.decomposition.ranks();
@@ -74,14 +74,14 @@ void restore_field(System<D>& system, Fields::Field& field, const StateReader& r
   if (!mine.empty()) std::memcpy(field.data(), mine.data(), mine.size());
 }
 
-/// Sets the particles of a system: what a run that is to be continued starts from.
+/// Sets the particles of a system, from which a run will be continued.
 template <int D>
 void restore_particles(System<D>& system, const StateReader& read) {
   for (const auto& field : system.fields.of_particles())
     if (field->kind != Fields::Kind::constant) restore_field(system, *field, read);
 }
 
-/// Sets the whole state, in Simulation::Hooks::restore. Collective.
+/// Sets the whole state; call in Simulation::Hooks::restore. Collective.
 template <int D>
 void restore_state(System<D>& system, const StateReader& read) {
   restore_particles(system, read);

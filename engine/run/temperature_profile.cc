@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Density and temperature in slabs across one axis.
 //
-// A sample finds n particles (their centres) with the kinetic energy K in a slab of volume V: the density is ⟨n⟩/V, the
-// temperature 2⟨K⟩/(D⟨n⟩), of which no mean velocity is taken out. Sums are exact, so that no order of summation
-// matters.
+// If a sample finds n particles (by their centres) with kinetic energy K in a slab of volume V, the density is ⟨n⟩/V
+// and the temperature 2⟨K⟩/(D⟨n⟩); the mean velocity is not subtracted. Sums are exact, so that their order does not
+// matter.
 
 #include <algorithm>
 #include <limits>
@@ -49,7 +49,7 @@ class TemperatureProfile : public Observable<D> {
 
   const Box<D>& box_;
   Eigen::Index axis_;
-  std::vector<double> number_;  // of particles in each slab, all samples together
+  std::vector<double> number_;  // particles in each slab, summed over all samples
   std::vector<ExactSum> twice_kinetic_;
 };
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Lists of candidates, one a sphere, in one array.
+// The lists of candidates of all spheres, in one array.
 //
-// A list starts and ends at multiples of the kernels' lanes and is padded with the sphere itself; candidates in the
-// same periodic box come first in it. A list that grows out of its place gets a new one; places are used again.
+// A list starts and ends at multiples of the kernels' lanes and is padded with the sphere itself; it begins with the
+// candidates in the same periodic box. A list that outgrows its block moves to a larger one; free blocks are reused.
 
 #include <algorithm>
 #include <limits>
@@ -19,14 +19,14 @@ namespace carom {
 template <int D>
 class CandidateLists {
  public:
-  /// Where the list of a sphere stands and how long it is, is kept in `next_events`.
+  /// The start and the length of each sphere's list are stored in `next_events`.
   CandidateLists(const Packing<D>& packing, unsigned lanes, PageVector<NextEvent<D>>& next_events)
       : packing_(packing), lanes_(lanes), next_events_(next_events) {}
 
   const std::uint32_t* of(const NextEvent<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
   std::uint32_t* of(const NextEvent<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
 
-  /// Forgets all lists, and expects those of n spheres, which have no capacity now.
+  /// Removes all lists and reserves memory for the lists of n spheres, whose capacities the caller has set to 0.
   void clear(std::size_t n) {
     pool_.clear();
     used_ = 0;
@@ -34,7 +34,7 @@ class CandidateLists {
     for (auto& unused : unused_) unused.clear();
   }
 
-  /// Makes these the list of a sphere.
+  /// Stores these candidates as the list of a sphere.
   void assign(Slot i, std::span<const std::uint32_t> candidates) {
     NextEvent<D>& a = next_events_[i];
     const auto n = static_cast<unsigned>(candidates.size());
@@ -43,7 +43,7 @@ class CandidateLists {
       if (units > std::numeric_limits<std::uint16_t>::max() / lanes_)
         throw Error(Failure::numerical, "a sphere has more than 65 thousand neighbours");
       if (a.capacity > 0) unused_[a.capacity].push_back(a.list);
-      a.list = take(units);
+      a.list = allocate(units);
       a.capacity = static_cast<std::uint16_t>(units);
     }
     std::uint32_t* const list = of(a);
@@ -52,7 +52,7 @@ class CandidateLists {
     divide(a);
   }
 
-  /// Moves those in the same box to the start of a list.
+  /// Moves the candidates in the same box to the start of a list.
   void divide(NextEvent<D>& a) {
     std::uint32_t* const list = of(a);
     const auto* const others = std::partition(list, list + a.count, [&](auto c) { return same_box(c); });
@@ -73,12 +73,12 @@ class CandidateLists {
     ++a.count;
   }
 
-  /// Takes a candidate out of the list of a sphere.
+  /// Removes a candidate from the list of a sphere.
   void drop(Slot i, std::uint32_t candidate) {
     const std::uint32_t* const list = of(next_events_[i]);
     remove(i, static_cast<unsigned>(std::find(list, list + next_events_[i].count, candidate) - list));
   }
-  /// The same, given its place; one from behind moves there.
+  /// Removes the candidate at index q; a later candidate moves to this index.
   void remove(Slot i, unsigned q) {
     NextEvent<D>& a = next_events_[i];
     if (q == a.count) return;
@@ -92,10 +92,10 @@ class CandidateLists {
   }
 
  private:
-  static constexpr unsigned kSpareRoom = 3;  // candidates that a new list has room for, beside those it has
+  static constexpr unsigned kSpareRoom = 3;  // spare entries of a new list
 
   bool same_box(std::uint32_t candidate) const { return packing_.linear(candidate) == 0; }
-  std::uint32_t take(unsigned units) {
+  std::uint32_t allocate(unsigned units) {
     if (unused_.size() <= units) unused_.resize(units + 1);
     if (!unused_[units].empty()) {
       const std::uint32_t list = unused_[units].back();
@@ -104,16 +104,16 @@ class CandidateLists {
     }
     const std::size_t at = used_;
     used_ += std::size_t{lanes_} * units;
-    pool_.resize(used_ + 8);  // lists are compared by eight
+    pool_.resize(used_ + 8);  // lists are compared in blocks of eight
     return static_cast<std::uint32_t>(at / lanes_);
   }
 
   Packing<D> packing_;
-  unsigned lanes_;  // lists start and end at multiples of so many candidates
+  unsigned lanes_;  // every list starts and ends at a multiple of this number
   PageVector<NextEvent<D>>& next_events_;
   PageVector<std::uint32_t> pool_;
-  std::size_t used_ = 0;                            // of the pool
-  std::vector<std::vector<std::uint32_t>> unused_;  // places given back, by capacity
+  std::size_t used_ = 0;                            // length of the pool in use
+  std::vector<std::vector<std::uint32_t>> unused_;  // free blocks, by capacity
 };
 
 }  // namespace carom

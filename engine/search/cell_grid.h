@@ -2,10 +2,10 @@
 #pragma once
 // A regular grid of search cells over the box.
 //
-// Positions are mapped to *unwrapped* integer cells: a particle outside a periodic box, or an image of one, has its own
-// cell numbers there, and the difference of two unwrapped cells gives the image of a neighbour that is meant. (The
-// nearest image of two positions is wrong where the box is dilute or small.) Along open and walled axes the outermost
-// cells reach to infinity. Only the search uses the cells: results never depend on them.
+// Positions are mapped to *unwrapped* integer cells: a position outside a periodic box, or an image of one, has cell
+// numbers of its own there, and the difference of two unwrapped cells gives the image of a neighbour. (The nearest
+// image of two positions is wrong if the box is dilute or small.) Along open and walled axes the outermost cells extend
+// to infinity. Only the search uses the cells: results never depend on them.
 
 #include <algorithm>
 #include <boost/container/small_vector.hpp>
@@ -22,11 +22,11 @@ namespace carom {
 template <int D>
 using Cell = std::array<std::int32_t, D>;
 
-/// What a grid must know of the particles that it is for.
+/// The number and the bounds of the particles for which a grid is made.
 template <int D>
 struct Extent {
   std::size_t particles = 0;
-  Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();  ///< of their positions
+  Vec<D> low = Vec<D>::Zero(), high = Vec<D>::Zero();  ///< bounds of the positions
 
   Extent() = default;
   explicit Extent(std::span<const Vec<D>> x) {
@@ -43,8 +43,8 @@ struct Extent {
 template <int D>
 class CellGrid {
  public:
-  /// A grid with cells of edge at least `smallest` over the box (open axes: over the positions), with no more than
-  /// about so many cells a particle.
+  /// Makes cells of edge at least `smallest` over the box (along open axes: over the positions), and not many more than
+  /// `cells_a_particle` of them per particle.
   CellGrid(const Box<D>& box, double smallest, const Extent<D>& extent, double cells_a_particle = 2) : box_(box) {
     const double most =
         std::max(1.0, std::floor(elementary::pow(cells_a_particle * static_cast<double>(extent.particles), 1.0 / D)));
@@ -52,7 +52,7 @@ class CellGrid {
       const bool open = !box.bounded(k);
       const double low = open ? extent.low[k] : 0, high = open ? extent.high[k] : box.edges[k];
       const double length = box.periodic(k) ? high - low : std::max(high - low, smallest);
-      // Not quite full: rounding must never make a cell smaller than what it is to hold.
+      // 1e-9 is a margin: rounding must never make a cell smaller than `smallest`.
       count_[k] = static_cast<std::int32_t>(std::clamp(std::floor(length / (smallest * (1 + 1e-9))), 1.0, most));
       origin_[k] = low;
       edge_[k] = length / count_[k];
@@ -61,7 +61,7 @@ class CellGrid {
     lay_out();
   }
 
-  /// Of which something can be stored.
+  /// The number of stored cells.
   std::size_t cells() const {
     std::size_t n = 1;
     for (int k = 0; k < D; ++k) n *= static_cast<std::size_t>(rows(k));
@@ -86,15 +86,15 @@ class CellGrid {
   /// The coordinate of the lower face of unwrapped cell number c on an axis.
   double face(int axis, std::int32_t c) const { return origin_[axis] + c * edge_[axis]; }
 
-  /// Where an unwrapped cell is stored.
+  /// The index at which an unwrapped cell is stored.
   std::size_t index(const Cell<D>& c) const {
     std::size_t at = 0;
     for (int k = 0; k < D; ++k) at += stride_[k] * static_cast<std::size_t>(row(k, wrapped(k, c[k])));
     return at;
   }
 
-  /// Only cells that are, along each of the first `axes` axes, at most `margin` cells from one of these places are
-  /// stored each for itself. All others share places that must stay empty: see holds().
+  /// Stores separately only the cells that are, along each of the first `axes` axes, at most `margin` cells from one of
+  /// these positions. All other cells share storage that must stay empty: see holds().
   void confine(std::span<const Vec<D>> places, std::int32_t margin, int axes = D) {
     for (int k = 0; k < axes; ++k) {
       std::vector<std::int32_t>& row = row_[k];
@@ -117,18 +117,18 @@ class CellGrid {
       if (!row_[k].empty() && row(k, wrapped(k, c[k])) == rows_[k]) return false;
     return true;
   }
-  /// Takes confine() back.
+  /// Undoes confine().
   void spread() {
     for (auto& row : row_) row.clear();
     lay_out();
   }
-  /// Where a cell of an axis, 0 … count - 1, is stored along it, and how many such rows there are.
+  /// The row in which cell 0 … count - 1 of an axis is stored, and the number of rows along this axis.
   std::int32_t row(int axis, std::int32_t c) const {
     return row_[axis].empty() ? c : row_[axis][static_cast<std::size_t>(c)];
   }
   std::int32_t rows(int axis) const { return row_[axis].empty() ? count_[axis] : rows_[axis] + 1; }
 
-  /// How many boxes an unwrapped cell number lies away.
+  /// The number of boxes between an unwrapped cell and the box that holds the origin.
   std::int32_t boxes(int axis, std::int32_t c) const {
     return c >= 0 && c < count_[axis] ? 0 : (c - wrapped(axis, c)) / count_[axis];
   }
@@ -138,12 +138,12 @@ class CellGrid {
     return image;
   }
 
-  /// A cell number of one axis as index() sums them up, and how many boxes away it lies.
+  /// What one axis adds to index(), and the number of boxes that the cell is away.
   struct Step {
     std::size_t offset;
     std::int32_t boxes;
   };
-  /// The step to unwrapped cell number c; false where there is no such cell, beyond a wall or an open end.
+  /// The step to unwrapped cell number c; false if this cell does not exist because it is beyond a wall or an open end.
   bool step(int axis, std::int32_t c, Step& to) const {
     const bool inside = c >= 0 && c < count_[axis];
     if (!inside && !box_.periodic(axis)) return false;
@@ -152,11 +152,11 @@ class CellGrid {
     return true;
   }
 
-  /// Calls visit(index, boxes) for every stored cell from `low` to `high` (inclusive, by axis), each image for itself;
-  /// `boxes` is how many boxes away the visited cell lies. Cells beyond walls and open ends do not exist.
+  /// Calls visit(index, boxes) for every cell from `low` to `high` (inclusive, by axis) and for each of its images;
+  /// `boxes` is the number of boxes that the visited cell is away. No cells exist beyond walls and open ends.
   template <class Visit>
   void for_each_between(Cell<D> low, Cell<D> high, Visit&& visit) const {
-    std::array<boost::container::small_vector<Step, 4>, D> places;  // of each axis
+    std::array<boost::container::small_vector<Step, 4>, D> places;  // by axis
     for (int k = 0; k < D; ++k) {
       if (!box_.periodic(k)) low[k] = std::max(low[k], 0), high[k] = std::min(high[k], count_[k] - 1);
       for (std::int32_t c = low[k]; c <= high[k]; ++c) {
@@ -172,7 +172,7 @@ class CellGrid {
           for (const Step& r : places[2]) visit(p.offset + q.offset + r.offset, Image<D>{p.boxes, q.boxes, r.boxes});
   }
 
-  /// The same for every stored cell within `range` cells of `centre`.
+  /// Calls visit(index, boxes) for every stored cell within `range` cells of `centre`.
   template <class Visit>
   void for_each_around(const Cell<D>& centre, const Cell<D>& range, Visit&& visit) const {
     Cell<D> low, high;
@@ -194,8 +194,8 @@ class CellGrid {
 
   Box<D> box_;
   Cell<D> count_;
-  std::array<std::vector<std::int32_t>, D> row_;  // by axis and cell, where confined: else the cell's own number
-  Cell<D> rows_{};                                // so many hold something there; one more is empty
+  std::array<std::vector<std::int32_t>, D> row_;  // by axis and cell, if confined; if empty, the cell's own number
+  Cell<D> rows_{};                                // stored rows if confined; one more row is empty
   std::array<std::size_t, D> stride_;
   Vec<D> origin_, edge_, inverse_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Places along a space-filling curve: what is near on it is near in space (Morton).
+// Orders positions along a space-filling curve: neighbours on the curve are close in space (Morton).
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace carom {
 
-/// Interleaves the bits of D numbers: the place on the curve.
+/// Interleaves the bits of D numbers to the index on the curve.
 template <int D>
 std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
   std::uint64_t code = 0;
@@ -20,7 +20,7 @@ std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
   return code;
 }
 
-/// The numbers of n places x(i) in the order of a space-filling curve.
+/// The indices of n positions x(i) in the order of a space-filling curve.
 template <int D, class Place>
 std::vector<std::uint32_t> along_curve(std::size_t n, Place&& x) {
   std::vector<std::uint32_t> order(n);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The spheres of each cell, for dilute systems: cells as small as a diameter, most of them empty, with a list through
-// the spheres of each. A sphere that crosses into another cell looks at the new ones around it.
+// Cells with linked lists of their spheres, for dilute systems: cells as small as a diameter, most of them empty. When
+// a sphere crosses into another cell, only the new cells around it are searched.
 
 #include <utility>
 
@@ -16,7 +16,7 @@ namespace carom {
 struct Candidates {
   std::vector<std::uint32_t> packed = std::vector<std::uint32_t>(64);
   unsigned count = 0;
-  unsigned same = 0;  ///< the first so many are in the same box
+  unsigned same = 0;  ///< the first `same` candidates are in the same box
 };
 
 template <int D>
@@ -24,7 +24,7 @@ class LinkedCells {
  public:
   using Place = CellPlace<D>;
 
-  /// Cells of edge at least `smallest`, for spheres in so many slots.
+  /// Makes cells of edge at least `smallest` for spheres in `slots` slots.
   LinkedCells(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, double smallest,
               const Extent<D>& extent, std::size_t slots)
       : packing_(packing),
@@ -39,7 +39,7 @@ class LinkedCells {
     lay_out();
   }
 
-  /// Before any sphere is inserted: most spheres will stay near these places, and memory for cells elsewhere is saved.
+  /// Call before any sphere is inserted: saves memory if most spheres stay near these positions.
   void confine(std::span<const Vec<D>> places) {
     grid_.confine(places, kCellsAround, D - 1);
     lay_out();
@@ -47,7 +47,7 @@ class LinkedCells {
 
   const CellGrid<D>& grid() const { return grid_; }
 
-  /// The cell of a place in the box.
+  /// The cell of a position.
   Place place(const Vec<D>& x) const {
     Place place{};
     const Cell<D> cell = grid_.cell(x);
@@ -62,7 +62,7 @@ class LinkedCells {
 
   /// Starts to fetch what cross() and searches read of a sphere.
   void prefetch(Slot i) const { prefetch_line(&link_[i]); }
-  /// Starts to fetch the cells of around(), or, where `step` is not 0, of ahead() after a step that is still to come.
+  /// Starts to fetch the cells of around() or, if `step` is not 0, of ahead() after the next step along the axis.
   void prefetch(const Place& place, int axis, int step) const {
     const HeadsTask task = step == 0 ? rows(place, D, 0) : rows_beyond(place, axis, step);
     for (unsigned a = 0; a < task.steps[0]; ++a)
@@ -72,20 +72,20 @@ class LinkedCells {
         prefetch_line(row + 3);
       }
   }
-  /// Starts to fetch the links of the first spheres of these cells, and calls fetch(slot) for the first ones; `found`
-  /// is room to work in.
+  /// Starts to fetch the links of the first spheres of these cells, and calls fetch(slot) for each first sphere.
+  /// `found` is working memory.
   template <class Fetch>
   void prefetch_spheres(const Place& place, int axis, int step, Candidates& found, Fetch&& fetch) const {
     const HeadsTask task = step == 0 ? rows(place, D, 0) : rows_beyond(place, axis, step);
     const unsigned n = kernels_.heads(task, found.packed.data()).count;
     for (unsigned q = 0; q < n; ++q) {
-      const Slot j = packing_.slot(found.packed[q] & ~kMore);
+      const Slot j = packing_.slot(found.packed[q] & ~kMoreInCell);
       fetch(j);
-      if ((found.packed[q] & kMore) != 0) prefetch(j);
+      if ((found.packed[q] & kMoreInCell) != 0) prefetch(j);
     }
   }
 
-  /// The same for a sphere that comes in later.
+  /// Inserts a sphere that enters later.
   void admit(Slot i, const Place& place) {
     if (i >= link_.size()) link_.resize(i + 1);
     for (const std::int32_t b : packing_.image(packing_.pack(0, place.boxes))) widest_ = std::max(widest_, std::abs(b));
@@ -96,7 +96,7 @@ class LinkedCells {
     if (confined_ && !grid_.holds(wrapped(place))) spread();
     std::uint32_t& first = first_[index(place)];
     link_[i] = {first, place.boxes};
-    first = packing_.pack(i, place.boxes) | (first != kEmpty ? kMore : 0);
+    first = packing_.pack(i, place.boxes) | (first != kEmpty ? kMoreInCell : 0);
     mirror(place);
   }
   void remove(Slot i, const Place& place) {
@@ -106,7 +106,7 @@ class LinkedCells {
       at = &link_[packing_.slot(*at)].next;
     }
     *at = link_[i].next;
-    if (before && *at == kEmpty) *before &= ~kMore;
+    if (before && *at == kEmpty) *before &= ~kMoreInCell;
     mirror(place);
   }
 
@@ -117,7 +117,7 @@ class LinkedCells {
     const int to = place.wrapped[axis] + step, count = grid_.count(axis);
     if (to >= 0 && to < count) {
       place.wrapped[axis] = static_cast<std::uint16_t>(to);
-    } else {  // round the periodic box
+    } else {  // through a face of the periodic box
       place.wrapped[axis] = static_cast<std::uint16_t>(to < 0 ? count - 1 : 0);
       const std::int32_t boxes = packing_.image(packing_.pack(0, place.boxes))[axis] + step;
       if (std::abs(boxes) > packing_.largest()) throw_too_far();
@@ -127,7 +127,7 @@ class LinkedCells {
     insert(i, place);
   }
 
-  /// All spheres in the cells that may hold places up to `reach` from those in a sphere's cell, itself among them.
+  /// Finds all spheres in the cells that may hold positions within `reach` of the sphere's cell, the sphere included.
   void find_near(const Place& place, double reach, std::vector<std::uint32_t>& found) const {
     found.clear();
     Cell<D> low, high;
@@ -138,28 +138,28 @@ class LinkedCells {
     }
     collect(low, high, found);
   }
-  /// All spheres in the cells between two corners, as seen from the box that holds the origin.
+  /// Finds all spheres in the cells between two corners, as seen from the box that holds the origin.
   void find_between(const Vec<D>& low, const Vec<D>& high, std::vector<std::uint32_t>& found) const {
     found.clear();
     collect(grid_.cell(low), grid_.cell(high), found);
   }
 
-  /// All spheres in the sphere's cell and those around it, itself among them.
+  /// Finds all spheres in the sphere's cell and in the cells around it, the sphere included.
   void around(Slot self, const Place& place, Candidates& found) const { search(self, place, D, 0, found); }
 
-  /// All spheres in the cells that came into view when the sphere crossed along an axis.
+  /// Finds all spheres in the cells that became neighbours when the sphere crossed along an axis.
   void ahead(Slot self, const Place& place, int axis, int step, Candidates& found) const {
     search(self, place, axis, step, found);
   }
 
  private:
   struct Link {
-    std::uint32_t next;  // the one behind the sphere in its cell, as in first_
-    std::int32_t boxes;  // of its place
+    std::uint32_t next;  // the next sphere in the cell, coded as in first_
+    std::int32_t boxes;  // image of the sphere's cell, as a linear image
   };
-  static constexpr std::uint32_t kMore = std::uint32_t{1} << 31;  ///< beside a sphere: another one is behind it
+  static constexpr std::uint32_t kMoreInCell = std::uint32_t{1} << 31;  ///< flag: another sphere of the cell follows
   static constexpr double kCellsAParticle = 8;
-  static constexpr std::int32_t kCellsAround = 3;  // cells, round those of a part
+  static constexpr std::int32_t kCellsAround = 3;  // margin around the cells of confine()
 
   std::uint32_t shifted(std::int32_t boxes) const { return static_cast<std::uint32_t>(boxes) << packing_.slot_bits; }
 
@@ -174,7 +174,8 @@ class LinkedCells {
     return cell;
   }
 
-  /// Makes empty cells. A row along the last axis has a cell before it and one behind it, and rows are read by four.
+  /// Makes empty cells. A row along the last axis has an extra cell at both ends, and rows are read four cells at a
+  /// time.
   void lay_out() {
     confined_ = false;
     std::ptrdiff_t cells = grid_.count(D - 1) + 2;
@@ -190,7 +191,7 @@ class LinkedCells {
     first_.assign(static_cast<std::size_t>(cells + 3), kEmpty);
   }
 
-  /// A sphere is outside the cells: from now on there are cells everywhere.
+  /// Stores all cells separately from now on, because a sphere is outside the confined cells.
   void spread() {
     const CellGrid<D> before = grid_;
     const auto old_steps = steps_;
@@ -212,7 +213,7 @@ class LinkedCells {
       }
   }
 
-  /// The cells before and behind a periodic row are images of its ends.
+  /// Updates the extra cells at the ends of a periodic row, which are images of its last and first cells.
   void mirror(const Place& place) {
     const int z = place.wrapped[D - 1], last = grid_.count(D - 1) - 1;
     if (!periodic_[D - 1] || (z > 0 && z < last)) return;
@@ -223,10 +224,10 @@ class LinkedCells {
     if (z == last) first_[at - row] = first == kEmpty ? first : first + box;
   }
 
-  /// The cells around a place, or only those a step away along an axis.
+  /// The cells around a cell, or only the cells one step away along an axis.
   HeadsTask rows(const Place& place, int axis, int step) const {
     static constexpr HeadStep kNone{0, 0};
-    const bool in_row = axis == D - 1;  // a cell of each row, not three
+    const bool in_row = axis == D - 1;  // one cell of each row, not three
     HeadsTask task{.first = first_.data() + place.wrapped[D - 1] + (in_row ? 1 + step : 0),
                    .step = {&kNone, &kNone},
                    .steps = {1, 1},
@@ -236,7 +237,7 @@ class LinkedCells {
     for (int k = 0; k < D - 1; ++k) {
       const int here = place.wrapped[k];
       int low = k == axis ? step : -1, high = k == axis ? step : 1;
-      if (!periodic_[k]) {  // no cells beyond walls
+      if (!periodic_[k]) {  // no cells exist beyond walls
         low = std::max(low, -here);
         high = std::min(high, grid_.count(k) - 1 - here);
       }
@@ -245,7 +246,7 @@ class LinkedCells {
     }
     return task;
   }
-  /// Those that a step along an axis will bring into view; none where they are beyond the end of the box.
+  /// The cells that the next step along an axis will make neighbours; none if they are beyond the end of the box.
   HeadsTask rows_beyond(const Place& place, int axis, int step) const {
     const int to = place.wrapped[axis] + 2 * step;
     if (to < -1 || to > grid_.count(axis)) return {};
@@ -257,14 +258,14 @@ class LinkedCells {
     const Heads heads = kernels_.heads(rows(place, axis, step), found.packed.data());
     found.count = heads.count;
     std::uint32_t any = heads.any;
-    if ((any & kMore) != 0) any |= follow(found);
-    const bool elsewhere = (any & ~kMore) >> packing_.slot_bits != 0;
+    if ((any & kMoreInCell) != 0) any |= follow(found);
+    const bool elsewhere = (any & ~kMoreInCell) >> packing_.slot_bits != 0;
     found.same = elsewhere ? 0 : found.count;
     if (elsewhere && 2 * widest_ + 1 > packing_.largest()) check(place, found);
-    std::fill_n(found.packed.data() + found.count, 8, packing_.pack(self, 0));  // follow() may have moved them
+    std::fill_n(found.packed.data() + found.count, 8, packing_.pack(self, 0));  // follow() overwrites padding
   }
 
-  /// Appends all spheres in the cells between two, `at` and `away` being those of the axes before `axis`.
+  /// Appends all spheres in the cells between two corners; `at` and `away` are the sums over the axes before `axis`.
   void collect(const Cell<D>& low, const Cell<D>& high, std::vector<std::uint32_t>& found, int axis = 0,
                std::ptrdiff_t at = 1, std::int32_t away = 0) const {
     const std::int32_t count = grid_.count(axis);
@@ -280,24 +281,24 @@ class LinkedCells {
       }
       std::uint32_t next = first_[static_cast<std::size_t>(cell)];
       while (next != kEmpty) {
-        const Slot j = packing_.slot(next & ~kMore);
+        const Slot j = packing_.slot(next & ~kMoreInCell);
         found.push_back(packing_.pack(j, link_[j].boxes - seen));
-        next = (next & kMore) != 0 ? link_[j].next : kEmpty;
+        next = (next & kMoreInCell) != 0 ? link_[j].next : kEmpty;
       }
     }
   }
 
-  /// Appends those behind the first of their cells.
+  /// Appends the later spheres of all cells whose first sphere has been found.
   std::uint32_t follow(Candidates& found) const {
     std::uint32_t any = 0;
     for (unsigned q = 0; q < found.count; ++q) {
       const std::uint32_t candidate = found.packed[q];
-      if ((candidate & kMore) == 0) continue;
-      found.packed[q] = candidate & ~kMore;
+      if ((candidate & kMoreInCell) == 0) continue;
+      found.packed[q] = candidate & ~kMoreInCell;
       const Slot slot = packing_.slot(candidate);
       // The box that was subtracted from the candidate is subtracted from the next one, too.
       const Link& link = link_[slot];
-      const std::uint32_t box = packing_.pack(slot, link.boxes) - (candidate & ~kMore), next = link.next - box;
+      const std::uint32_t box = packing_.pack(slot, link.boxes) - (candidate & ~kMoreInCell), next = link.next - box;
       any |= next ^ here_;
       if (found.count + 9u > found.packed.size()) found.packed.resize(2 * found.packed.size());
       found.packed[found.count++] = next;
@@ -305,7 +306,7 @@ class LinkedCells {
     return any;
   }
 
-  /// Where spheres have come so far that a difference of boxes may not fit: look at each.
+  /// Checks every candidate, because spheres have moved so many boxes that a difference of images may overflow.
   void check(const Place& place, const Candidates& found) const {
     const Image<D> own = packing_.image(packing_.pack(0, place.boxes));
     for (unsigned q = 0; q < found.count; ++q) {
@@ -319,13 +320,13 @@ class LinkedCells {
   const ScanKernels& kernels_;
   CellGrid<D> grid_;
   std::array<std::vector<HeadStep>, D - 1> steps_;  // to the cells −1 … count along each axis but the last
-  std::int32_t one_[D];                             // a box along each axis, as a linear image
+  std::int32_t one_[D];                             // one box along each axis, as a linear image
   bool periodic_[D];
   bool confined_ = false;
-  // Of each cell, rows along the last axis: a sphere with the boxes of its place, and kMore; or kEmpty.
+  // By cell, in rows along the last axis: the first sphere with the image of its cell, and kMoreInCell; or kEmpty.
   PageVector<std::uint32_t> first_;
   PageVector<Link> link_;    // by slot
-  std::uint32_t here_;       // a candidate in the same box, but for its slot
+  std::uint32_t here_;       // a candidate in the same box, without its slot
   std::int32_t widest_ = 0;  // the farthest box that a sphere has reached
 };
 

@@ -11,8 +11,8 @@
 namespace carom {
 
 namespace {
-constexpr std::size_t kMostListed = 10'000'000,
-                      kMostListedPartners = 200;  // a particle; more come from far too long a step
+constexpr std::size_t kMaxPairs = 10'000'000,
+                      kMaxPairsPerParticle = 200;  // per particle; only far too long a step gives more
 
 double mean(const std::vector<double>& of) {
   return std::accumulate(of.begin(), of.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, of.size()));
@@ -31,7 +31,7 @@ std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>
                                                           double margin) {
   const bool known = built_at_.size() == x.size(), still = x.data() == x_new.data();
   std::vector<Image<D>> crossed;
-  double squared_from_build = 0, squared_step = 0;  // the largest distances: two bounds for all
+  double squared_from_build = 0, squared_step = 0;  // the largest over all particles
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (known) {
       follow_wrap(static_cast<Id>(i), x, crossed);
@@ -42,13 +42,13 @@ std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>
     squared_step = std::max(squared_step, (x_new[i] - x[i]).squaredNorm());
   }
   if (!crossed.empty())
-    for (auto& pair : pairs_)  // the images of two particles all change by as much: their order stays
+    for (auto& pair : pairs_)  // all images of a pair change by the same number: the order is kept
       for (int k = 0; k < D; ++k) pair.image[k] += crossed[pair.i][k] - crossed[pair.j][k];
   const double step = std::sqrt(squared_step) + margin, from_build = std::sqrt(squared_from_build);
   if (!skin_.lasts(known, from_build, step, margin)) {
     skin_.renew(box_, step, [] { return std::string("a particle"); });
     if (build(x)) return pairs_;
-    skin_.begin(2 * step);  // no room for more
+    skin_.begin(2 * step);  // too many pairs with a wider skin
     if (build(x)) return pairs_;
     skin_.begin(0);
     built_at_.clear();
@@ -68,7 +68,8 @@ const Partners& NeighbourList<D>::partners() {
   return partners_;
 }
 
-/// Where particle i has been wrapped since the last time: notes it and moves its position at the build along.
+/// Detects whether particle i was wrapped since the last call: stores the jump and moves its position at the build
+/// along.
 template <int D>
 void NeighbourList<D>::follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<Image<D>>& crossed) {
   const Image<D> jump = box_.nearest_image(x[i] - built_at_[i]);
@@ -78,7 +79,7 @@ void NeighbourList<D>::follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<
   built_at_[i] -= box_.shift(jump);
 }
 
-/// False where there are far too many pairs.
+/// Returns false if there are far too many pairs.
 template <int D>
 bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
   for (std::size_t i = 0; i < x.size(); ++i)
@@ -101,7 +102,7 @@ bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
       if (d.squaredNorm() <= reach * reach) pairs_.push_back({i, j, image});
     });
     std::sort(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end());
-    if (pairs_.size() > kMostListed + kMostListedPartners * x.size()) return false;
+    if (pairs_.size() > kMaxPairs + kMaxPairsPerParticle * x.size()) return false;
   }
   return true;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A Verlet list: the pairs that come within reach while no particle moves far.
+// A Verlet list: the pairs that can come within reach while no particle moves far.
 //
-// The list is built from a cell grid with a skin and rebuilt when a particle has moved more than half of it. Pairs are
-// held in the order (lower id, higher id, image), so that loops over the list go in id order whatever the skin: a
-// wider list only adds pairs that are out of reach. A pair may stand there with several images where a periodic box is
-// small. (Verlet, Phys. Rev. 159 (1967) 98.)
+// The list is built from a cell grid with a skin and rebuilt when a particle has moved more than half of the skin.
+// Pairs are sorted by (lower id, higher id, image), so that loops over the list have the same order for any skin: a
+// wider skin only adds pairs that are out of reach. A pair can occur with several images if a periodic box is small.
+// (Verlet, Phys. Rev. 159 (1967) 98.)
 
 #include <span>
 #include <vector>
@@ -17,7 +17,7 @@
 
 namespace carom {
 
-/// Particles i < j; x[i] − x[j] + shift(image) is the pair's separation.
+/// A pair of particles i < j; their separation is x[i] − x[j] + shift(image).
 template <int D>
 struct NeighbourPair {
   Id i, j;
@@ -28,18 +28,17 @@ struct NeighbourPair {
 template <int D>
 class NeighbourList {
  public:
-  /// Lists pairs (i, j) that can come as near as reach(i) + reach(j). `without`: not those with a lower particle that
-  /// is marked there; it outlives the list, and empty: all.
+  /// Lists pairs (i, j) that can come as near as reach(i) + reach(j), except those pairs whose lower particle is marked
+  /// in `without`, which must outlive the list; if it is empty, all pairs are listed.
   NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without = {});
 
-  /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them
-  /// (arcs that deviate no farther from x than `margin` besides the straight displacement). Rebuilds where
-  /// needed. Throws Error(Failure::numerical) for steps of several edges of a periodic box, and with far too many
-  /// pairs.
+  /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them (arcs
+  /// that deviate from x by at most `margin` more than the straight displacement). Rebuilds the list if needed. Throws
+  /// Error(Failure::numerical) for steps of several edges of a periodic box, and for far too many pairs.
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new, double margin = 0);
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, double margin = 0) { return cover(x, x, margin); }
 
-  /// For each particle its partners among the pairs that cover() gave last, and where they stand there.
+  /// The partners of each particle in the pairs that cover() returned last, with the indices of the pairs.
   const Partners& partners();
 
   std::uint64_t rebuilds() const { return rebuilds_; }
@@ -54,7 +53,7 @@ class NeighbourList {
   Skin skin_;
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
   std::vector<NeighbourPair<D>> pairs_;
-  Partners partners_;  // empty: not used since the last build
+  Partners partners_;  // empty if not used since the last build
   std::uint64_t rebuilds_ = 0;
 };
 

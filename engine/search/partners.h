@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// From a list of pairs to the pairs of each particle.
+// Converts a list of pairs to the partners of each particle.
 
 #include <array>
 #include <span>
@@ -10,8 +10,8 @@
 
 namespace carom {
 
-/// For each particle its partners in a list of pairs, and where in the list they stand. Pairs come with i < j in
-/// ascending order; partners are then in the order of their ids too.
+/// The partners of each particle in a list of pairs, with the indices of the pairs. Pairs must have i < j and be in
+/// ascending order; partners are then in the order of their ids, too.
 class Partners {
  public:
   struct Partner {
@@ -22,10 +22,10 @@ class Partners {
   bool empty() const { return start_.empty(); }
   void clear() { start_.clear(); }
 
-  /// ids(k) gives the two ids of pair k.
+  /// ids(k) returns the two ids of pair k.
   template <class Ids>
   void build(std::size_t particles, std::size_t pairs, Ids&& ids) {
-    start_.assign(particles + 2, 0);  // while filling, start_[i + 1] is where the next partner of i goes
+    start_.assign(particles + 2, 0);  // while filling, start_[i + 1] is the index of i's next partner
     for (std::size_t k = 0; k < pairs; ++k)
       for (const Id id : ids(k)) ++start_[id + 2];
     for (std::size_t i = 0; i < particles; ++i) start_[i + 2] += start_[i + 1];

@@ -8,9 +8,9 @@
 namespace carom {
 namespace {
 
-constexpr double kPlaces = 1024;              // to a cell, along each axis
-constexpr double kMembers = 4;                // of a cell, at least: fewer would waste its line
-constexpr std::int32_t kCellsAroundPart = 2;  // cells, round those of a part
+constexpr double kPositionsPerCell = 1024;    // positions within a cell along each axis
+constexpr double kSpheresPerCell = 4;         // spheres per cell, at least: fewer would waste its line
+constexpr std::int32_t kCellsAroundPart = 2;  // margin around the cells of confine()
 
 }  // namespace
 
@@ -26,13 +26,13 @@ template <int D>
 double RegionCells<D>::edge(const Box<D>& box, const Extent<D>& extent, double spheres, double reach) {
   double volume = 1;
   for (int k = 0; k < D; ++k) volume *= box.bounded(k) ? box.edges[k] : extent.high[k] - extent.low[k];
-  return std::max(rounded(reach), elementary::pow(kMembers * volume / std::max(spheres, 1.0), 1.0 / D));
+  return std::max(rounded(reach), elementary::pow(kSpheresPerCell * volume / std::max(spheres, 1.0), 1.0 / D));
 }
 
-/// With room for places that are rounded: two of them may come out nearer or farther by one in each direction.
+/// Adds a margin for rounded positions: each of two can be off by one unit along each axis.
 template <int D>
 double RegionCells<D>::rounded(double reach) {
-  return reach * (1 + 2 * std::sqrt(D) / kPlaces);
+  return reach * (1 + 2 * std::sqrt(D) / kPositionsPerCell);
 }
 
 template <int D>
@@ -63,7 +63,7 @@ void RegionCells<D>::clear() {
     const std::int32_t unit = 1 << (packing_.field_bits * k), count = grid_.count(k);
     for (std::int32_t c = -margin_; c < count + margin_; ++c) {
       typename CellGrid<D>::Step step{0, 0};
-      grid_.step(k, c, step);  // leads nowhere beyond walls: not used there
+      grid_.step(k, c, step);  // invalid beyond walls: never used there
       widest_ = std::max(widest_, std::abs(step.boxes));
       steps_[k].push_back({static_cast<std::uint32_t>(step.offset), step.boxes * unit});
     }
@@ -78,7 +78,7 @@ const typename RegionCells<D>::Located& RegionCells<D>::locate(const Vec<D>& x) 
   located_.boxes = grid_.boxes(cell);
   for (int k = 0; k < D; ++k) {
     const double within = (x[k] - grid_.face(k, cell[k])) * grid_.inverse_edge(k);
-    located_.place[k] = static_cast<std::int32_t>(std::clamp(within * kPlaces, 0.0, kPlaces - 1));
+    located_.place[k] = static_cast<std::int32_t>(std::clamp(within * kPositionsPerCell, 0.0, kPositionsPerCell - 1));
   }
   return located_;
 }
@@ -143,10 +143,10 @@ typename RegionCells<D>::Found RegionCells<D>::find(const Vec<D>& x, double reac
   task.next = next_.data();
   const double most = rounded(reach);
   double rounding = 0;
-  std::size_t cells = 1, images = 1;  // images: how often a cell may be seen
+  std::size_t cells = 1, images = 1;  // images: how often a cell may be visited
   for (int k = 0; k < D; ++k) {
     const std::int32_t count = grid_.count(k), here = cell[k] - boxes[k] * count;
-    const double edge = grid_.edge(k), scale = edge / kPlaces;
+    const double edge = grid_.edge(k), scale = edge / kPositionsPerCell;
     task.scale[k] = static_cast<float>(scale);
     rounding += scale * scale;
     const std::int32_t range = most <= edge ? 1 : static_cast<std::int32_t>(std::ceil(most / edge));
@@ -155,11 +155,12 @@ typename RegionCells<D>::Found RegionCells<D>::find(const Vec<D>& x, double reac
     const CellStep* step = steps_[k].data() + here + low + margin_;
     auto& views = views_[k];
     views.resize(static_cast<std::size_t>(high - low) + 1);
-    float corner = static_cast<float>(low * static_cast<std::int32_t>(kPlaces) - place[k]);
+    float corner = static_cast<float>(low * static_cast<std::int32_t>(kPositionsPerCell) - place[k]);
     for (CellView& view : views) {
-      const float gap = std::max(std::max(corner - 1, -corner - static_cast<float>(kPlaces)), 0.0f) * task.scale[k];
+      const float gap =
+          std::max(std::max(corner - 1, -corner - static_cast<float>(kPositionsPerCell)), 0.0f) * task.scale[k];
       view = {*step++, corner * task.scale[k], gap * gap};
-      corner += static_cast<float>(kPlaces);
+      corner += static_cast<float>(kPositionsPerCell);
     }
     task.view[k] = views.data();
     task.views[k] = static_cast<unsigned>(views.size());
@@ -169,7 +170,7 @@ typename RegionCells<D>::Found RegionCells<D>::find(const Vec<D>& x, double reac
   if constexpr (D == 2) task.view[2] = &kHere, task.views[2] = 1;
   const double limit = (reach + std::sqrt(rounding)) * (1 + 1e-5);
   task.limit_squared = static_cast<float>(limit * limit);
-  // Lines beyond the first of their cells may all be here.
+  // Additional lines of crowded cells may all be visited.
   const std::size_t room = 8 * (cells + (lines_.size() - grid_.cells()) * images);
   if (slots_.size() < room) slots_.resize(2 * room), away_.resize(2 * room);
   const unsigned n = kernels_.near(task, slots_.data(), away_.data());

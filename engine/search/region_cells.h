@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The cells of skin_lists.h for spheres of similar size: in which the centres of their regions stand, and which are
-// near a place.
+// The cells of skin_lists.h for spheres of similar size: they store the centres of the spheres' regions and find the
+// centres near a position.
 //
-// A cell has a cache line for eight spheres, with their places in ten bits an axis, and further lines where it holds
-// more. Places are rounded down, so that all spheres within a distance are found, and some that are a little farther.
+// A cell has a cache line for eight spheres, with positions of ten bits per axis, and further lines if it holds more.
+// Positions are rounded down; find() returns all spheres within a distance and some that are a little farther.
 
 #include <limits>
 #include <span>
@@ -20,30 +20,31 @@ namespace carom {
 template <int D>
 class RegionCells {
  public:
-  /// For about so many spheres in the whole system, that see each other within `reach`; no find() will look farther
-  /// than `farthest`. clear() before anything else but confine().
+  /// For about `spheres` spheres in the whole system with interaction range `reach`; `farthest` is the largest reach of
+  /// find(). Call clear() before any other function except confine().
   RegionCells(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, const Extent<D>& extent,
               double spheres, double reach, double farthest);
 
-  /// Only cells close to these places are stored: see insert().
+  /// Stores only cells close to these positions: see insert().
   void confine(std::span<const Vec<D>> places);
-  /// Takes confine() back. Returns the spheres in the cells, which are empty now.
+  /// Undoes confine() and empties all cells. Returns the spheres that were in them.
   std::vector<Slot> spread();
   /// Empties all cells.
   void clear();
-  /// Boxes that find() looks away from the cell of a place at most.
+  /// The largest number of boxes between a position's cell and the cells that find() reads.
   std::int32_t widest() const { return widest_; }
 
-  /// Puts a sphere into the cell of a place, which lies in `boxes`; false: that cell is not stored, spread() first.
+  /// Inserts a sphere into the cell of a position, which is in box `boxes`; returns false if this cell is not stored:
+  /// call spread() first.
   bool insert(Slot i, const Vec<D>& x, Image<D>& boxes);
   void remove(Slot i, const Vec<D>& x);
 
   struct Found {
     std::span<const Slot> slots;
-    const std::int32_t* away;  ///< of each: the boxes its cell is away from that of the place, as a linear image
-    std::int32_t boxes;        ///< in which the latter lies
+    const std::int32_t* away;  ///< by sphere: the boxes between its cell and the position's, as a linear image
+    std::int32_t boxes;        ///< the box of the position, as a linear image
   };
-  /// The spheres within a distance of x; each image for itself. Good until the next call.
+  /// The spheres within a distance of x, once for each image. Valid until the next call.
   Found find(const Vec<D>& x, double reach);
 
  private:
@@ -64,10 +65,10 @@ class RegionCells {
   PageVector<CellLine> lines_;
   std::vector<std::uint32_t> next_;  // by line
   std::uint32_t free_ = kEmpty;
-  std::int32_t margin_ = 1;                     // cells that the farthest reach extends beyond one's own
+  std::int32_t margin_ = 1;                     // cells by which the farthest reach extends beyond a sphere's own
   std::array<std::vector<CellStep>, D> steps_;  // by axis: to the cells −margin … count + margin
   std::int32_t widest_ = 0;
-  Located located_;  // the last place: a sphere is inserted, and what is near it found
+  Located located_;  // the last position: it is used to insert a sphere and then to find its neighbours
 
   std::array<std::vector<CellView>, D> views_;
   std::vector<Slot> slots_;

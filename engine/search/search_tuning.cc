@@ -11,17 +11,17 @@ namespace carom {
 namespace {
 
 // Instructions, as callgrind counts them.
-constexpr double kPrediction = 400, kCandidate = 32;        // on a list
-constexpr double kRenewal = 4500;                           // of a list
-constexpr double kCellHead = 9, kCellCandidate = 60;        // a prediction on cells: for each cell and each candidate
-constexpr double kCrossing = 550;                           // into another cell, beside the cells and candidates ahead
-constexpr double kFewestPredictions = 20000;                // before counts are trusted
+constexpr double kPrediction = 400, kCandidate = 32;        // per prediction and per candidate on a list
+constexpr double kRenewal = 4500;                           // per renewal of a list
+constexpr double kCellHead = 9, kCellCandidate = 60;        // per prediction on cells: for each cell and each candidate
+constexpr double kCrossing = 550;                           // per crossing, without new cells and candidates
+constexpr double kFewestPredictions = 20000;                // before counts are used
 constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02;  // in mean diameters
 
-/// Packing fraction from which on lists are faster, as measured for equal spheres and discs.
+/// The packing fraction above which lists are faster, as measured for equal spheres and discs.
 double dense(int dimension) { return dimension == 2 ? 0.55 : 0.32; }
 
-/// The edge of cells that costs least: small ones are crossed often, large ones hold many candidates.
+/// The cheapest edge of cells: small cells are crossed often, large ones hold many candidates.
 double best_cell(const SearchSituation& s) {
   const double around = s.dimension == 2 ? 9 : 27, ahead = around / 3;
   double best = s.largest, least = std::numeric_limits<double>::infinity();
@@ -38,7 +38,7 @@ double best_cell(const SearchSituation& s) {
 
 }  // namespace
 
-// With the contact values of Henderson and of Carnahan and Starling.
+// Uses the contact values of Henderson and of Carnahan and Starling.
 double contacts_a_length(const SearchSituation& s) {
   const double filled = std::min(s.filled, 0.8), empty = 1 - filled;
   const double contact_value =
@@ -82,10 +82,10 @@ void SearchTuning::choose(const SearchSituation& situation, const EventCounts& c
     const auto rebuilds = static_cast<double>(counts.rebuilds - before_.rebuilds);
     if (lists_ && options_.skin == 0) adapt_skin(situation, predictions, candidates, rebuilds);
     if (options_.method == SearchOptions::Method::automatic && !lists_ && candidates > 40 * predictions)
-      lists_ = true;  // crowded somewhere: cells hold too many
+      lists_ = true;  // a crowded region: its cells hold too many spheres
     before_ = counts;
   }
-  // What cells and regions must be able to hold, whatever was chosen.
+  // The smallest cell that cells and regions allow in any case.
   cell_ = std::max(cell_, situation.largest);
 }
 
@@ -94,14 +94,14 @@ void SearchTuning::choose_first(const SearchSituation& s) {
   lists_ = options_.method == SearchOptions::Method::automatic
                ? s.filled > dense(s.dimension) || s.largest > 1.0001 * s.mean
                : options_.method == SearchOptions::Method::lists;
-  // The room that spheres have beside a close packing of theirs, about.
+  // The approximate space that each sphere has beyond close packing.
   const double room = s.mean * (elementary::pow(0.74 / std::clamp(s.filled, 0.01, 0.73), 1.0 / s.dimension) - 1);
   skin_ = options_.skin > 0 ? options_.skin : std::clamp(2 * room, 0.1 * s.mean, 0.4 * s.mean);
   cell_ = options_.cell > 0 ? options_.cell : best_cell(s);
 }
 
-/// Scales the skin to where predictions, which grow with the candidates, and renewals cost least together. Regions are
-/// left at a rate between that of free flight (1/skin) and that of diffusion (1/skin²).
+/// Scales the skin to the lowest sum of the costs of predictions, which increase with the candidates, and of renewals.
+/// The rate of renewals is between that of free flight (∝ 1/skin) and that of diffusion (∝ 1/skin²).
 void SearchTuning::adapt_skin(const SearchSituation& s, double predictions, double candidates, double rebuilds) {
   const double now = s.largest + 2 * skin_;
   double best = skin_, least = std::numeric_limits<double>::infinity();

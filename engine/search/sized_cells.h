@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Cells for particles of very different sizes: a grid for each factor of two in reach, because cells for the largest
-// would hold thousands of small ones. Built for correctness in any box; the event core has faster cells of its own.
+// Cells for particles of very different sizes: one grid for each factor of two in reach, because cells for the largest
+// particle would hold thousands of small ones. They are correct in any box; the event core has faster cells.
 
 #include <algorithm>
 #include <array>
@@ -18,8 +18,8 @@ namespace carom {
 template <int D>
 class SizedCells {
  public:
-  /// Two particles are near each other within the sum of their reaches and `skin` [length]. `extent`: of their
-  /// positions; it matters along open axes. The cells are empty at first.
+  /// Two particles are neighbours if their distance is at most the sum of their reaches and `skin` [length]. `extent`
+  /// has the bounds of the positions, which matter along open axes. The cells are empty at first.
   SizedCells(const Box<D>& box, std::span<const double> reach, const Extent<D>& extent, double skin = 0)
       : skin_(skin), largest_(reach.empty() ? 0 : *std::ranges::max_element(reach)), places_(reach.size()) {
     std::array<std::size_t, kOctaves> members{};
@@ -44,27 +44,27 @@ class SizedCells {
     places_[i] = {std::exchange(first, i), level.grid.boxes(cell)};
   }
 
-  /// Calls visit(j, image) for every particle j in the cells (the one at `x` among them) with an image that may touch
-  /// one of this reach at x: that image stands at x_j − shift(image).
+  /// Calls visit(j, image) for every particle j in the cells (including a particle at x) whose image at x_j −
+  /// shift(image) may touch a particle with this reach at x.
   template <class Visit>
   void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
     for (const Level& level : levels_) look_into(level, x, reach + level.largest + skin_, visit);
   }
 
  private:
-  static constexpr std::size_t kOctaves = 8;  // the last holds all that is smaller
-  static constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
-  static constexpr double kLargestNumber = 1 << 28;  // what a cell number can hold
+  static constexpr std::size_t kOctaves = 8;  // the last one holds all smaller particles
+  static constexpr std::uint32_t kNoParticle = std::numeric_limits<std::uint32_t>::max();
+  static constexpr double kLargestNumber = 1 << 28;  // the largest number of cells in a range
 
   struct Level {
-    Level(double reach, const CellGrid<D>& cells) : largest(reach), grid(cells), first(cells.cells(), kNobody) {}
+    Level(double reach, const CellGrid<D>& cells) : largest(reach), grid(cells), first(cells.cells(), kNoParticle) {}
     double largest;
     CellGrid<D> grid;
-    std::vector<std::uint32_t> first;  // of each cell
+    std::vector<std::uint32_t> first;  // by cell
   };
   struct Place {
     std::uint32_t next;  // in the cell
-    Image<D> boxes;      // from the box that holds the origin
+    Image<D> boxes;      // relative to the box that holds the origin
   };
 
   std::size_t octave(double reach) const {
@@ -84,17 +84,17 @@ class SizedCells {
       row[k] = centre[k] - range[k];
       inside = inside && row[k] >= 0 && centre[k] < grid.count(k) - range[k];
     }
-    if (inside) {  // no images, and the cells of a row stand together
+    if (inside) {  // no images, and the cells of a row are contiguous
       const auto length = 2 * static_cast<std::size_t>(range[D - 1]) + 1;
       do {
         const std::uint32_t* const first = level.first.data() + grid.index(row);
         for (const std::uint32_t* cell = first; cell < first + length; ++cell)
-          for (std::uint32_t j = *cell; j != kNobody; j = places_[j].next) visit(j, places_[j].boxes);
+          for (std::uint32_t j = *cell; j != kNoParticle; j = places_[j].next) visit(j, places_[j].boxes);
       } while (next_row(row, centre, range));
       return;
     }
     grid.for_each_around(centre, range, [&](std::size_t cell, const Image<D>& away) {
-      for (std::uint32_t j = level.first[cell]; j != kNobody; j = places_[j].next) {
+      for (std::uint32_t j = level.first[cell]; j != kNoParticle; j = places_[j].next) {
         Image<D> image = places_[j].boxes;
         for (int k = 0; k < D; ++k) image[k] -= away[k];
         visit(j, image);
@@ -102,7 +102,7 @@ class SizedCells {
     });
   }
 
-  /// Moves on to the next row within `range` of the centre; false after the last.
+  /// Moves to the next row within `range` of the centre; returns false after the last row.
   static bool next_row(Cell<D>& row, const Cell<D>& centre, const Cell<D>& range) {
     for (int k = D - 2; k >= 0; --k) {
       if (++row[k] <= centre[k] + range[k]) return true;
@@ -113,7 +113,7 @@ class SizedCells {
 
   double skin_, largest_;
   std::vector<Level> levels_;
-  std::array<std::size_t, kOctaves> level_;  // of an octave
+  std::array<std::size_t, kOctaves> level_;  // by octave
   std::vector<Place> places_;                // by particle
 };
 

@@ -33,11 +33,11 @@ std::uint8_t SkinLists<D>::octave(double largest, double radius) {
 template <int D>
 void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place, const Extent<D>& extent,
                          double max_displacement) {
-  // 1. Cells for each size.
+  // 1. Make the cells for each size.
   levels_.clear();
   widest_ = 0;
   const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
-  std::vector<Vec<D>> places;  // where these are a part of the system
+  std::vector<Vec<D>> places;  // empty if this is the whole system
   if (n < extent.particles)
     for (Slot i = 0; i < n; ++i) places.push_back(place(i));
   for (std::size_t l = 0; l < levels; ++l) {
@@ -55,14 +55,14 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
     cells.clear();
     widen(cells.widest());
   }
-  // 2. Every sphere into a cell.
+  // 2. Insert every sphere into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const Vec<D> x = place(static_cast<Slot>(i));
     for (int k = 0; k < D; ++k) next_events_[i].where.centre[k] = x[k];
     insert(static_cast<Slot>(i), x);
   }
-  // 3. Lists.
+  // 3. Make the lists.
   lists_.clear(n);
   for (Slot i = 0; i < n; ++i) {
     next_events_[i].capacity = 0;
@@ -80,7 +80,7 @@ template <int D>
 void SkinLists<D>::insert(Slot i, const Vec<D>& x) {
   RegionCells<D>& cells = levels_[level_of(i)].cells;
   Image<D> boxes;
-  if (!cells.insert(i, x, boxes)) {  // from now on there are cells everywhere
+  if (!cells.insert(i, x, boxes)) {  // all cells are stored from now on
     for (const Slot j : cells.spread()) insert(j, centre(j));
     widen(cells.widest());
     cells.insert(i, x, boxes);
@@ -90,7 +90,7 @@ void SkinLists<D>::insert(Slot i, const Vec<D>& x) {
     if (std::abs(b) > widest_) widen(std::abs(b));
 }
 
-/// The candidates of a sphere at x; good until the next call.
+/// The candidates of a sphere at x; valid until the next call.
 template <int D>
 std::span<const std::uint32_t> SkinLists<D>::surround(Slot i, const Vec<D>& x, double max_displacement) {
   unsigned found = 0;
@@ -136,7 +136,7 @@ std::span<const std::uint32_t> SkinLists<D>::renew(Slot i, const Vec<D>& x) {
   kept_.assign(a.count / 64 + 1u, 0);
   const std::uint32_t* const list = candidates(a);
   const unsigned fresh = kernels_.compare(list, a.count, found.data(), n, fresh_.data(), kept_.data());
-  for (unsigned q = a.count; q-- > 0;) {  // from the end: the one that moves up has been looked at
+  for (unsigned q = a.count; q-- > 0;) {  // from the end: the entry that moves to q has been checked
     if ((kept_[q / 64] >> (q % 64) & 1) != 0) continue;
     lists_.drop(packing_.slot(list[q]), packing_.reversed(i, list[q]));
     lists_.remove(i, q);
@@ -149,7 +149,7 @@ std::span<const std::uint32_t> SkinLists<D>::renew(Slot i, const Vec<D>& x) {
   return {fresh_.data(), fresh};
 }
 
-/// The sphere has been carried by so many boxes: its region goes with it, and the images in the lists follow.
+/// A sphere was moved by `boxes` boxes: moves its region along and corrects the images in the lists.
 template <int D>
 void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
   NextEvent<D>& a = next_events_[i];
@@ -197,7 +197,7 @@ void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> radius
   if (i == boxes_.size()) boxes_.push_back(0);
   if (!equal_) {
     if (i == level_.size()) level_.push_back(0);
-    // The smallest level that can hold it: there may be none of its octave.
+    // The smallest level that can hold the sphere: its octave may have none.
     const auto level =
         std::find_if(levels_.rbegin(), levels_.rend(), [&](const Level& l) { return l.largest_radius >= radius[i]; });
     level_[i] = static_cast<std::uint8_t>(levels_.rend() - level - 1);

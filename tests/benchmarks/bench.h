@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The program carom_bench: how fast the event core is on this machine, and the loops over pairs of particles.
+// The program carom_bench measures the speed of the event core and of the loops over pairs on this machine.
 //
 //   carom_bench --n 10000 --packing-fraction 0.49       bench_events(): collisions a second
 //   carom_bench --forces --potential yukawa             bench_forces(): pairs a second, steps a second
@@ -26,19 +26,19 @@ constexpr std::uint64_t kSeed = 20240117;
 struct Options {
   bool forces = false;           ///< measure forces instead of the event core
   std::vector<std::uint64_t> n;  ///< empty: see sizes()
-  std::uint64_t repeat = 3;      ///< measurements of a state, one after the other
-  std::filesystem::path json;    ///< all results, for scripts; empty: none
+  std::uint64_t repeat = 3;      ///< measurements of each state
+  std::filesystem::path json;    ///< file for all results; empty: none
 
   // Without `forces`:
   std::vector<double> packing_fraction{0.10, 0.30, 0.49};
   int dimension = 3;
   std::uint64_t equilibrate = 3;       ///< epochs of forty mean free times before
-  std::uint64_t collisions = 1000000;  ///< of a measurement, at least: whole epochs are measured
+  std::uint64_t collisions = 1000000;  ///< of a measurement, at least; whole epochs are measured
 
   // With `forces`:
-  std::vector<std::string> potential;  ///< these of bench_potentials(); empty: all
+  std::vector<std::string> potential;  ///< a part of bench_potentials(); empty: all
   std::string kind;                    ///< "forces" or "mean forces"; empty: both
-  std::uint64_t pairs = 20000000;      ///< of a measurement, at least: whole passes are measured
+  std::uint64_t pairs = 20000000;      ///< of a measurement, at least; whole passes are measured
   std::uint64_t steps = 200;           ///< of a measurement of the melt; 0: none
 
   std::vector<std::uint64_t> sizes() const {
@@ -48,24 +48,24 @@ struct Options {
   }
 };
 
-/// The event core: periodic fluids of hard spheres, run by the free-flight integrator epoch after epoch as a run does
-/// it, first to equilibrate and then, a number of times, to measure. The observables of a run (energies, overlaps,
-/// files) are not in the figures.
+/// The event core: periodic fluids of hard spheres, run by the free-flight integrator in epochs as in a normal run,
+/// first to equilibrate and then, several times, to measure. The observables of a run (energies, overlaps, files) are
+/// not measured.
 void bench_events(const Options& options);
 
 /// The potentials that bench_forces() measures.
 std::vector<std::string> bench_potentials();
 
-/// The loops over pairs: whole passes as a run makes them, from a Verlet list that is there already, over the pairs
-/// within the cutoff; then the velocity Verlet integrator in a Simulation that computes the energy after each step and
-/// makes new lists when they are due. No files are written.
+/// The loops over pairs: whole passes as in a run, over the pairs within the cutoff from an existing Verlet list; then
+/// the velocity Verlet integrator in a Simulation that computes the energy after each step and makes new lists when
+/// they are due. No files are written.
 void bench_forces(const Options& options);
 
 /// A deck from its text. Throws Error(Failure::deck).
 Deck deck_of(const std::string& text);
 
-/// Calls `work`; returns its wall time [s]. What is measured is done in here: tools/count-instructions counts the
-/// instructions of this function alone, by its name.
+/// Calls `work`; returns its wall time [s]. All measured work is called here: tools/count-instructions counts the
+/// instructions of this function by its name.
 double timed(const std::function<void()>& work);
 
 /// Prints at once. Throws Error(Failure::file).

@@ -17,9 +17,9 @@
 namespace carom::bench {
 namespace {
 
-constexpr std::uint64_t kWarmUp = 2;  // epochs of the measured core before it is measured
+constexpr std::uint64_t kWarmUp = 2;  // epochs of the measured core before the measurement
 
-/// A size in the table of /proc/self/status [bytes]; nothing where there is no such table.
+/// A size in the table of /proc/self/status [bytes]; nothing if there is no such table.
 std::optional<double> process_memory(const std::string& name) {
   std::ifstream status("/proc/self/status");
   for (std::string word; status >> word;)
@@ -27,8 +27,8 @@ std::optional<double> process_memory(const std::string& name) {
   return {};
 }
 
-/// The peak of resident memory above what was resident at its making [bytes]. Linux resets the earlier peak on request
-/// (proc(5), clear_refs); where it does not, there is no answer.
+/// The peak of resident memory above the resident memory at construction [bytes]. Linux resets the earlier peak on
+/// request (proc(5), clear_refs); otherwise there is no result.
 class PeakMemory {
  public:
   PeakMemory() {
@@ -53,7 +53,7 @@ class PeakMemory {
   std::optional<double> before_;
 };
 
-/// What a stretch of a run has covered.
+/// The measured part of a run.
 struct Stretch {
   std::uint64_t collisions = 0;
   double time = 0;
@@ -88,7 +88,7 @@ class Flow {
     return done;
   }
 
-  /// Gives the system away; nothing else may be called any more.
+  /// Returns the system; no other function may be called afterwards.
   std::unique_ptr<System<D>> release() { return std::move(system_); }
   const System<D>& system() const { return *system_; }
   const Counters& counters() const { return counters_; }
@@ -116,9 +116,9 @@ double compressibility(const System<D>& system, double virial, double time) {
 }
 
 /// `n` spheres of diameter 1 and mass 1 at temperature 1 on a lattice in the periodic box of this packing fraction: the
-/// simple cubic (2-D: square) lattice where it holds them, since that is unstable and melts at once, else the
-/// face-centred (hexagonal) one, which takes hundreds of collisions a particle to melt near freezing. The box is a cube
-/// (square), but for hexagonal lattices only near one. Throws Error(Failure::initial_state) where spheres overlap.
+/// simple cubic (2-D: square) lattice if it fits, because it is unstable and melts at once, otherwise the face-centred
+/// (hexagonal) one, which takes hundreds of collisions per particle to melt near freezing. The box is a cube (square),
+/// for hexagonal lattices only approximately. Throws Error(Failure::initial_state) if spheres overlap.
 template <int D>
 std::unique_ptr<System<D>> lattice_state(std::uint64_t n, double filled) {
   constexpr const char* text = R"(format = 1
@@ -146,7 +146,7 @@ run = {{ steps = 1 }}
       fmt::format("{} spheres at packing fraction {} overlap on any lattice; lower the packing fraction", n, filled));
 }
 
-/// Equilibrates and measures one state. The core that is measured has not seen the lattice melt, which is hard work.
+/// Equilibrates and measures one state. The measured core did not run during the melting, which is more work.
 template <int D>
 Json measure(std::uint64_t n, double filled, const Options& options) {
   PeakMemory memory;
@@ -236,7 +236,7 @@ std::string row(const Json& point) {
 
 void bench_events(const Options& options) {
   Json points = Json::array();
-  store(options, {{"points", points}});  // a file that cannot be written is better known before an hour of work
+  store(options, {{"points", points}});  // finds a file that cannot be written before an hour of work
   say(heading(options));
   for (const std::uint64_t n : options.sizes())
     for (const double filled : options.packing_fraction) {

@@ -18,9 +18,9 @@ namespace carom::bench {
 namespace {
 
 constexpr double kDensity = 0.8442;
-constexpr double kDisplacement = 0.15;      // of particles from lattice sites, along each axis, at most
+constexpr double kDisplacement = 0.15;      // largest displacement of particles from lattice sites along each axis
 constexpr double kStepDisplacement = 0.01;  // from there to the ends of mean forces
-constexpr std::uint64_t kMelting = 100;     // steps before they are measured
+constexpr std::uint64_t kMelting = 100;     // steps before the measurement
 
 struct Case {
   std::string_view name;
@@ -34,7 +34,7 @@ constexpr Case kCases[] = {
     {"coulomb", "form = \"damped-shifted\"\ndamping = 1.0\ncutoff = 2.5"},
 };
 
-/// An fcc lattice at temperature 1.44; charges +1 and −1 at random, which `coulomb` alone knows.
+/// An fcc lattice at temperature 1.44; random charges +1 and −1, which only `coulomb` uses.
 Deck deck_of(const Case& each, std::uint64_t n, std::uint64_t steps) {
   constexpr const char* text = R"(format = 1
 [system]
@@ -142,7 +142,7 @@ void measure_pairs(const Case& each, std::uint64_t n, const Options& options, co
   }
 }
 
-/// Notes the time whenever a measurement begins or ends.
+/// Stores the time whenever a measurement begins or ends.
 class StepClock final : public Observer<3> {
  public:
   explicit StepClock(std::uint64_t steps) : steps_(steps) {}

@@ -9,8 +9,8 @@
 namespace carom {
 namespace {
 
-/// An epoch of ten mean times between the events of a particle: all are scheduled, then each that is served is
-/// scheduled anew after an exponential time.
+/// An epoch of ten mean times between the events of a particle: all are scheduled, and each that is executed is
+/// scheduled again after an exponentially distributed time.
 void calendar_epoch(benchmark::State& state) {
   const auto n = static_cast<std::uint32_t>(state.range(0));
   constexpr double kHorizon = 10;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Search cells: the cell of a sphere, the spheres near it, and the table of all.
+// Search cells: the cell of a sphere, the spheres near it, and the table of all cells.
 
 #include <benchmark/benchmark.h>
 

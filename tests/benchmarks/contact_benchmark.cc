@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// When do two spheres touch, and what then: the arithmetic of one candidate and of one collision.
+// The arithmetic of one candidate for a contact, and of one collision.
 
 #include <benchmark/benchmark.h>
 
@@ -20,11 +20,11 @@ struct Pair {
   Vec<D> d, v, a;
 };
 
-/// Pairs as a prediction meets them in a fluid: anywhere between contact and `reach` diameters, thermal velocities;
-/// half of them approach, some of those hit.
+/// Pairs as a prediction finds them in a fluid: distances between contact and `reach` diameters, thermal velocities;
+/// half of them approach, some of these collide.
 template <int D>
 std::vector<Pair<D>> pairs(double reach) {
-  constexpr std::size_t kPairs = 4096;  // fits the cache, does not fit the branch predictor
+  constexpr std::size_t kPairs = 4096;  // fits the cache, but not the branch predictor
   std::vector<Pair<D>> all(kPairs);
   for (std::size_t i = 0; i < kPairs; ++i) {
     RandomStream place(1, RandomPurpose::position, static_cast<std::uint32_t>(i));

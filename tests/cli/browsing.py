@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of the page of `carom view` do with a browser: look at it, press keys, click."""
+"""Functions for the tests of the page of `carom view`: they read its pixels, press keys and click."""
 
 import base64
 import contextlib
@@ -19,8 +19,8 @@ BACKGROUND = np.array([20, 22, 26])
 
 
 def picture(browser, selector=".panel canvas", settled=True):
-    """The pixels of the first such element, once everything new is drawn unless `settled` is false. Those of a canvas are read from the
-    page: a screenshot of a page that draws all the time may take longer on a busy machine than the driver waits."""
+    """The pixels of the first such element, after everything new is drawn unless `settled` is false. The pixels of a canvas are read from
+    the page: a screenshot of a page that draws all the time may take longer on a busy machine than the driver waits."""
     from PIL import Image
     from selenium.webdriver.common.by import By
     if settled:
@@ -34,7 +34,7 @@ def picture(browser, selector=".panel canvas", settled=True):
 
 
 def lit(pixels):
-    """The part of the pixels that are not background."""
+    """The fraction of the pixels that are not background."""
     return (abs(pixels - BACKGROUND).max(axis=2) > 40).mean()
 
 
@@ -51,7 +51,7 @@ def label(browser):
     return browser.execute_script("return panels[0].label.textContent")
 
 
-# Where the centre of a sphere is on the page [pixels].
+# The position of a sphere's centre on the page [pixels].
 PLACE = """
 const canvas = panels[0].canvas.getBoundingClientRect(), x = arguments[0], axes = camera.axes(), shift = camera.shift();
 const [right, up, back] = axes.map((axis, k) => axis[0] * x[0] + axis[1] * x[1] + axis[2] * x[2] + shift[k]);

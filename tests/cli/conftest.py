@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def browser():
-    """Chromium without a window, where it is installed (tools/test-packages.txt)."""
+    """Chromium without a window, if it is installed (tools/test-packages.txt)."""
     import browsing  # noqa: F401, finds the tools
     from view_picture import chromium
     missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of bad input share: two decks, changes of them, and what the command says to them."""
+"""Common parts of the tests of bad input: two decks, changes of them, and the messages of the command."""
 
 import subprocess
 
@@ -85,7 +85,7 @@ def table(more):
 
 
 def both(tmp_path, text, code, *parts):
-    """`validate` and `run` refuse this deck alike."""
+    """`validate` and `run` refuse this deck with equal messages."""
     for answer in validate(tmp_path, text), carom("run", "deck.toml", "-o", "out", "--quiet", cwd=tmp_path):
         assert answer.returncode == code, answer.stderr
         for part in parts:

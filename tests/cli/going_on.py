@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of going on share: a run, to take it up again, and to compare it with an undisturbed one."""
+"""Common parts of the tests of continued runs: to run, to continue, and to compare with an undisturbed run."""
 
 import subprocess
 import sys
@@ -13,7 +13,7 @@ from compare import compare, summary_differences
 
 INTERRUPTED = 75
 ALL_OUTPUT = ["output.events=true", "output.rdf_interval=0.07", "output.msd_interval=0.05", "output.profile_interval=0.11"]
-CHECKPOINTS = ["output.checkpoint_wall=\"0\""]  # as many as there are looks at the clock
+CHECKPOINTS = ["output.checkpoint_wall=\"0\""]  # at every check of the clock
 
 
 def go_on(output, arguments=(), code=0, ranks=1, environment=None):
@@ -27,7 +27,7 @@ def go_on(output, arguments=(), code=0, ranks=1, environment=None):
 
 
 def expect_same(whole, continued):
-    """All files of two runs, but what they say of the machine."""
+    """Compares all files of two runs, except what describes the machine."""
     assert compare(whole, continued) + summary_differences(whole, continued) == []
     of_one = {path.name for path in whole.iterdir()}
     assert of_one == {path.name for path in continued.iterdir()} - {"checkpoint.previous.h5"} | (of_one & {"checkpoint.previous.h5"})
@@ -43,7 +43,7 @@ def wait_for_rows(job, output, rows=4):
 
 
 def box(method, dimension, steps, **more):
-    """64 spheres between walls and periodic borders, under forces that the method knows."""
+    """64 spheres between walls and periodic boundaries, with forces that the method handles."""
     free, points = method == "free-flight", method == "verlet"
     field = {"type": "uniform-field", "acceleration": [-0.3] + (dimension - 1) * [0.0]}
     forces = [{"type": "yukawa", "amplitude": 1.0, "kappa": 2.0, "cutoff": 1.9},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of `carom run` share: small decks, ways to start the command, reading what it left."""
+"""Common parts of the tests of `carom run`: small decks, ways to start the command, readers of its files."""
 
 import csv
 import json
@@ -18,14 +18,14 @@ needs_carom = pytest.mark.skipif(not CAROM, reason="needs the command: CAROM=bui
 
 needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler for the library that kills")
 
-# A namespace of its own for mounts, as root or with user namespaces: nothing of it is left behind.
+# A separate namespace for mounts, as root or with user namespaces, which disappears at the end.
 UNSHARE = ["unshare", "-m"] if os.geteuid() == 0 else ["unshare", "-Urm"]
 can_mount = subprocess.run(UNSHARE + ["mount", "-t", "tmpfs", "none", "/mnt"], capture_output=True).returncode == 0
 needs_mount = pytest.mark.skipif(not can_mount, reason="may not mount here (not root, no user namespaces)")
 
 
 def in_mount(options, target, arguments, keep=None):
-    """Runs a command with a tmpfs on `target`; afterwards copies what is there to `keep`."""
+    """Runs a command with a tmpfs on `target`; afterwards copies its contents to `keep`."""
     script = 'mount -t tmpfs -o "$1" none "$2"; keep="$3"; target="$2"; shift 3; "$@"; code=$?; '
     script += 'if [ -n "$keep" ]; then cp -r "$target" "$keep"; fi; exit $code'
     return subprocess.run(UNSHARE + ["sh", "-c", script, "sh", options, str(target), str(keep or ""), *arguments],
@@ -108,7 +108,7 @@ def mpirun(ranks, arguments, code=0, **options):
 
 
 def killer_library(directory):
-    """The library that kills at a change of a file (kill_at_write.c), built."""
+    """Builds the library that kills at a change of a file (kill_at_write.c)."""
     library = directory / "kill_at_write.so"
     subprocess.run(["cc", "-Wall", "-shared", "-fPIC", "-o", str(library), str(ROOT / "tests" / "cli" / "kill_at_write.c")],
                    check=True)
@@ -144,7 +144,7 @@ def thermo(output):
 
 
 def data_sets(path):
-    """Every data set of an HDF5 file, by each of its names (h5py's visititems shows a hard-linked one once only)."""
+    """Every data set of an HDF5 file, by each of its names (h5py's visititems shows a hard-linked one only once)."""
     def members(group, prefix):
         for name, item in group.items():
             if isinstance(item, h5py.Group):
@@ -163,7 +163,7 @@ def same(one, other):
 
 
 def frames_are_sound(output):
-    """Every frame that is in the file is whole and the same as in a run on an empty disk."""
+    """Every frame in the file is complete and equal to that of a run on an empty disk."""
     sets, rows = data_sets(output / "trajectory.h5md"), thermo(output)
     n = len(sets["particles/trajectory/position/value"])
     lengths = {len(v) for k, v in sets.items() if k.split("/")[-1] in ("value", "step", "time")}

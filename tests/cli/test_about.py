@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The manual page and the completions that cmake/about.py makes from what the command says of itself."""
+"""The manual page and the completions that cmake/about.py makes from the command's own descriptions."""
 
 import re
 import subprocess
@@ -20,7 +20,7 @@ def about(tmp_path_factory):
 
 
 def complete(about, *words):
-    """What bash offers for the last word."""
+    """The completions of bash for the last word."""
     script = f'. {about}/carom.bash; compopt() {{ :; }}; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _carom; echo "${{COMPREPLY[*]}}"'
     done = subprocess.run(["bash", "-c", script, "bash", *words], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and not done.stderr, done.stderr

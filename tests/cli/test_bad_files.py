@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the real command on files that decks name, and on decks, that cannot be read or are too much for the machine."""
+"""Runs the real command on files that decks name, and on decks, that cannot be read or are too large for the machine."""
 
 import pytest
 
@@ -39,12 +39,12 @@ def test_positions_file(tmp_path):
     (b"1 1 1\n" + 1000000 * b"\x80\xff", "places.csv:2:1: error: not a position: '" + 20 * "?" + "…' is no finite number"),
     (b"1 1 1\n" + 1000000 * b"1 ", "places.csv:2:1: error: not a position: there are 1000000 numbers"),
     (b"1 1 1\n" + 100000 * b"2 2\n", "places.csv:11:1: error: not a position: there are 2 numbers"),
-], ids=[str(n) for n in range(11)])  # contents are too long for names
+], ids=[str(n) for n in range(11)])  # the contents are too long for names
 def test_odd_positions_files(contents, words, tmp_path):
     (tmp_path / "places.csv").write_bytes(contents)
     answer = validate(tmp_path, PLACES)
     assert answer.returncode == 2 and words in answer.stderr, answer.stderr[:500]
-    assert len(answer.stderr) < 3000  # not one line for each of a file that is something else
+    assert len(answer.stderr) < 3000  # no message for each line of a wrong file
 
 
 def test_potential_from_a_file(tmp_path):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the real command on bad decks: each problem has its exit code, its place and its remedy."""
+"""Runs the real command on bad decks: each error has an exit code, a position and advice."""
 
 import pytest
 
@@ -16,7 +16,7 @@ def test_good_decks_are_valid(tmp_path):
         assert "deck.toml: valid" in answer.stdout
 
 
-# name: (deck, line of the message, all of these in it)
+# name: (deck, line of the message, required parts of the message)
 DECK_ERRORS = {
     "malformed TOML": (changed("step = 0.01", "step = = 0.01"), 24, ["not valid TOML"]),
     "TOML key twice": (changed("step = 0.01", "step = 0.01\nstep = 0.02"), 25, ["not valid TOML"]),
@@ -150,7 +150,7 @@ def test_deck_error(tmp_path, name):
     assert answer.stdout == ""
 
 
-# name: (deck, all of these in the message)
+# name: (deck, required parts of the message)
 IMPOSSIBLE_STATES = {
     "overlap": (
         changed("[5.0, 5.0]]", "[2.8, 5.0]]"),

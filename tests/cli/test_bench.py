@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""carom_bench, tiny: what it reports, forces, bad usage. And what tools/count-instructions makes of it, with a stand-in for
+"""Tiny runs of carom_bench: its reports, forces, bad usage; and tools/count-instructions, with a substitute for
 valgrind. No times are checked."""
 
 import json
@@ -28,7 +28,7 @@ def points(tmp_path, *arguments):
     table = bench(*arguments, "--json", tmp_path / "bench.json").stdout
     results = json.loads((tmp_path / "bench.json").read_text())
     assert results["version"] and "flags" in results["compiler"]
-    for point in results["points"]:  # a line of the table for each
+    for point in results["points"]:  # each has a line in the table
         assert any(line.split()[:2] == [str(point["n"]), f"{point['packing_fraction']:.3f}"]
                    for line in table.splitlines() if line.strip())
     return results["points"]
@@ -46,7 +46,7 @@ def check(point):
     assert per.keys() == {"crossings", "rebuilds", "stale", "predictions", "scheduled"}
     assert per["predictions"] >= 2  # both partners of a collision
     assert per["scheduled"] >= 1 and per["stale"] >= 0
-    assert per["crossings"] + per["rebuilds"] > 0  # no core has all spheres as candidates all the time
+    assert per["crossings"] + per["rebuilds"] > 0  # no core always has all spheres as candidates
     assert point["candidates_per_prediction"] > 0
     assert 0 <= point["stale_fraction"] < 1
     assert point["bytes_per_particle"] is None or point["bytes_per_particle"] > 0
@@ -60,8 +60,8 @@ def test_table(tmp_path):
         check(point)
         assert point["dimension"] == 3 and len(point["repeats"]) == 2
         assert point["equilibration_epochs"] == 5
-        assert point["equilibration_collisions"] > 10 * point["n"]  # ten mean free times an epoch
-        filled = point["packing_fraction"]  # Carnahan–Starling: it is the fluid requested
+        assert point["equilibration_collisions"] > 10 * point["n"]  # an epoch has ten mean free times
+        filled = point["packing_fraction"]  # Carnahan–Starling: this is the required fluid
         expected = (1 + filled + filled**2 - filled**3) / (1 - filled) ** 3
         assert abs(point["compressibility_factor"] / expected - 1) < 0.1
 
@@ -95,7 +95,7 @@ def test_forces(tmp_path):
     assert widths[-1] == "sse2" and set(widths) <= {"sse2", "avx2", "avx512"}
     assert ([(e["potential"], e["kind"], e["width"]) for e in results["forces"]]
             == [(p, kind, width) for p in potentials for kind in ("forces", "mean forces") for width in widths])
-    outcomes = {}  # identical bits in all widths, and nothing else is
+    outcomes = {}  # all widths give identical bits
     for entry in results["forces"] + results["steps"]:
         assert all(repeat.get("passes", 0) * entry.get("pairs", 0) >= 5000 or repeat.get("steps") == 5
                    for repeat in entry["repeats"])
@@ -143,7 +143,7 @@ def test_files_that_cannot_be_used(tmp_path):
     assert "nowhere" in done.stderr and done.stdout == ""  # reported before any work
 
 
-# Runs the program and counts $COST instructions a collision or pair.
+# Runs the program and reports $COST instructions per collision or pair.
 VALGRIND = f"""#!{sys.executable}
 import json, os, subprocess, sys
 command = [word for word in sys.argv[1:] if not word.startswith(("--tool=", "--callgrind-out-file=", "--toggle-collect="))]
@@ -168,7 +168,7 @@ def test_count_instructions(tmp_path):
                               env=os.environ | {"PATH": path, "COST": str(cost)}, capture_output=True, text=True,
                               timeout=120)
 
-    assert count(1000).returncode == 2  # nothing to compare with
+    assert count(1000).returncode == 2  # nothing to compare
     bench("--n", 100, "--packing-fraction", 0.3, "--json", tmp_path / "bench.json", *QUICK)
     compiler = json.loads((tmp_path / "bench.json").read_text())["compiler"]
     values = [{"n": 1000, "packing_fraction": f, "instructions_per_collision": 1000.0} for f in (0.1, 0.3, 0.49)]

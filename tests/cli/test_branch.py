@@ -39,7 +39,7 @@ def expect_later_part(whole, later, step, start=0):
     times = [sets["particles/trajectory/position/time"] for sets in frames]
     common = np.intersect1d(*times)
     assert len(common) > 2 and steps[1][0] >= step
-    assert len(common) >= len(times[1]) - 1  # the first may be between those of the whole run
+    assert len(common) >= len(times[1]) - 1  # the first may be between two times of the whole run
     for name in ("position", "velocity", "image"):
         one, other = (sets[f"particles/trajectory/{name}/value"][np.isin(time, common)] for sets, time in zip(frames, times))
         assert one.tobytes() == other.tobytes(), name
@@ -87,7 +87,7 @@ def test_within_an_epoch(after, tmp_path):
     job.send_signal(signal.SIGUSR2)
     assert job.wait(60) == INTERRUPTED, job.stderr.read()
     step = summary(out)["steps"]
-    last = summary(whole)["steps"] - 1  # which is a whole epoch
+    last = summary(whole)["steps"] - 1  # the end of an epoch
     assert step < last
     branch(out, later, [f"run.steps={last}"], ranks=after)
     start = thermo(later)["time"][0]
@@ -97,7 +97,7 @@ def test_within_an_epoch(after, tmp_path):
 
 @pytest.fixture(scope="module")
 def half(tmp_path_factory):
-    """A run of cdda, done after 30 steps of 0.02, with two checkpoints."""
+    """A complete run of cdda with 30 steps of 0.02 and two checkpoints."""
     place = tmp_path_factory.mktemp("half")
     run(write_deck(place, box("cdda", 2, 20)), place / "half")
     go_on(place / "half", ["--set", "run.steps=30"])
@@ -109,7 +109,7 @@ def half(tmp_path_factory):
     ["interaction.1.amplitude=0.5"], ["interaction.1.type=lennard-jones", "interaction.1.epsilon=0.1", "interaction.1.sigma=1.0"],
     ["output.frame_interval=0.01", "output.rdf_interval=0.02", "output.msd_interval=0.02"]])
 def test_changes(changes, half, tmp_path):
-    """Time and steps go on; energies, sums and averages begin anew; and the branch can itself be continued."""
+    """Time and steps continue; energies, sums and averages start again; and the branch itself can be continued."""
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     for ranks, out in ((1, whole), (2, parts)):
         branch(half, out, [*changes, "run.steps=" + ("60" if out == whole else "45")], ranks=ranks)
@@ -127,7 +127,7 @@ def test_changes(changes, half, tmp_path):
 
 
 def test_continue_names_the_command(half, tmp_path):
-    """Which does what was wanted."""
+    """Runs the command that the message names, which must succeed."""
     mine = tmp_path / "a run"
     shutil.copytree(half, mine)
     refused = go_on(mine, ["--set", "integrator.step=0.01", "--set", "run.steps=40"], code=2).stderr.strip()

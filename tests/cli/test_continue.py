@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`carom run --continue`: however a run was interrupted, its files in the end are those of an undisturbed one, bit for bit."""
+"""`carom run --continue`: after any interruption, the final files are those of an undisturbed run, bit for bit."""
 
 import os
 import pathlib
@@ -57,7 +57,7 @@ def test_the_time_of_both_parts_counts(tmp_path):
 
 
 def test_warnings_and_the_last_collision_are_kept(tmp_path):
-    """Of a stiff spring; and of spheres that fly apart, which ends the run so long after they have met."""
+    """Continues a run with a stiff spring, and a run that ends because its spheres fly apart long after their collision."""
     stiff = write_deck(tmp_path, SPRINGS.replace("stiffness = 1.0", "stiffness = 1e4"))
     run(stiff, tmp_path / "whole", ["run.steps=20"])
     run(stiff, tmp_path / "halves", ["run.steps=10"])
@@ -73,7 +73,7 @@ def test_warnings_and_the_last_collision_are_kept(tmp_path):
     steps = summary(out)["steps"]
     go_on(out, code=4)
     assert summary(out)["steps"] == steps
-    assert int(re.search(r"continued at step (\d+)", (out / "run.log").read_text())[1]) > 20  # they have met in step 19
+    assert int(re.search(r"continued at step (\d+)", (out / "run.log").read_text())[1]) > 20  # they collided in step 19
 
 
 @pytest.mark.parametrize("end", ["run.end_time", "run.collisions"])
@@ -89,7 +89,7 @@ def test_a_later_end(end, method, tmp_path):
 
 
 def test_a_finished_run_ends_at_once(tmp_path):
-    """With the same files, whether it ended within an epoch or between steps."""
+    """Its files are those of an undisturbed run, whether it ended within an epoch or between steps."""
     for n, (text, change) in enumerate([(box("free-flight", 3, 5), []), (box("free-flight", 2, 50), ["run.collisions=200"]),
                                         (box("edda", 3, 21), []), (box("verlet", 2, 21), ["run.end_time=0.333"])]):
         deck, whole, again = write_deck(tmp_path, text), tmp_path / f"whole{n}", tmp_path / f"again{n}"
@@ -101,8 +101,8 @@ def test_a_finished_run_ends_at_once(tmp_path):
 
 
 def spheres(tmp_path, collisions, step=200.0):
-    """A deck of free flight with long epochs, of two million collisions, in which rows come soon. Within an epoch it can stop after
-    half a million."""
+    """A deck of free flight with long epochs of two million collisions and frequent rows. It can stop within an epoch, after half a
+    million collisions."""
     text = SPHERES.replace("end_time = 3.0", f"collisions = {collisions}").replace('type = "free-flight"', f'type = "free-flight"\nstep = {step}')
     for old, new in [("count = 108", "count = 2048"), ("thermo_interval = 0.1", "thermo_interval = 1.0"), ("frame_interval = 0.5", "frame_interval = 2.5")]:
         assert old in text
@@ -133,11 +133,11 @@ def test_signals(number, tmp_path):
     assert not (out / "checkpoint.h5").exists()
     start = time.monotonic()
     job.send_signal(getattr(signal, "SIG" + number))
-    if number == "USR1":  # a checkpoint, and on it goes
+    if number == "USR1":  # writes a checkpoint and continues
         while not (out / "checkpoint.h5").exists():
             assert job.poll() is None
         assert job.wait(60) == 0
-        assert (out / "checkpoint.previous.h5").exists()  # and one at the end
+        assert (out / "checkpoint.previous.h5").exists()  # and another one at the end
         return
     assert job.wait(60) == INTERRUPTED
     assert time.monotonic() - start < 10
@@ -158,14 +158,14 @@ def test_signals_to_mpirun(number, code, tmp_path):
 
 
 def catches(process, number):
-    """Whether a process has a handler of its own for a signal."""
+    """Whether a process handles a signal itself."""
     for line in pathlib.Path(f"/proc/{process}/status").read_text().splitlines():
         if line.startswith("SigCgt:"):
             return bool(int(line.split()[1], 16) >> (number - 1) & 1)
 
 
 def test_a_second_interrupt_ends_at_once(tmp_path):
-    """While the first one's checkpoint, a large one, is still to be written."""
+    """Sends a second signal while a large checkpoint, due to the first one, is being written."""
     out = tmp_path / "out"
     job = subprocess.Popen(command(write_deck(tmp_path, SPHERES), out, ["particles.0.count=108000", "run.end_time=100.0"]),
                            stderr=subprocess.PIPE, text=True)
@@ -178,14 +178,14 @@ def test_a_second_interrupt_ends_at_once(tmp_path):
 
 
 def test_max_wall_again_and_again(tmp_path):
-    """A run that goes on in pieces of the wall clock, on ranks as they come, until exit code 0."""
+    """A run is continued with a wall time limit, on different numbers of ranks, until exit code 0."""
     deck, whole, out = write_deck(tmp_path, box("edda", 3, 2000)), tmp_path / "whole", tmp_path / "out"
     run(deck, whole, ALL_OUTPUT)
     run(deck, out, ALL_OUTPUT, arguments=("--quiet", "--max-wall", "0.05"), code=INTERRUPTED)
     pieces = 0
     for pieces in range(40):
         ranks = 2 if pieces == 1 else 1
-        wall = ["--max-wall", f"{0.2 * (1 + pieces):.1f}"]  # which starting takes a part of
+        wall = ["--max-wall", f"{0.2 * (1 + pieces):.1f}"]  # part of this is for the start
         done = subprocess.run((["mpirun", "-n", "2"] if ranks > 1 else []) + [CAROM, "run", "--continue", str(out), "--quiet", *wall],
                               env=mpi_environment(), capture_output=True, text=True, timeout=60)
         if done.returncode == 0:
@@ -240,7 +240,7 @@ def contents(directory):
 
 
 def test_an_end_that_lies_behind_is_refused(tmp_path):
-    """Steps, time and collisions are checked, on any number of ranks. Nothing changes, and the command of the message does what was wanted."""
+    """Steps, time and collisions are checked, on any number of ranks. No file changes, and the command in the message works."""
     text = box("psa", 3, 60).replace("steps = 60", "steps = 60\nend_time = 50.0\ncollisions = 100000")
     deck, done, short = write_deck(tmp_path, text), tmp_path / "done", tmp_path / "short"
     run(deck, done, ALL_OUTPUT)
@@ -287,7 +287,7 @@ def test_an_end_that_lies_behind_within_an_epoch(tmp_path):
 
 
 def test_a_file_of_another_run_is_named(tmp_path):
-    """A file that is missing, cut off or no file is named too. Nothing is written anywhere, on any number of ranks."""
+    """An error names a file that is missing, cut off or not a file. No file is written on any number of ranks."""
     deck, out, other = write_deck(tmp_path, box("psa", 3, 30)), tmp_path / "out", tmp_path / "other"
     run(deck, out, ALL_OUTPUT)
     run(deck, other, [*ALL_OUTPUT, "placement.seed=6"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`carom convert`, and trajectories themselves, in the programs that they are meant for: each file is opened by a reader of others."""
+"""`carom convert`, and trajectories themselves: each file is opened by the readers of other programs."""
 
 import os
 import pathlib
@@ -21,7 +21,7 @@ from runs import CAROM, SPHERES, SPRINGS, mpi_environment, mpirun, needs_carom, 
 warnings.filterwarnings("ignore", category=DeprecationWarning)
 pytestmark = needs_carom
 
-# Two species of which one is charged, in a periodic box.
+# Two species, one of them charged, in a periodic box.
 SALT = SPHERES.replace("count = 108", "count = 100") + """
 [[particles]]
 name = "ion"
@@ -50,7 +50,7 @@ def convert(trajectory, to, *arguments, code=0):
 
 
 def whole(trajectory, name, frame):
-    """A series of the file, with its three columns."""
+    """Reads a series of the file with its three columns."""
     return trajectory._group[name]["value"][frame]
 
 
@@ -79,7 +79,7 @@ def test_ase_reads_extended_xyz(trajectory):
         assert list(atoms.pbc[:trajectory.dimension]) == list(trajectory.periodic)
         assert (atoms.info["Time"], atoms.info["Step"]) == (trajectory.time[frame], trajectory.step[frame])
     assert read[0].info["species_names"] == ",".join(trajectory.species_names)
-    assert np.array_equal(read[0].numbers - 1, trajectory.species)  # symbols that stand for the names
+    assert np.array_equal(read[0].numbers - 1, trajectory.species)  # symbols represent the names
 
 
 def test_names_that_are_elements_stay(tmp_path):
@@ -176,7 +176,7 @@ np.savez(sys.argv[2], **found)
 @pytest.mark.parametrize("form", ["xdmf", "xdmf2"])
 def test_paraview_reads_xdmf(trajectory, tmp_path, form):
     """Debian's VTK has no reader of XDMF, and its python3-xdmf cannot be loaded: this needs ParaView. Its reader of XDMF 3
-    looks for the trajectory in the wrong place where the name of the file comes without a folder."""
+    looks for the trajectory in the wrong folder if the name of the file has no folder."""
     if not shutil.which("pvpython"):
         pytest.skip("needs ParaView: apt install python3-paraview")
     convert(trajectory, form, "--frames", "2:6:3")
@@ -196,7 +196,7 @@ def test_paraview_reads_xdmf(trajectory, tmp_path, form):
 
 @pytest.mark.parametrize("form", ["xdmf", "xdmf2"])
 def test_what_xdmf_refers_to_is_there(trajectory, form):
-    """Every data set that it names, by h5py: with the shape that it says."""
+    """Reads every data set that the file names with h5py and compares the shapes."""
     convert(trajectory, form, "-o", str(trajectory.path.parent / "all.xmf"))
     tree = ElementTree.parse(trajectory.path.parent / "all.xmf")
     assert [float(time.get("Value")) for time in tree.iter("Time")] == list(trajectory.time)
@@ -296,7 +296,7 @@ def test_a_choice_of_frames(trajectory):
 
 
 def test_an_open_box_and_mixed_radii(tmp_path):
-    """Each particle has its own size in every format; a direction without boundaries reaches as far as the particles do, or the box."""
+    """Each particle has its own size in every format; an open direction extends as far as the particles, or as the box."""
     text = SPRINGS.replace('["wall", "wall"]', '["open", "wall"]').replace("radius = 0.5", "radius = [0.5, 0.2, 0.3, 0.4]")
     text = text[:text.index("[[interaction]]")] + text[text.index("[integrator]"):]
     fast = text.replace("[[0.3, 0.1], [1.1, -0.4], [-0.9, 0.7], [0.2, -0.3]]", "[[-3.0, 0.1], [-5.0, -0.4], [4.0, 0.7], [5.0, -0.3]]")
@@ -323,7 +323,7 @@ def test_an_open_box_and_mixed_radii(tmp_path):
 
 
 def test_links_and_pipes_are_written_to(trajectory, tmp_path):
-    """`convert -o` and `view --export` do so. Where the file goes to standard output, what the command says goes to stderr."""
+    """`convert -o` and `view --export` write to links and pipes; if the file goes to standard output, messages go to stderr."""
     plain, target, link, pipe = (tmp_path / name for name in ("plain", "target", "link", "pipe"))
     export = [CAROM, "view", str(trajectory.path.parent), "--export"]
     commands = [[CAROM, "convert", str(trajectory.path), "--to", to, "-o"] for to in ("extxyz", "gsd")] + [export]

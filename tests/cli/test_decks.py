@@ -18,18 +18,18 @@ import compare
 from carom_files import Trajectory, find_carom, read_thermo, run_carom
 
 DECKS = sorted((ROOT / "inputs").glob("*.toml"))
-# Largest |H − H₁| / E_ref allowed over the shortened run: rounding for the exact methods; what is left are methods of
-# first and second order, at steps their decks chose well.
+# Largest |H − H₁| / E_ref allowed over the shortened run: rounding for the exact methods; the other methods are of
+# first and second order, with suitable steps in their decks.
 EXACT, APPROXIMATE = 1e-12, 1e-2
 EXACT_METHODS = {"free-flight", "cdda", "edda"}
-# Those of ten thousand particles under forces are run with fewer.
+# Decks of ten thousand particles with forces are run with fewer particles.
 FEWER = {"yukawa-fluid": ["particles.count=256"], "charged-mixture": ["particles.0.count=128", "particles.1.count=128"]}
 
 pytestmark = needs_carom
 
 
 def shortened(file):
-    """Overrides that leave about a second's work, and several frames in it."""
+    """Overrides that shorten a run to about a second with several frames."""
     deck = tomllib.loads(file.read_text())
     if deck["integrator"]["type"] == "free-flight":
         return ["run.end_time=1.0", "output.frame_interval=0.25", "output.thermo_interval=0.25"]

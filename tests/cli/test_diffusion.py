@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The diffusion coefficient of tools/plot_msd.py: of walks that are known, and of hard spheres."""
+"""The diffusion coefficient of tools/plot_msd.py: of random walks with known D, and of hard spheres."""
 
 import re
 import sys
@@ -16,7 +16,7 @@ from synthetic_run import write_run
 
 
 def test_diffusion_of_random_walks_is_within_its_error(tmp_path):
-    """Walks of a known D: errors are as large as they are said to be, and long lags do not decide."""
+    """Random walks with known D: errors are as large as stated, and long lags do not dominate."""
     pulls = []
     for seed in range(12):
         steps = np.random.default_rng(seed).normal(scale=0.1, size=(401, 20, 3))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trouble at run time: exit code, message, and what is left to read."""
+"""Failures of runs: exit code, message, and readable files."""
 
 import os
 import shutil
@@ -39,7 +39,7 @@ def test_full_disk(size, tmp_path):
 @needs_mount
 @pytest.mark.parametrize("what", ["frames", "thermo", "events", "averages"])
 def test_each_file_may_meet_a_full_disk(what, tmp_path):
-    """Of all files what has been flushed is there, and is what a run on an empty disk has written."""
+    """The flushed parts of all files are there and equal to the files of a run on an empty disk."""
     deck, disk, kept, free = write_deck(tmp_path, SPHERES), tmp_path / "disk", tmp_path / "kept", tmp_path / "free"
     disk.mkdir()
     often = {"frames": ["output.frame_interval=0.005"], "thermo": ["output.thermo_interval=0.0002"],
@@ -75,7 +75,7 @@ def test_disk_full_from_the_start(tmp_path):
 
 
 def test_file_size_limit(tmp_path):
-    """The same without a mount: a limit on file sizes, which would kill a process that does not look."""
+    """A full disk without a mount: a limit on file sizes, which would kill a process that ignores it."""
     deck, out = write_deck(tmp_path, SPHERES), tmp_path / "out"
     limited = ["sh", "-c", 'ulimit -f 20000; exec "$@"', "sh"]  # blocks of 512 bytes
     done = subprocess.run(limited + command(deck, out, ["run.end_time=100000.0", "output.frame_interval=0.05",
@@ -143,7 +143,7 @@ def test_bad_deck(change, code, words, tmp_path):
     out = tmp_path / "out"
     done = run(write_deck(tmp_path, SPRINGS), out, [change], code=code)
     assert words in done.stderr
-    assert not out.exists()  # nothing is touched by a deck that cannot run
+    assert not out.exists()  # a deck that cannot run changes no file
 
 
 def test_missing_deck(tmp_path):
@@ -152,7 +152,7 @@ def test_missing_deck(tmp_path):
 
 
 def test_spheres_that_have_flown_apart(tmp_path):
-    """No collision can come any more, and nothing else ends the run."""
+    """No further collision is possible, and the run has no other end."""
     deck = tmp_path / "apart.toml"
     deck.write_text("""format = 1
 [system]
@@ -177,7 +177,7 @@ collisions = 1000
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("checkpoints", ["\"0.05\"", "\"\""])
 def test_a_directory_that_is_removed(checkpoints, ranks, tmp_path):
-    """While the run is at work, also before its first checkpoint."""
+    """Removes the directory during a run, also before its first checkpoint."""
     deck, out = write_deck(tmp_path, SPHERES), tmp_path / "out"
     launcher = [*MPIRUN, str(ranks)] if ranks > 1 else []
     overrides = ["particles.0.count=4000", "run.end_time=20.0", f"output.checkpoint_wall={checkpoints}", "output.events=true"]
@@ -187,7 +187,7 @@ def test_a_directory_that_is_removed(checkpoints, ranks, tmp_path):
         assert job.poll() is None, job.stderr.read()
         time.sleep(0.01)
     while out.exists():
-        shutil.rmtree(out, ignore_errors=True)  # files may come meanwhile
+        shutil.rmtree(out, ignore_errors=True)  # the run may write files meanwhile
     error = job.communicate(timeout=60)[1]
     assert job.returncode == 5, error
     assert str(out) in error and "No such file or directory" in error

@@ -27,7 +27,7 @@ def output(request, tmp_path_factory):
 
 
 def universe(path):
-    """Reduced units have no names: MDAnalysis must be set not to convert them, which in 2.4 only load_new can be."""
+    """Reduced units have no names: MDAnalysis must not convert them, which in 2.4 only load_new allows."""
     with h5py.File(path) as file:
         n = file["particles/trajectory/position/value"].shape[1]
     u = MDAnalysis.Universe.empty(n, trajectory=True, velocities=True)
@@ -100,7 +100,7 @@ def test_info_of_other_files(tmp_path):
     (tmp_path / "text").write_text("not HDF5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = [1, 2]
-    with h5py.File(tmp_path / "strange.h5md", "w") as file:  # looks like a trajectory, but is not whole
+    with h5py.File(tmp_path / "strange.h5md", "w") as file:  # looks like a trajectory, but is incomplete
         file["particles/trajectory/position/value"] = np.zeros((1, 2, 3))
         file.create_group("h5md")
     for name, words in (("text", "HDF5"), ("other.h5", "no trajectory of carom"), ("strange.h5md", "cannot read"), ("missing", "No such")):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decks that an earlier version hung on, gave up, or got wrong: contacts at rest, unequal masses, long steps, loose tolerances.
+"""Decks on which an earlier version hung, failed, or gave wrong results: contacts at rest, unequal masses, long steps, loose tolerances.
 
 Each keeps its energy and overlaps to rounding, but for one that cannot run and says why.
 """
@@ -14,7 +14,7 @@ pytestmark = needs_carom
 
 DECKS = sorted((ROOT / "tests" / "data" / "hard").glob("*.toml"))
 assert DECKS
-PATIENCE = 60  # [s], against hangs
+TIME_LIMIT = 60  # [s], against hangs
 
 
 JAMMED = "edda-heap-hang"  # its spheres fall onto rows that fill the box from wall to wall
@@ -22,7 +22,7 @@ JAMMED = "edda-heap-hang"  # its spheres fall onto rows that fill the box from w
 
 @pytest.mark.parametrize("deck", [deck for deck in DECKS if deck.stem != JAMMED], ids=lambda deck: deck.stem)
 def test_energy_and_overlaps_are_right_to_rounding(deck, tmp_path):
-    done = subprocess.run(command(deck, tmp_path / "out"), capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(command(deck, tmp_path / "out"), capture_output=True, text=True, timeout=TIME_LIMIT)
     assert done.returncode == 0, done.stderr
     end, rows = summary(tmp_path / "out"), thermo(tmp_path / "out")
     energy = end["energy"]
@@ -35,6 +35,6 @@ def test_energy_and_overlaps_are_right_to_rounding(deck, tmp_path):
 
 def test_spheres_without_room_are_an_error(tmp_path):
     deck = ROOT / "tests" / "data" / "hard" / f"{JAMMED}.toml"
-    done = subprocess.run(command(deck, tmp_path / "out"), capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(command(deck, tmp_path / "out"), capture_output=True, text=True, timeout=TIME_LIMIT)
     assert done.returncode == 4
     assert "collide without end at one instant: they touch on all sides and have no room to part; leave gaps" in done.stderr

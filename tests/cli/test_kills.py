@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A run is killed at every other change of its files in turn: nothing that was flushed is lost."""
+"""A run is killed at every second change of its files in turn: no flushed data is lost."""
 
 import functools
 import os
@@ -28,7 +28,7 @@ FRAME_INTERVAL = 0.1
 
 @pytest.fixture(scope="module")
 def place():
-    """A directory on a file system in memory, where there is one: syncs take no time there."""
+    """A directory on a file system in memory if there is one: syncs take no time there."""
     memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
     with tempfile.TemporaryDirectory(prefix="carom-kills-", dir=memory) as name:
         yield pathlib.Path(name)
@@ -47,7 +47,7 @@ def killer(tmp_path_factory):
 
 
 def killed_run(killer, directory, at=None, half=False):
-    """Runs into directory/out and dies there at one change; returns how many changes were made where `at` is None."""
+    """Runs into directory/out and dies there at one change; returns the number of changes if `at` is None."""
     shutil.rmtree(directory / "out", ignore_errors=True)
     environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": str(directory / "out") + "/"}
     environment |= {"KILL_COUNT": str(directory / "count")} if at is None else {"KILL_AT": str(at), "KILL_HALF": str(int(half))}
@@ -57,10 +57,10 @@ def killed_run(killer, directory, at=None, half=False):
 
 
 def begins_like(sets, whole, clock):
-    """Whether all series have as many rows as `clock`, and these are the first of the undisturbed run."""
+    """Whether all series have as many rows as `clock`, and the rows are the first rows of the undisturbed run."""
     n = len(sets[clock])
     parts = {name: value[:n] if len(value.shape) > 0 and len(value) == len(whole[clock]) else value for name, value in whole.items()}
-    parts.pop("parameters/deck"), sets.pop("parameters/deck")  # names the directory
+    parts.pop("parameters/deck"), sets.pop("parameters/deck")  # it names the directory
     assert sets.keys() == parts.keys()
     for name, value in sets.items():
         assert value.tobytes() == parts[name].tobytes(), name
@@ -68,13 +68,13 @@ def begins_like(sets, whole, clock):
 
 
 def journal_is_complete(path):
-    """Whether the kill fell between the journal's end and that of the flush."""
+    """Whether the kill was between the end of the journal and the end of the flush."""
     journal = path.with_name(path.name + ".journal")
     return journal.exists() and journal.read_bytes()[:8] == b"CAROMJ01"
 
 
 def test_equal_runs_write_equal_bytes(killer, place):
-    """In as many changes, so that kills can be counted."""
+    """Every run makes an equal number of changes, so that kills can be counted."""
     runs = []
     for _ in range(2):
         changes = killed_run(killer, place)
@@ -110,7 +110,7 @@ def test_every_other_write(killer, place):
             assert not (out / (name + ".journal")).exists()
             after = begins_like(data_sets(out / name), whole[name], clock)
             assert after >= written.get(name, 0)
-            assert after >= left[name], (at, name)  # what the kill before has left
+            assert after >= left[name], (at, name)  # the files after the previous kill
             left[name] = after
             written[name] = after
         if not (out / "thermo.csv").exists():
@@ -122,11 +122,11 @@ def test_every_other_write(killer, place):
         # A row is written before the frame of the same time.
         frames_due = np.isclose(np.round(table["time"] / FRAME_INTERVAL) * FRAME_INTERVAL, table["time"]).sum()
         assert written["trajectory.h5md"] >= frames_due - 1, at
-    assert interrupted > 15  # kills within a flush were among them
+    assert interrupted > 15  # some kills were within a flush
 
 
 def logged_run(killer, directory):
-    """What a run does to its files, in order: (what, name, size, place)."""
+    """The file operations of a run, in order: (what, name, size, position)."""
     log, out = directory / "log", directory / "out"
     log.unlink(missing_ok=True)
     shutil.rmtree(out, ignore_errors=True)
@@ -137,7 +137,7 @@ def logged_run(killer, directory):
 
 
 def test_a_file_is_synced_before_it_takes_its_name(killer, place):
-    """The file is synced after its last write, and the directory after the renaming: a power failure leaves the old file or the new one."""
+    """The file is synced after its last write, and the directory after the renaming: after a power failure there is the old file or the new one."""
     calls = logged_run(killer, place)
     renamed = {}
     for n, (what, name, _, _) in enumerate(calls):
@@ -158,7 +158,7 @@ def test_a_file_is_synced_before_it_takes_its_name(killer, place):
 
 
 def test_the_journal_is_synced_before_the_file_is_changed(killer, place):
-    """It is emptied after the file is synced: whenever power fails, the file has the state of a flush, or the journal has all that it lacks."""
+    """The journal is emptied after the file is synced: at any power failure the file has the state of a flush, or the journal completes it."""
     calls, durable = logged_run(killer, place), 0
     for name in FILES:
         journal, ours = name + ".journal", [call for call in calls if call[1] in (name, name + ".journal")]
@@ -173,7 +173,7 @@ def test_the_journal_is_synced_before_the_file_is_changed(killer, place):
                 assert synced == 0 or before[:2] == ("sync", name)
                 flush = None
             elif file == journal and what == "sync":
-                # What is new in the file, to which the journal refers, is on the disk before it.
+                # New data in the file, to which the journal refers, is on the disk before the journal.
                 assert n == flush + 2 and before[:2] == ("sync", name)
                 synced, durable = 1, durable + 1
             elif file == name and what == "sync" and synced == 1:
@@ -186,7 +186,7 @@ def test_the_journal_is_synced_before_the_file_is_changed(killer, place):
 
 
 def test_an_incomplete_journal_is_discarded(tmp_path):
-    """Also one whose bytes are not those that were written."""
+    """A complete journal with a wrong checksum is discarded, too."""
     run(deck(tmp_path), tmp_path / "out")
     path = tmp_path / "out" / "trajectory.h5md"
     journal = path.with_name(path.name + ".journal")

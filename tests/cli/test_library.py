@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The library as a program finds it: installed, with the examples built on it."""
+"""The installed library, with the examples built with it."""
 
 import os
 import pathlib
@@ -29,7 +29,7 @@ def examples(tmp_path_factory):
 
 
 def sanitizers():
-    """What the library was built with must be linked into the examples, too."""
+    """The dependencies of the library must be linked into the examples, too."""
     cache = (BUILD / "CMakeCache.txt").read_text()
     found = re.search(r"^CAROM_SANITIZE:\w+=(.+)$", cache, re.M)
     return f"-fsanitize={found[1]}" if found else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A step that takes long: it is left when the run is asked to stop, and done again from its start when the run goes on."""
+"""Long steps: a step is abandoned when the run must stop, and repeated from its start when the run is continued."""
 
 import signal
 import subprocess
@@ -12,7 +12,7 @@ from runs import command, mpi_environment, needs_carom, run, summary, write_deck
 
 pytestmark = needs_carom
 
-# Discs packed closely: a million collisions in a time of 1, a hundred times more in ENDLESS.
+# Densely packed discs: a million collisions in a time of 1, a hundred times more in ENDLESS.
 JAMMED = """
 format = 1
 title = "jammed discs"
@@ -61,7 +61,7 @@ def deck_of(tmp_path, method, text=JAMMED):
 def expect_interrupted(out):
     assert summary(out)["status"] == "interrupted" and summary(out)["steps"] == 0
     assert (out / "checkpoint.h5").exists()
-    assert (out / "thermo.csv").read_text().count("\n") <= 2  # the start alone
+    assert (out / "thermo.csv").read_text().count("\n") <= 2  # only the start
 
 
 @pytest.mark.parametrize("method", ["psa", "cva", "mcva", "mcva restart", "cdda", "edda"])
@@ -117,4 +117,4 @@ def test_a_checkpoint_waits_for_the_end_of_the_step(tmp_path):
     wait_for_rows(job, out, 1)
     job.send_signal(signal.SIGUSR1)
     assert job.wait(30) == 0, job.stderr.read()
-    assert (out / "checkpoint.previous.h5").exists()  # and one at the end
+    assert (out / "checkpoint.previous.h5").exists()  # and another one at the end

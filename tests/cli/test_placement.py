@@ -11,7 +11,7 @@ from runs import CAROM, SPHERES, data_sets, needs_carom, run, summary, write_dec
 
 pytestmark = needs_carom
 
-# A mixture of two sizes with one radius a particle, and discs between walls.
+# A mixture of two sizes with one radius per particle, and discs between walls.
 RADII = [0.5 if i % 2 else 0.6 + 0.01 * (i % 7) for i in range(60)]
 MIXTURE = SPHERES.replace("count = 108", "count = 60").replace("radius = 0.5", f"radius = {RADII}").replace(
     'type = "fcc"\npacking_fraction = 0.3', 'type = "compressed"\npacking_fraction = 0.58') + """
@@ -33,7 +33,7 @@ def start(output):
 
 
 def smallest_gap(x, radius, box, periodic):
-    """Of all pairs, through the nearest images along the periodic axes."""
+    """Distances of all pairs, with nearest images along the periodic axes."""
     d = x[:, None] - x[None, :]
     d -= np.where(periodic, box * np.round(d / box), 0)
     gap = np.sqrt((d ** 2).sum(axis=2)) - radius[:, None] - radius[None, :]

@@ -21,7 +21,7 @@ from carom_files import toml_text
 
 pytestmark = needs_carom
 
-# No end of it, and little to see.
+# A run without end and with little output.
 ENDLESS = ["run.end_time=1e7", "integrator.step=1.0", "output.frame_interval=10.0", "output.thermo_interval=10.0"]
 
 
@@ -31,7 +31,7 @@ def start(ranks, arguments):
 
 
 def running(output):
-    """The processes of the run that writes there, by rank."""
+    """The processes of the run that writes to this directory, by rank."""
     found = {}
     for process in pathlib.Path("/proc").glob("[0-9]*"):
         try:
@@ -45,7 +45,7 @@ def running(output):
 
 
 def when_it_has_ended(output):
-    """mpirun does not wait for those it kills."""
+    """mpirun does not wait for processes that it kills."""
     for _ in range(1000):
         if not running(output):
             return
@@ -62,7 +62,7 @@ def when_it_runs(job, output):
 
 
 def idle_seconds(output):
-    """Processor time so far of each rank other than 0 of the run that writes there."""
+    """Processor time so far of each rank except 0 of the run that writes to this directory."""
     seconds = []
     for rank, pid in running(output).items():
         times = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]
@@ -83,7 +83,7 @@ def test_idle_ranks_sleep_and_share_the_exit_code(tmp_path):
     job.terminate()
     job.wait()
     assert len(before) == len(after) == 3
-    assert sum(after) - sum(before) < 0.3  # together; ranks that spin would take what the cores can give
+    assert sum(after) - sum(before) < 0.3  # in total; spinning ranks would use the whole cores
     mpirun(4, endless + ["--max-wall", "00:00:01"], code=75)
 
 
@@ -107,7 +107,7 @@ def test_an_error_of_all_ranks_is_reported_once(change, code, words, tmp_path):
     errors = run(deck, tmp_path / "plain", [change], code=code).stderr
     done = mpirun(3, command(deck, out, [change]), code=code)
     assert words in errors
-    # Of a step that cannot be done, one rank may know more than several.
+    # One rank may report more about a failed step than several ranks.
     assert code == 4 or done.stderr.count(errors.strip()) == 1
     assert done.stderr.count(words) == errors.count(words)
     assert "carom: rank" not in done.stderr and "MPI_ABORT" not in done.stderr
@@ -115,7 +115,7 @@ def test_an_error_of_all_ranks_is_reported_once(change, code, words, tmp_path):
     assert code != 4 or summary(out)["status"] == "failed"
 
 
-# 800 discs far from each other, of which the ranks have halves of the box. What is wrong is wrong at its right end.
+# 800 discs far from each other, and each rank has half of the box. The error is at the right end.
 APART = {
     "format": 1, "title": "an error that one rank meets",
     "system": {"dimension": 2, "box": [80.0, 40.0], "boundary": ["periodic", "periodic"]},
@@ -166,7 +166,7 @@ def test_an_error_of_one_rank_ends_all(spoil, words, of_one, tmp_path):
 
 
 def test_an_epoch_is_too_long_on_any_number_of_ranks(tmp_path):
-    """64 spheres cross more boxes than an image on ranks has room for, though in one core there is room for more."""
+    """64 spheres cross more boxes than an image on ranks has room for, although one core has room for more."""
     deck = write_deck(tmp_path, SPHERES.replace("108", "64").replace("fcc", "simple-cubic"))
     sets = ["placement.packing_fraction=0.001", "placement.seed=1", "integrator.step=2e5", "run.end_time=2e5",
             "output.frame_interval=0.0", "output.thermo_interval=20000"]
@@ -210,7 +210,7 @@ def test_a_stopped_rank(tmp_path):
 @pytest.mark.kills_mpirun
 @pytest.mark.parametrize("stopped", [0, 1])
 def test_a_rank_that_is_stopped_before_it_starts(stopped, tmp_path):
-    """MPI, which the other waits in, knows nothing of it."""
+    """A rank is stopped while the other waits in MPI, which does not detect it."""
     out = tmp_path / "out"
     first = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = {stopped} ]; then kill -STOP $$; fi; exec "$@"', "sh"]
     done = mpirun(2, first + command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--silence", "2")), code=70)
@@ -221,7 +221,7 @@ def test_a_rank_that_is_stopped_before_it_starts(stopped, tmp_path):
 @pytest.mark.kills_mpirun
 @needs_compiler
 def test_a_rank_that_is_stopped_at_the_end(tmp_path):
-    """When all has been written."""
+    """A rank is stopped after everything has been written."""
     (tmp_path / "stop.c").write_text("#include <signal.h>\nint MPI_Finalize(void) { return raise(SIGSTOP); }\n")
     subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "stop.so", tmp_path / "stop.c"], check=True)
     last = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = 1 ]; then export LD_PRELOAD={tmp_path}/stop.so; fi; exec "$@"', "sh"]
@@ -250,7 +250,7 @@ def test_a_rank_without_memory(tmp_path):
     status = pathlib.Path(f"/proc/{when_it_runs(job, out)[1]}/status").read_text()
     job.terminate()
     job.communicate()
-    # What a small run takes, and a little; a sphere takes some 300 bytes.
+    # The memory of a small run and a little more; a sphere takes about 300 bytes.
     limit = int(re.search(r"VmPeak:\s+(\d+) kB", status)[1]) + 20000
     limited = ["sh", "-c", f'if [ $OMPI_COMM_WORLD_RANK = 1 ]; then ulimit -v {limit}; fi; exec "$@"', "sh"]
     done = mpirun(2, limited + command(tmp_path / "input.toml", tmp_path / "large", ["particles.0.count=256000"]), code=70)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`mpirun carom run`: the same files on any number of ranks."""
+"""`mpirun carom run`: equal files on any number of ranks."""
 
 import filecmp
 import os
@@ -19,11 +19,11 @@ pytestmark = needs_carom
 
 
 def differences(one, other):
-    """Of two runs, but for what their summaries say of the machine."""
+    """Compares two runs, except for the machine's part of their summaries."""
     return compare.compare(one, other) + compare.summary_differences(one, other)
 
 
-# Before a command: only rank 0 finds files by their names alone.
+# A prefix of the command: only rank 0 finds files by relative names.
 RANK_0_AT_HOME = ["sh", "-c", 'if [ $OMPI_COMM_WORLD_RANK != 0 ]; then cd /; fi; exec "$@"', "sh"]
 
 # Discs of two sizes between walls, falling.
@@ -134,7 +134,7 @@ def test_bonded_pairs_left_out_and_tables_across_ranks(tmp_path):
     assert differences(tmp_path / "plain", tmp_path / "narrow") == []
     chains["interaction"] = [dict(table, exclude="none"), attraction, bonds]
     run(write_deck(tmp_path, toml_text(chains)), tmp_path / "all")
-    assert summary(tmp_path / "all")["energy"]["initial"] > done["energy"]["initial"]  # the bonded repel each other
+    assert summary(tmp_path / "all")["energy"]["initial"] > done["energy"]["initial"]  # bonded particles repel each other
 
 
 def test_too_few_particles_to_share(tmp_path):
@@ -176,7 +176,7 @@ def test_fewer_spheres_than_ranks(which, boundary, tmp_path):
 
 
 def light_and_heavy(boundary):
-    """Spheres of which the light ones fly through many boxes while the heavy ones move by a diameter."""
+    """Light spheres fly through many boxes while heavy spheres move by a diameter."""
     deck = tomllib.loads(SPHERES) | {
         "system": {"dimension": 3, "box": [6.0, 6.0, 6.0], "boundary": ["periodic", boundary, "periodic"]},
         "particles": [
@@ -189,7 +189,7 @@ def light_and_heavy(boundary):
     return deck
 
 
-# Heavy discs that fill the height of the box, and a light one between them: any number of collisions in any time.
+# Heavy discs that fill the height of the box, and a light one between them: unlimited collisions in any time.
 WEDGED = {
     "format": 1, "system": {"dimension": 2, "boundary": ["periodic", "periodic"], "box": [5.141516051556095, 1.7138386838520316]},
     "particles": [{"name": "disc", "radius": 0.4284596709630079, "temperature": 0.2665408484358747,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`carom run --continue` after what no run can help: kills, full disks, damaged checkpoints, processes that hold the directory."""
+"""`carom run --continue` after external failures: kills, full disks, damaged checkpoints, processes that hold the directory."""
 
 import os
 import pathlib
@@ -24,7 +24,7 @@ def killer(tmp_path_factory):
 
 
 def killed(killer, deck, out, at, overrides, go=False, where=""):
-    """Runs and dies at a change of its files; None: counts the changes. True: it has died."""
+    """Runs and dies at a change of its files (None: counts the changes); returns whether it died."""
     environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": f"{out}/{where}", "KILL_HALF": str((at or 0) % 2)}
     environment |= {"KILL_AT": str(at)} if at else {"KILL_COUNT": str(out.parent / "count")}
     what = [CAROM, "run", "--continue", str(out), "--quiet"] if go else command(deck, out, overrides)
@@ -36,7 +36,7 @@ def killed(killer, deck, out, at, overrides, go=False, where=""):
 @needs_compiler
 @pytest.mark.parametrize("method", ["free-flight", "psa"])
 def test_killed_at_its_writes(method, killer, tmp_path):
-    """Also while checkpoints are written, and while a run is being continued. CAROM_KILLS: how many more often."""
+    """Kills a run also while it writes checkpoints, and while it is being continued. CAROM_KILLS sets the number of kills."""
     dice, kills = random.Random(7), int(os.environ.get("CAROM_KILLS", "12"))
     deck, whole, out = write_deck(tmp_path, box(method, 3, 200 if method == "psa" else 60)), tmp_path / "whole", tmp_path / "out"
     run(deck, whole, ALL_OUTPUT)
@@ -50,7 +50,7 @@ def test_killed_at_its_writes(method, killer, tmp_path):
         if not killed(killer, deck, out, dice.randrange(1, most), ALL_OUTPUT + CHECKPOINTS, where=where):
             continue
         if not (out / "checkpoint.h5").exists() and not (out / "checkpoint.previous.h5").exists():
-            # Files may be there, or none yet.
+            # There may be files or none yet.
             assert "there is no checkpoint.h5 to go on from" in go_on(out, code=5).stderr
             refused += 1
             continue
@@ -65,7 +65,7 @@ def test_killed_at_its_writes(method, killer, tmp_path):
 
 @pytest.mark.kills_mpirun
 def test_killed_ranks(tmp_path):
-    """SIGKILL to mpirun at random instants, each time going on from the last checkpoint."""
+    """SIGKILL to mpirun at random instants, each time continuing from the last checkpoint."""
     dice = random.Random(3)
     deck, whole, out = write_deck(tmp_path, box("edda", 3, 400)), tmp_path / "whole", tmp_path / "out"
     run(deck, whole, ALL_OUTPUT)
@@ -84,11 +84,11 @@ def test_killed_ranks(tmp_path):
 
 @needs_mount
 def test_a_full_disk_during_a_checkpoint(tmp_path):
-    """The earlier one remains; with more space the run goes on."""
+    """The earlier checkpoint remains; with more space the run continues."""
     disk, kept, whole = tmp_path / "disk", tmp_path / "kept", tmp_path / "whole"
     disk.mkdir()
     deck = write_deck(tmp_path, SPHERES)
-    # Rows are written slowly, checkpoints of 200 kB more and more of them beside them.
+    # Rows are written slowly, and more and more checkpoints of 200 kB beside them.
     overrides = ["particles.0.count=4000", "run.end_time=40.0", "output.thermo_interval=0.5", "output.frame_interval=2.0"]
     run(deck, whole, overrides)
     done = in_mount("size=2700k", disk, command(deck, disk, overrides + CHECKPOINTS), kept)
@@ -100,7 +100,7 @@ def test_a_full_disk_during_a_checkpoint(tmp_path):
 
 
 def interrupted(tmp_path):
-    """A run with two checkpoints, and how an undisturbed one ends."""
+    """A run with two checkpoints, and the end of an undisturbed run."""
     deck, whole, out = write_deck(tmp_path, box("psa", 2, 300)), tmp_path / "whole", tmp_path / "out"
     run(deck, whole, ALL_OUTPUT)
     run(deck, out, [*ALL_OUTPUT, "run.steps=100"])
@@ -123,7 +123,7 @@ def test_the_other_slot(tmp_path):
         shutil.copytree(out, trial)
         (trial / "checkpoint.h5").write_bytes(contents)
         before = {path.name: path.read_bytes() for path in trial.iterdir()}
-        go_on(trial, ["--set", "run.steps=1"], code=2)  # what is refused leaves the slots as they are
+        go_on(trial, ["--set", "run.steps=1"], code=2)  # a refused command does not change the slots
         assert {path.name: path.read_bytes() for path in trial.iterdir()} == before
         done = go_on(trial, ["--set", "run.steps=300"])
         assert words in done.stderr and "going on from checkpoint.previous.h5" in done.stderr, done.stderr
@@ -140,7 +140,7 @@ def test_the_other_slot(tmp_path):
 
 @needs_compiler
 def test_a_damaged_slot_and_kills(killer, tmp_path):
-    """A run that goes on from the earlier checkpoint keeps that until there is another good one."""
+    """A run that continues from the earlier checkpoint keeps it until there is another valid one."""
     whole, out = interrupted(tmp_path)
     (out / "checkpoint.h5").write_bytes(b"damaged")
     trial, at, deaths = tmp_path / "trial", 0, 0
@@ -156,7 +156,7 @@ def test_a_damaged_slot_and_kills(killer, tmp_path):
 
 
 def test_the_checkpoint_is_read_when_the_directory_is_free(tmp_path):
-    """A process that is ending may write another meanwhile."""
+    """A process that is ending may write another checkpoint meanwhile."""
     whole, out = interrupted(tmp_path)
     earlier = tmp_path / "earlier"
     run(tmp_path / "input.toml", earlier, [*ALL_OUTPUT, "run.steps=100"])
@@ -174,7 +174,7 @@ def test_the_checkpoint_is_read_when_the_directory_is_free(tmp_path):
 
 
 def test_a_checkpoint_that_cannot_be_renamed(tmp_path):
-    """Is a file error; the last checkpoint remains, and the run goes on from it once there is room for its name."""
+    """A checkpoint that cannot be renamed is a file error; the last one remains, and the run continues from it once its name is free."""
     whole, out = interrupted(tmp_path)
     (out / "checkpoint.previous.h5").unlink()
     (out / "checkpoint.previous.h5").mkdir()
@@ -188,7 +188,7 @@ def test_a_checkpoint_that_cannot_be_renamed(tmp_path):
 
 
 def lock_of(out, process, host=None):
-    """Leaves the lock of a process."""
+    """Writes the lock of a process."""
     ticks = pathlib.Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[19]
     host = host or pathlib.Path("/proc/sys/kernel/hostname").read_text().strip()
     (out / "carom.lock").write_text(f"host {host}\nprocess {process}\nstarted then\nticks {ticks}\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`carom run`: the files it leaves, that observing changes nothing, early stops and kills."""
+"""`carom run`: its files, early stops and kills; observing changes nothing."""
 
 import csv
 import os
@@ -92,7 +92,7 @@ radius = 0.3
     run(out / "deck.toml", tmp_path / "plain", ["output.rdf_interval=0", "output.msd_interval=0"])
     assert not (tmp_path / "plain" / "rdf.csv").exists() and not (tmp_path / "plain" / "msd.csv").exists()
     assert same(last_records(out), last_records(tmp_path / "plain"))
-    # A second run in the directory takes nothing away.
+    # A second run in the directory removes nothing.
     run(write_deck(tmp_path, two), out)
     assert (out / "backup.1" / "rdf.csv").exists() and not (out / "rdf.csv").exists()
 
@@ -131,7 +131,7 @@ def test_resolved_deck_gives_the_same_run(text, tmp_path):
     run(write_deck(tmp_path, text), tmp_path / "a")
     run(tmp_path / "a" / "deck.toml", tmp_path / "b")
     a, b = (data_sets(tmp_path / name / "trajectory.h5md") for name in "ab")
-    for sets in (a, b):  # the resolved decks may differ in where the output goes
+    for sets in (a, b):  # the resolved decks may differ in the output directory
         del sets["parameters/deck"]
     assert same(a, b)
     assert (tmp_path / "a" / "thermo.csv").read_bytes() == (tmp_path / "b" / "thermo.csv").read_bytes()
@@ -182,7 +182,7 @@ def test_events_are_exact(text, tmp_path):
         np.add.at(change, events["lo"], events["impulse"])
         np.add.at(change, events["hi"], -events["impulse"])
         assert np.abs(v[0] + change - v[-1]).max() < 1e-11
-        # Flushed frames count the collisions that came before them.
+        # Flushed frames count the collisions before them.
         frames = data_sets(out / "trajectory.h5md")
         before = np.searchsorted(events["time"], frames["particles/trajectory/position/time"])
         assert (before == frames["observables/collisions/value"]).all()
@@ -198,7 +198,7 @@ def test_an_earlier_run_is_kept(tmp_path):
     assert (out / "backup.1" / "trajectory.h5md").read_bytes() == first
     assert summary(out / "backup.1")["steps"] == 400 and summary(out)["steps"] == 10
     assert (out / "notes.txt").read_text() == "mine"
-    run(deck, out, ["integrator.step=-1"], code=2)  # a deck that cannot run touches nothing
+    run(deck, out, ["integrator.step=-1"], code=2)  # a deck that cannot run changes no file
     assert summary(out)["steps"] == 10 and not (out / "backup.2").exists()
 
 
@@ -219,7 +219,7 @@ def test_one_run_at_a_time(tmp_path):
     assert f"process {child.pid}" in done.stderr and done.stderr.startswith("warning: ")
     assert "ended from outside" in (out / "run.log").read_text()
     assert (out / "backup.1" / "trajectory.h5md").exists() and not (out / "carom.lock").exists()
-    # The number of a process that began at another time; what a run on another host has left; something else.
+    # The number of a process that started at another time; the lock of a run on another host; another text.
     (out / "carom.lock").write_text(before.replace(f"process {child.pid}", f"process {os.getpid()}"))
     assert "ended from outside" in run(deck, out).stderr
     (out / "carom.lock").write_text(re.sub("host .*", "host elsewhere", before))
@@ -269,7 +269,7 @@ def test_max_wall(tmp_path):
     start = time.monotonic()
     done = run(deck, out, ["run.steps=100000000", "output.thermo_interval=100.0", "output.frame_interval=0.0"],
                ("--quiet", "--max-wall", "00:00:01"), code=75)
-    assert time.monotonic() - start < 60  # it does stop by itself
+    assert time.monotonic() - start < 60  # it stops by itself
     assert f"stopped by --max-wall; carom run --continue {out} goes on" in done.stderr
     s, last = summary(out), last_records(out)
     assert s["status"] == "interrupted" and 0 < s["steps"] < 100000000
@@ -289,10 +289,10 @@ def test_a_kill_leaves_readable_files(seed, tmp_path):
     time.sleep(random.Random(seed).uniform(0.05, 0.5))
     child.send_signal(signal.SIGKILL)
     assert child.wait() == -signal.SIGKILL
-    for name in ("trajectory.h5md", "events.h5"):  # completes a flush that the kill has interrupted
+    for name in ("trajectory.h5md", "events.h5"):  # completes a flush that the kill interrupted
         subprocess.run([CAROM, "info", out / name], check=True, stdout=subprocess.DEVNULL)
     rows, frames, events = thermo(out), data_sets(out / "trajectory.h5md"), data_sets(out / "events.h5")
-    written = len(frames["particles/trajectory/position/step"])  # MDAnalysis ends where a step is missing
+    written = len(frames["particles/trajectory/position/step"])  # MDAnalysis ends if a step is missing
     assert written > 10
     assert all(len(value) >= written for name, value in frames.items() if name.endswith(("/value", "/step", "/time")))
     assert len(rows["time"]) - written in (0, 1)  # a row is written before the frame of the same time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""tools/setup.sh on machines that it can't be run on here: what it would install, and by which commands."""
+"""tools/setup.sh on machines that are not available here: the packages that it would install, and its commands."""
 
 import os
 import pathlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The studies of tools/: of errors, of costs and of many ranks, by the command itself ($CAROM)."""
+"""The studies of errors, costs and many ranks in tools/, with the real command ($CAROM)."""
 
 import csv
 import sys
@@ -42,7 +42,7 @@ def test_integrator_tables():
 
 
 def rows_of(study, table, directory, deck, *options):
-    """What a study of a deck of inputs/ writes, drawn too."""
+    """Runs a study of a deck of inputs/ and checks its table and picture."""
     study.main([str(ROOT / "inputs" / f"{deck}.toml"), *options, "-o", str(directory)])
     assert (directory / f"{table}.png").stat().st_size > 1000
     with open(directory / f"{table}.csv", newline="") as file:
@@ -122,7 +122,7 @@ def test_rank_study(tmp_path, capsys, monkeypatch):
         assert events == pytest.approx(5 * int(row["particles"]))
         assert 0 < float(row["redone"]) < 0.05
     twice = [float(row["twice"]) for row in rows]
-    assert twice[0] < twice[1] and twice[4] < twice[1]  # more for ranks with neighbours on all sides, and for small ones
+    assert twice[0] < twice[1] and twice[4] < twice[1]  # larger for ranks with neighbours on all sides, and for small ranks
     printed = capsys.readouterr().out
     assert "One core: 1e+06 collisions/s (given)" in printed
     with open(tmp_path / "model.csv", newline="") as file:

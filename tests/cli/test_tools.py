@@ -26,7 +26,7 @@ from synthetic_run import write_run
 
 
 def make_run(directory, dimension=2, boundary="periodic", particles=20, frames=12, **more):
-    """Straight flights of points from random places in a box of unequal edges."""
+    """Straight flights of points from random positions in a box of unequal edges."""
     random = np.random.default_rng(7)
     edges = np.array([4.0, 5.0, 6.0])[:dimension]
     v = np.tile(random.normal(size=(particles, dimension)), (frames, 1, 1))
@@ -106,11 +106,11 @@ def test_every_missing_object_is_found(tmp_path):
     with h5py.File(run / "trajectory.h5md", "r") as file:
         file.visit(names.append)
     assert len(names) > 30
-    names.remove("observables/kinetic_energy")  # which observables there are is nowhere prescribed
+    names.remove("observables/kinetic_energy")  # no observable is required
     for name in names:
         (run / "trajectory.h5md").write_bytes(sound)
         with h5py.File(run / "trajectory.h5md", "r+") as file:
-            # visit() gives one name of a linked data set; whichever it is, the others remain.
+            # visit() gives one name of a linked data set; its other names remain.
             del file[name]
         assert check_h5md.violations(run, with_mdanalysis=False), name
 
@@ -125,7 +125,7 @@ def test_check_h5md_exit_codes(tmp_path, capsys):
 
 
 def corrupt(path):
-    """Other bytes in the middle, where tables of the file stand."""
+    """Changes bytes in the middle, in tables of the file."""
     data = bytearray(path.read_bytes())
     start, end = len(data) // 4, len(data) // 2
     data[start:end] = b"\xa5" * (end - start)
@@ -166,7 +166,7 @@ def test_a_damaged_file_is_one_line(tmp_path, monkeypatch, capsys, tool, damage)
     monkeypatch.chdir(tmp_path)
     main, name, arguments = READERS[tool]
     if (tool, damage) == ("plot_energy", "truncated"):
-        return  # it is shorter, and the rows that are left are whole
+        return  # it is shorter, and its rows are complete
     make_run(tmp_path / "run"), make_run(tmp_path / "sound")
     DAMAGES[damage](tmp_path / "run" / name)
     with pytest.raises(SystemExit) as end:
@@ -183,7 +183,7 @@ def test_a_locked_file_is_one_line(tmp_path):
     path = tmp_path / "run" / "trajectory.h5md"
     with open(path, "rb") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        for journal in (False, True):  # a run at work, before and after its second flush
+        for journal in (False, True):  # an unfinished run, before and after its second flush
             if journal:
                 path.with_name("trajectory.h5md.journal").write_bytes(b"")
             with pytest.raises(SystemExit, match="^[^\n]*run/trajectory.h5md: a process is writing this file[^\n]*$"):
@@ -255,7 +255,7 @@ def test_g_of_r_of_an_ideal_gas_is_one(tmp_path, dimension, boundary):
             r, g, error = plot_rdf.radial_distribution(trajectory, bins=10, species=pair)
             assert r[-1] > (1.3 if boundary == "periodic" else 2.5)
             assert g[2:] == pytest.approx(1.0, abs=0.03)
-            assert np.sqrt(np.mean(((g[2:] - 1) / error[2:]) ** 2)) < 4  # of four parts the error itself is uncertain
+            assert np.sqrt(np.mean(((g[2:] - 1) / error[2:]) ** 2)) < 4  # the error from four parts is itself uncertain
             assert np.all(error[2:] < 0.03)
 
 
@@ -297,7 +297,7 @@ def test_tables_of_a_run_are_drawn(tmp_path, capsys):
     assert "msd: D = 1\nmsd_a: D = 2\n" in capsys.readouterr().out
     for name in ("rdf.png", "msd.png"):
         assert (tmp_path / name).stat().st_size > 1000
-    # What is made of frames does not take the place of the run's own tables.
+    # Tables made from frames do not replace the run's own tables.
     run = make_run(tmp_path / "run", dimension=3)
     for name, tool in (("rdf", plot_rdf), ("msd", plot_msd)):
         (run / f"{name}.csv").write_text(before)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`carom view`: which requests get an answer, and which. The page itself in a browser: test_view_page.py."""
+"""`carom view`: its answers to requests. The page itself in a browser: test_view_page.py."""
 
 import contextlib
 import http.client
@@ -26,7 +26,7 @@ pytestmark = needs_carom
 
 @contextlib.contextmanager
 def page(*arguments):
-    """`carom` with these arguments; its address as (process, port, path)."""
+    """Starts `carom` with these arguments; returns (process, port, path)."""
     process = subprocess.Popen([CAROM, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
     try:
         address = next(line for line in process.stdout if "http" in line)
@@ -44,7 +44,7 @@ def get(port, path, method="GET"):
 
 def asked(port, path, method="GET", **headers):
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
-    connection.request(method, path, headers=headers)  # as it stands: urllib would tidy the path
+    connection.request(method, path, headers=headers)  # unchanged: urllib would normalise the path
     return connection.getresponse()
 
 
@@ -106,7 +106,7 @@ def test_head_gets_the_headers_of_get_and_no_body(shown):
     (port, path), end = shown, "\r\n\r\n"
     for target in (path, path + "runs", path + "nothing", "/"):
         expected = asked(port, target)
-        request, n = f"HEAD {target} HTTP/1.1\r\nHost: localhost", 1 if target == "/" else 3  # a refusal ends the connection
+        request, n = f"HEAD {target} HTTP/1.1\r\nHost: localhost", 1 if target == "/" else 3  # an error ends the connection
         with socket.create_connection(("127.0.0.1", port), 60) as client:
             client.sendall(f"{(n - 1) * (request + end)}{request}\r\nConnection: close{end}".encode())
             received = b"".join(iter(lambda: client.recv(1 << 16), b""))
@@ -121,7 +121,7 @@ HOSTS = {200: ["localhost", "LocalHost:80", "127.0.0.1", "127.0.0.1:9", "[::1]",
 
 
 def test_only_names_of_this_machine_are_answered(shown):
-    """The owner of another name can make it lead here, and his page would then be allowed to read this one."""
+    """The owner of another name can redirect it here, and a page under that name could then read this one."""
     port, path = shown
     for status, names in HOSTS.items():
         for name in names:
@@ -161,7 +161,7 @@ def test_connections_without_the_token_do_not_displace_the_page(finished):
 
 @pytest.fixture(scope="module")
 def large(finished, tmp_path_factory):
-    """A run with an answer that fits into no buffer of a socket."""
+    """A run with an answer that is larger than any socket buffer."""
     folder = tmp_path_factory.mktemp("large") / "run"
     shutil.copytree(finished, folder)
     (folder / "rdf.csv").write_bytes(b"1.0,2.0\n" * (1 << 21))
@@ -213,14 +213,14 @@ def test_a_connection_on_which_nothing_moves_is_closed(large):
 
 
 def test_without_a_free_descriptor_the_server_waits(finished):
-    """It sleeps between its attempts, and takes the connection when it can."""
+    """The server sleeps between its attempts, and accepts the connection as soon as it can."""
     def sleeps():
         with open(f"/proc/{process.pid}/status") as status:
             return next(int(line.split()[1]) for line in status if line.startswith("voluntary_ctxt_switches"))
 
     with page("view", finished) as (process, port, path):
         before = len(open_sockets(process))
-        assert get(port, path)[0] == 200  # it is at work, and has all descriptors of its own
+        assert get(port, path)[0] == 200  # it is running, and has opened all its descriptors
         wait_until(lambda: len(open_sockets(process)) == before)
         limits = resource.prlimit(process.pid, resource.RLIMIT_NOFILE)
         numbers = set(map(int, os.listdir(f"/proc/{process.pid}/fd")))
@@ -279,7 +279,7 @@ def test_bonds_are_those_of_the_trajectory(tmp_path):
 
 
 def test_a_run_that_is_shown_while_it_goes_on_is_the_same_run(tmp_path):
-    """Frames are whole at whatever instant they are asked for, and the run keeps its bits."""
+    """Frames are complete at any time of a request, and the run's results keep their bits."""
     overrides = ["run.end_time=120", "output.frame_interval=0.2", "output.thermo_interval=0.2", "particles.0.count=500"]
     deck = write_deck(tmp_path, SPHERES)
     run(deck, tmp_path / "alone", overrides)
@@ -378,7 +378,7 @@ def test_what_cannot_be_shown(finished, tmp_path):
 
 
 def test_a_flush_that_a_kill_has_cut_short_is_completed(finished, tmp_path):
-    """The journal of such a flush, made here by hand, holds the block of the last step."""
+    """The journal of this flush, written by the test, has the block of the last step."""
     import zlib
     folder = tmp_path / "killed"
     folder.mkdir()

@@ -104,7 +104,7 @@ def test_of_many_spheres_only_the_visible_ones_are_drawn(browser, tmp_path):
         turned = picture(browser)
         browser.execute_script("Visible.few = 50000; dirty = true")
         assert differing(seen, turned) > 0.02 and differing(turned, picture(browser)) < 2e-4
-        browser.execute_script("camera.zoom(0.2); Visible.few = 100; dirty = true")  # some are larger than a point may be
+        browser.execute_script("camera.zoom(0.2); Visible.few = 100; dirty = true")  # some are larger than the largest point
         near = picture(browser)
         assert browser.execute_script("return panels[0].spheres.visible.squares") > 0
         browser.execute_script("Visible.few = 50000; dirty = true")

@@ -32,7 +32,7 @@ def running(tmp_path, *overrides):
 
 
 def requested(browser):
-    """The addresses that the page has asked for."""
+    """The addresses that the page has requested."""
     import json
     messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
     return {message["params"]["request"]["url"] for message in messages if message["method"] == "Network.requestWillBeSent"}
@@ -53,7 +53,7 @@ def test_a_run_is_seen_while_it_goes_on(browser, tmp_path):
         assert differing(curve, picture(browser, "#curves canvas", False)) > 0.0005
         assert browser.execute_script("return charts.rdf.curves[0].x.length > 5 && Math.max(...charts.rdf.curves[0].y) > 1")
 
-        # Back by the slider: the first frame, which stays.
+        # The slider goes back to the first frame, which stays.
         browser.execute_script("element('frame').value = 0; element('frame').dispatchEvent(new Event('input'))")
         wait_for(browser, "panels[0].shown === 0")
         start = picture(browser)
@@ -62,14 +62,14 @@ def test_a_run_is_seen_while_it_goes_on(browser, tmp_path):
         assert "0 collisions" in label(browser)
         assert "frame 1 of" in browser.execute_script("return element('time').textContent")
 
-        # Colours: nothing moves, every sphere is of one kind, then none has collided yet.
+        # Colours by speed, species and collisions: no sphere moves, all are of one species, none has collided yet.
         colour_by(browser, "species")
         kinds = picture(browser)
         assert differing(start, kinds) > 0.02 and abs(lit(start) - lit(kinds)) < 0.1
         colour_by(browser, "collisions")
         assert differing(kinds, picture(browser)) > 0.02
 
-        # The mouse turns them; play goes on from here.
+        # The mouse turns the spheres; playing continues from here.
         from selenium.webdriver.common.action_chains import ActionChains
         from selenium.webdriver.common.by import By
         before = picture(browser)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Large cold cations and small hot anions under edda: the energy stays exact through the collisions, the species come
-// to one temperature, and g(r) at contact is that of psa at a tiny step from the same start.
+// Large cold cations and small hot anions under edda: energy is conserved to rounding through the collisions, the
+// species reach one temperature, and g(r) at contact is that of psa with a tiny step from the same start.
 //
 // Error bars are standard errors from 20 blocks after an equilibration of a fifth of the run. With 19 degrees of
 // freedom |t| > 5 has a probability of 8e-5.
@@ -22,8 +22,8 @@ using test::Mean;
 
 constexpr double cold = 0.5, hot = 1.5;
 
-/// 54 ions of each kind, charges 1 and −1, diameters 1 and 0.5, masses 1 and 0.25, at packing fraction 0.35: on fcc
-/// sites assigned at random.
+/// 54 ions of each kind, charges 1 and −1, diameters 1 and 0.5, masses 1 and 0.25, packing fraction 0.35: randomly
+/// assigned to fcc sites.
 std::unique_ptr<System<3>> charged_mixture(unsigned seed) {
   const std::size_t n = 108;
   const double volume = n / 2 * std::numbers::pi / 6 * (1 + 0.125) / 0.35;
@@ -52,7 +52,7 @@ std::unique_ptr<System<3>> charged_mixture(unsigned seed) {
   return system;
 }
 
-/// The temperatures of both species. The momentum of the whole is zero, so that m v² is 3kT(1 − m/M) on average.
+/// The temperatures of both species. The total momentum is zero, so the mean of m v² is 3kT(1 − m/M).
 std::array<double, 2> temperatures(const Particles<3>& p) {
   double whole = 0;
   for (const double m : p.mass) whole += m;
@@ -64,7 +64,7 @@ std::array<double, 2> temperatures(const Particles<3>& p) {
   return {energy[0] / freedom[0], energy[1] / freedom[1]};
 }
 
-/// Block after block, g at contact between unlike ions; at every sample, the difference of the temperatures.
+/// Computes g at contact between unlike ions for each block, and the difference of the temperatures for each sample.
 class Blocks : public Observer<3> {
  public:
   static constexpr int number = 20;
@@ -72,7 +72,7 @@ class Blocks : public Observer<3> {
 
   Blocks(const System<3>& system, double end_time)
       : start_(end_time / 5), length_((end_time - start_) / number), first_(temperatures(system.particles)) {
-    // Contact, at 0.75, is an edge between shells.
+    // Contact, at 0.75, is a boundary between shells.
     const RadialDistributionOptions options = {.sampling = sampling(), .range = 2.1, .bins = 84};
     for (int b = 0; b < number; ++b) blocks_.emplace_back(system, options);
   }
@@ -97,7 +97,7 @@ class Blocks : public Observer<3> {
   std::vector<double> difference_;
 };
 
-/// One run of the mixture to a time, and what was seen.
+/// The results of one run of the mixture.
 struct Measured {
   Mean difference, contact_value;
   double difference_at_start;
@@ -112,10 +112,10 @@ Measured measure(const char* method, double step, double end_time) {
   return {blocks.difference(), blocks.contact_value(), blocks.difference_at_start(), run->statistics()};
 }
 
-/// psa goes a share of the way at a step of `tiny`. `largest_error` bounds the error bars, those of g relative to it,
-/// so that to agree means something.
+/// psa runs for a fraction `share` of the time at step `tiny`. `largest_error` limits the error bars (of g: the
+/// relative ones), so that the comparison is meaningful.
 void expect_equilibrium(std::uint64_t collisions, double share, double tiny, double largest_error) {
-  const double end_time = static_cast<double>(collisions) / 1000;  // there are a few more in a unit of time
+  const double end_time = static_cast<double>(collisions) / 1000;  // a unit of time has slightly more
   const auto edda = measure("edda", 0.02, end_time), psa = measure("psa", tiny, share * end_time);
   for (const auto* m : {&edda, &psa})
     std::cout << m->statistics.counters.sphere_sphere << " collisions: relative energy error "

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// edda on lattices and chains of springs: what its sweeps cost, and what becomes of those that do not converge.
+// edda on lattices and chains of springs: the number of sweeps, and the handling of sweeps that do not converge.
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 namespace carom {
 namespace {
 
-/// Discs on a square lattice of this many rows, springs between neighbours, temperature 1, periodic.
+/// Discs on a square lattice with this number of rows, springs between neighbours, temperature 1, periodic.
 std::unique_ptr<System<2>> spring_lattice(int rows, double stiffness = 1.0, double spacing = 1.5) {
   const double edge = spacing * rows;
   std::vector<Vec<2>> x;
@@ -36,7 +36,8 @@ std::unique_ptr<System<2>> spring_lattice(int rows, double stiffness = 1.0, doub
   return system;
 }
 
-/// Chains of tangent hard spheres on stiff springs: those of inputs/polymer-melt.toml, with a spring constant of 3000.
+/// Chains of tangent hard spheres on stiff springs: the chains of inputs/polymer-melt.toml with a spring constant of
+/// 3000.
 std::unique_ptr<System<3>> stiff_melt(int edge, int chain, unsigned seed) {
   const double spacing = std::cbrt(std::numbers::pi / 6 / 0.35);
   std::vector<Vec<3>> x;
@@ -77,7 +78,7 @@ TEST(Edda, TheToleranceTradesPassesForWhatIsFolded) {
   for (const double tolerance : {0.0, 1e-9, 1e-6, 1e-3}) {
     const auto run = test::run_steps<2>(spring_lattice(12), "edda", 0.05, 100, {{"tolerance", tolerance}});
     const auto& s = run->statistics();
-    EXPECT_LE(s.max_energy_error, 1e-13 * s.energy_reference) << tolerance;  // whatever the sweeps leave
+    EXPECT_LE(s.max_energy_error, 1e-13 * s.energy_reference) << tolerance;  // whatever error the sweeps leave
     EXPECT_LE(*s.max_momentum_error, 1e-11) << tolerance;
     EXPECT_GT(s.counters.folded, 30 * last_folded) << tolerance;
     EXPECT_LT(s.force_passes, 0.9 * last_passes) << tolerance;
@@ -87,10 +88,10 @@ TEST(Edda, TheToleranceTradesPassesForWhatIsFolded) {
 }
 
 TEST(Edda, StiffSpringsTakeNoHalvings) {
-  // h²ω²/4 is 0.2 … 0.8: plain sweeps would take 60 and 150 a step. Without collisions, and with some.
+  // h²ω²/4 is 0.2 … 0.8: plain sweeps would need 60 and 150 per step. Without collisions and with some.
   struct Case {
     double stiffness, spacing;
-    std::uint64_t sweeps;  // about a fifth more than it takes
+    std::uint64_t sweeps;  // about a fifth more than needed
   };
   for (const auto& [stiffness, spacing, sweeps] :
        {Case{1000, 1.5, 1400}, Case{1000, 1.06, 1600}, Case{2000, 1.5, 1700}, Case{2000, 1.06, 2000}}) {
@@ -98,7 +99,7 @@ TEST(Edda, StiffSpringsTakeNoHalvings) {
     const auto run = test::run_steps<2>(spring_lattice(12, stiffness, spacing), "edda", 0.02, 100);
     const auto& s = run->statistics();
     EXPECT_EQ(s.counters.slabs_halved, 0u);
-    EXPECT_EQ(s.counters.fallbacks, 1u);  // the highest frequency is looked for once
+    EXPECT_EQ(s.counters.fallbacks, 1u);  // the highest frequency is computed once
     EXPECT_LE(s.counters.sweeps, sweeps);
     EXPECT_LE(s.max_energy_error, 1e-13 * s.energy_reference);
   }
@@ -106,7 +107,7 @@ TEST(Edda, StiffSpringsTakeNoHalvings) {
   EXPECT_EQ(soft->statistics().counters.fallbacks, 0u);
 }
 
-/// Root mean square difference of all positions, to the nearest image.
+/// Root mean square difference of all positions, for nearest images.
 template <int D>
 double rms_difference(const System<D>& a, const System<D>& b) {
   double sum = 0;
@@ -118,7 +119,7 @@ double rms_difference(const System<D>& a, const System<D>& b) {
 }
 
 TEST(Edda, AMeltOfStiffChainsKeepsOrderTwo) {
-  // h ω is 2.2 at the longest step: there the order is only approached, 1.5 against 2.0 from one step to the next.
+  // h ω is 2.2 at the longest step, where the order is only approached: 1.5 against 2.0 from one step to the next.
   const std::vector<double> steps = {0.02, 0.01, 0.005, 0.0025};
   std::vector<std::vector<double>> errors(steps.size());
   const double end = 0.1;  // 37 to 46 collisions of 125 beads, before chaos
@@ -136,7 +137,7 @@ TEST(Edda, AMeltOfStiffChainsKeepsOrderTwo) {
   for (auto& each : errors) {
     std::ranges::sort(each);
     median.push_back(each[each.size() / 2]);
-    EXPECT_LT(each.back(), 1.5 * each.front());  // so three of five starts tell the order to 0.1
+    EXPECT_LT(each.back(), 1.5 * each.front());  // so three of five starts give the order to 0.1
   }
   std::printf("    errors %.3g %.3g %.3g %.3g\n", median[0], median[1], median[2], median[3]);
   EXPECT_GT(test::fitted_order(steps, median), 1.75);
@@ -153,7 +154,7 @@ TEST(Edda, AMeltOfStiffChainsTakesFewSweeps) {
 }
 
 TEST(Edda, StepsFarTooLongForTheSpringsAreHalvedAndLoseNoEnergy) {
-  // h²ω²/4 is 80, 640, 6400: sweeps that part further and further are no reason to freeze colliding particles.
+  // h²ω²/4 is 80, 640, 6400: colliding particles must not be frozen only because sweeps diverge.
   for (const double stiffness : {1e5, 8e5, 8e6}) {
     const auto run = test::run_steps<2>(spring_lattice(12, stiffness), "edda", 0.02, 4);
     const auto& s = run->statistics();
@@ -164,7 +165,7 @@ TEST(Edda, StepsFarTooLongForTheSpringsAreHalvedAndLoseNoEnergy) {
 }
 
 TEST(Edda, ParticlesWhosePartnersSwapAreFrozenAndTheEnergyStaysExact) {
-  // Fourteen collisions a step of 144 discs on springs so stiff that neighbours bounce several times.
+  // Fourteen collisions per step of 144 discs on springs so stiff that neighbours bounce several times.
   const auto run = test::run_steps<2>(spring_lattice(12, 1000, 1.03), "edda", 0.02, 100);
   const auto& s = run->statistics();
   EXPECT_GT(s.counters.sphere_sphere, 1000u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// edda: each particle under a constant acceleration of its own. What that must keep, and what it must cost.
+// edda with constant accelerations of the particles: what it conserves, and its cost.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 namespace carom {
 namespace {
 
-/// The collisions of a run, in the order in which they were shown.
+/// The collisions of a run in the order in which they were reported.
 template <int D>
 struct Collisions : Observer<D> {
   void contacts(double slab_start, std::span<const Contact<D>> executed) override {
@@ -37,7 +37,7 @@ Collisions<D> collisions(std::unique_ptr<System<D>> system, const char* method, 
   return seen;
 }
 
-/// The same pairs, one after the other, at the same times.
+/// Expects equal pairs in equal order at equal times.
 template <int D>
 void expect_same_collisions(const Collisions<D>& mine, const Collisions<D>& theirs, double tolerance) {
   ASSERT_EQ(mine.keys.size(), theirs.keys.size());
@@ -50,7 +50,7 @@ void expect_same_collisions(const Collisions<D>& mine, const Collisions<D>& thei
   }
 }
 
-/// Charged spheres of two kinds with a hard core and a short reach, at temperature 1.
+/// Charged spheres of two kinds with a hard core and a short-range force, at temperature 1.
 std::unique_ptr<System<3>> charged_spheres() {
   auto system = test::hard_spheres<3>(3, 0.2);
   for (std::size_t i = 0; i < system->particles.size(); ++i) system->particles.charge[i] = i % 2 == 0 ? 1.0 : -1.0;
@@ -82,7 +82,7 @@ TEST(Edda, PotentialsWithACutoffInThreeDimensions) {
 }
 
 TEST(Edda, APairMeetsAgainAndAgainWithinOneSlab) {
-  // Drawn together from a small gap, two discs bounce about six times in a slab.
+  // Two discs attracted across a small gap bounce about six times in a slab.
   for (const char* method : {"edda"}) {
     auto system = test::make_system<2>({12, 12}, Boundary::open, {{5, 6}, {6.02, 6}}, {{0, 0}, {0, 0}}, {}, {1, 2});
     test::add_interaction(*system, "gravity", {{"constant", 8.0}});
@@ -97,8 +97,8 @@ TEST(Edda, APairMeetsAgainAndAgainWithinOneSlab) {
 }
 
 TEST(Edda, BouncesLowerThanTheLastBitOfAPositionKeepTheirTimes) {
-  // A disc that leaves its contact at 1e-9 is drawn back from a height of 1e-18: when, only the knowledge that it
-  // touches tells. The gap that its coordinates give is off by more, in one direction or the other.
+  // A disc that leaves its contact at speed 1e-9 returns from a height of 1e-18. The time of the contact follows only
+  // from the stored fact that it touches: the gap computed from its coordinates has a larger error of either sign.
   for (const char* method : {"edda"}) {
     auto bounces = [&](std::vector<Vec<2>> x, std::vector<Vec<2>> v, const char* force, const test::Given& given) {
       auto system = test::make_system<2>({6, 6}, Boundary::wall, std::move(x), std::move(v));
@@ -115,7 +115,7 @@ TEST(Edda, BouncesLowerThanTheLastBitOfAPositionKeepTheirTimes) {
                 20u)
           << method << " " << k;
     }
-    for (const double away : {-4, -1, 0, 1, 4})  // in last bits
+    for (const double away : {-4, -1, 0, 1, 4})  // in units in the last place
       EXPECT_EQ(bounces({{3, 5.5 + away * 8.9e-16}}, {{0, -1e-9}}, "uniform-field",
                         {{"acceleration", std::vector<double>{0.0, 2.0}}}),
                 20u)
@@ -125,7 +125,7 @@ TEST(Edda, BouncesLowerThanTheLastBitOfAPositionKeepTheirTimes) {
 
 TEST(Edda, WithoutForcesCollisionsAreThoseOfTheEventCore) {
   for (const char* method : {"edda"})
-    for (const double packing : {0.4, 0.65}) {  // several collisions a disc and slab, and many neighbours
+    for (const double packing : {0.4, 0.65}) {  // several collisions per disc and slab, and many neighbours
       const auto mine = collisions<2>(test::hard_spheres<2>(4, packing), method, 0.5, 1);
       const auto theirs = collisions<2>(test::hard_spheres<2>(4, packing), "free-flight", 0.5, 1);
       ASSERT_GT(theirs.keys.size(), 16u);
@@ -135,7 +135,7 @@ TEST(Edda, WithoutForcesCollisionsAreThoseOfTheEventCore) {
 }
 
 TEST(Edda, AParticleThatIsHitMayGetFartherThanAnyFirstFlight) {
-  // Heavy discs send light ones back three times as fast, towards each other from beyond what was looked at.
+  // Heavy discs send light ones back three times as fast, towards each other from beyond the searched range.
   auto system = [] {
     return test::make_system<2>({70, 10}, Boundary::open, {{2, 5}, {5, 5}, {56.8, 5}, {59.8, 5}},
                                 {{10, 0}, {-10, 0}, {10, 0}, {-10, 0}}, {}, {1000, 1, 1, 1000});
@@ -172,8 +172,8 @@ TEST(Edda, ABlowThroughAChainIsToldInItsCausalOrder) {
 }
 
 TEST(Edda, GrazingPairsComeAndGoWithoutHalvingTheSlab) {
-  // Two discs that repel each other pass so closely that they touch on the mean force of the whole slab and do not on
-  // that of the way to the contact, or converge slowly because the contact moves much with the force.
+  // Two discs that repel each other pass so closely that they touch under the mean force of the whole slab but not
+  // under that of the path to the contact, or converge slowly because the contact depends strongly on the force.
   auto pass = [](double miss) {
     auto system = test::make_system<2>({40, 40}, Boundary::open, {{5, 5}, {7.72, 6 + miss}, {6, 8}},
                                        {{1.5, 0}, {-1.5, 0}, {0, 0}});
@@ -199,7 +199,7 @@ TEST(Edda, GrazingPairsComeAndGoWithoutHalvingTheSlab) {
 }
 
 TEST(Edda, BondedAndOtherPairsCollide) {
-  // Three discs on a row, the first two joined by a spring that is slack at contact; the third is not joined.
+  // Three discs in a row: a spring that is slack at contact joins the first two; the third is free.
   for (const char* method : {"edda"}) {
     auto system =
         test::make_system<2>({9, 3}, Boundary::periodic, {{1, 1.5}, {2.6, 1.5}, {5, 1.5}}, {{1, 0}, {-1, 0}, {-2, 0}});
@@ -235,7 +235,7 @@ TEST(Edda, OneAndTwoParticlesUnderFields) {
     }
 }
 
-/// Notes the energy at given intervals.
+/// Records the energy at given intervals.
 struct EnergyNotes : Observer<2> {
   void thermo(const Snapshot<2>& shot) override { energy.push_back(shot.total()); }
   std::vector<double> energy;
@@ -259,13 +259,13 @@ TEST(Edda, TheEnergyErrorGrowsNoFasterThanTheRootOfTheSteps) {
     }
     std::vector<double> rms;
     for (double s : squares) rms.push_back(std::sqrt(s / starts));
-    // A random walk has 0.5; with 16 starts the fitted exponent scatters by about 0.1. A bias would give 1.
+    // A random walk has exponent 0.5; with 16 starts the fitted exponent scatters by about 0.1. A bias would give 1.
     EXPECT_LE(test::fitted_order(steps, rms), 0.5 + 0.25);
     EXPECT_LE(rms.back(), 1e-12);
   }
 }
 
-/// The state with all velocities turned round.
+/// The state with all velocities reversed.
 template <int D>
 std::unique_ptr<System<D>> turned(std::unique_ptr<System<D>> start, const System<D>& end) {
   start->particles.x = end.particles.x;

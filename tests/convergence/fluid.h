@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Fluids for the tests against the literature: melted at once, and measured with error bars.
+// Fluids for the tests against the literature: they melt at once and are measured with error bars.
 
 #include <array>
 #include <cmath>
@@ -14,9 +14,9 @@
 
 namespace carom::test {
 
-/// About n hard spheres (discs) of diameter 1 at this packing fraction and temperature 1, on sites drawn at random from
-/// a lattice close to the densest: with that many vacancies it melts within a few collisions a particle. (A perfect fcc
-/// crystal may live for long at packing fraction 0.49.)
+/// About n hard spheres (discs) of diameter 1 at this packing fraction and temperature 1, on random sites of a lattice
+/// close to the densest one: with so many vacancies it melts within a few collisions per particle. (A perfect fcc
+/// crystal can be metastable for long at packing fraction 0.49.)
 template <int D>
 std::unique_ptr<System<D>> molten(std::size_t about, double eta, unsigned seed) {
   const double densest = D == 3 ? 0.70 : 0.86, ball = D == 3 ? std::numbers::pi / 6 : std::numbers::pi / 4;
@@ -43,7 +43,7 @@ struct Mean {
   double value, error;
 };
 
-/// From the means of `blocks` blocks of y[first …], which must be long against all correlations.
+/// From the means of `blocks` blocks of y[first …], which must be much longer than all correlations.
 inline Mean blocked_mean(const std::vector<double>& y, std::size_t first, std::size_t blocks = 20) {
   const std::size_t length = (y.size() - first) / blocks;
   double sum = 0, squares = 0;
@@ -56,10 +56,10 @@ inline Mean blocked_mean(const std::vector<double>& y, std::size_t first, std::s
   return {sum / n, std::sqrt(std::max(0.0, squares / n - sum * sum / (n * n)) / (n - 1))};
 }
 
-/// Notes Z and the collision rate between rows of the thermo table.
+/// Records Z and the collision rate between rows of the thermo table.
 ///
-/// The momentum of the whole is zero, so that K = D(N − 1)kT/2, and with this T relative velocities are distributed as
-/// in the canonical ensemble: Z = 1 + Σ d·impulse/(D N kT Δt). The pressure of a row has 2K/(D V) for the ideal gas.
+/// The total momentum is zero, so that K = D(N − 1)kT/2; with this T relative velocities have the canonical
+/// distribution: Z = 1 + Σ d·impulse/(D N kT Δt). The pressure of a row has 2K/(D V) for the ideal gas.
 template <int D>
 struct FluidRows : Observer<D> {
   void thermo(const Snapshot<D>& shot) override {
@@ -81,7 +81,7 @@ struct FluidRows : Observer<D> {
   double time_ = 0;
 };
 
-/// Collisions of a slow test: so many, or what CAROM_SLOW_COLLISIONS says for a quick look.
+/// The number of collisions of a slow test; CAROM_SLOW_COLLISIONS overrides it.
 inline std::uint64_t slow_collisions(double usual) {
   const char* given = std::getenv("CAROM_SLOW_COLLISIONS");
   return static_cast<std::uint64_t>(given ? std::atof(given) : usual);

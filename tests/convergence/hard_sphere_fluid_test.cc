@@ -3,11 +3,11 @@
 // g(r) at contact.
 //
 // Error bars are standard errors from 20 blocks, after an equilibration of a fifth of the run. With 19 degrees of
-// freedom |t| > 4 has a probability of 8e-4, and |t| > 5 of 8e-5. The pressure remembers sound waves of the length of
-// the box, which die out in a time ~ L²: of 4000 discs at packing fraction 0.5 in several hundred mean free times, so
-// that blocks of 80 gave errors half as large as the scatter of six seeds. Hence small systems in long runs: here
-// blocks have a hundred mean free times and more, in the slow tests (at 10⁷ collisions) 400 in space and 800 in the
-// plane. Finite size is accounted for (literature.h: first order in 1/N; fluid.h: the momentum that is zero).
+// freedom |t| > 4 has a probability of 8e-4, and |t| > 5 of 8e-5. The pressure is correlated by sound waves of the
+// length of the box, which decay in a time ~ L²: several hundred mean free times for 4000 discs at packing fraction
+// 0.5, so that blocks of 80 gave errors half as large as the scatter of six seeds. Therefore the systems are small and
+// the runs long: blocks have a hundred mean free times or more here, and 400 (spheres) or 800 (discs) in the slow tests
+// of 10⁷ collisions. Finite size is corrected (literature.h: first order in 1/N; fluid.h: zero momentum).
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ using test::Mean;
 
 TEST(Literature, FitsGiveTheVirialCoefficients) {
   // B2 … B10 in powers of η: Labík, Kolafa, Malijevský, Phys. Rev. E 71 (2005) 021105; Clisby, McCoy, J. Stat. Phys.
-  // 122 (2006) 15. The next ones are below 2e-8 at η = 0.1.
+  // 122 (2006) 15. Further terms are below 2e-8 at η = 0.1.
   const double eta = 0.1;
   const auto series = [eta](std::initializer_list<double> b) {
     double z = 1, power = eta;
@@ -38,7 +38,7 @@ TEST(Literature, FitsGiveTheVirialCoefficients) {
               series({2, 4 * 0.7820044, 8 * 0.5322318, 16 * 0.33355604, 32 * 0.1988425, 64 * 0.1148728, 128 * 0.0649930,
                       256 * 0.0362193, 512 * 0.0199537}),
               1e-6);
-  // Carnahan and Starling's equation is known to be within 0.3 % up to η = 0.49, Henderson's of discs within 0.4 %.
+  // Carnahan and Starling's equation is accurate to 0.3 % up to η = 0.49, Henderson's for discs to 0.4 %.
   for (int k = 1; k < 10; ++k) {
     const double y = 0.05 * k, cs = (1 + y + y * y - y * y * y) / std::pow(1 - y, 3);
     const double henderson = (1 + y * y / 8) / std::pow(1 - y, 2);
@@ -52,12 +52,12 @@ TEST(Literature, FitsGiveTheVirialCoefficients) {
   const std::array<literature::Component, 2> equal = {{{0.5, 1}, {0.5, 1}}};
   EXPECT_NEAR(literature::mixture(equal, 0.4), (1 + 0.4 + 0.16 - 0.064) / 0.216, 1e-12);
   EXPECT_NEAR(literature::extended_mixture(equal, 0.4), literature::spheres(0.4), 1e-12);
-  // B2 and B3 are those of both equations, so that they differ by ΔB4 η³ at most at small η.
+  // Both equations have the exact B2 and B3, so they differ by at most ΔB4 η³ at small η.
   const std::array<literature::Component, 2> unequal = {{{0.5, 1}, {0.5, 0.2}}};
   EXPECT_NEAR(literature::extended_mixture(unequal, 0.01), literature::mixture(unequal, 0.01), 1e-6);
 }
 
-/// What a run has measured against what it should have.
+/// The measured and the expected results of a run.
 struct Compared {
   Mean z, rate;
   double expected_z, expected_rate, mean_free_path;
@@ -71,7 +71,7 @@ Compared compare(std::size_t about, double eta, std::uint64_t collisions, unsign
   test::FluidRows<D> rows(run->system().box.volume());
   run->add(rows);
   run->run();
-  rows.z.pop_back(), rows.rate.pop_back();  // the last row is cut short
+  rows.z.pop_back(), rows.rate.pop_back();  // the last row is shorter
   const auto& s = run->statistics();
   EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);
   EXPECT_LE(s.counters.max_overlap, 1e-12);
@@ -83,7 +83,7 @@ Compared compare(std::size_t about, double eta, std::uint64_t collisions, unsign
           rate, *s.mean_free_path};
 }
 
-/// Whether Z and the collision rate agree within their error bars and the literature's relative error.
+/// Tests whether Z and the collision rate agree within their error bars and the literature's relative error.
 template <int D>
 void expect_literature(std::size_t n, double eta, std::uint64_t collisions, double t_limit, double* sum_of_squares) {
   const Compared c = compare<D>(n, eta, collisions, 1);
@@ -93,10 +93,10 @@ void expect_literature(std::size_t n, double eta, std::uint64_t collisions, doub
             << c.expected_z << ", " << t << " errors; rate " << c.rate.value / c.expected_rate - 1 << " ± "
             << c.rate.error / c.expected_rate << std::endl;
   EXPECT_LE(std::abs(t), t_limit) << "packing fraction " << eta;
-  // Enskog's rate is known as well as Z: the collisional part of Z is proportional to it.
+  // Enskog's rate is as accurate as Z: the collisional part of Z is proportional to it.
   const double rate_error = std::hypot(c.rate.error, 4e-5 * c.expected_rate * c.expected_z / (c.expected_z - 1));
   EXPECT_NEAR(c.rate.value, c.expected_rate, t_limit * rate_error) << "packing fraction " << eta;
-  // That of the run as a whole, melting and all.
+  // The mean free path of the whole run, melting included.
   const double path = literature::mean_speed<D>() / c.expected_rate;
   EXPECT_NEAR(c.mean_free_path, path, 0.03 * path);
   if (sum_of_squares) *sum_of_squares += t * t;
@@ -108,12 +108,12 @@ TEST(HardSphereFluid, SpheresAtPackingFraction49) { expect_literature<3>(500, 0.
 TEST(HardSphereFluid, DiscsAtPackingFraction20) { expect_literature<2>(500, 0.20, 600000, 5, nullptr); }
 TEST(HardSphereFluid, DiscsAtPackingFraction60) { expect_literature<2>(500, 0.60, 1000000, 5, nullptr); }
 
-// A hundred particles, where the corrections for finite size are seen: without the one for the temperature Z − 1 would
-// be 0.9 % off, without the one for the ensemble Z 0.6 %.
+// A hundred particles show the corrections for finite size: without the correction for the temperature Z − 1 would be
+// 0.9 % off, without the one for the ensemble Z would be 0.6 % off.
 TEST(HardSphereFluid, AHundredSpheresShowTheirNumber) { expect_literature<3>(108, 0.30, 1000000, 5, nullptr); }
 
-/// All densities, with many collisions: each within its error bar, and the errors no larger on the whole than they may
-/// be (the mean of n squares of t with 19 degrees of freedom is 1.12 ± 1.6/√n).
+/// All densities with many collisions: each result is within its error bar, and the mean square of t is as expected
+/// (for n results with 19 degrees of freedom 1.12 ± 1.6/√n).
 template <int D>
 void expect_everywhere(std::initializer_list<double> packing_fractions, std::size_t n, std::uint64_t collisions) {
   double squares = 0;
@@ -130,7 +130,7 @@ TEST(HardSphereFluidSlow, DiscsFrom05To65) {
   expect_everywhere<2>({0.05, 0.10, 0.20, 0.30, 0.40, 0.50, 0.60, 0.65}, 1000, test::slow_collisions(1e7));
 }
 
-/// g at contact, extrapolated from the histogram, is that of the pressure.
+/// g at contact, extrapolated from the histogram, is the value that follows from the pressure.
 template <int D>
 void expect_contact_value(double eta, double tolerance) {
   const double tau = 1 / literature::enskog_rate<D>(eta);
@@ -146,22 +146,23 @@ void expect_contact_value(double eta, double tolerance) {
   EXPECT_GT(rdf.g()[100], 1);
 }
 
-// Their scatter is 0.7 % (spheres) and 1 % (discs) at 25 samples of 2000 particles.
+// The scatter is 0.7 % (spheres) and 1 % (discs) with 25 samples of 2000 particles.
 TEST(HardSphereFluid, ContactValueOfSpheres) { expect_contact_value<3>(0.40, 0.03); }
 TEST(HardSphereFluid, ContactValueOfDiscs) { expect_contact_value<2>(0.50, 0.04); }
 
-/// A Lorentz gas: one light sphere between heavy discs (spheres) that stand still on a lattice, so dense that the way
-/// is barred in all directions (discs) or almost all (spheres). The mean length of its flights is exact: π A/P in the
-/// plane and 4 V/S in space, A and V what is free, P and S what it bounces off (Chernov, J. Stat. Phys. 88 (1997) 1).
+/// A Lorentz gas: one light sphere between heavy discs (spheres) at rest on a lattice, so dense that the discs block
+/// all directions (spheres: almost all). The mean length of its flights is exact: π A/P in two and 4 V/S in three
+/// dimensions, with the free area A and volume V and the perimeter P and surface S of the obstacles (Chernov, J. Stat.
+/// Phys. 88 (1997) 1).
 template <int D>
 void expect_lorentz(int cells, double barred, std::uint64_t collisions) {
-  // `barred`: the share of the box that its centre cannot reach.
+  // `barred`: the fraction of the box that its centre cannot reach.
   const double radius = 0.1, r = 0.5 + radius;
   auto system = test::hard_spheres<D>(cells, barred * std::pow(0.5 / r, D));
   auto& p = system->particles;
   for (auto& v : p.v) v.setZero();
   for (auto& m : p.mass) m = 1e30;
-  // A place for it with no sphere near.
+  // A position for it away from all spheres.
   Vec<D> place = Vec<D>::Zero(), v = Vec<D>::Zero();
   const auto taken = [&] {
     return std::ranges::any_of(p.x, [&](const Vec<D>& x) {
@@ -181,12 +182,12 @@ void expect_lorentz(int cells, double barred, std::uint64_t collisions) {
   p.image.push_back({});
   auto run = test::make_run<D>(std::move(system), "free-flight", {.step = 200, .collisions = collisions});
   run->run();
-  // Each collision ends a flight of the light sphere, and one of a scatterer, of length 0.
+  // Each collision ends a flight of the light sphere, and a flight of length 0 of a scatterer.
   const double path = 2 * run->statistics().mean_free_path.value();
   const double pi = std::numbers::pi, volume = run->system().box.volume();
   const double expected = D == 2 ? (volume - scatterers * pi * r * r) / (2 * r * scatterers)
                                  : (volume - scatterers * 4 * pi / 3 * r * r * r) / (pi * r * r * scatterers);
-  // Free paths scatter about as much as their mean, and neighbouring ones are weakly correlated.
+  // The scatter of free paths is about their mean, and consecutive ones are weakly correlated.
   EXPECT_NEAR(path, expected, 5 * expected / std::sqrt(static_cast<double>(collisions)));
   EXPECT_LE(run->statistics().max_energy_error, 1e-12);
 }
@@ -194,7 +195,7 @@ void expect_lorentz(int cells, double barred, std::uint64_t collisions) {
 TEST(LorentzGas, MeanFreePathBetweenDiscs) { expect_lorentz<2>(4, 0.75, 300000); }
 TEST(LorentzGas, MeanFreePathBetweenSpheres) { expect_lorentz<3>(2, 0.60, 300000); }
 
-/// Equal numbers of spheres of two sizes, the large ones on a lattice of their own with the small ones between: NaCl's.
+/// Equal numbers of spheres of two sizes in the structure of NaCl.
 std::unique_ptr<System<3>> binary_mixture(int cells, double ratio, double eta) {
   const std::size_t half = 4ul * cells * cells * cells;
   const double small = 0.5 * ratio, large = 0.5, ball = 4 * std::numbers::pi / 3;
@@ -235,7 +236,7 @@ void expect_mixture(int cells, double ratio, double eta, std::uint64_t collision
   std::cout << "1:" << 1 / ratio << " at packing fraction " << eta << ": Z = " << z.value << " ± " << z.error
             << ", Mansoori and others " << expected << ", relative difference " << z.value / expected - 1 << '\n';
   EXPECT_NEAR(z.value, expected, std::hypot(4 * z.error, 0.008 * expected));
-  // The extended equation is the better one; how good is not known. Here they agree within errors of 0.1 %.
+  // The extended equation is more accurate; its error is not known. Here they agree within errors of 0.1 %.
   const double extended = literature::extended_mixture(both, eta);
   EXPECT_NEAR(z.value, extended, std::hypot(4 * z.error, 0.003 * extended));
   EXPECT_LE(run->statistics().counters.max_overlap, 1e-12);
@@ -250,7 +251,7 @@ TEST(HardSphereMixtureSlow, OneToFive) {
   for (const double eta : {0.20, 0.40}) expect_mixture(8, 0.2, eta, test::slow_collisions(1e7));
 }
 
-/// Nothing is lost in a long run: energy, momentum, contacts.
+/// A long run conserves energy and momentum and misses no contact.
 void expect_kept(std::uint64_t collisions) {
   auto run = test::make_run<3>(test::molten<3>(10000, 0.45, 1), "free-flight", {.step = 0.4, .collisions = collisions});
   run->run();
@@ -260,7 +261,7 @@ void expect_kept(std::uint64_t collisions) {
   EXPECT_EQ(s.counters.sphere_sphere, collisions);
   EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);
   EXPECT_LE(s.counters.max_overlap, 1e-12);
-  // Roundings of an impulse of size 1 add up like a random walk of steps below 1e-16 along each of three axes.
+  // Roundings of an impulse of size 1 add up like a random walk with steps below 1e-16 along each of three axes.
   EXPECT_LE(*s.max_momentum_error, 10 * 1e-16 * std::sqrt(3 * static_cast<double>(collisions)));
 }
 

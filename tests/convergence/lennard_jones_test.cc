@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Lennard-Jones fluids against other programs: temperature, energy and pressure.
 //
-// Runs keep their energy: they start as an fcc crystal at a temperature that is chosen so that the melt comes near the
-// temperature wanted, and are compared at the temperature they have. Temperatures are 2K/(3(N − 1)), for the momentum
-// is zero; pressures NkT/V + Σ d·F/(3V). Error bars are standard errors from 10 blocks, which must be long against all
+// Runs are at constant energy: they start as an fcc crystal at a temperature for which the melt comes near the required
+// temperature, and are compared at their actual temperature. Temperatures are 2K/(3(N − 1)), because the momentum is
+// zero; pressures NkT/V + Σ d·F/(3V). Error bars are standard errors from 10 blocks, which must be much longer than all
 // correlations; with 9 degrees of freedom |t| > 5 has a probability of 7e-4.
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace {
 using test::Given;
 using test::Mean;
 
-/// Rows of T, V/N and P from a time on.
+/// Rows of T, V/N and P after a given time.
 struct Rows : Observer<3> {
   Rows(double from, double volume) : from_(from), volume_(volume) {}
   void thermo(const Snapshot<3>& shot) override {
@@ -65,8 +65,8 @@ std::ostream& operator<<(std::ostream& out, const Mean& mean) { return out << me
 
 Mean mean_of(const std::vector<double>& y) { return test::blocked_mean(y, 0, 10); }
 
-/// ρ = 0.8442, cut at 2.5 and shifted, from T = 1.44: LAMMPS, 4000 atoms, times 6 … 40, has T = 0.698, V/N = −5.220, P
-/// = 0.751 ± 0.006. `slack`: what is allowed beside five standard errors, for the size of the system and the last
+/// ρ = 0.8442, cut at 2.5 and shifted, from T = 1.44: LAMMPS, 4000 atoms, times 6 … 40, gives T = 0.698, V/N = −5.220,
+/// P = 0.751 ± 0.006. `slack` is allowed in addition to five standard errors, for the system size and the rounded
 /// digits.
 void expect_lammps_state(int cells, const Length& length, double slack) {
   const Rows rows = melted(cells, 0.8442, 1.44, {{"cutoff", 2.5}, {"cut", std::string("shifted")}}, length);
@@ -75,7 +75,7 @@ void expect_lammps_state(int cells, const Length& length, double slack) {
   EXPECT_NEAR(t.value, 0.698, 5 * t.error + slack);
   EXPECT_NEAR(v.value, -5.220, 5 * v.error + slack);
   EXPECT_NEAR(p.value, 0.751, 5 * std::hypot(p.error, 0.006) + 4 * slack);
-  EXPECT_LE(t.error, 2 * slack);  // so that to agree means something
+  EXPECT_LE(t.error, 2 * slack);  // so that the comparison is meaningful
   EXPECT_LE(p.error, 10 * slack);
 }
 
@@ -95,8 +95,8 @@ struct NistState {
   }
 };
 
-/// Compares at the temperature of the run, by the line through both temperatures of NIST: T is linear in V in a run, so
-/// that differences from the line can be averaged row by row.
+/// Compares at the temperature of the run with the line through both temperatures of NIST: T is linear in V in a run,
+/// so differences from the line can be averaged row by row.
 void expect_nist_state(const NistState& state, double start_temperature, const Length& length) {
   const Rows rows =
       melted(5, state.density, start_temperature,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Long runs: the energy of cdda wanders like a random walk of rounding errors, and no faster.
+// Long runs: the energy of cdda drifts like a random walk of rounding errors, and no faster.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ TEST(LongRun, AMillionStepsOfBothExperiments) {
   }
 }
 
-/// Notes the energy at given intervals.
+/// Records the energy at given intervals.
 struct EnergyNotes : Observer<2> {
   void thermo(const Snapshot<2>& shot) override { energy.push_back(shot.total()); }
   std::vector<double> energy;
@@ -44,7 +44,7 @@ TEST(LongRun, TheEnergyErrorGrowsNoFasterThanTheRootOfTheSteps) {
     }
     std::vector<double> rms;
     for (double s : squares) rms.push_back(std::sqrt(s / starts));
-    // A random walk has 0.5; with 16 starts the fitted exponent scatters by about 0.08. A bias would give 1.
+    // A random walk has exponent 0.5; with 16 starts the fitted exponent scatters by about 0.08. A bias would give 1.
     EXPECT_LE(test::fitted_order(steps, rms), 0.5 + 0.2);
     EXPECT_LE(rms.back(), 1e-12);
   }

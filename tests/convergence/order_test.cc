@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Orders of convergence, at a fixed end time, averaged over perturbed starts.
+// Orders of convergence at a fixed end time, averaged over perturbed starts.
 
 #include <gtest/gtest.h>
 
@@ -15,8 +15,8 @@ using test::Given;
 template <int D>
 using Start = std::unique_ptr<System<D>> (*)(unsigned);
 
-/// The order in which the largest energy error (or shadow energy error) on the way to `end` falls with the step: the
-/// slope of the mean of log errors over 16 starts.
+/// The order in the step of the largest energy error (or shadow energy error) up to `end`: the slope of the mean of log
+/// errors over 16 starts.
 template <int D>
 double energy_order(Start<D> start, const char* method, double end, bool shadow, const Given& given = {}) {
   std::vector<double> steps = {0.03, 0.01, 0.003, 0.001}, errors;
@@ -110,7 +110,7 @@ TEST(Order, PositionsOfMcvaWithRestartAreShownAtTheRightTime) {
 
 TEST(Order, PositionsOfCddaOrderFourBetweenCollisions) {
   const Given four = {{"order", std::int64_t{4}}};
-  // The first collision of five-springs comes after t = 1.
+  // The first collision of five-springs is after t = 1.
   const auto early = test::run_until<2>(test::five_springs(), "cdda", 0.01, 0.9);
   ASSERT_EQ(early->statistics().counters.sphere_sphere + early->statistics().counters.sphere_wall, 0u);
   EXPECT_NEAR(position_order<2>(test::five_springs, "cdda", 0.9, {0.15, 0.1, 0.075, 0.05}, four), 4, 0.2);

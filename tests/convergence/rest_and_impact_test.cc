@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bodies at rest for 10⁴ steps, and bodies at rest that are hit: edda against cdda at small steps.
+// Bodies at rest for 10⁴ steps, and impacts on bodies at rest: edda against cdda at small steps.
 
 #include <gtest/gtest.h>
 
@@ -31,11 +31,11 @@ TEST(RestSlow, HangingChain) { expect_long_rest(test::hanging_chain()); }
 TEST(RestSlow, RowUnderAttraction) { expect_long_rest(test::row_under_attraction(3)); }
 TEST(RestSlow, Heap) { expect_long_rest(test::heap(14)); }  // 1015 spheres
 
-/// What hits the bodies at rest, in a trap in the middle of the floor, which bends paths.
+/// An impact on bodies at rest, in a trap in the middle of the floor, which bends paths.
 template <int D>
 struct Impact {
   Particle<D> striker;
-  double end;         // shortly after it, before small differences grow
+  double end;         // shortly after the impact, before small differences grow
   double trap = 0.2;  // stiffness
 };
 
@@ -92,7 +92,7 @@ TEST(Impact, OnAHangingChain) {
 }
 
 TEST(Impact, OnARowThatFillsTheBoxIsRefused) {
-  // The lowest row of the pyramid has no room to part, so no sequence of elastic collisions lets it come out of a blow.
+  // The lowest row of the pyramid has no space to separate, so no sequence of elastic collisions lets it move apart.
   for (const char* method : {"cdda", "edda"}) {
     SCOPED_TRACE(method);
     try {

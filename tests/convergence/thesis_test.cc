@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The two experiments of Enomoto's thesis against the numbers of an independent plain code (tests/data/reference).
+// The two experiments of Enomoto's thesis against an independent simple code (tests/data/reference).
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ std::unique_ptr<System<2>> experiment(const std::string& name) {
   return name == "five-springs" ? test::five_springs() : test::nine_gravity();
 }
 
-/// The rows of a CSV file of the reference, without comments and head line.
+/// The rows of a CSV file of the reference, without comments and header.
 std::vector<std::vector<std::string>> read_rows(const std::string& file) {
   std::ifstream in(std::string(CAROM_TEST_DATA) + "/reference/" + file);
   std::vector<std::vector<std::string>> rows;
@@ -47,8 +47,8 @@ TEST(Thesis, EnergyErrorsAreOfTheReferencesMagnitudeAtEveryStep) {
       EXPECT_LE(edda.max_energy_error, 1e-12 * edda.energy_reference);
       EXPECT_LE(edda.counters.max_overlap, 1e-12);
     } else {
-      // The motion is chaotic: after many collisions only magnitudes agree; with few, digits do.
-      // That of psa is a random walk of large errors: from 16 neighbouring starts at step 0.1 it is 0.2 to 1.7.
+      // The motion is chaotic: after many collisions only magnitudes agree; after few, digits do.
+      // psa's error is a random walk of large errors: from 16 neighbouring starts at step 0.1 it is 0.2 to 1.7.
       const double factor = h <= 0.003 ? 1.5 : method == "psa" && h >= 0.1 ? 12 : 5;
       EXPECT_LE(s.max_energy_error, factor * reference);
       EXPECT_GE(s.max_energy_error, reference / factor);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The reader of checkpoints on bytes of a fuzzer, as they are and signed with their length and CRC-32: what a run goes
-// on from, `carom info`, or an Error.
+// The reader of checkpoints on bytes from a fuzzer, unchanged and with a valid length and CRC-32: a run continues,
+// `carom info` succeeds, or there is an Error.
 
 #include <libdeflate.h>
 
@@ -21,7 +21,7 @@ using namespace carom;
 
 constexpr std::size_t kBlock = 512;
 
-/// Restores what the file has of three discs with an average; like `carom run --continue`.
+/// Restores three discs with an average from the file, like `carom run --continue`.
 void restore_from(const std::filesystem::path& path) {
   const Checkpoint checkpoint(path);
   System<2> system;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The parser of decks on bytes that a fuzzer makes (tools/fuzz): it ends with a deck or with an Error.
+// The parser of decks on bytes from a fuzzer (tools/fuzz): it returns a deck or throws an Error.
 
 #include <cstddef>
 #include <cstdint>

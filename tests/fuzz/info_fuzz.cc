@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// `carom info` on the bytes of a trajectory or a file of events: it ends with a text or with an Error.
+// `carom info` on the bytes of a trajectory or a file of events: it prints a text or throws an Error.
 
 #include "engine/base/error.h"
 #include "io/files/info.h"

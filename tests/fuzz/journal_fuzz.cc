@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The replay of a journal made by a fuzzer, as it is and with the right length and CRC-32: the file is written to only
-// where the journal is complete.
+// The replay of a journal from a fuzzer, unchanged and with a valid length and CRC-32: the file is changed only if the
+// journal is complete.
 
 #include <fcntl.h>
 #include <libdeflate.h>

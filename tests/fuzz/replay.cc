@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Runs a fuzz target without a fuzzer: `TARGET MUTATIONS FILE…` gives it each file and so many mutations of each, the
-// same ones every time.
+// Runs a fuzz target without a fuzzer: `TARGET MUTATIONS FILE…` passes each file and this number of mutations of each
+// file to it, equal in every run.
 
 #include <algorithm>
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using Input = std::vector<std::uint8_t>;
 
-/// The files, and those in the directories, by name.
+/// The files, and the files in the directories, sorted by name.
 std::vector<fs::path> files_of(int argc, char** argv) {
   std::vector<fs::path> files;
   for (int k = 2; k < argc; ++k) {
@@ -33,7 +33,7 @@ std::vector<fs::path> files_of(int argc, char** argv) {
   return files;
 }
 
-/// One to four changes: a bit, a byte that limits are likely at, eight bytes, a cut, a repetition.
+/// One to four changes: a bit, a byte at a likely limit, eight bytes, a cut, a repetition.
 void mutate(Input& input, std::mt19937_64& random) {
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random() % n); };
   constexpr std::uint8_t kLimits[] = {0, 1, 0x7f, 0x80, 0xff, '"', '[', '\n'};

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Ranks that work together and fail, for tests/mpi/CMakeLists.txt: `communicator_ranks WHAT [SILENCE]`.
 //
-// On rank 0 while the others sleep:
-//   ok        returns 7: so do all
-//   error     throws an Error of exit code 4: all end with it
-//   bug       throws something else: all are ended
+// On rank 0 while the other ranks sleep:
+//   ok        returns 7, and so do all ranks
+//   error     throws an Error of exit code 4: all ranks end with it
+//   bug       throws another exception: all ranks are ended
 // On all ranks:
-//   alike     all throw the same Error, one after the other
-//   one       rank 1 throws something, the others wait for it in a call
+//   alike     all throw equal Errors, one after the other
+//   one       rank 1 throws an exception, the other ranks wait for it in a call
 //   memory    rank 1 has no memory left
-//   first     rank 0 throws an Error, the others wait
-//   busy      rank 1 throws an Error, the others compute for ever
+//   first     rank 0 throws an Error, the other ranks wait
+//   busy      rank 1 throws an Error, the other ranks compute without end
 //   killed    rank 1 is killed
 //   stopped   rank 1 is stopped
-//   late      rank 1 computes longer than the silence and is given up
-//   suspended all are stopped, for longer than the silence, and go on: nothing has happened
-//   calls     the calls of MpiCommunicator give what they should
+//   late      rank 1 computes longer than the silence and is treated as lost
+//   suspended all are stopped for longer than the silence, and continue without an error
+//   calls     the calls of MpiCommunicator give the expected results
 //   latency   microseconds of the calls, beside MPI_Allreduce
 
 #include <unistd.h>
@@ -61,11 +61,11 @@ Bytes filled(std::size_t size, int from, int to) {
   return bytes;
 }
 
-/// Everything an Communicator promises, for messages of all sizes.
+/// Checks all functions of a Communicator with messages of all sizes.
 void check_calls(MpiCommunicator& ranks) {
   const int rank = ranks.rank(), size = ranks.size();
   for (const std::size_t length : {std::size_t{0}, std::size_t{1}, std::size_t{1000}, std::size_t{3000000}}) {
-    // Rank a sends something to b where a + b is not a multiple of 3.
+    // Rank a sends a message to b if a + b is not a multiple of 3.
     const auto sends = [](int a, int b) { return (a + b) % 3 != 0; };
     std::vector<Bytes> outgoing(static_cast<std::size_t>(size));
     for (int r = 0; r < size; ++r)
@@ -76,7 +76,7 @@ void check_calls(MpiCommunicator& ranks) {
       require(incoming[static_cast<std::size_t>(r)] ==
                   (sends(r, rank) ? filled(length + static_cast<std::size_t>(rank), r, rank) : Bytes{}),
               "swap");
-    // In a ring, where with two ranks both neighbours are one, and with one there are none.
+    // In a ring: with two ranks both neighbours are the same rank, with one rank there are none.
     std::vector<int> partners;
     for (const int r : {(rank + 1) % size, (rank + size - 1) % size})
       if (r != rank && std::find(partners.begin(), partners.end(), r) == partners.end()) partners.push_back(r);
@@ -124,7 +124,7 @@ void measure(MpiCommunicator& ranks, MPI_Comm world) {
   show("swap, nothing", [&] { ranks.swap(nothing); });
   const std::vector<Bytes> some(static_cast<std::size_t>(ranks.size()), Bytes(1000));
   show("swap, 1000 bytes each", [&] { ranks.swap(some); });
-  const int other = ranks.rank() ^ 1;  // the last of an odd number is alone
+  const int other = ranks.rank() ^ 1;  // the last of an odd number has no partner
   const std::vector<int> partners(other < ranks.size() ? 1 : 0, other);
   const std::vector<Bytes> messages(partners.size(), Bytes(1000));
   show("swap in pairs, 1000 bytes", [&] { ranks.swap(messages, partners); });
@@ -154,7 +154,7 @@ int all(const std::string& what, MpiCommunicator& ranks, MPI_Comm world) {
   if (what == "stopped" && is_one) std::raise(SIGSTOP);
   if (what == "late" && is_one) sleep(60);
   if (what == "suspended") {
-    // Stops this process in the midst of a wait for rank 0, or rank 0 itself.
+    // Stops this process while it waits for rank 0, or stops rank 0 itself.
     const pid_t me = getpid();
     if (fork() == 0) {
       sleep(0.3);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of the package share."""
+"""Common systems for the tests of the package."""
 
 import os
 import pathlib
@@ -24,7 +24,7 @@ def five_springs(**change):
 
 
 def gas(n=64, seed=1, boundary="periodic", packing=0.1, **epoch):
-    """Hard spheres on a cubic lattice with random velocities, by free flight; `epoch`: of the length step=…"""
+    """Hard spheres on a cubic lattice with random velocities, by free flight; `epoch` is the length step=…"""
     sites = round(n ** (1 / 3))
     assert sites ** 3 == n
     edge = (n * np.pi / 6 / packing) ** (1 / 3)
@@ -37,7 +37,7 @@ def gas(n=64, seed=1, boundary="periodic", packing=0.1, **epoch):
 
 
 def run_command(deck, directory, *more):
-    """The run of the command, opened."""
+    """Runs the command and opens its run."""
     done = subprocess.run([os.environ["CAROM"], "run", str(deck), "-o", str(directory), "--quiet", *more],
                           capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Python ends while threads run simulations: real processes, which must end by themselves and in peace."""
+"""Python ends while threads run simulations: real processes, which must end by themselves without errors."""
 
 import pathlib
 import subprocess
@@ -30,7 +30,7 @@ assert begun.wait(60)
 
 
 def ends(work, before="", after="", load="carom.version", threads=2):
-    """Standard output of a Python that ends while daemon threads do this work."""
+    """Standard output of a Python process that ends while daemon threads run this code."""
     script = SCRIPT.format(here=str(pathlib.Path(__file__).parent), work=work, before=before, after=after, load=load,
                            threads=threads)
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
@@ -56,7 +56,7 @@ def test_python_ends_while_threads_run(work, after):
 
 
 def test_a_thread_whose_run_is_stopped_ends_too():
-    """By SystemExit, which is not reported; another function at exit gives it the time to do so here."""
+    """A thread ends by SystemExit, which is not reported; another function at exit gives it time to do so."""
     out = ends(WORK["steps"], before="atexit.register(lambda: [each.join() for each in threading.enumerate() if each.daemon])")
     assert out.count("SystemExit()") == 2, out
 

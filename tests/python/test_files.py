@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs from Python that leave files, go on from them, and whose velocities a callback sets."""
+"""Runs from Python that write files and continue from them, and callbacks that set velocities."""
 
 import os
 import re
@@ -75,7 +75,7 @@ def test_a_change_of_a_continued_run_begins_another_without_files(tmp_path):
 
 
 def test_a_killed_python_is_continued(tmp_path):
-    """The run checkpoints all the time, and is killed after the second."""
+    """The run writes checkpoints continually, and is killed after the second."""
     script = ("import sys; sys.path.insert(0, sys.argv[1]); from scenes import five_springs; s = five_springs();"
               "s.output(sys.argv[2], thermo_interval=0.1, frame_interval=0.5, rdf_interval=0.1, msd_interval=0.1, events=True,"
               " checkpoint_wall='0.01'); s.run(time=100000)")

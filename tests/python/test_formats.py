@@ -13,7 +13,7 @@ from scenes import ROOT, five_springs
 
 
 def written(tmp_path, form, make):
-    """A run, converted; and its last frame."""
+    """A converted run, and its last frame."""
     sim = make()
     sim.output(tmp_path / "run", frame_interval=0.5)
     sim.run(time=1)
@@ -54,7 +54,7 @@ def test_what_the_command_writes_comes_back(tmp_path, form, make):
 
 
 def _kinds(sim, back):
-    """The species of what came back, in the numbers of the simulation: LAMMPS has numbers alone, species are of one mass."""
+    """The species of the imported particles, as numbers of the simulation: LAMMPS has only numbers, and one mass per species."""
     masses = [sim.mass[sim.species == k][0] for k in range(len(sim.species_names))]
     return np.array([int(np.argmin(np.abs(np.array(masses) - m))) for m in back.mass])
 

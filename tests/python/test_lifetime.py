@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The study of lifetimes (tools/lifetime_study.py): its starts, when it calls a cluster evaporated, what it makes of the lifetimes."""
+"""The study of lifetimes (tools/lifetime_study.py): its starts, its criterion of evaporation, and its statistics of lifetimes."""
 
 import csv
 import pathlib

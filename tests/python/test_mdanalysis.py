@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectories opened by MDAnalysis as they are."""
+"""Trajectories opened by MDAnalysis without conversion."""
 
 import subprocess
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What users get wrong: each has an exception of its kind, with a text that says what is wrong and what to do."""
+"""Mistakes of users: each raises an exception of its kind, with a message that names the error and gives advice."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a notebook shows; the real one where Debian's python3-nbclient and python3-ipykernel are there."""
+"""The output in a notebook; a real notebook if Debian's python3-nbclient and python3-ipykernel are installed."""
 
 import pytest
 

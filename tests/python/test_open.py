@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""carom.open() on what the command leaves, also without the compiled part."""
+"""carom.open() on the files of the command, also without the compiled part."""
 
 import copy
 import pickle
@@ -43,7 +43,7 @@ def test_everything_of_a_run_is_there(run):
 
 @pytest.mark.parametrize("way", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
 def test_copies_read_for_themselves(run, way):
-    run.trajectory.time, run.thermo  # what is kept is not copied
+    run.trajectory.time, run.thermo  # cached data are not copied
     other, trajectory, frame = way(run), way(run.trajectory), way(run.frames[-1])
     run.trajectory.time[0] = 7
     try:

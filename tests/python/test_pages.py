@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pages with code that is run: what the blocks print is what stands in the page."""
+"""Pages with code: the blocks are run and must print the output on the page."""
 
 import pathlib
 import subprocess

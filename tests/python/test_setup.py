@@ -85,7 +85,7 @@ def test_temperatures_are_exact_and_of_one_species():
 
 
 def pair(expression, **given):
-    """Two particles in a periodic box at a distance that can be set; what adding the potential returned."""
+    """Two particles in a periodic box at a distance that can be set, and the return value of adding the potential."""
     sim = carom.Simulation(box=[20, 20, 20], boundary="periodic")
     sim.add_particles([[5, 5, 5], [6, 5, 5]], radius=0.1)
     return sim, sim.add_potential(expression, **given)

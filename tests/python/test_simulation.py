@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulations from Python against the command, and against themselves."""
+"""Simulations from Python against the command, and against each other."""
 
 import copy
 import pickle
@@ -137,7 +137,7 @@ COPIES = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda one: pi
 
 @pytest.mark.parametrize("way", COPIES)
 def test_a_simulation_is_not_copied(way):
-    """A copy of the Python object alone would be another name of the same simulation."""
+    """A shallow copy of the Python object would be another name of one simulation."""
     with pytest.raises(TypeError, match=r"cannot be copied or pickled; write_deck\(file, time=…\) writes"):
         COPIES[way](five_springs())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Views of the particles: no copies, and never of memory that is gone."""
+"""Views of the particles: they copy nothing, and never refer to freed memory."""
 
 import gc
 import signal
@@ -156,5 +156,5 @@ print(inside - before, rows() - inside)
 def test_a_million_particles_go_in_by_one_copy_and_are_viewed_without():
     out = subprocess.run([sys.executable, "-c", MEMORY], check=True, capture_output=True, text=True).stdout
     going_in, viewing = map(float, out.split())
-    own = 1e6 * (24 + 24 + 12 + 8 + 8 + 8 + 2) / 2**20  # what the engine keeps of each [MB]
+    own = 1e6 * (24 + 24 + 12 + 8 + 8 + 8 + 2) / 2**20  # the engine's memory for the particles [MB]
     assert going_in < own + 12 and viewing < 2

@@ -31,7 +31,7 @@ from compare import OF_THE_MACHINE
 
 
 def flat(entries, prefix=""):
-    """Nested dictionaries as one, with names like energy.final."""
+    """Flattens nested dictionaries, with names like energy.final."""
     found = {}
     for name, value in entries.items():
         found |= flat(value, f"{prefix}{name}.") if isinstance(value, dict) else {prefix + name: value}
@@ -43,7 +43,7 @@ def number_or_null(value):
 
 
 def run_case(carom, name):
-    """Runs a case and returns what its results file should hold."""
+    """Runs a case and returns the contents for its results file."""
     with tempfile.TemporaryDirectory() as directory:
         summary = run_carom(carom, HERE / "decks" / f"{name}.toml", directory)
         thermo = {name: number_or_null(column[-1]) for name, column in read_thermo(directory).items()}
@@ -66,7 +66,7 @@ def run_case(carom, name):
 
 
 def differences(stored, new):
-    """What a check objects to, one line each."""
+    """The failures of a check, one line each."""
     lines = []
     for part in ("values", "summary", "thermo"):
         lines += [f"{name}: is no more" for name in sorted(stored[part].keys() - new[part].keys())]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A regression run that deviates must be noticed, and only then."""
+"""A regression test must fail if and only if a result deviates."""
 
 import copy
 import sys

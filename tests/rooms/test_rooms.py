@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every room includes only what stands below it, and no result of the engine depends on the C library."""
+"""Every room includes only lower rooms, and no result of the engine depends on the C library."""
 
 import pathlib
 import re
@@ -52,8 +52,8 @@ def test_includes_run_downwards():
 
 
 def test_no_result_depends_on_the_c_library():
-    """The last bits of these functions, and what a long double is, differ between processors and libraries: elementary.h
-    has functions whose bits are always the same."""
+    """The last bits of these functions, and the type long double, differ between processors and libraries: the functions
+    of elementary.h always have equal bits."""
     functions = ("pow exp exp2 expm1 log log2 log10 log1p sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh cbrt "
                  "hypot tgamma lgamma erf erfc fma normal_distribution exponential_distribution")
     banned = re.compile(rf"(?:std::|\b__builtin_)(?:{functions.replace(' ', '|')})f?\b|long double")

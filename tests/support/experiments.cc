@@ -13,7 +13,7 @@
 namespace carom::test {
 
 namespace {
-/// Perturbs the velocities of whatever moves by up to a percent; start 0 leaves them.
+/// Perturbs the velocities of the moving particles by up to a percent; start 0 changes nothing.
 template <int D>
 std::unique_ptr<System<D>> perturbed(std::unique_ptr<System<D>> system, unsigned start) {
   if (start == 0) return system;

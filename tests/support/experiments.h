@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The systems that several tests run, and one call that runs them.
+// The systems that several tests run, and functions that run them.
 
 #include <memory>
 #include <string>
@@ -22,33 +22,34 @@ std::unique_ptr<System<D>> make_system(const Vec<D>& edges, Boundary boundary, s
 
 using carom::add_interaction;
 
-/// First experiment of the thesis: five discs in a box joined by springs. A start other than 0 moves the moving discs'
-/// velocities by up to a percent, at random.
+/// First experiment of the thesis: five discs in a box joined by springs. A start other than 0 changes the velocities
+/// of the moving discs by up to a percent at random.
 std::unique_ptr<System<2>> five_springs(unsigned start = 0);
 
 /// Second experiment: nine gravitating discs in a box.
 std::unique_ptr<System<2>> nine_gravity(unsigned start = 0);
 
-/// Their relatives in three dimensions, with unequal radii and masses: a bonded ring of six, and eight that gravitate.
+/// Similar systems in three dimensions with unequal radii and masses: a bonded ring of six and eight gravitating
+/// spheres.
 std::unique_ptr<System<3>> bonded_cluster(unsigned start = 0);
 std::unique_ptr<System<3>> gravity_cluster(unsigned start = 0);
 
-/// Hard spheres (discs) of diameter 1 and mass 1 on an fcc (hexagonal) lattice, `cells` unit cells an edge, at this
-/// packing fraction and temperature 1, periodic.
+/// Hard spheres (discs) of diameter 1 and mass 1 on an fcc (hexagonal) lattice with `cells` unit cells per edge, at
+/// this packing fraction and temperature 1, periodic.
 template <int D>
 std::unique_ptr<System<D>> hard_spheres(int cells, double packing_fraction, unsigned seed = 1);
 
-/// An integrator made by its name, with defaults for what is not given, and a run with it.
+/// A run with the integrator of this name, with defaults for parameters that are not given.
 template <int D>
 std::unique_ptr<Simulation<D>> make_run(std::unique_ptr<System<D>> system, const std::string& integrator, Plan plan,
                                         const Given& given = {});
 
-/// make_run, and run() for so many steps of length h.
+/// make_run, and run() for this number of steps of length h.
 template <int D>
 std::unique_ptr<Simulation<D>> run_steps(std::unique_ptr<System<D>> system, const std::string& integrator, double h,
                                          std::int64_t steps, const Given& given = {});
 
-/// make_run, and run() to a time.
+/// make_run, and run() up to a time.
 template <int D>
 std::unique_ptr<Simulation<D>> run_until(std::unique_ptr<System<D>> system, const std::string& integrator, double h,
                                          double end_time, const Given& given = {});

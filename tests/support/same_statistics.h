@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Two runs of one system, on other ranks or taken up in between: all of their accounts that says anything of the
+// Compares the statistics of two runs of one system, on other ranks or continued: every number that describes the
 // motion.
 
 #include <gtest/gtest.h>

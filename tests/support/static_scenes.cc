@@ -10,7 +10,7 @@ namespace carom::test {
 
 namespace {
 
-/// Spheres at rest between hard walls, with weight.
+/// Spheres with weight at rest between hard walls.
 template <int D>
 std::unique_ptr<System<D>> under_gravity(const Vec<D>& edges, const std::vector<Vec<D>>& x) {
   auto system = make_system<D>(edges, Boundary::wall, x, std::vector<Vec<D>>(x.size(), Vec<D>::Zero()));
@@ -20,8 +20,8 @@ std::unique_ptr<System<D>> under_gravity(const Vec<D>& edges, const std::vector<
   return system;
 }
 
-/// Discs in rows, the first of n from wall to wall but for the margins, the others in the notches of the one before;
-/// `discs(row)` of each.
+/// Discs in rows, the first of n discs from wall to wall except for the margins, each other row in the notches of the
+/// row below; `discs(row)` is the number of discs of a row.
 template <typename Discs>
 StaticScene<2> rows(int n, std::size_t count, double margin, Discs&& discs) {
   std::vector<Vec<2>> x;
@@ -44,7 +44,7 @@ StaticScene<3> layers(int n, double margin) {
 }
 
 constexpr Id kLeft = 0, kRight = 1, kFloor = 2;  // numbers of walls in 2-D
-constexpr double kMargin = 2, kTrap = 2;         // beside what a trap holds together; its stiffness
+constexpr double kMargin = 2, kTrap = 2;         // around the bodies in a trap; stiffness of the trap
 
 }  // namespace
 
@@ -76,7 +76,7 @@ StaticScene<2> pyramid(int n) {
 }
 
 StaticScene<2> trapped_crystal(int n) {
-  const int left_out = (n - 1) / 2;  // discs in the longest row of the pyramid that is left out
+  const int left_out = (n - 1) / 2;  // discs in the longest row of the missing pyramid
   return in_trap(rows(n, static_cast<std::size_t>((n * (n + 1) - left_out * (left_out + 1)) / 2), kMargin,
                       [n](int row) { return n - row; }),
                  kTrap);
@@ -87,8 +87,8 @@ StaticScene<2> crystal(int n) {
 }
 
 StaticScene<2> arch(int keystones) {
-  // Neighbours are 0.8 apart sideways and 0.6 in height. A contact between a keystone and a disc at a wall has the
-  // direction (0.8, 0.6), so it bears load / 1.2 for the load on a pair of them.
+  // Neighbours are 0.8 apart horizontally and 0.6 in height. A contact between a keystone and a disc at a wall has the
+  // direction (0.8, 0.6), so it carries load / 1.2 for the load on a pair of discs.
   std::vector<Vec<2>> x;
   std::vector<Reaction> reactions;
   const auto total = static_cast<Id>(3 * keystones);
@@ -100,7 +100,7 @@ StaticScene<2> arch(int keystones) {
     const double below = above + 3;                                       // with the discs at the walls
     reactions.push_back({left, key, false, on_pair / 1.2});
     reactions.push_back({right, key, false, on_pair / 1.2});
-    const double sideways = 0.8 * on_pair / 1.2;  // by the keystone above
+    const double sideways = 0.8 * on_pair / 1.2;  // from the keystone above
     if (level == 0) {
       reactions.push_back({.lo = left, .hi = kFloor, .force = below / 2});
       reactions.push_back({.lo = right, .hi = kFloor, .force = below / 2});
@@ -108,7 +108,7 @@ StaticScene<2> arch(int keystones) {
       reactions.push_back({key - 3, left, false, below / 1.2});
       reactions.push_back({key - 3, right, false, below / 1.2});
     }
-    const double from_below = level == 0 ? 0 : 0.8 * below / 1.2;  // by the keystone below
+    const double from_below = level == 0 ? 0 : 0.8 * below / 1.2;  // from the keystone below
     reactions.push_back({.lo = left, .hi = kLeft, .force = sideways + from_below});
     reactions.push_back({.lo = right, .hi = kRight, .force = sideways + from_below});
   }
@@ -121,9 +121,9 @@ StaticScene<3> trapped_heap() { return in_trap(layers(2, kMargin), kTrap); }
 
 StaticScene<2> hanging_chain() {
   constexpr double kPull = 4, kStrut = 10, kStiffness = 200,
-                   kLength = 1.25;  // sideways pull of the chain; struts; springs
-  constexpr Id kHigh = 4;           // discs of a column
-  // From the left: the column's top, 8, 9 | 10, 11, the right column's top. Each spring bears the pull and the weight
+                   kLength = 1.25;  // horizontal pull of the chain; struts; springs
+  constexpr Id kHigh = 4;           // discs in a column
+  // From the left: the column's top, 8, 9 | 10, 11, the right column's top. Each spring carries the pull and the weight
   // below.
   const Vec<2> first = Vec<2>(kPull, -2.5), second = Vec<2>(kPull, -1.5);
   const Vec<2> a = Vec<2>(0.5, kHigh - 0.5) + kLength * first.normalized(), b = a + kLength * second.normalized();
@@ -140,7 +140,7 @@ StaticScene<2> hanging_chain() {
                      {"rest_length", (x[i] - x[j]).norm() - tension / kStiffness}});
   };
   for (Id k = 0; k < kHigh; ++k) spring(k, kHigh + k, -kStrut);
-  // The disc in the middle, 12, presses its two neighbours down by half its weight each, and apart.
+  // The middle disc, 12, presses its two neighbours down by half its weight each, and apart.
   const double pressed = 0.5 / rise;
   spring(kHigh - 1, 8, first.norm());
   spring(8, 9, second.norm());
@@ -165,7 +165,7 @@ StaticScene<2> row_under_attraction(int n) {
   for (Id k = 0; k < static_cast<Id>(n); ++k) {
     x.emplace_back(10.0 + k, 10.0);
     if (k == 0) continue;
-    double force = 0;  // of all on one side of the contact on all on the other
+    double force = 0;  // sum of the forces across the contact
     for (Id i = 0; i < k; ++i)
       for (Id j = k; j < static_cast<Id>(n); ++j) force += 10.0 / ((j - i) * (j - i));
     reactions.push_back({k - 1, k, false, force});

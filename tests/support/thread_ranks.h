@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Ranks that are threads of one process, for tests.
+// Ranks as threads of one process, for tests.
 
 #include <condition_variable>
 #include <exception>
@@ -19,7 +19,7 @@ class ThreadRanks {
   explicit ThreadRanks(int size)
       : messages_(static_cast<std::size_t>(size)), failures_(static_cast<std::size_t>(size)) {}
 
-  /// Does this on all ranks. Where it throws on any of them all end, and the first one's exception is thrown.
+  /// Calls this on all ranks. If it throws on any rank, all ranks end, and the first rank's exception is thrown.
   void run(const std::function<void(Communicator&)>& work) {
     std::vector<std::thread> threads;
     for (std::size_t rank = 0; rank < messages_.size(); ++rank)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The kernels of scan.h, written once for any number of lanes. Included by scan_*.cc only, which are compiled for
-// different instruction sets: everything here has internal linkage and uses nothing but raw pointers, so that no
-// function compiled for one machine can end up in another's binary.
+// The kernels of scan.h for any number of lanes. Only scan_*.cc include this file and are compiled for different
+// instruction sets: everything here has internal linkage and uses only raw pointers, so that no function that was
+// compiled for one machine can be linked into another's code.
 
 #include "engine/base/lanes.h"
 #include "engine/search/simd/scan.h"
@@ -21,7 +21,7 @@ inline Four load_two(const double* low, const double* high) {
 }
 inline Eight join(Four a, Four b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7); }
 
-/// Two neighbouring doubles of W records: `first` and `second` hold one each of all records.
+/// Loads two consecutive doubles of W records: `first` and `second` get one of each record.
 inline void load_pairs(const double* const* record, int at, Two& first, Two& second) {
   const Two even = load<Two>(record[0] + at), odd = load<Two>(record[1] + at);
   first = __builtin_shufflevector(even, odd, 0, 2);
@@ -53,10 +53,10 @@ inline double smallest(Double<W> x) {
   }
 }
 
-constexpr unsigned kBlock = 64;  // candidates per block: their times are kept until the first is known
+constexpr unsigned kBlock = 64;  // candidates per block: their times are stored until the smallest is known
 
-/// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: never, if it
-/// is infinite or NaN; −infinite where the two overlap and approach. Returns the least in each lane.
+/// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: ∞ or NaN for
+/// no contact; −∞ if the two overlap and approach. Returns the smallest time in each lane.
 template <int D, int W, bool latest, bool plain>
 inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting& s, std::uint32_t self,
                                                               const std::uint32_t* candidates, unsigned n,
@@ -73,9 +73,9 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
   const auto look = [&]<bool shifted>(const std::uint32_t* some, double* to) __attribute__((always_inline)) {
     const double* record[W];
     for (int l = 0; l < W; ++l) record[l] = records + std::size_t{8} * (some[l] & slot_mask);
-    V field[2 * D + 2];  // x, v, t of the candidates, and what comes after
+    V field[2 * D + 2];  // x, v, t of the candidates, and the next double
     for (int k = 0; k < 2 * D + 2; k += 2) load_pairs(record, k, field[k], field[k + 1]);
-    // Separation and its rate as the candidate sees them: all that follows is even in the sign.
+    // Separation and its rate as seen from the candidate: the formulas below are even in the sign.
     const V t_j = field[2 * D];
     const V now = latest ? t_i : t_i > t_j ? t_i : t_j, s_i = now - t_i, s_j = now - t_j;
     V d[D], v[D];
@@ -123,7 +123,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
     } else {
       if (s.radius)
         for (int l = 0; l < W; ++l) sigma[l] = s.radius[self] + s.radius[some[l] & slot_mask];
-      // As contact_time() for growing spheres, contact.h.
+      // The formulas of contact_time() for growing spheres in contact.h.
       const V rate = sigma * s.growth, reach = sigma * (1.0 + s.growth * now);
       const V c = d_squared - reach * reach, falling = b - reach * rate, outrun = v_squared - rate * rate;
       const V discriminant = v_squared * reach * reach - cross + rate * (rate * d_squared - 2.0 * reach * b);
@@ -131,7 +131,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       time = now + (falling < 0.0 ? c / (root - falling) : (falling + root) / -outrun);
       time = (discriminant > 0.0) & ((falling < 0.0) | (outrun < 0.0)) ? time : none;
       time =
-          (c <= 0.0) ? (((falling < 0.0) & (d_squared > 0.0)) ? all<V>(-kNever) : none) : time;  // but for the padding
+          (c <= 0.0) ? (((falling < 0.0) & (d_squared > 0.0)) ? all<V>(-kNever) : none) : time;  // without the padding
     }
     store(to, time);
     best = elementary::min(time, best);
@@ -143,7 +143,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
   return best;
 }
 
-/// The first of n times, given the least in each lane.
+/// Finds the first of n times, given the smallest time in each lane.
 template <int W>
 inline ScanResult first_of(const double* times, unsigned n, Double<W> best) {
   const double first = smallest<W>(best);
@@ -185,7 +185,7 @@ ScanResult scan(const ScanSetting& s, const ScanTask& task, bool latest) {
   return latest ? scan_plain<D, W, true>(s, task) : scan_plain<D, W, false>(s, task);
 }
 
-/// Two at once: the end of one and the start of the other overlap in the processor.
+/// Scans two spheres at once, so that the processor overlaps the end of one scan with the start of the other.
 template <int D, int W>
 void scan_two(const ScanSetting& s, const ScanTask* task, ScanResult* result) {
   if (!s.plain || task[0].n > kBlock || task[1].n > kBlock) {
@@ -212,7 +212,7 @@ typedef float Floats __attribute__((vector_size(4 * kInts)));
                scale_z = Floats{} + task.scale[2], limit = Floats{} + task.limit_squared;
   const float limit_squared = task.limit_squared;
   unsigned found = 0;
-  struct Place {  // a line, and the corner of its cell seen from the sphere
+  struct Place {  // a line, and the corner of its cell as seen from the sphere
     std::uint32_t line;
     std::int32_t boxes;
     float x, y, z;
@@ -234,7 +234,7 @@ typedef float Floats __attribute__((vector_size(4 * kInts)));
     away[found++] = boxes;
   };
   const auto flush = [&] {
-    std::uint64_t hits = 0;  // of eight lines, one bit for each of their spheres
+    std::uint64_t hits = 0;  // of eight lines, one bit for each sphere
     for (unsigned l = 0; l < lines; ++l) {
       const Place& at = places[l];
       hits |= static_cast<std::uint64_t>(within(at, task.lines[at.line])) << (8 * l);
@@ -289,7 +289,7 @@ typedef float Floats __attribute__((vector_size(4 * kInts)));
 
 using Quad = Width<4>::Unsigned;
 
-/// Those of four that a mask names, moved to the front.
+/// Moves the elements that a mask selects to the front of a vector.
 inline Quad pack(Quad four, unsigned mask) {
 #if defined(__SSSE3__)
   alignas(16) static const unsigned char order[8][16] = {{},

@@ -21,13 +21,13 @@ TEST(Calendar, ServesInOrderWhateverIsScheduledMeanwhile) {
       calendar.push(time, static_cast<std::uint32_t>(scheduled));
       if (time < 2.0) ++scheduled;
     };
-    for (int k = 0; k < 3000; ++k) push(3 * uniform(random));  // a third of them beyond the horizon
+    for (int k = 0; k < 3000; ++k) push(3 * uniform(random));  // a third beyond the horizon
     double now = 0;
     while (const CalendarEntry* entry = calendar.top(always)) {
       ASSERT_GE(double{entry->time}, now);
       now = entry->time;
       calendar.pop();
-      if (++served % 2 == 0) push(now + (served % 10 == 0 ? 0 : 0.3 * uniform(random)));  // into the present, too
+      if (++served % 2 == 0) push(now + (served % 10 == 0 ? 0 : 0.3 * uniform(random)));  // also at the current time
     }
     EXPECT_EQ(served, scheduled);
     EXPECT_GT(served, 3000u);
@@ -51,7 +51,7 @@ TEST(Calendar, LeavesOutWhatNoLongerHolds) {
   EXPECT_EQ(served, 500u);
 }
 
-TEST(Calendar, TakesVeryUnevenTimes) {  // bins adapt; entries at one time and far beyond the ring among them
+TEST(Calendar, TakesVeryUnevenTimes) {  // bins adapt; some entries have equal times or are far beyond the ring
   Calendar calendar;
   calendar.reset(1e6, 100);
   std::size_t scheduled = 0;

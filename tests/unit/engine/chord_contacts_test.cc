@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How a piece of cdda ends: contacts at the edge of the tolerance.
+// The end of a piece of cdda: contacts at the edge of the tolerance.
 
 #include "engine/integrators/chord_contacts.h"
 
@@ -10,8 +10,8 @@
 namespace carom::integrator {
 namespace {
 
-/// Disc 0 moves to the left towards disc 1, or towards the wall where there is no disc 1, from this gap to that one
-/// within a time of 1. The box is large, so the tolerance is coarse beside the rounding of positions near its corner.
+/// Disc 0 moves left towards disc 1, or towards the wall if there is no disc 1, from the first to the second gap in a
+/// time of 1. The box is large, so the tolerance is large compared with the rounding of positions near its corner.
 struct Approach {
   Approach(bool wall, double from, double to) {
     std::vector<Vec<2>> x = {{wall ? 0.5 + from : 1.5 + from, 3}}, v = {{to - from, 0}};
@@ -32,8 +32,8 @@ struct Approach {
 };
 
 TEST(ChordContacts, APieceEndsInContactOnlyWellWithinTheTolerance) {
-  // Positions are rounded once more after the piece: at the edge they might not touch any more, and the next piece
-  // would be without length.
+  // Positions are rounded once more after the piece: at the edge the bodies might no longer touch, and the next piece
+  // would have length 0.
   for (const bool wall : {false, true}) {
     SCOPED_TRACE(wall);
     const double tolerance = GapTolerance(1000)(wall ? 0.5 : 1.0);
@@ -67,9 +67,9 @@ TEST(ChordContacts, AContactAtTheEdgeOfTheToleranceMayDepart) {
       EXPECT_FALSE(end.violates) << from;
     }
     EXPECT_TRUE(Approach(wall, 0.99 * tolerance, -1.2 * tolerance).end.violates);
-    // One that rounding has left beyond the edge stays where it is.
+    // A body that rounding has moved beyond the edge stays there.
     EXPECT_FALSE(Approach(wall, -1.2 * tolerance, -1.2 * tolerance).end.violates);
-    // One that meets again at the end of the piece touches there.
+    // A body that returns at the end of the piece touches there.
     const auto again = Approach(wall, 0.0, -0.9 * tolerance).end;
     EXPECT_FALSE(again.violates);
     EXPECT_TRUE(again.touches);

@@ -27,12 +27,12 @@ std::vector<double> two_sizes(std::size_t n, std::size_t large, double ratio) {
   return radius;
 }
 
-/// Not a single overlap, not even by rounding, through any image; all spheres in the box and off its walls.
+/// Expects no overlap through any image, not even by rounding, and all spheres in the box and inside its walls.
 template <int D>
 void expect_sound(const Box<D>& box, const std::vector<double>& radius, const Compression<D>& done) {
   ASSERT_TRUE(done.reached()) << "factor " << done.factor << ", pressure " << done.reduced_pressure;
   ASSERT_EQ(done.x.size(), radius.size());
-  EXPECT_GT(done.factor, 1);  // by so little that it only keeps rounding from overlapping
+  EXPECT_GT(done.factor, 1);  // just enough that rounding makes no overlaps
   for (std::size_t i = 0; i < radius.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       Vec<D> d = done.x[i] - done.x[j];
@@ -98,8 +98,8 @@ TEST(Compression, SlowGrowthFollowsTheEquationOfState) {
   const auto box = box_for<3>(radius, fraction, {P, P, P});
   const auto done = compress<3>(box, radius, {.growth_rate = 0.005});
   expect_sound<3>(box, radius, done);
-  // Carnahan, Starling, J. Chem. Phys. 51 (1969) 635; the last slab ends there and has 1 % less of the volume on
-  // average.
+  // Carnahan, Starling, J. Chem. Phys. 51 (1969) 635; the last slab ends at this fraction, and its average volume is 1
+  // % larger.
   const double z = (1 + fraction + fraction * fraction - std::pow(fraction, 3)) / std::pow(1 - fraction, 3);
   EXPECT_NEAR(done.reduced_pressure, z, 0.08 * z);
 }
@@ -114,7 +114,7 @@ TEST(Compression, TellsWhereTheSpheresJammed) {
   EXPECT_LT(reached, 0.74);
   auto smaller = radius;
   for (double& r : smaller) r *= done.factor;
-  EXPECT_EQ(find_overlaps<3>(box, done.x, smaller).pairs, 0u);  // that far it came without overlap
+  EXPECT_EQ(find_overlaps<3>(box, done.x, smaller).pairs, 0u);  // up to here it compressed without overlap
 }
 
 TEST(Compression, GrowthFasterThanTheSpheresEndsToo) {

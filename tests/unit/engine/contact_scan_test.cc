@@ -12,7 +12,7 @@
 namespace carom {
 namespace {
 
-/// A scan of a system at rest in a slab of length 1 under the accelerations a.
+/// Scans a system at rest in a slab of length 1 with the accelerations a.
 struct Scene {
   Scene(std::vector<Vec<2>> x, std::vector<Vec<2>> v, std::vector<Vec<2>> acceleration, std::uint64_t max_events = 1000)
       : system(test::make_system<2>({20, 6}, Boundary::wall, x, v)),
@@ -55,12 +55,12 @@ TEST(ContactScan, ResolvesABlowThroughAChainInKeyOrder) {
   ASSERT_EQ(scene.contacts.size(), 2u);
   EXPECT_LT(scene.contacts[0].key, scene.contacts[1].key);
   EXPECT_EQ(scene.system->particles.v[2], Vec<2>(1, 0));
-  EXPECT_EQ(scene.contacts[1].impulse, Vec<2>(-1, 0));  // given to the lower id
+  EXPECT_EQ(scene.contacts[1].impulse, Vec<2>(-1, 0));  // on the lower id
   EXPECT_EQ(scene.counters.sphere_sphere, 2u);
 }
 
 TEST(ContactScan, LeavesAPairThatAnEarlierImpulseHasParted) {
-  // A light disc runs into two heavy ones at once; the first blow throws it back from both.
+  // A light disc hits two heavy ones at once; the first collision reverses it, away from both.
   const double angle = 25 * std::numbers::pi / 180;
   auto system = test::make_system<2>(
       {20, 6}, Boundary::wall,
@@ -77,13 +77,13 @@ TEST(ContactScan, LeavesAPairThatAnEarlierImpulseHasParted) {
 }
 
 TEST(ContactScan, HoldsAPressedChainAndLetsAPulledOneGo) {
-  // Three discs in a row: the outer ones are drawn inwards, then outwards.
+  // Three discs in a row: the outer ones are pulled inwards, then outwards.
   Scene scene({{3, 3}, {4, 3}, {5, 3}}, std::vector<Vec<2>>(3, Vec<2>::Zero()), {{2, 0.5}, {0, 0}, {-1, 0}});
   scene.resolve();
   ASSERT_EQ(scene.scan.resting().size(), 2u);
   auto a = scene.a;
   scene.scan.hold(scene.system->particles.v, a, 1.0);
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(a[i][0], 1.0 / 3, 1e-14);  // they move on together
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(a[i][0], 1.0 / 3, 1e-14);  // they move together
   EXPECT_EQ(a[0][1], 0.5);
   EXPECT_EQ(scene.scan.earliest(scene.system->particles.x, scene.system->particles.v, a, 1.0).key.time, kNever);
   a = {{-2, 0}, {0, 0}, {1, 0}};
@@ -100,13 +100,13 @@ TEST(ContactScan, HoldsADiscOnAWall) {
   EXPECT_EQ(a[0], Vec<2>(0.1, 0));
 }
 
-/// The squared distance of a pair after s, beyond contact.
+/// The squared distance of a pair at time s, less that at contact.
 double squared_gap(const Vec<2>& d, const Vec<2>& u, const Vec<2>& a, double s) {
   return (d + s * u + 0.5 * s * s * a).squaredNorm() - 1;
 }
 
 TEST(ContactScan, HoldsATurningPairThatIsBraked) {
-  // The pair turns by u and is braked by u·a: held apart just so much that it does not overlap before the end.
+  // The pair turns by u and is decelerated by u·a: held apart just enough that it does not overlap before the end.
   for (const double rest : {0.01, 0.1, 0.25}) {
     for (const double braking : {0.0, 1.0, -1.0}) {
       Scene scene({{3, 3}, {4, 3}}, {{0, 0.5}, {0, -0.5}}, {{2, -braking}, {-2, 0}});
@@ -124,7 +124,8 @@ TEST(ContactScan, HoldsATurningPairThatIsBraked) {
 }
 
 TEST(ContactScan, AContactThatWouldOpenByLessThanTheRestingGapRests) {
-  // Pressed at 2 on the floor: at the speed v it opens by v²/4. Then pairs, pressed by forces or known reactions.
+  // A force of 2 presses on the floor: at speed v the gap opens by v²/4. Then pairs, pressed by forces or known
+  // reactions.
   const double of_wall = std::sqrt(2 * 2 * kRestingGap * 0.5), of_pair = std::sqrt(2 * 3 * kRestingGap);
   for (const double share : {0.99, -0.99, 1.01, -1.01}) {
     const bool rests = std::abs(share) < 1;
@@ -142,7 +143,7 @@ TEST(ContactScan, AContactThatWouldOpenByLessThanTheRestingGapRests) {
 }
 
 TEST(ContactScan, WhatHasBeenStoppedMayRunIntoSomethingElse) {
-  // 0 is pressed on 1, and stops to approach it; 2, which nothing presses, was slower to leave than 1 is then.
+  // 0 is pressed on 1 and stops at it; 2, on which no force acts, was slower to leave than 1 is then.
   Scene scene({{3, 3}, {4, 3}, {5, 3}}, {{1e-6, 0}, {0, 0}, {1e-9, 0}}, {{2, 0}, {0, 0}, {0, 0}});
   auto& p = scene.system->particles;
   const double lost = scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
@@ -206,10 +207,10 @@ TEST(ContactScan, RemembersTheReactionsOfContactsThatArePressed) {
   EXPECT_NEAR(scene.reactions[0].force, 1, 1e-14);
   EXPECT_EQ(scene.reactions[1].key.kind, EventKind::wall);
   EXPECT_NEAR(scene.reactions[1].force, 2, 1e-14);
-  // The reactions count as forces for what is rounding: per mass, of all contacts of the particle.
+  // Reactions count as forces in the rounding error: per mass, over all contacts of the particle.
   EXPECT_NEAR(scene.scan.rounding_speed(0, {0, 0}), kRounding * (1 + 1 + 2), 1e-26);
   EXPECT_NEAR(scene.scan.rounding_speed(1, {0, 3}), kRounding * (3 + 1 + 1), 1e-26);
-  // The next piece starts from them, and those that are no longer needed are forgotten.
+  // The next piece starts from these reactions, and those that are no longer needed are removed.
   scene.resolve();
   EXPECT_EQ(scene.scan.resting()[0].force, scene.reactions[0].force);
   a.assign(3, {0, 1});
@@ -219,7 +220,7 @@ TEST(ContactScan, RemembersTheReactionsOfContactsThatArePressed) {
   EXPECT_TRUE(scene.reactions.empty());
 }
 
-/// A pair whose gap is `gap` and that is pressed by 2 each; hold_means over `length` gives the mean velocities.
+/// A pair with this gap and a force of 2 on each disc; hold_means over `length` returns the mean velocities.
 std::vector<Vec<2>> held_means(double gap, double length) {
   Scene scene({{3, 3}, {4 + gap, 3}}, {{0, 0}, {0, 0}}, {{2, 0}, {-2, 0}});
   scene.resolve();
@@ -238,11 +239,11 @@ TEST(ContactScan, HoldsMeansWithoutWork) {
 }
 
 TEST(ContactScan, RoundingThatHasOpenedOrClosedAContactIsTakenBack) {
-  // 0.7 tolerances of this box: more than half of one.
+  // 0.7 tolerances of this box: more than half a tolerance.
   const double gap = 0.7 * Box<2>{{20, 6}, {Boundary::wall, Boundary::wall}}.gap_tolerance()(1.0);
   for (const double length : {0.1, -0.1}) {
     const auto opened = held_means(gap, length), closed = held_means(-gap, length);
-    // x_1 − x_0 after the piece, less what it was.
+    // The change of x_1 − x_0 in the piece.
     EXPECT_LT(length * (opened[1] - opened[0])[0], -1e-16) << length;
     EXPECT_GT(length * (closed[1] - closed[0])[0], 1e-16) << length;
     EXPECT_GE(length * (opened[1] - opened[0])[0], -1.01 * gap) << length;

@@ -32,7 +32,7 @@ Precise gap_squared(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
   return sum;
 }
 
-/// The first contact by walking along the path in small steps: slow, and blind only to dips shorter than a step.
+/// Finds the first contact by small steps along the path: slow, and it misses only overlaps shorter than a step.
 template <int D>
 double walked_contact(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double rest, int steps) {
   auto gap = [&](double s) { return (d + s * v + (0.5 * s * s) * a).squaredNorm() - sigma * sigma; };
@@ -61,17 +61,17 @@ TYPED_TEST(Contact, StraightFlightsEndAtTheContactDistance) {
   std::mt19937_64 random(1);
   int hits = 0;
   for (int trial = 0; trial < 20000; ++trial) {
-    const double reach = trial % 2 ? 3 : 200;  // far away too: the discriminant must not cancel
+    const double reach = trial % 2 ? 3 : 200;  // also far away: the discriminant must not cancel
     const Vec<D> d = random_vector<D>(random, reach), aim = random_vector<D>(random, 0.99 / std::sqrt(D));
     const Vec<D> v = (aim - d) * (0.1 + 0.001 * (trial % 1000));
     if (d.norm() < 1.001) continue;
     const double s = contact_time<D>(d, v, 1.0, 0.0);
     ASSERT_LT(s, kNever) << "d " << d.transpose() << " v " << v.transpose();
     ++hits;
-    // The gap left is what an ulp of s makes of it, and of d.
+    // The remaining gap is due to the last bit of s and d.
     const double gap = static_cast<double>(gap_squared<D>(d, v, Vec<D>::Zero(), 1.0, s)) / 2;
     EXPECT_LE(std::abs(gap), 1e-15 * (reach + 4)) << "d " << d.transpose();
-    EXPECT_LE((d + s * v).dot(v), 0);  // the earlier of the two roots
+    EXPECT_LE((d + s * v).dot(v), 0);  // the earlier root
   }
   EXPECT_GT(hits, 15000);
 }
@@ -99,7 +99,7 @@ Precise grown_gap(const Vec<D>& d, const Vec<D>& v, double sigma, double w, doub
   return gap_squared<D>(d, v, Vec<D>::Zero(), 0.0, s) - reach * reach;
 }
 
-/// The first contact of growing spheres by walking in small steps.
+/// Finds the first contact of growing spheres by small steps.
 template <int D>
 double walked_growth(const Vec<D>& d, const Vec<D>& v, double sigma, double w, double rest, int steps) {
   auto gap = [&](double s) { return (d + s * v).norm() - (sigma + w * s); };
@@ -125,7 +125,7 @@ TYPED_TEST(Contact, GrowingSpheresMeetWhereWalkingFindsThem) {
     if (walked == kNever) {
       ++misses;
       if (s >= rest) continue;
-      EXPECT_LT((d + s * v).norm() - (1 + w * s), 1e-13);  // a dip between two steps of the walk: a shallow one
+      EXPECT_LT((d + s * v).norm() - (1 + w * s), 1e-13);  // a shallow overlap between two steps
       EXPECT_GT((d + (s + 0.0025) * v).norm() - (1 + w * (s + 0.0025)), -1e-4);
       continue;
     }
@@ -145,7 +145,7 @@ TYPED_TEST(Contact, WithoutGrowthTheBitsAreThoseOfStraightFlights) {
   std::mt19937_64 random(7);
   int hits = 0;
   for (int trial = 0; trial < 5000; ++trial) {
-    const Vec<D> d = random_vector<D>(random, 1.5), v = random_vector<D>(random, 2);  // overlaps among them
+    const Vec<D> d = random_vector<D>(random, 1.5), v = random_vector<D>(random, 2);  // some overlap
     const double plain = contact_time<D>(d, v, 1.0, 1e-3), grown = contact_time<D>(d, v, 1.0, 0.0, 1e-3);
     EXPECT_EQ(plain, grown);
     if (plain < kNever) ++hits;
@@ -162,7 +162,7 @@ TYPED_TEST(Contact, GrowthBringsPartingAndRestingSpheresTogether) {
   EXPECT_EQ(contact_time<D>(d, 0.5 * v, 1.0, 0.5, 0.0), kNever);       // as fast as they grow
   EXPECT_EQ(contact_time<D>(d, v, 1.0, 0.5, 0.0), kNever);
   const Vec<D> touching = Vec<D>::Unit(0);
-  EXPECT_EQ(contact_time<D>(touching, 0.4 * v, 1.0, 0.5, 1e-15), 0.0);  // parts slower than it grows
+  EXPECT_EQ(contact_time<D>(touching, 0.4 * v, 1.0, 0.5, 1e-15), 0.0);  // separates slower than it grows
   EXPECT_EQ(contact_time<D>(touching, 0.6 * v, 1.0, 0.5, 1e-15), kNever);
 }
 
@@ -178,7 +178,7 @@ TYPED_TEST(Contact, GrowingSpheresPartFasterThanTheyGrow) {
     const double before = d.dot(v_i - v_j) / sigma, after = d.dot(w_i - w_j) / sigma;
     EXPECT_NEAR(after, 2 * w - before, 1e-12);
     EXPECT_LT((m_i * w_i + m_j * w_j - m_i * v_i - m_j * v_j).norm(), 1e-12);
-    // Right after the collision, which left the gap where it was, they don't meet again.
+    // Just after the collision, which did not change the gap, the spheres do not collide again.
     if (before >= w) continue;
     EXPECT_EQ(contact_time<D>(d, w_i - w_j, sigma, w, approach_slack(sigma, 4, 4 + w)), kNever);
   }
@@ -195,7 +195,7 @@ TYPED_TEST(Contact, ParabolasMissNoContactAndInventNone) {
     const double s = contact_time<D>(d, v, a, 1.0, rest, false, 0.0);
     const double walked = walked_contact<D>(d, v, a, 1.0, rest, 1000);
     if (walked == kNever) {
-      // A dip between two steps of the walk, or none: if there is a contact, it is a shallow one.
+      // There is no contact, or a shallow overlap between two steps.
       if (s < kNever) {
         const double depth = (d + (s + rest / 2000) * v + (0.5 * (s + rest / 2000) * (s + rest / 2000)) * a).norm() - 1;
         EXPECT_GT(depth, -1e-3);
@@ -236,7 +236,7 @@ TYPED_TEST(Contact, ABounceUnderAttractionReturnsAfterTwiceSpeedOverAcceleration
   }
   EXPECT_EQ(contact_time<D>(d, v, a, 1.0, 1e-3, true, 1e-15), kNever);               // not within the time left
   EXPECT_EQ(contact_time<D>(d, Vec<D>::Zero(), a, 1.0, 1.0, true, 1e-15), 0.0);      // rests, pressed
-  EXPECT_EQ(contact_time<D>(d, Vec<D>::Zero(), -a, 1.0, 1.0, true, 1e-15), kNever);  // drawn apart
+  EXPECT_EQ(contact_time<D>(d, Vec<D>::Zero(), -a, 1.0, 1.0, true, 1e-15), kNever);  // pulled apart
 }
 
 TEST(WallContact, MatchesTheQuadratic) {

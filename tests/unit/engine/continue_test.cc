@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A run that is stopped, taken up from its state and ended, against one that went on: every bit, whatever the method
-// and the ranks before and after.
+// A run that is stopped and continued from its state against an uninterrupted run: every bit is equal, for all methods
+// and all numbers of ranks before and after.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ namespace {
 using test::Given;
 using State = std::map<std::string, Bytes>;
 
-/// All that a run shows.
+/// Everything that a run reports.
 template <int D>
 struct Account : Observer<D> {
   explicit Account(Communicator* others) : ranks(others) {}
@@ -67,12 +67,12 @@ struct Scene {
   }
 };
 
-/// When a run is left off: at the n-th question.
+/// When a run is stopped: at the n-th call of should_stop().
 struct Leave {
   int at = std::numeric_limits<int>::max();
-  bool at_last = false;  ///< to its end, with the state that is the last on the way of a longer run
-  int within_step = std::numeric_limits<int>::max();  ///< at the n-th look from within steps
-  int alone = std::numeric_limits<int>::max();        ///< at the n-th look of the last rank for itself
+  bool at_last = false;                               ///< at its end, in the last state that a longer run shares
+  int within_step = std::numeric_limits<int>::max();  ///< at the n-th check within steps
+  int alone = std::numeric_limits<int>::max();        ///< at the n-th check of the last rank alone
 };
 
 template <int D>
@@ -81,7 +81,7 @@ struct Outcome {
   Statistics statistics;
   State state;
   int looks = 0, looks_alone = 0;  ///< of the last rank
-  bool knew_all = false;           ///< the last rank, where it left alone
+  bool knew_all = false;           ///< of the last rank, if it left alone
 };
 
 template <int D>
@@ -132,14 +132,14 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
   return out;
 }
 
-/// `rest` is the end of `whole`.
+/// Expects that `rest` is the end of `whole`.
 void expect_tail(const std::vector<double>& whole, const std::vector<double>& rest) {
   ASSERT_LE(rest.size(), whole.size());
   const std::span<const double> tail = std::span(whole).last(rest.size());
   for (std::size_t k = 0; k < rest.size(); ++k) ASSERT_EQ(rest[k], tail[k]) << "value " << k << " of " << rest.size();
 }
 
-/// What is shown after a state is taken up is the end of what the undisturbed run shows.
+/// Expects that the output of a continued run is the end of the output of the uninterrupted run.
 template <int D>
 void expect_continued(const Outcome<D>& whole, const Outcome<D>& rest) {
   ASSERT_GT(rest.values.size(), 0u);
@@ -203,7 +203,7 @@ TEST(Continue, MethodsThatCutTheStepOfAll) {
                                                                                 {"cdda", {{"order", std::int64_t{4}}}}})
     compare<2>(springs(method, given), {{0, 0}, {2, 3}}, {1, 9});
 }
-/// `slab_collisions`: far fewer than those of an epoch, of which there are about 500 in 2.2 time units.
+/// `slab_collisions`: far fewer than in an epoch, of which there are about 500 in 2.2 time units.
 Scene<3> fluid(std::optional<std::uint64_t> slab_collisions = {}) {
   return {[] { return test::hard_spheres<3>(6, 0.35); },
           "free-flight",
@@ -214,7 +214,7 @@ Scene<3> fluid(std::optional<std::uint64_t> slab_collisions = {}) {
 TEST(Continue, FreeFlightBetweenEpochs) { compare<3>(fluid(), kRanks, {1, 3}); }
 TEST(Continue, FreeFlightWithinEpochs) { compare<3>(fluid(40), kRanks, {1, 3, 5}); }
 
-/// Left at one look after the other of those from within its steps: it goes on from the step's start.
+/// Stops at each of several checks within steps: the run continues from the step's start.
 template <int D>
 void compare_within_steps(const Scene<D>& scene, std::vector<std::array<int, 2>> ranks, int leaves) {
   SCOPED_TRACE(scene.method);
@@ -235,7 +235,7 @@ TEST(Continue, WithinStepsThatAreCut) {
            {"cva", {}}, {"mcva", {}}, {"mcva", {{"variant", "restart"}}}, {"cdda", {}}, {"edda", {}}})
     compare_within_steps<2>(springs(method, given), {{0, 0}, {2, 3}}, 3);
 }
-/// One rank leaves a flight of many contacts, and all leave the step.
+/// One rank leaves a flight with many contacts, and all ranks abandon the step.
 template <int D>
 void compare_within_a_flight(const Scene<D>& scene, bool knows_all) {
   const Outcome<D> whole = run<D>(scene, 0, scene.plan, {});
@@ -271,7 +271,7 @@ TEST(Continue, AStateOfAnotherNumberOfParticlesIsRefused) {
     }
 }
 
-/// The same simulation runs again, to a later end.
+/// A simulation runs again to a later end.
 TEST(Continue, RunAgain) {
   for (const Scene<3>& scene : {yukawa("psa"), yukawa("edda"), fluid(), fluid(40)}) {
     SCOPED_TRACE(scene.method);
@@ -288,7 +288,7 @@ TEST(Continue, RunAgain) {
     EXPECT_EQ(parts->system().particles.x, whole->system().particles.x);
     EXPECT_EQ(parts->system().particles.v, whole->system().particles.v);
     test::expect_same(whole->statistics(), parts->statistics());
-    // From an end that no step meets it goes on by steps from there.
+    // From an end between two steps it continues with whole steps.
     late.steps.reset(), late.end_time = 6.5 * late.step;
     parts->extend(late);
     parts->run();
@@ -300,7 +300,7 @@ TEST(Continue, RunAgain) {
   }
 }
 
-/// A run with a later end goes on as if it had had that end from the start.
+/// A run with a later end continues as if it had had that end from the start.
 TEST(Continue, ALaterEnd) {
   std::vector<std::pair<Scene<3>, std::array<Plan, 2>>> cases;
   const auto ends = [](const Plan& base, auto&& set) {
@@ -315,7 +315,7 @@ TEST(Continue, ALaterEnd) {
     cases.push_back({scene, ends(scene.plan, [](Plan& p, bool short_) { p.steps = short_ ? 2 : 5; })});
     cases.push_back(
         {scene, ends(scene.plan, [](Plan& p, bool short_) { p.end_time = (short_ ? 2.5 : 5.1) * p.step; })});
-    EXPECT_NE(3 * scene.plan.step - 2 * scene.plan.step, scene.plan.step);  // the last slab is no step, by rounding
+    EXPECT_NE(3 * scene.plan.step - 2 * scene.plan.step, scene.plan.step);  // rounding changes the last slab
     cases.push_back(
         {scene, ends(scene.plan, [](Plan& p, bool short_) { p.end_time = (short_ ? 3.0 : 5.1) * p.step; })});
   }
@@ -328,7 +328,7 @@ TEST(Continue, ALaterEnd) {
       const auto begun = run<3>(scene, ranks, plans[0], {.at_last = true});
       ASSERT_FALSE(begun.state.empty());
       expect_continued(whole, run<3>(scene, ranks, plans[1], {}, &begun.state));
-      // With the same end it ends as it has ended, if it ended within an epoch.
+      // With the old end it ends in the same state, if it ended within an epoch.
       if (!plans[0].collisions) continue;
       const auto ended = run<3>(scene, 0, plans[0], {});
       test::expect_same(ended.statistics, run<3>(scene, ranks, plans[0], {}, &begun.state).statistics);

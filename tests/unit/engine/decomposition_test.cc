@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Methods that share their work among ranks, against themselves on one: every bit.
+// Methods on several ranks against one rank: every bit is equal.
 
 #include "engine/ranks/decomposition.h"
 
@@ -17,7 +17,7 @@ namespace {
 
 using test::Given;
 
-/// All that a run shows.
+/// Everything that a run reports.
 template <int D>
 struct Account : Observer<D> {
   explicit Account(Communicator* shared_by = nullptr) : ranks(shared_by), rank(ranks ? ranks->rank() : 0) {}
@@ -65,7 +65,7 @@ template <int D>
 void expect_same(const Account<D>& one, const Account<D>& other) {
   ASSERT_EQ(one.frames.size(), other.frames.size());
   for (std::size_t k = 0; k < one.frames.size(); ++k) {
-    if (other.rank > 0) continue;  // it has none
+    if (other.rank > 0) continue;  // this rank has no output
     EXPECT_EQ(one.frames[k].x, other.frames[k].x) << "frame " << k;
     EXPECT_EQ(one.frames[k].v, other.frames[k].v) << "frame " << k;
     EXPECT_EQ(one.frames[k].image, other.frames[k].image) << "frame " << k;
@@ -75,7 +75,7 @@ void expect_same(const Account<D>& one, const Account<D>& other) {
   test::expect_same(one.statistics, other.statistics);
 }
 
-/// `contacts`: how many collisions there must be at least for the test to tell anything.
+/// `contacts`: the smallest number of collisions that makes the test meaningful.
 template <int D>
 Statistics compare(const Scene<D>& scene, const std::string& method, double step, std::int64_t steps,
                    std::uint64_t contacts, const Given& given = {}) {
@@ -84,7 +84,7 @@ Statistics compare(const Scene<D>& scene, const std::string& method, double step
       .step = step, .steps = steps, .frame_interval = 7 * step, .thermo_interval = 3 * step, .events = true};
   const Account<D> alone = run<D>(scene, method, plan, given, nullptr);
   EXPECT_GE(alone.statistics.counters.sphere_sphere + alone.statistics.counters.sphere_wall, contacts);
-  Statistics last;  // of the most ranks
+  Statistics last;  // for the largest number of ranks
   for (const int ranks : {1, 2, 3, 4, 8}) {
     SCOPED_TRACE(ranks);
     std::vector<Account<D>> all(static_cast<std::size_t>(ranks));
@@ -98,7 +98,7 @@ Statistics compare(const Scene<D>& scene, const std::string& method, double step
   return last;
 }
 
-/// A fluid of spheres that repel each other beyond contact.
+/// A fluid of spheres that repel each other at a distance.
 Scene<3> yukawa(double packing_fraction) {
   return [=] {
     auto system = test::hard_spheres<3>(3, packing_fraction);
@@ -109,7 +109,7 @@ Scene<3> yukawa(double packing_fraction) {
   };
 }
 
-/// Discs on a lattice, each joined to its neighbours by springs across the edges of the box.
+/// Discs on a lattice, each joined to its neighbours by springs, also across the edges of the box.
 std::unique_ptr<System<2>> springs(int cells) {
   auto system = test::hard_spheres<2>(cells, 0.5);
   test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}});
@@ -160,7 +160,7 @@ const std::vector<std::pair<std::string, Given>> kMethods = {
 TEST(Decomposition, Springs) {
   for (const auto& [method, given] : kMethods) compare<2>([] { return springs(7); }, method, 0.02, 25, 20, given);
 }
-/// Spheres joined to their neighbours, which attract the others only; with a long-range correction, and a table.
+/// Spheres joined to their neighbours that attract all other spheres; with a long-range correction, and a table.
 std::unique_ptr<System<3>> chains() {
   auto system = test::hard_spheres<3>(3, 0.45);
   test::add_interaction(*system, "harmonic-bond", {{"within", 1.4}, {"stiffness", 20.0}, {"rest_length", 1.2}});
@@ -186,12 +186,12 @@ TEST(Decomposition, Fluid) {
 TEST(Decomposition, Cloud) {
   for (const auto& [method, given] : kMethods) compare<3>(cloud, method, 0.02, 30, 5, given);
 }
-/// So many that each rank knows only some.
+/// There are so many particles that each rank has only a part of them.
 TEST(Decomposition, ManySprings) {
   for (const char* method : {"verlet", "psa", "edda"}) {
     const std::uint64_t contacts = std::string(method) == "verlet" ? 0 : 400;
     const Counters c = compare<2>([] { return springs(40); }, method, 0.02, 60, contacts).counters;
-    EXPECT_EQ(c.slabs_again, 0u) << method;  // ghosts that go wrong at the rim are right again in the next slab
+    EXPECT_EQ(c.slabs_again, 0u) << method;  // wrong ghosts at the rim are corrected in the next slab
   }
 }
 TEST(Decomposition, Rod) {
@@ -200,8 +200,8 @@ TEST(Decomposition, Rod) {
     EXPECT_LT(s.counters.slabs_again, 5u) << method;
   }
 }
-/// Chains of collisions that reach from the rim of what a rank knows to what matters: discs in a long strip, so close
-/// that each collides more than once in two steps.
+/// Chains of collisions that reach from the rim of a rank's ghosts to its own particles: discs in a long strip, so
+/// dense that each collides more than once in two steps.
 TEST(Decomposition, GhostsThatGoWrong) {
   const auto strip = [] {
     std::vector<Vec<2>> x, v;
@@ -215,10 +215,10 @@ TEST(Decomposition, GhostsThatGoWrong) {
   };
   for (const char* method : {"psa", "edda"}) {
     const Counters c = compare<2>(strip, method, 0.12, 5, 10000).counters;
-    EXPECT_GT(c.slabs_again, c.slabs_by_all) << method;  // more ghosts were enough
+    EXPECT_GT(c.slabs_again, c.slabs_by_all) << method;  // more ghosts were sufficient
   }
 }
-/// From bonds that ranks find in their blocks to what they sum up over what they know: none has all.
+/// No rank has all particles: neither to find the bonds in its block nor to sum up forces over its own and its ghosts.
 TEST(Decomposition, NoRankHasAllParticles) {
   const auto lattice = [] { return test::hard_spheres<2>(40, 0.5); };
   const test::Given bonds = {{"within", 1.4}, {"stiffness", 3.0}, {"rest_length", 1.2}};
@@ -267,7 +267,7 @@ TEST(Decomposition, APathHasHalfTheAccelerationOfTheStep) {
     decomposition.divide(true, kStep);
     ASSERT_FALSE(decomposition.knows_all());
     const Particles<2>& p = system->particles;
-    // Only the last rank accelerates its own particles. The accelerations of copies do not count.
+    // Only the last rank accelerates its own particles. The accelerations of copies are ignored.
     const auto enough = [&](double acceleration) {
       std::vector<Vec<2>> a(p.size(), Vec<2>::Zero());
       for (Id i = 0; i < p.size(); ++i)
@@ -288,14 +288,14 @@ TEST(Decomposition, APathHasHalfTheAccelerationOfTheStep) {
     EXPECT_FALSE(enough(-3.01 * 2 / kStep));
   });
 }
-/// In such long steps a collision is felt farther away than a rank knows.
+/// Such long steps have collisions whose effects reach beyond a rank's ghosts.
 TEST(Decomposition, StepsThatTakeAllParticles) {
   EXPECT_GT(compare<2>([] { return springs(40); }, "psa", 0.5, 2, 1000).counters.slabs_by_all, 0u);
 }
 TEST(Decomposition, WithoutCores) {
   for (const auto& scene : {yukawa(0.1), yukawa(0.3)}) compare<3>(scene, "verlet", 0.01, 150, 0);
 }
-/// What a run of free discs ends with on every one of so many ranks; 0: alone.
+/// The final error of a run of free discs on each of this many ranks; 0: without ranks.
 std::string failure_of(const System<2>& start, const IntegratorInfo& info, const Given& given, int ranks) {
   std::vector<std::string> all(static_cast<std::size_t>(std::max(ranks, 1)));
   test::ThreadRanks(std::max(ranks, 1)).run([&](Communicator& exchange) {
@@ -325,7 +325,7 @@ TEST(Decomposition, TheOutermostSphereIsNamedByItsId) {
         << message;
   }
 }
-/// Two discs fly into each other, as no method has them do; between them lies the narrow subdomain of three others.
+/// Two discs move into each other, which no method allows; the narrow subdomain of three other discs lies between them.
 TEST(Decomposition, TheDeepestOverlapIsFoundAcrossRanks) {
   const Vec<2> rest = {0, 0};
   const auto system =
@@ -340,7 +340,7 @@ TEST(Decomposition, TheDeepestOverlapIsFoundAcrossRanks) {
         << ranks << ": " << message;
   }
 }
-/// Two pairs, each on a rank of its own where there are several.
+/// Two pairs, each on its own rank if there are several.
 TEST(Decomposition, OfOverlapsAlikeTheOneWithTheLowestIdsIsNamed) {
   const Vec<2> rest = {0, 0}, right = {0.25, 0}, left = {-0.25, 0};
   const auto system = test::make_system<2>(
@@ -372,7 +372,7 @@ Scene<2> stiff(int cells, double packing_fraction) {
     return system;
   };
 }
-/// Neighbours bounce so often in a step that the order of some collisions changes from sweep to sweep.
+/// Neighbours bounce so often in a step that the order of some collisions changes between sweeps.
 TEST(Decomposition, ParticlesThatAreFrozen) {
   const Counters c = compare<2>(stiff(40, 0.74), "edda", 0.04, 12, 300).counters;
   EXPECT_GT(c.frozen, 0u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How long an epoch of free flight is where no step is given: forty mean free times by Enskog's theory, to two digits.
+// The length of an epoch of free flight without a given step: forty mean free times by Enskog's theory, to two digits.
 
 #include "engine/setup/epoch.h"
 
@@ -22,7 +22,7 @@ TEST(Epoch, IsFortyMeanFreeTimesInAnyDimension) {
   EXPECT_NEAR(spheres * 4 * sphere * at_sphere * speed, 40, 0.05 * 40);
 }
 
-/// Along periodic axes the image of the fastest particle, and of the lightest in equilibrium, must fit into its bits.
+/// On periodic axes the images of the fastest particle, and of the lightest in equilibrium, must fit into their bits.
 TEST(Epoch, EndsBeforeAParticleHasComeThroughTooManyBoxes) {
   const auto usual = test::hard_spheres<3>(4, 0.3);
   const double boxes = Packing<3>(1, usual->size()).largest();

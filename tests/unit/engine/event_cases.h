@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Systems for tests that compare runs bit for bit, and what such runs leave.
+// Systems for tests that compare runs bit for bit, and the results of such runs.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ struct Case {
   int slabs = 3;
 };
 
-/// What a run leaves: every contact and the last state.
+/// The results of a run: every contact and the last state.
 template <int D>
 struct Outcome {
   std::vector<Contact<D>> contacts;
@@ -56,7 +56,7 @@ void expect_same(const Outcome<D>& a, const Outcome<D>& b, const std::string& wh
   EXPECT_EQ(bits_of<D>(a.particles.v), bits_of<D>(b.particles.v)) << what;
 }
 
-/// Spheres at random places in a box, with radii between those given.
+/// Spheres at random positions in a box, with radii in the given range.
 template <int D>
 std::unique_ptr<System<D>> random_system(int n, const Vec<D>& edges, std::array<Boundary, D> boundary, double smallest,
                                          double largest, std::uint64_t seed) {

@@ -21,8 +21,7 @@ struct Hit {
   Id lo, hi;
 };
 
-/// Event-driven dynamics the slow and obvious way: all spheres are moved to every event, all pairs and images are
-/// tried.
+/// Simple and slow event-driven dynamics: all spheres are moved to every event, and all pairs and images are tried.
 template <int D>
 std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g, double end) {
   std::vector<Hit> hits;
@@ -59,7 +58,7 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
           double s = kNever;
           if (a == 0)
             s = v < 0 ? std::max(0.0, gap / -v) : kNever;
-          else if (const double disc = v * v - 2 * a * gap; disc > 0)  // the root where it moves towards the wall
+          else if (const double disc = v * v - 2 * a * gap; disc > 0)  // the root at which it moves towards the wall
             s = (-v - std::sqrt(disc)) / a;
           if (s < -1e-9 || (s < 1e-9 && v + a * s >= 0)) s = kNever;
           if (s < best) best = s, next = {now + s, EventKind::wall, Id(i), Id(2 * k + side)};
@@ -120,7 +119,7 @@ void expect_same_events(const System<D>& system, const Vec<D>& g, double end, st
   ASSERT_EQ(contacts.size(), obvious.size());
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const auto& key = contacts[k].key;
-    EXPECT_NEAR(key.time, obvious[k].t, 1e-6) << "event " << k;  // rounding grows with every collision
+    EXPECT_NEAR(key.time, obvious[k].t, 1e-6) << "event " << k;  // rounding errors grow with every collision
     EXPECT_EQ(key.kind, obvious[k].kind) << "event " << k;
     EXPECT_EQ(key.lo, obvious[k].lo) << "event " << k;
     EXPECT_EQ(key.hi, obvious[k].hi) << "event " << k;
@@ -169,7 +168,7 @@ TEST(EventCore, FindsThemWhereWallsMove) {
 }
 
 TEST(EventCore, TwoSpheresInADiluteBoxMeetThroughAFarImage) {
-  // They part in a periodic box of 40 diameters and meet on the other side: the nearest image at the start is not it.
+  // They separate in a periodic box of 40 diameters and meet on the other side: not through the initial nearest image.
   auto system = test::make_system<2>({40, 40}, P, {{10, 20}, {12, 20}}, {{-1, 0}, {1, 0}});
   Counters counters;
   std::vector<Contact<2>> contacts;
@@ -203,7 +202,7 @@ TEST(EventCore, StoppingOnTheWayChangesNothing) {
   EXPECT_EQ(plain.v, stopped.v);
 }
 
-TEST(EventCore, RadiiMayChangeBetweenSlabs) {  // equal and unequal ones: no list that was made for others is kept
+TEST(EventCore, RadiiMayChangeBetweenSlabs) {  // equal and unequal radii: no old list is kept
   for (const bool equal : {true, false}) {
     auto system = test::hard_spheres<3>(3, 0.2);
     Particles<3>& p = system->particles;
@@ -257,7 +256,7 @@ TEST(EventCore, SimultaneousCollisionsOfALatticeKeepTheirOrder) {
   for (std::size_t k = 1; k < contacts.size(); ++k) EXPECT_LT(contacts[k - 1].key, contacts[k].key);
 }
 
-/// The smallest gap over contact distance, of pairs through periodic images and of walls, with radii scaled.
+/// The smallest gap relative to the contact distance, of pairs through periodic images and of walls, with scaled radii.
 template <int D>
 double smallest_gap(const System<D>& system, const Particles<D>& p, double scale) {
   double smallest = std::numeric_limits<double>::infinity();
@@ -291,8 +290,7 @@ TEST(EventCore, GrowingSpheresNeverOverlap) {
     }
     EXPECT_GT(counters.sphere_sphere, 20u);
     EXPECT_LT(counters.max_overlap, 1e-12);
-    for (const Contact<D>& contact :
-         contacts) {  // at the moment of contact the spheres touch, as large as they are then
+    for (const Contact<D>& contact : contacts) {  // at contact the spheres touch with their sizes at that time
       const Particles<D>& p = system->particles;
       const double now = 1 + growth * contact.key.time;
       const double distance = (contact.x_lo - contact.x_hi).norm();
@@ -306,7 +304,7 @@ TEST(EventCore, GrowingSpheresNeverOverlap) {
       }
     }
   };
-  check(test::hard_spheres<2>(8, 0.4), 0.1, 3);  // many small cells, which growth makes larger
+  check(test::hard_spheres<2>(8, 0.4), 0.1, 3);  // many small cells, which grow with the spheres
   check(test::hard_spheres<3>(3, 0.2), 0.1, 3);
   check(random_spheres<2>(8, 4, {W, W}, 9), 0.05, 8);
   check(random_spheres<2>(8, 4, {P, W}, 10), 0.05, 8);
@@ -330,8 +328,8 @@ TEST(EventCore, GrowthPushesRestingSpheresApartAndOffTheWalls) {
   EXPECT_DOUBLE_EQ(p.v[0][0], 1.0);  // twice the rate of the radius
   EXPECT_DOUBLE_EQ(p.v[1][0], -1.0);
 
-  // Two discs at rest at a distance of 2, far from the walls: they touch at t = 1 and part at twice the rate of σ = 1 +
-  // t.
+  // Two discs at rest at a distance of 2, far from the walls: they touch at t = 1 and separate at twice the rate of σ =
+  // 1 + t.
   auto pair = test::make_system<2>({10, 9}, W, {{4, 4.5}, {6, 4.5}}, {{0, 0}, {0, 0}});
   EventCore<2> other(pair->box, pair->particles);
   other.load(pair->particles, Vec<2>::Zero(), 1.2, 1.0);

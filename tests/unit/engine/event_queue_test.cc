@@ -21,12 +21,12 @@ struct Spheres {
     flights.load(system->particles, Vec<2>::Zero(), 10, 0);
     queue.clear();
   }
-  /// Plans a contact of sphere i with sphere j, which has collided `since` times since then.
+  /// Plans a contact of sphere i with sphere j, which has had `since` collisions after that.
   void plan(Slot i, double at, Slot j, std::uint32_t since = 0) {
     queue.offer(i, at, EventKind::pair, flights.packing().pack(j, 0));
     queue[i].partner_version -= since;
   }
-  /// Takes out the next event before 10; its sphere.
+  /// Removes the next event before 10 and returns its sphere.
   Slot next() {
     Slot i = 0;
     return queue.next(10, i, time) ? i : kNone;

@@ -9,7 +9,7 @@
 namespace carom {
 namespace {
 
-/// A search of its own, without a core.
+/// An EventSearch without an EventCore.
 template <int D>
 struct Searched {
   Searched(std::unique_ptr<System<D>> spheres, const Vec<D>& g, SearchOptions::Method method, double displacement = 0.1)
@@ -21,14 +21,14 @@ struct Searched {
     std::vector<Record<D>> records;
     const Particles<D>& p = system->particles;
     for (Id i = 0; i < p.size(); ++i) {
-      const double s = system->box.walls().empty() ? 0.1 * (i % 3) : 0;  // since its record; no wall may lie between
+      const double s = system->box.walls().empty() ? 0.1 * (i % 3) : 0;  // since its record; it passes no wall
       records.push_back({p.x[i] - s * p.v[i] + (0.5 * s * s) * g, p.v[i] - s * g, kStart - s, i, 0, p.species[i]});
     }
     flights.load(records, sizes, g, kEnd);
     search.start(kStart, displacement);
   }
 
-  /// Calls visit(j, image) for all images near the box of the other spheres.
+  /// Calls visit(j, image) for all other spheres in all images near the box.
   template <class Visit>
   void for_all_others(Slot i, Visit&& visit) const {
     for (Slot j = 0; j < flights.size(); ++j)
@@ -42,8 +42,8 @@ struct Searched {
         if (there) visit(j, image);
       }
   }
-  /// Compares what a sphere plans with what trying everything finds: nothing comes before, and it is not later than
-  /// contacts before the sphere or the other one has its next event. Returns the first contact.
+  /// Compares a sphere's plan with a search by brute force: no contact comes before it, and it is not later than a
+  /// contact before the next events of both spheres. Returns the first contact.
   double expect_planned(Slot i) const {
     double first = kNever, seen = kNever;
     for (const Wall<D>& wall : flights.walls()) first = std::min(first, flights.wall_contact(i, wall));
@@ -60,7 +60,7 @@ struct Searched {
     return first;
   }
 
-  /// By trying everything.
+  /// The first contact by brute force.
   double first_contact() const {
     double first = kNever;
     for (Slot i = 0; i < flights.size(); ++i) {
@@ -84,7 +84,7 @@ struct Searched {
 
 constexpr auto kMethods = {SearchOptions::Method::lists, SearchOptions::Method::cells};
 
-/// In the order of the queue up to the first contact: before it nothing changes but what spheres look at.
+/// Executes the queue up to the first contact: before it only neighbourhoods change.
 template <int D>
 void expect_nothing_missed(Searched<D>& s) {
   double first = kNever;
@@ -110,7 +110,7 @@ TEST(EventSearch, PlansTheContactsThatTryingEverythingFinds) {
   }
 }
 
-/// Serves the queue, as EventCore does: each contact is the first that trying everything finds.
+/// Executes the queue like EventCore: each contact is the first one that brute force finds.
 template <int D>
 void expect_contacts(Searched<D>& s, int contacts) {
   Slot i = 0;
@@ -166,7 +166,7 @@ TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
         if (i != s.dismissed) s.expect_planned(i);
     };
     const Vec<3> x = s.flights.at(3, now).x, other = s.flights.at(40, now).x;
-    for (const auto& [i, at] : {std::pair<Slot, Vec<3>>{3, other}, {40, x}}) {  // they change places
+    for (const auto& [i, at] : {std::pair<Slot, Vec<3>>{3, other}, {40, x}}) {  // they exchange positions
       s.flights.set(i, {at, -2.0 * s.flights[i].v, now, s.flights[i].id, 0, s.flights[i].species});
       s.search.move(i, now);
     }

@@ -49,7 +49,7 @@ TEST(ExactSeries, IsTheSameSum) {
   }
 }
 
-TEST(ExactSeries, HasRoomForTheLargestTerms) {  // each has all bits that the first of both sums holds
+TEST(ExactSeries, HasRoomForTheLargestTerms) {  // each term has all bits that the first digit of both sums holds
   const double largest = 0x1.ffffffffffep12;
   ExactSeries series;
   std::vector<double> terms(2000, largest);

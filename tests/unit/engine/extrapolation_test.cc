@@ -10,7 +10,7 @@ namespace {
 
 using integrator::Extrapolation;
 
-/// The mean over a slab of an acceleration that is a polynomial of this degree in time, one for each of two particles.
+/// The mean over a slab of an acceleration that is a polynomial of this degree in time, for each of two particles.
 std::vector<Vec<2>> mean(int degree, double start, double length) {
   std::vector<Vec<2>> a(2, Vec<2>::Zero());
   for (int p = 0; p <= degree; ++p) {
@@ -30,7 +30,7 @@ struct Slabs {
     past.pass(length, mean(degree, time, length));
     time += length;
   }
-  /// The largest error of what is expected of the next slab.
+  /// The largest error of the prediction for the next slab.
   double error(double length, std::size_t most = 3) {
     std::vector<Vec<2>> expected(2, Vec<2>::Constant(77));
     past.expect(length, expected, most);
@@ -44,7 +44,7 @@ struct Slabs {
   Extrapolation<2> past;
 };
 
-/// After n slabs an acceleration of degree n − 1 is continued exactly, and one of degree n is not.
+/// After n slabs an acceleration of degree n − 1 is predicted exactly, and one of degree n is not.
 TEST(Extrapolation, ContinuesPolynomialsOverSlabsOfUnequalLengths) {
   for (const std::vector<double>& lengths :
        {std::vector{0.5, 0.2, 0.7, 0.3}, {0.1, 0.25, 0.6, 0.5}, {0.4, 0.4, 0.4, 0.4}, {0.3, 0.3, 0.1, 0.3}})
@@ -68,7 +68,7 @@ TEST(Extrapolation, FromASlabThatIsMuchShorterOnlyItsOwnIsTaken) {
   std::vector<Vec<2>> expected(2);
   slabs.past.expect(0.301, expected);
   EXPECT_EQ(expected, slabs.past.last());
-  slabs.past.expect(0.3, expected);  // what lies before that slab is forgotten
+  slabs.past.expect(0.3, expected);  // slabs before this one are ignored
   EXPECT_EQ(expected, slabs.past.last());
 }
 

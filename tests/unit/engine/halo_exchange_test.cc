@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Of random particles that ranks know by a bisection: owners, copies that matter, and values that owners send.
+// The halos of random particles in a bisection: owners, relevant copies, and values that owners send.
 
 #include "engine/ranks/halo_exchange.h"
 
@@ -24,7 +24,7 @@ std::vector<Vec<2>> random_places() {
   return x;
 }
 
-/// What one of four ranks knows of all.
+/// The part of all particles that one of four ranks has.
 struct Known {
   explicit Known(int me) : bisection(kBox, random_places(), 4, kFar, alone) {
     const std::vector<Vec<2>> all = random_places();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A halo is as wide as paths and collisions ask for, and a division ends before a particle has left what it allows for.
+// A halo is as wide as paths and collisions need, and a division ends before a particle exceeds its displacement.
 
 #include "engine/ranks/halo_width.h"
 
@@ -42,7 +42,7 @@ TEST(HaloWidth, AllowsForPathsThatWereTooLongUntilThatIsLongAgo) {
   width.fit(kReach, kPath, kDiameter);
   EXPECT_EQ(width.near(), first);
   width.ask_for_path(std::numeric_limits<double>::infinity());
-  EXPECT_FALSE(width.asked());  // none is wide enough
+  EXPECT_FALSE(width.asked());  // no width is sufficient
 }
 
 TEST(HaloWidth, GrowsDeeperWhereCopiesWentWrong) {
@@ -57,7 +57,7 @@ TEST(HaloWidth, GrowsDeeperWhereCopiesWentWrong) {
   EXPECT_DOUBLE_EQ(width.far() - width.near(), depth);
 }
 
-/// Two particles may each have come so far, and go on through one slab, while they can touch or feel each other.
+/// Two particles may each have moved this far and continue for one slab while they can touch or interact.
 TEST(HaloWidth, IsOutdatedBeforeAParticleHasComeTooFar) {
   for (const double path : {0.001, 0.01, 0.1, 1.0}) {
     HaloWidth width = fitted(true);
@@ -74,7 +74,7 @@ TEST(HaloWidth, IsOutdatedBeforeAParticleHasComeTooFar) {
     EXPECT_LE(looks, 10) << path;
     width.fit(kReach, path, kDiameter);
     EXPECT_FALSE(width.outdated([] { return 0.0; }));
-    // However slow it was before, it may be as fast as is allowed in the slab to come.
+    // Even if it was slower before, it may have the largest allowed speed in the next slab.
     for (come = 0; width.fit(kReach, path, kDiameter), !width.outdated([&] { return come; }); come += 0.01)
       ASSERT_LE(kReach + 2 * (come + 2 * path), width.near()) << path;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The cases in which plain codes hang, overlap or lose energy: contacts that rest, graze, come together or in chains.
+// Cases in which simple codes hang, overlap or lose energy: contacts that rest, graze, coincide or form chains.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ struct Method {
   std::string label;
   const char* name;
   Parameters given;
-  double energy;  // the relative energy error it may make at step 0.01 in these cases
+  double energy;  // the allowed relative energy error at step 0.01 in these cases
 };
 
 void PrintTo(const Method& method, std::ostream* out) { *out << method.label; }
@@ -49,7 +49,7 @@ std::unique_ptr<System<2>> gravitating(std::vector<Vec<2>> x, std::vector<Vec<2>
 TEST_P(HardCases, TwoTouchingSpheresAtRestStayTogether) {
   auto result = run(gravitating({{5, 5}, {6, 5}}, {{0, 0}, {0, 0}}), 0.01, 500);
   expect_sane(*result);
-  if (std::string(GetParam().name) == "psa") return;  // it kicks and lets them bounce, to first order
+  if (std::string(GetParam().name) == "psa") return;  // its kicks make discs bounce, to first order
   EXPECT_EQ(result->system().particles.x[0], Vec<2>(5, 5));
   EXPECT_EQ(result->statistics().counters.sphere_sphere, 0u);
 }
@@ -73,7 +73,7 @@ TEST_P(HardCases, ABlowIntoAChainAtRestPassesThrough) {
 }
 
 TEST_P(HardCases, ThreeBodiesMeetAtOneInstant) {
-  // Three discs fall on a fourth from three sides at the same time, by symmetry.
+  // Three discs hit a fourth from three sides at the same time, by symmetry.
   const double s = std::sqrt(0.75);
   auto result =
       run(gravitating({{6, 6}, {8, 6}, {6 - 1, 6 + 2 * s}, {6 - 1, 6 - 2 * s}}, std::vector<Vec<2>>(4, Vec<2>::Zero())),
@@ -83,8 +83,8 @@ TEST_P(HardCases, ThreeBodiesMeetAtOneInstant) {
 }
 
 TEST_P(HardCases, ATurningPairInContactIsBraked) {
-  // Two touching discs that circle each other, and a third that pulls: the pair turns, is braked and is pressed
-  // together.
+  // Two touching discs that circle each other, and a third that attracts them: the pair turns, is decelerated and is
+  // pressed together.
   for (double h : {0.1, 0.01}) {
     auto system =
         test::make_system<2>({20, 20}, Boundary::open, {{10, 10}, {11, 10}, {10.3, 13}}, {{0, -0.6}, {0, 0.6}, {0, 0}});
@@ -97,7 +97,7 @@ TEST_P(HardCases, ATurningPairInContactIsBraked) {
 }
 
 TEST_P(HardCases, GrazingPairsUnderAttraction) {
-  // Pairs that pass at 1 ± a little: some of them touch in one step size and not in another.
+  // Pairs that pass at 1 ± a small distance: some touch with one step size and not with another.
   for (double miss : {-1e-3, -1e-6, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 1e-6, 1e-3}) {
     auto result = run(gravitating({{3, 5}, {9, 6.13 + miss}}, {{1, 0}, {-1, 0}}), 0.05, 300);
     const auto& s = result->statistics();
@@ -114,7 +114,7 @@ TEST_P(HardCases, APairDrawnTogetherBouncesWithoutEndAndWithoutLoss) {
 }
 
 TEST_P(HardCases, AContactAtTheVeryStartAndTheVeryEndOfAStep) {
-  // Contact at t = 1 exactly, a step end; then at the wall, also at a step end.
+  // Contact at t = 1, exactly at a step end; then at the wall, also at a step end.
   auto system = test::make_system<2>({8, 4}, Boundary::wall, {{2, 2}, {5, 2}}, {{1, 0}, {-1, 0}});
   auto result = run(std::move(system), 0.25, 40);
   expect_sane(*result);
@@ -129,7 +129,7 @@ TEST_P(HardCases, UnequalRadiiAndMassesInACornerUnderAField) {
   auto result = run(std::move(system), 0.01, 2000);
   const auto& s = result->statistics();
   EXPECT_LE(s.counters.max_overlap, 1e-12);
-  // Spheres roll in the corner, with contacts much faster than the step: only the exact method is held to its order
+  // Spheres roll in the corner, with contacts much faster than the step: only the exact method must keep its order
   // here.
   if (GetParam().energy > 1e-12) return;
   EXPECT_LE(s.max_energy_error, GetParam().energy * s.energy_reference);
@@ -141,7 +141,7 @@ TEST_P(HardCases, ASmallPeriodicBoxMeetsItsOwnImages) {
   const auto& s = result->statistics();
   EXPECT_GT(s.counters.sphere_sphere, 20u);
   EXPECT_LE(s.counters.max_overlap, 1e-12);
-  EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);  // no forces: exact for every method
+  EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);  // without forces every method is exact
   EXPECT_LE(*s.max_momentum_error, 1e-12);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Free flight on ranks that have blocks of the particles, against one that has all.
+// Free flight on ranks that have blocks of the particles, against one rank with all particles.
 
 #include "engine/ranks/id_blocks.h"
 
@@ -13,7 +13,7 @@
 namespace carom {
 namespace {
 
-/// All that a run shows.
+/// Everything that a run reports.
 template <int D>
 struct Account : Observer<D> {
   Sampling sampling() const override { return {.interval = 0.11}; }
@@ -112,7 +112,7 @@ TEST(IdBlocks, Species) {
       100);
 }
 
-/// Two that overlap and never move are seen by whichever rank, in whichever way the box is cut.
+/// Two spheres that overlap and never move are found for all ranks and all divisions of the box.
 TEST(IdBlocks, OverlapsAreFound) {
   const auto grid = [] {
     std::vector<Vec<3>> x, v(125, Vec<3>::Zero());
@@ -151,7 +151,7 @@ TEST(Sizes, AreThoseOfTheSpeciesWhereTheyAreEqual) {
   EXPECT_EQ(by_id.largest_radius(), 0.5);
 }
 
-/// Whichever rank has which spheres, and with many at the same coordinates.
+/// The distribution of spheres among the ranks does not matter, even with many equal coordinates.
 TEST(Bisection, HasTheSameCutsOnAnyNumberOfRanks) {
   for (const bool layers : {false, true}) {
     auto system = random_system<3>(500, {30, 12, 12}, {O, P, W}, 0.3, 0.3, 3);
@@ -164,7 +164,7 @@ TEST(Bisection, HasTheSameCutsOnAnyNumberOfRanks) {
     for (const Vec<3>& at : x) ++spheres[whole.owner(at)];
     for (const std::size_t n : spheres) EXPECT_NEAR(static_cast<double>(n), 500.0 / 7, layers ? 40 : 5);
     test::ThreadRanks(3).run([&](Communicator& ranks) {
-      std::vector<Vec<3>> some;  // one rank has none
+      std::vector<Vec<3>> some;  // one rank has no particles
       for (std::size_t i = 0; i < x.size(); ++i)
         if (static_cast<int>(i % 2) == ranks.rank()) some.push_back(x[i]);
       const Bisection<3> bisection(system->box, some, 7, 1.0, ranks);
@@ -178,7 +178,7 @@ TEST(Bisection, HasTheSameCutsOnAnyNumberOfRanks) {
   }
 }
 
-/// Spheres in a row of 1000, of which those at the left have three times as much to do.
+/// Spheres in a row of 1000; the spheres at the left have three times as much work.
 TEST(Bisection, GivesEachTheSameWork) {
   const Box<2> box{{100, 10}, {W, W}};
   std::vector<Vec<2>> x;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The table of slots by id does what a map does, however ids fall together.
+// The table of slots by id gives the results of a map, for any collisions of ids.
 
 #include "engine/ranks/id_table.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The engine as a library: what a program may get wrong, and the errors.
+// The engine as a library: mistakes that a program can make, and their errors.
 
 #include <carom/carom.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ std::unique_ptr<System<2>> two_discs() {
   return system;
 }
 
-/// What the error says that this throws; empty: it throws none.
+/// The message of the error that this throws; empty if it throws nothing.
 template <class Action>
 std::string message(Failure failure, Action&& action) {
   try {

@@ -20,8 +20,8 @@ std::unique_ptr<System<2>> two_species(std::size_t n) {
   return system;
 }
 
-/// Against displacements between the same origins, from positions that are kept: lag j·10^d intervals is measured from
-/// the origins 0, 10^(d+1), 2·10^(d+1), …
+/// Compares with displacements between stored positions for equal origins: lag j·10^d intervals is measured from the
+/// origins 0, 10^(d+1), 2·10^(d+1), …
 TEST(MeanSquaredDisplacement, IsThatOfTheKeptPositions) {
   const std::size_t n = 7, samples = 2345;
   auto system = two_species(n);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Particles go with all their fields to each rank that is to know them, and stand there by their ids.
+// Particles move with all their fields to each rank that needs them, and are sorted by their ids there.
 
 #include "engine/ranks/migration.h"
 
@@ -8,7 +8,7 @@
 namespace carom {
 namespace {
 
-/// The particles of a rank, with a field beside those of a system.
+/// The particles of a rank, with a field in addition to those of a system.
 struct Known {
   Known() {
     fields.add("position", p.x);

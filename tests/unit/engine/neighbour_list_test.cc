@@ -14,7 +14,7 @@
 namespace carom {
 namespace {
 
-/// Every pair and image within reach, by trying all of them.
+/// Every pair and image within reach, by brute force.
 template <int D>
 std::set<NeighbourPair<D>> brute_force(const Box<D>& box, const std::vector<Vec<D>>& x,
                                        const std::vector<double>& reach) {
@@ -66,7 +66,7 @@ void walk(Boundary boundary, double edge, double reach) {
       for (int k = 0; k < D; ++k) p[k] += step(random);
     const auto pairs = list.cover(x, moved);
     expect_covered<D>(box, x, std::vector<double>(x.size(), reach / 2), pairs);
-    // At the end of the step positions are not wrapped yet: the list's images are those of the start.
+    // At the end of the step positions are not wrapped yet: the list's images are those at the start.
     std::set<NeighbourPair<D>> listed(pairs.begin(), pairs.end());
     for (const auto& pair : brute_force<D>(box, moved, std::vector<double>(x.size(), reach / 2)))
       EXPECT_TRUE(listed.contains(pair));
@@ -116,7 +116,7 @@ TEST(NeighbourList, RefusesWildStepsBeforeTheyFillTheMemory) {
   NeighbourList<2> list(box, std::vector<double>(x.size(), 0.5));
   const auto pairs = list.cover(x);
   const std::vector before(pairs.begin(), pairs.end());
-  EXPECT_THROW(list.cover(x, 100.0), Error);  // 3600 particles and 35 images of them around each
+  EXPECT_THROW(list.cover(x, 100.0), Error);  // 3600 particles, each with 35 images around
   EXPECT_TRUE(std::ranges::equal(list.cover(x), before));
 }
 
@@ -154,7 +154,7 @@ void list_unequal(Boundary boundary) {
   NeighbourList<D> list(box, reach);
   const auto pairs = list.cover(x);
   expect_covered<D>(box, x, reach, pairs);
-  for (const auto& pair : pairs)  // and no more than the skin wants
+  for (const auto& pair : pairs)  // and no more pairs than the skin requires
     EXPECT_LT((x[pair.i] - x[pair.j] + box.shift(pair.image)).norm(), reach[pair.i] + reach[pair.j] + 1);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Observables by their names: all that are declared, and the profile.
+// Observables by their names: all declared ones, and the profile.
 
 #include "engine/run/observable.h"
 
@@ -94,8 +94,7 @@ TEST(Profile, OfAUniformFluidIsFlat) {
   const double counts = static_cast<double>(profile->samples()) * n / 8;
   EXPECT_GE(profile->samples(), 110u);
   for (std::size_t b = 0; b < 8; ++b) {
-    // The scatter of an ideal gas in samples that know nothing of each other; theirs is about that of a quarter as
-    // many.
+    // The scatter of an ideal gas in independent samples; these samples scatter about like a quarter as many.
     EXPECT_NEAR(table[1].values[b], n / volume, 5 * 2 * n / volume / std::sqrt(counts)) << b;
     EXPECT_NEAR(table[2].values[b], 1, 5 * 2 * std::sqrt(2 / (3 * counts))) << b;
   }

@@ -39,7 +39,7 @@ void expect_by_hand() {
 TEST(Observables, ByHandInTwoDimensions) { expect_by_hand<2>(); }
 TEST(Observables, ByHandInThreeDimensions) { expect_by_hand<3>(); }
 
-/// −1 for attraction, +1 for repulsion: two particles at rest, 1.5 apart.
+/// −1 for attraction, +1 for repulsion: two particles at rest at distance 1.5.
 template <int D>
 double pressure_at_rest(double amplitude) {
   Vec<D> x = Vec<D>::Constant(2), y = x;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Subdomains on two ranks that exchange paths agree, and have what one core has.
+// Subdomains on two ranks that exchange paths have equal paths, and those of one core.
 
 #include "engine/ranks/path_exchange.h"
 
@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kEnd = 0.12;
 
-/// A blow passes from one subdomain through a row of spheres into the other, which did not see it come.
+/// A collision sequence passes from one subdomain through a row of spheres into the other, which did not predict it.
 TEST(PathExchange, MakesSubdomainsAgreeAboutAWindow) {
   std::vector<Vec<3>> x, v(16, Vec<3>::Zero());
   for (int i = 0; i < 16; ++i) x.push_back({2.0 + 1.001 * i, 3, 3});

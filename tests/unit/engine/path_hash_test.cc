@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Two ranks that have a particle agree on the word of its path where its events are the same, and only there.
+// Two ranks that have a particle compute equal hashes of its path if its events are equal, and only then.
 
 #include "engine/slabs/path_hash.h"
 
@@ -16,7 +16,7 @@ Particles<3> particles_of(std::vector<Id> ids) {
   return p;
 }
 
-/// The words of particles 3, 6 and 9 on a rank that has particles with these ids, after events given by local numbers.
+/// The hashes of particles 3, 6 and 9 on a rank with particles of these ids, after events given by local numbers.
 std::array<std::uint64_t, 3> words(const std::vector<Id>& ids, const std::vector<EventKey<3>>& events) {
   const Particles<3> p = particles_of(ids);
   PathHashes<3> hashes(p);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Walls that move: every bounce, the work and the energy against what is known exactly.
+// Moving walls: every bounce, the work and the energy against exact results.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kRadius = 0.5, kMass = 2;
 
-/// One sphere that flies to and fro along axis 0, between a wall that stands and a piston.
+/// One sphere that moves back and forth along axis 0 between a fixed wall and a piston.
 std::unique_ptr<System<2>> one_sphere(double length, double speed, double piston) {
   auto system = std::make_unique<System<2>>();
   system->box.edges = {length, 3};
@@ -36,8 +36,9 @@ class Log : public Observer<2> {
   std::vector<Contact<2>> all;
 };
 
-/// The piston comes at a speed u. From one meeting with it to the next, the speed before them v and the room ℓ (of the
-/// centre), the sphere takes 2ℓ/(v + 3u) and (v + u)ℓ stays the same: the invariant v ℓ of slow pistons, made exact.
+/// The piston moves at speed u. From one contact to the next, with the speed v before and the free length ℓ of the
+/// centre, the sphere takes 2ℓ/(v + 3u) and conserves (v + u)ℓ: the exact form of the adiabatic invariant v ℓ of slow
+/// pistons.
 void expect_exact_bounces(const std::string& method, double step, double tolerance) {
   const double length = 10, u = 0.0625, end = 100;
   auto run = test::make_run<2>(one_sphere(length, 1.3, -u), method, {.step = step, .end_time = end, .events = true});
@@ -64,12 +65,12 @@ void expect_exact_bounces(const std::string& method, double step, double toleran
     v += 2 * u;
   }
   EXPECT_GT(met, 10u);
-  EXPECT_GT(time, end);  // it was the last
+  EXPECT_GT(time, end);  // no contact is missing
   const Statistics& s = run->statistics();
   EXPECT_NEAR(s.counters.wall_work.value(), work, 1e-13 * work);
   EXPECT_NEAR(s.energy_final - s.energy_initial, work, 1e-14 * s.energy_final);
   EXPECT_GT(work, 2 * s.energy_initial);
-  EXPECT_TRUE(std::isnan(s.mean_pressure));  // there is no one volume
+  EXPECT_TRUE(std::isnan(s.mean_pressure));  // the volume varies
   EXPECT_LE(s.max_energy_error, 1e-14 * s.energy_final);
   EXPECT_NEAR(run->system().box.edges[0], length - u * end, 1e-12);
   const double ends = std::abs(run->system().particles.v[0][0]) * (length - u * end - 2 * kRadius);
@@ -93,7 +94,7 @@ TEST(Piston, GivesWayAndTakesEnergy) {
   }
 }
 
-/// A sphere at rest is met; one that flees as fast as the piston comes is not.
+/// The piston hits a sphere at rest, but not one that moves away as fast as the piston.
 TEST(Piston, MeetsWhatIsAtRest) {
   for (const std::string method : {"free-flight", "psa"}) {
     auto system = one_sphere(4, 0, -1);
@@ -106,7 +107,7 @@ TEST(Piston, MeetsWhatIsAtRest) {
   }
 }
 
-/// H − W is kept to the order of psa, with forces.
+/// psa conserves H − W to its order, with forces.
 TEST(Piston, EnergyAndWorkAddUpUnderForces) {
   const auto error = [](double h) {
     auto system = test::make_system<2>({8, 4}, Boundary::wall, {{4, 2}, {6, 2.5}}, {{1.5, 0.4}, {0.5, -0.3}});
@@ -120,7 +121,7 @@ TEST(Piston, EnergyAndWorkAddUpUnderForces) {
   EXPECT_LT(error(0.0002), 0.5 * error(0.001));
 }
 
-/// What a run says that throws.
+/// The error message of a run that throws.
 std::string message(const std::function<void(System<2>&)>& change, const std::string& method,
                     Communicator* ranks = nullptr) {
   auto system = one_sphere(10, 1, -0.1);

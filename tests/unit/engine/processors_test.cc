@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Short runs and single evaluations whose results have the same bits on every processor and by every compiler: the
-// hashes here are checked by each build that runs this test. A change of results that is meant changes them.
+// Short runs and single evaluations whose results have equal bits on every processor and with every compiler: each
+// build that runs this test checks these hashes. An intended change of results changes them.
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ struct Hash {
   }
 };
 
-/// Expects the hash that is stored under this name.
+/// Expects the stored hash of this name.
 void expect(const std::string& name, const Hash& hash) {
   static const std::map<std::string, std::uint64_t> stored = {
       {"normal deviates", 0x7086691b30edab8},

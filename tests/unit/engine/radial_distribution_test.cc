@@ -13,7 +13,7 @@
 namespace carom {
 namespace {
 
-/// Points at random places, two species of 2/3 and 1/3 of them.
+/// Points at random positions; two species with 2/3 and 1/3 of them.
 template <int D>
 std::unique_ptr<System<D>> random_points(std::size_t n, const Vec<D>& edges, std::array<Boundary, D> boundary,
                                          double radius, unsigned seed) {
@@ -33,7 +33,7 @@ std::unique_ptr<System<D>> random_points(std::size_t n, const Vec<D>& edges, std
   return system;
 }
 
-/// Pairs in each shell, by looking at every image of every pair.
+/// Pairs in each shell, from every image of every pair.
 template <int D>
 std::vector<double> counted_pairs(const System<D>& system, double range, int bins, int a, int b) {
   std::vector<double> counts(static_cast<std::size_t>(bins));
@@ -70,7 +70,7 @@ void expect_brute_force(const Vec<D>& edges, std::array<Boundary, D> boundary, d
             EXPECT_TRUE(std::isnan(g[k]));
           else if (periodic)
             EXPECT_NEAR(g[k], counts[k] * edges.prod() / (pairs * shell), 1e-9 * (1 + g[k])) << n << ' ' << k;
-          else  // the counts themselves, whatever the norm
+          else  // the counts, without the normalisation
             EXPECT_EQ(g[k] > 0, counts[k] > 0) << n << ' ' << k;
         }
       }
@@ -100,8 +100,8 @@ TEST(RadialDistribution, HasAContactValueWhereAllRadiiAreOne) {
   }
 }
 
-/// Spheres of radius 0.25 stand in shells around one of radius 0.5, from contact on, with g ∝ e^(−2(r − 0.75)). There
-/// is no contact value where one of them has another radius.
+/// Spheres of radius 0.25 in shells around one of radius 0.5, from contact on, with g ∝ e^(−2(r − 0.75)). There is no
+/// contact value if one sphere has another radius.
 TEST(RadialDistribution, TheContactValueIsThatAtTheContactDistanceOfTwoSpecies) {
   constexpr double kWidth = 0.025, kEdge = 6, kDensity = 300;
   std::vector<Vec<3>> x = {Vec<3>::Constant(3)};
@@ -150,8 +150,8 @@ void expect_ideal_gas(const Vec<D>& edges, std::array<Boundary, D> boundary, dou
   EXPECT_EQ(rdf.samples(), samples);
   const double width = range / bins, ball = D == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3;
   for (int k = 0; k < bins; ++k) {
-    // Counts scatter as Poisson's; walls make the density of partners differ from place to place, which adds to it
-    // about 1/√(samples n).
+    // Counts have Poisson's scatter; walls make the density of partners depend on position, which adds about
+    // 1/√(samples n).
     const double shell = ball * (std::pow((k + 1) * width, D) - std::pow(k * width, D));
     const double counts = samples * (n * n / 2.0) * shell / edges.prod();
     EXPECT_NEAR(rdf.g()[k], 1.0, 5 / std::sqrt(counts) + 0.005) << k;

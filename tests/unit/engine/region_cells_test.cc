@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What cells find near a place is what trying all spheres in all images finds.
+// The neighbours that cells find agree with a search through all spheres in all images.
 
 #include "engine/search/region_cells.h"
 
@@ -26,7 +26,7 @@ struct Centres {
     for (std::size_t i = 0; i < n; ++i)
       for (int k = 0; k < D; ++k) {
         const double at = uniform(random);
-        x[i][k] = i % 3 == 0 ? 0.3 * at : at * box.edges[k];  // one in three is in a corner: more than a line holds
+        x[i][k] = i % 3 == 0 ? 0.3 * at : at * box.edges[k];  // a third is in a corner: more than a line holds
         if (box.periodic(k)) x[i][k] += box.edges[k] * (static_cast<int>(random() % 3) - 1);
       }
   }

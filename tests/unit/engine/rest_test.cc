@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bodies at rest: nothing moves, the reactions are those of statics, on any number of ranks.
+// Bodies at rest: nothing moves, and the reactions are those of statics on any number of ranks.
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ void PrintTo(const Case<D>& each, std::ostream* out) {
   *out << each.name;
 }
 
-/// Expects that these reactions hold every body against the forces.
+/// Expects that these reactions balance the forces on every body.
 template <int D>
 void expect_balance(const System<D>& system, const std::vector<test::Reaction>& reactions, double error) {
   const auto& p = system.particles;
@@ -47,7 +47,7 @@ void expect_balance(const System<D>& system, const std::vector<test::Reaction>& 
   EXPECT_LE(test::largest_difference<D>(left, std::vector<Vec<D>>(p.size(), Vec<D>::Zero())), error);
 }
 
-/// The reactions that the run keeps for its next step.
+/// The reactions that the run stores for its next step.
 template <int D>
 std::vector<test::Reaction> reactions_of(const System<D>& system) {
   std::vector<Reaction<D>> kept;
@@ -62,7 +62,7 @@ std::vector<test::Reaction> reactions_of(const System<D>& system) {
   return reactions;
 }
 
-/// Expects the forces of these contacts, each to 1e-10 of it, and no other contact.
+/// Expects the forces of these contacts to a relative error of 1e-10, and no other contact.
 void expect_reactions(std::vector<test::Reaction> found, std::vector<test::Reaction> expected) {
   const auto contact = [](const test::Reaction& each) { return std::tuple(each.wall, each.lo, each.hi); };
   std::ranges::sort(found, {}, contact);
@@ -95,7 +95,7 @@ void expect_rest(const Case<D>& each, const std::string& method) {
   if (!expected.empty()) expect_reactions(reactions, expected);
 }
 
-/// Positions and velocities of all after the steps, on so many ranks.
+/// Positions and velocities of all particles after the steps on this number of ranks.
 template <int D>
 Particles<D> at_the_end(const Case<D>& each, int ranks) {
   Particles<D> end;
@@ -120,7 +120,7 @@ void expect_the_same_on_all_ranks(const Case<D>& each) {
   }
 }
 
-/// Expects bodies that are held in contact and move: energy stays to rounding, and no contact opens.
+/// Expects that moving bodies stay in contact: energy is conserved to rounding, and no contact opens.
 template <int D>
 void expect_held_in_motion(std::unique_ptr<System<D>> system, const std::string& method, std::size_t contacts) {
   const auto run = test::run_steps<D>(std::move(system), method, kStep, 2000);
@@ -134,8 +134,8 @@ void expect_held_in_motion(std::unique_ptr<System<D>> system, const std::string&
   EXPECT_EQ(reactions_of(run->system()).size(), contacts) << method;
 }
 
-/// Two discs that attract each other and turn about each other in contact, free or in a trap, which pulls the lighter
-/// one the more and bends the path of the pair.
+/// Two discs that attract each other and rotate about each other in contact, free or in a trap, which pulls the lighter
+/// disc more strongly and bends the path of the pair.
 std::unique_ptr<System<2>> turning_pair(double mass, double trap) {
   auto system = test::make_system<2>({30, 30}, Boundary::open, {{10, 10}, {11, 10}}, {{0.2, -0.5 * mass}, {0.2, 0.5}},
                                      {}, {1, mass});
@@ -143,7 +143,7 @@ std::unique_ptr<System<2>> turning_pair(double mass, double trap) {
   if (trap > 0) test::add_interaction(*system, "harmonic-trap", {{"stiffness", trap}});
   return system;
 }
-/// A column that slides on the floor, to and fro in a trap.
+/// A column that slides back and forth on the floor in a trap.
 std::unique_ptr<System<2>> sliding_column(int n) {
   auto scene = test::in_trap(test::column(n), 0.5);
   for (auto& v : scene.system->particles.v) v = {0.7, 0};
@@ -155,7 +155,7 @@ TEST(HeldInMotion, TurningPairs) {
 }
 TEST(HeldInMotion, ATurningPairInATrap) { expect_held_in_motion(turning_pair(0.2, 0.05), "edda", 1); }
 TEST(HeldInMotion, WhatAContactLosesWhenItComesToRestIsGivenBack) {
-  // The disc hits the floor so slowly that it is stopped; its weight would press it back at once.
+  // The disc hits the floor so slowly that it is stopped; otherwise its weight would press it back at once.
   auto scene = test::in_trap(test::column(1), 0.5);
   scene.system->particles.v[0] = {0.3, -0.9 * std::sqrt(2 * kRestingGap * kRadius)};
   expect_held_in_motion(std::move(scene.system), "edda", 1);

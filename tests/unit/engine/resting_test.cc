@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reactions of resting contacts: closed forms, all sets of contacts in turn, and what the stretch keeps.
+// Reactions of resting contacts: closed forms, brute force over all sets of contacts, and what the stretch conserves.
 
 #include "engine/slabs/resting.h"
 
@@ -33,7 +33,7 @@ RestingContact<D> at_wall(Id i, Id wall) {
           .normal = (wall % 2 == 0 ? 1.0 : -1.0) * Vec<D>::Unit(wall_axis(wall))};
 }
 
-/// A column on the floor, of bodies with these masses from below.
+/// A column of bodies with these masses on the floor; the lowest is first.
 Contacts<2> column(std::size_t n) {
   Contacts<2> contacts;
   for (Id k = 1; k < n; ++k) contacts.push_back(pair<2>(k - 1, k, {0, -1}));
@@ -93,7 +93,7 @@ TEST(SolveReactions, MassRatiosOfAMillion) {
     double above = 0;
     for (Id k = static_cast<Id>(mass.size()); k-- > 0;) {
       above += mass[k];
-      // The rounding of the forces on a light body is that of the weight above it: a condition number of 1e6 and more.
+      // Forces on a light body have the rounding errors of the weight above it: a condition number of 1e6 and more.
       EXPECT_NEAR((k > 0 ? contacts[k - 1] : contacts.back()).lambda / above, 1, 1e-9) << k;
       EXPECT_NEAR(w[k][1], 0, 1e-9) << k;
     }
@@ -101,7 +101,7 @@ TEST(SolveReactions, MassRatiosOfAMillion) {
 }
 
 TEST(SolveReactions, AContactThatIsDrawnApartOpens) {
-  // 0 is pressed on the floor, 1 is drawn off it; 3 is pressed on 2, and both fall freely.
+  // 0 is pressed on the floor, 1 is pulled off it; 3 is pressed on 2, and both fall freely.
   Contacts<2> contacts = {pair<2>(0, 1, {0, -1}), pair<2>(2, 3, {0, -1}), at_wall<2>(0, kFloor2)};
   const std::vector<double> mass = {1, 2, 3, 1};
   Motion<2> w = {{0.5, -1}, {0.25, 0.125}, {0, -1}, {0, -3}};
@@ -116,7 +116,7 @@ TEST(SolveReactions, AContactThatIsDrawnApartOpens) {
 }
 
 TEST(SolveReactions, ALeverThatLiftsOneOfItsContacts) {
-  // Pressed from the start, 0–1 opens once 1–2 is held: the heavy 2 drives 1 away faster than 0 follows.
+  // The contact 0–1 is pressed at first and opens once 1–2 is held: the heavy 2 drives 1 away faster than 0 follows.
   Contacts<2> contacts = {pair<2>(0, 1, {-1, 0}), pair<2>(1, 2, {1, 0})};
   const std::vector<double> mass = {1, 1, 10};
   Motion<2> w = {{2, 0}, {1, 0}, {4, 0}};
@@ -152,7 +152,7 @@ TEST(SolveReactions, TellsTheEnergyLost) {
 }
 
 TEST(SolveReactions, ClustersDoNotFeelEachOther) {
-  // Two columns and a triangle, of which the ids interleave.
+  // Two columns and a triangle with interleaved ids.
   const auto member = [](Id cluster, Id k) { return 3 * k + cluster; };
   constexpr Id kEach = 4;
   Contacts<2> all;
@@ -186,7 +186,7 @@ TEST(SolveReactions, ClustersDoNotFeelEachOther) {
 }
 
 TEST(SolveReactions, ASquareCrystalBetweenWallsStays) {
-  // Its rows are pressed from wall to wall by any force as well: the reactions are not unique, the motion is.
+  // Any force also presses its rows from wall to wall: the motion is unique, the reactions are not.
   constexpr Id n = 12;
   Contacts<2> contacts;
   for (Id row = 0; row < n; ++row)
@@ -224,7 +224,7 @@ TEST(SolveReactions, KnownReactionsStay) {
   ASSERT_TRUE(solve_reactions<2>(contacts, mass, w));
   expect_unchanged();
   EXPECT_EQ(w, held);
-  // What is wrong by less than the slack stays, and what is wrong by more does not.
+  // An error below the slack stays, and a larger one is corrected.
   for (auto& contact : contacts) contact.slack = 1e-9;
   w = given;
   for (auto& each : w) each[1] *= 1 + 1e-9;
@@ -235,14 +235,14 @@ TEST(SolveReactions, KnownReactionsStay) {
   ASSERT_TRUE(solve_reactions<2>(contacts, mass, w));
   EXPECT_NEAR(contacts.back().lambda / found.back(), 1 + 1e-7, 1e-13);
   EXPECT_LE(std::abs(w[4][1]), 1e-14);
-  // Reactions that are no longer needed go.
+  // Reactions that are no longer needed are removed.
   w.assign(9, {0, 1});
   for (Id k = 0; k < 9; ++k) w[k][1] = 1 + k;
   ASSERT_TRUE(solve_reactions<2>(contacts, mass, w));
   for (const auto& contact : contacts) EXPECT_EQ(contact.lambda, 0);
 }
 
-/// A problem that has a solution: the bounds are those of some motion or lower.
+/// A problem with a solution: the bounds are at most those of a possible motion.
 template <int D>
 struct RandomCluster {
   explicit RandomCluster(std::uint32_t number) {
@@ -276,7 +276,7 @@ struct RandomCluster {
   Contacts<D> contacts;
 };
 
-/// The motion by trying all sets of contacts with reactions of which the normals are independent.
+/// The motion, by trying all sets of contacts with reactions whose normals are independent.
 template <int D>
 std::optional<Motion<D>> by_all_sets(const RandomCluster<D>& given) {
   const auto m = static_cast<Eigen::Index>(given.contacts.size());
@@ -340,7 +340,7 @@ void expect_all_sets_agree() {
   EXPECT_GT(pressed, 500);
 }
 
-/// Clusters in which exchanging all wrong contacts at once goes round in circles.
+/// Clusters for which exchanging all wrong contacts at once does not end.
 template <int D>
 void expect_an_end(std::initializer_list<std::uint32_t> numbers) {
   for (const std::uint32_t number : numbers) {
@@ -360,7 +360,7 @@ TEST(SolveReactions, ExchangesComeToAnEnd) {
 TEST(SolveReactions, AgreesWithAllSetsOfContactsInTwoDimensions) { expect_all_sets_agree<2>(); }
 TEST(SolveReactions, AgreesWithAllSetsOfContactsInThreeDimensions) { expect_all_sets_agree<3>(); }
 
-/// Expects that the normal velocities go, and that energy stays and momentum along `free` axes.
+/// Expects that normal velocities become 0, and that energy and momentum along `free` axes are conserved.
 template <int D>
 void expect_kept(Contacts<D> contacts, const std::vector<double>& mass, Motion<D> v, const Vec<D>& free) {
   const double energy = kinetic<D>(mass, v);
@@ -378,7 +378,7 @@ TEST(KeepTangential, AFreePairOfUnequalMasses) {
       expect_kept<3>({pair<3>(0, 1, {-1, 0, 0})}, mass, {{normal_speed + 3, 2, 1}, {3, -1, 0.5}}, {1, 1, 1});
     }
   }
-  // In closed form: the centre of mass, at (0, 1/2), goes on; the energy of the relative motion is now tangential.
+  // In closed form: the centre of mass, at (0, 1/2), continues; the energy of the relative motion is now tangential.
   Contacts<2> contacts = {pair<2>(0, 1, {-2, 0})};
   Motion<2> v = {{-0.3, 2}, {0.1, 0}};
   EXPECT_EQ(keep_tangential<2>(contacts, {1, 3}, v), 0);
@@ -391,14 +391,14 @@ TEST(KeepTangential, AFreePairOfUnequalMasses) {
 TEST(KeepTangential, OnWalls) {
   const double small = 0.05;
   for (const std::vector<double>& mass : {std::vector<double>{1, 1}, {1, 7}, {7, 1}}) {
-    // On the floor side by side; then one on top of another that slides on the floor.
+    // Side by side on the floor; then one on top of another that slides on the floor.
     expect_kept<2>({pair<2>(0, 1, {0, -1}), at_wall<2>(0, kFloor2)}, mass, {{2, -small}, {-1, small}}, {1, 0});
     expect_kept<3>({pair<3>(0, 1, {0, 0, -1}), at_wall<3>(0, kFloor3)}, mass, {{2, 1, small}, {-1, 0.5, 0}}, {1, 1, 0});
     // In a corner, only the third axis is free.
     expect_kept<3>({pair<3>(0, 1, {0, -1, -1}), at_wall<3>(0, kFloor3), at_wall<3>(0, 2)}, mass,
                    {{2, small, small}, {-1, 0.5, -0.5 + small}}, {1, 0, 0});
   }
-  // A sphere alone has no motion to stretch: its momentum along the wall stays.
+  // A single sphere has no motion to stretch: its momentum along the wall is conserved.
   Contacts<2> contacts = {at_wall<2>(0, kFloor2)};
   Motion<2> v = {{0.8, 0.125}};
   EXPECT_EQ(keep_tangential<2>(contacts, {2}, v), 0.015625);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Nothing that the search does may reach the physics: the same bits whatever the method, the skin, the cells, the bins,
-// the sorting and the vector width.
+// The search never changes a result: equal bits for any method, skin, cells, bins, sorting and vector width.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +14,7 @@
 namespace carom {
 namespace {
 
-/// Sets an environment variable for a while.
+/// Sets an environment variable during its lifetime.
 class Environment {
  public:
   Environment(const char* name, const char* value) : name_(name) {
@@ -54,7 +53,7 @@ void expect_the_same_whatever_the_search(const Case<D>& c, std::size_t at_least)
   ASSERT_GE(reference.contacts.size(), at_least);
   for (std::size_t k = 1; k < reference.contacts.size(); ++k) {
     if (reference.contacts[k].key.time > reference.contacts[k - 1].key.time) continue;
-    if (reference.contacts[k].key.time < reference.contacts[k - 1].key.time) continue;  // the next slab
+    if (reference.contacts[k].key.time < reference.contacts[k - 1].key.time) continue;  // in the next slab
     EXPECT_LT(reference.contacts[k - 1].key, reference.contacts[k].key);
   }
   expect_same(reference, run(c, {}), "automatic");
@@ -112,12 +111,12 @@ TEST(Search, Field) {
       {.system = random_system<2>(40, {7, 12}, {W, W}, 0.3, 0.5, 8), .g = {0, -0.5}, .slab = 1}, 200);
 }
 
-TEST(Search, OpenSpace) {  // they fly away, some meet
+TEST(Search, OpenSpace) {  // they fly apart, some meet
   expect_the_same_whatever_the_search<3>(
       {.system = random_system<3>(200, {8, 8, 8}, {O, O, P}, 0.5, 0.5, 9), .slab = 4, .slabs = 4}, 150);
 }
 
-TEST(Search, TinyPeriodicBoxes) {  // a sphere meets its neighbour through several images, and flies many boxes far
+TEST(Search, TinyPeriodicBoxes) {  // a sphere meets its neighbour through several images and crosses many boxes
   expect_the_same_whatever_the_search<3>(
       {.system = random_system<3>(3, {1.7, 1.9, 2.1}, {P, P, P}, 0.4, 0.4, 10), .slab = 5}, 50);
   expect_the_same_whatever_the_search<2>({.system = random_system<2>(2, {2.2, 2.6}, {P, P}, 0.5, 0.5, 11), .slab = 20},
@@ -142,7 +141,7 @@ TEST(Search, ExactTies) {  // a lattice with speeds of 1: whole layers collide a
   expect_the_same_whatever_the_search<3>({.system = test::make_system<3>({9, 9, 9}, P, x, v), .slab = 2}, 400);
 }
 
-TEST(Search, BlowsFromBothSides) {  // two that touch are hit at one instant, again and again, and pass the blows on
+TEST(Search, BlowsFromBothSides) {  // two touching spheres are hit at one instant, repeatedly
   std::vector<Vec<2>> x, v;
   for (int row = 0; row < 4; ++row)
     for (const double place : {2.0, 5.5, 6.5, 10.0}) {
@@ -154,7 +153,7 @@ TEST(Search, BlowsFromBothSides) {  // two that touch are hit at one instant, ag
                                          100);
 }
 
-/// Lists are used in dense fluids, and in mixtures, where cells for the largest spheres would hold many small ones.
+/// Lists are used in dense fluids and in mixtures, because cells for the largest spheres would hold many small ones.
 TEST(SearchTuning, TakesListsForDenseFluidsAndForMixtures) {
   const auto lists = [](const SearchSituation& situation, Method method = Method::automatic) {
     SearchTuning tuning({.method = method});
@@ -182,7 +181,7 @@ TEST(Search, AWidthThisMachineLacksIsAnError) {
   EXPECT_THROW(vector_widths(), Error);
 }
 
-/// One sphere and 30 others at random, some of them in other boxes.
+/// One sphere and 30 others at random positions, some of them in other boxes.
 template <int D>
 struct Surroundings {
   explicit Surroundings(bool plain) : packing(31, 31), records(31), radius(31, 0.5) {
@@ -223,7 +222,7 @@ void expect_all_widths_agree(bool plain) {
   for (unsigned n = 0; n <= 30; ++n) {
     auto candidates = s.candidates;
     for (unsigned q = n; q < 32; ++q) candidates[q] = s.packing.pack(0, 0);
-    // One by one, as contact.h has it.
+    // One by one, with the functions of contact.h.
     double first = kNever;
     std::uint32_t which = 0;
     for (unsigned q = 0; q < n; ++q) {
@@ -285,7 +284,7 @@ TEST(Scan, ReportsTies) {
 TEST(Scan, SeesAnOverlapHoweverSlowlyItGrows) {
   Surroundings<3> s(true);
   s.records[0] = {Vec<3>::Zero(), Vec<3>::Zero(), 0, 0, 0, 0};
-  for (const double approach : {1e-3, 1e-6, 1e-9, 1e-12}) {  // far below what the discriminant can tell
+  for (const double approach : {1e-3, 1e-6, 1e-9, 1e-12}) {  // far below the resolution of the discriminant
     s.records[1] = {{1 - 1e-16, 0, 0}, {-approach, 0.7, 0.3}, 0, 1, 0, 0};
     s.candidates.assign(8, s.packing.pack(0, 0));
     s.candidates[0] = s.packing.pack(1, 0);
@@ -297,7 +296,7 @@ TEST(Scan, SeesAnOverlapHoweverSlowlyItGrows) {
   }
 }
 
-/// Images up to the farthest come back as they were; how far that is.
+/// Expects that all images up to the farthest are restored; returns the farthest.
 template <int D>
 std::int32_t room_for_images(std::size_t slots, std::size_t particles) {
   const Packing<D> packing(slots, particles);
@@ -341,7 +340,7 @@ TEST(Scan, FindsTheFirstOfMoreThanABlockOfCandidates) {
       EXPECT_EQ(result.which, first - 1);
       EXPECT_FALSE(result.tied);
     }
-    records[first % 7 + 70].x[0] = 3;  // in another block, or the same
+    records[first % 7 + 70].x[0] = 3;  // in another block or in the same block
     for (const auto& result : {scan<3, 4>(s.setting, task, true), scan<3, 8>(s.setting, task, false)})
       EXPECT_TRUE(result.tied);
   }

@@ -14,7 +14,7 @@
 namespace carom {
 namespace {
 
-/// Notes when it was shown what.
+/// Records what was reported at which time.
 template <int D>
 struct Notebook : Observer<D> {
   void frame(const Snapshot<D>& shot) override { frames.push_back(shot.time), x.push_back(shot.particles->x); }
@@ -85,7 +85,7 @@ TEST(Simulation, SamplesAtTheTimesOfEachObserver) {
     late.wanted = {.interval = 0.5, .start = 0.9};
     for (auto* notes : {&often, &late, &never}) run->add(*notes);
     run->run();
-    ASSERT_EQ(often.samples.size(), 13u);  // 0, 0.2, … 2.4; the end is no due time
+    ASSERT_EQ(often.samples.size(), 13u);  // 0, 0.2, … 2.4; the end is not a due time
     for (int k = 0; k < 13; ++k) EXPECT_NEAR(often.samples[k], 0.2 * k, 1e-12);
     ASSERT_EQ(late.samples.size(), 4u);  // 0.9, 1.4, 1.9, 2.4
     for (int k = 0; k < 4; ++k) EXPECT_NEAR(late.samples[k], 0.9 + 0.5 * k, 1e-12);
@@ -103,13 +103,13 @@ TEST(Simulation, SamplesAtTheTimesOfEachObserver) {
 }
 
 TEST(Simulation, MeasuresTheMeanFreeFlight) {
-  // Two discs that meet head on, in a periodic box: 3.5 of way to go each, at 2 and at 1; equal masses exchange
+  // Two discs that collide head on in a periodic box after 3.5 of path each, at 2 and at 1; equal masses exchange
   // velocities.
   auto run = test::make_run<2>(test::make_system<2>({8, 4}, Boundary::periodic, {{1, 1}, {5, 1}}, {{2, 0}, {-1, 0}}),
                                "free-flight", {.step = 1, .end_time = 700});
   run->run();
   const auto& s = run->statistics();
-  // The first time at 1, then every (8 − 2)/3; in between one goes 4 and the other 2.
+  // The first time is 1, then every (8 − 2)/3; in between one disc moves by 4 and the other by 2.
   EXPECT_EQ(s.counters.sphere_sphere, 350u);
   EXPECT_NEAR(*s.mean_free_time, 2, 1e-12);
   EXPECT_NEAR(*s.mean_free_path, 3, 1e-12);
@@ -120,8 +120,8 @@ TEST(Simulation, MeasuresTheMeanFreeFlight) {
   EXPECT_FALSE(none->statistics().mean_free_path);
 }
 
-/// Two discs as above, in a run that branches off at step 30, which is at another time than 30 steps of its own: sums,
-/// means and what is done begin there.
+/// Two discs as above, in a run that branches off at step 30, which is at another time than 30 steps of its own: sums
+/// and means begin there.
 TEST(Simulation, ABranchCountsFromItsStart) {
   for (const Plan& plan : {Plan{.step = 1, .end_time = 745}, Plan{.step = 1, .steps = 730}}) {
     struct Fractions : Observer<2> {
@@ -143,7 +143,7 @@ TEST(Simulation, ABranchCountsFromItsStart) {
   }
 }
 
-/// Two discs that fall one after the other, and meet once: |v| grows alike and evenly, to a mean of ½ + ½ g T.
+/// Two discs that fall at different times and meet once: |v| grows equally and uniformly, with a mean of ½ + ½ g T.
 TEST(Simulation, TheMeanSpeedIsThatOfTheWholeSlab) {
   auto system = test::make_system<2>({100, 4}, Boundary::open, {{5, 2}, {2, 2}}, {{0, 0}, {1, 0}});
   test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{1.0, 0.0}}});
@@ -162,7 +162,7 @@ TEST(Simulation, ThePressureOfARowIsThatSinceTheRowBefore) {
     Notebook<2> notes;
     run->add(notes);
     run->run();
-    const std::vector<double> collisions = {0, 1 / 2.75, 2 / 2.75, 1 / 2.75, 1 / 1.75};  // in a unit of time
+    const std::vector<double> collisions = {0, 1 / 2.75, 2 / 2.75, 1 / 2.75, 1 / 1.75};  // per unit time
     ASSERT_EQ(notes.pressure.size(), collisions.size());
     for (std::size_t k = 0; k < collisions.size(); ++k)
       EXPECT_NEAR(notes.pressure[k], (5 + 3 * collisions[k]) / (2 * 32), 1e-13) << "row " << k;
@@ -177,7 +177,7 @@ TEST(Simulation, ShortensTheLastStepToMeetTheEnd) {
   EXPECT_LT(test::largest_difference(run->system().particles.x, straight->system().particles.x), 1e-4);
 }
 
-/// The end is met to the bit, though 3 · 0.1 is more than 0.3 and 3 · 0.7 less than 2.1.
+/// The end is met to the bit, although 3 · 0.1 is more than 0.3 and 3 · 0.7 less than 2.1.
 TEST(Simulation, EndsExactlyAtItsEnd) {
   EXPECT_GT(3 * 0.1, 0.3);
   EXPECT_LT(3 * 0.7, 2.1);
@@ -188,7 +188,7 @@ TEST(Simulation, EndsExactlyAtItsEnd) {
   }
 }
 
-/// Each of these runs is stopped after two slabs, by which the discs have met once.
+/// Each of these runs is stopped after two slabs; the discs have met once by then.
 TEST(Simulation, TheFractionDoneIsThatOfTheNearestEnd) {
   const auto fraction = [](Plan plan) {
     plan.step = 1;
@@ -238,7 +238,7 @@ TEST(Simulation, FreeFlightEndsAtTheNthCollision) {
   EXPECT_DOUBLE_EQ(run->statistics().end_time, notes.times.back());
 }
 
-/// However far they have flown: two discs that meet every 4 between walls, in a box that is open elsewhere.
+/// Two discs that meet every 4 between walls, in a box that is open elsewhere: no flight distance ends the run.
 TEST(Simulation, SpheresThatMeetAgainAndAgainHaveNotFlownApart) {
   const auto run = test::make_run<2>(test::make_system<2>({6, 6}, Boundary::wall, {{2, 3}, {4, 3}}, {{1, 0}, {-1, 0}}),
                                      "free-flight", {.step = 1000, .collisions = 25000});
@@ -289,7 +289,7 @@ TEST(Simulation, WallsAreTouchedWhereTheyStand) {
   }
 }
 
-/// A disc hits one that rests on the floor, which ends a piece of a step; high above another bounces from wall to wall.
+/// A disc hits one that rests on the floor, which ends a piece of a step; far above another bounces between walls.
 TEST(Simulation, ContactsInPiecesOfAStepHaveTheirTimes) {
   auto system =
       test::make_system<2>({6, 8}, Boundary::wall, {{3, 0.5}, {3.2, 1.8}, {3, 6}}, {{0, 0}, {0, -1}, {20, 0}});
@@ -342,7 +342,7 @@ TEST(Simulation, ForcesThatAreNotFiniteEndTheRun) {
   EXPECT_THROW(test::run_steps<2>(std::move(system), "verlet", 0.1, 10), Error);
 }
 
-/// Two particles on a spring that is stretched.
+/// Two particles joined by a stretched spring.
 std::unique_ptr<System<2>> oscillator(double stiffness) {
   auto system = test::make_system<2>({60, 60}, Boundary::open, {{1, 0}, {40, 0}}, {{0, 0}, {0, 0}});
   test::add_interaction(*system, "harmonic-bond",
@@ -360,7 +360,7 @@ std::string failure_of(Simulation<2>& run) {
   return "none";
 }
 
-/// H is 1 − 1 = 0 where two discs pass that attract each other; the energies that it is made of are not.
+/// H is 1 − 1 = 0 if two discs that attract each other pass; K and V are not 0.
 TEST(Simulation, EnergiesAreComparedWithWhatTheyConsistOf) {
   auto system = test::make_system<2>({9, 9}, Boundary::open, {{3, 3}, {6, 7}}, {{0.8, -0.6}, {-0.8, 0.6}});
   test::add_interaction(*system, "gravity", {{"constant", 5.0}});
@@ -370,7 +370,7 @@ TEST(Simulation, EnergiesAreComparedWithWhatTheyConsistOf) {
   EXPECT_NEAR(run->statistics().energy_scale, 2, 1e-8);
 }
 
-/// Störmer–Verlet keeps a harmonic oscillator's H + h²G to fourth order, and H to second.
+/// Störmer–Verlet conserves a harmonic oscillator's H + h²G to fourth order, and H to second.
 TEST(Simulation, TheShadowEnergyIsKeptBetterThanTheEnergy) {
   const auto errors = [](double step) {
     const auto run = test::run_steps<2>(oscillator(1), "verlet", step, static_cast<std::int64_t>(6 / step));
@@ -383,8 +383,7 @@ TEST(Simulation, TheShadowEnergyIsKeptBetterThanTheEnergy) {
   EXPECT_LT(coarse[1], 0.05 * coarse[0]);
 }
 
-/// A particle that falls from rest has almost no energy at the start. Later H is the rounding of K + V, which are
-/// large.
+/// A particle that falls from rest has almost no energy at the start. Later H is the rounding error of the large K + V.
 TEST(Simulation, EnergiesOfRoundingAreNoBlowUp) {
   auto system = test::make_system<2>({9, 9}, Boundary::open, {{1e-40, 0}}, {{0, 0}});
   test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0.1, 0.0}}});
@@ -394,7 +393,7 @@ TEST(Simulation, EnergiesOfRoundingAreNoBlowUp) {
   EXPECT_GT(run.statistics().max_energy_error, 1e-30);
 }
 
-/// Two discs of radii 1.5 and 0.5 fly into each other, as no method has them do, from a distance of 2.5 to one of 1.8.
+/// Two discs of radii 1.5 and 0.5 move into each other, which no method allows, from a distance of 2.5 to one of 1.8.
 TEST(Simulation, OverlapsAreRelativeToTheContactDistance) {
   IntegratorInfo info = find_integrator("verlet");
   info.hard_cores = true, info.smooth_forces = false;

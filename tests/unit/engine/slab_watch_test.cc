@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A slab that is left restores the state that it started from.
+// An abandoned slab restores its initial state.
 
 #include "engine/slabs/slab_watch.h"
 
@@ -54,10 +54,10 @@ TEST(SlabWatch, RestoresTheStateOfTheFirstCut) {
     EXPECT_EQ(s.mass, (std::vector<double>{4, 5, 6}));
     EXPECT_EQ(s.debt, debt);
     EXPECT_EQ(s.lengths, lengths);
-    EXPECT_EQ(s.steps, steps + 3);  // the run's own
+    EXPECT_EQ(s.steps, steps + 3);  // counted by the run
     s.change();
     const double after = s.debt;
-    watch.restore();  // nothing has been kept since
+    watch.restore();  // nothing has been stored since
     EXPECT_EQ(s.debt, after);
   }
 }

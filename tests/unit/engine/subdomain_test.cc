@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kEnd = 0.12, kDisplacement = 0.5;  // of a window
 
-/// What a subdomain is made of.
+/// The parts of a subdomain.
 struct Parts {
   Parts(const Box<3>& box, const Sizes& sizes)
       : core(box, &sizes, {}), ownership(core), paths(core.flights(), ownership), repair(box, core, ownership, paths) {}
@@ -24,7 +24,7 @@ struct Parts {
 
 std::unique_ptr<System<3>> fluid() { return random_system<3>(320, {14, 6, 6}, {P, P, P}, 0.5, 0.5, 11); }
 
-/// A system in two subdomains, each with all spheres that concern it; and one core with all of them.
+/// A system in two subdomains, each with all spheres it needs, and one core with all spheres.
 struct Divided {
   explicit Divided(std::unique_ptr<System<3>> spheres = fluid(), const Vec<3>& g = Vec<3>::Zero())
       : system(std::move(spheres)),
@@ -55,12 +55,12 @@ struct Divided {
       part->changed = part->paths.end();
     }
   }
-  /// Sends the changed paths; the number of them.
+  /// Sends the changed paths; returns their number.
   std::size_t send_paths() {
     std::size_t sent = 0;
     for (const int from : {0, 1})
       for (const Slot i : parts[from]->changed) {
-        EXPECT_EQ(parts[from]->ownership.holders(i), 1u);  // the other one is the only neighbour
+        EXPECT_EQ(parts[from]->ownership.holders(i), 1u);  // it has only one neighbour
         Parts& to = *parts[1 - from];
         Bytes& bytes = messages.emplace_back();
         parts[from]->paths.write(i, bytes);
@@ -71,7 +71,7 @@ struct Divided {
       }
     return sent;
   }
-  /// How many own spheres are not as the whole has them.
+  /// The number of own spheres that differ from the whole system's.
   std::size_t wrong() const {
     std::vector<Record<3>> right(system->size());
     for (const Record<3>& r : whole.flights().records()) right[r.id] = r;
@@ -95,8 +95,8 @@ struct Divided {
   std::deque<Bytes> messages;
 };
 
-/// Expects that each sphere is owned where it is at this time, and that its owner knows whether it is a ghost in the
-/// other subdomain. Returns the number of ghosts.
+/// Expects that each sphere is owned by the subdomain that contains it at this time, and that its owner knows whether
+/// it is a ghost in the other. Returns the number of ghosts.
 std::size_t expect_owners(const Divided& d, double time) {
   std::size_t ghosts = 0;
   for (Id id = 0; id < d.system->size(); ++id) {
@@ -126,7 +126,7 @@ TEST(Ownership, EverySphereHasOneOwnerWhichKnowsWhereItIsAGhost) {
   EXPECT_LT(ghosts, 280u);
 }
 
-/// Spheres that start at rest change owners, and become ghosts, as soon as the field has brought them there.
+/// Spheres that start at rest change owners and become ghosts as soon as the field has moved them there.
 TEST(Ownership, SpheresThatFallChangeTheirOwners) {
   constexpr int kWindows = 10;
   constexpr double length = kEnd / kWindows;
@@ -163,7 +163,7 @@ TEST(Ownership, AGhostMeetsWhatIsAsNearAsBothCanCome) {
       const bool meets = here.meeting_place(r, end, low, high);
       EXPECT_EQ(meets, away <= reach - kDisplacement + way) << id;
       ++(meets ? somewhere : nowhere);
-      for (const Vec<3>& place : d.system->particles.x) {  // of those that may meet it
+      for (const Vec<3>& place : d.system->particles.x) {  // possible partners
         Vec<3> x = place - r.x;
         x = r.x + x + d.system->box.shift(d.system->box.nearest_image(x));
         const double from_here = std::sqrt(d.bisection.squared_distance(0, place));
@@ -190,7 +190,7 @@ TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
   const Ownership<3>& ownership = d.parts[0]->ownership;
   int compared = 0;
   paths.for_each_ghost([&](Slot g) {
-    EXPECT_FALSE(paths.matches(g));  // a path with events, and no script
+    EXPECT_FALSE(paths.matches(g));  // a path with events and without a script
     Bytes& own = d.messages.emplace_back();
     paths.write(g, own);
     Reader reader(own);
@@ -209,7 +209,7 @@ TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
   const double time = node.key.time;
   EXPECT_FALSE(paths.matches(last));
   EXPECT_FALSE(paths.all_match(kEnd));
-  EXPECT_TRUE(paths.all_match(time));  // it counts only before
+  EXPECT_TRUE(paths.all_match(time));  // only earlier paths count
 }
 
 TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
@@ -241,7 +241,7 @@ TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
 }
 
 TEST(WindowRepair, GoesOnUntilAllOwnSpheresAreAsInOneCore) {
-  // An impact passes from one subdomain through a row of spheres into the other, which did not see it come.
+  // An impact passes from one subdomain through a row of spheres into the other, which did not predict it.
   std::vector<Vec<3>> x, v(16, Vec<3>::Zero());
   for (int i = 0; i < 16; ++i) x.push_back({2.0 + 1.001 * i, 3, 3});
   v[0][0] = 3;
@@ -259,7 +259,7 @@ TEST(WindowRepair, GoesOnUntilAllOwnSpheresAreAsInOneCore) {
   std::uint64_t redone = 0;
   for (const auto& part : d.parts) {
     EXPECT_TRUE(part->paths.all_match(kEnd));
-    double fastest = 0;  // of what was seen at first, and of what came by repairs
+    double fastest = 0;  // of the first run and of repairs
     part->paths.for_each_own([&](Slot i) {
       for (const Node<3>& node : part->paths.path(i)) fastest = std::max(fastest, node.after.v.squaredNorm());
     });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Walls, boundaries and the account of contacts: what they are to all that use them.
+// Walls, boundaries and the record of contacts, as all users see them.
 
 #include "engine/base/wall.h"
 

@@ -8,7 +8,7 @@
 
 namespace carom {
 
-inline constexpr double kDisplacement = 0.5;  // that a sphere comes in a window
+inline constexpr double kDisplacement = 0.5;  // of a sphere in a window
 
 template <int D>
 std::vector<Record<D>> records_of(const Particles<D>& p) {
@@ -17,7 +17,7 @@ std::vector<Record<D>> records_of(const Particles<D>& p) {
   return records;
 }
 
-/// A subdomain of a bisection with all spheres that concern it, at time 0.
+/// A subdomain of a bisection with all spheres it needs, at time 0.
 template <int D>
 std::unique_ptr<Subdomain<D>> subdomain_of(const System<D>& system, const Sizes& sizes, const Bisection<D>& bisection,
                                            std::uint32_t number, double end) {
@@ -29,7 +29,7 @@ std::unique_ptr<Subdomain<D>> subdomain_of(const System<D>& system, const Sizes&
   return subdomain;
 }
 
-/// Three ranks, of which the last has no subdomain, advance a system up to `end` and make_consistent about that window:
+/// Three ranks, the last without a subdomain, advance a system up to `end` and call make_consistent for this window;
 /// then check(ranks, subdomain, rounds of the exchange) on each.
 template <int D>
 void in_a_window(const System<D>& system, const Sizes& sizes, double end, auto&& check) {

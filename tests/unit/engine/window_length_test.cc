@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Windows end before a sphere may come too far, are as many as collisions ask for, and a sphere that is too fast is
+// Windows end before a sphere may move too far, their number follows the collisions, and a sphere that is too fast is
 // found.
 
 #include "engine/ranks/window_length.h"
@@ -65,7 +65,7 @@ TEST(WindowLength, FollowsTheRateOfCollisionsAndIsForced) {
   EXPECT_NEAR(first(), 0.003, 1e-5);
 }
 
-/// A heavy sphere sends a light one, which was on its way, off at nearly twice its speed.
+/// A heavy sphere hits a light one that moved towards it, which then has nearly twice its speed.
 TEST(WindowLength, FindsWhenASphereMayHaveComeTooFar) {
   const auto system =
       test::make_system<3>({20, 6, 6}, P, {{2, 3, 3}, {3.25, 3, 3}}, {{1, 0, 0}, {0.2, 0, 0}}, {0.5, 0.5}, {1.0, 0.01});
@@ -81,7 +81,7 @@ TEST(WindowLength, FindsWhenASphereMayHaveComeTooFar) {
   subdomain->run(0, 2);
   const double met = 0.25 / 0.8, speed = 0.2 + 2 / 1.01 * 0.8;
   EXPECT_NEAR(length.first_beyond(subdomain.get(), 0, 2, alone), met + (1 - 0.2 * met) / speed, 1e-9);
-  EXPECT_LT(length.window_end(0, 2), before);  // the next ones allow for it
+  EXPECT_LT(length.window_end(0, 2), before);  // later windows allow for it
   EXPECT_EQ(length.first_beyond(nullptr, 0, 2, alone), std::numeric_limits<double>::infinity());
 }
 

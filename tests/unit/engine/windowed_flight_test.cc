@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A system divided among ranks has the bits of one that is not, whatever the subdomains and the windows.
+// A system divided among ranks has the bits of an undivided one, for any subdomains and windows.
 
 #include "engine/ranks/windowed_flight.h"
 
@@ -12,7 +12,7 @@
 namespace carom {
 namespace {
 
-/// How a run is divided.
+/// A division of a run.
 struct Way {
   int subdomains = 1;
   SearchOptions::Method method = SearchOptions::Method::automatic;
@@ -83,7 +83,7 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
     for (const Method method : {Method::lists, Method::cells}) {
       WindowCounts counts;
       const std::string what = std::to_string(subdomains) + (method == Method::lists ? " lists" : " cells");
-      const double in_cache = subdomains % 2 == 0 ? SearchOptions{}.in_cache : 0;  // nothing: fetch all ahead
+      const double in_cache = subdomains % 2 == 0 ? SearchOptions{}.in_cache : 0;  // 0: prefetch all spheres
       expect_same(reference,
                   divided(c, {.subdomains = subdomains, .method = method, .in_cache = in_cache}, &many, &counts), what);
       if (testing::Test::HasFailure()) return;
@@ -119,8 +119,8 @@ TEST(WindowedFlight, ManySizes) {
       {.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3, .slabs = 2}, 200);
 }
 
-/// All in one line across the longest edge, at its end or in its middle: subdomains can have no sphere, or one, before
-/// others come, in the same epoch or in the next.
+/// All spheres are in one line across the longest edge, at its end or in its middle: subdomains can have no sphere, or
+/// one, before spheres arrive, in the same epoch or in the next.
 TEST(WindowedFlight, EmptyRegions) {
   for (const double column : {5.0, 100.0}) {
     const int n = 80;
@@ -139,10 +139,10 @@ TEST(WindowedFlight, EmptyRegions) {
   }
 }
 
-/// The core of a subdomain has cells near its spheres only, until one comes to where none was expected: here all, out
-/// of one end of a periodic box into all of it.
+/// The core of a subdomain has cells near its spheres only until a sphere leaves them: here all spheres move from one
+/// end of a periodic box into all of it.
 TEST(WindowedFlight, SpheresFarFromTheirRegion) {
-  for (const double radius : {0.4, 0.2})  // equal ones, and others
+  for (const double radius : {0.4, 0.2})  // equal radii, and unequal ones
     for (const auto method : {SearchOptions::Method::lists, SearchOptions::Method::cells}) {
       auto system = random_system<3>(150, {6, 6, 6}, {P, P, P}, radius, 0.4, 23);
       system->box.edges = {60, 7, 7};
@@ -153,7 +153,7 @@ TEST(WindowedFlight, SpheresFarFromTheirRegion) {
       whole.load(p, Vec<3>::Zero(), 20);
       whole.run(20, {.counters = counters, .contacts = &all});
       Sizes sizes(p);
-      sizes.spheres *= 4;  // as if there were more elsewhere
+      sizes.spheres *= 4;  // as if there were more spheres elsewhere
       EventCore<3> part(system->box, &sizes, {.method = method});
       std::vector<Record<3>> records;
       for (Id i = 0; i < p.size(); ++i) records.push_back({p.x[i], p.v[i], 0.0, i, 0, p.species[i]});
@@ -182,14 +182,14 @@ TEST(WindowedFlight, Pistons) {
   }
 }
 
-/// Subdomains with more events a sphere become smaller: that changes no path.
+/// Subdomains with more events per sphere become smaller, which changes no path.
 TEST(WindowedFlight, UnevenWork) {
   expect_the_same_however_divided<3>(
       {.system = random_system<3>(200, {6, 6, 24}, {P, P, W}, 0.4, 0.4, 17), .g = {0, 0, -2}, .slab = 1.5, .slabs = 5},
       1500);
 }
 
-/// One sphere is so fast that each subdomain would have more neighbours than there are bits for.
+/// One sphere is so fast that each subdomain would have more neighbours than there are bits.
 TEST(WindowedFlight, MoreRegionsThanTheBoxHasRoomFor) {
   const Case<3> c{.system = test::hard_spheres<3>(6, 0.49), .slab = 0.01, .slabs = 2};
   c.system->particles.v[5] *= 100;
@@ -205,15 +205,15 @@ TEST(WindowedFlight, OpenSpace) {
       {.system = random_system<3>(200, {8, 8, 8}, {O, O, P}, 0.5, 0.5, 9), .slab = 4, .slabs = 4}, 150);
 }
 
-TEST(WindowedFlight, TinyPeriodicBoxes) {  // subdomains border on themselves, and spheres meet through several images
+TEST(WindowedFlight, TinyPeriodicBoxes) {  // subdomains are their own neighbours, spheres have many images
   expect_the_same_however_divided<3>(
       {.system = random_system<3>(24, {3.1, 2.9, 3.3}, {P, P, P}, 0.4, 0.4, 10), .slab = 2}, 400);
   expect_the_same_however_divided<2>({.system = random_system<2>(16, {4.2, 5.6}, {P, P}, 0.5, 0.5, 11), .slab = 5},
                                      300);
 }
 
-/// Rows and columns of spheres at exact places, at rest or with speeds of −1 and 1 along an axis: many collisions at
-/// one instant, chains of them.
+/// Rows and columns of spheres at exact positions, at rest or with speeds of −1 and 1 along an axis: many collisions at
+/// one instant, and chains of collisions.
 TEST(WindowedFlight, ExactTies) {
   for (const std::size_t variant : {0, 1, 2, 3, 4, 5}) {
     const int n = 6;
@@ -233,7 +233,7 @@ TEST(WindowedFlight, ExactTies) {
   }
 }
 
-/// A bullet would cross many subdomains in a window that suits the others.
+/// A very fast sphere would cross many subdomains in a window that suits the other spheres.
 TEST(WindowedFlight, OneFastSphere) {
   Case<3> c{.system = random_system<3>(200, {9, 9, 9}, {P, P, P}, 0.4, 0.4, 12), .slab = 1, .slabs = 2};
   c.system->particles.v[17] = {300, 20, 1};
@@ -262,7 +262,7 @@ TEST(WindowedFlight, EndsAtACollision) {
   }
 }
 
-/// Windows so short that each has one collision at most: the last one wanted is the last of its window.
+/// Windows so short that each has at most one collision: the limit is reached by the last collision of a window.
 TEST(WindowedFlight, EndsAtTheLastCollisionOfAWindow) {
   const Case<2> c{.system = test::hard_spheres<2>(5, 0.5), .slab = 0.2, .slabs = 2};
   for (const std::uint64_t limit : {1, 2, 3, 20}) {
@@ -275,13 +275,13 @@ TEST(WindowedFlight, EndsAtTheLastCollisionOfAWindow) {
   }
 }
 
-/// Pairs that meet in the first window, one of each close to the end of the box, where a subdomain ends, and the other
-/// up to a diameter and nearly twice the largest displacement away from it.
+/// Pairs that meet in the first window. One sphere of each is close to the end of the box, where a subdomain ends; the
+/// other is up to a diameter and nearly twice the largest displacement away from it.
 TEST(WindowedFlight, GhostsFromAsFarAsTwoSpheresCanCome) {
   const int rows = 40;
   std::vector<Vec<2>> x, v;
   for (int k = 0; k < rows; ++k) {
-    const double away = 2.7 - 0.05 * k;  // of the one beyond the end
+    const double away = 2.7 - 0.05 * k;  // of the sphere beyond the end
     x.push_back({0.01, 2.0 * k + 1});
     x.push_back({200 - away, 2.0 * k + 1});
     v.push_back({-1 + 1e-3 * k, 0});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A damaged checkpoint is refused: every byte changed in turn, cut off at every length.
+// A damaged checkpoint is refused: every byte is changed in turn, and the file is cut to every length.
 
 #include "io/files/checkpoint.h"
 
@@ -21,7 +21,7 @@ std::string contents(const fs::path& path) {
 }
 void write(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
 
-/// A small one in this directory.
+/// A small checkpoint in this directory.
 fs::path written_in(const fs::path& directory) {
   const auto system = test::sample_system<2>();
   const CheckpointHead head{.deck = "format = 1\n",
@@ -40,7 +40,7 @@ fs::path written_in(const fs::path& directory) {
   return directory / run_file::checkpoint;
 }
 
-/// Why a file is refused; empty: it is not.
+/// The reason why a file is refused; empty if it is not.
 std::string refusal(const fs::path& file) {
   try {
     Checkpoint checkpoint(file);

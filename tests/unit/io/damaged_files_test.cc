@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// `carom info` on files that are whole for HDF5, but claim what no writer of carom writes: each is refused with its
-// name.
+// `carom info` on files that are valid for HDF5 but contain what carom never writes: each is refused with an error that
+// names it.
 
 #include <cmath>
 #include <functional>
@@ -30,7 +30,7 @@ fs::path written_trajectory() {
   return path;
 }
 
-/// Changes a file, and returns why it is refused.
+/// Changes a file; returns the reason why it is refused.
 std::string refusal(const fs::path& path, const std::function<void(hid_t file)>& change) {
   {
     const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
@@ -44,7 +44,7 @@ std::string refusal(const fs::path& path, const std::function<void(hid_t file)>&
   }
 }
 
-/// Puts a data set of this type and shape, never written to, in the place of another.
+/// Replaces a data set by one of this type and shape that was never written to.
 void replace(hid_t file, const char* name, hid_t type, const std::vector<hsize_t>& shape) {
   H5Ldelete(file, name, H5P_DEFAULT);
   const Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose);

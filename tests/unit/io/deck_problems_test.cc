@@ -8,7 +8,7 @@ namespace {
 
 TEST(Nearest, FindsSlipsOfTheFingers) {
   const std::vector<std::string> keys{"radius", "mass", "rest_length", "steps"};
-  EXPECT_EQ(nearest("raduis", keys), "radius");  // two letters swapped
+  EXPECT_EQ(nearest("raduis", keys), "radius");  // two letters exchanged
   EXPECT_EQ(nearest("mas", keys), "mass");
   EXPECT_EQ(nearest("restlength", keys), "rest_length");
   EXPECT_EQ(nearest("stepps", keys), "steps");

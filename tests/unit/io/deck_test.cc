@@ -17,7 +17,7 @@
 namespace carom {
 namespace {
 
-/// A folder of this test's own with decks in it.
+/// A folder with decks for each test.
 class DeckTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -134,7 +134,7 @@ TEST_F(DeckTest, ReadsWhatItSays) {
   EXPECT_EQ(p.species, (std::vector<std::uint16_t>{0, 0, 1}));
 }
 
-/// Lists count from the first particle of their own species.
+/// Indices of lists count from the first particle of their own species.
 TEST_F(DeckTest, ListsOfALaterSpeciesAreItsOwn) {
   Deck deck = read(springs, {"particles.1.position=[[8, 5], [8, 2]]", "particles.1.velocity=[[1, 2], [3, 4]]",
                              "particles.1.radius=[0.3, 0.4]", "particles.1.mass=[5, 6]", "particles.1.charge=[7, 8]"});
@@ -177,7 +177,7 @@ TEST_F(DeckTest, VectorsHaveANumberForEachAxis) {
     }
 }
 
-/// An error says what is wrong and where.
+/// An error names the problem and its position.
 TEST_F(DeckTest, MistakesAreRefused) {
   const auto said = [&](const std::string& text, const std::vector<std::string>& set, bool replace = false) {
     try {
@@ -210,7 +210,7 @@ TEST_F(DeckTest, MistakesAreRefused) {
     EXPECT_NE(said(text, set).find(says), std::string::npos) << says << " in: " << said(text, set);
   EXPECT_EQ(said(springs, {"system.box=[1, 1]", R"(system.boundary=["open", "open"])"}),
             "");  // an open box has no volume
-  // Where another type is set, keys of the deck that it does not know are dropped; keys that are set with it are
+  // If another type is set, keys of the deck that it does not have are dropped; unknown keys that are set with it are
   // errors.
   std::string fourth = springs;
   fourth.replace(fourth.find("step = 0.01"), 11, "step = 0.01\norder = 4");
@@ -244,7 +244,7 @@ TEST_F(DeckTest, WarnsOfACutoffBeyondHalfThePeriodicBox) {
   EXPECT_NE(warnings("4.5")[0].find("cutoff 4.5 is more than half the box, 4.25"), std::string::npos);
 }
 
-/// A checkpoint has the bonds that were found at the start of the run, so a branch cannot ask for another length.
+/// A checkpoint has the bonds that were found at the start of the run, so a branch cannot set another length.
 TEST_F(DeckTest, ABranchHasTheBondsOfItsRun) {
   std::string lattice = fluid + R"([[interaction]]
 type = "harmonic-bond"
@@ -288,7 +288,7 @@ TEST_F(DeckTest, ResolvedDeckKeepsWhatTheInitialStateDecided) {
   EXPECT_EQ(again.toml_text, deck.toml_text);
 }
 
-/// Species, vacancies and walls; and what does not fit, in the same words.
+/// Species, vacancies and walls; errors have the same messages on all numbers of ranks.
 TEST_F(DeckTest, RanksBuildTheSharesOfOneInitialState) {
   const std::string mixture = R"(format = 1
 [system]
@@ -380,7 +380,8 @@ TEST_F(DeckTest, VelocitiesOfGivenPositionsAreDrawnWithSeed1) {
 }
 
 TEST_F(DeckTest, EpochIsAboutFortyMeanFreeTimes) {
-  // Equal spheres of diameter and temperature 1 at packing fraction 0.3: Enskog's rate is 10.1 collisions a unit time.
+  // Equal spheres of diameter and temperature 1 at packing fraction 0.3: Enskog's rate is 10.1 collisions per unit
+  // time.
   Deck deck = read(fluid, {"particles.0.radius=0.5", "particles.1.mass=1.0", "particles.0.temperature=1",
                            "particles.1.temperature=1"});
   build_system<3>(deck);
@@ -430,7 +431,7 @@ TEST_F(DeckTest, ExplicitSpheresStandAmongRandomOnes) {
   EXPECT_EQ(system->particles.size(), 15u);
 }
 
-/// The largest sphere of all species decides, wherever it stands in its list.
+/// The largest sphere of all species matters, at any position in its list.
 TEST_F(DeckTest, LatticesKeepTheLargestOfAListOfRadiiOffTheWalls) {
   const std::string box = R"(format = 1
 [system]
@@ -476,7 +477,7 @@ TEST_F(DeckTest, CompressedMixturesAreWhatTheDeckSaysAndComeOutOfTheResolvedDeck
   auto lighter = set;
   lighter.back() = "particles.1.mass=1";
   Deck other = read(fluid, lighter);
-  EXPECT_EQ(build_system<3>(other)->particles.x, p.x);  // masses and velocities of the run don't matter
+  EXPECT_EQ(build_system<3>(other)->particles.x, p.x);  // masses and velocities of the run are ignored
 }
 
 TEST_F(DeckTest, ShortestPeriodOfOneBondIsThatOfItsOscillator) {
@@ -485,7 +486,7 @@ TEST_F(DeckTest, ShortestPeriodOfOneBondIsThatOfItsOscillator) {
   EXPECT_NEAR(shortest_period(*system), 2 * std::numbers::pi / std::sqrt(3 * (1 + 0.5)), 1e-12);
 }
 
-/// A pair within a cutoff takes four bytes; along a periodic axis a particle meets images, between walls it does not.
+/// A pair within a cutoff takes four bytes; along a periodic axis a particle has images, between walls it has none.
 TEST_F(DeckTest, MemoryOfPairsIsThatOfThoseWithinTheCutoff) {
   const auto pairs = [&](double cutoff) {
     Deck deck = read(springs + "[[interaction]]\ntype = \"yukawa\"\namplitude = 1\nkappa = 3\ncutoff = " +
@@ -496,7 +497,7 @@ TEST_F(DeckTest, MemoryOfPairsIsThatOfThoseWithinTheCutoff) {
     box.boundary = {Boundary::wall, Boundary::periodic};
     return (estimated_memory(*deck.source, &box) - estimated_memory<2>(*deck.source, nullptr)) / (4 * 0.5 * 1e8);
   };
-  const double disc = std::numbers::pi / 4;  // of its square
+  const double disc = std::numbers::pi / 4;  // the disc's fraction of its square
   EXPECT_NEAR(pairs(1), disc * 0.2 * 0.25, 1e-3 * pairs(1));
   EXPECT_NEAR(pairs(4), disc * 0.8 * 1.0, 1e-3 * pairs(4));
   EXPECT_NEAR(pairs(16), disc * 1.0 * 4.0, 1e-3 * pairs(16));

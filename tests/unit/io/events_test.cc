@@ -57,7 +57,7 @@ TEST(Events, HoldsEveryContactExactly) {
   EXPECT_EQ(row[1], -2.0 / 3);
 }
 
-/// Events are written with each row and each frame, though their batch is not full.
+/// Events are written with each row and each frame, even if their batch is not full.
 TEST(Events, AreInTheFileWhereARowOrAFrameIs) {
   const auto path = test::fresh_directory() / "events.h5", copy = path.parent_path() / "copy.h5";
   const auto system = test::sample_system<2>();
@@ -79,7 +79,7 @@ TEST(Events, AreInTheFileWhereARowOrAFrameIs) {
   EXPECT_EQ(written(), 4u);
 }
 
-/// A run that is continued goes on counting its slabs.
+/// A continued run continues its count of slabs.
 TEST(Events, SlabsGoOnFromTheMark) {
   const auto path = test::fresh_directory() / "events.h5";
   Statistics statistics;

@@ -82,7 +82,7 @@ TYPED_TEST(Trajectory, SharesItsClockByHardLinks) {
       EXPECT_EQ(address(element + clock), address(p + "position" + clock)) << element;
 }
 
-// A flushed frame can be read while the writer is still at work: what a kill leaves.
+// A flushed frame can be read while the writer continues, as it must after a kill.
 TYPED_TEST(Trajectory, IsReadableAfterEveryFrame) {
   constexpr int D = TypeParam::value;
   const auto path = fresh_directory() / "t.h5md";
@@ -100,7 +100,7 @@ TYPED_TEST(Trajectory, IsReadableAfterEveryFrame) {
   }
 }
 
-/// VMD takes one radius of a species: the mean of its particles, exactly their own where all have the same.
+/// VMD has one radius per species: the mean of its particles, and exactly their radius if all are equal.
 TEST(TrajectoryFile, ASpeciesOfMixedRadii) {
   const auto path = fresh_directory() / "t.h5md";
   const auto system = test::sample_system<2>();
@@ -114,13 +114,13 @@ TEST(TrajectoryFile, ASpeciesOfMixedRadii) {
   EXPECT_EQ(radii[1], 0.3);
 }
 
-/// Another rank that has no particles, and is lost in the middle of the second frame.
+/// A second rank without particles, which is lost in the middle of the second frame.
 TEST(TrajectoryFile, HasNoPartOfAFrameInWhichARankIsLost) {
   struct Lost : Communicator {
     int calls = 0;
     int size() const override { return 2; }
     std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
-      if (++calls == 6) throw Error(Failure::numerical, "a rank is lost");  // two when the file is made, two a frame
+      if (++calls == 6) throw Error(Failure::numerical, "a rank is lost");  // two for a new file, two a frame
       return {outgoing[0], {}};
     }
   } ranks;
@@ -141,7 +141,7 @@ TEST(TrajectoryFile, HasNoPartOfAFrameInWhichARankIsLost) {
   EXPECT_EQ(all_numbers(file, "particles/trajectory/mass")[2], 3.5);
 }
 
-/// Units are written as the module `units` of H5MD asks, as texts of variable length.
+/// Units are written as the module `units` of H5MD requires, as strings of variable length.
 TEST(TrajectoryFile, SaysItsUnits) {
   const auto path = fresh_directory() / "t.h5md";
   Deck deck = test::sample_deck(2);
@@ -206,7 +206,7 @@ TEST(TrajectoryFile, NamesTheFileThatCannotBeCreated) {
 
 TEST(Hdf5File, AnArrayOfManyPiecesIsReadAsWritten) {
   const auto folder = fresh_directory();
-  std::vector<double> values(3 * 100001);  // 2.4 MB, no whole number of pieces
+  std::vector<double> values(3 * 100001);  // 2.4 MB, not a multiple of the block size
   std::iota(values.begin(), values.end(), 0.5);
   for (const bool plain : {false, true}) {
     const auto path = folder / (plain ? "plain.h5" : "journaled.h5");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Blocks of a journal against a plain array of bytes, and files that are left in the middle of a flush.
+// Blocks of a journal against a plain array of bytes, and files whose flush was interrupted.
 
 #include "io/files/journal.h"
 
@@ -44,11 +44,11 @@ TEST(Journal, BlocksAreThoseOfAnArray) {
     for (std::size_t puts = below(12); puts > 0; --puts) {
       const std::size_t at = below(10) * 400 + below(2) * below(400), length = 1 + below(2) * below(900);
       Bytes data(length);
-      for (std::size_t k = 0; k < length; ++k)  // mostly what is there already, as HDF5 does
+      for (std::size_t k = 0; k < length; ++k)  // mostly unchanged bytes, as from HDF5
         data[k] = below(100) < 97 ? expected[at + k] : static_cast<std::byte>(below(256));
       blocks.put(at, data);
       std::copy(data.begin(), data.end(), expected.begin() + static_cast<std::ptrdiff_t>(at));
-      Bytes seen = file;  // what a reader of the driver gets before the flush
+      Bytes seen = file;  // what the driver returns before the flush
       blocks.overlay(0, seen);
       ASSERT_EQ(seen, expected);
       const std::size_t from = below(kSize - 100);
@@ -74,7 +74,7 @@ TEST(Journal, BlocksAreThoseOfAnArray) {
   }
 }
 
-// A checksum that fits what is damaged makes no journal of it.
+// Damaged bytes with a valid checksum are not a journal.
 TEST(Journal, BlocksThatDoNotFitAreNotReplayed) {
   hdf5::Blocks blocks;
   blocks.put(10, Bytes(100));
@@ -92,14 +92,14 @@ TEST(Journal, BlocksThatDoNotFitAreNotReplayed) {
   EXPECT_TRUE(with(100, good.size()));
   EXPECT_FALSE(with(101, good.size()));
   EXPECT_FALSE(with(~std::uint64_t{0}, good.size()));
-  EXPECT_FALSE(with(100, good.size() + 15));  // a part of a second block's head
+  EXPECT_FALSE(with(100, good.size() + 15));  // a part of a second block's header
   EXPECT_FALSE(with(100, good.size() - 1));
   EXPECT_FALSE(with(100, hdf5::kJournalHead + 8));
 }
 
 TEST(Journal, AReplayedFileHasItsBlocksAndItsSize) {
   const fs::path path = test::fresh_directory() / "a.h5", beside = path.string() + ".journal";
-  std::ofstream(path, std::ios::binary) << std::string(kSize + 300, 'x');  // some behind its end
+  std::ofstream(path, std::ios::binary) << std::string(kSize + 300, 'x');  // longer than the journal's file
   hdf5::Blocks blocks;
   blocks.put(kSize - 10, Bytes(10, std::byte{'y'}));
   const Bytes journal = blocks.journal(kSize, {});
@@ -111,13 +111,13 @@ TEST(Journal, AReplayedFileHasItsBlocksAndItsSize) {
   EXPECT_FALSE(fs::exists(beside));
 }
 
-// A file that is opened again: cut, appended to, and left in the middle of a flush, is made whole by the next to open
-// it.
+// A file that is opened again, shortened, extended and left in the middle of a flush is completed by the next program
+// that opens it.
 TEST(Journal, AFileOpenedAgainIsWholeAfterEveryFlush) {
   const fs::path path = test::fresh_directory() / "a.h5", copy = path.parent_path() / "copy.h5";
   {
     hdf5::File file = hdf5::File::create(path);
-    EXPECT_FALSE(fs::exists(path));  // nothing of it has been flushed
+    EXPECT_FALSE(fs::exists(path));  // nothing has been flushed
     const hdf5::Handle group = file.group("g");
     hdf5::Series<double> series(file, group, "x", {100});
     for (int row = 0; row < 50; ++row) series.append(std::vector<double>(100, row));
@@ -146,7 +146,7 @@ TEST(Journal, AFileOpenedAgainIsWholeAfterEveryFlush) {
   }
 }
 
-/// A file that the driver has open, through HDF5's interface for drivers.
+/// A file that the driver has opened, used through HDF5's interface for drivers.
 class DriverFile {
  public:
   explicit DriverFile(const fs::path& path) {
@@ -160,7 +160,7 @@ class DriverFile {
   DriverFile(const DriverFile&) = delete;
   DriverFile& operator=(const DriverFile&) = delete;
 
-  // These return whether it was done.
+  // These functions return whether they succeeded.
   bool write(std::uint64_t at, const Bytes& data) {
     return H5FDwrite(file_, H5FD_MEM_DEFAULT, H5P_DEFAULT, at, data.size(), data.data()) >= 0;
   }
@@ -202,7 +202,7 @@ TEST(Journal, TheDriverReadsWhatWaits) {
     now.resize(std::max(now.size(), at + data.size()));
     std::copy(data.begin(), data.end(), now.begin() + static_cast<std::ptrdiff_t>(at));
     const std::size_t from = below(now.size()), length = 1 + below(600);
-    Bytes expected(length);  // zeros behind the end
+    Bytes expected(length);  // zeros beyond the end
     std::copy_n(now.begin() + static_cast<std::ptrdiff_t>(from), std::min(length, now.size() - from), expected.begin());
     ASSERT_EQ(file.read(from, length), expected) << n;
     if (n > 10) {
@@ -211,7 +211,7 @@ TEST(Journal, TheDriverReadsWhatWaits) {
       ASSERT_TRUE(std::equal(flushed.begin(), flushed.end(), there.begin())) << n;
     }
     if (below(4) > 0 && n != 10) continue;
-    if (below(3) == 0) {  // HDF5 gives room back, or takes more, before a flush
+    if (below(3) == 0) {  // HDF5 frees or allocates space before a flush
       now.resize(now.size() / 2 + below(now.size()));
       ASSERT_TRUE(file.resize(now.size()));
     }
@@ -220,12 +220,12 @@ TEST(Journal, TheDriverReadsWhatWaits) {
     ASSERT_EQ(contents(path), now) << n;
     ASSERT_LE(std::ifstream(path.string() + ".journal", std::ios::binary).get(), 0);  // empty, or emptied
   }
-  ASSERT_TRUE(file.resize(now.size() / 3));  // without anything that waits
+  ASSERT_TRUE(file.resize(now.size() / 3));  // with no waiting data
   ASSERT_TRUE(file.flush());
   EXPECT_EQ(fs::file_size(path), now.size() / 3);
 }
 
-/// Files cannot be written behind so many bytes while it lives.
+/// During its lifetime files cannot be written beyond this size.
 class Limit {
  public:
   explicit Limit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -246,7 +246,7 @@ class Limit {
   rlimit before_{};
 };
 
-// The journal is complete, and the file cannot be written: the journal stays, and has all, to the last byte.
+// The journal is complete, and writing to the file fails: the journal stays and is complete to the last byte.
 TEST(Journal, AFlushThatIsTornIsCompletedLater) {
   const fs::path path = test::fresh_directory() / "a.h5", journal = path.string() + ".journal";
   Bytes expected(100000, std::byte{1});
@@ -284,7 +284,7 @@ TEST(Journal, RoomIsGivenBackWhereAFlushFails) {
   DriverFile file(path);
   const Bytes flushed(1000, std::byte{1}), more(30000, std::byte{2});
   ASSERT_TRUE(file.write(0, flushed) && file.flush() && file.write(1000, more));
-  EXPECT_EQ(fs::file_size(path), 31000u);  // what is new waits for nothing
+  EXPECT_EQ(fs::file_size(path), 31000u);  // new data can be written at once
   {
     const Limit limit(40000);
     EXPECT_FALSE(file.write(31000, more));
@@ -294,7 +294,7 @@ TEST(Journal, RoomIsGivenBackWhereAFlushFails) {
   EXPECT_FALSE(fs::exists(path.string() + ".journal"));
 }
 
-// By whichever name it is opened, the journal is found beside the file itself.
+// The journal is beside the file itself, whichever name is used to open the file.
 TEST(Journal, AFileBehindALink) {
   const fs::path directory = test::fresh_directory(), file = directory / "there" / "a.h5", link = directory / "a.h5";
   fs::create_directory(directory / "there");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Files of a run that are cut back to a mark and appended to are those of a run that went on.
+// A run's files that are cut back to a mark and continued are equal to those of an uninterrupted run.
 
 #include <fstream>
 #include <map>
@@ -23,7 +23,7 @@ std::string contents(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Every data set by its name: its shape and bytes.
+/// Every data set by its name, with its shape and bytes.
 std::map<std::string, std::string> data_sets(const fs::path& path) {
   const hdf5::File file = hdf5::File::open(path);
   struct Found {
@@ -68,7 +68,7 @@ Deck deck_of_all(const fs::path& directory, const System<D>& system) {
   return deck;
 }
 
-/// Shows a run of hard spheres to the files.
+/// Writes a run of hard spheres to the files.
 template <int D>
 void show(RunFiles<D>& files, ThermoTable<D>& table, unsigned seed, double end_time) {
   Simulation<D> run(
@@ -108,7 +108,7 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
     FileMark end = log.mark();
     std::uint64_t rows = table.rows();
     marks(at, end, rows);
-    show(files, table, 3, 3);  // what the checkpoint knows nothing of; more than a chunk
+    show(files, table, 3, 3);  // data after the checkpoint; more than a chunk
   }
   EXPECT_NE(data_sets(whole.output.directory / run_file::events), data_sets(cut.output.directory / run_file::events));
   {
@@ -146,7 +146,8 @@ TYPED_TEST(Marks, FilesCutBackAreThoseOfARunThatWentOn) {
   EXPECT_EQ(rows_of(whole.output.directory), rows_of(cut.output.directory));
 }
 
-// Each file that is missing, shorter than at the checkpoint, changed, or another run's is named, and nothing changes.
+// A file that is missing, shorter than at the checkpoint, changed, or another run's is named in an error, and nothing
+// changes.
 TEST(MarksOfFiles, FilesThatAreNotThoseOfTheRunAreErrors) {
   const fs::path directory = test::fresh_directory();
   const auto system = test::hard_spheres<2>(3, 0.6);
@@ -210,7 +211,7 @@ TEST(MarksOfFiles, FilesThatAreNotThoseOfTheRunAreErrors) {
     changed[changed.size() / 3] ^= 1;
     std::ofstream(path, std::ios::binary) << changed;
   }
-  // What the files of this run do not have at all.
+  // Data that the files of this run lack.
   FileMarks later = at;
   later.frames.length += 100;
   std::swap(at, later);

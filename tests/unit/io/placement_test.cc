@@ -20,7 +20,7 @@ Box<D> box_of(const Vec<D>& edges, Boundary boundary) {
   return box;
 }
 
-/// The smallest distance between two of the points, images included, by trying all pairs.
+/// The smallest distance between two of the points, images included, by brute force.
 template <int D>
 double smallest_distance(const Box<D>& box, const std::vector<Vec<D>>& x) {
   double smallest = box.edges.minCoeff();
@@ -40,12 +40,12 @@ TEST(Lattice, FccInItsCubeIsPerfect) {
 }
 
 TEST(Lattice, HexagonalInItsBoxIsPerfect) {
-  const double area = 1024 * std::numbers::sqrt3 / 2;  // of cells with neighbours at distance 1
+  const double area = 1024 * std::numbers::sqrt3 / 2;  // of cells with neighbour distance 1
   const auto box = box_of<2>(commensurate_edges<2>(Lattice::centred, 1024, area), Boundary::periodic);
   EXPECT_NEAR(box.volume(), area, 1e-10);
   const auto sites = lattice_sites(Lattice::centred, box, 1024, 0.5);
   ASSERT_EQ(sites.size(), 1024u);
-  EXPECT_GT(smallest_distance(box, sites), 0.95);  // 1 but for the fit of whole cells to a box near the square
+  EXPECT_GT(smallest_distance(box, sites), 0.95);  // less than 1 because whole cells must fit the box
 }
 
 TEST(Lattice, SimpleLatticesFillSquareAndCube) {
@@ -84,7 +84,7 @@ TEST(RandomInsertion, PlacesUnequalSpheresWithoutOverlap) {
     const auto box = box_of<2>(Vec<2>::Constant(12), boundary);
     std::vector<double> radius(100, 0.3);
     std::fill_n(radius.begin() + 50, 20, 0.8);
-    std::vector<Vec<2>> x(radius.size(), Vec<2>::Constant(6));  // the first one stands there already
+    std::vector<Vec<2>> x(radius.size(), Vec<2>::Constant(6));  // the first one is there already
     std::vector<Id> ids(radius.size() - 1);
     std::iota(ids.begin(), ids.end(), 1);
     ASSERT_EQ(insert_at_random<2>(box, x, radius, ids, 5), ids.size());
@@ -119,7 +119,7 @@ TEST(RandomInsertion, TellsHowFarItCame) {
   std::iota(ids.begin(), ids.end(), 0);
   const std::size_t placed = insert_at_random<2>(box, x, radius, ids, 5, 2000);
   EXPECT_GT(placed, 10u);
-  EXPECT_LT(placed, 21u);  // 0.547 of the box at most, but for the finite size
+  EXPECT_LT(placed, 21u);  // at most 0.547 of the box, except for the finite size
 }
 
 TEST(Overlaps, AgreeWithAllPairsInEveryKindOfBox) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What signals and the clock ask of a run.
+// Requests to a run by signals and by the clock.
 
 #include "io/command/requests.h"
 
@@ -36,7 +36,7 @@ TEST(Requests, CheckpointsAreAnIntervalApart) {
   EXPECT_FALSE(requests.now(alone).checkpoint);
 }
 
-/// The wall time counts from the start of the run, not from its last checkpoint. A run that has to stop writes a
+/// The wall time counts from the start of the run, not from its last checkpoint. A run that must stop writes a
 /// checkpoint.
 TEST(Requests, TheWallTimeEndsTheRun) {
   Communicator alone;
@@ -52,7 +52,7 @@ TEST(Requests, TheWallTimeEndsTheRun) {
   EXPECT_EQ(requests.reason(), "--max-wall");
 }
 
-TEST(Requests, ASignalThatIsIgnoredStaysIgnored) {  // as nohup has it
+TEST(Requests, ASignalThatIsIgnoredStaysIgnored) {  // as under nohup
   Communicator alone;
   std::signal(SIGHUP, SIG_IGN);
   Requests requests({});

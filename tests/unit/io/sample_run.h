@@ -11,7 +11,7 @@
 
 namespace carom::test {
 
-/// A directory of its own for each test, empty at its start.
+/// An empty directory for each test.
 inline std::filesystem::path fresh_directory() {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   const auto path = std::filesystem::path(testing::TempDir()) /

@@ -60,7 +60,7 @@ TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   EXPECT_EQ(values[11], 1.0 / 3);
 }
 
-// Only a whole row counts: a kill may have left a part of one.
+// Only complete rows count: a kill may leave a partial row.
 TEST(Thermo, TheLastRowSaysHowFarARunHasCome) {
   const auto path = fresh_directory() / "thermo.csv";
   const auto expect = [&](double time, std::int64_t step, std::uint64_t collisions) {
@@ -87,7 +87,7 @@ TEST(Thermo, TheLastRowSaysHowFarARunHasCome) {
   expect(12, 100, 6000000001);
 }
 
-// A piece that does not fit is taken back, so that the file ends with a whole line, and the message names the file.
+// Text that does not fit is removed, so that the file ends with a complete line, and the message names the file.
 TEST(TextFile, TakesBackWhatDoesNotFit) {
   const auto path = fresh_directory() / "limited.txt";
   rlimit before{};
@@ -110,7 +110,7 @@ TEST(TextFile, TakesBackWhatDoesNotFit) {
   EXPECT_EQ(contents(path), "first line\n");
 }
 
-// A link stays, and what it leads to is exchanged as a whole, or made.
+// A symbolic link stays; its target is replaced as a whole, or created.
 TEST(WriteAside, GoesBehindLinks) {
   const auto directory = fresh_directory();
   fs::create_directory(directory / "there");
@@ -181,7 +181,7 @@ TEST(RenameFile, ReplacesFilesAndLinksOnly) {
 
 TEST(Log, AFullDiskIsAnError) { EXPECT_THROW(RunLog("/dev/full", true).note("lost"), Error); }
 
-// A table for people: few rows, evenly in each doubling, and always the last.
+// A table for readers: few rows, evenly in each doubling, and always the last.
 TEST(Log, TheTableIsNoCopyOfThermo) {
   const auto path = fresh_directory() / "run.log";
   const auto system = test::sample_system<2>();
@@ -190,7 +190,7 @@ TEST(Log, TheTableIsNoCopyOfThermo) {
   constexpr int kRows = 100001;
   for (int row = 0; row <= kRows; ++row) table.thermo(test::sample_snapshot<2>(system->particles, row, row));
   table.finish();
-  table.finish();  // it is there
+  table.finish();  // it has been written
   std::ifstream in(path);
   std::vector<int> steps;
   std::string line;
@@ -240,7 +240,7 @@ TEST(Log, TheBannerSaysWhatRunsAndToWhichEnd) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
 }
 
-/// The second rank has three times the events of the first one.
+/// The second rank has three times as many events as the first.
 TEST(Log, ReportsWhatRanksDidAndWhereTheirTimeWent) {
   Statistics s;
   s.steps = 4, s.end_time = 2.5, s.wall_seconds = 8;
@@ -387,9 +387,9 @@ TEST(DirectoryLock, SaysWhetherTheProcessThatItNamesIsAtWork) {
     EXPECT_EQ(lock.warning(), "");
     EXPECT_TRUE(run_is_at_work(directory));
     EXPECT_THROW(DirectoryLock{directory}, Error);
-    EXPECT_FALSE(with("ticks ", "ticks 1"));  // the number of a process that has ended came again
+    EXPECT_FALSE(with("ticks ", "ticks 1"));  // the number of a process that has ended was used again
     EXPECT_FALSE(with("process " + std::to_string(getpid()), "process 0"));
-    EXPECT_TRUE(with("host ", "host not-"));  // whether it has ended cannot be told from here
+    EXPECT_TRUE(with("host ", "host not-"));  // the process is on another host: its end is unknown
     EXPECT_TRUE(run_is_at_work(directory));
   }
   EXPECT_FALSE(fs::exists(lock_file));

@@ -3,9 +3,9 @@
 // Measures a potential's four functions against 50-digit arithmetic, over wide ranges of ρ and of the step from ρ to
 // ρ'.
 //
-// The exact side needs V(ρ) only: derivatives are taken numerically with 50 digits, the quotient by dividing
-// differences. Errors are in ε of a scale that is made the same way from a function M(ρ): the sum of the magnitudes of
-// the terms of V. Where V has one term, M = V and the errors are relative; where terms cancel, they are relative to the
+// The exact results need V(ρ) only: derivatives are computed numerically with 50 digits, the quotient by dividing
+// differences. Errors are in ε of a scale that is computed likewise from a function M(ρ), the sum of the magnitudes of
+// the terms of V. If V has one term, M = V and the errors are relative; if terms cancel, they are relative to the
 // terms.
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@
 
 namespace carom::test {
 
-/// The largest errors met, in ε of the scale.
+/// The largest errors found, in ε of the scale.
 struct Errors {
   double value = 0, derivative = 0, second_derivative = 0, quotient = 0;
 };
@@ -41,8 +41,8 @@ Precise precise_quotient(F f, const Precise& b, const Precise& a) {
   return a == b ? precise_derivative(f, a) : Precise((f(a) - f(b)) / (a - b));
 }
 
-/// Compares at ρ log-uniform in [from, to] and ρ' = ρ (1 ± δ), δ from 1e-17 to 10 and 0. `allowed(ρ, δ)` multiplies
-/// what counts as one ε, for potentials with arguments that round.
+/// Compares at ρ log-uniform in [from, to] and ρ' = ρ (1 ± δ), δ from 1e-17 to 10 and 0. `allowed(ρ, δ)` is a factor on
+/// ε for potentials whose arguments are rounded.
 template <Potential P, class V, class M, class Allowed>
 Errors measure(const P& potential, V exact, M scale, double from, double to, Allowed allowed, int count = 1500) {
   std::mt19937_64 random(7);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Every type of interaction, in boxes that suit it.
+// Every type of interaction, in suitable boxes.
 
 #include <gtest/gtest.h>
 
@@ -59,8 +59,8 @@ inline const std::vector<Case>& cases() {
   return all;
 }
 
-/// Calls check(scene, term) for every case, or check(scene, term, remake), where remake(scene) makes the same term for
-/// another scene. What the terms read from the environment they read again for each.
+/// Calls check(scene, term) for every case, or check(scene, term, remake), where remake(scene) makes an equal term for
+/// another scene. Terms read their environment variables again for each.
 template <int D, class Check>
 void for_each_case(Check&& check) {
   for (const Case& each : cases()) {

@@ -21,7 +21,7 @@ using test::expect_within;
 using test::measure;
 using test::Precise;
 
-/// V made to end at ρ_c, in 50 digits; and the sum of its terms' magnitudes.
+/// V with its cutoff at ρ_c, in 50 digits, and the sum of its terms' magnitudes.
 template <class V>
 struct ExactCut {
   V v;
@@ -64,8 +64,8 @@ TEST(Cut, LennardJonesIsAccurateAlsoAcrossTheCutoff) {
   }
 }
 
-/// The errors of a switched potential in ε of what its terms are; `m` the sum of the magnitudes of the terms of V. The
-/// ends lie on every side of both borders, and as near as 1e-16 of the distance between them.
+/// The errors of a switched potential in ε of its terms; `m` is the sum of the magnitudes of the terms of V. Pairs end
+/// on both sides of both borders, as near as 1e-16 of the distance between them.
 template <Potential P, class V, class M>
 void expect_switched(const P& potential, V v, M m, double cutoff, double from, double limit) {
   const Cut cut(potential, cutoff, CutKind::switched, from);
@@ -174,7 +174,7 @@ TEST(Cut, IsTwiceContinuouslyDifferentiableAtTheCutoff) {
   for (const CutKind kind : {CutKind::quadratic, CutKind::switched}) {
     const Cut potential(whole, cutoff, kind, 0.9 * cutoff);
     double last = 1;
-    for (const double step : {1e-3, 1e-5, 1e-7}) {  // V, V′, V″ fall as the third, second and first power
+    for (const double step : {1e-3, 1e-5, 1e-7}) {  // V, V′, V″ decrease with the third, second and first power
       const double z = step * rho_c, inside = rho_c - z;
       const double v = 2000 * whole.value(rho_c);  // the switch: 10 t³, t = z/0.19 ρ_c
       EXPECT_LE(std::abs(potential.value(inside)), v * step * step * step + 1e-17);

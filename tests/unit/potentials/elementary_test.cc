@@ -22,7 +22,7 @@ using test::Precise;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Uniform in [from, to], and as many again spread over all magnitudes up to these ends.
+/// Uniform in [from, to], and an equal number over all magnitudes up to these ends.
 std::vector<double> arguments(double from, double to, int count = 4000) {
   std::mt19937_64 random(20240117);
   std::uniform_real_distribution<double> uniform(from, to), magnitude(-60, 0), sign(-1, 1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Random small systems over many orders of magnitude: sums of forces, energies and virials are those of plain loops, or
-// an error names a pair that is the reason. CAROM_FUZZ_SYSTEMS sets the number of systems of the slow test.
+// Random small systems over many orders of magnitude: sums of forces, energies and virials agree with simple loops, or
+// an error names a pair that causes it. CAROM_FUZZ_SYSTEMS sets the number of systems of the slow test.
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ using test::Law;
 using test::Real;
 using test::Sized;
 
-/// Positions or their changes: some next to, or on top of, another; some far away.
+/// Positions or their changes: some near or at another one, some far away.
 template <int D>
 std::vector<Vec<D>> random_positions(Dice& dice, std::size_t particles, double edge, bool periodic) {
   std::vector<Vec<D>> x;
@@ -41,7 +41,7 @@ std::vector<Vec<D>> random_positions(Dice& dice, std::size_t particles, double e
   return x;
 }
 
-/// Sums of plain loops over pairs and images.
+/// Sums of simple loops over pairs and images.
 template <int D>
 struct Expected {
   struct Force {
@@ -53,12 +53,12 @@ struct Expected {
   } energy, magnitude, virial;
   struct Pair {
     Id i, j;
-    Real share;  // of what can be summed, that its force takes, or its energy
+    Real share;  // its force or energy / the largest possible sum
   };
-  std::vector<Pair> pairs;     // of forces and energies
-  Real largest = 0;            // of these shares
-  Real largest_mean = 0;       // the same of mean forces
-  bool bond_too_long = false;  // for its periodic box
+  std::vector<Pair> pairs;     // pairs with forces or energies
+  Real largest = 0;            // the largest share
+  Real largest_mean = 0;       // the largest share of mean forces
+  bool bond_too_long = false;  // for a periodic box
   static constexpr Real kUnit = 256 * std::numeric_limits<double>::epsilon();
 
   explicit Expected(std::size_t particles) : forces(particles), mean_forces(particles) {}
@@ -136,7 +136,7 @@ struct Tally {
   double worst = 0;
 };
 
-/// How many times the allowed error; infinite for no number.
+/// The error as a multiple of the allowed error; infinite for NaN.
 Real excess(double value, Real expected, Real error) {
   if (value == expected) return 0;
   const Real off = std::abs(value - expected) / error;
@@ -155,7 +155,7 @@ void expect_forces(const std::vector<Vec<D>>& f, const std::vector<typename Expe
     }
 }
 
-/// An error must name a pair, by ids, with a force or energy that is too large, and say what to do.
+/// An error must name, by ids, a pair with a force or energy that is too large, and give advice.
 template <int D>
 void expect_reason(const Error& error, const Expected<D>& expected, const Particles<D>& p) {
   EXPECT_EQ(error.failure(), Failure::numerical);
@@ -201,7 +201,7 @@ void try_system(Dice& dice, Tally& tally) {
     system->interactions.back()->use(*widths[dice.below(widths.size())]);
   } while (dice.one_in(3));
   SCOPED_TRACE(description);
-  for (Id i = 0; i < n; ++i) p.id.push_back(3 * i + 5);  // as ranks have them
+  for (Id i = 0; i < n; ++i) p.id.push_back(3 * i + 5);  // as on several ranks
   system->quanta = quanta(*system);
 
   auto x_new = p.x;
@@ -243,7 +243,7 @@ void try_system(Dice& dice, Tally& tally) {
   }
   EXPECT_LT(expected.largest_mean, 2);
   expect_forces<D>(f, expected.mean_forces, tally);
-  // Some of them come somewhere else, and back.
+  // Moves some particles and moves them back.
   auto other = x_new;
   std::vector<char> changed(n);
   for (Id i = 0; i < n; ++i)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sums over pairs at the limits of what they can hold: what does not fit is refused, with the pair that is the reason.
+// Sums over pairs at the limits of their range: an overflow is refused with an error that names the pair.
 
 #include "engine/base/error.h"
 #include "engine/forces/potentials/inverse_distance.h"
@@ -12,7 +12,7 @@ using test::cut_lennard_jones;
 using test::kQuantum;
 using test::Scene;
 
-/// The message of the Error(Failure::numerical) that these forces are.
+/// The message of the Error(Failure::numerical) that these forces throw.
 template <int D>
 std::string refusal(const Interaction<D>& term, const std::vector<Vec<D>>& x) {
   ForceSums<D> forces(x.size(), kQuantum);
@@ -33,7 +33,7 @@ TEST(PairSums, NameThePairWhoseForceIsNoNumber) {
   EXPECT_NE(gravity.find("between particles 5 and 17"), std::string::npos) << gravity;
   const std::string fluid = refusal(*scene.make("lennard-jones", cut_lennard_jones(0.8, 2.0)), x);
   EXPECT_NE(fluid.find("between particles 5 and 17"), std::string::npos) << fluid;
-  ForceSums<3> mean(x.size(), kQuantum);  // a step that is only tried
+  ForceSums<3> mean(x.size(), kQuantum);  // for a trial step
   scene.make("gravity", {{"constant", 1.0}})->add_mean_forces(x, x, mean);
   EXPECT_TRUE(std::isnan(mean.value(0)[0]));
   x[3][1] = std::numeric_limits<double>::quiet_NaN();
@@ -74,7 +74,7 @@ TEST(PairSums, HoldForcesOfAllMagnitudesOrSaySo) {
   int held = 0, refused = 0;
   for (int round = 0; round < 300; ++round) {
     auto x = scene.particles.x;
-    for (int n = 0; n < 3; ++n) {  // some come close to each other
+    for (int n = 0; n < 3; ++n) {  // some approach each other closely
       const auto i = scene.random() % x.size(), j = scene.random() % x.size();
       x[i] = x[j] + std::pow(10, exponent(scene.random)) * Vec<3>(part(scene.random), part(scene.random), 1);
     }

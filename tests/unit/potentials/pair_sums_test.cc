@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sums over pairs: every bit of them, whatever computes them and in which order.
+// Sums over pairs have equal bits for any kernel and any order.
 
 #include <cstdlib>
 
@@ -57,8 +57,8 @@ TEST(PairSums, AreTheSameInEveryVectorWidth) {
   expect_the_same_in_all_widths<3>();
 }
 
-/// Kernels read up to eight partners behind a run: these must be places in the list, whatever a list of more particles
-/// has left there.
+/// Kernels read up to eight partners beyond the end of a run: these must be valid indices, even after a list of more
+/// particles.
 TEST(CutoffList, HasPlacesBehindTheLastPartnerToo) {
   for (const PairKernels* kernels : available_kernels<PairKernels>()) {
     SCOPED_TRACE(kernels->name);
@@ -110,7 +110,7 @@ TEST(PairSums, AreThoseOfPlainLoopsOverPairs) {
   const Cut fluid(LennardJones(1.0, 0.8), 2.0, CutKind::shifted);
   expect_reference(scene, *scene.make("lennard-jones", cut_lennard_jones(0.8, 2.0)), fluid, 4, nullptr, x, x_new);
   Scene<2> plane(150, 9, Boundary::wall, 0.2);
-  plane.particles.charge[3] = 0;  // pairs of no weight add nothing
+  plane.particles.charge[3] = 0;  // pairs of zero weight add nothing
   plane.particles.charge[4] = 1e-3;
   const auto& q = plane.particles.x;
   const auto q_new = test::displaced(q, plane.random_vectors(0.3), 1);
@@ -122,7 +122,7 @@ TEST(PairSums, AreThoseOfPlainLoopsOverPairs) {
 }
 
 TEST(PairSums, HoldSeveralImagesOfAPairInASmallBox) {
-  for (const double edge : {1.1, 1.7, 2.6, 4.1}) {  // the cutoff reaches round the box
+  for (const double edge : {1.1, 1.7, 2.6, 4.1}) {  // the cutoff extends beyond the box
     Scene<2> scene(7, edge, Boundary::periodic, 0.2);
     const auto& x = scene.particles.x;
     const auto x_new = test::displaced(x, scene.random_vectors(0.02), 1);
@@ -152,7 +152,7 @@ TEST(PairSums, PassOverManyPairsOfNoWeight) {
                    Yukawa(2, 0.1), std::numeric_limits<double>::infinity(), &scene.particles.charge, x, x);
 }
 
-/// Moves particles about, wraps them now and then, and compares with plain loops all the time.
+/// Moves particles, sometimes wraps them, and compares with simple loops after each step.
 template <int D>
 void travel(double edge, int particles, double speed, const std::string& width) {
   SCOPED_TRACE(width);
@@ -177,7 +177,7 @@ void travel(double edge, int particles, double speed, const std::string& width) 
     travelled->add_forces(x, forces);
     travelled->add_mean_forces(x, x_new, mean);
     const Reference<D> expected(scene, potential, 1.44, nullptr, x, x_new);
-    if (step == 20) {  // too far away for the plain loops
+    if (step == 20) {  // too far away for the simple loops
       x[5][0] -= 3 * edge;
       continue;
     }
@@ -195,7 +195,7 @@ TEST(PairSums, DoNotDependOnTheHistoryOfTheList) {
   }
 }
 
-/// No kernels are made for it.
+/// A potential without kernels.
 struct OwnYukawa : Yukawa {
   using Yukawa::Yukawa;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which pairs a term sums over, in which order, and what a deck may not ask for.
+// Which pairs a term sums over, their order, and what a deck must not request.
 
 #include <gtest/gtest.h>
 
@@ -102,7 +102,7 @@ TEST(Pairs, BondsWithinADistanceJoinTheNeighboursOfALattice) {
   for (int i = 0; i < 16; ++i) scene.particles.x[i] = Vec<2>(0.5 + 2 * (i / 4), 0.5 + 2 * (i % 4));
   const Given lattice = {{"within", 2.1}, {"stiffness", 2.0}, {"rest_length", 1.0}};
   const auto bonds = scene.make("harmonic-bond", lattice);
-  EXPECT_EQ(bonds->interacting_pairs(scene.particles.x), 32u);  // two a particle, across the edges too
+  EXPECT_EQ(bonds->interacting_pairs(scene.particles.x), 32u);  // two per particle, also across the edges
   EXPECT_DOUBLE_EQ(energy(*bonds, scene.particles.x), 32);
 }
 
@@ -134,7 +134,7 @@ TEST(Pairs, AYukawaTermWithChargesIsTheirProductTimesThatWithout) {
 }
 
 TEST(Pairs, TailsCountThePairsOfTheirSpecies) {
-  Scene<3> scene(12, 10, Boundary::periodic, 0.5);  // 8 A and 4 B; charges 1 and −0.5 in turns
+  Scene<3> scene(12, 10, Boundary::periodic, 0.5);  // 8 A and 4 B; charges alternate between 1 and −0.5
   Given given = {{"epsilon", 1.0}, {"sigma", 1.0}, {"cutoff", 2.0}, {"cut", "shifted"s}, {"tail", true}};
   const auto tail = [&](const Names& names) {
     Given all = given;

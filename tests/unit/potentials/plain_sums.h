@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// All bits that a term sums up, and the same sums by plain loops over pairs.
+// All bits of a term's sums, and the corresponding sums by simple loops over pairs.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ Quanta<D> quanta(const ForceSums<D>& sums) {
   return all;
 }
 
-/// All that a term gives, as far as it shows.
+/// All results of a term.
 template <int D>
 struct Outcome {
   Quanta<D> forces, mean_forces, products;
@@ -48,7 +48,7 @@ Outcome<D> outcome(const Interaction<D>& term, const std::vector<Vec<D>>& x, con
   return result;
 }
 
-/// Sums of a potential by plain double loops over pairs and images.
+/// Sums of a potential by simple double loops over pairs and images.
 template <int D>
 struct Reference {
   using Whole = typename ForceSums<D>::Whole;

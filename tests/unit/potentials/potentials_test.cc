@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Every pair potential against 50-digit arithmetic; the stated number of ε is what its header promises.
+// Every pair potential against 50-digit arithmetic; the number of ε is the one that its header promises.
 
 #include <boost/math/special_functions/erf.hpp>
 
@@ -29,7 +29,7 @@ TEST(Accuracy, HarmonicBond) {
   const auto scale = [&](const Precise& rho) {
     return Precise(Precise(k) / 2 * (rho + 2 * Precise(length) * sqrt(rho)));
   };
-  // The value is of order L² near r = 0, where the scale of its derivative goes to zero: measured from r = 0.1 L on.
+  // The value is of order L² near r = 0, where the scale of its derivative goes to zero: compared from r = 0.1 L on.
   expect_within(measure(HarmonicBond(k, length), exact, scale, 0.04, 1e6), 4);
 }
 

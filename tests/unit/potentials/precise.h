@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// What the tests of this folder measure errors with: 50-digit arithmetic and units in the last place.
+// 50-digit arithmetic and errors in units in the last place, for the tests in this folder.
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <cmath>
@@ -10,7 +10,7 @@ namespace carom::test {
 
 using Precise = boost::multiprecision::cpp_bin_float_50;
 
-/// |computed − exact| in units of 2^-52·|scale|; a unit is never smaller than the smallest subnormal number.
+/// |computed − exact| in units of 2^-52·|scale|; a unit is at least the smallest subnormal number.
 inline double error_in_epsilons(double computed, const Precise& exact, const Precise& scale) {
   if (!std::isfinite(computed)) return std::numeric_limits<double>::infinity();
   const Precise unit = abs(scale) * Precise(std::numeric_limits<double>::epsilon());

@@ -12,7 +12,7 @@ Sized Law::quotient(Real a, Real b) const {
   if (a == b) return slope(a);
   const Sized ends = (value(b) - value(a)) / (b - a);
   const Real steepest = std::max(slope(a).size, slope(b).size);
-  if (b - a > 1e-4L * b) return {ends.v, std::min(ends.size, steepest) + 0x1p-11L * ends.size};  // of 64 bits
+  if (b - a > 1e-4L * b) return {ends.v, std::min(ends.size, steepest) + 0x1p-11L * ends.size};  // rounding of 64 bits
   Real from = a, sum = 0;
   const auto add = [&](Real to) {
     if (!(to > from)) return;
@@ -157,7 +157,7 @@ Law inverse_distance(const char* type, double strength) {
   return law;
 }
 
-/// Points of a cubic in ρ, which are joined by it.
+/// Points of a cubic in ρ, and the interpolation between them.
 Law table(Dice& dice, double strength, double last) {
   std::array<Real, 4> c;
   for (Real& each : c) each = dice.uniform(-strength, strength);
@@ -181,7 +181,7 @@ Law table(Dice& dice, double strength, double last) {
     const Real below = std::min<Real>(rho - start, 0), in = rho - below;
     return Sized(at(in, 0) + below * (at(in, 1) + below / 2 * at(in, 2)), 400 * strength);
   };
-  law.slope = [=](Real rho) {  // below the first point, too
+  law.slope = [=](Real rho) {  // also below the first point
     const Real below = std::min<Real>(rho - start, 0), in = rho - below;
     return Sized(at(in, 1) + below * at(in, 2), 400 * strength / unit);
   };

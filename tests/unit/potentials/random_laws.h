@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Random pair potentials over many orders of magnitude, by formulas of their own in long double.
+// Random pair potentials over many orders of magnitude, from independent formulas in long double.
 
 #include <cmath>
 #include <functional>
@@ -12,8 +12,8 @@ namespace carom::test {
 
 using Real = long double;
 
-/// A number, and the sum of the magnitudes of the terms that it was made from, times how much more than ε their own
-/// rounding may be: errors are relative to this.
+/// A number with the sum of the magnitudes of its terms, scaled by the ratio of their own allowed rounding to ε: errors
+/// are relative to this.
 struct Sized {
   Real v, size;
   Sized(Real value) : v(value), size(std::abs(value)) {}
@@ -39,18 +39,18 @@ struct Law {
   std::string type;
   Given given = {};
   Function value = {}, slope = {};  // V and dV/dρ
-  std::vector<double> breaks = {};  // of higher derivatives, ascending [ρ]
+  std::vector<double> breaks = {};  // discontinuities of higher derivatives, ascending [ρ]
   double cutoff2 = std::numeric_limits<double>::infinity();
   enum { one, masses, charges } weight = one;
   PairList bonds = {};
 
-  /// The divided difference: the mean of the slope, by three Gauss points in each smooth part where the step is short.
+  /// The divided difference; for a short step the mean of the slope, by three Gauss points in each smooth part.
   Sized quotient(Real a, Real b) const;
-  /// Ends at the cutoff.
+  /// Cuts the potential off.
   void cut(double cutoff, const std::string& kind, Real curvature = 0);
 };
 
-/// For so many particles in a box of this edge.
+/// For this number of particles in a box of this edge.
 Law random_law(Dice& dice, std::size_t particles, double edge, bool periodic);
 
 }  // namespace carom::test

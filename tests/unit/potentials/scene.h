@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A small system to try interactions on: random particles in a box, and interactions made by name.
+// A small system to test interactions: random particles in a box, and interactions made by name.
 
 #include <random>
 #include <string>
@@ -18,7 +18,7 @@ struct Scene {
   Particles<D> particles;
   std::vector<std::string> species = {"A", "B"};
 
-  /// `count` points, uniform in a box of this edge, no two (nor their images) nearer than `apart`.
+  /// `count` points, uniform in a box of this edge; all distances, images included, are at least `apart`.
   Scene(int count, double edge, Boundary boundary, double apart) {
     box.edges = Vec<D>::Constant(edge);
     box.boundary.fill(boundary);

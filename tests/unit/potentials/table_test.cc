@@ -16,7 +16,7 @@ struct Points {
   std::vector<double> r, v;
 };
 
-/// Points of Lennard-Jones, equally far apart in r.
+/// Points of Lennard-Jones at equal distances in r.
 Points lennard_jones_points(int count, double from = 0.8, double to = 3) {
   Points p;
   for (int k = 0; k < count; ++k) {
@@ -110,7 +110,7 @@ class ExactSpline {
 
 TEST(Table, QuotientsAreThoseOfTheSplineAlsoAcrossKnots) {
   Points p = lennard_jones_points(60, 0.9);
-  p.r[30] += 0.4 * (p.r[31] - p.r[30]);  // not equally far apart
+  p.r[30] += 0.4 * (p.r[31] - p.r[30]);  // unequal distances
   const Table table(p.r, p.v, {});
   const ExactSpline exact(p);
   std::mt19937_64 random(5);
@@ -125,7 +125,7 @@ TEST(Table, QuotientsAreThoseOfTheSplineAlsoAcrossKnots) {
     const double quotient = table.quotient(b, a);
     const Precise expected = a == b ? test::precise_derivative(exact, Precise(a))
                                     : Precise((exact(Precise(a)) - exact(Precise(b))) / (Precise(a) - Precise(b)));
-    const double scale = 1 + std::abs(table.derivative(std::min(a, b)));  // the largest slope of a piece
+    const double scale = 1 + std::abs(table.derivative(std::min(a, b)));  // the largest slope of an interval
     worst = std::max(worst, test::error_in_epsilons(quotient, expected, Precise(scale)));
     worst_value = std::max(worst_value, test::error_in_epsilons(table.value(b), exact(Precise(b)), Precise(1)));
     EXPECT_EQ(quotient, table.quotient(a, b));
@@ -143,7 +143,7 @@ TEST(Table, TheWorkOfAStepIsTheDifferenceOfTheValues) {
                 1e-14 * (1 + std::abs(table.value(b))));
 }
 
-// Where the spline passes through zero, errors are measured against a share of the largest values at its points.
+// Where the spline is zero, errors are relative to a fraction of the largest values at its points.
 TEST(Table, ItsScaleIsThatOfTheSplineButNeverZero) {
   const Points p = lennard_jones_points(23);  // the third at the distance 1, where V = 0
   const std::vector<double> slopes = lennard_jones_slopes(p);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Every type of interaction in two and three dimensions: its loops must agree with its own energy.
+// Every type of interaction in two and three dimensions: its forces must agree with its energy.
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ TYPED_TEST(InDimension, ForcesAreMinusTheGradientOfTheEnergy) {
 TYPED_TEST(InDimension, TheVirialIsMinusTheDerivativeOfTheEnergyByTheScaleOfTheBox) {
   constexpr int D = TypeParam::value;
   this->for_each_case([](Scene<D>& scene, const Interaction<D>& term, auto&& remake) {
-    if (!term.keeps_momentum()) return;  // fields have none
+    if (!term.keeps_momentum()) return;  // fields do not conserve it
     const auto scaled_energy = [&](double scale) {
       Scene<D> scaled = scene;
       scaled.box.edges *= scale;
@@ -151,7 +151,7 @@ TYPED_TEST(InDimension, WrappingAParticleChangesNothingInAPeriodicBox) {
     const auto f = forces(term, x), f_carried = forces(term, carried);
     for (std::size_t i = 0; i < x.size(); ++i)
       EXPECT_LE((f[i] - f_carried[i]).norm(), 1e-11 * (1 + f[i].norm())) << "particle " << i;
-    // A pair keeps its image during a step: across the edge it is the same step as inside.
+    // A pair keeps its image during a step: a step across the edge is equal to one inside.
     const auto w = scene.random_vectors(0.3);
     const auto mean = mean_forces(term, x, displaced(x, w, 1));
     const auto mean_carried = mean_forces(term, carried, displaced(carried, w, 1));
