@@ -41,7 +41,7 @@ DISCS = toml_text(tomllib.loads(SPHERES) | {
 
 @pytest.mark.parametrize("text", [SPHERES, DISCS], ids=["spheres", "discs"])
 def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
-    output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11", "output.profile_interval=0.13"]
+    output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11", "output.profile_interval=0.13", "output.sample_start=0.05"]
     if text is SPHERES:
         output += ["particles.0.count=500", "run.end_time=1.0"]
     run(write_deck(tmp_path, text), tmp_path / "plain", output)
@@ -88,7 +88,7 @@ def test_positions_from_a_file_that_rank_0_sees(tmp_path):
 def test_forces_are_shared(method, tmp_path):
     deck = ROOT / "inputs" / "yukawa-fluid.toml"
     shorter = ["particles.count=256", "interaction.0.cutoff=2.5", "run.steps=20", "output.events=true", f"integrator.type={method}", "integrator.step=0.01",
-               "output.frame_interval=0.1", "output.rdf_interval=0.07", "output.profile_interval=0.05"]
+               "output.frame_interval=0.1", "output.rdf_interval=0.07", "output.profile_interval=0.05", "output.sample_start=0.05"]
     run(deck, tmp_path / "plain", shorter)
     assert summary(tmp_path / "plain")["events"]["sphere_sphere"] > 0
     for ranks in 2, 3:
