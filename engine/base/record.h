@@ -78,7 +78,7 @@ class Packing {
           static_cast<std::int32_t>(code >> (field_bits * k) & ((1u << field_bits) - 1)) - (1 << (field_bits - 1));
     return image;
   }
-  /// The same pair as packed by its other partner, from `self`.
+  /// Packs this pair as its other partner does, seen from `self`.
   std::uint32_t reversed(Slot self, std::uint32_t candidate) const { return pack(self, -linear(candidate)); }
 
   int slot_bits = 1, field_bits = 2;

@@ -67,7 +67,7 @@ struct Overlaps {
   double distance = 0;  ///< of that pair [length]
   double contact = 1;   ///< its contact distance [length]
 
-  /// Of that pair, relative to its contact distance; 0 where there is none.
+  /// The overlap of that pair, relative to its contact distance; 0 if there is none.
   double depth() const { return pairs == 0 ? 0 : 1 - distance / contact; }
   void add(const Overlaps& other) {
     const auto order = [](const Overlaps& o) { return std::tuple(o.distance / o.contact, o.lo, o.hi); };

@@ -288,7 +288,7 @@ TEST(Decomposition, APathHasHalfTheAccelerationOfTheStep) {
     EXPECT_FALSE(enough(-3.01 * 2 / kStep));
   });
 }
-/// Such long steps have collisions whose effects reach beyond a rank's ghosts.
+/// Steps this long have collisions whose effects reach beyond a rank's ghosts.
 TEST(Decomposition, StepsThatTakeAllParticles) {
   EXPECT_GT(compare<2>([] { return springs(40); }, "psa", 0.5, 2, 1000).counters.slabs_by_all, 0u);
 }
