@@ -46,14 +46,14 @@ name = "plus"
 count = {1}
 charge = 1.0
 temperature = 1.44
-radius = 0.1
+display_radius = 0.1
 mass = 1.0
 [[particles]]
 name = "minus"
 count = {2}
 charge = -1.0
 temperature = 1.44
-radius = 0.1
+display_radius = 0.1
 mass = 1.0
 [placement]
 type = "fcc"
