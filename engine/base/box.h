@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The simulation box: a rectangle or cuboid from the origin to `edges`, with a boundary rule for each axis.
+// The simulation box: a rectangle or cuboid from the origin to `edges` with a boundary rule for each axis, and all
+// walls.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "engine/base/boundary.h"
@@ -12,52 +14,96 @@
 
 namespace carom {
 
+/// A wall beside the box, or a face of the box that is more than a fixed hard wall. Box::add() checks and completes it.
+template <int D>
+struct WallOptions {
+  std::string name;                ///< a face of the box: "x-", "x+", "y-", …; another name: a further wall
+  Vec<D> normal = Vec<D>::Zero();  ///< of a further wall: into the space of the spheres, of any length
+  double offset = 0;               ///< of a further wall: normal·x = offset at time 0
+  double velocity = 0;             ///< along the normal [length/time]
+  bool one_sided = true;           ///< false: it acts on the spheres on both sides
+  Id number = 0;                   ///< set by add(); the rear of a wall with two sides has the next number
+
+  bool moves() const { return velocity != 0; }
+  /// How far it has moved along its normal since time 0.
+  double displacement(double time) const { return velocity * time; }
+};
+
 template <int D>
 struct Box {
-  Vec<D> edges = Vec<D>::Ones();  ///< [length]; within a slab: the edges at its start
+  Vec<D> edges = Vec<D>::Ones();  ///< at time 0 [length]
   std::array<Boundary, D> boundary{};
-  Vec<D> edge_velocity = Vec<D>::Zero();  ///< upper walls, along their axes [length/time]; nonzero: a piston
+  std::vector<WallOptions<D>> options{};  ///< of walls; use add()
+  double time = 0;                        ///< of the start of the slab, since the start of the run
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }
-  bool piston(int axis) const { return walled(axis) && edge_velocity[axis] != 0; }
-  bool pistons() const {
-    for (int k = 0; k < D; ++k)
-      if (piston(k)) return true;
-    return false;
-  }
   /// Whether some axis has this boundary.
   bool has(Boundary kind) const { return std::ranges::find(boundary, kind) != boundary.end(); }
-  /// The box after a time, with its pistons moved.
-  Box after(double time) const {
-    Box later = *this;
-    for (int k = 0; k < D; ++k)
-      if (piston(k)) later.edges[k] += edge_velocity[k] * time;
-    return later;
+  bool has_walls() const { return has(Boundary::wall) || !options.empty(); }
+
+  /// Adds a wall, or changes a face of the box; edges and boundaries must be set. Throws Error(Failure::deck).
+  void add(WallOptions<D> wall);
+  /// The options of a wall; null: it is a fixed hard face of the box.
+  const WallOptions<D>* find(Id number) const {
+    for (const WallOptions<D>& each : options)
+      if (each.number == number || (!each.one_sided && each.number + 1 == number)) return &each;
+    return nullptr;
+  }
+  /// Whether the walls are the fixed faces of the box, so that its volume is that of the spheres.
+  bool plain() const {
+    return std::ranges::all_of(options, [](const auto& each) { return each.number < 2 * D && !each.moves(); });
   }
   /// Whether all positions along the axis stay between 0 and the edge at all times.
-  bool bounded(int axis) const { return boundary[axis] != Boundary::open && !piston(axis); }
+  bool bounded(int axis) const {
+    return boundary[axis] != Boundary::open && std::ranges::none_of(options, [&](const auto& each) {
+             return each.moves() && each.number / 2 == static_cast<Id>(axis);
+           });
+  }
   /// Whether all axes are bounded, so that the box has a density.
   bool closed() const {
     for (int k = 0; k < D; ++k)
       if (!bounded(k)) return false;
     return true;
   }
-  /// The wall with this number; its axis must have walls.
+  /// The wall with this number, from `time` on; it must exist.
   Wall<D> wall(Id number) const {
-    const int axis = wall_axis(number);
-    return number % 2 == 0 ? Wall<D>{axis, 1, 0, 0} : Wall<D>{axis, -1, edges[axis], -edge_velocity[axis]};
+    const WallOptions<D>* const its = find(number);
+    Wall<D> wall{.number = number};
+    if (number < 2 * D) {
+      wall.axis = static_cast<int>(number / 2);
+      wall.normal = (number % 2 == 0 ? 1.0 : -1.0) * Vec<D>::Unit(wall.axis);
+      wall.offset = number % 2 == 0 ? 0.0 : -edges[wall.axis];
+    } else {
+      wall.normal = its->normal;
+      wall.offset = its->offset;
+      wall.one_sided = its->one_sided;
+    }
+    if (!its) return wall;
+    wall.offset += its->displacement(time);
+    wall.velocity = its->velocity;
+    if (number != its->number) {  // the rear
+      wall.normal = -wall.normal;
+      wall.offset = -wall.offset;
+      wall.velocity = -wall.velocity;
+    }
+    return wall;
   }
   /// All walls, ordered by number.
-  std::vector<Wall<D>> walls() const {
-    std::vector<Wall<D>> all;
-    for (Id number = 0; number < 2 * D; ++number)
-      if (walled(wall_axis(number))) all.push_back(wall(number));
+  std::vector<Wall<D>> walls() const;
+  /// For messages: "the upper wall of axis 1", "the wall 'ramp'".
+  std::string wall_name(Id number) const;
+
+  /// The lengths of the box at a time, between its faces [length].
+  Vec<D> lengths(double at) const {
+    Vec<D> all = edges;
+    for (const WallOptions<D>& each : options)
+      if (each.number < 2 * D) all[static_cast<int>(each.number / 2)] -= each.displacement(at);
     return all;
   }
+  double volume() const { return lengths(time).prod(); }
   /// The gap below which spheres count as touching, anywhere in the box.
   GapTolerance gap_tolerance() const { return GapTolerance(edges.maxCoeff()); }
-  double volume() const { return edges.prod(); }
 
   /// The image that brings `d`, a difference of two positions, nearest to the origin: the number of edges to add on
   /// each axis.

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "engine/base/wall.h"
+#include "engine/base/box.h"
 
 namespace carom {
 
@@ -44,10 +44,10 @@ bool same_partners(const EventKey<D>& a, const EventKey<D>& b) {
 
 /// Names the partners for messages: "particles 3 and 7", "particle 3 and the upper wall of axis 1".
 template <int D>
-std::string partners(const EventKey<D>& key) {
+std::string partners(const EventKey<D>& key, const Box<D>& box) {
   const std::string lo = std::to_string(key.lo);
   if (key.kind == EventKind::pair) return "particles " + lo + " and " + std::to_string(key.hi);
-  return "particle " + lo + " and " + wall_name(key.hi);
+  return "particle " + lo + " and " + box.wall_name(key.hi);
 }
 
 /// One executed collision.

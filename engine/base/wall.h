@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// A hard, elastic wall of the box: a plane normal to an axis, with everything a contact with it needs. A wall that
-// moves at a constant speed u is a piston: a collision turns the normal velocity v of a sphere into 2u − v.
+// A hard wall: a plane with everything a contact with it needs. box.h makes the list of all walls.
+//
+// A wall at normal·x = level(t) acts on the spheres on the side that its normal points to. The level is a polynomial of
+// the time in a slab; in free flight a shaken wall has the exact sine. A collision turns the velocity v of a sphere
+// along the normal into 2u − v, where u is the velocity of the wall.
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "engine/base/vec.h"
 
@@ -14,40 +16,48 @@ namespace carom {
 
 template <int D>
 struct Wall {
-  int axis = 0;
-  double inward = 1;    ///< unit normal along the axis: 1 for a lower wall, −1 for an upper one
-  double position = 0;  ///< along the axis at time 0, the start of the slab [length]
-  double velocity = 0;  ///< along the normal [length/time]
+  Id number = 0;  ///< in event keys and files: 2·axis for the lower face of the box, 2·axis + 1 for the upper one, 2·D
+                  ///< and more for further walls
+  int axis = -1;                   ///< of a face of the box; −1 for a further wall
+  Vec<D> normal = Vec<D>::Zero();  ///< unit vector into the space of the spheres
+  bool one_sided = true;           ///< false: does not act on spheres whose centres are behind the plane
+  double offset = 0;               ///< level at time 0, the start of the slab [length]
+  double velocity = 0;             ///< along the normal, at time 0 [length/time]
+  double acceleration = 0;         ///< along the normal [length/time²]
 
-  /// The number in event keys and files: 2·axis for a lower wall, 2·axis + 1 for an upper one.
-  Id number() const { return static_cast<Id>(2 * axis + (inward > 0 ? 0 : 1)); }
-  Vec<D> normal() const { return inward * Vec<D>::Unit(axis); }
-  double along_normal(const Vec<D>& v) const { return inward * v[axis]; }
-  double at(double t) const { return position + inward * velocity * t; }
-  /// The gap between the wall and a sphere at x at time t [length].
+  double along_normal(const Vec<D>& v) const { return axis >= 0 ? normal[axis] * v[axis] : normal.dot(v); }
+  double level(double t) const { return offset + t * (velocity + 0.5 * t * acceleration); }
+  double velocity_at(double t) const { return velocity + t * acceleration; }
+  /// The gap between the wall and a sphere at x at time t; infinite if the wall does not act on the sphere [length].
   double gap(const Vec<D>& x, double radius, double t = 0) const {
-    return inward > 0 ? x[axis] - at(t) - radius : at(t) - radius - x[axis];
+    const double at = level(t);
+    if (axis >= 0) return normal[axis] > 0 ? x[axis] - at - radius : -at - radius - x[axis];
+    const double distance = normal.dot(x) - at;
+    return one_sided || distance > 0 ? distance - radius : std::numeric_limits<double>::infinity();
   }
-  /// The rate at which the gap of a sphere with velocity v grows.
-  double opening(const Vec<D>& v) const { return along_normal(v) - velocity; }
-  /// The component along the axis after the collision of a sphere with a radius that grows at `rate`; v is the
-  /// component before it.
-  double reflected(double v, double rate = 0) const { return inward * (2 * (velocity + rate)) - v; }
-  /// The work that this impulse does on a sphere [energy].
-  double work(const Vec<D>& impulse) const { return velocity * along_normal(impulse); }
+  /// The rate at which the gap of a sphere with velocity v grows, and the acceleration of the gap if v has that of a.
+  double opening(const Vec<D>& v, double t = 0) const { return along_normal(v) - velocity_at(t); }
+  double speeding(const Vec<D>& a) const { return along_normal(a) - acceleration; }
+  /// The velocity after the collision of a sphere with velocity v and a radius that grows at `rate`.
+  Vec<D> bounced(Vec<D> v, double t = 0, double rate = 0) const {
+    const double u = velocity_at(t) + rate;
+    if (axis >= 0)
+      v[axis] = normal[axis] * (2 * u) - v[axis];
+    else
+      v += (2 * (u - normal.dot(v))) * normal;
+    return v;
+  }
+  /// The work that this impulse does on a sphere at time t [energy].
+  double work(const Vec<D>& impulse, double t = 0) const { return velocity_at(t) * along_normal(impulse); }
   /// The point that a sphere at x touches at time t.
   Vec<D> foot(Vec<D> x, double t = 0) const {
-    x[axis] = at(t);
+    if (axis >= 0)
+      x[axis] = normal[axis] * level(t);
+    else
+      x -= (normal.dot(x) - level(t)) * normal;
     return x;
   }
 };
-
-/// The axis of the wall with this number, and its name in messages: "the upper wall of axis 1".
-inline int wall_axis(Id number) { return static_cast<int>(number / 2); }
-inline std::string wall_name(Id number) {
-  const std::string side = number % 2 == 0 ? "the lower" : "the upper";
-  return side + " wall of axis " + std::to_string(number / 2);
-}
 
 /// The tolerance below which a gap counts as touching: max(1e-13 contact distances, 4 ulp of the box) [length].
 class GapTolerance {

@@ -135,9 +135,9 @@ double EventCore<D>::run(double end, const Report& report) {
     ++since_sort_;
     const std::uint32_t generation = queue_.generation_of(i);
     if (generation > std::numeric_limits<std::uint16_t>::max())
-      throw Error(Failure::numerical, partners(queue_.key_of(i)) +
+      throw Error(Failure::numerical, partners(queue_.key_of(i), box_) +
                                           " collide without end at one instant; separate the spheres that touch there");
-    if (++events_ > report.max_events) throw_too_many_contacts(report.max_events, partners(queue_.key_of(i)));
+    if (++events_ > report.max_events) throw_too_many_contacts(report.max_events, partners(queue_.key_of(i), box_));
     if (a.kind == EventKind::wall) {
       collide_wall(i, now, generation, report);
       search_.plan(i, now);
@@ -197,7 +197,7 @@ void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, c
   const Wall<D> wall = box_.wall(key.hi);
   const Impact<D> impact = flights_.bounce(i, wall, time, generation);
   ++queue_[i].version;
-  const double work = wall.work(impact.impulse);
+  const double work = wall.work(impact.impulse, time);
   if (report.trace) return report.trace->end(flights_[i], flights_[i], work, impact.overlap);
   report.counters.add(EventKind::wall, work, impact.overlap);
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], impact));

@@ -142,7 +142,7 @@ void EventSearch<D>::offer_all(const ScanTask& task) {
 template <int D>
 void EventSearch<D>::foresee_walls(Slot i) {
   for (const Wall<D>& wall : flights_.walls())
-    queue_.offer(i, flights_.wall_contact(i, wall), EventKind::wall, wall.number());
+    queue_.offer(i, flights_.wall_contact(i, wall), EventKind::wall, wall.number);
 }
 
 template <int D>

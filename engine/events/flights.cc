@@ -140,13 +140,13 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
 template <int D>
 double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const {
   const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
-  const double gap = wall.gap(r.x, at_record, r.t), opening = wall.opening(r.v) - rate;
-  const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity));
+  const double gap = wall.gap(r.x, at_record, r.t), opening = wall.opening(r.v, r.t) - rate;
+  const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity_at(r.t)));
   const bool touching = gap <= gap_tolerance_(at_record);
-  const double s = wall_contact_time(gap, opening, wall.along_normal(g_), horizon_ - r.t, touching, slack);
+  const double s = wall_contact_time(gap, opening, wall.speeding(g_), horizon_ - r.t, touching, slack);
   if (s == 0 && !(opening < -slack))
     throw Error(Failure::numerical,
-                "particle " + std::to_string(r.id) + " rests on " + wall_name(wall.number()) +
+                "particle " + std::to_string(r.id) + " rests on " + box_.wall_name(wall.number) +
                     " under the uniform field and would bounce without end; give it a height or a velocity");
   return r.t + s;
 }
@@ -175,11 +175,9 @@ template <int D>
 Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const {
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
-  double& v = r.v[wall.axis];
-  const double after = wall.reflected(v, rate);
-  Impact<D> impact{r.x - wall.foot(r.x, t), Vec<D>::Zero(), -wall.gap(r.x, at_contact, t) / at_contact};
-  impact.impulse[wall.axis] = mass(i) * (after - v);
-  v = after;
+  const Vec<D> after = wall.bounced(r.v, t, rate);
+  const Impact<D> impact{r.x - wall.foot(r.x, t), mass(i) * (after - r.v), -wall.gap(r.x, at_contact, t) / at_contact};
+  r.v = after;
   r.generation = static_cast<std::uint16_t>(generation);
   return impact;
 }
@@ -194,7 +192,7 @@ Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, co
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const {
   const Wall<D> wall = box_.wall(key.hi);
-  return {key, r.x, wall.foot(r.x, key.time), impact.impulse, wall.work(impact.impulse), impact.overlap};
+  return {key, r.x, wall.foot(r.x, key.time), impact.impulse, wall.work(impact.impulse, key.time), impact.overlap};
 }
 
 template class Flights<2>;

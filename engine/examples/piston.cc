@@ -30,7 +30,7 @@ class Rows : public carom::Observer<3> {
  public:
   explicit Rows(const carom::Simulation<3>& run) : run_(run) {}
   void thermo(const carom::Snapshot<3>& shot) override {
-    const double edge = run_.system().box.edges[0];
+    const double edge = run_.system().box.lengths(shot.time)[0];
     std::printf("edge %5.2f, temperature %.4f, adiabat %.4f, work %.3f\n", edge, shot.temperature, adiabat(edge),
                 run_.statistics().counters.wall_work.value());
   }
@@ -47,7 +47,7 @@ int main(int count, char** arguments) {
   carom::Box<3>& box = system->box;
   box.edges = {kLong, kWide, kWide};
   box.boundary = {carom::Boundary::wall, carom::Boundary::periodic, carom::Boundary::periodic};
-  box.edge_velocity[0] = -speed;
+  box.add({.name = "x+", .velocity = speed});
   auto sites = carom::lattice_sites<3>(carom::Lattice::centred, box, kSpheres, 0.5);
   sites.resize(kSpheres);
   for (const auto& x : sites) system->particles.add({.x = x});

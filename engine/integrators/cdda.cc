@@ -42,7 +42,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     scan_->begin_slab(report.counters, report.contacts, &piece_->a(), slab.length, watch_);
     if (watch_) watch_->cut();  // a solve changes the accelerations that the next one starts from
     auto& p = system.particles;
-    auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, p); };
+    auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, system); };
     double done = 0, longest = slab.length;
     bool ended = false;
     while (!ended) {
@@ -63,7 +63,8 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       if (!ended && done + tau == done) scan_->count_event(violator_);  // limits the number of pieces of length zero
       std::ranges::copy(piece_->x(), p.x.begin());
       std::ranges::copy(piece_->v(), p.v.begin());
-      scan_->remember();
+      scan_->remember(tau);
+      system.box.time += tau;
       scan_->slide(p.x, p.v);
       done += tau;
     }
@@ -108,7 +109,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     }
     // The bracket has closed on a jump: a grazing contact that exists for some τ only. The piece before it is accepted.
     if (lo == 0)
-      throw Error(Failure::numerical, partners(violator_) +
+      throw Error(Failure::numerical, partners(violator_, scan_->box()) +
                                           " meet at once, however short the step; "
                                           "separate them or give them a relative velocity");
     scan_->count_event(violator_);

@@ -52,11 +52,11 @@ class ChordContacts {
     for (Id i = 0; i < x.size(); ++i)
       for (const Wall<D>& wall : scan_.walls()) {
         key.lo = i;
-        key.hi = wall.number();
+        key.hi = wall.number;
         if (scan_.rests(key)) continue;
         const double radius = system_.particles.radius[i];
-        judge_wall(key, wall.gap(x[i], radius), wall.along_normal(chord[i]), wall.along_normal(v[i]),
-                   wall.along_normal(v_end[i]), radius, tau, scan_.rounding_speed(i, v[i]), end);
+        judge_wall(key, wall.gap(x[i], radius), wall.opening(chord[i], 0.5 * tau), wall.opening(v[i]),
+                   wall.opening(v_end[i], tau), radius, tau, scan_.rounding_speed(i, v[i]), end);
       }
     return end;
   }

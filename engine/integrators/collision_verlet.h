@@ -53,7 +53,8 @@ class VerletPieces {
     }
     accelerations_.update(system_, *counters_);
     kick(p.v, accelerations_.a, 0.5 * tau);
-    scan_.remember();
+    scan_.remember(0.5 * tau);  // the first kick has the reactions; stop_approach() does in place of the second
+    system_.box.time += tau;
     if (!scan_.resting().empty()) scan_.stop_approach(p.x, p.v);
   }
 

@@ -27,7 +27,7 @@ class CollisionVerlet : public Integrator<D> {
     pieces_->begin_slab(report, slab.length);
     double done = 0;
     for (bool contact = true; contact;) {
-      pieces_->collide(done, [&](const Touch<D>& touch) { collide_elastically(touch, system.particles); });
+      pieces_->collide(done, [&](const Touch<D>& touch) { collide_elastically(touch, system); });
       const double rest = slab.length - done, tau = pieces_->next_contact(rest);
       contact = tau < rest;
       pieces_->advance(contact ? tau : rest);

@@ -127,7 +127,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       const bool resolved = found_.touching;
       if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(p.x, p.v)))) {
         system.decomposition.need_all();
-        owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, p); });
+        owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, system); });
         found_.touching = !scan.resting().empty();
       }
       const double rest = slab.length - done, piece = std::min({longest, contact, rest});
@@ -158,7 +158,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       contact = kNever;
       if (longest * kMostPieces < slab.length && !end_.complete && end_.too_strong && end_.time > 0)
         throw Error(Failure::numerical,
-                    partners(end_.key) + " collide again and again without moving, even in pieces of a " +
+                    partners(end_.key, system.box) + " collide again and again without moving, even in pieces of a " +
                         std::to_string(kMostPieces) +
                         "th of the step: they have no room between their neighbours or walls; leave gaps between "
                         "spheres that fill a box from wall to wall, or use a smaller integrator.step");
@@ -341,13 +341,16 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     ExactSeries lack, kinetic;
     double pressing = 0;  // Σ |F| |x| of reactions
     if (resting()) {      // then every rank has all particles
-      const double lost = core_->scan().slide(x, v_end_);
+      const double lost = core_->scan().slide(x, v_end_, h);
       if (system.decomposition.ranks().rank() == 0) {
         lack.add(lost);
         for (const auto& contact : core_->scan().resting()) {
           const Id lo = contact.key.lo, hi = contact.key.hi;
           Vec<D> moved = x[lo] - p.x[lo];
-          if (contact.key.kind == EventKind::pair) moved -= x[hi] - p.x[hi];
+          if (contact.key.kind == EventKind::pair)
+            moved -= x[hi] - p.x[hi];
+          else
+            moved -= h * core_->scan().mean_speed(hi, h) * contact.normal;
           lack.add(-contact.force * contact.normal.dot(moved) / contact.normal.norm());
         }
       }
@@ -380,6 +383,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   /// Moves the particles to the slab's end and folds in the missing energy.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
+    core_->scan().remember(h);
     core_->finish(p);
     p.v.swap(v_end_);
     if (balance_.stretch != 0)
@@ -388,7 +392,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     counters_->folded += balance_.folded;
     counters_->frozen += balance_.frozen;
     system.decomposition.update_halo();
-    core_->scan().remember();
     past_.pass(h, resting() ? smooth_ : mean_);
   }
 

@@ -55,10 +55,11 @@ class FreeFlight : public Integrator<D> {
       const Stopwatch watch(report.counters.seconds.predict);
       flight.take(system.particles, g_, slab.length);
     }
-    const Box<D> start = system.box;
-    const auto end_at = [&](double time) {
-      flight.give_back(time, system.particles);
-      system.box = start.after(time);
+    double& time = system.box.time;
+    const double start = time;
+    const auto end_at = [&](double reached) {
+      flight.give_back(reached, system.particles);
+      time = start + reached;
     };
     // Runs to `end` or to the collision limit; returns whether it reached `end`.
     const auto run = [&](double end) {
@@ -72,9 +73,9 @@ class FreeFlight : public Integrator<D> {
       flight.fly_to(due, copies_);
       copies_.image = system.particles.image;
       for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
-      system.box = start.after(due);
+      time = start + due;
       report.observer(due, copies_);
-      system.box = start;
+      time = start;
       return true;
     };
     try {

@@ -82,6 +82,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
   void restart_slab(System<D>& system, double length) {
     auto& p = system.particles;
     take_motion(p, node_);
+    system.box.time -= lag_;
     double node_time = -lag_;
     for (;;) {
       collide(system, node_time);
@@ -96,6 +97,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     lag_ = length - node_time;
     take_motion(node_, p);
     if (lag_ <= 0) return;
+    system.box.time += lag_;
     for (std::size_t i = 0; i < p.size(); ++i) {
       p.v[i] += (0.5 * lag_) * pieces_->flight()[i];
       p.x[i] += lag_ * p.v[i];
@@ -133,6 +135,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
       nw -= n.dot(w_[hi]);
       nv -= n.dot(p.v[hi]);
       wKw += w_[hi].dot(product_[hi]);
+    } else {
+      nv -= touch.speed;  // then bλ + ½aλ² is the change of S_h less the work of the wall
     }
     for (std::size_t i = 0; i < p.size(); ++i) wKv += product_[i].dot(p.v[i]);
     const double sixth = h_ * h_ / 6;

@@ -33,10 +33,6 @@ void System<D>::check() const {
     if (!(box.edges[k] > 0) || !std::isfinite(box.edges[k]))
       refuse("the edge of the box along axis " + std::to_string(k) + " is " + short_text(box.edges[k]),
              "give a positive length");
-  for (int k = 0; k < D; ++k)
-    if (!std::isfinite(box.edge_velocity[k]) || (box.edge_velocity[k] != 0 && !box.walled(k)))
-      refuse("the edge of the box along axis " + std::to_string(k) + " moves at " + short_text(box.edge_velocity[k]),
-             "only walls can move, at finite speeds: make that boundary a wall, or its edge_velocity 0");
   for (Id i = 0; i < p.size(); ++i) {
     const auto wrong = [&](const char* what, const char* remedy) {
       refuse("the " + std::string(what) + " of particle " + std::to_string(p.id_of(i)) + " cannot be", remedy);

@@ -33,7 +33,6 @@ struct System {
     fields.add("radius", particles.radius, Kind::constant);
     fields.add("charge", particles.charge, Kind::constant);
     fields.add("species", particles.species, Kind::constant);
-    fields.add_value("edges", box.edges);
   }
   System(const System&) = delete;
   System& operator=(const System&) = delete;
@@ -51,7 +50,7 @@ struct System {
 
   /// Whether the total momentum is conserved: no walls, no external field.
   bool keeps_momentum() const {
-    return !box.has(Boundary::wall) &&
+    return !box.has_walls() &&
            std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
   }
 

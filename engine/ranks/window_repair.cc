@@ -111,7 +111,7 @@ void WindowRepair<D>::predict(Repaired& m, const EventKey<D>& now) {
     if (!(t < end_)) continue;
     const std::uint32_t generation = Flights<D>::generation_at(m.now, t);
     tasks_.push({.kind = Task::Kind::contact,
-                 .key = {t, generation, EventKind::wall, m.now.id, wall.number()},
+                 .key = {t, generation, EventKind::wall, m.now.id, wall.number},
                  .a = m.slot,
                  .version_a = m.version});
   }
@@ -163,7 +163,7 @@ void WindowRepair<D>::contact(const Task& task) {
   if (!pair) {
     const Wall<D> wall = box_.wall(key.hi);
     const Impact<D> impact = flights_.bounce(a.slot, of_a.after, wall, key.time, key.generation);
-    of_a.virial = wall.work(impact.impulse);
+    of_a.virial = wall.work(impact.impulse, key.time);
     of_a.overlap = impact.overlap;
     append(a, of_a);
     return predict(a, key);

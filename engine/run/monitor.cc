@@ -194,7 +194,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   }
   account_.virial_time += elapsed * account_.virial;
   if (const double time = s.end_time - s.start_time; time > 0) {
-    if (system_.box.pistons()) account_.virial_time = std::numeric_limits<double>::quiet_NaN();  // the volume varies
+    if (!system_.box.plain()) account_.virial_time = std::numeric_limits<double>::quiet_NaN();  // the volume varies
     s.mean_pressure = (account_.virial_time + s.counters.collision_virial.value()) / (time * D * system_.box.volume());
     s.collision_rate =
         2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * time);

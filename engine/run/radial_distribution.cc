@@ -94,9 +94,10 @@ double shell_volume(double a, double b, const Vec<D>& edges, const std::array<bo
 /// The error if g(r) up to `range` is not defined in this system.
 template <int D>
 std::optional<ParameterError> error_of(const System<D>& system, double range) {
-  if (!system.box.closed())
-    return ParameterError{"interval", "g(r) needs a density, and a box with an open boundary or a piston has none",
-                          "set rdf_interval = 0, or close the box"};
+  if (!system.box.closed() || !system.box.plain())
+    return ParameterError{
+        "interval", "g(r) needs a density, and a box with an open boundary, walls that move or further walls has none",
+        "set rdf_interval = 0, or close the box"};
   const double longest = RadialDistribution<D>::longest_range(system);
   if (range > 0 && range <= longest * (1 + 1e-9)) return {};
   std::ostringstream what, remedy;

@@ -27,8 +27,8 @@ void check_spheres(const System<D>& system) {
                                               std::to_string(k) + ", less than a diameter of " + short_text(diameter) +
                                               "; enlarge it, a sphere must not touch itself");
   if (const Outsiders out = find_outsiders(system); out.spheres > 0)
-    throw Error(Failure::initial_state, "particle " + std::to_string(out.worst) + " is not inside the walls of axis " +
-                                            std::to_string(out.axis) +
+    throw Error(Failure::initial_state, "particle " + std::to_string(out.worst) + " reaches " + short_text(out.depth) +
+                                            " beyond " + system.box.wall_name(out.wall) +
                                             "; keep it a radius from every wall, or enlarge the box");
   if (const Overlaps overlaps = find_overlaps(system); overlaps.pairs > 0)
     throw Error(Failure::initial_state, "particles " + std::to_string(overlaps.lo) + " and " +
@@ -224,6 +224,7 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
   Decomposition<D>& decomposition = system_->decomposition;
   for (Counters before = report.counters;;) try {
       watch.begin();
+      system_->box.time = slab.start;
       integrator_->slab(*system_, slab, report);
       return true;
     } catch (HaloTooSmall) {

@@ -57,9 +57,10 @@ template <int D>
 std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
   if (parameters.integer("axis") >= D)
     return ParameterError{"axis", "there is no such axis", "the axes are numbered from 0"};
-  if (system.box.closed()) return {};
-  return ParameterError{"interval", "a profile needs slabs, and a box with an open boundary or a piston has none",
-                        "set profile_interval = 0, or close the box"};
+  if (system.box.closed() && system.box.plain()) return {};
+  return ParameterError{
+      "interval", "a profile needs slabs, and a box with an open boundary, walls that move or further walls has none",
+      "set profile_interval = 0, or close the box"};
 }
 
 }  // namespace

@@ -162,6 +162,7 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
 
   std::vector<Id> order(ids.begin(), ids.end());
   std::stable_sort(order.begin(), order.end(), [&](Id a, Id b) { return radius[a] > radius[b]; });
+  const auto walls = box.walls();
   std::size_t placed = 0;
   for (const Id i : order) {
     RandomStream random(seed, RandomPurpose::position, i);
@@ -171,7 +172,7 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
         const double margin = box.walled(k) ? radius[i] : 0;
         x[i][k] = margin + random.uniform() * (box.edges[k] - 2 * margin);
       }
-      free = true;
+      free = box.plain() || std::ranges::all_of(walls, [&](const auto& w) { return w.gap(x[i], radius[i]) >= 0; });
       cells.for_each_near(x[i], radius[i], [&](Id j, const Image<D>& image) {
         const double contact = radius[i] + radius[j];
         if ((x[i] - x[j] + box.shift(image)).squaredNorm() < contact * contact) free = false;
@@ -214,7 +215,7 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
       outside = true;
       if (depth <= found.depth) continue;
       found.worst = i;
-      found.axis = wall.axis;
+      found.wall = wall.number;
       found.depth = depth;
     }
     if (outside) ++found.spheres;

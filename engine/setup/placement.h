@@ -84,7 +84,7 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
 struct Outsiders {
   std::size_t spheres = 0;
   Id worst = 0;
-  int axis = 0;
+  Id wall = 0;       ///< its number
   double depth = 0;  ///< how far the worst one extends beyond the wall [length]
 };
 template <int D>

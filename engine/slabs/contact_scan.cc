@@ -32,6 +32,7 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events, s
     : box_(system.box),
       particles_(system.particles),
       walls_(system.box.walls()),
+      walls_at_(system.box.time),
       tolerance_(system.box.gap_tolerance()),
       list_(system.box, system.particles.radius),
       keeps_momentum_(system.keeps_momentum()),
@@ -63,12 +64,10 @@ void ContactScan<D>::note_pressed() {
 /// Finds all contacts at x, in the order of their keys.
 template <int D>
 void ContactScan<D>::find_touching(double time, Positions<D> x) {
-  if (box_.pistons())
-    throw Error(Failure::deck, "this method knows no walls that move; take free-flight or psa, or stop them");
   touching_.clear();
-  const auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma) {
+  const auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma, double speed = 0) {
     counters_->max_overlap = std::max(counters_->max_overlap, -gap / sigma);
-    touching_.push_back({key, normal});
+    touching_.push_back({key, normal, speed});
   };
   EventKey<D> key;
   key.time = time;
@@ -84,12 +83,12 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   key.kind = EventKind::wall;
   key.image = {};
   for (Id i = 0; i < x.size(); ++i)
-    for (const Wall<D>& wall : walls_) {
+    for (const Wall<D>& wall : walls()) {
       const double gap = wall.gap(x[i], particles_.radius[i]);
       if (gap > tolerance(particles_.radius[i])) continue;
       key.lo = i;
-      key.hi = wall.number();
-      note(key, wall.normal(), gap, particles_.radius[i]);
+      key.hi = wall.number;
+      note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
     }
   std::ranges::sort(touching_, {}, &Touch<D>::key);
 }
@@ -122,6 +121,7 @@ double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& norma
   const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
   Vec<D> a = Vec<D>::Zero();
   if (a_ && key.lo < a_->size()) a = pair ? Vec<D>((*a_)[key.lo] - (*a_)[key.hi]) : (*a_)[key.lo];
+  if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
   const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
   const double pressing = std::max(known_force(key) * inverse_mass, -a.dot(normal) / normal.norm());
   const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
@@ -133,19 +133,19 @@ double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& norma
 /// The gradient of the gap of a contact at x, up to a positive factor.
 template <int D>
 Vec<D> ContactScan<D>::normal(const EventKey<D>& key, Positions<D> x) const {
-  if (key.kind == EventKind::wall) return box_.wall(key.hi).normal();
+  if (key.kind == EventKind::wall) return box_.wall(key.hi).normal;
   return x[key.lo] - x[key.hi] + box_.shift(key.image);
 }
 
 template <int D>
 double ContactScan<D>::normal_speed(const Touch<D>& touch, Positions<D> v) const {
-  if (!touch.pair()) return touch.normal.dot(v[touch.key.lo]);
+  if (!touch.pair()) return touch.normal.dot(v[touch.key.lo]) - touch.speed;
   return touch.normal.dot(v[touch.key.lo] - v[touch.key.hi]) / touch.normal.norm();
 }
 
 template <int D>
 void ContactScan<D>::count_event(const EventKey<D>& key) {
-  if (++events_ > max_events_) throw_too_many_contacts(max_events_, partners(key));
+  if (++events_ > max_events_) throw_too_many_contacts(max_events_, partners(key, box_));
 }
 
 template <int D>
@@ -187,7 +187,7 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
     if (!(normal_speed(touch, v) < -resting_speed(touch, v))) continue;
     touch.key.generation = generation;
     if (generation > kMostRounds)
-      throw Error(Failure::numerical, partners(touch.key) +
+      throw Error(Failure::numerical, partners(touch.key, box_) +
                                           " and their neighbours collide without end at one instant: they touch on all "
                                           "sides and have no room to part; leave gaps between spheres that fill the "
                                           "space between walls, or a periodic box");
@@ -208,7 +208,9 @@ void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>&
     contact.virial = touch.normal.dot(impulse);
     contact.x_hi = x[hi] - box_.shift(touch.key.image);
   } else {
-    contact.x_hi = box_.wall(hi).foot(x[lo]);
+    const Wall<D> wall = box_.wall(hi);
+    contact.x_hi = wall.foot(x[lo]);
+    contact.virial = wall.work(impulse);
   }
   counters_->record(contact, contacts_);
 }
@@ -254,7 +256,10 @@ template <int D>
 void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double rest) {
   for (auto& contact : resting_) {
     contact.bound = contact.slack = 0;
-    if (contact.key.kind != EventKind::pair) continue;
+    if (contact.key.kind != EventKind::pair) {
+      contact.bound = box_.wall(contact.key.hi).acceleration;
+      continue;
+    }
     // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `rest`. For a pair that turns (u) while
     // it slows down (u·a < 0) the second term would cause an overlap; the reaction, normal to u, does not change u·a.
     const Vec<D> u = v[contact.key.lo] - v[contact.key.hi];
@@ -276,7 +281,7 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     const double gap = pair ? contact.normal.norm() - sigma : box_.wall(hi).gap(x[lo], sigma);
     if (pair) contact.normal = 2 * contact.normal + length * (w_before[lo] - w_before[hi]);
     if (length < 0) contact.normal = -contact.normal;
-    contact.bound = 0;
+    contact.bound = pair ? 0.0 : length < 0 ? -mean_speed(hi, length) : mean_speed(hi, length);
     contact.slack = 0.125 * normal_slack(contact, w_before);  // about 30 ε of the speeds, as good as a new solution
     const double touching = tolerance(sigma);
     if (std::abs(gap) <= 0.5 * touching) continue;
@@ -286,7 +291,7 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     // of the reaction, 2 m/h times that speed, is known to ε x only.
     const double rounding = rounding_speed(contact.key, w_before), at_once = tolerance(0) / std::abs(length);
     const double speed = gap < -touching && at_once <= kMostCorrection * rounding ? at_once : 0.5 * rounding;
-    contact.bound = std::clamp(-gap / std::abs(length), -speed, speed) * contact.normal.norm();
+    contact.bound += std::clamp(-gap / std::abs(length), -speed, speed) * contact.normal.norm();
   }
   return press_apart(w, 2 / std::abs(length));
 }
@@ -295,17 +300,21 @@ template <int D>
 double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v) {
   for (auto& contact : resting_) {
     contact.normal = normal(contact.key, x);
-    contact.lambda = contact.bound = 0;
+    contact.lambda = 0;
+    contact.bound = wall_speed(contact.key);
     contact.slack = normal_slack(contact, v);
   }
   double lost = 0;
   solve_reactions<D>(resting_, particles_.mass, v, &lost);
+  for (const auto& contact : resting_) lost += count_work(contact.lambda * wall_speed(contact.key));
   return lost;
 }
 
 template <int D>
-void ContactScan<D>::remember() {
+void ContactScan<D>::remember(double length) {
   if (resting_.empty() && reactions_.empty()) return;
+  for (const auto& contact : resting_)
+    if (contact.key.kind == EventKind::wall) count_work(contact.force * length * mean_speed(contact.key.hi, length));
   reactions_.clear();
   for (const auto& contact : resting_)
     if (contact.force > 0) reactions_.push_back({contact.key, contact.force});
@@ -313,11 +322,14 @@ void ContactScan<D>::remember() {
 }
 
 template <int D>
-double ContactScan<D>::slide(Positions<D> x, Vectors<D> v) {
+double ContactScan<D>::slide(Positions<D> x, Vectors<D> v, double later) {
   std::vector<RestingContact<D>> held;
   for (const auto& contact : resting_)
     if (contact.force > 0) held.push_back({.key = contact.key, .normal = normal(contact.key, x)});
-  for (auto& contact : held) contact.slack = normal_slack(contact, v);
+  for (auto& contact : held) {
+    contact.slack = normal_slack(contact, v);
+    contact.bound = wall_speed(contact.key, later);
+  }
   return keep_tangential<D>(held, particles_.mass, v);
 }
 
@@ -351,14 +363,14 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   key.kind = EventKind::wall;
   key.image = {};
   for (Id i = 0; i < x.size(); ++i)
-    for (const Wall<D>& wall : walls_) {
+    for (const Wall<D>& wall : walls()) {
       const double gap = wall.gap(x[i], particles_.radius[i]);
       key.lo = i;
-      key.hi = wall.number();
+      key.hi = wall.number;
       const bool touching = gap <= tolerance(particles_.radius[i]);
-      key.time = wall_contact_time(gap, wall.along_normal(v[i]), wall.along_normal(a[i]), rest, touching,
+      key.time = wall_contact_time(gap, wall.opening(v[i]), wall.speeding(a[i]), rest, touching,
                                    touching ? rounding_speed(key, v) : 0.0);
-      if (key.time < kNever) offer(wall.normal());
+      if (key.time < kNever) offer(wall.normal);
     }
   // Pieces that end in a contact without an impulse count too, so that their number is limited.
   if (first.key.time < kNever && events_ == events_at_last_cut_) count_event(first.key);
@@ -367,11 +379,11 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
 }
 
 template <int D>
-void collide_elastically(const Touch<D>& touch, Particles<D>& particles) {
+void collide_elastically(const Touch<D>& touch, System<D>& system) {
+  Particles<D>& particles = system.particles;
   const Id lo = touch.key.lo, hi = touch.key.hi;
   if (!touch.pair()) {
-    double& v = particles.v[lo][wall_axis(hi)];
-    v = -v;
+    particles.v[lo] = system.box.wall(hi).bounced(particles.v[lo]);
     return;
   }
   const double mass_lo = particles.mass[lo], mass_hi = particles.mass[hi];
@@ -382,7 +394,7 @@ void collide_elastically(const Touch<D>& touch, Particles<D>& particles) {
 
 template class ContactScan<2>;
 template class ContactScan<3>;
-template void collide_elastically<2>(const Touch<2>&, Particles<2>&);
-template void collide_elastically<3>(const Touch<3>&, Particles<3>&);
+template void collide_elastically<2>(const Touch<2>&, System<2>&);
+template void collide_elastically<3>(const Touch<3>&, System<3>&);
 
 }  // namespace carom

@@ -31,6 +31,7 @@ template <int D>
 struct Touch {
   EventKey<D> key;  ///< key.time counts from now for a future contact
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
+  double speed = 0;  ///< of a wall along the normal
   bool pair() const { return key.kind == EventKind::pair; }
 };
 
@@ -80,16 +81,21 @@ class ContactScan {
   /// Call resolve() first; contacts held at rest are not searched for.
   Touch<D> earliest(Positions<D> x, Positions<D> v, Positions<D> a, double rest);
 
-  /// Call this at the end of a piece: the next solve starts from its reactions.
-  void remember();
+  /// Call this when a piece is accepted, before the box moves on: counts the work of moving walls on spheres at rest on
+  /// them, whose reactions have acted for this length of time, and the next solve starts from these reactions.
+  void remember(double length);
 
   /// Makes the velocities of contacts that were held over a piece tangential at its end, x, and conserves their energy
   /// (the normal velocity that a held piece of finite length leaves would make the pair bounce at once). Returns the
-  /// energy that is missing afterwards.
-  double slide(Positions<D> x, Vectors<D> v);
+  /// energy that is missing afterwards. The box is at a time that is `later` at the end of the piece.
+  double slide(Positions<D> x, Vectors<D> v, double later = 0);
 
   /// The candidate pairs, for methods that search for contacts themselves.
   NeighbourList<D>& list() { return list_; }
+
+  const Box<D>& box() const { return box_; }
+  /// The mean velocity of a wall along its normal over a piece that starts now.
+  double mean_speed(Id wall, double length) const { return box_.wall(wall).velocity_at(0.5 * length); }
 
   double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
   double tolerance(double sigma) const { return tolerance_(sigma); }
@@ -103,7 +109,11 @@ class ContactScan {
   double floor(double gap_at_start, double tolerance) const {
     return std::min(-tolerance, gap_at_start - std::numeric_limits<double>::epsilon() * box_.edges.maxCoeff());
   }
-  std::span<const Wall<D>> walls() const { return walls_; }
+  /// The walls from the present time of the box on.
+  std::span<const Wall<D>> walls() {
+    if (std::exchange(walls_at_, box_.time) != box_.time) walls_ = box_.walls();
+    return walls_;
+  }
 
   /// Counts one more contact or piece of length zero; throws if the slab needs more than max_events.
   void count_event(const EventKey<D>& key);
@@ -137,6 +147,13 @@ class ContactScan {
                   const std::function<void(const Touch<D>&)>& impulse);
   void record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse);
   double known_force(const EventKey<D>& key) const;
+  double wall_speed(const EventKey<D>& key, double later = 0) const {
+    return key.kind == EventKind::wall ? box_.wall(key.hi).velocity_at(later) : 0.0;
+  }
+  double count_work(double work) {
+    if (work != 0) counters_->wall_work.add(work);
+    return work;
+  }
   double stop_rounding(Vectors<D> v) const;
   Vec<D> normal(const EventKey<D>& key, Positions<D> x) const;
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;
@@ -146,6 +163,7 @@ class ContactScan {
   const Box<D>& box_;
   const Particles<D>& particles_;
   std::vector<Wall<D>> walls_;
+  double walls_at_;  // the time of walls_
   GapTolerance tolerance_;
   NeighbourList<D> list_;
   bool keeps_momentum_;
@@ -164,6 +182,6 @@ class ContactScan {
 
 /// Applies the elastic impulse, which conserves kinetic energy and momentum.
 template <int D>
-void collide_elastically(const Touch<D>& touch, Particles<D>& particles);
+void collide_elastically(const Touch<D>& touch, System<D>& system);
 
 }  // namespace carom

@@ -75,7 +75,7 @@ class Problem {
       std::vector<int> bodies;
       Vec<D> free = Vec<D>::Ones(), momentum = Vec<D>::Zero();  // free: 0 along axes of walls that the cluster touches
       for (const int k : cluster) {
-        if (arms_[k].hi == kWall) free[wall_axis(contacts_[k].key.hi)] = 0;
+        if (arms_[k].hi == kWall) free = (contacts_[k].normal.array() == 0).select(free, 0);
         for (const int b : {arms_[k].lo, arms_[k].hi})
           if (b != kWall) bodies.push_back(b);
       }
@@ -91,7 +91,14 @@ class Problem {
         momentum += m * after;
         v = after;
       }
-      const Vec<D> centre = free.cwiseProduct(momentum) / mass;
+      Vec<D> centre = free.cwiseProduct(momentum) / mass;
+      bool carried = false;  // by a moving wall
+      for (const int k : cluster) {
+        const auto& [key, normal, speed, slack, lambda, force] = contacts_[k];
+        if (arms_[k].hi != kWall || speed == 0) continue;
+        carried = true;
+        centre += (speed - normal.dot(centre)) * normal;
+      }
       for (const int b : bodies) kinetic += 0.5 / bodies_[b].inverse_mass * (w_[bodies_[b].id] - centre).squaredNorm();
       if (!(std::abs(lost) <= kMostStretched * kinetic)) {
         lacks += lost;
@@ -99,7 +106,11 @@ class Problem {
       }
       if (lost == 0) continue;
       const double share = lost / kinetic, stretch = share / (1 + std::sqrt(1 + share));
-      for (const int b : bodies) w_[bodies_[b].id] += stretch * (w_[bodies_[b].id] - centre);
+      for (const int b : bodies) {
+        const Vec<D> more = stretch * (w_[bodies_[b].id] - centre);
+        w_[bodies_[b].id] += more;
+        if (carried) lacks -= more.dot(centre) / bodies_[b].inverse_mass;
+      }
     }
     return lacks;
   }

@@ -29,8 +29,6 @@ SlabCore<D>::SlabCore(System<D>& system, std::uint64_t max_events)
       particles_(system.particles),
       max_events_(max_events),
       most_bend_(kMostBend * mean_distance(system)) {
-  if (system.decomposition.joined() && box_.pistons())
-    throw Error(Failure::deck, "forces and walls that move together need one rank; take one, or free-flight");
   system.fields.add_value("reactions", reactions_);
   system.fields.add_working(
       this, [this] { release(); },
@@ -143,7 +141,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   if (shared)
     compare_ranks(!end.complete || too_many_contacts_ || longest_path_ > 0);
   else if (too_many_contacts_)
-    throw_too_many_contacts(max_events_, partners(end.key));
+    throw_too_many_contacts(max_events_, partners(end.key, box_));
   else if (longest_path_ > 0 && !a_.empty())
     return {.complete = false, .too_strong = true};
   else if (longest_path_ > 0) {
@@ -272,10 +270,10 @@ void SlabCore<D>::predict_walls(Id i) {
   for (const Wall<D>& wall : walls_) {
     const double gap = wall.gap(x, radius, t);
     const bool touching = gap <= scan_->tolerance(radius);
-    const double s = wall_contact_time(gap, wall.opening(v), wall.along_normal(a), length_ - t, touching,
+    const double s = wall_contact_time(gap, wall.opening(v, t), wall.speeding(a), length_ - t, touching,
                                        touching ? scan_->rounding_speed(i, v) : 0.0);
     if (!(t + s < length_)) continue;
-    EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = wall.number()};
+    EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = wall.number};
     if (!held_.empty() && scan_->rests(key)) continue;
     key.generation = generation(i, key.time);
     queue_.push_back({key, version(i)});
@@ -289,8 +287,8 @@ struct SlabCore<D>::Meeting {
   Meeting(const SlabCore& core, const EventKey<D>& key) : v_lo(core.velocity(key.lo, key.time)) {
     if (key.kind == EventKind::wall) {
       const Wall<D> wall = core.box_.wall(key.hi);
-      normal = wall.normal();
-      speed = wall.opening(v_lo);
+      normal = wall.normal;
+      speed = wall.opening(v_lo, key.time);
       sigma = core.particles_.radius[key.lo];
       return;
     }
@@ -354,13 +352,12 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   };
   if (key.kind == EventKind::wall) {
     const Wall<D> wall = box_.wall(key.hi);
-    double& v = lo.v[wall.axis];
-    if (!(wall.opening(lo.v) < 0)) return;
-    const double after = wall.reflected(v);
-    contact.impulse[wall.axis] = mass * (after - v);
-    contact.virial = wall.work(contact.impulse);
+    if (!(wall.opening(lo.v, key.time) < 0)) return;
+    const Vec<D> after = wall.bounced(lo.v, key.time);
+    contact.impulse = mass * (after - lo.v);
+    contact.virial = wall.work(contact.impulse, key.time);
     contact.x_hi = wall.foot(lo.x, key.time);
-    v = after;
+    lo.v = after;
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
     const double mass_hi = particles_.mass[key.hi];

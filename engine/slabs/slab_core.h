@@ -84,7 +84,7 @@ class SlabCore {
   void finish(Particles<D>& particles) {
     particles.x.swap(x_);
     particles.v.swap(v_);
-    system_.box = system_.box.after(length_);
+    system_.box.time += length_;
   }
 
   /// The contacts at the slab's start, and the resting ones.

@@ -56,7 +56,7 @@ void check_spheres(const Deck::Source& source, const System<D>& system, Problems
   if (const Outsiders out = find_outsiders(system); out.spheres > 0)
     problems.error(place_of(source, out.worst),
                    say(plural(out.spheres, "sphere is", "spheres are"), " not inside the walls; the worst is particle ",
-                       out.worst, ", which reaches ", out.depth, " beyond a wall of axis ", out.axis),
+                       out.worst, ", which reaches ", out.depth, " beyond ", system.box.wall_name(out.wall)),
                    "move it inside (at least a radius from every wall), or enlarge the box");
   if (const Overlaps overlaps = find_overlaps(system); overlaps.pairs > 0)
     problems.error(place_of(source, overlaps.hi),
@@ -85,7 +85,7 @@ template <int D>
 void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
   const Deck::Source& source = *deck.source;
   const Box<D>& box = system.box;
-  if (!source.integrator->hard_cores && !box.walls().empty())
+  if (!source.integrator->hard_cores && box.has_walls())
     problems.warning(source.system, "walls do not act with " + deck.integrator + ", which knows no hard cores",
                      "make the boundary open or periodic, or take another integrator");
 

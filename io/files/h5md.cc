@@ -168,9 +168,8 @@ struct TrajectoryWriter<D>::Contents {
         edges(file, "particles/trajectory/box/edges", {3, 3}),
         momentum(file, "observables/momentum", {3}),
         collisions(file, "observables/collisions"),
+        box_of(system.box),
         ranks(system.decomposition.ranks()) {
-    for (std::size_t k = 0; k < 3; ++k)
-      edge_rows[4 * k] = static_cast<int>(k) < D ? system.box.edges[static_cast<int>(k)] : 1.0;
     for (const auto& column : scalar_columns<D>())
       if (column.element) observables.push_back({{file, std::string("observables/") + column.element}, column.of});
     for (auto* element : {&velocity, &edges, &momentum}) element->share_clock(file, position.group);
@@ -288,7 +287,7 @@ struct TrajectoryWriter<D>::Contents {
     double (*of)(const Snapshot<D>&);
   };
   std::vector<Scalar> observables;
-  std::array<double, 9> edge_rows{};
+  const Box<D>& box_of;
   Communicator& ranks;
 };
 
@@ -309,7 +308,10 @@ template <int D>
 void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   Contents& c = *contents_;
   c.write_particles(*s.particles);
-  c.edges.value.append(c.edge_rows);
+  const Vec<D> lengths = c.box_of.lengths(s.time);
+  std::array<double, 9> edges{0, 0, 0, 0, 0, 0, 0, 0, 1};  // in two dimensions 1 along z
+  for (int k = 0; k < D; ++k) edges[4 * static_cast<std::size_t>(k)] = lengths[k];
+  c.edges.value.append(edges);
   c.momentum.value.append(three_columns<double>(std::array{s.momentum}, D));
   c.collisions.value.append(s.collisions);
   for (auto& [element, of] : c.observables) element.value.append(of(s));

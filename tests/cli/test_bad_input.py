@@ -163,7 +163,7 @@ IMPOSSIBLE_STATES = {
         ["pairs of spheres overlap", "contact distance 1"]),
     "outside a wall": (
         changed("[[2.0, 5.0]", "[[0.25, 5.0]"),
-        ["1 sphere is not inside the walls", "particle 0", "0.25 beyond a wall of axis 0"]),
+        ["1 sphere is not inside the walls", "particle 0", "0.25 beyond the lower wall of axis 0"]),
     "periodic box too small": (
         changed('["wall", "wall"]', '["wall", "periodic"]').replace("[10.0, 10.0]", "[10.0, 0.9]").replace("5.0]", "0.45]"),
         ["the periodic box is 0.9 long on axis 1, less than a diameter of 1"]),

@@ -139,7 +139,7 @@ MISTAKES = {
     "no integrator": (USAGE, "there is no integrator; call integrator(name, step=…) first", lambda: without("integrator")),
     "run without particles": (USAGE, "there are no particles; call add_particles() first", lambda: without("particles")),
     "overlap": (STATE, "particles 0 and 1 overlap, at distance 0.5; move them apart", lambda: alone([[3, 3], [3.5, 3]])),
-    "outside": (STATE, "particle 0 is not inside the walls of axis 0; keep it a radius from every wall",
+    "outside": (STATE, "particle 0 reaches 1 beyond the upper wall of axis 0; keep it a radius from every wall",
                 lambda: alone([[12.5, 3]])),
     "sphere larger than the box": (STATE, "the periodic box is 0.9 long on axis 1, less than a diameter of 1",
                                    lambda: alone([[3, 0.5]], box=[12, 0.9], boundary="periodic")),

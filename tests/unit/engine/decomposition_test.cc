@@ -321,7 +321,8 @@ TEST(Decomposition, TheOutermostSphereIsNamedByItsId) {
   system->particles.x[last][0] = 0.2;
   for (const int ranks : {0, 2, 3}) {
     const std::string message = failure_of(*system, find_integrator("free-flight"), {{"step", 1.0}}, ranks);
-    EXPECT_TRUE(message.starts_with("particle " + std::to_string(last) + " is not inside the walls of axis 0"))
+    EXPECT_TRUE(
+        message.starts_with("particle " + std::to_string(last) + " reaches 0.3 beyond the lower wall of axis 0"))
         << message;
   }
 }

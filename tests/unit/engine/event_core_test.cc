@@ -21,6 +21,13 @@ struct Hit {
   Id lo, hi;
 };
 
+/// The velocity of the upper edge of the box along an axis.
+template <int D>
+double edge_velocity(const Box<D>& box, int axis) {
+  const WallOptions<D>* const face = box.find(static_cast<Id>(2 * axis + 1));
+  return face ? -face->velocity : 0;
+}
+
 /// Simple and slow event-driven dynamics: all spheres are moved to every event, and all pairs and images are tried.
 template <int D>
 std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g, double end) {
@@ -52,9 +59,9 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
       }
       for (int k = 0; k < D; ++k)
         for (int side = 0; side < 2 && box.walled(k); ++side) {
-          const double sign = side == 0 ? 1 : -1, wall = side == 0 ? 0 : box.edges[k] + now * box.edge_velocity[k],
+          const double sign = side == 0 ? 1 : -1, wall = side == 0 ? 0 : box.edges[k] + now * edge_velocity(box, k),
                        gap = sign * (p.x[i][k] - wall) - p.radius[i];
-          const double v = sign * (p.v[i][k] - side * box.edge_velocity[k]), a = sign * g[k];
+          const double v = sign * (p.v[i][k] - side * edge_velocity(box, k)), a = sign * g[k];
           double s = kNever;
           if (a == 0)
             s = v < 0 ? std::max(0.0, gap / -v) : kNever;
@@ -73,7 +80,7 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
     hits.push_back(next);
     if (next.kind == EventKind::wall) {
       double& v = p.v[next.lo][next.hi / 2];
-      v = 2 * (next.hi % 2) * box.edge_velocity[next.hi / 2] - v;
+      v = 2 * (next.hi % 2) * edge_velocity(box, static_cast<int>(next.hi / 2)) - v;
     } else {
       const Vec<D> d = p.x[next.lo] - p.x[next.hi] + best_shift;
       const double f = collision_factor<D>(d, p.v[next.lo] - p.v[next.hi], p.mass[next.lo], p.mass[next.hi]);
@@ -125,8 +132,8 @@ void expect_same_events(const System<D>& system, const Vec<D>& g, double end, st
     EXPECT_EQ(key.hi, obvious[k].hi) << "event " << k;
     if (key.kind != EventKind::wall) continue;
     Vec<D> foot = contacts[k].x_lo;
-    const int axis = wall_axis(key.hi);
-    foot[axis] = key.hi % 2 == 0 ? 0 : system.box.edges[axis] + system.box.edge_velocity[axis] * key.time;
+    const int axis = static_cast<int>(key.hi / 2);
+    foot[axis] = key.hi % 2 == 0 ? 0 : system.box.edges[axis] + edge_velocity(system.box, axis) * key.time;
     EXPECT_EQ(contacts[k].x_hi, foot) << "event " << k;
   }
 }
@@ -159,10 +166,11 @@ TEST(EventCore, FindsThemInAUniformField) {
 TEST(EventCore, FindsThemWhereWallsMove) {
   for (const double speed : {-0.15, 0.4}) {
     const auto flat = random_spheres<2>(8, 4, {W, P}, 2);
-    flat->box.edge_velocity = {speed, 0};
+    flat->box.add({.name = "x+", .velocity = -speed});
     expect_same_events<2>(*flat, Vec<2>::Zero(), 6, 20);
     const auto deep = random_spheres<3>(10, 3.5, {W, W, W}, 6);
-    deep->box.edge_velocity = {speed, 0.1, 0};
+    deep->box.add({.name = "x+", .velocity = -speed});
+    deep->box.add({.name = "y+", .velocity = -0.1});
     expect_same_events<3>(*deep, Vec<3>(0, 0, -0.5), 4, 20);
   }
 }

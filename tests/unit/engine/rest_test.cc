@@ -40,7 +40,7 @@ void expect_balance(const System<D>& system, const std::vector<test::Reaction>& 
   for (const test::Reaction& each : reactions) {
     EXPECT_GT(each.force, 0);
     const Vec<D> normal =
-        each.wall ? system.box.wall(each.hi).normal() : Vec<D>((p.x[each.lo] - p.x[each.hi]) / (2 * kRadius));
+        each.wall ? system.box.wall(each.hi).normal : Vec<D>((p.x[each.lo] - p.x[each.hi]) / (2 * kRadius));
     left[each.lo] += each.force * normal;
     if (!each.wall) left[each.hi] -= each.force * normal;
   }

@@ -30,7 +30,7 @@ RestingContact<D> pair(Id lo, Id hi, const Vec<D>& normal, double bound = 0) {
 template <int D>
 RestingContact<D> at_wall(Id i, Id wall) {
   return {.key = {.kind = EventKind::wall, .lo = i, .hi = wall},
-          .normal = (wall % 2 == 0 ? 1.0 : -1.0) * Vec<D>::Unit(wall_axis(wall))};
+          .normal = (wall % 2 == 0 ? 1.0 : -1.0) * Vec<D>::Unit(static_cast<int>(wall / 2))};
 }
 
 /// A column of bodies with these masses on the floor; the lowest is first.

@@ -278,7 +278,7 @@ TEST(Simulation, WallsAreTouchedWhereTheyStand) {
     run->run();
     std::array<int, 4> hits{};
     for (const Contact<2>& contact : notes.touched) {
-      const int axis = wall_axis(contact.key.hi);
+      const int axis = static_cast<int>(contact.key.hi / 2);
       Vec<2> foot = contact.x_lo;
       foot[axis] = contact.key.hi % 2 == 0 ? 0 : run->system().box.edges[axis];
       EXPECT_EQ(contact.x_hi, foot) << method;

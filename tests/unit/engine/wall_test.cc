@@ -29,12 +29,12 @@ TEST(Walls, OfABox) {
                   {4, "the lower wall of axis 2", 1.25, -2, {1, 2, 0}},
                   {5, "the upper wall of axis 2", 3.25, 2, {1, 2, 5}}};
   for (std::size_t k = 0; k < walls.size(); ++k) {
-    EXPECT_EQ(walls[k].number(), expected[k].number);
-    EXPECT_EQ(box.wall(expected[k].number).position, walls[k].position);
-    EXPECT_EQ(wall_name(walls[k].number()), expected[k].name);
+    EXPECT_EQ(walls[k].number, expected[k].number);
+    EXPECT_EQ(box.wall(expected[k].number).offset, walls[k].offset);
+    EXPECT_EQ(box.wall_name(walls[k].number), expected[k].name);
     EXPECT_EQ(walls[k].gap(x, 0.25), expected[k].gap);
     EXPECT_EQ(walls[k].along_normal(v), expected[k].approach);
-    EXPECT_EQ(walls[k].normal().dot(v), expected[k].approach);
+    EXPECT_EQ(walls[k].normal.dot(v), expected[k].approach);
     EXPECT_EQ(walls[k].foot(x), expected[k].foot);
   }
 }
@@ -81,7 +81,7 @@ TEST(ContactTally, AddsUpWhatItsPartsCount) {
   EXPECT_EQ(one.collision_virial.value(), 0.2);
   EXPECT_EQ(one.max_overlap, 5e-16);
   ASSERT_EQ(log.size(), 2u);
-  EXPECT_EQ(partners(log[1].key), "particle 1 and the upper wall of axis 1");
+  EXPECT_EQ(partners(log[1].key, Box<2>{}), "particle 1 and the upper wall of axis 1");
 }
 
 }  // namespace

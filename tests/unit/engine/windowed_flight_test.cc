@@ -177,7 +177,8 @@ TEST(WindowedFlight, WallsAndFields) {
 TEST(WindowedFlight, Pistons) {
   for (const double speed : {-0.3, 0.7}) {
     Case<3> c{.system = random_system<3>(150, {7, 6, 8}, {W, P, W}, 0.4, 0.5, 25), .slab = 1};
-    c.system->box.edge_velocity = {speed, 0, -0.2};
+    c.system->box.add({.name = "x+", .velocity = -speed});
+    c.system->box.add({.name = "z+", .velocity = 0.2});
     expect_the_same_however_divided<3>(c, 800);
   }
 }

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/base/box.h"
+
+#include "engine/base/error.h"
+
+namespace carom {
+namespace {
+
+/// The names of the faces, by number.
+template <int D>
+std::vector<std::string> face_names() {
+  std::vector<std::string> names;
+  for (int k = 0; k < D; ++k)
+    for (const char side : {'-', '+'}) names.push_back({"xyz"[k], side});
+  return names;
+}
+
+}  // namespace
+
+template <int D>
+void Box<D>::add(WallOptions<D> wall) {
+  const auto refuse = [&](const std::string& what, const std::string& remedy) {
+    throw Error(Failure::deck, "the wall '" + wall.name + "' " + what + "; " + remedy);
+  };
+  const auto faces = face_names<D>();
+  const auto face = std::ranges::find(faces, wall.name);
+  const double length = wall.normal.norm();
+  if (!std::isfinite(length + wall.offset + wall.velocity))
+    refuse("has a number that is not finite", "give finite ones");
+  if (std::ranges::find(options, wall.name, &WallOptions<D>::name) != options.end())
+    refuse("is given twice", "give each wall its own name");
+  if (face != faces.end()) {
+    wall.number = static_cast<Id>(face - faces.begin());
+    if (!walled(static_cast<int>(wall.number / 2)))
+      refuse("does not exist, because that boundary is " + std::string(find_boundary(boundary[wall.number / 2]).name),
+             "make that boundary a wall");
+    if (length > 0 || wall.offset != 0 || !wall.one_sided)
+      refuse("is a face of the box, which has its normal, its place and one side",
+             "leave normal, offset and one_sided out, or choose another name");
+  } else {
+    if (!(length > 0)) {
+      std::string known;
+      for (int k = 0; k < D; ++k)
+        if (walled(k)) known += (known.empty() ? "" : ", ") + faces[2 * k] + ", " + faces[2 * k + 1];
+      refuse("is no face of the box and has no normal",
+             "give a normal that is not zero" + (known.empty() ? known : ", or the name of a face: " + known));
+    }
+    wall.normal /= length;
+    wall.offset /= length;
+    wall.number = 2 * D;
+    for (const WallOptions<D>& each : options)
+      if (each.number >= 2 * D) wall.number = each.number + (each.one_sided ? 1 : 2);
+  }
+  options.push_back(std::move(wall));
+}
+
+template <int D>
+std::vector<Wall<D>> Box<D>::walls() const {
+  std::vector<Wall<D>> all;
+  for (Id number = 0; number < 2 * D; ++number)
+    if (walled(static_cast<int>(number / 2))) all.push_back(wall(number));
+  for (const WallOptions<D>& each : options) {
+    if (each.number < 2 * D) continue;
+    all.push_back(wall(each.number));
+    if (!each.one_sided) all.push_back(wall(each.number + 1));
+  }
+  return all;
+}
+
+template <int D>
+std::string Box<D>::wall_name(Id number) const {
+  if (number >= 2 * D) return "the wall '" + find(number)->name + "'";
+  const std::string side = number % 2 == 0 ? "the lower" : "the upper";
+  return side + " wall of axis " + std::to_string(number / 2);
+}
+
+template struct Box<2>;
+template struct Box<3>;
+
+}  // namespace carom
