@@ -2,8 +2,9 @@
 #pragma once
 // thermo.csv: one row per output time, each in the file before the run continues.
 //
-// Its columns are declared in thermo.cc, and nowhere else: the trajectory, run.log, Python, the page and `carom methods`
-// show them, too. Reduced units; the fewest digits that reproduce the doubles; `nan` if a method has no shadow energy.
+// Its columns are declared in thermo.cc, and nowhere else: the trajectory, run.log, Python, the page and `carom
+// methods` show them, too. Reduced units; the fewest digits that reproduce the doubles; `nan` if a method has no shadow
+// energy.
 
 #include <array>
 #include <filesystem>
