@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/base/box.h"
 
-#include "engine/base/error.h"
-
 namespace carom {
 namespace {
 
@@ -25,7 +23,7 @@ void Box<D>::add(WallOptions<D> wall) {
   const auto faces = face_names<D>();
   const auto face = std::ranges::find(faces, wall.name);
   const double length = wall.normal.norm();
-  if (!std::isfinite(length + wall.offset + wall.velocity))
+  if (!std::isfinite(length + wall.offset + wall.velocity + wall.amplitude + wall.frequency))
     refuse("has a number that is not finite", "give finite ones");
   if (std::ranges::find(options, wall.name, &WallOptions<D>::name) != options.end())
     refuse("is given twice", "give each wall its own name");
@@ -65,6 +63,53 @@ std::vector<Wall<D>> Box<D>::walls() const {
     if (!each.one_sided) all.push_back(wall(each.number + 1));
   }
   return all;
+}
+
+/// Sets where the wall is and how it moves. In a step of length h a shaken wall moves on a parabola. That of an
+/// oscillator with the acceleration −Ω²(X + X')/2, where X and X' are its positions at the two ends and Ω =
+/// (2/h)·tan(πfh), has the positions of the sine at the ends of all steps and a continuous velocity, of order 2.
+template <int D>
+void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
+  if (its.amplitude == 0) {
+    wall.offset += its.displacement(time);
+    wall.velocity = its.velocity;
+    return;
+  }
+  wall.offset += its.moved;
+  if (step == 0) {
+    wall.amplitude = its.amplitude;
+    wall.frequency = its.frequency;
+    wall.turns = its.frequency * time;
+    return;
+  }
+  const auto [cos_half, sin_half] = cosine_and_sine(0.5 * its.frequency * step);
+  const auto [cos, sin] = cosine_and_sine(its.frequency * step_start);
+  const double omega = 2 / step * (sin_half / cos_half), s = time - step_start;
+  const double end = cosine_and_sine(its.frequency * (step_start + step))[1];
+  wall.acceleration = -0.5 * omega * omega * its.amplitude * (sin + end);
+  wall.velocity = omega * its.amplitude * cos + s * wall.acceleration;
+  wall.offset += its.amplitude * (sin + s * omega * cos) + 0.5 * s * s * wall.acceleration;
+}
+
+template <int D>
+void Box<D>::restart() {
+  for (WallOptions<D>& each : options) each.moved = each.displacement(time);
+  begin_step(0, 0);
+}
+
+template <int D>
+void Box<D>::check(Failure failure) const {
+  const auto all = walls();
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (std::size_t j = i + 1; j < all.size(); ++j) {
+      const Wall<D>&one = all[i], &other = all[j];
+      const bool front_and_rear = one.number >= 2 * D && find(one.number) == find(other.number);
+      const bool facing = (one.normal + other.normal).norm() < 1e-6;
+      if (front_and_rear || !facing || one.level(0) + other.level(0) < 0) continue;
+      throw Error(failure, wall_name(one.number) + " and " + wall_name(other.number) +
+                               " leave no room between them at time " + short_text(time) +
+                               "; move them apart, or end the run before they meet");
+    }
 }
 
 template <int D>

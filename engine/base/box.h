@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/base/boundary.h"
+#include "engine/base/error.h"
 #include "engine/base/wall.h"
 
 namespace carom {
@@ -21,12 +22,19 @@ struct WallOptions {
   Vec<D> normal = Vec<D>::Zero();  ///< of a further wall: into the space of the spheres, of any length
   double offset = 0;               ///< of a further wall: normal·x = offset at time 0
   double velocity = 0;             ///< along the normal [length/time]
-  bool one_sided = true;           ///< false: it acts on the spheres on both sides
-  Id number = 0;                   ///< set by add(); the rear of a wall with two sides has the next number
+  double amplitude = 0;   ///< shaken: the displacement along the normal is amplitude·sin(2π·frequency·time)
+  double frequency = 0;   ///< [1/time]
+  bool one_sided = true;  ///< false: it acts on the spheres on both sides
+  double moved = 0;       ///< displacement before time 0 [length]
+  Id number = 0;          ///< set by add(); the rear of a wall with two sides has the next number
 
-  bool moves() const { return velocity != 0; }
-  /// How far it has moved along its normal since time 0.
-  double displacement(double time) const { return velocity * time; }
+  /// Whether it moves or has moved.
+  bool moves() const { return velocity != 0 || amplitude != 0 || moved != 0; }
+  /// How far it has moved along its normal.
+  double displacement(double time) const {
+    const double smooth = moved + velocity * time;
+    return amplitude == 0 ? smooth : smooth + amplitude * cosine_and_sine(frequency * time)[1];
+  }
 };
 
 template <int D>
@@ -35,6 +43,7 @@ struct Box {
   std::array<Boundary, D> boundary{};
   std::vector<WallOptions<D>> options{};  ///< of walls; use add()
   double time = 0;                        ///< of the start of the slab, since the start of the run
+  double step_start = 0, step = 0;        ///< of a stepping method; 0: shaken walls move on a sine
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }
@@ -80,17 +89,27 @@ struct Box {
       wall.one_sided = its->one_sided;
     }
     if (!its) return wall;
-    wall.offset += its->displacement(time);
-    wall.velocity = its->velocity;
+    set_motion(*its, wall);
     if (number != its->number) {  // the rear
       wall.normal = -wall.normal;
       wall.offset = -wall.offset;
       wall.velocity = -wall.velocity;
+      wall.acceleration = -wall.acceleration;
+      wall.amplitude = -wall.amplitude;
     }
     return wall;
   }
   /// All walls, ordered by number.
   std::vector<Wall<D>> walls() const;
+  /// Call this at the start of a slab. `length`: of the step of a stepping method, else 0.
+  void begin_step(double start, double length) {
+    time = step_start = start;
+    step = length;
+  }
+  /// Makes the present time the time 0 of a new run, with all walls where they are.
+  void restart();
+  /// Throws Error(failure) if two parallel walls leave no room between them.
+  void check(Failure failure) const;
   /// For messages: "the upper wall of axis 1", "the wall 'ramp'".
   std::string wall_name(Id number) const;
 
@@ -102,6 +121,8 @@ struct Box {
     return all;
   }
   double volume() const { return lengths(time).prod(); }
+  void set_motion(const WallOptions<D>& options, Wall<D>& wall) const;
+
   /// The gap below which spheres count as touching, anywhere in the box.
   GapTolerance gap_tolerance() const { return GapTolerance(edges.maxCoeff()); }
 

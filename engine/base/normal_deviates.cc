@@ -77,17 +77,28 @@ Number logarithm(double u) {
   return kLn2 * Number{k, 0} + s * kArtanh.at(s * s);
 }
 
-}  // namespace
-
-std::array<double, 2> normal_deviates(double u, double turn) {
-  const Number length = rounded(square_root(Number{-2, 0} * rounded(logarithm(u))));
+/// The cosine and the sine of 2π·turn for turns in [0, 1).
+std::array<Number, 2> on_circle(double turn) {
   const Number angle = rounded(kTwoPi * Number{turn, 0});
   const int quadrant = static_cast<int>(std::floor(4 * turn + 0.5));
   const Number r = angle + -(kHalfPi * Number{static_cast<double>(quadrant), 0}), squared = r * r;
   const Number sine = r * kSine.at(squared), cosine = kCosine.at(squared);
   const Number x = quadrant % 2 == 0 ? cosine : sine, y = quadrant % 2 == 0 ? sine : cosine;
   const Number cos = quadrant == 1 || quadrant == 2 ? -x : x, sin = quadrant == 2 || quadrant == 3 ? -y : y;
+  return {cos, sin};
+}
+
+}  // namespace
+
+std::array<double, 2> normal_deviates(double u, double turn) {
+  const Number length = rounded(square_root(Number{-2, 0} * rounded(logarithm(u))));
+  const auto [cos, sin] = on_circle(turn);
   return {rounded(length * rounded(cos)).hi, rounded(length * rounded(sin)).hi};
+}
+
+std::array<double, 2> cosine_and_sine(double turn) {
+  const auto [cos, sin] = on_circle(turn - std::floor(turn));
+  return {cos.hi, sin.hi};
 }
 
 }  // namespace carom

@@ -9,4 +9,7 @@ namespace carom {
 /// error is below 0.502 ulp, plus the 2^-62 by which the rounded angle moves a deviate.
 std::array<double, 2> normal_deviates(double u, double turn);
 
+/// The cosine and the sine of 2π·turn for any number of turns, with the same bits on every machine.
+std::array<double, 2> cosine_and_sine(double turn);
+
 }  // namespace carom

@@ -11,9 +11,9 @@ namespace carom {
 namespace {
 
 /// In the order of ParameterValue and of Parameter::Type.
-constexpr std::array kTypes = {"true or false",   "a whole number",  "a number",           "a list of numbers",
-                               "a text",          "a list of texts", "a list of id pairs", "a list of vectors",
-                               "a table of texts"};
+constexpr std::array kTypes = {"true or false", "a whole number",  "a number",           "a list of numbers",
+                               "a text",        "a list of texts", "a list of id pairs", "a list of vectors",
+                               "a table"};
 
 [[noreturn]] void refuse(std::string_view of, const std::string& what, const std::string& remedy) {
   throw Error(Failure::deck, std::string(of) + ": " + what + "; " + remedy);
@@ -29,8 +29,11 @@ std::string listed(const auto& words) {
 
 void check(std::string_view of, const Parameter& parameter, const ParameterValue& value) {
   const auto type = static_cast<std::size_t>(parameter.type);
-  if (value.index() != type)
-    refuse(of, quoted(parameter.name) + " is " + kTypes[value.index()], std::string("give ") + kTypes[type]);
+  const bool either = parameter.type == Parameter::Type::real_or_table &&
+                      (std::holds_alternative<double>(value) || std::holds_alternative<TableValue>(value));
+  if (value.index() != type && !either)
+    refuse(of, quoted(parameter.name) + " is " + kTypes[value.index()],
+           std::string("give ") + (type < kTypes.size() ? kTypes[type] : "a number or a table"));
   const auto complain = [&](const std::optional<ParameterError>& error) {
     if (!error) return;
     refuse(of, quoted(parameter.name) + " " + error->what,
@@ -41,6 +44,16 @@ void check(std::string_view of, const Parameter& parameter, const ParameterValue
   if (const auto* whole = std::get_if<std::int64_t>(&value)) {
     check_number(static_cast<double>(*whole));
     complain(choice_error(std::to_string(*whole), parameter));
+  }
+  if (const auto* table = std::get_if<TableValue>(&value)) {
+    for (const Parameter& key : parameter.keys) {
+      const auto at = table->find(key.name);
+      if (at == table->end())
+        refuse(of, quoted(parameter.name) + " has no " + quoted(key.name), "add it: " + key.meaning);
+      std::visit([&](const auto& each) { check(of, key, each); }, at->second);
+    }
+    if (table->size() > parameter.keys.size())
+      refuse(of, quoted(parameter.name) + " has an unknown key", "leave it out");
   }
   if (const auto* list = std::get_if<std::vector<double>>(&value)) std::ranges::for_each(*list, check_number);
   if (const auto* text = std::get_if<std::string>(&value)) complain(choice_error(*text, parameter));
@@ -93,7 +106,8 @@ Parameters completed(std::string_view of, std::span<const Parameter> declared, P
       continue;
     }
     ParameterValue value = given.all().find(name)->second;
-    if (const auto* whole = std::get_if<std::int64_t>(&value); whole && parameter.type == Parameter::Type::real)
+    if (const auto* whole = std::get_if<std::int64_t>(&value);
+        whole && (parameter.type == Parameter::Type::real || parameter.type == Parameter::Type::real_or_table))
       value = static_cast<double>(*whole);
     check(of, parameter, value);
     given.set(name, std::move(value));

@@ -22,7 +22,7 @@
 namespace carom {
 
 struct Parameter {
-  /// The first nine are in the order of ParameterValue. Only decks have the last three.
+  /// The first nine are in the order of ParameterValue. Only decks have lists with an entry for each particle.
   enum class Type {
     boolean,
     integer,  ///< a real number without a fraction (1e6) will do
@@ -31,9 +31,10 @@ struct Parameter {
     text,
     text_list,
     pair_list,
-    vector_list,   ///< one vector of system.dimension numbers for each particle
-    text_table,    ///< an inline table of texts: `keys`
-    real_or_list,  ///< one number for all, or one for each particle
+    vector_list,    ///< one vector of system.dimension numbers for each particle
+    table,          ///< an inline table: `keys`
+    real_or_list,   ///< one number for all, or one for each particle
+    real_or_table,  ///< a number, or an inline table: `keys`
   };
   enum class Range { any, positive, non_negative };
 
@@ -46,7 +47,7 @@ struct Parameter {
   std::vector<std::string> choices{};  ///< for text: the allowed values; empty = any
   std::vector<std::array<std::string, 2>> former{};       ///< for text: former values, each with what to write instead
   double most = std::numeric_limits<double>::infinity();  ///< for numbers: the largest allowed value
-  std::vector<Parameter> keys{};                          ///< of a text_table: its texts, all required
+  std::vector<Parameter> keys{};                          ///< of a table: numbers and texts, all required
 
   bool required() const { return fallback.empty(); }
   bool has_default() const { return !required() && fallback != "none"; }
@@ -55,9 +56,11 @@ struct Parameter {
 /// Pairs of particle ids.
 using PairList = std::vector<std::array<std::uint32_t, 2>>;
 
-using ParameterValue =
-    std::variant<bool, std::int64_t, double, std::vector<double>, std::string, std::vector<std::string>, PairList,
-                 std::vector<std::vector<double>>, std::map<std::string, std::string>>;
+/// An inline table.
+using TableValue = std::map<std::string, std::variant<double, std::string>>;
+
+using ParameterValue = std::variant<bool, std::int64_t, double, std::vector<double>, std::string,
+                                    std::vector<std::string>, PairList, std::vector<std::vector<double>>, TableValue>;
 
 /// Validated values by name. Parameters with a default are always present, those declared "none" only if given.
 class Parameters {

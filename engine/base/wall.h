@@ -2,14 +2,16 @@
 #pragma once
 // A hard wall: a plane with everything a contact with it needs. box.h makes the list of all walls.
 //
-// A wall at normal·x = level(t) acts on the spheres on the side that its normal points to. The level is a polynomial of
-// the time in a slab; in free flight a shaken wall has the exact sine. A collision turns the velocity v of a sphere
-// along the normal into 2u − v, where u is the velocity of the wall.
+// A wall at normal·x = level(t) acts on the spheres on the side that its normal points to. In a slab it moves on a
+// parabola; in free flight, where slabs are long, a shaken wall adds a sine. A collision turns the velocity v of a
+// sphere along the normal into 2u − v, where u is the velocity of the wall.
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "engine/base/normal_deviates.h"
 #include "engine/base/vec.h"
 
 namespace carom {
@@ -24,10 +26,21 @@ struct Wall {
   double offset = 0;               ///< level at time 0, the start of the slab [length]
   double velocity = 0;             ///< along the normal, at time 0 [length/time]
   double acceleration = 0;         ///< along the normal [length/time²]
+  double amplitude = 0;            ///< of the sine; 0: none [length]
+  double frequency = 0;            ///< of the sine [1/time]
+  double turns = 0;                ///< of the sine at time 0
 
   double along_normal(const Vec<D>& v) const { return axis >= 0 ? normal[axis] * v[axis] : normal.dot(v); }
-  double level(double t) const { return offset + t * (velocity + 0.5 * t * acceleration); }
-  double velocity_at(double t) const { return velocity + t * acceleration; }
+  double level(double t) const {
+    const double smooth = offset + t * (velocity + 0.5 * t * acceleration);
+    return amplitude == 0 ? smooth : smooth + amplitude * cosine_and_sine(turns + frequency * t)[1];
+  }
+  double velocity_at(double t) const {
+    const double smooth = velocity + t * acceleration;
+    return amplitude == 0 ? smooth : smooth + speed() * cosine_and_sine(turns + frequency * t)[0];
+  }
+  /// The largest speed of the sine.
+  double speed() const { return 2 * std::numbers::pi * frequency * amplitude; }
   /// The gap between the wall and a sphere at x at time t; infinite if the wall does not act on the sphere [length].
   double gap(const Vec<D>& x, double radius, double t = 0) const {
     const double at = level(t);
@@ -35,7 +48,8 @@ struct Wall {
     const double distance = normal.dot(x) - at;
     return one_sided || distance > 0 ? distance - radius : std::numeric_limits<double>::infinity();
   }
-  /// The rate at which the gap of a sphere with velocity v grows, and the acceleration of the gap if v has that of a.
+  /// The rate at which the gap of a sphere with velocity v grows, and the acceleration without the sine for an
+  /// acceleration a.
   double opening(const Vec<D>& v, double t = 0) const { return along_normal(v) - velocity_at(t); }
   double speeding(const Vec<D>& a) const { return along_normal(a) - acceleration; }
   /// The velocity after the collision of a sphere with velocity v and a radius that grows at `rate`.

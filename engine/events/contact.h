@@ -100,6 +100,7 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
 
 /// A sphere and a wall: gap + v s + a s²/2, v and a along the wall's inward normal, s in [0, rest).
 inline double wall_contact_time(double gap, double v, double a, double rest, bool touching, double slack) {
+  if (!(gap < kNever)) return kNever;
   if (touching) {
     if (v < -slack) return 0;
     if (a >= 0) return kNever;

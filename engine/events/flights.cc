@@ -7,6 +7,7 @@
 #include "engine/base/error.h"
 #include "engine/events/collision.h"
 #include "engine/events/contact.h"
+#include "engine/events/shaken_contact.h"
 
 namespace carom {
 namespace {
@@ -143,12 +144,28 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
   const double gap = wall.gap(r.x, at_record, r.t), opening = wall.opening(r.v, r.t) - rate;
   const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity_at(r.t)));
   const bool touching = gap <= gap_tolerance_(at_record);
-  const double s = wall_contact_time(gap, opening, wall.speeding(g_), horizon_ - r.t, touching, slack);
+  const double rest = horizon_ - r.t;
+  const double s = wall.amplitude == 0 ? wall_contact_time(gap, opening, wall.speeding(g_), rest, touching, slack)
+                                       : shaken_contact(r, at_record, rate, wall, touching, slack);
   if (s == 0 && !(opening < -slack))
     throw Error(Failure::numerical,
                 "particle " + std::to_string(r.id) + " rests on " + box_.wall_name(wall.number) +
                     " under the uniform field and would bounce without end; give it a height or a velocity");
   return r.t + s;
+}
+
+template <int D>
+double Flights<D>::shaken_contact(const Record<D>& r, double radius, double rate, const Wall<D>& wall, bool touching,
+                                  double slack) const {
+  const double distance = wall.normal.dot(r.x) - (wall.offset + wall.velocity * r.t);
+  if (!wall.one_sided && !(distance > wall.level(r.t) - wall.offset)) return kNever;
+  const ShakenGap gap{.y = distance - radius,
+                      .v = wall.along_normal(r.v) - wall.velocity - rate,
+                      .a = wall.along_normal(g_),
+                      .amplitude = wall.amplitude,
+                      .frequency = wall.frequency,
+                      .turns = wall.turns + wall.frequency * r.t};
+  return gap.first_contact(horizon_ - r.t, touching, slack);
 }
 
 template <int D>

@@ -114,6 +114,8 @@ class Flights {
 
  private:
   void advance(Record<D>& r, double t) const;
+  double shaken_contact(const Record<D>& r, double radius, double rate, const Wall<D>& wall, bool touching,
+                        double slack) const;
   double grown(double length, double t) const { return length * (1 + growth_ * t); }
   double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
   double mass(Slot i) const { return mass_.empty() ? common_mass_ : mass_[i]; }

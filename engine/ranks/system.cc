@@ -33,6 +33,7 @@ void System<D>::check() const {
     if (!(box.edges[k] > 0) || !std::isfinite(box.edges[k]))
       refuse("the edge of the box along axis " + std::to_string(k) + " is " + short_text(box.edges[k]),
              "give a positive length");
+  box.check(Failure::initial_state);
   for (Id i = 0; i < p.size(); ++i) {
     const auto wrong = [&](const char* what, const char* remedy) {
       refuse("the " + std::string(what) + " of particle " + std::to_string(p.id_of(i)) + " cannot be", remedy);

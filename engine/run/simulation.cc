@@ -224,7 +224,8 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
   Decomposition<D>& decomposition = system_->decomposition;
   for (Counters before = report.counters;;) try {
       watch.begin();
-      system_->box.time = slab.start;
+      system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
+      if (!system_->box.options.empty()) system_->box.check(Failure::numerical);
       integrator_->slab(*system_, slab, report);
       return true;
     } catch (HaloTooSmall) {

@@ -47,6 +47,7 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   watch_ = watch;
   a_ = a;
   length_ = length;
+  walls_at_ = std::numeric_limits<double>::quiet_NaN();  // they may move otherwise from now on
   events_ = 0;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
   note_pressed();

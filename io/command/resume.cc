@@ -172,7 +172,7 @@ Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks) {
 template <int D>
 GivenState state_of(Resumed& from, const Deck& deck) {
   if (from.is_branch()) check_end(deck, from.head);
-  return {from.reader(), from.head.bonds, from.is_branch()};
+  return {from.reader(), from.head.bonds, from.head.time, from.is_branch()};
 }
 
 template <int D>

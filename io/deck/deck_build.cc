@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
+#include "engine/base/wall_options.h"
 #include "engine/forces/pair_filter.h"
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/epoch.h"
@@ -121,6 +122,8 @@ template <int D>
 void fill_box(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
+  for (const WallConfig& wall : source.walls)
+    if (!wall.wrong) add_wall(system.box, wall.parameters);
   system.species.clear();
   for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
 }
@@ -191,6 +194,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
     if (ranks && !system->decomposition.joined()) system->decomposition.join(*ranks);
     restore_particles(*system, given->read);
     take_bonds(*deck.source, given->bonds);
+    system->box.begin_step(given->time, 0);
   } else {
     place_particles(source, *system);
     check_memory(source, &system->box, share);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/base/wall_options.h"
 #include "io/deck/deck_source.h"
 #include "io/deck/options.h"
 
@@ -24,6 +25,8 @@ class Interpreter {
   void all() {
     top();
     system();
+    for (const ValueTable& table : values_.list("wall")) source_.walls.push_back({table.values, table.at, table.wrong});
+    try_walls();
     for (const ValueTable& table : values_.list("particles")) species(table);
     placement();
     integrator();
@@ -65,6 +68,32 @@ class Interpreter {
     if (const auto* boundary = table->find<std::vector<std::string>>("boundary")) {
       one_an_axis(*table, "boundary", boundary->size());
       for (const std::string& name : *boundary) source_.boundary.push_back(find_boundary(name).boundary);
+    }
+  }
+
+  /// Adds the walls to a box, if enough is known about it.
+  void try_walls() {
+    const auto attempt = [&](auto box) {
+      std::copy_n(source_.boundary.begin(), dimension_, box.boundary.begin());
+      for (const WallConfig& wall : source_.walls)
+        if (!wall.wrong) report(wall.at, [&] { add_wall(box, wall.parameters); });
+      if (source_.edges.size() != dimension_ || source_.walls.empty()) return;
+      std::copy_n(source_.edges.begin(), dimension_, box.edges.begin());
+      report(source_.walls.back().at, [&] { box.check(Failure::deck); });
+    };
+    if (source_.boundary.size() != dimension_) return;
+    if (dimension_ == 2) attempt(Box<2>());
+    if (dimension_ == 3) attempt(Box<3>());
+  }
+
+  /// Reports the error that `work` throws, with the form "what; what to do", at this place.
+  void report(const Place& at, auto&& work) {
+    try {
+      work();
+    } catch (const Error& e) {
+      const std::string message = e.what();
+      const std::size_t cut = message.find("; ");
+      problems_.error(at, message.substr(0, cut), message.substr(cut + 2));
     }
   }
 
@@ -369,8 +398,8 @@ class Interpreter {
     if (lattice && !deck_.output.observables.empty() && deck_.output.sample_start == 0)
       problems_.warning(table->at, "the averages include the initial lattice, on which g(r) has sharp peaks",
                         "set sample_start to a time at which the lattice has melted");
-    if (const auto* units = table->find<std::map<std::string, std::string>>("units"))
-      deck_.output.units = {units->at("length"), units->at("time")};
+    if (const auto* units = table->find<TableValue>("units"))
+      deck_.output.units = {std::get<std::string>(units->at("length")), std::get<std::string>(units->at("time"))};
     if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {
       deck_.output.checkpoint_wall = wall_seconds(*wall);
       if (!deck_.output.checkpoint_wall)

@@ -144,8 +144,11 @@ class NodeReader {
         return read_list<PairList::value_type>(node, [this](const toml::node& n) { return read_pair(n); });
       case vector_list:
         return read_list<std::vector<double>>(node, [&](const toml::node& n) { return read_list<double>(n, as_real); });
-      case text_table:
-        return read_texts(node);
+      case table:
+        return read_inline(node, "a table");
+      case real_or_table:
+        if (node.is_table()) return read_inline(node, "a number or a table");
+        return read_real(node);
     }
     return {};
   }
@@ -227,25 +230,28 @@ class NodeReader {
     return ids;
   }
 
-  std::optional<std::map<std::string, std::string>> read_texts(const toml::node& node) {
+  std::optional<TableValue> read_inline(const toml::node& node, const std::string& wanted) {
     const toml::table* table = node.as_table();
-    if (table == nullptr) return wrong_type(node, "a table");
-    std::map<std::string, std::string> texts;
+    if (table == nullptr) return wrong_type(node, wanted);
+    TableValue values;
     std::vector<std::string> known;
     for (const Parameter& key : key_.keys) {
       known.push_back(key.name);
       const toml::node* item = table->get(key.name);
       if (item == nullptr)
-        complain(node, "has no '" + key.name + "'", "add it, one of: " + join(key.choices));
-      else if (auto text = NodeReader(key, deck_, problems_).read_text(*item))
-        texts.emplace(key.name, std::move(*text));
+        complain(node, "has no '" + key.name + "'",
+                 "add it" + (key.choices.empty() ? ": " + type_name(key) : ", one of: " + join(key.choices)));
+      else if (auto value = NodeReader(key, deck_, problems_).read(*item)) {
+        if (const auto* number = std::get_if<double>(&*value)) values.emplace(key.name, *number);
+        if (const auto* text = std::get_if<std::string>(&*value)) values.emplace(key.name, *text);
+      }
     }
     for (const auto& [name, item] : *table)
       if (std::ranges::find(known, name.str()) == known.end())
         problems_.error(deck_.place(name, item), "unknown key '" + std::string(name.str()) + "' in '" + key_.name + "'",
                         suggestion(std::string(name.str()), known));
-    if (texts.size() != known.size() || table->size() != known.size()) return {};
-    return texts;
+    if (values.size() != known.size() || table->size() != known.size()) return {};
+    return values;
   }
 
   template <class T, class ReadItem>

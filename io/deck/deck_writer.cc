@@ -58,9 +58,10 @@ std::string literal(const std::array<Item, N>& items) {
   return bracketed(items);
 }
 
-std::string literal(const std::map<std::string, std::string>& table) {
+std::string literal(const TableValue& table) {
   std::string text;
-  for (const auto& [name, value] : table) text += (text.empty() ? "" : ", ") + name + " = " + literal(value);
+  for (const auto& [name, value] : table)
+    text += (text.empty() ? "" : ", ") + name + " = " + std::visit([](const auto& each) { return literal(each); }, value);
   return "{ " + text + " }";
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "engine/base/interaction.h"
+#include "engine/base/wall_options.h"
 #include "engine/integrators/integrator.h"
 
 namespace carom {
@@ -30,7 +31,7 @@ Parameter units_key() {
   const std::vector<std::string> lengths = {"Angstrom", "fm", "pm", "nm", "um", "mm", "m"},
                                  times = {"fs", "ps", "ns", "us", "ms", "s"};
   Parameter units = {
-      "units", text_table, "none", "-",
+      "units", table, "none", "-",
       "what the trajectory says its lengths and times are in, as { length = \"Angstrom\", time = \"ps\" }, "
       "for programs that want to know; numbers are written as they are; none: reduced units"};
   units.keys = {{"length", text, "", "-", "the unit of length", Range::any, lengths},
@@ -91,6 +92,11 @@ std::vector<TableSchema> make_schema() {
          "edges of the box, which begins at the origin; may be left out where placement.packing_fraction sets it",
          Range::positive},
         boundary_key()}},
+      {"wall",
+       true,
+       false,
+       "a wall beside those of the box, or a face of the box that is more than a fixed wall; hard and elastic",
+       wall_parameters()},
       {"particles",
        true,
        true,
@@ -210,10 +216,11 @@ std::string type_name(const Parameter& key) {
       return "list of vectors";
     case real_or_list:
       return range + "number, or a list with one for each particle";
-    case text_table: {
+    case table:
+    case real_or_table: {
       std::string names;
       for (const Parameter& each : key.keys) names += (names.empty() ? "" : " and ") + each.name;
-      return "table of the texts " + names;
+      return (key.type == table ? "table of " : range + "number, or a table of ") + names;
     }
   }
   throw std::logic_error("unknown key type");

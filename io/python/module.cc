@@ -10,7 +10,9 @@
 #include <utility>
 
 #include "engine/base/boundary.h"
+#include "engine/base/wall_options.h"
 #include "engine/forces/potentials/table.h"
+#include "io/deck/schema.h"
 #include "io/files/thermo.h"
 #include "io/files/version.h"
 #include "io/python/python_lock.h"
@@ -127,6 +129,10 @@ void bind(py::module_& module, const char* name) {
            })
       .def("set_position", [](S& session, const Array& x) { session.set_position(span_of(x)); })
       .def("set_velocity", [](S& session, const Array& v) { session.set_velocity(span_of(v)); })
+      .def("add_wall",
+           [](S& session, const py::dict& given) {
+             session.add_wall(parameters_of("wall", wall_parameters(), given));
+           })
       .def("add_force",
            [](S& session, const std::string& type, const py::dict& given) {
              const InteractionInfo& info = find_interaction(type);
@@ -210,6 +216,12 @@ void bind(py::module_& module, const char* name) {
                                py::list all;
                                for (const Force& force : s.forces())
                                  all.append(py::make_tuple(force.info->name, values_of(force.parameters)));
+                               return all;
+                             })
+      .def_property_readonly("walls",
+                             [](const S& s) {
+                               py::list all;
+                               for (const Parameters& wall : s.walls()) all.append(values_of(wall));
                                return all;
                              })
       .def_property_readonly("box",
@@ -299,6 +311,10 @@ py::dict descriptors() {
   }
   py::dict all;
   all["integrators"] = methods, all["forces"] = terms, all["boundaries"] = rules;
+  py::dict wall;
+  wall["name"] = "wall", wall["meaning"] = table_schema("wall").meaning;
+  wall["parameters"] = described(wall_parameters());
+  all["walls"] = py::make_tuple(wall);
   return all;
 }
 

@@ -6,8 +6,10 @@
 #include <cmath>
 
 #include "engine/run/measurement.h"
+#include "engine/base/wall_options.h"
 #include "engine/run/state.h"
 #include "engine/setup/epoch.h"
+#include "io/deck/deck_source.h"
 
 namespace carom::python {
 namespace {
@@ -64,6 +66,7 @@ Session<D>::Session(Deck& deck) {
   system_ = build_system<D>(deck);
   plan_ = deck.plan;
   box_ = system_->box;
+  for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
   species_ = system_->species;
   size_ = system_->size();
   integrator_ = &find_integrator(deck.integrator);
@@ -88,6 +91,8 @@ void Session<D>::change(const char* what) {
   deck_.reset();
   checkpoint_.reset();
   averages_.clear();
+  box_.restart();
+  system_->box = box_;
 }
 
 template <int D>
@@ -159,6 +164,17 @@ void Session<D>::set(std::vector<Vec<D>> Particles<D>::*member, std::span<const 
   for (std::size_t i = 0; i < size_; ++i) rows[i] = vector_at<D>(values, i);
   need_finite<D>(rows, what);
   std::ranges::copy(rows, (system_->particles.*member).begin());
+}
+
+template <int D>
+void Session<D>::add_wall(Parameters given) {
+  Parameters complete = completed("wall", wall_parameters(), std::move(given));
+  Box<D> box = box_;
+  box.restart();
+  carom::add_wall(box, complete);
+  change("add walls");
+  system_->box = box_ = box;
+  walls_.push_back(std::move(complete));
 }
 
 template <int D>
@@ -292,6 +308,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
 template <int D>
 void Session<D>::rest(Particles<D>& particles) {
   for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // if free flight has failed
+  box_.time = statistics_.end_time;
   system_ = std::make_unique<System<D>>();
   system_->box = box_;
   system_->species = species_;

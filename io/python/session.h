@@ -58,6 +58,8 @@ class Session {
   /// N velocities, drawn from the Maxwell–Boltzmann distribution for particles with a temperature (not NaN) [energy];
   /// the present velocities for the rest.
   std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
+  /// Adds a wall or changes a face of the box.
+  void add_wall(Parameters given);
   void add_force(std::string_view type, Parameters given);
   void set_integrator(std::string_view name, Parameters given);
   /// Makes later runs write files: `set` overrides [output] of a deck, including the directory; thermo rows and calls
@@ -91,6 +93,7 @@ class Session {
   const IntegratorInfo* integrator() const { return integrator_; }
   const Parameters& integrator_parameters() const { return parameters_; }
   const std::vector<Force>& forces() const { return terms_.all(); }
+  const std::vector<Parameters>& walls() const { return walls_; }
   /// During a run: only in RunHooks::show.
   Averages averages() const;
   /// Warnings of the last run about its files.
@@ -113,6 +116,7 @@ class Session {
   void save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record);
 
   Box<D> box_;
+  std::vector<Parameters> walls_;
   std::vector<std::string> species_;
   Terms<D> terms_;
   const IntegratorInfo* integrator_ = nullptr;

@@ -45,10 +45,11 @@ void change_value(const Fields& fields, const std::string& name, const std::func
 
 template <int D>
 Session<D>::Session(Deck& deck, Resumed& from) {
-  const GivenState given{from.reader(), from.head.bonds};
+  const GivenState given{from.reader(), from.head.bonds, from.head.time};
   system_ = build_system<D>(deck, nullptr, &given);
   plan_ = deck.plan;
   box_ = system_->box;
+  for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
   species_ = system_->species;
   size_ = system_->size();
   integrator_ = &find_integrator(deck.integrator);

@@ -12,7 +12,8 @@ namespace {
 
 /// In the order of Parameter::Type.
 constexpr std::array kPythonTypes = {
-    "bool", "int", "float", "list[float]", "str", "list[str]", "list[tuple[int, int]]"};
+    "bool",      "int",                   "float",               "list[float]", "str",
+    "list[str]", "list[tuple[int, int]]", "list[list[float]]", "dict", "float or list[float]", "float or dict"};
 
 [[noreturn]] void refuse(std::string_view of, std::string_view name, const std::string& what) {
   throw Error(Failure::deck, std::string(of) + ": '" + std::string(name) + "' " + what);
@@ -78,6 +79,17 @@ ParameterValue value_of(std::string_view of, const Parameter* declared, std::str
   if (py::isinstance<py::str>(value)) return value.cast<std::string>();
   if (!array && PyIndex_Check(value.ptr())) return whole(of, name, value);
   if (PyFloat_Check(value.ptr()) || (!array && py::hasattr(value, "__float__"))) return value.cast<double>();
+  if (py::isinstance<py::dict>(value)) {
+    TableValue table;
+    for (const auto& [key, each] : value.cast<py::dict>())
+      if (py::isinstance<py::str>(each))
+        table[py::str(key)] = each.cast<std::string>();
+      else if (py::hasattr(each, "__float__"))
+        table[py::str(key)] = each.cast<double>();
+      else
+        refuse(of, name, "has a '" + py::str(key).cast<std::string>() + "' that is no number and no text; give one");
+    return table;
+  }
   if (array || PySequence_Check(value.ptr())) return list_of(of, declared, name, value);
   refuse(of, name,
          "is a " + py::str(py::type::of(value).attr("__name__")).cast<std::string>() +

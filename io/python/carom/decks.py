@@ -46,6 +46,8 @@ def deck_of(sim, of, ends):
     if sim._session.method == "verlet":
         for species in deck["particles"]:
             species["display_radius"] = species.pop("radius")
+    if sim.walls:
+        deck["wall"] = sim.walls
     if sim._session.forces:
         deck["interaction"] = [{"type": name} | given for name, given in sim._session.forces]
     deck["integrator"] = {"type": sim._session.method} | sim._session.method_parameters

@@ -209,6 +209,18 @@ class Simulation:
         each[chosen] = temperature
         self._session.set_velocity(self._session.drawn_velocities(each, seed))
 
+    def add_wall(self, name, normal=None, **options):
+        """Adds a wall, or changes a face of the box: "x-", "x+", "y-", … where its boundary is a wall.
+
+        normal: of a further wall, into the space of the spheres. Other options are those of [[wall]] in decks: offset,
+        velocity (a number along the normal, or {"amplitude": …, "frequency": …}), one_sided, …; see carom.describe("wall").
+
+            sim.add_wall("x+", velocity=0.05)                         # a piston
+            sim.add_wall("ramp", normal=[1, 2], offset=3.0)           # normal·x = offset
+        """
+        options = refuse_masked("add_wall", options | {"name": name_of("add_wall", name)})
+        self._session.add_wall(options if normal is None else options | {"normal": numbers("add_wall", "normal", normal)})
+
     def add_force(self, type, **parameters):
         """Adds a term of V by its name in decks; see carom.describe(type). Ids and species in it must be there already."""
         self._session.add_force(name_of("add_force", type), refuse_masked(type, parameters))
@@ -345,6 +357,7 @@ class Simulation:
     species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view")
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
     box = property(lambda self: self._session.box, doc="Edges [length].")
+    walls = property(lambda self: self._session.walls, doc="The walls that were added, as dictionaries of their options.")
     boundary = property(lambda self: self._session.boundary, doc="The name of the boundary on each axis.")
 
     energy_error = property(lambda self: self._session.energy_error,

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/base/wall_options.h"
+
+namespace carom {
+
+const std::vector<Parameter>& wall_parameters() {
+  using enum Parameter::Type;
+  using Range = Parameter::Range;
+  static const std::vector<Parameter> all = [] {
+    Parameter velocity{"velocity", real_or_table, "0.0", "length/time",
+                       "along the normal, constant; or { amplitude, frequency }: shaken, displaced along the normal by "
+                       "amplitude·sin(2π·frequency·time)"};
+    velocity.keys = {{"amplitude", real, "", "length", "the largest displacement"},
+                     {"frequency", real, "", "1/time", "oscillations a unit of time", Range::positive}};
+    return std::vector<Parameter>{
+        {"name", text, "", "-",
+         "of a face of the box, to change it: x-, x+, y-, y+, z-, z+, where its boundary is a wall; any other name: a "
+         "further wall"},
+        {"normal", real_list, "none", "-", "of a further wall: a vector, of any length, into the space of the spheres"},
+        {"offset", real, "0.0", "length", "of a further wall: at the start it is where normal·x = offset"},
+        velocity,
+        {"one_sided", boolean, "true", "-",
+         "false: a further wall with spheres on both sides; true: all spheres are on the side of its normal"}};
+  }();
+  return all;
+}
+
+template <int D>
+void add_wall(Box<D>& box, const Parameters& given) {
+  WallOptions<D> wall{.name = given.text("name"), .offset = given.real("offset"), .one_sided = given.flag("one_sided")};
+  if (const auto* normal = given.find<std::vector<double>>("normal")) {
+    if (normal->size() != D)
+      throw Error(Failure::deck, "the wall '" + wall.name + "' has a normal of " + std::to_string(normal->size()) +
+                                     " numbers; give " + std::to_string(D));
+    wall.normal = Eigen::Map<const Vec<D>>(normal->data());
+  }
+  if (const auto* speed = given.find<double>("velocity")) wall.velocity = *speed;
+  if (const auto* shaken = given.find<TableValue>("velocity")) {
+    wall.amplitude = std::get<double>(shaken->at("amplitude"));
+    wall.frequency = std::get<double>(shaken->at("frequency"));
+  }
+  box.add(std::move(wall));
+}
+
+template void add_wall(Box<2>&, const Parameters&);
+template void add_wall(Box<3>&, const Parameters&);
+
+}  // namespace carom

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// The parameters of a wall, as decks and Python give them.
+
+#include "engine/base/box.h"
+#include "engine/base/parameters.h"
+
+namespace carom {
+
+const std::vector<Parameter>& wall_parameters();
+
+/// Adds a wall with these parameters, which are complete. Throws Error(Failure::deck).
+template <int D>
+void add_wall(Box<D>& box, const Parameters& given);
+
+}  // namespace carom
