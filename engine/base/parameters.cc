@@ -90,7 +90,8 @@ ParameterValue default_value(const Parameter& parameter) {
     return whole;
   }
   double real = 0;
-  const bool number = parameter.type == Parameter::Type::real || parameter.type == Parameter::Type::real_or_list;
+  const bool number = parameter.type == Parameter::Type::real || parameter.type == Parameter::Type::real_or_list ||
+                      parameter.type == Parameter::Type::real_or_table;
   if (!number || std::from_chars(text.data(), end, real).ec != std::errc{})
     throw std::logic_error("the default of " + quoted(parameter.name) + " cannot be read");
   return real;

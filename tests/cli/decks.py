@@ -80,6 +80,10 @@ def lennard_jones(more):
                    FLUID.replace("radius", "display_radius"))
 
 
+def walled(keys):
+    return changed("[[particles]]", f"[[wall]]\n{keys}\n[[particles]]")
+
+
 def table(more):
     return lennard_jones(more).replace('"lennard-jones"\nepsilon = 1\nsigma = 1', '"table"')
 

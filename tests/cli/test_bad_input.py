@@ -3,7 +3,7 @@
 
 import pytest
 
-from decks import FLUID, GOOD, carom, changed, lennard_jones, table, validate
+from decks import FLUID, GOOD, carom, changed, lennard_jones, table, validate, walled
 from runs import needs_carom
 
 pytestmark = needs_carom
@@ -61,6 +61,28 @@ DECK_ERRORS = {
         changed("box = [6.0, 6.0, 6.0]\n", "", changed('"fcc"', '"fcc"\npacking_fraction = 1', FLUID)),
         15, ["'packing_fraction' must be below 1"]),
     "unknown order": (changed("step = 0.01", "step = 0.01\norder = 3"), 25, ["'order' cannot be '3'"]),
+    "wall without a name": (walled("velocity = 1.0"), 9, ["missing key 'name' in [[wall]]"]),
+    "wall of a periodic boundary": (
+        walled('name = "x-"').replace('["wall", "wall"]', '["periodic", "wall"]'),
+        9, ["the wall 'x-' does not exist", "make that boundary a wall"]),
+    "wall without a normal": (
+        walled('name = "ramp"'), 9, ["'ramp' is no face of the box and has no normal", "x-, x+, y-, y+"]),
+    "wall with a normal of zeros": (walled('name = "ramp"\nnormal = [0, 0]'), 9, ["give a normal that is not zero"]),
+    "wall with a normal in three dimensions": (
+        walled('name = "ramp"\nnormal = [0, 0, 1]'), 9, ["a normal of 3 numbers", "give 2"]),
+    "face with a normal": (walled('name = "y+"\nnormal = [0, 1]'), 9, ["'y+' is a face of the box", "leave normal"]),
+    "wall that is given twice": (
+        walled('name = "y+"\n[[wall]]\nname = "y+"'), 11, ["'y+' is given twice", "its own name"]),
+    "walls that cross": (
+        walled('name = "lid"\nnormal = [0, -1]\noffset = 0.5'), 9, ["the wall 'lid' leave no room", "move them apart"]),
+    "wall that is shaken without a frequency": (
+        walled('name = "y+"\nvelocity = {amplitude = 1}'), 11, ["'velocity' has no 'frequency'", "positive number"]),
+    "wall with a frequency of 0": (
+        walled('name = "y+"\nvelocity = {amplitude = 1, frequency = 0}'), 11, ["'frequency' must be positive (is 0)"]),
+    "wall with an unknown motion": (
+        walled('name = "y+"\nvelocity = {amplitude = 1, frequency = 1, phase = 1}'), 11, ["unknown key 'phase'"]),
+    "wall with the velocity of a text": (
+        walled('name = "y+"\nvelocity = "fast"'), 11, ["'velocity' has the wrong type: string", "a number or a table"]),
     "boundary for too few axes": (
         changed('["wall", "wall"]', '["wall"]'),
         7, ["'boundary' has the wrong length (1)", "give 2"]),
@@ -164,6 +186,9 @@ IMPOSSIBLE_STATES = {
     "outside a wall": (
         changed("[[2.0, 5.0]", "[[0.25, 5.0]"),
         ["1 sphere is not inside the walls", "particle 0", "0.25 beyond the lower wall of axis 0"]),
+    "wall that runs into a sphere": (
+        walled('name = "ramp"\nnormal = [2, 0]\noffset = 4.5'),
+        ["1 sphere is not inside the walls", "particle 0", "0.75 beyond the wall 'ramp'"]),
     "periodic box too small": (
         changed('["wall", "wall"]', '["wall", "periodic"]').replace("[10.0, 10.0]", "[10.0, 0.9]").replace("5.0]", "0.45]"),
         ["the periodic box is 0.9 long on axis 1, less than a diameter of 1"]),

@@ -39,6 +39,31 @@ DISCS = toml_text(tomllib.loads(SPHERES) | {
     "output": {"directory": "unused", "frame_interval": 0.7, "thermo_interval": 0.3}})
 
 
+# Discs between a ramp, a shaken floor and a piston.
+WALLS = toml_text(tomllib.loads(DISCS) | {
+    "title": "walls",
+    "system": {"dimension": 2, "box": [30.0, 20.0], "boundary": ["wall", "wall"]},
+    "wall": [{"name": "x+", "velocity": 0.1},
+             {"name": "ramp", "normal": [1.0, 2.0], "offset": 8.0},
+             {"name": "y-", "velocity": {"amplitude": 0.2, "frequency": 0.5}}]})
+
+
+@pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
+def test_walls_are_those_of_one_rank_and_continue(method, tmp_path):
+    output = ["output.events=true"] if method == "free-flight" else [
+        "output.events=true", f"integrator.type={method}", "integrator.step=0.02", "run.end_time=3.0"]
+    deck = write_deck(tmp_path, WALLS)
+    run(deck, tmp_path / "plain", output)
+    for ranks in 2, 4:
+        assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
+        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
+    half = "run.end_time=1.5" if method != "free-flight" else "run.collisions=700"
+    run(deck, tmp_path / "half", output + [half])
+    subprocess.run([CAROM, "run", "--continue", tmp_path / "half", "--quiet", "--set",
+                    "run.end_time=3.0" if method != "free-flight" else "run.collisions=1500"], check=True)
+    assert filecmp.cmp(tmp_path / "plain" / "thermo.csv", tmp_path / "half" / "thermo.csv", shallow=False)
+
+
 @pytest.mark.parametrize("text", [SPHERES, DISCS], ids=["spheres", "discs"])
 def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
     output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11", "output.profile_interval=0.13", "output.sample_start=0.05"]
