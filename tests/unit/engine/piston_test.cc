@@ -67,7 +67,7 @@ void expect_exact_bounces(const std::string& method, double step, double toleran
   EXPECT_GT(met, 10u);
   EXPECT_GT(time, end);  // no contact is missing
   const Statistics& s = run->statistics();
-  EXPECT_NEAR(s.counters.wall_work.value(), work, 1e-13 * work);
+  EXPECT_NEAR(s.counters.work.value(), work, 1e-13 * work);
   EXPECT_NEAR(s.energy_final - s.energy_initial, work, 1e-14 * s.energy_final);
   EXPECT_GT(work, 2 * s.energy_initial);
   EXPECT_TRUE(std::isnan(s.mean_pressure));  // the volume varies
@@ -88,7 +88,7 @@ TEST(Piston, GivesWayAndTakesEnergy) {
   for (const std::string method : {"free-flight", "psa"}) {
     const auto run = test::run_until<2>(one_sphere(4, 2, 0.5), method, 0.5, 20);
     const Statistics& s = run->statistics();
-    EXPECT_LT(s.counters.wall_work.value(), 0) << method;
+    EXPECT_LT(s.counters.work.value(), 0) << method;
     EXPECT_LE(s.max_energy_error, 1e-14 * s.energy_initial) << method;
     EXPECT_GE(run->system().box.edges[0] - kRadius - run->system().particles.x[0][0], 0) << method;
   }
@@ -103,7 +103,7 @@ TEST(Piston, MeetsWhatIsAtRest) {
     const auto run = test::run_until<2>(std::move(system), method, 0.75, 1.5);
     EXPECT_EQ(run->statistics().counters.sphere_wall, 1u) << method;
     EXPECT_NEAR(run->system().particles.x[0][0], 3 - 2 * (1.5 - 0.5), 1e-13) << method;
-    EXPECT_NEAR(run->statistics().counters.wall_work.value(), 0.5 * kMass * 4, 1e-13) << method;
+    EXPECT_NEAR(run->statistics().counters.work.value(), 0.5 * kMass * 4, 1e-13) << method;
   }
 }
 
@@ -114,7 +114,7 @@ TEST(Piston, EnergyAndWorkAddUpUnderForces) {
     system->box.edge_velocity = {-0.3, 0.1};
     add_interaction(*system, "harmonic-bond", {{"chain", true}, {"stiffness", 4.0}, {"rest_length", 2.0}});
     const auto run = test::run_until<2>(std::move(system), "psa", h, 6);
-    EXPECT_GT(std::abs(run->statistics().counters.wall_work.value()), 0.05);
+    EXPECT_GT(std::abs(run->statistics().counters.work.value()), 0.05);
     return run->statistics().max_energy_error;
   };
   EXPECT_LT(error(0.001), 0.01);
