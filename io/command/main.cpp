@@ -23,6 +23,7 @@
 #include "io/deck/options.h"
 #include "io/deck/schema.h"
 #include "io/files/info.h"
+#include "io/files/thermo.h"
 #include "io/view/view.h"
 #include "parallel/world.h"
 
@@ -190,7 +191,7 @@ int carom_main(int argc, char** argv) {
   return once([&] {
     if (validate.parsed()) return carom::validate_command(deck, set);
     if (schema.parsed()) return print(carom::schema_page(markdown));
-    if (methods.parsed()) return print(carom::methods_page());
+    if (methods.parsed()) return print(carom::methods_page() + carom::columns_page());
     if (info.parsed()) return carom::info_command(file);
     if (convert.parsed()) return carom::convert_command(to);
     if (views.view->parsed()) return carom::view_command(views.options);

@@ -33,7 +33,7 @@ std::vector<std::string_view> symbols_of(const std::vector<std::string>& names) 
 }
 
 /// A value of the second line of extended XYZ.
-std::string quoted(const std::string& text) {
+std::string quoted_for_extxyz(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
@@ -79,7 +79,7 @@ std::string write_extxyz(const TrajectoryReader& trajectory, std::span<const std
         f.time, f.step);
     for (std::size_t k = 0; k < 3; ++k)
       fmt::format_to(out, "{}{}", k > 0 ? " " : "", periodic(trajectory, k) ? 'T' : 'F');
-    fmt::format_to(out, "\" species_names={}\n", quoted(joined(trajectory.species_names)));
+    fmt::format_to(out, "\" species_names={}\n", quoted_for_extxyz(joined(trajectory.species_names)));
     for (std::size_t i = 0; i < trajectory.particles(); ++i) {
       const auto *x = &f.position[3 * i], *v = &f.velocity[3 * i];
       const auto* image = &f.image[3 * i];

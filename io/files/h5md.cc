@@ -145,8 +145,9 @@ template <class T>
 struct Element {
   Handle group;
   Series<T> value;
-  Element(File& file, const std::string& name, std::vector<hsize_t> row_shape = {})
-      : group(file.group(name)), value(file, group, "value", std::move(row_shape)) {}
+  Element(File& file, const std::string& name, std::vector<hsize_t> row_shape = {},
+          hid_t stored = hdf5::native_type<T>())
+      : group(file.group(name)), value(file, group, "value", std::move(row_shape), stored) {}
   void share_clock(File& file, const Handle& clock) {
     file.link(clock, "step", group, "step");
     file.link(clock, "time", group, "time");
@@ -166,17 +167,19 @@ struct TrajectoryWriter<D>::Contents {
         time(file, position.group, "time"),
         box(file.group("particles/trajectory/box")),
         edges(file, "particles/trajectory/box/edges", {3, 3}),
-        momentum(file, "observables/momentum", {3}),
-        collisions(file, "observables/collisions"),
         ranks(system.decomposition.ranks()) {
     for (std::size_t k = 0; k < 3; ++k)
       edge_rows[4 * k] = static_cast<int>(k) < D ? system.box.edges[static_cast<int>(k)] : 1.0;
-    for (const auto& column : scalar_columns<D>())
-      if (column.element) observables.push_back({{file, std::string("observables/") + column.element}, column.of});
-    for (auto* element : {&velocity, &edges, &momentum}) element->share_clock(file, position.group);
+    for (const Column<D>& column : columns<D>()) {
+      if (!column.element) continue;
+      const bool counts = column.kind == ColumnKind::count, vector = column.kind == ColumnKind::vector;
+      const auto stored = counts ? hdf5::native_type<std::uint64_t>() : hdf5::native_type<double>();
+      const std::string name = std::string("observables/").append(column.element);
+      observables.push_back({{file, name, std::vector<hsize_t>(vector ? 1 : 0, 3), stored}, &column});
+    }
+    for (auto* element : {&velocity, &edges}) element->share_clock(file, position.group);
     image.share_clock(file, position.group);
-    collisions.share_clock(file, position.group);
-    for (auto& [element, of] : observables) element.share_clock(file, position.group);
+    for (auto& [element, column] : observables) element.share_clock(file, position.group);
   }
 
   void create(const Deck& deck, const System<D>& system) {
@@ -190,10 +193,9 @@ struct TrajectoryWriter<D>::Contents {
   }
 
   void cut(std::uint64_t frames) {
-    for (auto* element : {&position, &velocity, &edges, &momentum}) element->value.cut(frames);
-    for (auto& [element, of] : observables) element.value.cut(frames);
+    for (auto* element : {&position, &velocity, &edges}) element->value.cut(frames);
+    for (auto& [element, column] : observables) element.value.cut(frames);
     image.value.cut(frames);
-    collisions.value.cut(frames);
     time.cut(frames);
     step.cut(frames);
   }
@@ -281,13 +283,12 @@ struct TrajectoryWriter<D>::Contents {
   Series<std::int64_t> step;
   Series<double> time;
   Handle box;
-  Element<double> edges, momentum;
-  Element<std::uint64_t> collisions;
-  struct Scalar {
+  Element<double> edges;
+  struct Observable {
     Element<double> element;
-    double (*of)(const Snapshot<D>&);
+    const Column<D>* column;
   };
-  std::vector<Scalar> observables;
+  std::vector<Observable> observables;
   std::array<double, 9> edge_rows{};
   Communicator& ranks;
 };
@@ -310,9 +311,11 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   Contents& c = *contents_;
   c.write_particles(*s.particles);
   c.edges.value.append(c.edge_rows);
-  c.momentum.value.append(three_columns<double>(std::array{s.momentum}, D));
-  c.collisions.value.append(s.collisions);
-  for (auto& [element, of] : c.observables) element.value.append(of(s));
+  for (auto& [element, column] : c.observables) {
+    std::vector<double> row(column->components() > 1 ? 3 : 1);
+    for (int axis = 0; axis < column->components(); ++axis) row[static_cast<std::size_t>(axis)] = column->of(s, axis);
+    element.value.append(row);
+  }
   c.time.append(s.time);
   c.step.append(s.step);
   c.file.flush();

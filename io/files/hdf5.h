@@ -165,8 +165,10 @@ class SeriesBase {
 template <class T>
 class Series : public SeriesBase {
  public:
-  Series(const File& file, const Handle& where, const std::string& name, std::vector<hsize_t> row_shape = {})
-      : SeriesBase(file, where, name, native_type<T>(), std::move(row_shape)) {}
+  /// `stored`: the type in the file, to which the values are converted.
+  Series(const File& file, const Handle& where, const std::string& name, std::vector<hsize_t> row_shape = {},
+         hid_t stored = native_type<T>())
+      : SeriesBase(file, where, name, stored, std::move(row_shape)) {}
   /// `values`: whole rows, the last axis fastest.
   void append(std::span<const T> values) { SeriesBase::append(native_type<T>(), values.data(), values.size()); }
   void append(T value) { SeriesBase::append(native_type<T>(), &value, 1); }

@@ -169,9 +169,10 @@ template <int D>
 void ThermoTable<D>::thermo(const Snapshot<D>& s) {
   constexpr std::uint64_t kOfADoubling = 16;
   if (rows_ == 0) {
-    std::string head = fmt::format("{:>12} {:>10} {:>12}", "time", "step", "collisions");
-    for (const auto& column : scalar_columns<D>())
-      if (column.heading) head += fmt::format(" {:>{}}", column.heading, std::atoi(column.format));
+    std::string head;
+    for (const Column<D>& column : columns<D>())
+      if (column.format)
+        head += fmt::format("{}{:>{}}", head.empty() ? "" : " ", column.heading, std::atoi(column.format));
     log_.note(head);
   }
   const std::uint64_t row = rows_++;
@@ -190,9 +191,11 @@ void ThermoTable<D>::finish() {
 
 template <int D>
 void ThermoTable<D>::write(const Snapshot<D>& s) {
-  std::string row = fmt::format("{:>12.6g} {:>10} {:>12}", s.time, s.step, s.collisions);
-  for (const auto& column : scalar_columns<D>())
-    if (column.heading) row += fmt::format(fmt::runtime(std::string(" {:>") + column.format + "}"), column.of(s));
+  std::string row;
+  for (const Column<D>& column : columns<D>())
+    if (column.format)
+      row +=
+          fmt::format(fmt::runtime(fmt::format("{}{{:>{}}}", row.empty() ? "" : " ", column.format)), column.of(s, 0));
   log_.note(row);
 }
 

@@ -12,27 +12,51 @@
 
 namespace carom {
 
+namespace {
+constexpr ColumnChart kError{"error", "largest |H − H₁| so far", true}, kTemperature{"temperature", "temperature"},
+    kPressure{"pressure", "pressure"};
+}  // namespace
+
 template <int D>
-const std::vector<ScalarColumn<D>>& scalar_columns() {
+const std::vector<Column<D>>& columns() {
   using S = const Snapshot<D>&;
-  static const auto all = [] {
-    std::vector<ScalarColumn<D>> columns = {
-        {"kinetic", "kinetic_energy", [](S s) { return s.kinetic; }, "kinetic", "14.8g"},
-        {"potential", "potential_energy", [](S s) { return s.potential; }, "potential", "14.8g"},
-        {"total", "total_energy", [](S s) { return s.total(); }, "total", "16.10g"},
-        {"shadow", "shadow_energy", [](S s) { return s.shadow; }},
-        {"max_energy_error", "max_energy_error", [](S s) { return s.max_energy_error; }, "max |ΔE|", "10.2e"},
-        {"momentum_x", nullptr, [](S s) { return s.momentum[0]; }},  // in the trajectory one element, a vector
-        {"momentum_y", nullptr, [](S s) { return s.momentum[1]; }}};
-    if constexpr (D == 3) columns.push_back({"momentum_z", nullptr, [](S s) { return s.momentum[2]; }});
-    columns.push_back({"temperature", "temperature", [](S s) { return s.temperature; }, "temperature", "12.6g"});
-    columns.push_back({"pressure", "pressure", [](S s) { return s.pressure; }, "pressure", "12.6g"});
-    return columns;
-  }();
+  using enum ColumnKind;
+  // name, kind, unit, meaning, number, name in Python and in the trajectory, format in run.log, chart
+  static const std::vector<Column<D>> all = {
+      {"time", number, "time", "simulated time since the start of the run",  //
+       [](S s, int) { return s.time; }, "time", nullptr, "12.6g"},
+      {"step", count, "-", "steps done; with free-flight, epochs begun or done",  //
+       [](S s, int) { return static_cast<double>(s.step); }, "step", nullptr, "10.0f"},
+      {"collisions", count, "-", "pair collisions so far",  //
+       [](S s, int) { return static_cast<double>(s.collisions); }, "collisions", "collisions", "12.0f"},
+      {"kinetic", number, "energy", "K",  //
+       [](S s, int) { return s.kinetic; }, "kinetic", "kinetic_energy", "14.8g"},
+      {"potential", number, "energy", "V with its long-range corrections",  //
+       [](S s, int) { return s.potential; }, "potential", "potential_energy", "14.8g"},
+      {"total", number, "energy", "H = K + V",  //
+       [](S s, int) { return s.total(); }, "energy", "total_energy", "16.10g"},
+      {"shadow", number, "energy", "S_h of Verlet types; NaN for other methods",  //
+       [](S s, int) { return s.shadow; }, "shadow_energy", "shadow_energy"},
+      {"max_energy_error", number, "energy", kError.title,  //
+       [](S s, int) { return s.max_energy_error; }, nullptr, "max_energy_error", "10.2e", &kError, "max |ΔE|"},
+      {"momentum", vector, "mass length/time", "total momentum",  //
+       [](S s, int axis) { return s.momentum[axis]; }, "momentum", "momentum"},
+      {"temperature", number, "energy", "2K/(D N), k_B = 1",  //
+       [](S s, int) { return s.temperature; }, "temperature", "temperature", "12.6g", &kTemperature},
+      {"pressure", number, "energy/length^D", "virial pressure, with the collisions since the last row",  //
+       [](S s, int) { return s.pressure; }, "pressure", "pressure", "12.6g", &kPressure}};
   return all;
 }
-template const std::vector<ScalarColumn<2>>& scalar_columns();
-template const std::vector<ScalarColumn<3>>& scalar_columns();
+template const std::vector<Column<2>>& columns();
+template const std::vector<Column<3>>& columns();
+
+std::string columns_page() {
+  std::string text = "thermo.csv – a row each output.thermo_interval\n";
+  for (const Column<3>& column : columns<3>())
+    text += fmt::format("    {}{} [{}]: {}\n", column.name, column.components() > 1 ? "_x, _y, _z" : "", column.unit,
+                        column.meaning);
+  return text;
+}
 
 ThermoPoint last_thermo_point(const std::filesystem::path& path) {
   constexpr std::streamoff kTailBytes = 2000;  // bytes, more than two rows have
@@ -53,15 +77,19 @@ template <int D>
 ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path, const std::optional<FileMark>& mark)
     : file_(path, mark) {
   if (mark) return;
-  std::string head = "time,step,collisions";
-  for (const auto& column : scalar_columns<D>()) head += std::string(",") + column.name;
+  std::string head;
+  for (const Column<D>& column : columns<D>())
+    for (int axis = 0; axis < column.components(); ++axis)
+      head += fmt::format("{}{}{}", head.empty() ? "" : ",", column.name, column.suffix(axis));
   file_.append(head + '\n');
 }
 
 template <int D>
 void ThermoWriter<D>::thermo(const Snapshot<D>& s) {
-  std::string row = fmt::format("{},{},{}", s.time, s.step, s.collisions);
-  for (const auto& column : scalar_columns<D>()) row += fmt::format(",{}", column.of(s));
+  std::string row;
+  for (const Column<D>& column : columns<D>())
+    for (int axis = 0; axis < column.components(); ++axis)
+      row += fmt::format("{}{}", row.empty() ? "" : ",", column.of(s, axis));
   file_.append(row + '\n');
 }
 

@@ -2,11 +2,14 @@
 #pragma once
 // thermo.csv: one row per output time, each in the file before the run continues.
 //
-// Columns: time, step, collisions, then scalar_columns(); reduced units; the fewest digits that reproduce the doubles;
-// `nan` if a method has no shadow energy.
+// Its columns are declared in thermo.cc, and nowhere else: the trajectory, run.log, Python, the page and `carom
+// methods` show them, too. Reduced units; the fewest digits that reproduce the doubles; `nan` if a method has no shadow
+// energy.
 
+#include <array>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "engine/run/simulation.h"
@@ -14,19 +17,38 @@
 
 namespace carom {
 
-/// A number about a state that the files of a run show. A new column is declared in thermo.cc, and nowhere else.
+/// A chart of the page; columns of the same chart share its axes.
+struct ColumnChart {
+  const char* name;
+  const char* title;
+  bool logarithmic = false;
+};
+
+enum class ColumnKind { number, count, vector };
+
 template <int D>
-struct ScalarColumn {
-  const char* name;     ///< in thermo.csv
-  const char* element;  ///< name in /observables of the trajectory; null: left out
-  double (*of)(const Snapshot<D>&);
-  const char* heading = nullptr;  ///< heading in the table of run.log; null: left out
-  const char* format = nullptr;   ///< format in that table, with the width of the column: "14.8g"
+struct Column {
+  const char* name;  ///< in thermo.csv; for each axis of a vector, _x, _y or _z is appended
+  ColumnKind kind;
+  const char* unit;
+  const char* meaning;
+  double (*of)(const Snapshot<D>&, int axis);  ///< `axis` is that of a vector
+  const char* python;                          ///< property of carom.Simulation; null: none
+  const char* element;                         ///< name in /observables of the trajectory; null: left out
+  const char* format = nullptr;                ///< in the table of run.log, with the width: "14.8g"; null: left out
+  const ColumnChart* chart = nullptr;          ///< on the page; null: none
+  const char* heading = name;                  ///< in the table of run.log
+
+  int components() const { return kind == ColumnKind::vector ? D : 1; }
+  const char* suffix(int axis) const { return components() == 1 ? "" : std::array{"_x", "_y", "_z"}.at(axis); }
 };
 
 /// All columns, in the order of thermo.csv.
 template <int D>
-const std::vector<ScalarColumn<D>>& scalar_columns();
+const std::vector<Column<D>>& columns();
+
+/// The columns as a text for the manual.
+std::string columns_page();
 
 /// The point of the run at which a row was written.
 struct ThermoPoint {

@@ -11,6 +11,7 @@
 
 #include "engine/base/boundary.h"
 #include "engine/forces/potentials/table.h"
+#include "io/files/thermo.h"
 #include "io/files/version.h"
 #include "io/python/python_lock.h"
 #include "io/python/session.h"
@@ -92,11 +93,25 @@ void run(Session<D>& session, const Plan& plan, const py::object& callback, cons
   }
 }
 
+/// A number, an integer or an array of D numbers.
+template <int D>
+py::object value_of(const Column<D>& column, const Snapshot<D>& shot) {
+  if (column.kind == ColumnKind::number) return py::float_(column.of(shot, 0));
+  if (column.kind == ColumnKind::count) return py::int_(static_cast<std::int64_t>(column.of(shot, 0)));
+  Array all(D);
+  for (int axis = 0; axis < D; ++axis) all.mutable_data()[axis] = column.of(shot, axis);
+  return all;
+}
+
 template <int D>
 void bind(py::module_& module, const char* name) {
   using S = Session<D>;
   const auto number = [](double (*get)(S&)) { return [get](S& session) { return get(session); }; };
-  py::class_<S>(module, name)
+  py::class_<S> session_type(module, name);
+  for (const Column<D>& column : columns<D>())
+    if (column.python)
+      session_type.def_property_readonly(column.python, [&column](S& s) { return value_of(column, s.shot()); });
+  session_type
       .def(py::init([](const std::vector<double>& edges, const std::vector<std::string>& boundary) {
         return std::make_unique<S>(edges, boundary);
       }))
@@ -176,24 +191,10 @@ void bind(py::module_& module, const char* name) {
              const auto values = which == "mass" ? all.mass : which == "radius" ? all.radius : all.charge;
              return view<double>(values.data(), values.size(), 0, self);
            })
-      .def_property_readonly("time", number([](S& s) { return s.shot().time; }))
-      .def_property_readonly("kinetic", number([](S& s) { return s.shot().kinetic; }))
-      .def_property_readonly("potential", number([](S& s) { return s.shot().potential; }))
-      .def_property_readonly("energy", number([](S& s) { return s.shot().total(); }))
-      .def_property_readonly("shadow", number([](S& s) { return s.shot().shadow; }))
-      .def_property_readonly("temperature", number([](S& s) { return s.shot().temperature; }))
-      .def_property_readonly("pressure", number([](S& s) { return s.shot().pressure; }))
       .def_property_readonly("energy_error", number([](S& s) {
                                const double scale = s.statistics().energy_reference;
                                return scale > 0 ? s.shot().max_energy_error / scale : 0.0;
                              }))
-      .def_property_readonly("momentum",
-                             [](S& s) {
-                               const Vec<D>& p = s.shot().momentum;
-                               return std::vector<double>(p.begin(), p.end());
-                             })
-      .def_property_readonly("step", [](S& s) { return s.shot().step; })
-      .def_property_readonly("collisions", [](S& s) { return s.shot().collisions; })
       .def_property_readonly("force_passes", number([](S& s) { return s.statistics().force_passes; }))
       .def_property_readonly("wall_seconds", number([](S& s) { return s.statistics().wall_seconds; }))
       .def_property_readonly("interval", [](const S& s) { return s.plan().thermo_interval; })
@@ -329,5 +330,9 @@ PYBIND11_MODULE(_carom, module) {
   module.def("view", serve_page);
   module.def("spline", spline);
   module.def("descriptors", descriptors);
+  py::dict meanings;
+  for (const carom::Column<3>& column : carom::columns<3>())
+    if (column.python) meanings[column.python] = std::string(column.meaning) + " [" + column.unit + "]";
+  module.attr("columns") = meanings;
   module.attr("version") = carom::version_string();
 }

@@ -17,6 +17,7 @@
 #include "io/files/hdf5.h"
 #include "io/files/journal.h"
 #include "io/files/output_directory.h"
+#include "io/files/thermo.h"
 #include "io/files/trajectory_reader.h"
 
 namespace carom {
@@ -56,6 +57,18 @@ std::optional<std::uint64_t> number_behind(std::string_view question, std::strin
   const auto [end, error] = std::from_chars(question.data(), question.data() + question.size(), number);
   if (question.empty() || error != std::errc{} || end != question.data() + question.size()) return {};
   return number;
+}
+
+/// The columns of thermo.csv that the page draws.
+Json curves() {
+  Json all = Json::array();
+  for (const Column<3>& column : columns<3>())
+    if (const ColumnChart* chart = column.chart)
+      all.push_back({{"column", column.name},
+                     {"chart", chart->name},
+                     {"title", chart->title},
+                     {"logarithmic", chart->logarithmic}});
+  return all;
 }
 
 /// The complete rows of a table from byte `first` on.
@@ -117,6 +130,7 @@ Json RunSource::state() {
   state["name"] = directory_.lexically_normal().string();
   state["status"] = status;
   state["frames"] = frames_;
+  state["curves"] = curves();
   state["thermo"] = status_of(directory_ / run_file::thermo).size;
   state["rdf"] = status_of(directory_ / "rdf.csv").version;
   return state;

@@ -2,6 +2,7 @@
 """Simulations: arrays and keywords checked here, everything else by the engine, with its texts."""
 
 import collections.abc
+import operator
 import os
 import warnings
 
@@ -346,19 +347,8 @@ class Simulation:
     box = property(lambda self: self._session.box, doc="Edges [length].")
     boundary = property(lambda self: self._session.boundary, doc="The name of the boundary on each axis.")
 
-    time = property(lambda self: self._session.time, doc="Simulated time since the start of the run [time].")
-    step = property(lambda self: self._session.step, doc="Steps done; of free-flight, epochs begun or done.")
-    collisions = property(lambda self: self._session.collisions, doc="Pair collisions so far.")
-    kinetic = property(lambda self: self._session.kinetic, doc="K [energy]")
-    potential = property(lambda self: self._session.potential, doc="V with its long-range corrections [energy]")
-    energy = property(lambda self: self._session.energy, doc="H = K + V [energy]")
-    shadow_energy = property(lambda self: self._session.shadow, doc="S_h of Verlet types [energy]; else NaN")
     energy_error = property(lambda self: self._session.energy_error,
                             doc="The largest |H - H_1| so far, over max(|H_1|, K_1 + sum |V|).")
-    temperature = property(lambda self: self._session.temperature, doc="2K/(D N), k_B = 1 [energy]")
-    pressure = property(lambda self: self._session.pressure,
-                        doc="Virial, with the collisions since the call before [energy/length^D]")
-    momentum = property(lambda self: np.array(self._session.momentum), doc="The total, (D,) [mass length/time]")
     force_passes = property(lambda self: self._session.force_passes, doc="Pair evaluations / interacting pairs.")
     wall_seconds = property(lambda self: self._session.wall_seconds, doc="What the run has taken [s].")
 
@@ -382,3 +372,8 @@ class Simulation:
         if array.shape != shape:
             raise UsageError(f"Simulation: '{name}' has shape {array.shape}; give {shape}")
         return array
+
+
+# The numbers that runs write to thermo.csv: time, energy, temperature, …
+for _name, _meaning in _carom.columns.items():
+    setattr(Simulation, _name, property(operator.attrgetter("_session." + _name), doc=_meaning))

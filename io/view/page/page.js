@@ -2,11 +2,7 @@
 "use strict";
 // The page: asks for what is new, decides which frame is shown, and draws a panel for each run and the curves of all runs.
 const camera = new Camera();
-const charts = {
-  error: new Chart(element("curves"), "largest |H − H₁| so far", "time", true),
-  temperature: new Chart(element("curves"), "temperature", "time"),
-  pressure: new Chart(element("curves"), "pressure", "time"),
-};
+const charts = {};        // by name; io/files/thermo.cc declares them, but for g(r)
 const panels = [];
 let dirty = true;         // something has changed since the last drawing
 let playing = false;

@@ -13,6 +13,7 @@ class Panel {
     for (const part of ["label", "key", "numbers"]) this[part] = add(this.box, "div", part);
     this.spheres = new Spheres(this.canvas, camera);
     this.state = { frames: 0 };
+    this.curves = {};
     this.thermoBytes = 0;
     this.path = null;
     steer(this);
@@ -36,7 +37,6 @@ class Panel {
     this.choose(-1);
     for (const chart of Object.values(charts)) chart.curves = chart.curves.filter((curve) => curve.panel !== this);
     this.curves = {};
-    for (const name of ["error", "temperature", "pressure"]) this.curves[name] = this.curve(charts[name], this.state.integrator, name === "error");
   }
   curve(chart, name, largest) {
     const curve = new Curve(name || "", COLOURS[(chart === charts.rdf ? chart.curves.length : this.number) % 6], largest);
@@ -49,9 +49,12 @@ class Panel {
     const { names, columns, rows } = readTable(text, this.names);
     this.names = names;
     this.thermoBytes += new TextEncoder().encode(text).length;
-    for (const [name, column] of [["error", "max_energy_error"], ["temperature", "temperature"], ["pressure", "pressure"]]) {
-      this.curves[name].name = this.state.integrator || "";
-      for (let row = 0; row < rows; row++) this.curves[name].add(columns.time[row], columns[column][row]);
+    for (const { column, chart, title, logarithmic } of this.state.curves || []) {
+      if (!columns[column]) continue;
+      charts[chart] = charts[chart] || new Chart(element("curves"), title, "time", logarithmic);
+      const curve = this.curves[column] = this.curves[column] || this.curve(charts[chart], "", logarithmic);
+      curve.name = this.state.integrator || "";
+      for (let row = 0; row < rows; row++) curve.add(columns.time[row], columns[column][row]);
     }
     dirty = true;
   }

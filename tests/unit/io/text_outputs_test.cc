@@ -58,6 +58,8 @@ TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   EXPECT_EQ(values[5], 1.25);
   EXPECT_TRUE(std::isnan(values[6]));
   EXPECT_EQ(values[11], 1.0 / 3);
+  for (const Column<3>& column : columns<3>())
+    EXPECT_NE(columns_page().find(std::string("    ").append(column.name)), std::string::npos) << column.name;
 }
 
 // Only complete rows count: a kill may leave a partial row.
