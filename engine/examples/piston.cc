@@ -32,7 +32,7 @@ class Rows : public carom::Observer<3> {
   void thermo(const carom::Snapshot<3>& shot) override {
     const double edge = run_.system().box.lengths(shot.time)[0];
     std::printf("edge %5.2f, temperature %.4f, adiabat %.4f, work %.3f\n", edge, shot.temperature, adiabat(edge),
-                run_.statistics().counters.wall_work.value());
+                run_.statistics().counters.work.value());
   }
 
  private:

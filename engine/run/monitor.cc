@@ -223,8 +223,8 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   shot.step = statistics_.steps;
   shot.collisions = statistics_.counters.sphere_sphere;
   shot.particles = &state;
-  // The energy of the spheres and of the moving walls, which have lost the work they did.
-  account_.energy = shot.kinetic + sums.energy.value() - statistics_.counters.wall_work.value();
+  // The conserved quantity: the energy of the spheres, what they have lost, and less what walls and baths gave them.
+  account_.energy = shot.kinetic + sums.energy.value() + statistics_.counters.drained();
   account_.magnitude = found.magnitude;
   account_.virial = found.virial;
   account_.speed = found.speed;

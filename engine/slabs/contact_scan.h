@@ -151,7 +151,7 @@ class ContactScan {
     return key.kind == EventKind::wall ? box_.wall(key.hi).velocity_at(later) : 0.0;
   }
   double count_work(double work) {
-    if (work != 0) counters_->wall_work.add(work);
+    if (work != 0) counters_->work.add(work);
     return work;
   }
   double stop_rounding(Vectors<D> v) const;

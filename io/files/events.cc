@@ -10,10 +10,10 @@ namespace {
 
 /// One column: the rows that wait in memory, and the data set in the file.
 template <class T>
-struct Column {
+struct EventColumn {
   std::vector<T> waiting;
   hdf5::Series<T> written;
-  Column(hdf5::File& file, const hdf5::Handle& group, const char* name, std::vector<hsize_t> row_shape = {})
+  EventColumn(hdf5::File& file, const hdf5::Handle& group, const char* name, std::vector<hsize_t> row_shape = {})
       : written(file, group, name, std::move(row_shape)) {}
   void write() {
     written.append(waiting);
@@ -73,14 +73,15 @@ struct EventWriter<D>::Contents {
 
   hdf5::File file;
   hdf5::Handle group = file.group("events");
-  Column<double> time{file, group, "time"};
-  Column<std::int64_t> slab{file, group, "slab"};
-  Column<double> time_in_slab{file, group, "time_in_slab"};
-  Column<std::uint32_t> generation{file, group, "generation"};
-  Column<std::uint8_t> kind{file, group, "kind"};
-  Column<std::uint32_t> lo{file, group, "lo"}, hi{file, group, "hi"};
-  Column<std::int32_t> image{file, group, "image", {D}};
-  Column<double> x_lo{file, group, "x_lo", {D}}, x_hi{file, group, "x_hi", {D}}, impulse{file, group, "impulse", {D}};
+  EventColumn<double> time{file, group, "time"};
+  EventColumn<std::int64_t> slab{file, group, "slab"};
+  EventColumn<double> time_in_slab{file, group, "time_in_slab"};
+  EventColumn<std::uint32_t> generation{file, group, "generation"};
+  EventColumn<std::uint8_t> kind{file, group, "kind"};
+  EventColumn<std::uint32_t> lo{file, group, "lo"}, hi{file, group, "hi"};
+  EventColumn<std::int32_t> image{file, group, "image", {D}};
+  EventColumn<double> x_lo{file, group, "x_lo", {D}}, x_hi{file, group, "x_hi", {D}},
+      impulse{file, group, "impulse", {D}};
   std::int64_t slabs_done = 0;
 };
 

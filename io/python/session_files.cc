@@ -111,7 +111,7 @@ void Session<D>::push(const Simulation<D>& run) {
   Particles<D>& p = at_work_->particles;
   change_value<Statistics>(at_work_->fields, "statistics", [&](Statistics& s) {
     for (Id i = 0; i < p.size(); ++i)
-      s.counters.wall_work.add(0.5 * p.mass[i] * (pushed_[i].squaredNorm() - p.v[i].squaredNorm()));
+      s.counters.work.add(0.5 * p.mass[i] * (pushed_[i].squaredNorm() - p.v[i].squaredNorm()));
     s.max_momentum_error.reset();
   });
   p.v = std::exchange(pushed_, {});

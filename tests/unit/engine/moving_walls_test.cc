@@ -67,7 +67,7 @@ TEST(FurtherWalls, APartitionActsOnBothSides) {
     for (const Id i : {0u, 1u}) EXPECT_LE(p.x[i][0], 6 + 0.125 * 16 - 0.5 + 1e-12) << method;
     for (const Id i : {2u, 3u}) EXPECT_GE(p.x[i][0], 6 + 0.125 * 16 + 0.5 - 1e-12) << method;
     EXPECT_LT(s.max_energy_error, 1e-13 * s.energy_reference) << method;
-    EXPECT_NE(s.counters.wall_work.value(), 0);
+    EXPECT_NE(s.counters.work.value(), 0);
   }
 }
 
@@ -115,7 +115,7 @@ TEST(ShakenWalls, WorkIsTheEnergyGained) {
       EXPECT_NEAR(contact.x_lo[1] - contact.x_hi[1], 0.5, 1e-11) << method;
     }
     EXPECT_GT(hits, 4) << method;
-    EXPECT_GT(std::abs(s.counters.wall_work.value()), 0.1) << method;
+    EXPECT_GT(std::abs(s.counters.work.value()), 0.1) << method;
     EXPECT_LT(s.max_energy_error, (exact ? 1e-12 : 1e-1) * s.energy_reference) << method;
   }
 }
@@ -147,7 +147,7 @@ TEST(ShakenWalls, CarryWhatLiesOnThem) {
     const Statistics& s = run->statistics();
     EXPECT_NEAR(run->system().particles.x[0][1], 0.6, 1e-4) << method;
     EXPECT_LT(s.max_energy_error, 1e-12 * s.energy_reference) << method;
-    EXPECT_NEAR(s.counters.wall_work.value(), s.energy_final - s.energy_initial, 1e-12) << method;
+    EXPECT_NEAR(s.counters.work.value(), s.energy_final - s.energy_initial, 1e-12) << method;
     EXPECT_LT(s.counters.sphere_wall, 20u) << method;
   }
 }

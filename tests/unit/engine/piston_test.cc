@@ -68,7 +68,7 @@ void expect_exact_bounces(const std::string& method, double step, double toleran
   EXPECT_GT(met, 10u);
   EXPECT_GT(time, end);  // no contact is missing
   const Statistics& s = run->statistics();
-  EXPECT_NEAR(s.counters.wall_work.value(), work, 1e-13 * work);
+  EXPECT_NEAR(s.counters.work.value(), work, 1e-13 * work);
   EXPECT_NEAR(s.energy_final - s.energy_initial, work, 1e-14 * s.energy_final);
   EXPECT_GT(work, 2 * s.energy_initial);
   EXPECT_TRUE(std::isnan(s.mean_pressure));  // the volume varies
@@ -89,7 +89,7 @@ TEST(Piston, GivesWayAndTakesEnergy) {
   for (const std::string method : {"free-flight", "psa"}) {
     const auto run = test::run_until<2>(one_sphere(4, 2, 0.5), method, 0.5, 20);
     const Statistics& s = run->statistics();
-    EXPECT_LT(s.counters.wall_work.value(), 0) << method;
+    EXPECT_LT(s.counters.work.value(), 0) << method;
     EXPECT_LE(s.max_energy_error, 1e-14 * s.energy_initial) << method;
     EXPECT_GE(run->system().box.lengths(20)[0] - kRadius - run->system().particles.x[0][0], 0) << method;
   }
@@ -104,7 +104,7 @@ TEST(Piston, MeetsWhatIsAtRest) {
     const auto run = test::run_until<2>(std::move(system), method, 0.75, 1.5);
     EXPECT_EQ(run->statistics().counters.sphere_wall, 1u) << method;
     EXPECT_NEAR(run->system().particles.x[0][0], 3 - 2 * (1.5 - 0.5), 1e-13) << method;
-    EXPECT_NEAR(run->statistics().counters.wall_work.value(), 0.5 * kMass * 4, 1e-13) << method;
+    EXPECT_NEAR(run->statistics().counters.work.value(), 0.5 * kMass * 4, 1e-13) << method;
   }
 }
 
@@ -123,7 +123,7 @@ TEST(Piston, EnergyAndWorkAddUpToRounding) {
     for (const double h : {0.01, 0.1}) {
       const auto run = test::run_until<2>(springs(), method, h, 6);
       const Statistics& s = run->statistics();
-      EXPECT_GT(std::abs(s.counters.wall_work.value()), 0.5) << method;
+      EXPECT_GT(std::abs(s.counters.work.value()), 0.5) << method;
       EXPECT_GT(s.counters.sphere_wall, 3u) << method;
       EXPECT_LT(s.max_energy_error, 1e-12 * s.energy_reference) << method << " " << h;
     }
@@ -149,7 +149,7 @@ TEST(Piston, CarriesWhatLiesOnIt) {
     add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
     const auto run = test::run_until<2>(std::move(system), method, 0.05, 8);
     const Statistics& s = run->statistics();
-    EXPECT_NEAR(s.counters.wall_work.value(), 2 * 0.25 * 8, 1e-11) << method;
+    EXPECT_NEAR(s.counters.work.value(), 2 * 0.25 * 8, 1e-11) << method;
     EXPECT_LT(s.max_energy_error, 1e-12 * s.energy_reference) << method;
     EXPECT_NEAR(run->system().particles.x[0][1], 0.5 + 0.25 * 8, 1e-12) << method;
     EXPECT_LT(s.counters.sphere_wall, 5u) << method;
@@ -172,7 +172,7 @@ TEST(Piston, GivesTheSameBitsOnAnyRanks) {
           add_interaction(*system, "yukawa", {{"amplitude", 0.2}, {"kappa", 2.0}, {"cutoff", 2.0}});
         if (count > 1) system->decomposition.join(ranks);
         const auto run = test::run_until<2>(std::move(system), method, 0.1, 8);
-        EXPECT_GT(run->statistics().counters.wall_work.value(), 0);
+        EXPECT_GT(run->statistics().counters.work.value(), 0);
         auto all = gathered(ranks, run->system().particles);
         if (ranks.rank() == 0) x = all.x;
       });

@@ -91,7 +91,7 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
       EXPECT_EQ(one.sphere_wall, many.sphere_wall) << what;
       EXPECT_EQ(one.collision_virial.value(), many.collision_virial.value()) << what;
       EXPECT_EQ(one.max_overlap, many.max_overlap) << what;
-      EXPECT_EQ(one.wall_work.value(), many.wall_work.value()) << what;
+      EXPECT_EQ(one.work.value(), many.work.value()) << what;
       if (getenv("SHOW"))
         std::cerr << what << ": windows " << counts.windows << " rounds " << counts.rounds << " cut " << counts.cut
                   << " events " << counts.events << " run " << counts.run_events << " redone " << counts.redone_events
