@@ -84,6 +84,7 @@ void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   std::copy_n(shot_.momentum.begin(), D, account_.first_momentum.begin());
   count_from(shot_);
+  statistics_.first_step_error = 0;
   sample(time, system_.particles);
   show(shot_, true);
 }
@@ -92,6 +93,7 @@ void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
 template <int D>
 void Monitor<D>::count_from(const Snapshot<D>& shot) {
   statistics_.energy_after_first_step = shot.total();
+  statistics_.first_step_error = std::abs(account_.energy - account_.first_energy);
   account_.first_energy = account_.energy;
   account_.first_shadow = shot.shadow;
   statistics_.energy_reference = std::max(std::abs(account_.energy), account_.magnitude);

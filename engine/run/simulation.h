@@ -90,6 +90,7 @@ struct Statistics {
   double force_passes = 0;  ///< pair evaluations / interacting pairs
 
   double energy_initial = 0, energy_after_first_step = 0, energy_final = 0;
+  double first_step_error = 0;  ///< |H + drained| after the first step less that before it
   double energy_reference = 0;  ///< max(|H₁|, K₁ + Σ|V|), the divisor for energy errors
   double energy_scale = 0;      ///< max(|H₀|, K₀ + Σ|V|) at the start; energy_reference if this is 0
   /// The long-range corrections (engine/forces/potentials/tail.h), which the energies above and the pressures include.

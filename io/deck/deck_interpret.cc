@@ -75,8 +75,8 @@ class Interpreter {
   void try_walls() {
     const auto attempt = [&](auto box) {
       std::copy_n(source_.boundary.begin(), dimension_, box.boundary.begin());
-      for (const WallConfig& wall : source_.walls)
-        if (!wall.wrong) report(wall.at, [&] { add_wall(box, wall.parameters); });
+      for (WallConfig& wall : source_.walls)
+        if (!wall.wrong) wall.wrong = report(wall.at, [&] { add_wall(box, wall.parameters); });
       if (source_.edges.size() != dimension_ || source_.walls.empty()) return;
       std::copy_n(source_.edges.begin(), dimension_, box.edges.begin());
       report(source_.walls.back().at, [&] { box.check(Failure::deck); });
@@ -86,15 +86,17 @@ class Interpreter {
     if (dimension_ == 3) attempt(Box<3>());
   }
 
-  /// Reports the error that `work` throws, with the form "what; what to do", at this place.
-  void report(const Place& at, auto&& work) {
+  /// Reports the error that `work` throws, with the form "what; what to do", at this place; returns whether it throws.
+  bool report(const Place& at, auto&& work) {
     try {
       work();
     } catch (const Error& e) {
       const std::string message = e.what();
       const std::size_t cut = message.find("; ");
       problems_.error(at, message.substr(0, cut), message.substr(cut + 2));
+      return true;
     }
+    return false;
   }
 
   void one_an_axis(const ValueTable& table, const std::string& key, std::size_t size) {

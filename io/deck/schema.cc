@@ -95,7 +95,7 @@ std::vector<TableSchema> make_schema() {
       {"wall",
        true,
        false,
-       "a wall beside those of the box, or a face of the box that is more than a fixed wall; hard and elastic",
+       "a wall beside those of the box, or a face of the box that is more than a fixed hard wall",
        wall_parameters()},
       {"particles",
        true,

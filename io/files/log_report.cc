@@ -122,7 +122,7 @@ std::optional<std::string> energy_warning(const Statistics& s, const IntegratorI
   // Errors count from the end of the first step, which may itself have the large error.
   const auto share = [](double error, double of) { return of > 0 ? error / of : 0; };
   const double later = share(s.max_energy_error, s.energy_reference),
-               first = share(std::abs(s.energy_after_first_step - s.energy_initial), s.energy_scale);
+               first = share(s.first_step_error, s.energy_scale);
   constexpr double kExactErrorBound = 1e-12;  // the bound of the exact methods, relative to the reference energy
   if (std::max(first, later) <= 1) {
     if (!method.exact || std::max(first, later) <= kExactErrorBound) return {};

@@ -82,7 +82,7 @@ DECK_ERRORS = {
     "wall with an unknown motion": (
         walled('name = "y+"\nvelocity = {amplitude = 1, frequency = 1, phase = 1}'), 11, ["unknown key 'phase'"]),
     "wall with the velocity of a text": (
-        walled('name = "y+"\nvelocity = "fast"'), 11, ["'velocity' has the wrong type: string", "a number or a table"]),
+        walled('name = "y+"\nvelocity = "fast"'), 11, ["'velocity' has the wrong type: string", "table of amplitude and frequency"]),
     "boundary for too few axes": (
         changed('["wall", "wall"]', '["wall"]'),
         7, ["'boundary' has the wrong length (1)", "give 2"]),

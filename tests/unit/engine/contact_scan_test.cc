@@ -22,7 +22,7 @@ struct Scene {
   }
   void resolve() {
     auto& p = system->particles;
-    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
+    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *system); });
   }
   Touch<2> earliest(double rest) { return scan.earliest(system->particles.x, system->particles.v, a, rest); }
 
@@ -71,7 +71,7 @@ TEST(ContactScan, LeavesAPairThatAnEarlierImpulseHasParted) {
   ContactScan<2> scan(*system, 100, reactions);
   scan.begin_slab(counters, nullptr, nullptr, 1.0);
   auto& p = system->particles;
-  scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
+  scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *system); });
   EXPECT_EQ(counters.sphere_sphere, 1u);
   EXPECT_EQ(p.v[2], Vec<2>(0, 0));
 }
@@ -146,7 +146,7 @@ TEST(ContactScan, WhatHasBeenStoppedMayRunIntoSomethingElse) {
   // 0 is pressed on 1 and stops at it; 2, on which no force acts, was slower to leave than 1 is then.
   Scene scene({{3, 3}, {4, 3}, {5, 3}}, {{1e-6, 0}, {0, 0}, {1e-9, 0}}, {{2, 0}, {0, 0}, {0, 0}});
   auto& p = scene.system->particles;
-  const double lost = scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
+  const double lost = scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *scene.system); });
   ASSERT_EQ(scene.contacts.size(), 1u);
   EXPECT_EQ(scene.contacts[0].key.lo, 1u);
   EXPECT_EQ(scene.contacts[0].key.hi, 2u);
@@ -167,7 +167,7 @@ TEST(ContactScan, SlidingKeepsEnergyAndMomentumOfUnequalMasses) {
     const std::vector<Vec<2>> a = {{2, 0}, {-2, 0}};
     scan.begin_slab(counters, nullptr, &a, 1.0);
     auto& p = system->particles;
-    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, p); });
+    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *system); });
     auto held = a;
     scan.hold(p.v, held, 0.1);
     ASSERT_EQ(scan.resting().size(), 1u);
@@ -201,7 +201,7 @@ TEST(ContactScan, RemembersTheReactionsOfContactsThatArePressed) {
   EXPECT_EQ(scene.scan.resting().size(), 3u);
   auto a = scene.a;
   scene.scan.hold(scene.system->particles.v, a, 1.0);
-  scene.scan.remember();
+  scene.scan.remember(1);
   ASSERT_EQ(scene.reactions.size(), 2u);
   EXPECT_EQ(scene.reactions[0].key.hi, 1u);
   EXPECT_NEAR(scene.reactions[0].force, 1, 1e-14);
@@ -216,7 +216,7 @@ TEST(ContactScan, RemembersTheReactionsOfContactsThatArePressed) {
   a.assign(3, {0, 1});
   a[1] = {0, 2};
   scene.scan.hold(scene.system->particles.v, a, 1.0);
-  scene.scan.remember();
+  scene.scan.remember(1);
   EXPECT_TRUE(scene.reactions.empty());
 }
 

@@ -36,7 +36,7 @@ Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std
         core.run(c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = limit});
     core.fly_to(reached, p);
     for (std::size_t i = 0; i < p.size(); ++i) box.wrap(p.x[i], p.image[i]);
-    box = box.after(reached);
+    box.time += reached;
   }
   if (counted) *counted = counters;
   return out;
@@ -62,7 +62,7 @@ Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr
           flight.run(c.slab, {.counters = counters, .contacts = &contacts, .collision_limit = way.limit});
       flight.give_back(reached, p);
       system.wrap();
-      system.box = system.box.after(reached);
+      system.box.time += reached;
     }
     Particles<D> all = gathered(ranks, p);
     if (ranks.rank() > 0) return;
