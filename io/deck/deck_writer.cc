@@ -61,7 +61,8 @@ std::string literal(const std::array<Item, N>& items) {
 std::string literal(const TableValue& table) {
   std::string text;
   for (const auto& [name, value] : table)
-    text += (text.empty() ? "" : ", ") + name + " = " + std::visit([](const auto& each) { return literal(each); }, value);
+    text +=
+        (text.empty() ? "" : ", ") + name + " = " + std::visit([](const auto& each) { return literal(each); }, value);
   return "{ " + text + " }";
 }
 

@@ -130,9 +130,7 @@ void bind(py::module_& module, const char* name) {
       .def("set_position", [](S& session, const Array& x) { session.set_position(span_of(x)); })
       .def("set_velocity", [](S& session, const Array& v) { session.set_velocity(span_of(v)); })
       .def("add_wall",
-           [](S& session, const py::dict& given) {
-             session.add_wall(parameters_of("wall", wall_parameters(), given));
-           })
+           [](S& session, const py::dict& given) { session.add_wall(parameters_of("wall", wall_parameters(), given)); })
       .def("add_force",
            [](S& session, const std::string& type, const py::dict& given) {
              const InteractionInfo& info = find_interaction(type);

@@ -5,8 +5,8 @@
 #include <chrono>
 #include <cmath>
 
-#include "engine/run/measurement.h"
 #include "engine/base/wall_options.h"
+#include "engine/run/measurement.h"
 #include "engine/run/state.h"
 #include "engine/setup/epoch.h"
 #include "io/deck/deck_source.h"

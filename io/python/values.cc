@@ -11,9 +11,17 @@ namespace carom::python {
 namespace {
 
 /// In the order of Parameter::Type.
-constexpr std::array kPythonTypes = {
-    "bool",      "int",                   "float",               "list[float]", "str",
-    "list[str]", "list[tuple[int, int]]", "list[list[float]]", "dict", "float or list[float]", "float or dict"};
+constexpr std::array kPythonTypes = {"bool",
+                                     "int",
+                                     "float",
+                                     "list[float]",
+                                     "str",
+                                     "list[str]",
+                                     "list[tuple[int, int]]",
+                                     "list[list[float]]",
+                                     "dict",
+                                     "float or list[float]",
+                                     "float or dict"};
 
 [[noreturn]] void refuse(std::string_view of, std::string_view name, const std::string& what) {
   throw Error(Failure::deck, std::string(of) + ": '" + std::string(name) + "' " + what);

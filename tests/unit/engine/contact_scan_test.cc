@@ -146,7 +146,8 @@ TEST(ContactScan, WhatHasBeenStoppedMayRunIntoSomethingElse) {
   // 0 is pressed on 1 and stops at it; 2, on which no force acts, was slower to leave than 1 is then.
   Scene scene({{3, 3}, {4, 3}, {5, 3}}, {{1e-6, 0}, {0, 0}, {1e-9, 0}}, {{2, 0}, {0, 0}, {0, 0}});
   auto& p = scene.system->particles;
-  const double lost = scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *scene.system); });
+  const double lost =
+      scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *scene.system); });
   ASSERT_EQ(scene.contacts.size(), 1u);
   EXPECT_EQ(scene.contacts[0].key.lo, 1u);
   EXPECT_EQ(scene.contacts[0].key.hi, 2u);

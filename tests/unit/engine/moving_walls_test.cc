@@ -30,7 +30,8 @@ class Log : public Observer<2> {
 /// Discs bounce in a wedge under gravity: every contact is at a wall or between discs, and the energy stays.
 TEST(FurtherWalls, DiscsInAWedgeKeepTheirEnergy) {
   for (const std::string& method : kMethods) {
-    auto system = test::make_system<2>({10, 20}, Boundary::wall, {{4, 6}, {5.5, 9}, {5, 12}}, {{0.3, 0}, {0, 0}, {-0.2, 0}});
+    auto system =
+        test::make_system<2>({10, 20}, Boundary::wall, {{4, 6}, {5.5, 9}, {5, 12}}, {{0.3, 0}, {0, 0}, {-0.2, 0}});
     system->box.add({.name = "left", .normal = {3, 4}, .offset = 15});  // through (5, 0)
     system->box.add({.name = "right", .normal = {-1, 1}, .offset = -5});
     add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
@@ -76,7 +77,8 @@ TEST(ShakenContact, IsTheFirst) {
   int found = 0;
   for (int k = 0; k < 200; ++k) {
     const double u = 0.1 * (k % 20), w = 0.05 * (k / 20);
-    const ShakenGap gap{.y = 0.31 + u, .v = 1.5 * w - 1, .a = 0.3 * w - 0.2, .amplitude = 0.3, .frequency = 0.7, .turns = w};
+    const ShakenGap gap{
+        .y = 0.31 + u, .v = 1.5 * w - 1, .a = 0.3 * w - 0.2, .amplitude = 0.3, .frequency = 0.7, .turns = w};
     if (gap.at(0) <= 0) continue;
     const double rest = 4, first = gap.first_contact(rest, false, 0);
     double tried = 0;

@@ -215,19 +215,19 @@ TEST(Log, TheTableIsNoCopyOfThermo) {
 
 TEST(Log, WarnsOfAnEnergyThatIsWrongByItsOwnSize) {
   Statistics s;
-  s.energy_initial = 1, s.energy_after_first_step = 1.5, s.energy_reference = 2, s.energy_scale = 1;
+  s.first_step_error = 0.5, s.energy_reference = 2, s.energy_scale = 1;
   s.max_energy_error = 1.9;
   const IntegratorInfo &psa = find_integrator("psa"), &edda = find_integrator("edda");
   EXPECT_FALSE(energy_warning(s, psa));
   EXPECT_NE(energy_warning(s, edda)->find("rounding has added up to 0.95 of"), std::string::npos);
-  s.energy_after_first_step = s.energy_initial, s.max_energy_error = 1.9e-12;
+  s.first_step_error = 0, s.max_energy_error = 1.9e-12;
   EXPECT_FALSE(energy_warning(s, edda));
-  s.energy_after_first_step = 1 + 2e-12;
+  s.first_step_error = 2e-12;
   EXPECT_NE(energy_warning(s, edda)->find("rounding has added up to 2e-12 of"), std::string::npos);
-  s.energy_after_first_step = 1.5;
+  s.first_step_error = 0.5;
   s.max_energy_error = 5;
   EXPECT_NE(energy_warning(s, psa)->find("wrong by 2.5 times its own size:"), std::string::npos);
-  s.energy_after_first_step = -3, s.max_energy_error = 0;
+  s.first_step_error = 4, s.max_energy_error = 0;
   EXPECT_NE(energy_warning(s, edda)->find("wrong by 4 times its own size after the first step:"), std::string::npos);
 }
 
