@@ -98,6 +98,20 @@ def random_forces(dice, method, dimension, boundary, species):
     return terms + dice.sample(pairs, dice.choice([1, 1, 2]))
 
 
+def random_walls(dice, boundary, end):
+    """Further walls, and faces that move or are shaken, by at most a tenth of a sphere during the run."""
+    walls, dimension = [], len(boundary)
+    for axis, side in [(axis, side) for axis in range(dimension) if boundary[axis] == "wall" for side in "-+"]:
+        if dice.random() < 0.3:
+            continue
+        motion = dice.choice([dice.uniform(-0.05, 0.05) / end, {"amplitude": dice.uniform(0, 0.05), "frequency": dice.uniform(0.1, 1.0)}])
+        walls.append({"name": "xyz"[axis] + side, "velocity": motion})
+    if "open" in boundary and dice.random() < 0.5:
+        normal = [0.0 if kind == "periodic" else dice.gauss(0, 1) for kind in boundary]
+        walls.append({"name": "far", "normal": normal, "offset": -30.0 * sum(abs(each) for each in normal)})
+    return walls
+
+
 def random_deck(dice, seconds):
     """A deck that takes about this long; many cannot run."""
     method = dice.choice(["free-flight", "free-flight", "verlet", "psa", "psa", "cva", "mcva", "cdda", "edda", "edda"])
@@ -140,7 +154,8 @@ def random_deck(dice, seconds):
     if method == "verlet":
         for species in particles:
             species["display_radius"] = species.pop("radius")
-    return {"format": 1, "system": {"dimension": dimension, "boundary": boundary}, "particles": particles,
+    return {"format": 1, "system": {"dimension": dimension, "boundary": boundary},
+            "wall": random_walls(dice, boundary, end) if method != "verlet" and dice.random() < 0.7 else [], "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
             "interaction": random_forces(dice, method, dimension, boundary, [each["name"] for each in particles]),
             "integrator": integrator, "run": run, "output": output}

@@ -71,6 +71,27 @@ void write_parameters(File& file, const Deck& deck, const System<D>& system) {
   file.write_texts(group, "species", system.species);
 }
 
+/// The walls that are more than fixed faces of the box; `motion`: normal·x at the start, and how it changes, of each.
+template <int D>
+void write_walls(File& file, const Box<D>& box) {
+  if (box.options.empty()) return;
+  std::vector<std::string> names;
+  std::vector<Vec<D>> normals;
+  std::vector<double> motion;
+  for (const WallOptions<D>& each : box.options) {
+    const Wall<D> wall = box.wall(each.number);
+    names.push_back(each.name);
+    normals.push_back(wall.normal);
+    motion.insert(motion.end(), {wall.offset - (each.displacement(box.time) - each.moved), each.velocity,
+                                 each.amplitude, each.frequency});
+  }
+  const Handle group = file.group("parameters/walls");
+  file.write_texts(group, "name", names);
+  file.write_array(group, "normal", hdf5::native_type<double>(), three_columns<double>(normals, D).data(),
+                   {names.size(), 3});
+  file.write_array(group, "motion", hdf5::native_type<double>(), motion.data(), {names.size(), 4});
+}
+
 /// The radius of a species: the mean of its particles, exact if all have the same radius.
 struct SpeciesRadius {
   double first = 0, excess = 0;
@@ -184,6 +205,7 @@ struct TrajectoryWriter<D>::Contents {
   void create(const Deck& deck, const System<D>& system) {
     write_origin(file);
     write_parameters(file, deck, system);
+    write_walls(file, system.box);
     write_box(system.box);
     write_fixed(system);
     write_bonds(file, system);

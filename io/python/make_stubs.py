@@ -37,15 +37,15 @@ ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]"
              "callback": "Callable[[Simulation], object]", "progress": "bool", "type": "str", "packing_fraction": "float",
              "seed": "int", "parameters": "Any", "thermo_interval": "float", "keys": "Any", "port": "int", "browser": "bool",
              "expression": "str | Callable[..., Any]", "start": "float", "cutoff": "float", "tolerance": "float",
-             "options": "Mapping[str, Any]", "constants": "Any"}
+             "options": "Mapping[str, Any]", "constants": "Any", "name": "str", "normal": "npt.ArrayLike"}
 RESULTS = {"__init__": "None", "from_deck": "Simulation", "from_run": "Simulation", "from_file": "Simulation",
-           "add_particles": "range", "place": "range", "thermalize": "None", "add_potential": "Sampled", "output": "None",
+           "add_particles": "range", "add_wall": "None", "place": "range", "thermalize": "None", "add_potential": "Sampled", "output": "None",
            "open": "Run", "view": "Page", "run": "None", "write_deck": "None", "__len__": "int", "__repr__": "str"}
 PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np.float64]",
               "image": "npt.NDArray[np.int32]", "unwrapped": "npt.NDArray[np.float64]", "mass": "npt.NDArray[np.float64]",
               "radius": "npt.NDArray[np.float64]", "charge": "npt.NDArray[np.float64]",
               "species": "npt.NDArray[np.uint16]", "momentum": "npt.NDArray[np.float64]", "species_names": "list[str]",
-              "box": "list[float]", "boundary": "list[str]", "step": "int", "collisions": "int", "directory": "str | None",
+              "box": "list[float]", "boundary": "list[str]", "walls": "list[dict[str, Any]]", "step": "int", "collisions": "int", "directory": "str | None",
               "averages": "dict[str, dict[str, npt.NDArray[np.float64]]]"}
 VALUES = {"list[float]": "npt.ArrayLike", "list[str]": "Sequence[str]", "list[tuple[int, int]]": "npt.ArrayLike"}
 

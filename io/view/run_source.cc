@@ -83,6 +83,20 @@ std::string rows_from(const std::filesystem::path& path, std::uint64_t first) {
   return text;
 }
 
+/// Name, normal and motion of each wall that is more than a fixed face of the box.
+Json walls_of(const hdf5::File& file) {
+  Json walls = Json::array();
+  if (!hdf5::exists(file, "/parameters/walls")) return walls;
+  const auto names = hdf5::texts(file, "/parameters/walls/name");
+  const auto normal = hdf5::numbers<double>(file, "/parameters/walls/normal"),
+             motion = hdf5::numbers<double>(file, "/parameters/walls/motion");
+  for (std::size_t n = 0; n < names.size(); ++n)
+    walls.push_back({{"name", names[n]},
+                     {"normal", std::vector<double>(&normal.at(3 * n), &normal.at(3 * n) + 3)},
+                     {"motion", std::vector<double>(&motion.at(4 * n), &motion.at(4 * n) + 4)}});
+  return walls;
+}
+
 }  // namespace
 
 RunSource::RunSource(std::filesystem::path directory, bool awaited)
@@ -111,6 +125,7 @@ void RunSource::look() {
              {"particles", particles_},
              {"bonds",
               hdf5::exists(file, vmd_structure::bond_from) ? hdf5::shape(file, vmd_structure::bond_from).at(0) : 0}};
+    head_["walls"] = walls_of(file);
     counts_.clear();
   });
   seen_ = now.version;

@@ -195,3 +195,23 @@ def test_progress_is_a_line_that_goes_away(capsys, monkeypatch):
     assert "%" in line and line.endswith("\r") and "\n" not in line
     sim.run(steps=600, progress=False)
     assert capsys.readouterr().err == ""
+
+
+def test_walls_move_and_stay_where_they_are_in_the_next_run():
+    sim = carom.Simulation(box=[10, 6])
+    sim.add_particles([[2, 3], [5, 3], [8, 3]], velocity=[[1, 0.2], [0, -0.1], [-0.5, 0]], radius=0.5)
+    sim.add_wall("x+", velocity=0.25)
+    sim.add_wall("ramp", normal=[1, 1], offset=1.5)
+    sim.add_wall("y+", velocity={"amplitude": 0.1, "frequency": 0.5})
+    assert [wall["name"] for wall in sim.walls] == ["x+", "ramp", "y+"]
+    sim.integrator("edda", step=0.05)
+    before = sim.energy
+    sim.run(time=8)
+    assert sim.energy > before and sim.energy_error < 1e-13
+    assert sim.position[:, 0].max() <= 10 - 8 * 0.25 - 0.5 + 1e-9
+    assert (sim.position.sum(axis=1) / np.sqrt(2)).min() >= 1.5 / np.sqrt(2) + 0.5 - 1e-9
+    sim.velocity = -sim.velocity
+    sim.run(time=4)
+    assert sim.position[:, 0].max() <= 10 - 12 * 0.25 - 0.5 + 1e-9
+    with pytest.raises(carom.UsageError, match="the wall 'x-' is a face of the box"):
+        sim.add_wall("x-", normal=[1, 0])

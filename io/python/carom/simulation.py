@@ -209,17 +209,17 @@ class Simulation:
         each[chosen] = temperature
         self._session.set_velocity(self._session.drawn_velocities(each, seed))
 
-    def add_wall(self, name, normal=None, **options):
+    def add_wall(self, name, normal=None, **parameters):
         """Adds a wall, or changes a face of the box: "x-", "x+", "y-", … where its boundary is a wall.
 
-        normal: of a further wall, into the space of the spheres. Other options are those of [[wall]] in decks: offset,
+        normal: of a further wall, into the space of the spheres. Other parameters are those of [[wall]] in decks: offset,
         velocity (a number along the normal, or {"amplitude": …, "frequency": …}), one_sided, …; see carom.describe("wall").
 
             sim.add_wall("x+", velocity=0.05)                         # a piston
             sim.add_wall("ramp", normal=[1, 2], offset=3.0)           # normal·x = offset
         """
-        options = refuse_masked("add_wall", options | {"name": name_of("add_wall", name)})
-        self._session.add_wall(options if normal is None else options | {"normal": numbers("add_wall", "normal", normal)})
+        given = refuse_masked("add_wall", parameters | {"name": name_of("add_wall", name)})
+        self._session.add_wall(given if normal is None else given | {"normal": numbers("add_wall", "normal", normal)})
 
     def add_force(self, type, **parameters):
         """Adds a term of V by its name in decks; see carom.describe(type). Ids and species in it must be there already."""

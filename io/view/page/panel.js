@@ -78,7 +78,7 @@ class Panel {
     if (!camera.fitted) camera.fit(frame.edges, this.flat, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight));
     Object.assign(this, { frame, shown: number });
     this.spheres.setPositions(frame.position);
-    this.spheres.setBox(frame.edges, this.state.boundary, this.flat);
+    this.spheres.setBox(frame.edges, this.state.boundary, this.flat, this.state.walls.map((wall) => planeOf(wall, frame.time)));
     offerColours();
     this.colour();
     await this.follow();

@@ -45,14 +45,14 @@ class Spheres {
   setValues(values, range) { Object.assign(this, { values, range }); }
   // `pairs`: two ids for each bond.
   setBonds(pairs) { this.bonds = pairs; }
-  // `boundary`: wall, periodic or open, for each axis.
-  setBox(edges, boundary, flat) {
+  // `boundary`: wall, periodic or open, for each axis. `planes`: further walls and walls that have moved.
+  setBox(edges, boundary, flat, planes = []) {
     const corner = (bits) => edges.map((edge, k) => (bits & (1 << k) ? edge : 0)), ends = [], dimension = flat ? 2 : 3;
     for (let bits = 0; bits < 1 << dimension; bits++)
       for (let k = 0; k < dimension; k++) if (!(bits & (1 << k))) ends.push(...corner(bits), ...corner(bits | (1 << k)));
     if (flat) for (let k = 2; k < ends.length; k += 3) ends[k] = 0;
     this.lines("box", ends);
-    Object.assign(this, { edges, boundary, flat, walls: wallsOf(edges, boundary, flat) });
+    Object.assign(this, { edges, boundary, flat, walls: [...wallsOf(edges, boundary, flat), ...planes.map((plane) => partOf(plane, edges, flat))] });
   }
   // `ends`: the two ends of each line, three coordinates each.
   lines(name, ends) {
@@ -144,7 +144,7 @@ class Spheres {
   // Only walls behind the particles are drawn, hatched and translucent.
   drawWalls() {
     const gl = this.gl, eye = this.camera.position(), numbers = [];
-    for (const { axis, at, inward, corners } of this.walls) if (this.flat || (eye[axis] - at) * inward > 0) numbers.push(...corners.flat());
+    for (const { normal, level, corners } of this.walls) if (this.flat || dot(normal, eye) > level) numbers.push(...corners.flat());
     this.facing = numbers.length / 18;
     if (!numbers.length) return;
     this.fill("walls", new Float32Array(numbers));
@@ -175,9 +175,42 @@ function wallsOf(edges, boundary, flat) {
         else x[v] = t * edges[v];
         return x;
       };
-      walls.push({ axis, at, inward: upper ? -1 : 1,
+      const side = upper ? -1 : 1;
+      walls.push({ normal: [0, 1, 2].map((k) => (k === axis ? side : 0)), level: side * at,
                    corners: [[0, 0], [1, 0], [0, 1], [0, 1], [1, 0], [1, 1]].map(([s, t]) => corner(s, t)) });
     }
   }
   return walls;
+}
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+// Where a wall is at a time: normal·x = level.
+function planeOf({ normal, motion: [offset, velocity, amplitude, frequency] }, time) {
+  return { normal, level: offset + velocity * time + amplitude * Math.sin(2 * Math.PI * frequency * time) };
+}
+// The part of a plane that is in the box, as triangles; in two dimensions a band behind it.
+function partOf({ normal, level }, edges, flat) {
+  const ends = [];
+  for (let axis = 0; axis < (flat ? 2 : 3); axis++)
+    for (let bits = 0; bits < (flat ? 4 : 8); bits++) {
+      if (bits & (1 << axis)) continue;
+      const x = [0, 1, 2].map((k) => (bits & (1 << k) ? edges[k] : 0));
+      const at = (level - dot(normal, x)) / normal[axis];
+      if (at >= 0 && at <= edges[axis]) ends.push(x.map((each, k) => (k === axis ? at : each)));
+    }
+  if (flat) {
+    const band = 0.02 * Math.max(edges[0], edges[1]), far = (a) => Math.max(...ends.map((b) => Math.hypot(a[0] - b[0], a[1] - b[1])));
+    if (ends.length < 2) return { normal, level, corners: [] };
+    const p = ends.reduce((a, b) => (far(b) > far(a) ? b : a));
+    const q = ends.reduce((a, b) => (Math.hypot(b[0] - p[0], b[1] - p[1]) > Math.hypot(a[0] - p[0], a[1] - p[1]) ? b : a));
+    const behind = (x) => x.map((each, k) => each - band * normal[k]);
+    return { normal, level, corners: [p, q, behind(p), behind(p), q, behind(q)] };
+  }
+  const middle = [0, 1, 2].map((k) => ends.reduce((sum, x) => sum + x[k], 0) / ends.length);
+  const across = Math.abs(normal[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const u = cross(normal, across), v = cross(normal, u);
+  const angle = (x) => { const d = x.map((each, k) => each - middle[k]); return Math.atan2(dot(d, v), dot(d, u)); };
+  ends.sort((a, b) => angle(a) - angle(b));
+  return { normal, level, corners: ends.flatMap((x, k) => [middle, x, ends[(k + 1) % ends.length]]) };
 }

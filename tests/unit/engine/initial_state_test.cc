@@ -31,7 +31,7 @@ TEST(InitialState, OutsidersAndOverlapsAreThoseOfOneRank) {
   const Outsiders out = find_outsiders(*whole);
   EXPECT_EQ(out.spheres, 2u);
   EXPECT_EQ(out.worst, 4u);
-  EXPECT_EQ(out.axis, 1);
+  EXPECT_EQ(out.wall, 2u);
   EXPECT_NEAR(out.depth, 0.25, 1e-12);
   const Overlaps overlaps = find_overlaps(*whole);
   EXPECT_EQ(overlaps.pairs, 4u);
@@ -42,8 +42,8 @@ TEST(InitialState, OutsidersAndOverlapsAreThoseOfOneRank) {
       const auto system = spoilt();
       system->decomposition.join(exchange);
       const Outsiders far = find_outsiders(*system);
-      EXPECT_EQ(std::tuple(far.spheres, far.worst, far.axis, far.depth),
-                std::tuple(out.spheres, out.worst, out.axis, out.depth));
+      EXPECT_EQ(std::tuple(far.spheres, far.worst, far.wall, far.depth),
+                std::tuple(out.spheres, out.worst, out.wall, out.depth));
       const Overlaps near = find_overlaps(*system);
       EXPECT_EQ(std::tuple(near.pairs, near.lo, near.hi, near.distance, near.contact),
                 std::tuple(overlaps.pairs, overlaps.lo, overlaps.hi, overlaps.distance, overlaps.contact));
