@@ -154,8 +154,9 @@ def random_deck(dice, seconds):
     if method == "verlet":
         for species in particles:
             species["display_radius"] = species.pop("radius")
+    walled = method != "verlet" and integrator.get("variant") != "restart" and dice.random() < 0.7
     return {"format": 1, "system": {"dimension": dimension, "boundary": boundary},
-            "wall": random_walls(dice, boundary, end) if method != "verlet" and dice.random() < 0.7 else [], "particles": particles,
+            "wall": random_walls(dice, boundary, end) if walled else [], "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
             "interaction": random_forces(dice, method, dimension, boundary, [each["name"] for each in particles]),
             "integrator": integrator, "run": run, "output": output}

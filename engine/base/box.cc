@@ -4,6 +4,9 @@
 namespace carom {
 namespace {
 
+/// The longest step, in periods of a shaken wall: its largest speed is wrong by (2π·0.1)²/12, 3 %.
+constexpr double kLongestStep = 0.1;
+
 /// The names of the faces, by number.
 template <int D>
 std::vector<std::string> face_names() {
@@ -99,6 +102,11 @@ void Box<D>::restart() {
 
 template <int D>
 void Box<D>::check(Failure failure) const {
+  for (const WallOptions<D>& each : options)
+    if (each.frequency * step > kLongestStep)
+      throw Error(failure, wall_name(each.number) + " is shaken with the period " + short_text(1 / each.frequency) +
+                               ", too short for steps of " + short_text(step) + "; take a step of at most " +
+                               short_text(kLongestStep / each.frequency));
   const auto all = walls();
   for (std::size_t i = 0; i < all.size(); ++i)
     for (std::size_t j = i + 1; j < all.size(); ++j) {

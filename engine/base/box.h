@@ -108,7 +108,7 @@ struct Box {
   }
   /// Makes the present time the time 0 of a new run, with all walls where they are.
   void restart();
-  /// Throws Error(failure) if two parallel walls leave no room between them.
+  /// Throws Error(failure) if two parallel walls leave no room between them, or a step is too long for a shaken wall.
   void check(Failure failure) const;
   /// For messages: "the upper wall of axis 1", "the wall 'ramp'".
   std::string wall_name(Id number) const;

@@ -154,6 +154,29 @@ TEST(ShakenWalls, CarryWhatLiesOnThem) {
   }
 }
 
+/// The message of a run that is refused.
+std::string refusal(const std::string& method, double step, const Parameters& given) {
+  auto system = test::make_system<2>({4, 9}, Boundary::wall, {{1, 2}}, {{0, 0}});
+  system->box.add({.name = "y-", .amplitude = 0.1, .frequency = 2});
+  try {
+    test::run_until<2>(std::move(system), method, step, 1, given);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ShakenWalls, AreRefusedWhereStepsDoNotFollowThem) {
+  EXPECT_EQ(refusal("mcva", 0.01, {{"variant", std::string("restart")}}),
+            "mcva with variant = \"restart\" knows no shaken walls; take variant = \"grid\"");
+  EXPECT_EQ(
+      refusal("edda", 0.06, {}),
+      "the lower wall of axis 1 is shaken with the period 0.5, too short for steps of 0.06; take a step of at most "
+      "0.05");
+  EXPECT_EQ(refusal("edda", 0.05, {}), "");
+  EXPECT_EQ(refusal("free-flight", 1, {}), "");
+}
+
 TEST(Walls, NeedRoomBetweenThem) {
   Box<2> box{.edges = {10, 10}};
   box.add({.name = "x-", .velocity = 0.5});
