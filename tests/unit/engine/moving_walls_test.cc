@@ -172,7 +172,7 @@ TEST(ShakenWalls, AreRefusedWhereStepsDoNotFollowThem) {
   EXPECT_EQ(
       refusal("edda", 0.06, {}),
       "the lower wall of axis 1 is shaken with the period 0.5, too short for steps of 0.06; take a step of at most "
-      "0.05");
+      "0.05 (in step 1, from time 0)");
   EXPECT_EQ(refusal("edda", 0.05, {}), "");
   EXPECT_EQ(refusal("free-flight", 1, {}), "");
 }
