@@ -389,4 +389,6 @@ class Simulation:
 
 # The numbers that runs write to thermo.csv: time, energy, temperature, …
 for _name, _meaning in _carom.columns.items():
-    setattr(Simulation, _name, property(operator.attrgetter("_session." + _name), doc=_meaning))
+    _column = property(operator.attrgetter("_session." + _name), doc=_meaning)
+    _column.__set_name__(Simulation, _name)  # for messages
+    setattr(Simulation, _name, _column)
