@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/base/boundary.h"
+#include "engine/base/contact_law.h"
 #include "engine/base/error.h"
 #include "engine/base/wall.h"
 
@@ -44,6 +45,7 @@ struct Box {
   std::vector<WallOptions<D>> options{};  ///< of walls; use add()
   double time = 0;                        ///< of the start of the slab, since the start of the run
   double step_start = 0, step = 0;        ///< of a stepping method; 0: shaken walls move on a sine
+  ContactLaws contacts{};
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }

@@ -50,6 +50,31 @@ std::string partners(const EventKey<D>& key, const Box<D>& box) {
   return "particle " + lo + " and " + box.wall_name(key.hi);
 }
 
+/// The energies of a contact: the kinetic energy changes by work + heat − dissipated.
+struct Exchange {
+  double virial = 0;      ///< of a pair: (x_lo − x_hi)·impulse as computed [energy]
+  double impulse = 0;     ///< of a wall: on the sphere, along the wall's normal [mass·length/time]
+  double work = 0;        ///< that a moving wall does on the sphere [energy]
+  double heat = 0;        ///< that the sphere gets from a thermal wall [energy]
+  double dissipated = 0;  ///< energy lost [energy]
+};
+
+/// An exchange in two numbers, for logs of many contacts.
+struct PackedExchange {
+  double first = 0;  ///< the virial of a pair, the impulse of a wall
+  double lost = 0;   ///< what is dissipated; of a thermal wall the heat, negated
+
+  PackedExchange() = default;
+  PackedExchange(EventKind kind, const Exchange& all)
+      : first(kind == EventKind::pair ? all.virial : all.impulse), lost(all.dissipated - all.heat) {}
+  /// `wall`: null for a pair.
+  template <int D>
+  Exchange unpacked(const Wall<D>* wall, double time) const {
+    if (!wall) return {.virial = first, .dissipated = lost};
+    return {.impulse = first, .work = wall->velocity_at(time) * first, .dissipated = lost};
+  }
+};
+
 /// One executed collision.
 template <int D>
 struct Contact {
@@ -57,7 +82,7 @@ struct Contact {
   Vec<D> x_lo, x_hi;   ///< centres at contact [length], x_hi at the image that is touched; for a wall event x_hi is the
                        ///< point touched
   Vec<D> impulse;      ///< on `lo`; `hi` receives its negative [mass·length/time]
-  double virial = 0;   ///< pair: (x_lo − x_hi)·impulse as computed; wall: the work done on the sphere [energy]
+  Exchange exchange{};
   double overlap = 0;  ///< at contact, relative to the contact distance, if the method computes it
 };
 

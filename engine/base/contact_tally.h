@@ -6,10 +6,32 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/archive.h"
 #include "engine/base/contact_log.h"
 #include "engine/base/exact_sum.h"
 
 namespace carom {
+
+/// Sums over the contacts with a wall.
+struct WallTally {
+  std::uint64_t contacts = 0;
+  ExactSum impulse;  ///< on spheres, along the normal [mass·length/time]
+  ExactSum work;     ///< done on spheres [energy]
+  ExactSum heat;     ///< that spheres got [energy]
+
+  void add(const Exchange& of_contact) {
+    ++contacts;
+    impulse.add(of_contact.impulse);
+    work.add(of_contact.work);
+    heat.add(of_contact.heat);
+  }
+  void add(const WallTally& other) {
+    contacts += other.contacts;
+    impulse.add(other.impulse);
+    work.add(other.work);
+    heat.add(other.heat);
+  }
+};
 
 struct ContactTally {
   std::uint64_t sphere_sphere = 0;  ///< executed pair collisions
@@ -19,15 +41,28 @@ struct ContactTally {
   ExactSum dissipated;              ///< energy lost at contacts [energy]
   ExactSum work;                    ///< work done on spheres by moving walls [energy]
   ExactSum heat;                    ///< energy that spheres got from walls and baths with a temperature [energy]
+  std::vector<WallTally> walls;     ///< by number, as far as walls were hit
 
   /// What kinetic and potential energy have lost to the surroundings: H + drained() is conserved.
   double drained() const { return dissipated.value() - work.value() - heat.value(); }
 
   std::uint64_t contacts() const { return sphere_sphere + sphere_wall; }
-  /// `virial`: the virial of a pair, or the work of a wall.
-  void add(EventKind kind, double virial, double overlap) {
-    ++(kind == EventKind::pair ? sphere_sphere : sphere_wall);
-    (kind == EventKind::pair ? collision_virial : work).add(virial);
+  /// The sums of a wall.
+  WallTally& wall(Id number) {
+    if (walls.size() <= number) walls.resize(number + 1);
+    return walls[number];
+  }
+  void add_pair(const Exchange& exchange, double overlap) {
+    ++sphere_sphere;
+    collision_virial.add(exchange.virial);
+    if (exchange.dissipated != 0) dissipated.add(exchange.dissipated);
+    max_overlap = std::max(max_overlap, overlap);
+  }
+  void add_wall(Id number, const Exchange& exchange, double overlap) {
+    ++sphere_wall;
+    wall(number).add(exchange);
+    for (const auto& [sum, term] : {std::pair{&work, exchange.work}, {&heat, exchange.heat}, {&dissipated, exchange.dissipated}})
+      if (term != 0) sum->add(term);
     max_overlap = std::max(max_overlap, overlap);
   }
   void add(const ContactTally& other) {
@@ -38,11 +73,18 @@ struct ContactTally {
     dissipated.add(other.dissipated);
     work.add(other.work);
     heat.add(other.heat);
+    for (std::size_t number = other.walls.size(); number-- > 0;) wall(static_cast<Id>(number)).add(other.walls[number]);
+  }
+  void archive(Archive& archive) {
+    archive(sphere_sphere, sphere_wall, max_overlap, collision_virial, dissipated, work, heat, walls);
   }
   /// Counts a contact and appends it to `log` unless `log` is null.
   template <int D>
   void record(const Contact<D>& contact, std::vector<Contact<D>>* log) {
-    add(contact.key.kind, contact.virial, contact.overlap);
+    if (contact.key.kind == EventKind::pair)
+      add_pair(contact.exchange, contact.overlap);
+    else
+      add_wall(contact.key.hi, contact.exchange, contact.overlap);
     if (log) log->push_back(contact);
   }
 };

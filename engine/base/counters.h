@@ -28,6 +28,12 @@ struct Counters : ContactTally {
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;
   } seconds;
+
+  void archive(Archive& archive) {
+    ContactTally::archive(archive);
+    archive(force_passes, sweeps, pieces, slabs_halved, fallbacks, frozen, folded, divisions, slabs_again, slabs_by_all,
+            events, windows, seconds);
+  }
 };
 
 /// Adds its lifetime to a total, without the time that nested stopwatches measure.

@@ -52,13 +52,14 @@ struct Wall {
   /// acceleration a.
   double opening(const Vec<D>& v, double t = 0) const { return along_normal(v) - velocity_at(t); }
   double speeding(const Vec<D>& a) const { return along_normal(a) - acceleration; }
-  /// The velocity after the collision of a sphere with velocity v and a radius that grows at `rate`.
-  Vec<D> bounced(Vec<D> v, double t = 0, double rate = 0) const {
+  /// The velocity after the collision of a sphere with velocity v and a radius that grows at `rate`, with this
+  /// coefficient of restitution.
+  Vec<D> bounced(Vec<D> v, double t = 0, double rate = 0, double restitution = 1) const {
     const double u = velocity_at(t) + rate;
     if (axis >= 0)
-      v[axis] = normal[axis] * (2 * u) - v[axis];
+      v[axis] = normal[axis] * ((1 + restitution) * u) - restitution * v[axis];
     else
-      v += (2 * (u - normal.dot(v))) * normal;
+      v += ((1 + restitution) * (u - normal.dot(v))) * normal;
     return v;
   }
   /// The work that this impulse does on a sphere at time t [energy].

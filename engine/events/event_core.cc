@@ -182,9 +182,9 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
   const Impact<D> impact = flights_.collide(i, j, shift, time, generation);
   ++queue_[i].version;
   ++queue_[j].version;
-  const double virial = impact.d.dot(impact.impulse);
-  if (report.trace) return report.trace->end(flights_[i], flights_[j], virial, impact.overlap);
-  report.counters.add(EventKind::pair, virial, impact.overlap);
+  if (report.trace)
+    return report.trace->end(flights_[i], flights_[j], {EventKind::pair, impact.exchange}, impact.overlap);
+  report.counters.add_pair(impact.exchange, impact.overlap);
   if (!report.contacts) return;
   const EventKey<D> key = pair_key<D>(time, generation, flights_[i].id, flights_[j].id, packing.image(partner));
   report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, impact));
@@ -197,9 +197,9 @@ void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, c
   const Wall<D> wall = box_.wall(key.hi);
   const Impact<D> impact = flights_.bounce(i, wall, time, generation);
   ++queue_[i].version;
-  const double work = wall.work(impact.impulse, time);
-  if (report.trace) return report.trace->end(flights_[i], flights_[i], work, impact.overlap);
-  report.counters.add(EventKind::wall, work, impact.overlap);
+  if (report.trace)
+    return report.trace->end(flights_[i], flights_[i], {EventKind::wall, impact.exchange}, impact.overlap);
+  report.counters.add_wall(key.hi, impact.exchange, impact.overlap);
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], impact));
 }
 

@@ -176,7 +176,9 @@ Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const 
   const Vec<D> d = a.x - b.x + shift;
   const double mass_a = mass(i), mass_b = mass(j);
   const double radii = radius(i) + radius(j), sigma = grown(radii, t);
-  const Vec<D> impulse = collision_factor<D>(d, a.v - b.v, mass_a, mass_b, sigma, radii * growth_) * d;
+  const auto [factor, dissipated] =
+      pair_impulse<D>(laws(), a.species, b.species, d, a.v - b.v, mass_a, mass_b, sigma, radii * growth_);
+  const Vec<D> impulse = factor * d;
   if (common_mass_ == 1) {  // gives the same bits without divisions
     a.v += impulse;
     b.v -= impulse;
@@ -185,31 +187,29 @@ Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const 
     b.v -= impulse / mass_b;
   }
   a.generation = b.generation = static_cast<std::uint16_t>(generation);
-  return {d, impulse, 1 - d.norm() / sigma};
+  return {d, impulse, {.virial = d.dot(impulse), .dissipated = dissipated}, 1 - d.norm() / sigma};
 }
 
 template <int D>
 Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const {
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
-  const Vec<D> after = wall.bounced(r.v, t, rate);
-  const Impact<D> impact{r.x - wall.foot(r.x, t), mass(i) * (after - r.v), -wall.gap(r.x, at_contact, t) / at_contact};
+  const auto [after, impulse, exchange] = wall_impulse<D>(laws(), wall, r.species, mass(i), r.v, t, rate);
   r.v = after;
   r.generation = static_cast<std::uint16_t>(generation);
-  return impact;
+  return {r.x - wall.foot(r.x, t), impulse, exchange, -wall.gap(r.x, at_contact, t) / at_contact};
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
                                   const Impact<D>& impact) const {
-  if (a.id < b.id) return {key, a.x, b.x - shift, impact.impulse, impact.d.dot(impact.impulse), impact.overlap};
-  return {key, b.x, a.x + shift, -impact.impulse, impact.d.dot(impact.impulse), impact.overlap};
+  if (a.id < b.id) return {key, a.x, b.x - shift, impact.impulse, impact.exchange, impact.overlap};
+  return {key, b.x, a.x + shift, -impact.impulse, impact.exchange, impact.overlap};
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const {
-  const Wall<D> wall = box_.wall(key.hi);
-  return {key, r.x, wall.foot(r.x, key.time), impact.impulse, wall.work(impact.impulse, key.time), impact.overlap};
+  return {key, r.x, box_.wall(key.hi).foot(r.x, key.time), impact.impulse, impact.exchange, impact.overlap};
 }
 
 template class Flights<2>;

@@ -24,6 +24,7 @@ template <int D>
 struct Impact {
   Vec<D> d;        ///< from the second centre to the first [length]
   Vec<D> impulse;  ///< impulse on the first sphere [mass·length/time]
+  Exchange exchange;
   double overlap;  ///< at contact, relative to the contact distance
 };
 
@@ -116,11 +117,14 @@ class Flights {
   void advance(Record<D>& r, double t) const;
   double shaken_contact(const Record<D>& r, double radius, double rate, const Wall<D>& wall, bool touching,
                         double slack) const;
+  /// The spheres of a compression, which grow, are elastic.
+  const ContactLaws& laws() const { return growth_ == 0 ? box_.contacts : elastic_; }
   double grown(double length, double t) const { return length * (1 + growth_ * t); }
   double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
   double mass(Slot i) const { return mass_.empty() ? common_mass_ : mass_[i]; }
 
   const Box<D>& box_;
+  ContactLaws elastic_;
   std::vector<Wall<D>> walls_;
   Vec<D> g_ = Vec<D>::Zero();
   bool field_ = false;

@@ -21,7 +21,7 @@ template <int D>
 struct Node {
   Record<D> after;
   EventKey<D> key;
-  double virial = 0;   ///< d·impulse of a pair; the work of a wall [energy]
+  PackedExchange exchange{};
   double overlap = 0;  ///< at contact, relative to the contact distance
 
   /// The other sphere's id; kNoPartner at a wall.
@@ -49,7 +49,8 @@ class Trace {
 
   /// An event of one sphere, or of two, the one with the lower id first.
   struct Event {
-    double time, virial, overlap;
+    double time, overlap;
+    PackedExchange exchange;
     std::uint32_t generation;
     std::uint32_t partner;  ///< the partner of the first sphere, as in NextEvent
     Id id[2];
@@ -88,10 +89,10 @@ class Trace {
     before_.push_back(b);
   }
   /// Call after the event.
-  void end(const Record<D>& a, const Record<D>& b, double virial, double overlap) {
+  void end(const Record<D>& a, const Record<D>& b, const PackedExchange& exchange, double overlap) {
     Event& event = events_.back();
     event.time = a.t;
-    event.virial = virial;
+    event.exchange = exchange;
     event.overlap = overlap;
     fastest_squared_ = std::max({fastest_squared_, a.v.squaredNorm(), b.v.squaredNorm()});
   }

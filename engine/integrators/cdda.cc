@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "engine/base/error.h"
+#include "engine/events/collision.h"
 #include "engine/integrators/chord_contacts.h"
 #include "engine/integrators/discrete_gradient.h"
 #include "engine/integrators/registry.h"
@@ -42,11 +43,11 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     scan_->begin_slab(report.counters, report.contacts, &piece_->a(), slab.length, watch_);
     if (watch_) watch_->cut();  // a solve changes the accelerations that the next one starts from
     auto& p = system.particles;
-    auto elastic = [&](const Touch<D>& touch) { collide_elastically(touch, system); };
+    const auto contact = [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, p); };
     double done = 0, longest = slab.length;
     bool ended = false;
     while (!ended) {
-      scan_->resolve(done, p.x, p.v, elastic);
+      scan_->resolve(done, p.x, p.v, contact);
       const double rest = slab.length - done;
       if (!(rest > 0)) break;  // the last contact rounds to the end of the slab
       const double wanted = std::min(rest, longest), tau = find_piece(p, wanted);

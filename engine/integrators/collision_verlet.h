@@ -30,7 +30,7 @@ class VerletPieces {
   }
 
   /// Applies the impulse to all contacts that approach; see ContactScan::resolve.
-  void collide(double time, const std::function<void(const Touch<D>&)>& impulse) {
+  void collide(double time, const ApplyImpulse<D>& impulse) {
     scan_.resolve(time, system_.particles.x, system_.particles.v, impulse);
   }
 

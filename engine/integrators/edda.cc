@@ -27,6 +27,7 @@
 
 #include "engine/base/elementary.h"
 #include "engine/base/error.h"
+#include "engine/events/collision.h"
 #include "engine/forces/forces.h"
 #include "engine/forces/stiffness.h"
 #include "engine/integrators/chebyshev.h"
@@ -127,7 +128,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       const bool resolved = found_.touching;
       if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(p.x, p.v)))) {
         system.decomposition.need_all();
-        owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { collide_elastically(touch, system); });
+        owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, p); });
         found_.touching = !scan.resting().empty();
       }
       const double rest = slab.length - done, piece = std::min({longest, contact, rest});

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "engine/base/error.h"
+#include "engine/events/collision.h"
 #include "engine/integrators/collision_verlet.h"
 #include "engine/integrators/registry.h"
 
@@ -125,10 +126,11 @@ class ModifiedCollisionVerlet : public Integrator<D> {
   }
 
   void collide(System<D>& system, double time) {
-    pieces_->collide(time, [&](const Touch<D>& touch) { impulse(system, touch); });
+    pieces_->collide(time, [&](const Touch<D>& touch) { return impulse(system, touch); });
   }
 
-  void impulse(System<D>& system, const Touch<D>& touch) {
+  /// Returns the energy that the contact dissipates.
+  double impulse(System<D>& system, const Touch<D>& touch) {
     auto& p = system.particles;
     const Id lo = touch.key.lo, hi = touch.key.hi;
     const Vec<D>& n = touch.normal;
@@ -148,18 +150,36 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     const double a = nw + sixth * wKw, b = nv + sixth * wKv;
     const double discriminant = b * b - 2 * a * debt_;
     double lambda = a > 0 && b < 0 && discriminant >= 0 ? (std::sqrt(discriminant) - b) / a : -2 * b / a;
+    double dissipated = 0;
+    if (!system.box.contacts.elastic()) {  // the shadow impulse is elastic
+      const Impulse inelastic = law(system, touch);
+      if (inelastic.dissipated != 0) lambda = inelastic.factor, dissipated = inelastic.dissipated;
+    }
     // Impulses that remove most of a slow pair's normal velocity, contact after contact, would bring it to rest.
-    if (!(a > 0) || !(nv + lambda * nw > -kLeastRestitution * nv)) {
+    if (dissipated == 0 && (!(a > 0) || !(nv + lambda * nw > -kLeastRestitution * nv))) {
       lambda = -2 * nv / nw;
       ++counters_->fallbacks;
     }
-    debt_ += lambda * (b + 0.5 * a * lambda);
+    debt_ += lambda * (b + 0.5 * a * lambda) + dissipated;
     p.v[lo] += lambda * w_[lo];
     w_[lo].setZero();
     if (touch.pair()) {
       p.v[hi] += lambda * w_[hi];
       w_[hi].setZero();
     }
+    return dissipated;
+  }
+
+  /// The impulse of the law of this contact, in multiples of the normal.
+  static Impulse law(const System<D>& system, const Touch<D>& touch) {
+    const auto& p = system.particles;
+    const Id lo = touch.key.lo, hi = touch.key.hi;
+    if (touch.pair())
+      return pair_impulse<D>(system.box.contacts, p.species[lo], p.species[hi], touch.normal, p.v[lo] - p.v[hi],
+                             p.mass[lo], p.mass[hi]);
+    const auto bounced =
+        wall_impulse<D>(system.box.contacts, system.box.wall(hi), p.species[lo], p.mass[lo], p.v[lo]);
+    return {bounced.exchange.impulse, bounced.exchange.dissipated};
   }
 
   double h_;

@@ -70,7 +70,18 @@ std::vector<Value> gather_values(Communicator& ranks, std::span<const Value> min
 template <class Sums>
 Sums sum_of_all(Communicator& ranks, const Sums& mine) {
   Sums all;
-  for (const Sums& each : gather_values<Sums>(ranks, {&mine, 1})) all.add(each);
+  if constexpr (requires(Sums sums, Archive& archive) { sums.archive(archive); }) {
+    Archive out;
+    Sums(mine).archive(out);
+    for (const Bytes& each : ranks.gather(out.bytes())) {
+      Archive in(each);
+      Sums sums;
+      sums.archive(in);
+      all.add(sums);
+    }
+  } else {
+    for (const Sums& each : gather_values<Sums>(ranks, {&mine, 1})) all.add(each);
+  }
   return all;
 }
 

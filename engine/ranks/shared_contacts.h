@@ -38,7 +38,7 @@ bool commit_contacts(const System<D>& system, std::span<const Contact<D>> found,
   std::vector<Contact<D>> own;
   for (Contact<D> contact : found) {
     if (!p.owns(contact.key.lo)) continue;
-    tally.add(contact.key.kind, contact.virial, contact.overlap);
+    tally.record<D>(contact, nullptr);
     if (!log) continue;
     contact.key.lo = p.id_of(contact.key.lo);
     if (contact.key.kind == EventKind::pair) contact.key.hi = p.id_of(contact.key.hi);

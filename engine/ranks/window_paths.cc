@@ -62,7 +62,7 @@ Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, s
           .key = event.slot[1] == kNoEntry
                      ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
                      : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner)),
-          .virial = event.virial,
+          .exchange = event.exchange,
           .overlap = event.overlap};
 }
 
@@ -159,13 +159,19 @@ bool WindowPaths<D>::all_match(double end) {
 template <int D>
 ContactTally WindowPaths<D>::tally() const {
   ContactTally tally;
+  const auto add = [&](Id wall, double time, const PackedExchange& exchange, double overlap) {
+    if (wall == kNoEntry) return tally.add_pair(exchange.unpacked<D>(nullptr, time), overlap);
+    const auto its = std::ranges::find(flights_.walls(), wall, &Wall<D>::number);
+    tally.add_wall(wall, exchange.unpacked(&*its, time), overlap);
+  };
   for (const auto& event : trace_.events())
     if (const Slot lo = event.slot[0]; ownership_.owns(lo) && rewritten_[lo] == 0)
-      tally.add(event.slot[1] != kNoEntry ? EventKind::pair : EventKind::wall, event.virial, event.overlap);
+      add(event.slot[1] != kNoEntry ? kNoEntry : event.partner, event.time, event.exchange, event.overlap);
   for (const Slot i : paths_.slots()) {
     if (!ownership_.owns(i) || rewritten_[i] == 0) continue;
     for (const Node<D>& node : paths_.at(i).nodes)
-      if (node.key.lo == node.after.id) tally.add(node.key.kind, node.virial, node.overlap);
+      if (node.key.lo == node.after.id)
+        add(node.key.kind == EventKind::pair ? kNoEntry : node.key.hi, node.key.time, node.exchange, node.overlap);
   }
   return tally;
 }

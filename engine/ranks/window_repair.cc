@@ -163,7 +163,7 @@ void WindowRepair<D>::contact(const Task& task) {
   if (!pair) {
     const Wall<D> wall = box_.wall(key.hi);
     const Impact<D> impact = flights_.bounce(a.slot, of_a.after, wall, key.time, key.generation);
-    of_a.virial = wall.work(impact.impulse, key.time);
+    of_a.exchange = {key.kind, impact.exchange};
     of_a.overlap = impact.overlap;
     append(a, of_a);
     return predict(a, key);
@@ -172,7 +172,7 @@ void WindowRepair<D>::contact(const Task& task) {
   Node<D> of_b{b.now, key};
   const Impact<D> impact =
       flights_.collide(a.slot, of_a.after, b.slot, of_b.after, box_.shift(task.image), key.time, key.generation);
-  of_a.virial = of_b.virial = impact.d.dot(impact.impulse);
+  of_a.exchange = of_b.exchange = {key.kind, impact.exchange};
   of_a.overlap = of_b.overlap = impact.overlap;
   append(a, of_a);
   append(b, of_b);

@@ -226,6 +226,7 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       watch.begin();
       system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
       if (!system_->box.options.empty()) system_->box.check(Failure::numerical);
+      if (!system_->box.contacts.elastic()) system_->box.contacts.thermal_speed = thermal_speed(*system_);
       integrator_->slab(*system_, slab, report);
       return true;
     } catch (HaloTooSmall) {

@@ -109,6 +109,13 @@ struct Statistics {
   std::optional<double> mean_free_time, mean_free_path;
   double wall_seconds = 0;     ///< of the loop of run()
   bool stopped_early = false;  ///< by should_stop
+
+  void archive(Archive& archive) {
+    archive(steps, end_time, fraction_done, start_steps, start_time, counters, force_passes, energy_initial,
+            energy_after_first_step, energy_final, first_step_error, energy_reference, energy_scale, tail_energy,
+            tail_pressure, max_energy_error, max_shadow_energy_error, max_momentum_error, mean_pressure, collision_rate,
+            mean_free_time, mean_free_path, wall_seconds, stopped_early);
+  }
 };
 
 /// The origin of the step count: step n ends at time + (n − steps) · Plan::step.

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
 
 namespace carom {
 
@@ -159,8 +158,7 @@ void ContactScan<D>::commit(double time, std::span<const Contact<D>> executed) {
 }
 
 template <int D>
-double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
-                               const std::function<void(const Touch<D>&)>& impulse) {
+double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse) {
   find_touching(time, x);
   sort_out(v);
   double lost = 0;
@@ -182,7 +180,7 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v,
 /// One round of impulses, in key order.
 template <int D>
 void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v,
-                                const std::function<void(const Touch<D>&)>& impulse) {
+                                const ApplyImpulse<D>& impulse) {
   for (Touch<D>& touch : approaching_) {
     // An earlier impulse of this round may have separated the spheres.
     if (!(normal_speed(touch, v) < -resting_speed(touch, v))) continue;
@@ -196,23 +194,25 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
     if (watch_) watch_->cut();
     const Id lo = touch.key.lo;
     const Vec<D> before = v[lo];
-    impulse(touch);
-    record(touch, x, particles_.mass[lo] * (v[lo] - before));
+    const double dissipated = impulse(touch);
+    record(touch, x, particles_.mass[lo] * (v[lo] - before), dissipated);
   }
 }
 
 template <int D>
-void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse) {
+void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated) {
   const Id lo = touch.key.lo, hi = touch.key.hi;
   Contact<D> contact{touch.key, x[lo], x[lo], impulse};
   if (touch.pair()) {
-    contact.virial = touch.normal.dot(impulse);
+    contact.exchange.virial = touch.normal.dot(impulse);
     contact.x_hi = x[hi] - box_.shift(touch.key.image);
   } else {
     const Wall<D> wall = box_.wall(hi);
     contact.x_hi = wall.foot(x[lo]);
-    contact.virial = wall.work(impulse);
+    contact.exchange.impulse = wall.along_normal(impulse);
+    contact.exchange.work = wall.work(impulse);
   }
+  contact.exchange.dissipated = dissipated;
   counters_->record(contact, contacts_);
 }
 
@@ -379,23 +379,7 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   return first;
 }
 
-template <int D>
-void collide_elastically(const Touch<D>& touch, System<D>& system) {
-  Particles<D>& particles = system.particles;
-  const Id lo = touch.key.lo, hi = touch.key.hi;
-  if (!touch.pair()) {
-    particles.v[lo] = system.box.wall(hi).bounced(particles.v[lo]);
-    return;
-  }
-  const double mass_lo = particles.mass[lo], mass_hi = particles.mass[hi];
-  const double g = collision_factor<D>(touch.normal, particles.v[lo] - particles.v[hi], mass_lo, mass_hi);
-  particles.v[lo] += (g / mass_lo) * touch.normal;
-  particles.v[hi] -= (g / mass_hi) * touch.normal;
-}
-
 template class ContactScan<2>;
 template class ContactScan<3>;
-template void collide_elastically<2>(const Touch<2>&, System<2>&);
-template void collide_elastically<3>(const Touch<3>&, System<3>&);
 
 }  // namespace carom

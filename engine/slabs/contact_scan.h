@@ -35,6 +35,10 @@ struct Touch {
   bool pair() const { return key.kind == EventKind::pair; }
 };
 
+/// Applies the impulse of a contact, which changes velocities; returns the energy that the contact dissipates.
+template <int D>
+using ApplyImpulse = std::function<double(const Touch<D>&)>;
+
 template <int D>
 class ContactScan {
  public:
@@ -51,7 +55,7 @@ class ContactScan {
   /// Applies `impulse`, which changes the velocities in `v`, to every contact that touches and approaches at x, in key
   /// order, until no contact approaches, and records which contacts rest. Returns the energy that contacts lost when
   /// they came to rest. Throws Error(Failure::numerical) beyond max_events.
-  double resolve(double time, Positions<D> x, Vectors<D> v, const std::function<void(const Touch<D>&)>& impulse);
+  double resolve(double time, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
 
   /// Whether no contact approaches and no contact rests.
   bool quiet(Positions<D> x, Positions<D> v) {
@@ -143,9 +147,8 @@ class ContactScan {
   double resting_speed(const Touch<D>& touch, Positions<D> v) const {
     return resting_speed(touch.key, touch.normal, v[touch.key.lo], v[touch.pair() ? touch.key.hi : touch.key.lo]);
   }
-  void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v,
-                  const std::function<void(const Touch<D>&)>& impulse);
-  void record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse);
+  void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
+  void record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated);
   double known_force(const EventKey<D>& key) const;
   double wall_speed(const EventKey<D>& key, double later = 0) const {
     return key.kind == EventKind::wall ? box_.wall(key.hi).velocity_at(later) : 0.0;
@@ -179,9 +182,5 @@ class ContactScan {
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
 };
-
-/// Applies the elastic impulse, which conserves kinetic energy and momentum.
-template <int D>
-void collide_elastically(const Touch<D>& touch, System<D>& system);
 
 }  // namespace carom

@@ -338,7 +338,7 @@ typename SlabCore<D>::Flight& SlabCore<D>::flight(Id i, const EventKey<D>& key) 
   return f;
 }
 
-/// Applies the elastic impulse if the spheres still approach.
+/// Applies the impulse if the spheres still approach.
 template <int D>
 void SlabCore<D>::collide(const EventKey<D>& key) {
   flight(key.lo, key);
@@ -353,20 +353,22 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   if (key.kind == EventKind::wall) {
     const Wall<D> wall = box_.wall(key.hi);
     if (!(wall.opening(lo.v, key.time) < 0)) return;
-    const Vec<D> after = wall.bounced(lo.v, key.time);
-    contact.impulse = mass * (after - lo.v);
-    contact.virial = wall.work(contact.impulse, key.time);
-    contact.x_hi = wall.foot(lo.x, key.time);
+    const auto [after, impulse, exchange] =
+        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, key.time);
+    contact.impulse = impulse;
+    contact.exchange = exchange;
     lo.v = after;
+    contact.x_hi = wall.foot(lo.x, key.time);
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
     const double mass_hi = particles_.mass[key.hi];
     const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
     if (!(d.dot(v) < 0)) return;
-    const double g = collision_factor<D>(d, v, mass, mass_hi);
+    const auto [g, dissipated] = pair_impulse<D>(box_.contacts, particles_.species[key.lo], particles_.species[key.hi],
+                                                 d, v, mass, mass_hi);
     contact.impulse = g * d;
     contact.x_hi = hi.x - box_.shift(key.image);
-    contact.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse);
+    contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse), .dissipated = dissipated};
     lo.v += (g / mass) * d;
     hi.v -= (g / mass_hi) * d;
     checks_path(hi);

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "engine/base/error.h"
+#include "engine/events/collision.h"
 #include "tests/support/experiments.h"
 
 namespace carom {
@@ -22,7 +23,7 @@ struct Scene {
   }
   void resolve() {
     auto& p = system->particles;
-    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *system); });
+    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles); });
   }
   Touch<2> earliest(double rest) { return scan.earliest(system->particles.x, system->particles.v, a, rest); }
 
@@ -71,7 +72,7 @@ TEST(ContactScan, LeavesAPairThatAnEarlierImpulseHasParted) {
   ContactScan<2> scan(*system, 100, reactions);
   scan.begin_slab(counters, nullptr, nullptr, 1.0);
   auto& p = system->particles;
-  scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *system); });
+  scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles); });
   EXPECT_EQ(counters.sphere_sphere, 1u);
   EXPECT_EQ(p.v[2], Vec<2>(0, 0));
 }
@@ -147,7 +148,7 @@ TEST(ContactScan, WhatHasBeenStoppedMayRunIntoSomethingElse) {
   Scene scene({{3, 3}, {4, 3}, {5, 3}}, {{1e-6, 0}, {0, 0}, {1e-9, 0}}, {{2, 0}, {0, 0}, {0, 0}});
   auto& p = scene.system->particles;
   const double lost =
-      scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *scene.system); });
+      scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { return resolve_contact<2>(touch.key, touch.normal, scene.system->box, scene.system->particles); });
   ASSERT_EQ(scene.contacts.size(), 1u);
   EXPECT_EQ(scene.contacts[0].key.lo, 1u);
   EXPECT_EQ(scene.contacts[0].key.hi, 2u);
@@ -168,7 +169,7 @@ TEST(ContactScan, SlidingKeepsEnergyAndMomentumOfUnequalMasses) {
     const std::vector<Vec<2>> a = {{2, 0}, {-2, 0}};
     scan.begin_slab(counters, nullptr, &a, 1.0);
     auto& p = system->particles;
-    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { collide_elastically(touch, *system); });
+    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles); });
     auto held = a;
     scan.hold(p.v, held, 0.1);
     ASSERT_EQ(scan.resting().size(), 1u);

@@ -58,8 +58,8 @@ void expect_exact_bounces(const std::string& method, double step, double toleran
     const double before = -contact.impulse[0] / (2 * kMass) - u;
     EXPECT_NEAR((before + u) * (contact.x_hi[0] - 2 * kRadius), invariant, tolerance * invariant);
     EXPECT_NEAR(contact.impulse[0], -2 * kMass * (v + u), tolerance);
-    EXPECT_NEAR(contact.virial, 2 * kMass * u * (v + u), tolerance);  // ½m ((v + 2u)² − v²)
-    work += contact.virial;
+    EXPECT_NEAR(contact.exchange.work, 2 * kMass * u * (v + u), tolerance);  // ½m ((v + 2u)² − v²)
+    work += contact.exchange.work;
     const double next = 2 * room / (v + 3 * u);
     time += next;
     room -= u * next;

@@ -69,8 +69,8 @@ TEST(ContactTally, AddsUpWhatItsPartsCount) {
   std::vector<Contact<2>> log;
   Counters one, other;
   const Vec<2> zero = Vec<2>::Zero();
-  const Contact<2> pair{{.kind = EventKind::pair, .lo = 1, .hi = 2}, zero, zero, zero, 0.1, 3e-16};
-  const Contact<2> bounce{{.kind = EventKind::wall, .lo = 1, .hi = 3}, zero, zero, zero, 0, 5e-16};
+  const Contact<2> pair{{.kind = EventKind::pair, .lo = 1, .hi = 2}, zero, zero, zero, {.virial = 0.1}, 3e-16};
+  const Contact<2> bounce{{.kind = EventKind::wall, .lo = 1, .hi = 3}, zero, zero, zero, {}, 5e-16};
   one.record(pair, &log);
   one.record(bounce, &log);
   other.record<2>(pair, nullptr);
