@@ -127,6 +127,11 @@ std::string Box<D>::wall_name(Id number) const {
   return side + " wall of axis " + std::to_string(number / 2);
 }
 
+template <int D>
+std::string Box<D>::name_of(Id number) const {
+  return number >= 2 * D ? find(number)->name : face_names<D>()[number];
+}
+
 template struct Box<2>;
 template struct Box<3>;
 

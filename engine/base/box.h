@@ -114,6 +114,8 @@ struct Box {
   void check(Failure failure) const;
   /// For messages: "the upper wall of axis 1", "the wall 'ramp'".
   std::string wall_name(Id number) const;
+  /// The name of a wall in decks: "x-", "ramp".
+  std::string name_of(Id number) const;
 
   /// The lengths of the box at a time, between its faces [length].
   Vec<D> lengths(double at) const {

@@ -85,12 +85,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     system.fields.add_value("edda", scales_);
     system.fields.add_value("edda found", kept_);
     system.fields.add_value("edda owed", owed_);
+    set_scales(system);
     const auto sum = [&](auto&& term) { return sum_over_all<D>(system, term); };
-    const double n = static_cast<double>(std::max<std::size_t>(1, system.size()));
-    scales_.speed = std::sqrt(sum([&](Id i) { return p.v[i].squaredNorm(); }) / n);
-    scales_.strength = std::sqrt(sum([&](Id i) { return a_[i].squaredNorm(); }) / n);
     const double mass = sum([&](Id i) { return p.mass[i]; });
-    const bool free = n > 1 && system.keeps_momentum();  // and more than it moves
+    const bool free = system.size() > 1 && system.keeps_momentum();  // and more than it moves
     for (int k = 0; k < D; ++k)
       scales_.centre[k] = free ? sum([&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass : 0.0;
   }
@@ -98,6 +96,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     slab_ = slab.index;
+    if (!system.box.contacts.elastic()) set_scales(system);
     watch_ = report.watch;
     core_->begin_step(report.counters, report.contacts, &past_.last(), slab.length, watch_);
     found_ = kept_;  // a step that is repeated forgets what its first attempt found
@@ -116,6 +115,16 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     double longest = kNever;                      // the longest piece in which the sweeps converge
     int converged = 0;                            // pieces of this length that took few sweeps
   };
+
+  /// Sets the scales of velocities and accelerations from the present ones.
+  void set_scales(const System<D>& system) {
+    const auto mean = [&](Positions<D> w) {
+      const double n = static_cast<double>(std::max<std::size_t>(1, system.size()));
+      return std::sqrt(sum_over_all<D>(system, [&](Id i) { return w[i].squaredNorm(); }) / n);
+    };
+    scales_.speed = mean(system.particles.v);
+    scales_.strength = mean(past_.last());
+  }
 
   /// The pieces of a step.
   void advance(System<D>& system, const Slab& slab) {
@@ -399,7 +408,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::uint64_t max_events_;
   double tolerance_;  // largest residual h |e|, relative to the speed scale
   struct Scales {
-    double speed = 0, strength = 0;  // root mean square velocity and acceleration at the start of the run
+    double speed = 0, strength = 0;  // root mean square velocity and acceleration at the start of the run or, if
+                                     // contacts dissipate, of the step
     std::array<double, D> centre{};  // velocity of the centre of mass, if momentum is conserved
   } scales_;
   std::optional<SlabCore<D>> core_;

@@ -48,6 +48,25 @@ void check_interval(double interval, double step) {
                 "an output interval is shorter than a millionth of the step; give 0, the step or something longer");
 }
 
+/// √(Σ m v²/(D Σ m)) [length/time].
+template <int D>
+double thermal_speed(const System<D>& system) {
+  const auto& p = system.particles;
+  const double twice_kinetic = sum_over_all<D>(system, [&](Id i) { return p.mass[i] * p.v[i].squaredNorm(); });
+  return std::sqrt(twice_kinetic / (D * sum_over_all<D>(system, [&](Id i) { return p.mass[i]; })));
+}
+
+/// A rest speed above the thermal speed would make most contacts elastic.
+template <int D>
+void check_rest_speeds(const System<D>& system) {
+  if (system.box.contacts.elastic()) return;
+  const double thermal = thermal_speed(system);
+  for (const ContactLaw& law : system.box.contacts.all())
+    if (thermal > 0 && law.rest_speed >= thermal)
+      throw Error(Failure::deck, "the rest_speed " + short_text(law.rest_speed) + " of a contact is above the thermal " +
+                                     "speed at the start, " + short_text(thermal) + "; give a smaller one, or none");
+}
+
 Plan checked(const Plan& plan) {
   if (!(plan.step > 0)) throw Error(Failure::deck, "the step must be positive");
   if (!plan.steps && !plan.end_time && !plan.collisions)
@@ -109,6 +128,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   };
   const bool again = monitor_ != nullptr;
   if (!again) {
+    if (!hooks.restore) check_rest_speeds(*system_);
     if (info_.smooth_forces) {
       system_->quanta = quanta(*system_);
       s.counters.divisions += divide();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
+#include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "engine/forces/pair_filter.h"
 #include "engine/ranks/id_blocks.h"
@@ -122,10 +123,12 @@ template <int D>
 void fill_box(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
-  for (const WallConfig& wall : source.walls)
+  for (const TableConfig& wall : source.walls)
     if (!wall.wrong) add_wall(system.box, wall.parameters);
   system.species.clear();
   for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
+  for (const TableConfig& contact : source.contacts)
+    if (!contact.wrong) add_contact<D>(system.box, system.species, contact.parameters);
 }
 
 template <int D>

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "io/deck/deck_source.h"
 #include "io/deck/options.h"
@@ -26,8 +27,10 @@ class Interpreter {
     top();
     system();
     for (const ValueTable& table : values_.list("wall")) source_.walls.push_back({table.values, table.at, table.wrong});
-    try_walls();
+    for (const ValueTable& table : values_.list("contact"))
+      source_.contacts.push_back({table.values, table.at, table.wrong});
     for (const ValueTable& table : values_.list("particles")) species(table);
+    try_walls();
     placement();
     integrator();
     cores();
@@ -71,12 +74,16 @@ class Interpreter {
     }
   }
 
-  /// Adds the walls to a box, if enough is known about it.
+  /// Adds walls and contacts to a box, if enough is known about it.
   void try_walls() {
     const auto attempt = [&](auto box) {
       std::copy_n(source_.boundary.begin(), dimension_, box.boundary.begin());
-      for (WallConfig& wall : source_.walls)
+      std::vector<std::string> names;
+      for (const SpeciesConfig& species : source_.species) names.push_back(species.name);
+      for (TableConfig& wall : source_.walls)
         if (!wall.wrong) wall.wrong = report(wall.at, [&] { add_wall(box, wall.parameters); });
+      for (TableConfig& contact : source_.contacts)
+        if (!contact.wrong) contact.wrong = report(contact.at, [&] { add_contact(box, names, contact.parameters); });
       if (source_.edges.size() != dimension_ || source_.walls.empty()) return;
       std::copy_n(source_.edges.begin(), dimension_, box.edges.begin());
       report(source_.walls.back().at, [&] { box.check(Failure::deck); });

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "engine/base/interaction.h"
+#include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "engine/integrators/integrator.h"
 
@@ -92,6 +93,8 @@ std::vector<TableSchema> make_schema() {
          "edges of the box, which begins at the origin; may be left out where placement.packing_fraction sets it",
          Range::positive},
         boundary_key()}},
+      {"contact", true, false, "the law of all contacts between two partners; contacts without one are elastic",
+       contact_parameters()},
       {"wall", true, false, "a wall beside those of the box, or a face of the box that is more than a fixed hard wall",
        wall_parameters()},
       {"particles",

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/base/boundary.h"
+#include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "engine/forces/potentials/table.h"
 #include "io/deck/schema.h"
@@ -131,6 +132,10 @@ void bind(py::module_& module, const char* name) {
       .def("set_velocity", [](S& session, const Array& v) { session.set_velocity(span_of(v)); })
       .def("add_wall",
            [](S& session, const py::dict& given) { session.add_wall(parameters_of("wall", wall_parameters(), given)); })
+      .def("add_contact",
+           [](S& session, const py::dict& given) {
+             session.add_contact(parameters_of("contact", contact_parameters(), given));
+           })
       .def("add_force",
            [](S& session, const std::string& type, const py::dict& given) {
              const InteractionInfo& info = find_interaction(type);
@@ -222,6 +227,12 @@ void bind(py::module_& module, const char* name) {
                                for (const Parameters& wall : s.walls()) all.append(values_of(wall));
                                return all;
                              })
+      .def_property_readonly("contacts",
+                             [](const S& s) {
+                               py::list all;
+                               for (const Parameters& contact : s.contacts()) all.append(values_of(contact));
+                               return all;
+                             })
       .def_property_readonly("box",
                              [](const S& s) {
                                const Vec<D>& edges = s.box().edges;
@@ -309,10 +320,14 @@ py::dict descriptors() {
   }
   py::dict all;
   all["integrators"] = methods, all["forces"] = terms, all["boundaries"] = rules;
-  py::dict wall;
-  wall["name"] = "wall", wall["meaning"] = table_schema("wall").meaning;
-  wall["parameters"] = described(wall_parameters());
-  all["walls"] = py::make_tuple(wall);
+  const auto table = [](const char* name, const std::vector<Parameter>& parameters) {
+    py::dict one;
+    one["name"] = name, one["meaning"] = table_schema(name).meaning;
+    one["parameters"] = described(parameters);
+    return py::make_tuple(one);
+  };
+  all["walls"] = table("wall", wall_parameters());
+  all["contacts"] = table("contact", contact_parameters());
   return all;
 }
 

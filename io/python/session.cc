@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "engine/run/measurement.h"
 #include "engine/run/state.h"
@@ -67,6 +68,7 @@ Session<D>::Session(Deck& deck) {
   plan_ = deck.plan;
   box_ = system_->box;
   for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
+  for (const auto& contact : deck.source->contacts) contacts_.push_back(contact.parameters);
   species_ = system_->species;
   size_ = system_->size();
   integrator_ = &find_integrator(deck.integrator);
@@ -102,7 +104,10 @@ void Session<D>::add_particles(const Columns& columns) {
   const std::size_t before = size_, added = columns.x.size() / D, kinds = species_.size();
   const auto at = std::ranges::find(species_, columns.species);
   const auto kind = static_cast<std::uint16_t>(at - species_.begin());
-  if (kind == kinds) species_.push_back(columns.species);
+  if (kind == kinds) {
+    species_.push_back(columns.species);
+    if (!contacts_.empty()) set_contacts(contacts_);
+  }
   system_->species = species_;
   views_.detach(all);
   const auto resize = [&](std::size_t n) {
@@ -175,6 +180,25 @@ void Session<D>::add_wall(Parameters given) {
   change("add walls");
   system_->box = box_ = box;
   walls_.push_back(std::move(complete));
+  set_contacts(contacts_);
+}
+
+template <int D>
+void Session<D>::add_contact(Parameters given) {
+  auto all = contacts_;
+  all.push_back(completed("contact", contact_parameters(), std::move(given)));
+  change("add contacts");
+  set_contacts(std::move(all));
+}
+
+/// Sets these laws for the present species and walls.
+template <int D>
+void Session<D>::set_contacts(std::vector<Parameters> all) {
+  Box<D> box = box_;
+  box.contacts = {};
+  for (const Parameters& each : all) carom::add_contact<D>(box, species_, each);
+  system_->box = box_ = box;
+  contacts_ = std::move(all);
 }
 
 template <int D>

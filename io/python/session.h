@@ -60,6 +60,8 @@ class Session {
   std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
   /// Adds a wall or changes a face of the box.
   void add_wall(Parameters given);
+  /// Sets the law of contacts between two partners, which must be there already.
+  void add_contact(Parameters given);
   void add_force(std::string_view type, Parameters given);
   void set_integrator(std::string_view name, Parameters given);
   /// Makes later runs write files: `set` overrides [output] of a deck, including the directory; thermo rows and calls
@@ -94,6 +96,7 @@ class Session {
   const Parameters& integrator_parameters() const { return parameters_; }
   const std::vector<Force>& forces() const { return terms_.all(); }
   const std::vector<Parameters>& walls() const { return walls_; }
+  const std::vector<Parameters>& contacts() const { return contacts_; }
   /// During a run: only in RunHooks::show.
   Averages averages() const;
   /// Warnings of the last run about its files.
@@ -106,6 +109,7 @@ class Session {
  private:
   class Shown;
   void change(const char* what);
+  void set_contacts(std::vector<Parameters> all);
   void set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what);
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
@@ -116,7 +120,7 @@ class Session {
   void save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record);
 
   Box<D> box_;
-  std::vector<Parameters> walls_;
+  std::vector<Parameters> walls_, contacts_;
   std::vector<std::string> species_;
   Terms<D> terms_;
   const IntegratorInfo* integrator_ = nullptr;

@@ -48,6 +48,8 @@ def deck_of(sim, of, ends):
             species["display_radius"] = species.pop("radius")
     if sim.walls:
         deck["wall"] = sim.walls
+    if sim.contacts:
+        deck["contact"] = sim.contacts
     if sim._session.forces:
         deck["interaction"] = [{"type": name} | given for name, given in sim._session.forces]
     deck["integrator"] = {"type": sim._session.method} | sim._session.method_parameters

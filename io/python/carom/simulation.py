@@ -221,6 +221,18 @@ class Simulation:
         given = refuse_masked("add_wall", parameters | {"name": name_of("add_wall", name)})
         self._session.add_wall(given if normal is None else given | {"normal": numbers("add_wall", "normal", normal)})
 
+    def add_contact(self, one, other, **parameters):
+        """Sets the law of contacts between two species, or a species and a wall ("x-", or its name); "*" for any. They must
+        be there already; a later law replaces an earlier one.
+
+        Parameters are those of [[contact]] in decks: restitution, rest_speed, …; see carom.describe("contact").
+
+            sim.add_contact("*", "*", restitution=0.9)
+            sim.add_contact("ice", "ice", restitution={"form": "power", "v0": 0.01, "exponent": 0.234})
+        """
+        given = refuse_masked("add_contact", dict(parameters))
+        self._session.add_contact(given | {"between": [name_of("add_contact", one), name_of("add_contact", other)]})
+
     def add_force(self, type, **parameters):
         """Adds a term of V by its name in decks; see carom.describe(type). Ids and species in it must be there already."""
         self._session.add_force(name_of("add_force", type), refuse_masked(type, parameters))
@@ -357,6 +369,7 @@ class Simulation:
     species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view")
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
     box = property(lambda self: self._session.box, doc="Edges [length].")
+    contacts = property(lambda self: self._session.contacts, doc="The laws of contacts, as dictionaries of their options.")
     walls = property(lambda self: self._session.walls, doc="The walls that were added, as dictionaries of their options.")
     boundary = property(lambda self: self._session.boundary, doc="The name of the boundary on each axis.")
 
