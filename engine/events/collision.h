@@ -29,10 +29,10 @@ struct Impulse {
 /// A contact of two spheres whose contact distance grows at the rate w; d as above.
 template <int D>
 Impulse pair_impulse(const ContactLaws& laws, std::uint16_t species_i, std::uint16_t species_j, const Vec<D>& d,
-                        const Vec<D>& v, double mass_i, double mass_j, double sigma = 0, double w = 0) {
+                     const Vec<D>& v, double mass_i, double mass_j, double sigma = 0, double w = 0) {
   if (laws.elastic()) return {collision_factor<D>(d, v, mass_i, mass_j, sigma, w), 0};
   const double closing = -(d.dot(v) - sigma * w), square = closing * closing / d.squaredNorm();
-  const double e = laws.of_pair(species_i, species_j).at(std::sqrt(square), laws.thermal_speed);
+  const double e = laws.of_pair(species_i, species_j).at(std::sqrt(square), laws.thermal_speed, laws.slow);
   return {collision_factor<D>(d, v, mass_i, mass_j, sigma, w, e),
           0.5 * (1 - e * e) * square / (1 / mass_i + 1 / mass_j)};
 }
@@ -49,7 +49,7 @@ template <int D>
 Bounced<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, std::uint16_t species, double mass,
                         const Vec<D>& v, double t = 0, double rate = 0) {
   const double closing = rate - wall.opening(v, t);
-  const double e = laws.elastic() ? 1 : laws.of_wall(species, wall.number).at(closing, laws.thermal_speed);
+  const double e = laws.elastic() ? 1 : laws.of_wall(species, wall.number).at(closing, laws.thermal_speed, laws.slow);
   const Vec<D> after = wall.bounced(v, t, rate, e);
   const Vec<D> impulse = mass * (after - v);
   return {after,
@@ -70,8 +70,8 @@ double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& bo
     p.v[lo] = after;
     return exchange.dissipated;
   }
-  const auto [g, dissipated] = pair_impulse<D>(box.contacts, p.species[lo], p.species[hi], d, p.v[lo] - p.v[hi],
-                                               p.mass[lo], p.mass[hi]);
+  const auto [g, dissipated] =
+      pair_impulse<D>(box.contacts, p.species[lo], p.species[hi], d, p.v[lo] - p.v[hi], p.mass[lo], p.mass[hi]);
   p.v[lo] += (g / p.mass[lo]) * d;
   p.v[hi] -= (g / p.mass[hi]) * d;
   return dissipated;
