@@ -98,14 +98,14 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   std::ranges::sort(touching_, {}, &Touch<D>::key);
 }
 
-/// Sorts the contacts into approaching and resting ones.
+/// Sorts the contacts into approaching and resting ones. `all_stop`: contacts that dissipate rest if they approach.
 template <int D>
-void ContactScan<D>::sort_out(Positions<D> v) {
+void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   approaching_.clear();
   resting_.clear();
   for (const Touch<D>& touch : touching_) {
     const double speed = normal_speed(touch, v);
-    if (speed < -stopping_speed(touch, v))
+    if (speed < -stopping_speed(touch, v) && !(all_stop && dissipates(touch.key)))
       approaching_.push_back(touch);
     else if (speed <= resting_speed(touch, v))
       resting_.push_back({.key = without_time(touch.key), .normal = touch.normal});
@@ -200,7 +200,9 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
   double lost = 0;
   for (std::uint32_t generation = 0;; ++generation) {
     one_by_one(generation, x, v, impulse);
-    sort_out(v);
+    // Inelastic impacts in a cluster go on without end, ever slower; after some rounds the rest of the approach stops.
+    const bool all_stop = generation >= kMostBounces;
+    sort_out(v, all_stop);
     if (!approaching_.empty()) continue;
     if (resting_.empty()) return lost;
     if (watch_) watch_->cut();
@@ -208,7 +210,7 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
     const std::vector<Vec<D>> before(dissipative ? v.begin() : v.end(), v.end());
     lost += stop_rounding(v) + stop_approach(x, v);
     if (dissipative) lost -= count_dissipated(before, v);
-    sort_out(v);  // a sphere that was stopped may have been moving away from another contact
+    sort_out(v, all_stop);  // a sphere that was stopped may have been moving away from another contact
     const auto slow = [&](const Touch<D>& touch) { return normal_speed(touch, v) < -resting_speed(touch, v); };
     if (approaching_.empty() && !(dissipative && generation < kMostRounds && std::ranges::any_of(touching_, slow)))
       break;

@@ -152,7 +152,7 @@ class ContactScan {
   bool dissipates(const EventKey<D>& key) const;
   double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);
-  void sort_out(Positions<D> v);
+  void sort_out(Positions<D> v, bool all_stop = false);
   void note_pressed();
   double rounding_speed(const EventKey<D>& key, Positions<D> v) const {
     return rounding_speed(key.lo, v[key.lo]) + (key.kind == EventKind::pair ? rounding_speed(key.hi, v[key.hi]) : 0.0);

@@ -208,7 +208,7 @@ FlightEnd<D> SlabCore<D>::serve() {
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses no spheres together: elastic contacts that do not approach need no impulse.
     if (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key)))
-      return {.complete = false, .time = key.time, .key = key};
+      return {.complete = false, .time = box_.contacts.elastic() ? key.time : end_before(key), .key = key};
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
     const bool too_strong = !a_.empty() && most >= kMostContactsOfParticle;
     too_many_contacts_ = !too_strong && contacts_.size() >= max_events_;
