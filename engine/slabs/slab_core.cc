@@ -310,12 +310,13 @@ bool SlabCore<D>::comes_to_rest(const EventKey<D>& key) const {
   return meeting.speed >= -scan_->stopping_speed(key, meeting.normal, meeting.v_lo, meeting.v_hi);
 }
 
-/// The time at which the gap is a quarter of the tolerance; 0 if it is no more than that from the start.
+/// The time at which the gap is a quarter of the tolerance; that of the contact if this was before the start.
 template <int D>
 double SlabCore<D>::end_before(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
   const double early = 0.25 * scan_->tolerance(meeting.sigma);
-  return meeting.speed < 0 ? std::max(0.0, key.time + early / meeting.speed) : key.time;
+  const double end = meeting.speed < 0 ? key.time + early / meeting.speed : key.time;
+  return end > 0 ? end : key.time;
 }
 
 /// Starts a new flight of particle i at this event, before the impulse.
