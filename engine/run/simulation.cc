@@ -5,6 +5,7 @@
 
 #include "engine/base/error.h"
 #include "engine/forces/forces.h"
+#include "engine/run/baths.h"
 #include "engine/run/monitor.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/initial_state.h"
@@ -90,6 +91,9 @@ typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system,
     if (!info.smooth_forces && !term->common_acceleration())
       throw Error(Failure::deck, name + " knows no forces but a uniform-field; take psa, edda or their relatives");
   if (info.hard_cores) check_spheres(system);
+  if (system.box.bath.type != Bath::Type::none && system.box.bath.has_ramp() && !plan.steps && !plan.end_time)
+    throw Error(Failure::deck, "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
+                               "run.end_time, or one temperature");
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
   if (plan.step != 0) given.set("step", plan.step);
@@ -165,6 +169,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
   begin(hooks);
+  set_ramp();
   SlabWatch watch(system_->fields, first_of_integrator_, hooks.leave, hooks.leave_here);
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
@@ -205,6 +210,7 @@ void Simulation<D>::run(const Hooks& hooks) {
       if (hooks.left) hooks.left();
       continue;
     }
+    act_of_bath(slab, report);
     show_contacts(slab);
     s.counters.seconds.communicate = system_->decomposition.seconds_waited();
     last_collisions_ = s.counters.sphere_sphere - collisions;
@@ -264,6 +270,27 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       throw Error(Failure::numerical, std::string(e.what()) + " (in step " + std::to_string(slab.index + 1) +
                                           ", from time " + short_text(slab.start) + ")");
     }
+}
+
+/// What the bath does at the end of a slab: rescaling at the end of a whole step or epoch, all kicks of a step.
+template <int D>
+void Simulation<D>::act_of_bath(const Slab& slab, SlabReport<D>& report) {
+  const Bath& bath = system_->box.bath;
+  const double start = time_of(slab.index), length = length_from(start, plan_);
+  if (bath.rescales() && !(report.reached < slab.length))
+    rescale(*system_, slab.index, start + length, length, report.counters);
+  if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);
+}
+
+/// Sets the times of a ramp of the bath's temperature, unless an earlier plan has set them.
+template <int D>
+void Simulation<D>::set_ramp() {
+  Bath& bath = system_->box.bath;
+  if (bath.type == Bath::Type::none || !bath.has_ramp() || bath.ramp_end > bath.ramp_start) return;
+  const Statistics& s = statistics_;
+  bath.ramp_start = bath.ramp_end = s.start_time;
+  if (plan_.steps) bath.ramp_end += static_cast<double>(*plan_.steps - s.start_steps) * plan_.step;
+  if (plan_.end_time) bath.ramp_end = plan_.steps ? std::min(bath.ramp_end, *plan_.end_time) : *plan_.end_time;
 }
 
 /// For free flight that ends only after a number of collisions: throws if the spheres have separated for good.

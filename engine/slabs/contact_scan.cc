@@ -118,6 +118,8 @@ template <int D>
 double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
                                      const Vec<D>& v_hi) const {
   const bool pair = key.kind == EventKind::pair;
+  // Nothing rests on a thermal wall.
+  if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) return -std::numeric_limits<double>::min();
   const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
   Vec<D> a = Vec<D>::Zero();
   if (a_ && key.lo < a_->size()) a = pair ? Vec<D>((*a_)[key.lo] - (*a_)[key.hi]) : (*a_)[key.lo];
@@ -195,12 +197,14 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
     const Id lo = touch.key.lo;
     const Vec<D> before = v[lo];
     const double dissipated = impulse(touch);
-    record(touch, x, particles_.mass[lo] * (v[lo] - before), dissipated);
+    const double gained = 0.5 * particles_.mass[lo] * (v[lo].squaredNorm() - before.squaredNorm());
+    record(touch, x, particles_.mass[lo] * (v[lo] - before), dissipated, gained);
   }
 }
 
 template <int D>
-void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated) {
+void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated,
+                            double gained) {
   const Id lo = touch.key.lo, hi = touch.key.hi;
   Contact<D> contact{touch.key, x[lo], x[lo], impulse};
   if (touch.pair()) {
@@ -211,6 +215,7 @@ void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>&
     contact.x_hi = wall.foot(x[lo]);
     contact.exchange.impulse = wall.along_normal(impulse);
     contact.exchange.work = wall.work(impulse);
+    if (wall.thermal()) contact.exchange.heat = gained - contact.exchange.work;
   }
   contact.exchange.dissipated = dissipated;
   counters_->record(contact, contacts_);

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "engine/base/bath_options.h"
 #include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "engine/run/measurement.h"
@@ -69,6 +70,7 @@ Session<D>::Session(Deck& deck) {
   box_ = system_->box;
   for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
   for (const auto& contact : deck.source->contacts) contacts_.push_back(contact.parameters);
+  for (const auto& bath : deck.source->baths) baths_.push_back(bath.parameters);
   species_ = system_->species;
   size_ = system_->size();
   integrator_ = &find_integrator(deck.integrator);
@@ -189,6 +191,27 @@ void Session<D>::add_contact(Parameters given) {
   all.push_back(completed("contact", contact_parameters(), std::move(given)));
   change("add contacts");
   set_contacts(std::move(all));
+}
+
+template <int D>
+void Session<D>::set_bath(Parameters given) {
+  Parameters complete = completed("bath", bath_parameters(), std::move(given));
+  const Bath bath = bath_of(complete);
+  change("set a bath");
+  system_->box.bath = box_.bath = bath;
+  baths_ = {std::move(complete)};
+}
+
+template <int D>
+void Session<D>::set_bath_temperature(double temperature) {
+  if (baths_.empty()) refuse("there is no bath; call add_bath() first");
+  if (running_ && !(showing_ && std::this_thread::get_id() == runner_))
+    refuse("a run is going on; change the temperature of the bath in its callback, before it or after it");
+  Parameters given = baths_[0];
+  given.set("temperature", temperature);
+  baths_[0] = completed("bath", bath_parameters(), std::move(given));
+  box_.bath.set_temperature(temperature);
+  (at_work_ ? at_work_->box : system_->box).bath.set_temperature(temperature);
 }
 
 /// Sets these laws for the present species and walls.
@@ -333,6 +356,7 @@ template <int D>
 void Session<D>::rest(Particles<D>& particles) {
   for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // if free flight has failed
   box_.time = statistics_.end_time;
+  box_.bath = at_work_->box.bath;  // with the times of its ramp
   system_ = std::make_unique<System<D>>();
   system_->box = box_;
   system_->species = species_;

@@ -51,6 +51,7 @@ Session<D>::Session(Deck& deck, Resumed& from) {
   box_ = system_->box;
   for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
   for (const auto& contact : deck.source->contacts) contacts_.push_back(contact.parameters);
+  for (const auto& bath : deck.source->baths) baths_.push_back(bath.parameters);
   species_ = system_->species;
   size_ = system_->size();
   integrator_ = &find_integrator(deck.integrator);
