@@ -10,7 +10,7 @@ namespace {
 
 /// The number with the Poisson distribution of mean 1 that a uniform number in (0, 1) stands for.
 int poisson(double uniform) {
-  constexpr int kMost = 18;  // more have a probability of 10⁻¹⁷
+  constexpr int kMost = 18;                   // more have a probability of 10⁻¹⁷
   double probability = 0x1.78b56362cef38p-2;  // 1/e
   int k = 0;
   for (double sum = probability; k < kMost && uniform > sum; sum += probability) probability /= ++k;

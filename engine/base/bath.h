@@ -12,8 +12,8 @@ struct Bath {
   enum class Type : std::uint8_t {
     none,
     andersen,   ///< replaces the velocity of a particle at random times (Andersen, J. Chem. Phys. 72 (1980) 2384)
-    rescaling,  ///< scales all velocities at the end of each slab (Bussi, Donadio, Parrinello, J. Chem. Phys. 126 (2007)
-                ///< 014101)
+    rescaling,  ///< scales all velocities at the end of each slab (Bussi, Donadio, Parrinello, J. Chem. Phys. 126
+                ///< (2007) 014101)
   };
   /// The number of a kick's wall in event keys: a kick is an event of one particle, like a contact with a wall.
   static constexpr Id kNumber = 0xfffffffe;

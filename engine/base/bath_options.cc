@@ -9,10 +9,14 @@ const std::vector<Parameter>& bath_parameters() {
   using enum Parameter::Type;
   using Range = Parameter::Range;
   static const std::vector<Parameter> all = {
-      {"type", text, "", "-",
+      {"type",
+       text,
+       "",
+       "-",
        "andersen: at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann; "
        "rescaling: all velocities are scaled by a common random factor, so that the kinetic energy is canonical",
-       Range::any, {"andersen", "rescaling"}},
+       Range::any,
+       {"andersen", "rescaling"}},
       {"temperature", real_or_list, "", "energy", "a number, or [first, last]: a linear ramp over the run",
        Range::positive},
       {"rate", real, "", "1/time", "kicks of a particle per unit time; of rescaling: 1/relaxation time",

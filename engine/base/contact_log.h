@@ -81,9 +81,9 @@ struct PackedExchange {
 template <int D>
 struct Contact {
   EventKey<D> key;
-  Vec<D> x_lo, x_hi;   ///< centres at contact [length], x_hi at the image that is touched; for a wall event x_hi is the
-                       ///< point touched
-  Vec<D> impulse;      ///< on `lo`; `hi` receives its negative [mass·length/time]
+  Vec<D> x_lo, x_hi;  ///< centres at contact [length], x_hi at the image that is touched; for a wall event x_hi is the
+                      ///< point touched
+  Vec<D> impulse;     ///< on `lo`; `hi` receives its negative [mass·length/time]
   Exchange exchange{};
   double overlap = 0;  ///< at contact, relative to the contact distance, if the method computes it
 };

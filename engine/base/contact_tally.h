@@ -66,7 +66,8 @@ struct ContactTally {
     }
     ++sphere_wall;
     wall(number).add(exchange);
-    for (const auto& [sum, term] : {std::pair{&work, exchange.work}, {&heat, exchange.heat}, {&dissipated, exchange.dissipated}})
+    for (const auto& [sum, term] :
+         {std::pair{&work, exchange.work}, {&heat, exchange.heat}, {&dissipated, exchange.dissipated}})
       if (term != 0) sum->add(term);
     max_overlap = std::max(max_overlap, overlap);
   }

@@ -9,7 +9,8 @@ namespace carom {
 
 const std::vector<Parameter>& wall_parameters();
 
-/// Adds a wall with these parameters, which are complete; `seed` is used if they have none. Throws Error(Failure::deck).
+/// Adds a wall with these parameters, which are complete; `seed` is used if they have none. Throws
+/// Error(Failure::deck).
 template <int D>
 void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed = 1);
 

@@ -30,7 +30,7 @@ struct Impulse {
 /// A contact of two spheres whose contact distance grows at the rate w; d as above.
 template <int D>
 Impulse pair_impulse(const ContactLaws& laws, std::uint16_t species_i, std::uint16_t species_j, const Vec<D>& d,
-                        const Vec<D>& v, double mass_i, double mass_j, double sigma = 0, double w = 0) {
+                     const Vec<D>& v, double mass_i, double mass_j, double sigma = 0, double w = 0) {
   if (laws.elastic()) return {collision_factor<D>(d, v, mass_i, mass_j, sigma, w), 0};
   const double closing = -(d.dot(v) - sigma * w), square = closing * closing / d.squaredNorm();
   const double e = laws.of_pair(species_i, species_j).at(std::sqrt(square), laws.thermal_speed);
@@ -78,8 +78,8 @@ double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& bo
     p.v[lo] = after;
     return exchange.dissipated;
   }
-  const auto [g, dissipated] = pair_impulse<D>(box.contacts, p.species[lo], p.species[hi], d, p.v[lo] - p.v[hi],
-                                               p.mass[lo], p.mass[hi]);
+  const auto [g, dissipated] =
+      pair_impulse<D>(box.contacts, p.species[lo], p.species[hi], d, p.v[lo] - p.v[hi], p.mass[lo], p.mass[hi]);
   p.v[lo] += (g / p.mass[lo]) * d;
   p.v[hi] -= (g / p.mass[hi]) * d;
   return dissipated;

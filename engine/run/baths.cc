@@ -8,8 +8,8 @@
 namespace carom {
 namespace {
 
-/// A deviate of the gamma distribution of this shape, at least 1, and scale 1 (Marsaglia, Tsang, ACM Trans. Math. Softw.
-/// 26 (2000) 363).
+/// A deviate of the gamma distribution of this shape, at least 1, and scale 1 (Marsaglia, Tsang, ACM Trans. Math.
+/// Softw. 26 (2000) 363).
 double gamma_deviate(double shape, RandomStream& random) {
   const double d = shape - 1.0 / 3, c = 1 / std::sqrt(9 * d);
   for (;;) {
@@ -54,7 +54,8 @@ void rescale(System<D>& system, std::int64_t slab, double time, double length, C
   const double kept = elementary::exp(-length * bath.rate), fresh = -elementary::expm1(-length * bath.rate);
   const double of_one = 0.5 * bath.temperature_at(time) / kinetic;  // the mean energy of a degree of freedom / K
   const double first = random.normal_pair()[0], others = squared_normals(freedoms - 1, random);
-  const double squared = kept + fresh * of_one * (first * first + others) + 2 * first * std::sqrt(kept * fresh * of_one);
+  const double squared =
+      kept + fresh * of_one * (first * first + others) + 2 * first * std::sqrt(kept * fresh * of_one);
   const double factor = std::sqrt(squared);
   for (Vec<D>& v : p.v) v = centre + factor * (v - centre);
   counters.heat.add(kinetic_energy<D>(system, Vec<D>::Zero()) - before);

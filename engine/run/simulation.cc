@@ -64,8 +64,9 @@ void check_rest_speeds(const System<D>& system) {
   const double thermal = thermal_speed(system);
   for (const ContactLaw& law : system.box.contacts.all())
     if (thermal > 0 && law.rest_speed >= thermal)
-      throw Error(Failure::deck, "the rest_speed " + short_text(law.rest_speed) + " of a contact is above the thermal " +
-                                     "speed at the start, " + short_text(thermal) + "; give a smaller one, or none");
+      throw Error(Failure::deck, "the rest_speed " + short_text(law.rest_speed) +
+                                     " of a contact is above the thermal " + "speed at the start, " +
+                                     short_text(thermal) + "; give a smaller one, or none");
 }
 
 Plan checked(const Plan& plan) {
@@ -91,9 +92,6 @@ typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system,
     if (!info.smooth_forces && !term->common_acceleration())
       throw Error(Failure::deck, name + " knows no forces but a uniform-field; take psa, edda or their relatives");
   if (info.hard_cores) check_spheres(system);
-  if (system.box.bath.type != Bath::Type::none && system.box.bath.has_ramp() && !plan.steps && !plan.end_time)
-    throw Error(Failure::deck, "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
-                               "run.end_time, or one temperature");
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
   if (plan.step != 0) given.set("step", plan.step);
@@ -180,6 +178,8 @@ void Simulation<D>::run(const Hooks& hooks) {
   const auto show_contacts = [&](const Slab& slab) {
     if (!plan_.events) return;
     const Stopwatch stopwatch(s.counters.seconds.output);
+    if (system_->box.bath.kicks())
+      std::erase_if(contacts, [](const auto& each) { return each.key.hi == Bath::kNumber; });
     for (auto& contact : contacts) contact.key.time += count_.within;
     for (auto* observer : observers_) observer->contacts(time_of(slab.index), contacts);
     contacts.clear();
@@ -287,6 +287,10 @@ template <int D>
 void Simulation<D>::set_ramp() {
   Bath& bath = system_->box.bath;
   if (bath.type == Bath::Type::none || !bath.has_ramp() || bath.ramp_end > bath.ramp_start) return;
+  if (!plan_.steps && !plan_.end_time)
+    throw Error(Failure::deck,
+                "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
+                "run.end_time, or one temperature");
   const Statistics& s = statistics_;
   bath.ramp_start = bath.ramp_end = s.start_time;
   if (plan_.steps) bath.ramp_end += static_cast<double>(*plan_.steps - s.start_steps) * plan_.step;

@@ -366,8 +366,8 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     const double mass_hi = particles_.mass[key.hi];
     const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
     if (!(d.dot(v) < 0)) return;
-    const auto [g, dissipated] = pair_impulse<D>(box_.contacts, particles_.species[key.lo], particles_.species[key.hi],
-                                                 d, v, mass, mass_hi);
+    const auto [g, dissipated] =
+        pair_impulse<D>(box_.contacts, particles_.species[key.lo], particles_.species[key.hi], d, v, mass, mass_hi);
     contact.impulse = g * d;
     contact.x_hi = hi.x - box_.shift(key.image);
     contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse), .dissipated = dissipated};

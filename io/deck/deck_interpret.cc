@@ -97,8 +97,7 @@ class Interpreter {
 
   void bath(TableConfig config) {
     if (!config.wrong) config.wrong = report(config.at, [&] { bath_of(config.parameters); });
-    if (!source_.baths.empty())
-      problems_.error(config.at, "a second [[bath]]", "give one; it acts on all particles");
+    if (!source_.baths.empty()) problems_.error(config.at, "a second [[bath]]", "give one; it acts on all particles");
     source_.baths.push_back(std::move(config));
   }
 
@@ -383,6 +382,11 @@ class Interpreter {
     table->read<std::int64_t>("collisions", deck_.plan.collisions);
     if (!table->given("steps") && !table->given("end_time") && !table->given("collisions"))
       problems_.error(table->at, "[run] has no end", "give steps, end_time or collisions");
+    const auto ramp = [](const TableConfig& bath) { return bath.parameters.find<std::vector<double>>("temperature"); };
+    if (const auto at = std::ranges::find_if(source_.baths, ramp);
+        at != source_.baths.end() && table->given("collisions") && !table->given("steps") && !table->given("end_time"))
+      problems_.error(at->at, "the temperature is a ramp over a run without a last time",
+                      "give run.steps or run.end_time, or one temperature");
     if (source_.integrator != nullptr && !source_.integrator->hard_cores && table->given("collisions") &&
         !table->given("steps") && !table->given("end_time"))
       problems_.error(table->place("collisions"),

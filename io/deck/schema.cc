@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "engine/base/bath_options.h"
-#include "engine/base/interaction.h"
 #include "engine/base/contact_options.h"
+#include "engine/base/interaction.h"
 #include "engine/base/wall_options.h"
 #include "engine/integrators/integrator.h"
 

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "engine/base/bath_options.h"
 #include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "engine/run/measurement.h"
@@ -191,27 +190,6 @@ void Session<D>::add_contact(Parameters given) {
   all.push_back(completed("contact", contact_parameters(), std::move(given)));
   change("add contacts");
   set_contacts(std::move(all));
-}
-
-template <int D>
-void Session<D>::set_bath(Parameters given) {
-  Parameters complete = completed("bath", bath_parameters(), std::move(given));
-  const Bath bath = bath_of(complete);
-  change("set a bath");
-  system_->box.bath = box_.bath = bath;
-  baths_ = {std::move(complete)};
-}
-
-template <int D>
-void Session<D>::set_bath_temperature(double temperature) {
-  if (baths_.empty()) refuse("there is no bath; call add_bath() first");
-  if (running_ && !(showing_ && std::this_thread::get_id() == runner_))
-    refuse("a run is going on; change the temperature of the bath in its callback, before it or after it");
-  Parameters given = baths_[0];
-  given.set("temperature", temperature);
-  baths_[0] = completed("bath", bath_parameters(), std::move(given));
-  box_.bath.set_temperature(temperature);
-  (at_work_ ? at_work_->box : system_->box).bath.set_temperature(temperature);
 }
 
 /// Sets these laws for the present species and walls.

@@ -86,6 +86,9 @@ DECK_ERRORS = {
         bathed('type = "andersen"\ntemperature = 1.0\nrate = 0'), 12, ["'rate' must be positive (is 0)"]),
     "bath with three temperatures": (
         bathed('type = "andersen"\ntemperature = [1.0, 2.0, 3.0]\nrate = 1.0'), 9, ["3 numbers", "the first and the last"]),
+    "bath with a ramp to no end": (
+        bathed('type = "andersen"\ntemperature = [1.0, 2.0]\nrate = 1.0').replace("steps = 10", "collisions = 10"),
+        9, ["a ramp over a run without a last time", "run.end_time"]),
     "two baths": (
         bathed('type = "andersen"\ntemperature = 1.0\nrate = 1.0\n[[bath]]\ntype = "rescaling"\ntemperature = 1.0\nrate = 1.0'),
         13, ["a second [[bath]]", "give one"]),
