@@ -13,7 +13,8 @@ const std::vector<Parameter>& bath_parameters() {
        text,
        "",
        "-",
-       "andersen: at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann; "
+       "andersen: at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann, in "
+       "methods with steps at the end of the step; "
        "rescaling: all velocities are scaled by a common random factor, so that the kinetic energy is canonical",
        Range::any,
        {"andersen", "rescaling"}},
