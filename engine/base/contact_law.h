@@ -14,22 +14,20 @@ namespace carom {
 
 /// The coefficient of restitution e: a contact turns the normal speed v of approach into e·v.
 struct ContactLaw {
-  double restitution = 1;   ///< e, where the exponent is 0
-  double v0 = 0;            ///< of the power law e = min(1, (v/v0)^−exponent) (Bridges, Hatzes, Lin, Nature 309 (1984)
-                            ///< 333, for ice) [length/time]
-  double exponent = 0;      ///< 0: no power law
-  double rest_speed = -1;   ///< approaches slower than this are elastic or, where forces press the partners together,
-                            ///< end at rest [length/time]; negative: kRestFraction of the thermal speed
+  double restitution = 1;  ///< e, where the exponent is 0
+  double v0 = 0;           ///< of the power law e = min(1, (v/v0)^−exponent) (Bridges, Hatzes, Lin, Nature 309 (1984)
+                           ///< 333, for ice) [length/time]
+  double exponent = 0;     ///< 0: no power law
+  double rest_speed = -1;  ///< see ContactLaws::slow [length/time]; negative: kRestFraction of the thermal speed
 
-  /// Below it, relative to the thermal speed, single precision would lose a contact's share of the energy: the energy
-  /// that slower contacts keep is 1e-16 of the whole.
+  /// Relative to the thermal speed: what slower approaches could lose is 1e-16 of the energy, the rounding of a sum.
   static constexpr double kRestFraction = 1e-8;
 
   bool elastic() const { return restitution == 1 && exponent == 0; }
   double slowest(double thermal_speed) const { return rest_speed < 0 ? kRestFraction * thermal_speed : rest_speed; }
-  /// e for an approach at this speed.
-  double at(double speed, double thermal_speed) const {
-    if (!(speed >= slowest(thermal_speed))) return 1;
+  /// e for an approach at this speed; `slow`: below the rest speed.
+  double at(double speed, double thermal_speed, double slow) const {
+    if (!(speed >= slowest(thermal_speed))) return elastic() ? 1 : slow;
     return exponent == 0 ? restitution : std::min(1.0, elementary::pow(speed / v0, -exponent));
   }
 };
@@ -38,6 +36,9 @@ struct ContactLaw {
 class ContactLaws {
  public:
   double thermal_speed = 0;  ///< √(Σ m v²/(D Σ m)) at the start of the slab [length/time]
+  /// e of approaches slower than the rest speed: 1 in free flight, which would otherwise need endless collisions in a
+  /// finite time (Luding, McNamara, Granul. Matter 1 (1998) 113); 0 in methods with steps, which hold contacts at rest.
+  double slow = 1;
 
   /// Whether all contacts are elastic.
   bool elastic() const { return laws_.empty(); }
@@ -60,7 +61,9 @@ class ContactLaws {
     which_[species * columns_ + species_ + number] = law;
   }
   // Call these only if not all contacts are elastic.
-  const ContactLaw& of_pair(std::uint16_t one, std::uint16_t other) const { return laws_[which_[one * columns_ + other]]; }
+  const ContactLaw& of_pair(std::uint16_t one, std::uint16_t other) const {
+    return laws_[which_[one * columns_ + other]];
+  }
   const ContactLaw& of_wall(std::uint16_t species, Id number) const {
     return laws_[which_[species * columns_ + species_ + number]];
   }

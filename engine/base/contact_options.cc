@@ -19,8 +19,9 @@ const std::vector<Parameter>& contact_parameters() {
         {"between", text_list, "", "-", "two species, or a species and a wall (x-, x+, … or its name); \"*\" for any"},
         restitution,
         {"rest_speed", real, "none", "length/time",
-         "slower approaches are elastic, or, where forces press the partners together in methods with steps, end at "
-         "rest; 1e-8 of the thermal speed where absent",
+         "slower approaches end at rest in methods with steps and are elastic in free flight; 1e-8 of the thermal "
+         "speed "
+         "where absent",
          Range::non_negative}};
   }();
   return all;

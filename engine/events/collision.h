@@ -33,7 +33,7 @@ Impulse pair_impulse(const ContactLaws& laws, std::uint16_t species_i, std::uint
                      const Vec<D>& v, double mass_i, double mass_j, double sigma = 0, double w = 0) {
   if (laws.elastic()) return {collision_factor<D>(d, v, mass_i, mass_j, sigma, w), 0};
   const double closing = -(d.dot(v) - sigma * w), square = closing * closing / d.squaredNorm();
-  const double e = laws.of_pair(species_i, species_j).at(std::sqrt(square), laws.thermal_speed);
+  const double e = laws.of_pair(species_i, species_j).at(std::sqrt(square), laws.thermal_speed, laws.slow);
   return {collision_factor<D>(d, v, mass_i, mass_j, sigma, w, e),
           0.5 * (1 - e * e) * square / (1 / mass_i + 1 / mass_j)};
 }
@@ -56,7 +56,7 @@ Bounced<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, std::uint1
     return {after, impulse, {.impulse = wall.along_normal(impulse), .work = work, .heat = gained - work}};
   }
   const double closing = rate - wall.opening(v, t);
-  const double e = laws.elastic() ? 1 : laws.of_wall(species, wall.number).at(closing, laws.thermal_speed);
+  const double e = laws.elastic() ? 1 : laws.of_wall(species, wall.number).at(closing, laws.thermal_speed, laws.slow);
   const Vec<D> after = wall.bounced(v, t, rate, e);
   const Vec<D> impulse = mass * (after - v);
   return {after,

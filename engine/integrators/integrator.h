@@ -22,6 +22,7 @@ struct Slab {
   std::int64_t index = 0;  ///< of the step or epoch
   double start = 0;        ///< simulated time at its start
   double length = 0;       ///< > 0
+  std::int64_t steps = 1;  ///< in this length; more than one only in free flight of a gas that has cooled
   /// Free flight stops at this many pair collisions (counted by Counters::sphere_sphere from the start of the run).
   std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();
 };

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "engine/events/collision.h"
 #include "engine/integrators/kicks.h"
 #include "engine/integrators/registry.h"
 #include "engine/slabs/slab_core.h"
@@ -26,21 +27,73 @@ class PrimitiveSplitting : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
-    kicked_ = p.v;
-    kick(kicked_, accelerations_.a, 0.5 * slab.length);
     core_->begin_step(report.counters, report.contacts, &accelerations_.a, slab.length, report.watch);
-    core_->begin(kicked_, {}, slab.length);
-    core_->fly({});
-    core_->commit(0);
-    core_->finish(p);
-    system.decomposition.update_halo();
-    accelerations_.update(system, report.counters);
-    kick(p.v, accelerations_.a, 0.5 * slab.length);
+    if (!system.box.contacts.elastic()) {
+      settling_slab(system, slab.length, report);
+    } else {
+      kicked_ = p.v;
+      kick(kicked_, accelerations_.a, 0.5 * slab.length);
+      core_->begin(kicked_, {}, slab.length);
+      core_->fly({});
+      core_->commit(0);
+      core_->finish(p);
+      system.decomposition.update_halo();
+      accelerations_.update(system, report.counters);
+      kick(p.v, accelerations_.a, 0.5 * slab.length);
+    }
     system.wrap();
     report.reached = slab.length;
   }
 
  private:
+  /// A slab of spheres that come to rest: the drift is cut where a slow contact stops or a resting one is hit, and the
+  /// kicks do not make resting contacts approach.
+  void settling_slab(System<D>& system, double length, SlabReport<D>& report) {
+    auto& p = system.particles;
+    auto& scan = core_->scan();
+    scan.stop_within(length);
+    settle(system, 0);
+    kick(p.v, accelerations_.a, 0.5 * length);
+    bool touching = !scan.resting().empty();
+    if (touching) scan.stop_approach(p.x, p.v, 0.5 * length);
+    touching = settle(system, 0);
+    for (double done = 0, contact = kNever; done < length;) {
+      const double rest = length - done, piece = std::min(rest, contact);
+      kicked_ = p.v;
+      core_->begin(kicked_, {}, piece, touching);
+      const FlightEnd<D> end = core_->fly({});
+      if (!end.complete) {
+        system.decomposition.need_all();
+        scan.count_event(end.key);
+        contact = end.time > 0 ? end.time : kNever;
+        if (contact == kNever) touching = settle(system, done);
+        continue;
+      }
+      core_->commit(done);
+      core_->finish(p);
+      done = piece == rest ? length : done + piece;
+      contact = kNever;
+      if (done < length) touching = settle(system, done);
+    }
+    system.decomposition.update_halo();
+    accelerations_.update(system, report.counters);
+    kick(p.v, accelerations_.a, 0.5 * length);
+    scan.drop_open(p.x);
+    if (!scan.resting().empty()) scan.stop_approach(p.x, p.v, 0.5 * length);
+    scan.remember(0);
+  }
+
+  /// Resolves the contacts at the present positions; returns whether any contact approached or rests. Collective.
+  bool settle(System<D>& system, double time) {
+    auto& p = system.particles;
+    auto& scan = core_->scan();
+    if (!system.decomposition.any(!scan.quiet(p.x, p.v))) return false;
+    system.decomposition.need_all();
+    scan.resolve(time, p.x, p.v,
+                 [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, p); });
+    return true;
+  }
+
   std::uint64_t max_events_;
   std::optional<SlabCore<D>> core_;
   Accelerations<D> accelerations_;

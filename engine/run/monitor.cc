@@ -95,7 +95,7 @@ void Monitor<D>::count_from(const Snapshot<D>& shot) {
   statistics_.energy_after_first_step = shot.total();
   statistics_.first_step_error = std::abs(account_.energy - account_.first_energy);
   account_.first_energy = account_.energy;
-  account_.first_shadow = shot.shadow;
+  account_.first_shadow = shot.shadow + statistics_.counters.drained();
   statistics_.energy_reference = std::max(std::abs(account_.energy), account_.magnitude);
   if (statistics_.energy_scale == 0) statistics_.energy_scale = statistics_.energy_reference;
 }
@@ -177,7 +177,8 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   if (first && info_.stepping) count_from(shot_);
   s.max_energy_error = std::max(s.max_energy_error, std::abs(account_.energy - account_.first_energy));
   if (with_shadow)
-    s.max_shadow_energy_error = std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow - account_.first_shadow));
+    s.max_shadow_energy_error =
+        std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + s.counters.drained() - account_.first_shadow));
   guard(energy, magnitude);
   if (s.max_momentum_error)
     s.max_momentum_error =

@@ -15,6 +15,9 @@ namespace carom {
 namespace {
 /// Output intervals shorter than this fraction of a step are refused: counting them would take too long.
 constexpr double kLeastInterval = 1e-6;
+/// The longest epoch of a gas that has cooled, in steps: a gas slower than this is at rest to the rounding of
+/// positions.
+constexpr double kLongestEpoch = 1e9;
 /// Flight distance without any pair collision after which a run in an open box ends [longest edge].
 constexpr double kFarApart = 1e4;
 
@@ -227,9 +230,10 @@ void Simulation<D>::run(const Hooks& hooks) {
     } else {
       // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: rounding does not
       // accumulate.
-      ++s.steps;
+      s.steps += slab.steps;
       s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
       count_.within = 0;
+      if (!info_.stepping && !system_->box.contacts.elastic()) lengthen_epochs();
     }
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
@@ -252,7 +256,10 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       watch.begin();
       system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
       if (!system_->box.options.empty()) system_->box.check(Failure::numerical);
-      if (!system_->box.contacts.elastic()) system_->box.contacts.thermal_speed = thermal_speed(*system_);
+      if (ContactLaws& laws = system_->box.contacts; !laws.elastic()) {
+        laws.thermal_speed = thermal_speed(*system_);
+        laws.slow = info_.stepping ? 0 : 1;
+      }
       integrator_->slab(*system_, slab, report);
       return true;
     } catch (HaloTooSmall) {
@@ -324,12 +331,30 @@ bool Simulation<D>::is_last_on_the_way() const {
          (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
 }
 
+/// Sets the length of the next epoch, so that its number of collisions hardly changes as the gas cools. Collective.
+template <int D>
+void Simulation<D>::lengthen_epochs() {
+  const double speed = thermal_speed(*system_);
+  if (count_.first_speed == 0) count_.first_speed = speed;
+  const double slower = speed > 0 ? count_.first_speed / speed : 1;
+  count_.stride = static_cast<std::int64_t>(std::clamp(slower, 1.0, kLongestEpoch));
+}
+
 template <int D>
 Slab Simulation<D>::next_slab() const {
   Slab slab;
   slab.index = statistics_.steps;
   slab.start = time_of(slab.index) + count_.within;
-  slab.length = length_from(time_of(slab.index), plan_) - count_.within;
+  slab.steps = count_.stride;
+  if (plan_.steps) slab.steps = std::min(slab.steps, *plan_.steps - slab.index);
+  if (plan_.end_time) {
+    const double left = *plan_.end_time - plan_.slack() - time_of(slab.index);
+    slab.steps = static_cast<std::int64_t>(std::min(static_cast<double>(slab.steps), left / plan_.step));
+  }
+  slab.steps = std::max<std::int64_t>(slab.steps, 1);
+  const double length =
+      slab.steps == 1 ? length_from(time_of(slab.index), plan_) : static_cast<double>(slab.steps) * plan_.step;
+  slab.length = length - count_.within;
   if (!info_.stepping)
     slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_,
                                     plan_.collisions.value_or(slab.collision_limit));

@@ -124,6 +124,9 @@ struct StepCount {
   double time = 0;
   /// How far an epoch of free flight has advanced that needs several slabs [time].
   double within = 0;
+  /// Free flight with contacts that dissipate: an epoch is as many steps long as the gas is slower than at the start.
+  double first_speed = 0;   ///< thermal speed at the start [length/time]
+  std::int64_t stride = 1;  ///< steps of the next epoch
 };
 
 template <int D>
@@ -208,6 +211,7 @@ class Simulation {
     return count_.time + static_cast<double>(step - count_.steps) * plan_.step;
   }
   Slab next_slab() const;
+  void lengthen_epochs();
   bool finished() const;
   void need_collisions() const;
   double fraction_done() const;

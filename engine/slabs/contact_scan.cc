@@ -55,9 +55,14 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
 template <int D>
 void ContactScan<D>::note_pressed() {
   pressed_.assign(reactions_.empty() ? 0 : particles_.size(), 0.0);
+  held_.assign(box_.contacts.elastic() ? 0 : pressed_.size(), Vec<D>::Zero());
   for (const auto& [key, force] : reactions_) {
     pressed_[key.lo] += force / particles_.mass[key.lo];
     if (key.kind == EventKind::pair) pressed_[key.hi] += force / particles_.mass[key.hi];
+    if (held_.empty()) continue;
+    const Vec<D> along = normal(key, particles_.x).normalized();
+    held_[key.lo] += force / particles_.mass[key.lo] * along;
+    if (key.kind == EventKind::pair) held_[key.hi] -= force / particles_.mass[key.hi] * along;
   }
 }
 
@@ -99,10 +104,10 @@ void ContactScan<D>::sort_out(Positions<D> v) {
   approaching_.clear();
   resting_.clear();
   for (const Touch<D>& touch : touching_) {
-    const double speed = normal_speed(touch, v), rest = resting_speed(touch, v);
-    if (speed < -rest)
+    const double speed = normal_speed(touch, v);
+    if (speed < -stopping_speed(touch, v))
       approaching_.push_back(touch);
-    else if (speed <= rest)
+    else if (speed <= resting_speed(touch, v))
       resting_.push_back({.key = without_time(touch.key), .normal = touch.normal});
   }
 }
@@ -121,15 +126,46 @@ double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& norma
   // Nothing rests on a thermal wall.
   if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) return -std::numeric_limits<double>::min();
   const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
+  const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
+  const double closing = pressing(key, normal);
+  if (!(closing > 0)) return rounding;
+  return std::max(rounding,
+                  std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces));
+}
+
+template <int D>
+double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
+                                      const Vec<D>& v_hi) const {
+  const double resting = resting_speed(key, normal, v_lo, v_hi);
+  if (!dissipates(key)) return resting;
+  const double closing = std::max(0.0, pressing(key, normal));
+  const auto& species = particles_.species;
+  const ContactLaw& law = key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
+                                                      : box_.contacts.of_wall(species[key.lo], key.hi);
+  // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
+  const double kick = kick_ * closing, e = law.at(kick, 0, 0);
+  return std::max(resting, law.slowest(box_.contacts.thermal_speed) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces));
+}
+
+template <int D>
+bool ContactScan<D>::dissipates(const EventKey<D>& key) const {
+  if (box_.contacts.elastic()) return false;
+  const auto& species = particles_.species;
+  return key.kind == EventKind::pair ? !box_.contacts.of_pair(species[key.lo], species[key.hi]).elastic()
+                                     : !box_.contacts.of_wall(species[key.lo], key.hi).elastic();
+}
+
+/// The acceleration at which a contact would close by forces and, if contacts dissipate, by other reactions.
+template <int D>
+double ContactScan<D>::pressing(const EventKey<D>& key, const Vec<D>& normal) const {
+  const bool pair = key.kind == EventKind::pair;
+  const auto between = [&](const std::vector<Vec<D>>& w) { return pair ? Vec<D>(w[key.lo] - w[key.hi]) : w[key.lo]; };
   Vec<D> a = Vec<D>::Zero();
-  if (a_ && key.lo < a_->size()) a = pair ? Vec<D>((*a_)[key.lo] - (*a_)[key.hi]) : (*a_)[key.lo];
+  if (a_ && key.lo < a_->size()) a = between(*a_);
   if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
   const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
-  const double pressing = std::max(known_force(key) * inverse_mass, -a.dot(normal) / normal.norm());
-  const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
-  if (!(pressing > 0)) return rounding;
-  return std::max(rounding,
-                  std::min(std::sqrt(2 * pressing * kRestingGap * sigma), 0.5 * pressing * length_ / kMostBounces));
+  const double closing = std::max(known_force(key) * inverse_mass, -a.dot(normal) / normal.norm());
+  return held_.empty() ? closing : std::max(closing, -(a + between(held_)).dot(normal) / normal.norm());
 }
 
 /// The gradient of the gap of a contact at x, up to a positive factor.
@@ -170,10 +206,15 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
     if (!approaching_.empty()) continue;
     if (resting_.empty()) return lost;
     if (watch_) watch_->cut();
+    const bool dissipative = !box_.contacts.elastic();
+    const std::vector<Vec<D>> before(dissipative ? v.begin() : v.end(), v.end());
     lost += stop_rounding(v) + stop_approach(x, v);
+    if (dissipative) lost -= count_dissipated(before, v);
     sort_out(v);  // a sphere that was stopped may have been moving away from another contact
-    if (approaching_.empty()) break;
-    count_event(approaching_.front().key);
+    const auto slow = [&](const Touch<D>& touch) { return normal_speed(touch, v) < -resting_speed(touch, v); };
+    if (approaching_.empty() && !(dissipative && generation < kMostRounds && std::ranges::any_of(touching_, slow)))
+      break;
+    if (!approaching_.empty()) count_event(approaching_.front().key);
   }
   for (auto& contact : resting_) contact.force = known_force(contact.key);
   return lost;
@@ -185,7 +226,7 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
                                 const ApplyImpulse<D>& impulse) {
   for (Touch<D>& touch : approaching_) {
     // An earlier impulse of this round may have separated the spheres.
-    if (!(normal_speed(touch, v) < -resting_speed(touch, v))) continue;
+    if (!(normal_speed(touch, v) < -stopping_speed(touch, v))) continue;
     touch.key.generation = generation;
     if (generation > kMostRounds)
       throw Error(Failure::numerical, partners(touch.key, box_) +
@@ -303,7 +344,7 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
 }
 
 template <int D>
-double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v) {
+double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v, double kick) {
   for (auto& contact : resting_) {
     contact.normal = normal(contact.key, x);
     contact.lambda = 0;
@@ -312,8 +353,35 @@ double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v) {
   }
   double lost = 0;
   solve_reactions<D>(resting_, particles_.mass, v, &lost);
-  for (const auto& contact : resting_) lost += count_work(contact.lambda * wall_speed(contact.key));
+  for (auto& contact : resting_) {
+    lost += count_work(contact.lambda * wall_speed(contact.key));
+    if (kick > 0) contact.force = contact.lambda * contact.normal.norm() / kick;
+  }
   return lost;
+}
+
+template <int D>
+void ContactScan<D>::drop_open(Positions<D> x) {
+  std::erase_if(resting_, [&](const auto& contact) {
+    const auto& [key, x_lo] = std::pair(contact.key, x[contact.key.lo]);
+    if (key.kind == EventKind::pair) return !touches(normal(key, x), contact_distance(key.lo, key.hi));
+    return box_.wall(key.hi).gap(x_lo, particles_.radius[key.lo]) > tolerance(particles_.radius[key.lo]);
+  });
+}
+
+/// Counts what stop_approach() has taken from the contacts that dissipate, and returns it. The reaction λ along n takes
+/// −λ (u + u′)/2, where u and u′ are the rates n·(v_lo − v_hi) before and after, relative to the wall.
+template <int D>
+double ContactScan<D>::count_dissipated(Positions<D> before, Positions<D> after) {
+  double all = 0;
+  for (const auto& contact : resting_) {
+    if (contact.lambda == 0 || !dissipates(contact.key)) continue;
+    Vec<D> both = before[contact.key.lo] + after[contact.key.lo];
+    if (contact.key.kind == EventKind::pair) both -= before[contact.key.hi] + after[contact.key.hi];
+    all += contact.lambda * (wall_speed(contact.key) - 0.5 * contact.normal.dot(both));
+  }
+  if (all != 0) counters_->dissipated.add(all);
+  return all;
 }
 
 template <int D>

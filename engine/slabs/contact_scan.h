@@ -78,8 +78,12 @@ class ContactScan {
   /// found to rounding.
   bool hold_means(Positions<D> x, Positions<D> w_before, Vectors<D> w, double length);
 
-  /// Stops the approach of resting contacts at new positions; returns the energy that they lose.
-  double stop_approach(Positions<D> x, Vectors<D> v);
+  /// Stops the approach of resting contacts at new positions; returns the energy that they lose. `kick`: the time in
+  /// which forces have caused this approach; the reactions are kept for remember() [time].
+  double stop_approach(Positions<D> x, Vectors<D> v, double kick = 0);
+
+  /// Drops resting contacts that have opened.
+  void drop_open(Positions<D> x);
 
   /// The first contact on the parabolas x + v s + a s²/2 within [0, rest); key.time is kNever when there is none.
   /// Call resolve() first; contacts held at rest are not searched for.
@@ -136,8 +140,17 @@ class ContactScan {
   /// A contact rests below this normal speed: the rounding error, or a speed at which the forces on the spheres close
   /// the contact again before it has opened by kRestingGap. `normal` may have any length.
   double resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
+  /// A contact stops if the spheres approach more slowly than this: the resting speed or, if it dissipates, the rest
+  /// speed of its law.
+  double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
+
+  /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
+  void stop_within(double time) { kick_ = time; }
 
  private:
+  double pressing(const EventKey<D>& key, const Vec<D>& normal) const;
+  bool dissipates(const EventKey<D>& key) const;
+  double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);
   void sort_out(Positions<D> v);
   void note_pressed();
@@ -146,6 +159,9 @@ class ContactScan {
   }
   double resting_speed(const Touch<D>& touch, Positions<D> v) const {
     return resting_speed(touch.key, touch.normal, v[touch.key.lo], v[touch.pair() ? touch.key.hi : touch.key.lo]);
+  }
+  double stopping_speed(const Touch<D>& touch, Positions<D> v) const {
+    return stopping_speed(touch.key, touch.normal, v[touch.key.lo], v[touch.pair() ? touch.key.hi : touch.key.lo]);
   }
   void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
   /// `gained`: the change of the kinetic energy of lo.
@@ -177,9 +193,10 @@ class ContactScan {
   std::vector<Contact<D>>* contacts_ = nullptr;
   SlabWatch* watch_ = nullptr;
   const std::vector<Vec<D>>* a_ = nullptr;
-  double length_ = 0;
+  double length_ = 0, kick_ = 0;
   std::vector<Reaction<D>>& reactions_;
   std::vector<double> pressed_;  // by particle: Σ |acceleration| over its reactions
+  std::vector<Vec<D>> held_;     // by particle: its acceleration by reactions; empty if no contact dissipates
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
 };

@@ -206,8 +206,9 @@ FlightEnd<D> SlabCore<D>::serve() {
     if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
     if (resolved_ && !(key.time > 0)) continue;  // rounding
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
-    // A straight flight presses no spheres together: contacts that do not approach need no impulse.
-    if (held || (!a_.empty() && comes_to_rest(key))) return {.complete = false, .time = key.time, .key = key};
+    // A straight flight presses no spheres together: elastic contacts that do not approach need no impulse.
+    if (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key)))
+      return {.complete = false, .time = key.time, .key = key};
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
     const bool too_strong = !a_.empty() && most >= kMostContactsOfParticle;
     too_many_contacts_ = !too_strong && contacts_.size() >= max_events_;
@@ -306,7 +307,7 @@ struct SlabCore<D>::Meeting {
 template <int D>
 bool SlabCore<D>::comes_to_rest(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
-  return meeting.speed >= -scan_->resting_speed(key, meeting.normal, meeting.v_lo, meeting.v_hi);
+  return meeting.speed >= -scan_->stopping_speed(key, meeting.normal, meeting.v_lo, meeting.v_hi);
 }
 
 /// The time at which the gap is a quarter of the tolerance; 0 if it is no more than that from the start.
