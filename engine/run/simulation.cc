@@ -233,7 +233,7 @@ void Simulation<D>::run(const Hooks& hooks) {
       s.steps += slab.steps;
       s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
       count_.within = 0;
-      if (!info_.stepping && !system_->box.contacts.elastic()) lengthen_epochs();
+      if (!info_.stepping && !system_->box.contacts.elastic() && !system_->box.bath.rescales()) lengthen_epochs();
     }
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;

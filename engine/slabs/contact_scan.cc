@@ -137,7 +137,7 @@ template <int D>
 double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
                                       const Vec<D>& v_hi) const {
   const double resting = resting_speed(key, normal, v_lo, v_hi);
-  if (!dissipates(key)) return resting;
+  if (resting < 0 || !dissipates(key)) return resting;
   const double closing = std::max(0.0, pressing(key, normal));
   const auto& species = particles_.species;
   const ContactLaw& law = key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
