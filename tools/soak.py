@@ -106,10 +106,18 @@ def random_walls(dice, boundary, end):
             continue
         motion = dice.choice([dice.uniform(-0.05, 0.05) / end, {"amplitude": dice.uniform(0, 0.05), "frequency": dice.uniform(0.1, 1.0)}])
         walls.append({"name": "xyz"[axis] + side, "velocity": motion})
+        if dice.random() < 0.3:
+            walls[-1]["temperature"] = dice.uniform(0.3, 3.0)
     if "open" in boundary and dice.random() < 0.5:
         normal = [0.0 if kind == "periodic" else dice.gauss(0, 1) for kind in boundary]
         walls.append({"name": "far", "normal": normal, "offset": -30.0 * sum(abs(each) for each in normal)})
     return walls
+
+
+def random_bath(dice, end):
+    """A bath, with a ramp or without, that acts between once in ten runs and ten times a run."""
+    temperature = dice.choice([dice.uniform(0.5, 2.0), [dice.uniform(0.5, 2.0), dice.uniform(0.5, 2.0)]])
+    return {"type": dice.choice(["andersen", "rescaling"]), "temperature": temperature, "rate": 10**dice.uniform(-1, 1) / end}
 
 
 def random_deck(dice, seconds):
@@ -154,9 +162,12 @@ def random_deck(dice, seconds):
     if method == "verlet":
         for species in particles:
             species["display_radius"] = species.pop("radius")
+    bath = random_bath(dice, end) if integrator.get("variant") != "restart" and dice.random() < 0.3 else None
+    if bath and isinstance(bath["temperature"], list) and "collisions" in run:
+        bath["temperature"] = bath["temperature"][0]
     walled = method != "verlet" and integrator.get("variant") != "restart" and dice.random() < 0.7
     return {"format": 1, "system": {"dimension": dimension, "boundary": boundary},
-            "wall": random_walls(dice, boundary, end) if walled else [], "particles": particles,
+            "wall": random_walls(dice, boundary, end) if walled else [], "bath": [bath] if bath else [], "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
             "interaction": random_forces(dice, method, dimension, boundary, [each["name"] for each in particles]),
             "integrator": integrator, "run": run, "output": output}

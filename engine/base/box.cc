@@ -26,7 +26,7 @@ void Box<D>::add(WallOptions<D> wall) {
   const auto faces = face_names<D>();
   const auto face = std::ranges::find(faces, wall.name);
   const double length = wall.normal.norm();
-  if (!std::isfinite(length + wall.offset + wall.velocity + wall.amplitude + wall.frequency))
+  if (!std::isfinite(length + wall.offset + wall.velocity + wall.amplitude + wall.frequency + wall.temperature))
     refuse("has a number that is not finite", "give finite ones");
   if (std::ranges::find(options, wall.name, &WallOptions<D>::name) != options.end())
     refuse("is given twice", "give each wall its own name");
@@ -97,6 +97,7 @@ void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
 template <int D>
 void Box<D>::restart() {
   for (WallOptions<D>& each : options) each.moved = each.displacement(time);
+  bath.ramp_start = bath.ramp_end = 0;
   begin_step(0, 0);
 }
 
@@ -122,6 +123,7 @@ void Box<D>::check(Failure failure) const {
 
 template <int D>
 std::string Box<D>::wall_name(Id number) const {
+  if (number == Bath::kNumber) return "the bath";
   if (number >= 2 * D) return "the wall '" + find(number)->name + "'";
   const std::string side = number % 2 == 0 ? "the lower" : "the upper";
   return side + " wall of axis " + std::to_string(number / 2);
@@ -129,6 +131,7 @@ std::string Box<D>::wall_name(Id number) const {
 
 template <int D>
 std::string Box<D>::name_of(Id number) const {
+  if (number == Bath::kNumber) return "bath";
   return number >= 2 * D ? find(number)->name : face_names<D>()[number];
 }
 

@@ -23,11 +23,13 @@ struct WallOptions {
   Vec<D> normal = Vec<D>::Zero();  ///< of a further wall: into the space of the spheres, of any length
   double offset = 0;               ///< of a further wall: normal·x = offset at time 0
   double velocity = 0;             ///< along the normal [length/time]
-  double amplitude = 0;   ///< shaken: the displacement along the normal is amplitude·sin(2π·frequency·time)
-  double frequency = 0;   ///< [1/time]
-  bool one_sided = true;  ///< false: it acts on the spheres on both sides
-  double moved = 0;       ///< displacement before time 0 [length]
-  Id number = 0;          ///< set by add(); the rear of a wall with two sides has the next number
+  double amplitude = 0;    ///< shaken: the displacement along the normal is amplitude·sin(2π·frequency·time)
+  double frequency = 0;    ///< [1/time]
+  bool one_sided = true;   ///< false: it acts on the spheres on both sides
+  double temperature = 0;  ///< of a thermal wall [energy]; 0: none
+  std::uint64_t seed = 1;  ///< of its random numbers
+  double moved = 0;        ///< displacement before time 0 [length]
+  Id number = 0;           ///< set by add(); the rear of a wall with two sides has the next number
 
   /// Whether it moves or has moved.
   bool moves() const { return velocity != 0 || amplitude != 0 || moved != 0; }
@@ -43,8 +45,9 @@ struct Box {
   Vec<D> edges = Vec<D>::Ones();  ///< at time 0 [length]
   std::array<Boundary, D> boundary{};
   std::vector<WallOptions<D>> options{};  ///< of walls; use add()
-  double time = 0;                        ///< of the start of the slab, since the start of the run
-  double step_start = 0, step = 0;        ///< of a stepping method; 0: shaken walls move on a sine
+  Bath bath{};
+  double time = 0;                  ///< of the start of the slab, since the start of the run
+  double step_start = 0, step = 0;  ///< of a stepping method; 0: shaken walls move on a sine
   ContactLaws contacts{};
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
@@ -77,10 +80,16 @@ struct Box {
       if (!bounded(k)) return false;
     return true;
   }
-  /// The wall with this number, from `time` on; it must exist.
+  /// The wall with this number, from `time` on; it must exist. With Bath::kNumber: the kicks of the bath.
   Wall<D> wall(Id number) const {
     const WallOptions<D>* const its = find(number);
     Wall<D> wall{.number = number};
+    if (number == Bath::kNumber) {
+      wall.temperature = bath.temperature;
+      wall.seed = bath.seed;
+      wall.bath = &bath;
+      return wall;
+    }
     if (number < 2 * D) {
       wall.axis = static_cast<int>(number / 2);
       wall.normal = (number % 2 == 0 ? 1.0 : -1.0) * Vec<D>::Unit(wall.axis);
@@ -92,6 +101,8 @@ struct Box {
     }
     if (!its) return wall;
     set_motion(*its, wall);
+    wall.temperature = its->temperature;
+    wall.seed = its->seed;
     if (number != its->number) {  // the rear
       wall.normal = -wall.normal;
       wall.offset = -wall.offset;
@@ -108,7 +119,7 @@ struct Box {
     time = step_start = start;
     step = length;
   }
-  /// Makes the present time the time 0 of a new run, with all walls where they are.
+  /// Makes the present time the time 0 of a new run, with all walls where they are and ramps at their starts.
   void restart();
   /// Throws Error(failure) if two parallel walls leave no room between them, or a step is too long for a shaken wall.
   void check(Failure failure) const;

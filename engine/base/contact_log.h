@@ -71,7 +71,9 @@ struct PackedExchange {
   template <int D>
   Exchange unpacked(const Wall<D>* wall, double time) const {
     if (!wall) return {.virial = first, .dissipated = lost};
-    return {.impulse = first, .work = wall->velocity_at(time) * first, .dissipated = lost};
+    Exchange all{.impulse = first, .work = wall->velocity_at(time) * first};
+    (wall->thermal() ? all.heat : all.dissipated) = wall->thermal() ? -lost : lost;
+    return all;
   }
 };
 

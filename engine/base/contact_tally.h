@@ -36,6 +36,7 @@ struct WallTally {
 struct ContactTally {
   std::uint64_t sphere_sphere = 0;  ///< executed pair collisions
   std::uint64_t sphere_wall = 0;    ///< executed wall collisions
+  std::uint64_t kicks = 0;          ///< of a bath
   double max_overlap = 0;           ///< deepest overlap at a contact, relative to the contact distance
   ExactSum collision_virial;        ///< Σ d·impulse over pair collisions [mass·length²/time]
   ExactSum dissipated;              ///< energy lost at contacts [energy]
@@ -59,6 +60,10 @@ struct ContactTally {
     max_overlap = std::max(max_overlap, overlap);
   }
   void add_wall(Id number, const Exchange& exchange, double overlap) {
+    if (number == Bath::kNumber) {
+      ++kicks;
+      return heat.add(exchange.heat);
+    }
     ++sphere_wall;
     wall(number).add(exchange);
     for (const auto& [sum, term] :
@@ -69,6 +74,7 @@ struct ContactTally {
   void add(const ContactTally& other) {
     sphere_sphere += other.sphere_sphere;
     sphere_wall += other.sphere_wall;
+    kicks += other.kicks;
     max_overlap = std::max(max_overlap, other.max_overlap);
     collision_virial.add(other.collision_virial);
     dissipated.add(other.dissipated);
@@ -77,7 +83,7 @@ struct ContactTally {
     for (std::size_t number = other.walls.size(); number-- > 0;) wall(static_cast<Id>(number)).add(other.walls[number]);
   }
   void archive(Archive& archive) {
-    archive(sphere_sphere, sphere_wall, max_overlap, collision_virial, dissipated, work, heat, walls);
+    archive(sphere_sphere, sphere_wall, kicks, max_overlap, collision_virial, dissipated, work, heat, walls);
   }
   /// Counts a contact and appends it to `log` unless `log` is null.
   template <int D>

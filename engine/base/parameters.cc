@@ -29,11 +29,16 @@ std::string listed(const auto& words) {
 
 void check(std::string_view of, const Parameter& parameter, const ParameterValue& value) {
   const auto type = static_cast<std::size_t>(parameter.type);
-  const bool either = parameter.type == Parameter::Type::real_or_table &&
-                      (std::holds_alternative<double>(value) || std::holds_alternative<TableValue>(value));
+  const bool plain = std::holds_alternative<double>(value);
+  const bool either =
+      (parameter.type == Parameter::Type::real_or_table && (plain || std::holds_alternative<TableValue>(value))) ||
+      (parameter.type == Parameter::Type::real_or_list &&
+       (plain || std::holds_alternative<std::vector<double>>(value)));
   if (value.index() != type && !either)
     refuse(of, quoted(parameter.name) + " is " + kTypes[value.index()],
-           std::string("give ") + (type < kTypes.size() ? kTypes[type] : "a number or a table"));
+           std::string("give ") + (type < kTypes.size()                              ? kTypes[type]
+                                   : parameter.type == Parameter::Type::real_or_list ? "a number or a list"
+                                                                                     : "a number or a table"));
   const auto complain = [&](const std::optional<ParameterError>& error) {
     if (!error) return;
     refuse(of, quoted(parameter.name) + " " + error->what,
@@ -108,7 +113,8 @@ Parameters completed(std::string_view of, std::span<const Parameter> declared, P
     }
     ParameterValue value = given.all().find(name)->second;
     if (const auto* whole = std::get_if<std::int64_t>(&value);
-        whole && (parameter.type == Parameter::Type::real || parameter.type == Parameter::Type::real_or_table))
+        whole && (parameter.type == Parameter::Type::real || parameter.type == Parameter::Type::real_or_list ||
+                  parameter.type == Parameter::Type::real_or_table))
       value = static_cast<double>(*whole);
     check(of, parameter, value);
     given.set(name, std::move(value));

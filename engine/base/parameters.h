@@ -22,7 +22,7 @@
 namespace carom {
 
 struct Parameter {
-  /// The first nine are in the order of ParameterValue. Only decks have lists with an entry for each particle.
+  /// The first nine are in the order of ParameterValue.
   enum class Type {
     boolean,
     integer,  ///< a real number without a fraction (1e6) will do
@@ -33,7 +33,7 @@ struct Parameter {
     pair_list,
     vector_list,    ///< one vector of system.dimension numbers for each particle
     table,          ///< an inline table: `keys`
-    real_or_list,   ///< one number for all, or one for each particle
+    real_or_list,   ///< a number, or a list of numbers
     real_or_table,  ///< a number, or an inline table: `keys`
   };
   enum class Range { any, positive, non_negative };

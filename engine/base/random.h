@@ -31,15 +31,27 @@ constexpr std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> c
 
 /// The purpose of a stream of numbers; streams with different purposes are independent. The values are part of the
 /// meaning of a seed and never change.
-enum class RandomPurpose : std::uint32_t { position = 1, velocity = 2, species = 3, probe = 4, compression = 5 };
+enum class RandomPurpose : std::uint32_t {
+  position = 1,
+  velocity = 2,
+  species = 3,
+  probe = 4,
+  compression = 5,
+  rescaling = 6,
+  kick_time = 7,
+  kick = 8,
+  thermal_wall = 9
+};
 
 /// The numbers of one purpose and one id, in sequence.
 class RandomStream {
  public:
-  RandomStream(std::uint64_t seed, RandomPurpose purpose, std::uint32_t id)
+  /// Begins with the number 2·`block`.
+  RandomStream(std::uint64_t seed, RandomPurpose purpose, std::uint32_t id, std::uint64_t block = 0)
       : key_{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)},
         purpose_(static_cast<std::uint32_t>(purpose)),
-        id_(id) {}
+        id_(id),
+        index_(2 * block) {}
 
   std::uint64_t bits() {
     if (index_ % 2 == 0) {
@@ -72,7 +84,7 @@ class RandomStream {
  private:
   std::array<std::uint32_t, 2> key_;
   std::uint32_t purpose_, id_;
-  std::uint64_t index_ = 0;
+  std::uint64_t index_;
   std::array<std::uint32_t, 4> block_{};
 };
 

@@ -11,6 +11,7 @@
 #include <limits>
 #include <numbers>
 
+#include "engine/base/bath.h"
 #include "engine/base/normal_deviates.h"
 #include "engine/base/vec.h"
 
@@ -29,6 +30,9 @@ struct Wall {
   double amplitude = 0;            ///< of the sine; 0: none [length]
   double frequency = 0;            ///< of the sine [1/time]
   double turns = 0;                ///< of the sine at time 0
+  double temperature = 0;          ///< of a thermal wall [energy]; 0: none
+  std::uint64_t seed = 1;          ///< of its random numbers
+  const Bath* bath = nullptr;      ///< not null: no wall at all, its contacts are the kicks of this bath
 
   double along_normal(const Vec<D>& v) const { return axis >= 0 ? normal[axis] * v[axis] : normal.dot(v); }
   double level(double t) const {
@@ -64,6 +68,7 @@ struct Wall {
   }
   /// The work that this impulse does on a sphere at time t [energy].
   double work(const Vec<D>& impulse, double t = 0) const { return velocity_at(t) * along_normal(impulse); }
+  bool thermal() const { return temperature > 0; }
   /// The point that a sphere at x touches at time t.
   Vec<D> foot(Vec<D> x, double t = 0) const {
     if (axis >= 0)

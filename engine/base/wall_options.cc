@@ -19,6 +19,12 @@ const std::vector<Parameter>& wall_parameters() {
         {"normal", real_list, "none", "-", "of a further wall: a vector, of any length, into the space of the spheres"},
         {"offset", real, "0.0", "length", "of a further wall: at the start it is where normal·x = offset"},
         velocity,
+        {"temperature", real, "none", "energy",
+         "of a thermal wall: after a contact the velocity relative to the wall is that of a gas of this temperature "
+         "behind it",
+         Range::positive},
+        {"seed", integer, "none", "-", "of the random numbers of a thermal wall; that of [placement] where absent",
+         Range::non_negative},
         {"one_sided", boolean, "true", "-",
          "false: a further wall with spheres on both sides; true: all spheres are on the side of its normal"}};
   }();
@@ -26,7 +32,7 @@ const std::vector<Parameter>& wall_parameters() {
 }
 
 template <int D>
-void add_wall(Box<D>& box, const Parameters& given) {
+void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed) {
   WallOptions<D> wall{.name = given.text("name"), .offset = given.real("offset"), .one_sided = given.flag("one_sided")};
   if (const auto* normal = given.find<std::vector<double>>("normal")) {
     if (normal->size() != D)
@@ -34,6 +40,9 @@ void add_wall(Box<D>& box, const Parameters& given) {
                                      " numbers; give " + std::to_string(D));
     wall.normal = Eigen::Map<const Vec<D>>(normal->data());
   }
+  wall.seed = seed;
+  if (const auto* own = given.find<std::int64_t>("seed")) wall.seed = static_cast<std::uint64_t>(*own);
+  if (const auto* temperature = given.find<double>("temperature")) wall.temperature = *temperature;
   if (const auto* speed = given.find<double>("velocity")) wall.velocity = *speed;
   if (const auto* shaken = given.find<TableValue>("velocity")) {
     wall.amplitude = std::get<double>(shaken->at("amplitude"));
@@ -42,7 +51,7 @@ void add_wall(Box<D>& box, const Parameters& given) {
   box.add(std::move(wall));
 }
 
-template void add_wall(Box<2>&, const Parameters&);
-template void add_wall(Box<3>&, const Parameters&);
+template void add_wall(Box<2>&, const Parameters&, std::uint64_t);
+template void add_wall(Box<3>&, const Parameters&, std::uint64_t);
 
 }  // namespace carom

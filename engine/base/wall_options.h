@@ -9,8 +9,9 @@ namespace carom {
 
 const std::vector<Parameter>& wall_parameters();
 
-/// Adds a wall with these parameters, which are complete. Throws Error(Failure::deck).
+/// Adds a wall with these parameters, which are complete; `seed` is used if they have none. Throws
+/// Error(Failure::deck).
 template <int D>
-void add_wall(Box<D>& box, const Parameters& given);
+void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed = 1);
 
 }  // namespace carom

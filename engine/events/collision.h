@@ -6,6 +6,7 @@
 #include "engine/base/box.h"
 #include "engine/base/contact_log.h"
 #include "engine/base/particles.h"
+#include "engine/events/thermal_contact.h"
 
 namespace carom {
 
@@ -44,10 +45,16 @@ struct Bounced {
   Exchange exchange;
 };
 
-/// A contact at time t with a wall, of a sphere with velocity v and a radius that grows at `rate`.
+/// A contact at time t with a wall, of a sphere with velocity v and a radius that grows at `rate`; `draw` matters for
+/// thermal walls only.
 template <int D>
 Bounced<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, std::uint16_t species, double mass,
-                        const Vec<D>& v, double t = 0, double rate = 0) {
+                        const Vec<D>& v, const Draw& draw, double t = 0, double rate = 0) {
+  if (wall.thermal()) {
+    const Vec<D> after = thermal_velocity(wall, mass, draw, t), impulse = mass * (after - v);
+    const double work = wall.work(impulse, t), gained = 0.5 * mass * (after.squaredNorm() - v.squaredNorm());
+    return {after, impulse, {.impulse = wall.along_normal(impulse), .work = work, .heat = gained - work}};
+  }
   const double closing = rate - wall.opening(v, t);
   const double e = laws.elastic() ? 1 : laws.of_wall(species, wall.number).at(closing, laws.thermal_speed, laws.slow);
   const Vec<D> after = wall.bounced(v, t, rate, e);
@@ -66,7 +73,8 @@ double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& bo
   const Id lo = key.lo, hi = key.hi;
   if (key.kind == EventKind::wall) {
     const auto [after, impulse, exchange] =
-        wall_impulse<D>(box.contacts, box.wall(hi), p.species[lo], p.mass[lo], p.v[lo]);
+        wall_impulse<D>(box.contacts, box.wall(hi), p.species[lo], p.mass[lo], p.v[lo],
+                        {.id = p.id_of(lo), .time = box.time, .number = key.generation});
     p.v[lo] = after;
     return exchange.dissipated;
   }

@@ -30,7 +30,7 @@ void Flights<D>::assign(std::span<const Id> order) {
 
 template <int D>
 void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
-  walls_ = box_.walls();
+  set_walls();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = growth;
@@ -44,6 +44,13 @@ void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double hor
     if (common_mass_ == 0) mass_.push_back(particles.mass[r.id]);
     r = {particles.x[r.id], particles.v[r.id], 0.0, r.id, 0, particles.species[r.id]};
   }
+}
+
+/// The walls of the box, and the kicks of its bath.
+template <int D>
+void Flights<D>::set_walls() {
+  walls_ = box_.walls();
+  if (box_.bath.kicks()) walls_.push_back(box_.wall(Bath::kNumber));
 }
 
 template <int D>
@@ -92,7 +99,7 @@ void Flights<D>::advance(Record<D>& r, double t) const {
 
 template <int D>
 void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon) {
-  walls_ = box_.walls();
+  set_walls();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
@@ -140,6 +147,7 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
 
 template <int D>
 double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const {
+  if (wall.bath) return wall.bath->next_kick(r.id, box_.time, r.t, horizon_);
   const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
   const double gap = wall.gap(r.x, at_record, r.t), opening = wall.opening(r.v, r.t) - rate;
   const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity_at(r.t)));
@@ -147,7 +155,7 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
   const double rest = horizon_ - r.t;
   const double s = wall.amplitude == 0 ? wall_contact_time(gap, opening, wall.speeding(g_), rest, touching, slack)
                                        : shaken_contact(r, at_record, rate, wall, touching, slack);
-  if (s == 0 && !(opening < -slack))
+  if (s == 0 && !(opening < -slack) && !wall.thermal())
     throw Error(Failure::numerical,
                 "particle " + std::to_string(r.id) + " rests on " + box_.wall_name(wall.number) +
                     " under the uniform field and would bounce without end; give it a height or a velocity");
@@ -194,10 +202,12 @@ template <int D>
 Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const {
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
-  const auto [after, impulse, exchange] = wall_impulse<D>(laws(), wall, r.species, mass(i), r.v, t, rate);
+  const auto [after, impulse, exchange] = wall_impulse<D>(
+      laws(), wall, r.species, mass(i), r.v, {.id = r.id, .time = box_.time + t, .number = generation}, t, rate);
   r.v = after;
   r.generation = static_cast<std::uint16_t>(generation);
-  return {r.x - wall.foot(r.x, t), impulse, exchange, -wall.gap(r.x, at_contact, t) / at_contact};
+  const double overlap = wall.bath ? 0 : -wall.gap(r.x, at_contact, t) / at_contact;
+  return {r.x - wall.foot(r.x, t), impulse, exchange, overlap};
 }
 
 template <int D>

@@ -114,6 +114,7 @@ class Flights {
   bool equal() const { return common_radius_ != 0; }
 
  private:
+  void set_walls();
   void advance(Record<D>& r, double t) const;
   double shaken_contact(const Record<D>& r, double radius, double rate, const Wall<D>& wall, bool touching,
                         double slack) const;

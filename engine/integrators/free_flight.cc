@@ -105,7 +105,8 @@ IntegratorInfo free_flight() {
   epoch.fallback = "none";
   epoch.meaning =
       "length of an epoch, after which all particles are brought to one time; about forty mean free times where it is "
-      "absent";
+      "absent, and at most a tenth of the relaxation time of a bath of type rescaling, which acts at the ends of "
+      "epochs";
   Parameter limit = parameter::max_events_per_step();
   limit.meaning = "collisions that one epoch may need, per particle, before the run ends with an error";
   return {

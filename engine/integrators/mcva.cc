@@ -32,6 +32,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     // In a step a shaken wall moves on a parabola, and the next one begins at the end of the step, not at a node.
     if (restart_ && std::ranges::any_of(system.box.options, [](const auto& wall) { return wall.amplitude != 0; }))
       throw Error(Failure::deck, "mcva with variant = \"restart\" knows no shaken walls; take variant = \"grid\"");
+    if (restart_ && system.box.bath.type != Bath::Type::none)
+      throw Error(Failure::deck, "mcva with variant = \"restart\" knows no baths; take variant = \"grid\"");
     pieces_.emplace(system, max_events_);
     pieces_->start(counters);
     node_ = system.particles;
@@ -133,6 +135,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
   double impulse(System<D>& system, const Touch<D>& touch) {
     auto& p = system.particles;
     const Id lo = touch.key.lo, hi = touch.key.hi;
+    if (!touch.pair() && system.box.wall(hi).thermal())
+      return resolve_contact<D>(touch.key, touch.normal, system.box, p);
     const Vec<D>& n = touch.normal;
     w_[lo] = n / p.mass[lo];
     if (touch.pair()) w_[hi] = -n / p.mass[hi];
@@ -178,7 +182,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
       return pair_impulse<D>(system.box.contacts, p.species[lo], p.species[hi], touch.normal, p.v[lo] - p.v[hi],
                              p.mass[lo], p.mass[hi]);
     const auto bounced =
-        wall_impulse<D>(system.box.contacts, system.box.wall(hi), p.species[lo], p.mass[lo], p.v[lo]);
+        wall_impulse<D>(system.box.contacts, system.box.wall(hi), p.species[lo], p.mass[lo], p.v[lo], {});
     return {bounced.exchange.impulse, bounced.exchange.dissipated};
   }
 

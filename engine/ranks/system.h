@@ -48,9 +48,9 @@ struct System {
   /// The number of particles on all ranks, also while event cores hold them.
   std::size_t size() const { return decomposition.total(); }
 
-  /// Whether the total momentum is conserved: no walls, no external field.
+  /// Whether the total momentum is conserved: no walls, no kicks of a bath, no external field.
   bool keeps_momentum() const {
-    return !box.has_walls() &&
+    return !box.has_walls() && !box.bath.kicks() &&
            std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
   }
 

@@ -5,6 +5,7 @@
 
 #include "engine/base/error.h"
 #include "engine/forces/forces.h"
+#include "engine/run/baths.h"
 #include "engine/run/monitor.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/initial_state.h"
@@ -169,6 +170,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   const auto clock_start = std::chrono::steady_clock::now();
   Statistics& s = statistics_;
   begin(hooks);
+  set_ramp();
   SlabWatch watch(system_->fields, first_of_integrator_, hooks.leave, hooks.leave_here);
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
@@ -179,6 +181,8 @@ void Simulation<D>::run(const Hooks& hooks) {
   const auto show_contacts = [&](const Slab& slab) {
     if (!plan_.events) return;
     const Stopwatch stopwatch(s.counters.seconds.output);
+    if (system_->box.bath.kicks())
+      std::erase_if(contacts, [](const auto& each) { return each.key.hi == Bath::kNumber; });
     for (auto& contact : contacts) contact.key.time += count_.within;
     for (auto* observer : observers_) observer->contacts(time_of(slab.index), contacts);
     contacts.clear();
@@ -209,6 +213,7 @@ void Simulation<D>::run(const Hooks& hooks) {
       if (hooks.left) hooks.left();
       continue;
     }
+    act_of_bath(slab, report);
     show_contacts(slab);
     s.counters.seconds.communicate = system_->decomposition.seconds_waited();
     last_collisions_ = s.counters.sphere_sphere - collisions;
@@ -228,7 +233,7 @@ void Simulation<D>::run(const Hooks& hooks) {
       s.steps += slab.steps;
       s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
       count_.within = 0;
-      if (!info_.stepping && !system_->box.contacts.elastic()) lengthen_epochs();
+      if (!info_.stepping && !system_->box.contacts.elastic() && !system_->box.bath.rescales()) lengthen_epochs();
     }
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
@@ -272,6 +277,31 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       throw Error(Failure::numerical, std::string(e.what()) + " (in step " + std::to_string(slab.index + 1) +
                                           ", from time " + short_text(slab.start) + ")");
     }
+}
+
+/// What the bath does at the end of a slab: rescaling at the end of a whole step or epoch, all kicks of a step.
+template <int D>
+void Simulation<D>::act_of_bath(const Slab& slab, SlabReport<D>& report) {
+  const Bath& bath = system_->box.bath;
+  const double start = time_of(slab.index), length = length_from(start, plan_);
+  if (bath.rescales() && !(report.reached < slab.length))
+    rescale(*system_, slab.index, start + length, length, report.counters);
+  if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);
+}
+
+/// Sets the times of a ramp of the bath's temperature, unless an earlier plan has set them.
+template <int D>
+void Simulation<D>::set_ramp() {
+  Bath& bath = system_->box.bath;
+  if (bath.type == Bath::Type::none || !bath.has_ramp() || bath.ramp_end > bath.ramp_start) return;
+  if (!plan_.steps && !plan_.end_time)
+    throw Error(Failure::deck,
+                "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
+                "run.end_time, or one temperature");
+  const Statistics& s = statistics_;
+  bath.ramp_start = bath.ramp_end = s.start_time;
+  if (plan_.steps) bath.ramp_end += static_cast<double>(*plan_.steps - s.start_steps) * plan_.step;
+  if (plan_.end_time) bath.ramp_end = plan_.steps ? std::min(bath.ramp_end, *plan_.end_time) : *plan_.end_time;
 }
 
 /// For free flight that ends only after a number of collisions: throws if the spheres have separated for good.

@@ -205,6 +205,8 @@ class Simulation {
 
   void begin(const Hooks& hooks);
   bool fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch);
+  void act_of_bath(const Slab& slab, SlabReport<D>& report);
+  void set_ramp();
   double time_of(std::int64_t step) const {
     return count_.time + static_cast<double>(step - count_.steps) * plan_.step;
   }

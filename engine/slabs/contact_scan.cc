@@ -123,6 +123,8 @@ template <int D>
 double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
                                      const Vec<D>& v_hi) const {
   const bool pair = key.kind == EventKind::pair;
+  // Nothing rests on a thermal wall.
+  if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) return -std::numeric_limits<double>::min();
   const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
   const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
   const double closing = pressing(key, normal);
@@ -135,7 +137,7 @@ template <int D>
 double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
                                       const Vec<D>& v_hi) const {
   const double resting = resting_speed(key, normal, v_lo, v_hi);
-  if (!dissipates(key)) return resting;
+  if (resting < 0 || !dissipates(key)) return resting;
   const double closing = std::max(0.0, pressing(key, normal));
   const auto& species = particles_.species;
   const ContactLaw& law = key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
@@ -238,12 +240,14 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
     const Id lo = touch.key.lo;
     const Vec<D> before = v[lo];
     const double dissipated = impulse(touch);
-    record(touch, x, particles_.mass[lo] * (v[lo] - before), dissipated);
+    const double gained = 0.5 * particles_.mass[lo] * (v[lo].squaredNorm() - before.squaredNorm());
+    record(touch, x, particles_.mass[lo] * (v[lo] - before), dissipated, gained);
   }
 }
 
 template <int D>
-void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated) {
+void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated,
+                            double gained) {
   const Id lo = touch.key.lo, hi = touch.key.hi;
   Contact<D> contact{touch.key, x[lo], x[lo], impulse};
   if (touch.pair()) {
@@ -254,6 +258,7 @@ void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>&
     contact.x_hi = wall.foot(x[lo]);
     contact.exchange.impulse = wall.along_normal(impulse);
     contact.exchange.work = wall.work(impulse);
+    if (wall.thermal()) contact.exchange.heat = gained - contact.exchange.work;
   }
   contact.exchange.dissipated = dissipated;
   counters_->record(contact, contacts_);

@@ -164,7 +164,8 @@ class ContactScan {
     return stopping_speed(touch.key, touch.normal, v[touch.key.lo], v[touch.pair() ? touch.key.hi : touch.key.lo]);
   }
   void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
-  void record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated);
+  /// `gained`: the change of the kinetic energy of lo.
+  void record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated, double gained);
   double known_force(const EventKey<D>& key) const;
   double wall_speed(const EventKey<D>& key, double later = 0) const {
     return key.kind == EventKind::wall ? box_.wall(key.hi).velocity_at(later) : 0.0;

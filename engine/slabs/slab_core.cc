@@ -354,9 +354,11 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   };
   if (key.kind == EventKind::wall) {
     const Wall<D> wall = box_.wall(key.hi);
-    if (!(wall.opening(lo.v, key.time) < 0)) return;
+    if (!(wall.opening(lo.v, key.time) < 0) && !wall.thermal()) return;
+    // Sweeps change the time of a contact, not its random numbers.
+    const Draw draw{.id = particles_.id_of(key.lo), .time = box_.time, .number = std::uint64_t{lo.version} << 32};
     const auto [after, impulse, exchange] =
-        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, key.time);
+        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, draw, key.time);
     contact.impulse = impulse;
     contact.exchange = exchange;
     lo.v = after;

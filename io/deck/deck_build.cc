@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
+#include "engine/base/bath_options.h"
 #include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "engine/forces/pair_filter.h"
@@ -124,7 +125,9 @@ void fill_box(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
   for (const TableConfig& wall : source.walls)
-    if (!wall.wrong) add_wall(system.box, wall.parameters);
+    if (!wall.wrong) add_wall(system.box, wall.parameters, source.placement.seed);
+  for (const TableConfig& bath : source.baths)
+    if (!bath.wrong) system.box.bath = bath_of(bath.parameters, source.placement.seed);
   system.species.clear();
   for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
   for (const TableConfig& contact : source.contacts)

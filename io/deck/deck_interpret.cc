@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/base/bath_options.h"
 #include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
 #include "io/deck/deck_source.h"
@@ -29,6 +30,7 @@ class Interpreter {
     for (const ValueTable& table : values_.list("wall")) source_.walls.push_back({table.values, table.at, table.wrong});
     for (const ValueTable& table : values_.list("contact"))
       source_.contacts.push_back({table.values, table.at, table.wrong});
+    for (const ValueTable& table : values_.list("bath")) bath({table.values, table.at, table.wrong});
     for (const ValueTable& table : values_.list("particles")) species(table);
     try_walls();
     placement();
@@ -91,6 +93,12 @@ class Interpreter {
     if (source_.boundary.size() != dimension_) return;
     if (dimension_ == 2) attempt(Box<2>());
     if (dimension_ == 3) attempt(Box<3>());
+  }
+
+  void bath(TableConfig config) {
+    if (!config.wrong) config.wrong = report(config.at, [&] { bath_of(config.parameters); });
+    if (!source_.baths.empty()) problems_.error(config.at, "a second [[bath]]", "give one; it acts on all particles");
+    source_.baths.push_back(std::move(config));
   }
 
   /// Reports the error that `work` throws, with the form "what; what to do", at this place; returns whether it throws.
@@ -374,6 +382,11 @@ class Interpreter {
     table->read<std::int64_t>("collisions", deck_.plan.collisions);
     if (!table->given("steps") && !table->given("end_time") && !table->given("collisions"))
       problems_.error(table->at, "[run] has no end", "give steps, end_time or collisions");
+    const auto ramp = [](const TableConfig& bath) { return bath.parameters.find<std::vector<double>>("temperature"); };
+    if (const auto at = std::ranges::find_if(source_.baths, ramp);
+        at != source_.baths.end() && table->given("collisions") && !table->given("steps") && !table->given("end_time"))
+      problems_.error(at->at, "the temperature is a ramp over a run without a last time",
+                      "give run.steps or run.end_time, or one temperature");
     if (source_.integrator != nullptr && !source_.integrator->hard_cores && table->given("collisions") &&
         !table->given("steps") && !table->given("end_time"))
       problems_.error(table->place("collisions"),

@@ -39,7 +39,7 @@ struct InteractionConfig {
   bool wrong = false;  ///< a problem with it has been reported
 };
 
-/// A table that is a list of parameters: [[wall]], [[contact]].
+/// A table that is a list of parameters: [[wall]], [[contact]], [[bath]].
 struct TableConfig {
   Parameters parameters;
   Place at;
@@ -51,7 +51,7 @@ struct Deck::Source {
   Place system, box, step;
   std::vector<double> edges;  ///< empty: the packing fraction sets them
   std::vector<Boundary> boundary;
-  std::vector<TableConfig> walls, contacts;
+  std::vector<TableConfig> walls, contacts, baths;
   std::vector<SpeciesConfig> species;
   PlacementConfig placement;
   std::vector<InteractionConfig> interactions;
@@ -67,7 +67,7 @@ struct Deck::Source {
 /// points.
 void interpret(DeckValues values, const TextReader& reader, Deck& deck, Problems& problems);
 
-/// Boundaries, edges (1 if they follow from the packing fraction), walls, contacts and the names of species.
+/// Boundaries, edges (1 if they follow from the packing fraction), walls, contacts, the bath and the names of species.
 template <int D>
 void fill_box(const Deck::Source& source, System<D>& system);
 

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 
-#include "engine/base/interaction.h"
+#include "engine/base/bath_options.h"
 #include "engine/base/contact_options.h"
+#include "engine/base/interaction.h"
 #include "engine/base/wall_options.h"
 #include "engine/integrators/integrator.h"
 
@@ -97,6 +98,7 @@ std::vector<TableSchema> make_schema() {
        contact_parameters()},
       {"wall", true, false, "a wall beside those of the box, or a face of the box that is more than a fixed hard wall",
        wall_parameters()},
+      {"bath", true, false, "a heat bath for all particles; at most one", bath_parameters()},
       {"particles",
        true,
        true,
@@ -215,7 +217,7 @@ std::string type_name(const Parameter& key) {
     case vector_list:
       return "list of vectors";
     case real_or_list:
-      return range + "number, or a list with one for each particle";
+      return range + "number, or a list of numbers";
     case table:
     case real_or_table: {
       std::string names;

@@ -8,7 +8,8 @@
 //   time_in_slab  the exact time, since the start of the slab
 //   generation    order within one instant
 //   kind          0 pair, 1 wall
-//   lo, hi        lower and higher id; at a wall: the particle, and 2·axis + (0 lower, 1 upper)
+//   lo, hi        lower and higher id; at a wall: the particle, and the number of the wall (2·axis + (0 lower, 1 upper)
+//                 for faces of the box)
 //   image         [D] how many box edges `hi` is shifted by
 //   x_lo, x_hi    [D] centres at contact, x_hi shifted to that image; at a wall: the point of contact
 //   impulse       [D] given to lo, taken from hi

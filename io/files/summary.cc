@@ -31,7 +31,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"ranks", outcome.ranks},
       {"steps", s.steps},
       {"end_time", s.end_time},
-      {"events", {{"sphere_sphere", c.sphere_sphere}, {"sphere_wall", c.sphere_wall}}},
+      {"events", {{"sphere_sphere", c.sphere_sphere}, {"sphere_wall", c.sphere_wall}, {"kicks", c.kicks}}},
       {"energy",
        {{"initial", s.energy_initial},
         {"after_first_step", s.energy_after_first_step},

@@ -31,21 +31,24 @@ PATHS = "str | os.PathLike[str]"
 # Of arguments whose default is None the type is this or None.
 ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]", "dimension": "Literal[2, 3]",
              "position": "npt.ArrayLike", "velocity": "npt.ArrayLike", "radius": "npt.ArrayLike", "mass": "npt.ArrayLike",
-             "charge": "npt.ArrayLike", "species": "str", "count": "int", "temperature": "float",
+             "charge": "npt.ArrayLike", "species": "str", "count": "int", "temperature": "float | Sequence[float]",
              "deck": f"{PATHS} | Mapping[str, Any]", "file": PATHS, "set": "Mapping[str, Any]", "directory": PATHS,
              "take_over": "bool", "frame": "int", "time": "float", "steps": "int", "collisions": "int", "every": "float",
              "callback": "Callable[[Simulation], object]", "progress": "bool", "type": "str", "packing_fraction": "float",
              "seed": "int", "parameters": "Any", "thermo_interval": "float", "keys": "Any", "port": "int", "browser": "bool",
              "expression": "str | Callable[..., Any]", "start": "float", "cutoff": "float", "tolerance": "float",
-             "options": "Mapping[str, Any]", "constants": "Any", "name": "str", "normal": "npt.ArrayLike"}
+             "options": "Mapping[str, Any]", "constants": "Any", "name": "str", "normal": "npt.ArrayLike",
+             "one": "str", "other": "str", "rate": "float"}
 RESULTS = {"__init__": "None", "from_deck": "Simulation", "from_run": "Simulation", "from_file": "Simulation",
-           "add_particles": "range", "add_wall": "None", "place": "range", "thermalize": "None", "add_potential": "Sampled", "output": "None",
+           "add_particles": "range", "add_wall": "None", "add_contact": "None", "add_bath": "None", "place": "range", "thermalize": "None",
+           "add_potential": "Sampled", "output": "None",
            "open": "Run", "view": "Page", "run": "None", "write_deck": "None", "__len__": "int", "__repr__": "str"}
 PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np.float64]",
               "image": "npt.NDArray[np.int32]", "unwrapped": "npt.NDArray[np.float64]", "mass": "npt.NDArray[np.float64]",
               "radius": "npt.NDArray[np.float64]", "charge": "npt.NDArray[np.float64]",
               "species": "npt.NDArray[np.uint16]", "momentum": "npt.NDArray[np.float64]", "species_names": "list[str]",
-              "box": "list[float]", "boundary": "list[str]", "walls": "list[dict[str, Any]]", "contacts": "list[dict[str, Any]]", "step": "int", "collisions": "int", "directory": "str | None",
+              "box": "list[float]", "boundary": "list[str]", "walls": "list[dict[str, Any]]", "contacts": "list[dict[str, Any]]", "bath": "dict[str, Any] | None", "bath_temperature": "float | list[float] | None",
+              "step": "int", "collisions": "int", "directory": "str | None",
               "averages": "dict[str, dict[str, npt.NDArray[np.float64]]]"}
 VALUES = {"list[float]": "npt.ArrayLike", "list[str]": "Sequence[str]", "list[tuple[int, int]]": "npt.ArrayLike"}
 

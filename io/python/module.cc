@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "engine/base/bath_options.h"
 #include "engine/base/boundary.h"
 #include "engine/base/contact_options.h"
 #include "engine/base/wall_options.h"
@@ -132,6 +133,9 @@ void bind(py::module_& module, const char* name) {
       .def("set_velocity", [](S& session, const Array& v) { session.set_velocity(span_of(v)); })
       .def("add_wall",
            [](S& session, const py::dict& given) { session.add_wall(parameters_of("wall", wall_parameters(), given)); })
+      .def("set_bath",
+           [](S& session, const py::dict& given) { session.set_bath(parameters_of("bath", bath_parameters(), given)); })
+      .def("set_bath_temperature", [](S& session, double temperature) { session.set_bath_temperature(temperature); })
       .def("add_contact",
            [](S& session, const py::dict& given) {
              session.add_contact(parameters_of("contact", contact_parameters(), given));
@@ -233,6 +237,12 @@ void bind(py::module_& module, const char* name) {
                                for (const Parameters& contact : s.contacts()) all.append(values_of(contact));
                                return all;
                              })
+      .def_property_readonly("baths",
+                             [](const S& s) {
+                               py::list all;
+                               for (const Parameters& bath : s.baths()) all.append(values_of(bath));
+                               return all;
+                             })
       .def_property_readonly("box",
                              [](const S& s) {
                                const Vec<D>& edges = s.box().edges;
@@ -328,6 +338,7 @@ py::dict descriptors() {
   };
   all["walls"] = table("wall", wall_parameters());
   all["contacts"] = table("contact", contact_parameters());
+  all["baths"] = table("bath", bath_parameters());
   return all;
 }
 

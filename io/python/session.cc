@@ -69,6 +69,7 @@ Session<D>::Session(Deck& deck) {
   box_ = system_->box;
   for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
   for (const auto& contact : deck.source->contacts) contacts_.push_back(contact.parameters);
+  for (const auto& bath : deck.source->baths) baths_.push_back(bath.parameters);
   species_ = system_->species;
   size_ = system_->size();
   integrator_ = &find_integrator(deck.integrator);
@@ -333,6 +334,7 @@ template <int D>
 void Session<D>::rest(Particles<D>& particles) {
   for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // if free flight has failed
   box_.time = statistics_.end_time;
+  box_.bath = at_work_->box.bath;  // with the times of its ramp
   system_ = std::make_unique<System<D>>();
   system_->box = box_;
   system_->species = species_;

@@ -60,6 +60,10 @@ class Session {
   std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
   /// Adds a wall or changes a face of the box.
   void add_wall(Parameters given);
+  /// Sets the bath, in place of an earlier one.
+  void set_bath(Parameters given);
+  /// Changes its temperature; the next run() goes on.
+  void set_bath_temperature(double temperature);
   /// Sets the law of contacts between two partners, which must be there already.
   void add_contact(Parameters given);
   void add_force(std::string_view type, Parameters given);
@@ -97,6 +101,8 @@ class Session {
   const std::vector<Force>& forces() const { return terms_.all(); }
   const std::vector<Parameters>& walls() const { return walls_; }
   const std::vector<Parameters>& contacts() const { return contacts_; }
+  /// None, or one.
+  const std::vector<Parameters>& baths() const { return baths_; }
   /// During a run: only in RunHooks::show.
   Averages averages() const;
   /// Warnings of the last run about its files.
@@ -120,7 +126,7 @@ class Session {
   void save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record);
 
   Box<D> box_;
-  std::vector<Parameters> walls_, contacts_;
+  std::vector<Parameters> walls_, contacts_, baths_;
   std::vector<std::string> species_;
   Terms<D> terms_;
   const IntegratorInfo* integrator_ = nullptr;

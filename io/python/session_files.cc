@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The files of a session's runs: their deck, their state, the averages.
 
+#include "engine/base/bath_options.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_source.h"
 #include "io/python/session.h"
@@ -51,6 +52,7 @@ Session<D>::Session(Deck& deck, Resumed& from) {
   box_ = system_->box;
   for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
   for (const auto& contact : deck.source->contacts) contacts_.push_back(contact.parameters);
+  for (const auto& bath : deck.source->baths) baths_.push_back(bath.parameters);
   species_ = system_->species;
   size_ = system_->size();
   integrator_ = &find_integrator(deck.integrator);
@@ -140,6 +142,27 @@ Averages Session<D>::averages() const {
   record_->files().for_each_average(
       [&](const std::string& name, const Observable<D>& average) { all[name] = average.table(); });
   return all;
+}
+
+template <int D>
+void Session<D>::set_bath(Parameters given) {
+  Parameters complete = completed("bath", bath_parameters(), std::move(given));
+  const Bath bath = bath_of(complete);
+  change("set a bath");
+  system_->box.bath = box_.bath = bath;
+  baths_ = {std::move(complete)};
+}
+
+template <int D>
+void Session<D>::set_bath_temperature(double temperature) {
+  if (baths_.empty()) refuse("there is no bath; call add_bath() first");
+  if (running_ && !(showing_ && std::this_thread::get_id() == runner_))
+    refuse("a run is going on; change the temperature of the bath in its callback, before it or after it");
+  Parameters given = baths_[0];
+  given.set("temperature", temperature);
+  baths_[0] = completed("bath", bath_parameters(), std::move(given));
+  box_.bath.set_temperature(temperature);
+  (at_work_ ? at_work_->box : system_->box).bath.set_temperature(temperature);
 }
 
 template <int D>

@@ -84,6 +84,10 @@ def walled(keys):
     return changed("[[particles]]", f"[[wall]]\n{keys}\n[[particles]]")
 
 
+def bathed(keys):
+    return changed("[[particles]]", f"[[bath]]\n{keys}\n[[particles]]")
+
+
 def table(more):
     return lennard_jones(more).replace('"lennard-jones"\nepsilon = 1\nsigma = 1', '"table"')
 

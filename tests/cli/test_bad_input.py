@@ -3,7 +3,7 @@
 
 import pytest
 
-from decks import FLUID, GOOD, carom, changed, lennard_jones, table, validate, walled
+from decks import FLUID, GOOD, bathed, carom, changed, lennard_jones, table, validate, walled
 from runs import needs_carom
 
 pytestmark = needs_carom
@@ -75,6 +75,23 @@ DECK_ERRORS = {
         walled('name = "y+"\n[[wall]]\nname = "y+"'), 11, ["'y+' is given twice", "its own name"]),
     "walls that cross": (
         walled('name = "lid"\nnormal = [0, -1]\noffset = 0.5'), 9, ["the wall 'lid' leave no room", "move them apart"]),
+    "thermal wall without heat": (
+        walled('name = "y+"\ntemperature = 0'), 11, ["'temperature' must be positive (is 0)"]),
+    "bath without a type": (bathed("temperature = 1.0\nrate = 1.0"), 9, ["missing key 'type' in [[bath]]"]),
+    "bath of an unknown type": (
+        bathed('type = "berendsen"\ntemperature = 1.0\nrate = 1.0'), 10, ["'berendsen'", "andersen, rescaling"]),
+    "bath that is cold": (
+        bathed('type = "andersen"\ntemperature = -1.0\nrate = 1.0'), 11, ["'temperature' must be positive (is -1)"]),
+    "bath without kicks": (
+        bathed('type = "andersen"\ntemperature = 1.0\nrate = 0'), 12, ["'rate' must be positive (is 0)"]),
+    "bath with three temperatures": (
+        bathed('type = "andersen"\ntemperature = [1.0, 2.0, 3.0]\nrate = 1.0'), 9, ["3 numbers", "the first and the last"]),
+    "bath with a ramp to no end": (
+        bathed('type = "andersen"\ntemperature = [1.0, 2.0]\nrate = 1.0').replace("steps = 10", "collisions = 10"),
+        9, ["a ramp over a run without a last time", "run.end_time"]),
+    "two baths": (
+        bathed('type = "andersen"\ntemperature = 1.0\nrate = 1.0\n[[bath]]\ntype = "rescaling"\ntemperature = 1.0\nrate = 1.0'),
+        13, ["a second [[bath]]", "give one"]),
     "wall that is shaken without a frequency": (
         walled('name = "y+"\nvelocity = {amplitude = 1}'), 11, ["'velocity' has no 'frequency'", "positive number"]),
     "wall with a frequency of 0": (

@@ -64,6 +64,27 @@ def test_walls_are_those_of_one_rank_and_continue(method, tmp_path):
     assert filecmp.cmp(tmp_path / "plain" / "thermo.csv", tmp_path / "half" / "thermo.csv", shallow=False)
 
 
+@pytest.mark.parametrize("bath", ["andersen", "rescaling", "thermal walls"])
+@pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
+def test_baths_are_those_of_one_rank_and_continue(method, bath, tmp_path):
+    heated = {"bath": [{"type": bath, "temperature": 2.0, "rate": 2.0}]}
+    if bath == "thermal walls":
+        heated = {"wall": [{"name": "y-", "temperature": 2.0}, {"name": "y+", "temperature": 0.5, "velocity": 0.1}]}
+    deck = write_deck(tmp_path, toml_text(tomllib.loads(DISCS) | heated | {"run": {"end_time": 3.0}}))
+    output = ["output.events=true", "integrator.step=" + ("0.25" if method == "free-flight" else "0.02"), f"integrator.type={method}"]
+    run(deck, tmp_path / "plain", output)
+    energy = summary(tmp_path / "plain")["energy"]
+    assert abs(energy["final"] - energy["initial"]) > 0.01 * abs(energy["initial"])
+    if method != "psa":
+        assert energy["max_abs_error"] < 1e-12 * energy["reference"]
+    for ranks in 2, 4:
+        assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
+        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
+    run(deck, tmp_path / "half", output + ["run.end_time=1.5"])
+    subprocess.run([CAROM, "run", "--continue", tmp_path / "half", "--quiet", "--set", "run.end_time=3.0"], check=True)
+    assert filecmp.cmp(tmp_path / "plain" / "thermo.csv", tmp_path / "half" / "thermo.csv", shallow=False)
+
+
 @pytest.mark.parametrize("text", [SPHERES, DISCS], ids=["spheres", "discs"])
 def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
     output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11", "output.profile_interval=0.13", "output.sample_start=0.05"]

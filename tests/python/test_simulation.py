@@ -215,3 +215,40 @@ def test_walls_move_and_stay_where_they_are_in_the_next_run():
     assert sim.position[:, 0].max() <= 10 - 12 * 0.25 - 0.5 + 1e-9
     with pytest.raises(carom.UsageError, match="the wall 'x-' is a face of the box"):
         sim.add_wall("x-", normal=[1, 0])
+
+
+def test_a_bath_changes_its_temperature_between_runs():
+    def heated(first, second):
+        sim = gas()
+        sim.add_bath("andersen", temperature=1.0, rate=5.0)
+        assert sim.bath["type"] == "andersen" and sim.bath_temperature == 1.0
+        sim.run(time=4)
+        assert sim.time == 4
+        sim.bath_temperature = second
+        assert sim.bath_temperature == second
+        sim.run(time=8)
+        assert sim.time == 8 and sim.energy_error < 1e-12
+        return sim
+
+    hot, cool = heated(1.0, 4.0), heated(1.0, 1.0)
+    assert hot.temperature > 3 and 0.5 < cool.temperature < 1.5      # N = 64 and more: the standard deviation is below 0.11 T
+    sim = gas()
+    with pytest.raises(carom.UsageError, match="there is no bath; call add_bath"):
+        sim.bath_temperature = 2.0
+    with pytest.raises(carom.UsageError, match="'type' cannot be 'nose'"):
+        sim.add_bath("nose", temperature=1.0, rate=1.0)
+    with pytest.raises(carom.UsageError, match="'rate' must be positive"):
+        sim.add_bath("rescaling", temperature=1.0, rate=0)
+    sim.add_bath("rescaling", temperature=[1.0, 2.0], rate=10.0)
+    sim.run(time=5)
+    assert 1.4 < sim.temperature < 2.6
+
+
+def test_thermal_walls_heat():
+    sim = carom.Simulation(box=[10, 6])
+    sim.add_particles([[2, 3], [5, 3], [8, 3]], velocity=[[1, 0.2], [0, -0.1], [-0.5, 0]], radius=0.5)
+    sim.add_wall("x+", temperature=5.0, seed=3)
+    sim.integrator("edda", step=0.05)
+    before = sim.energy
+    sim.run(time=100)
+    assert sim.energy > 2 * before and sim.energy_error < 1e-12

@@ -48,6 +48,8 @@ def deck_of(sim, of, ends):
             species["display_radius"] = species.pop("radius")
     if sim.walls:
         deck["wall"] = sim.walls
+    if sim._session.baths:
+        deck["bath"] = sim._session.baths
     if sim.contacts:
         deck["contact"] = sim.contacts
     if sim._session.forces:

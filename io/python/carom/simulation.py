@@ -233,6 +233,24 @@ class Simulation:
         given = refuse_masked("add_contact", dict(parameters))
         self._session.add_contact(given | {"between": [name_of("add_contact", one), name_of("add_contact", other)]})
 
+    def add_bath(self, type, temperature, rate, seed=1):
+        """Couples all particles to a heat bath, in place of an earlier one.
+
+        type: "andersen": at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann;
+        "rescaling": all velocities are scaled by a common random factor, so that the kinetic energy is canonical.
+        temperature: a number [energy], or [first, last]: a linear ramp over the next run. rate: kicks of a particle per
+        unit time; of rescaling 1/relaxation time.
+
+            sim.add_bath("andersen", temperature=1.0, rate=0.5)
+            sim.run(time=100)
+            sim.bath_temperature = 2.0       # the next run() goes on
+        """
+        given = {"type": type, "temperature": temperature, "rate": rate, "seed": seed}
+        self._session.set_bath(refuse_masked("add_bath", given))
+
+    def _set_bath_temperature(self, value):
+        self._session.set_bath_temperature(value)
+
     def add_force(self, type, **parameters):
         """Adds a term of V by its name in decks; see carom.describe(type). Ids and species in it must be there already."""
         self._session.add_force(name_of("add_force", type), refuse_masked(type, parameters))
@@ -370,6 +388,10 @@ class Simulation:
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
     box = property(lambda self: self._session.box, doc="Edges [length].")
     contacts = property(lambda self: self._session.contacts, doc="The laws of contacts, as dictionaries of their options.")
+    bath = property(lambda self: next(iter(self._session.baths), None),
+                    doc="The heat bath, as a dictionary of its options; None: there is none.")
+    bath_temperature = property(lambda self: self.bath and self.bath["temperature"], _set_bath_temperature,
+                                doc="The temperature of the bath [energy]; may be set between runs, which go on.")
     walls = property(lambda self: self._session.walls, doc="The walls that were added, as dictionaries of their options.")
     boundary = property(lambda self: self._session.boundary, doc="The name of the boundary on each axis.")
 

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/base/bath_options.h"
+
+#include "engine/base/error.h"
+
+namespace carom {
+
+const std::vector<Parameter>& bath_parameters() {
+  using enum Parameter::Type;
+  using Range = Parameter::Range;
+  static const std::vector<Parameter> all = {
+      {"type",
+       text,
+       "",
+       "-",
+       "andersen: at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann, in "
+       "methods with steps at the end of the step; "
+       "rescaling: all velocities are scaled by a common random factor, so that the kinetic energy is canonical",
+       Range::any,
+       {"andersen", "rescaling"}},
+      {"temperature", real_or_list, "", "energy", "a number, or [first, last]: a linear ramp over the run",
+       Range::positive},
+      {"rate", real, "", "1/time", "kicks of a particle per unit time; of rescaling: 1/relaxation time",
+       Range::positive},
+      {"seed", integer, "none", "-", "of the random numbers; that of [placement] where absent", Range::non_negative}};
+  return all;
+}
+
+Bath bath_of(const Parameters& given, std::uint64_t seed) {
+  Bath bath{.type = given.text("type") == "andersen" ? Bath::Type::andersen : Bath::Type::rescaling,
+            .rate = given.real("rate"),
+            .seed = seed};
+  if (const auto* own = given.find<std::int64_t>("seed")) bath.seed = static_cast<std::uint64_t>(*own);
+  if (const auto* constant = given.find<double>("temperature")) bath.set_temperature(*constant);
+  if (const auto* ramp = given.find<std::vector<double>>("temperature")) {
+    if (ramp->size() != 2)
+      throw Error(Failure::deck, "the temperature of the bath has " + std::to_string(ramp->size()) +
+                                     " numbers; give one, or the first and the last of a ramp");
+    bath.temperature = ramp->front();
+    bath.last_temperature = ramp->back();
+  }
+  return bath;
+}
+
+}  // namespace carom
