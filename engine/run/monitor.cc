@@ -53,7 +53,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   fields.add_value("account", account_);
   fields.add_of_run({"last measurement", [this](Archive& archive) {
                        archive(shot_.time, shot_.step, shot_.collisions, shot_.kinetic, shot_.potential, shot_.shadow,
-                               shot_.momentum, shot_.temperature);
+                               shot_.momentum, shot_.temperature, shot_.dissipated, shot_.work, shot_.heat);
                      }});
   fields.add_value("next frame", frames_.next());
   fields.add_value("next row", rows_.next());
@@ -226,6 +226,9 @@ Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const In
   shot.step = statistics_.steps;
   shot.collisions = statistics_.counters.sphere_sphere;
   shot.particles = &state;
+  shot.dissipated = statistics_.counters.dissipated.value();
+  shot.work = statistics_.counters.work.value();
+  shot.heat = statistics_.counters.heat.value();
   // The conserved quantity: the energy of the spheres, what they have lost, and less what walls and baths gave them.
   account_.energy = shot.kinetic + sums.energy.value() + statistics_.counters.drained();
   account_.magnitude = found.magnitude;

@@ -48,7 +48,10 @@ struct Snapshot {
   Vec<D> momentum = Vec<D>::Zero();
   double temperature = 0;  ///< 2K/(D N), in units of energy (k_B = 1); total momentum is not subtracted
   double pressure = 0;     ///< virial: (2K + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
+  double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
   double total() const { return kinetic + potential; }
+  /// What stays constant, whatever contacts, walls and baths do.
+  double conserved() const { return total() + dissipated - work - heat; }
 };
 
 /// The times at which an observer needs the particles: start, start + interval, …

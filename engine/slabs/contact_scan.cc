@@ -356,10 +356,22 @@ double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v, double kick) 
   double lost = 0;
   solve_reactions<D>(resting_, particles_.mass, v, &lost);
   for (auto& contact : resting_) {
-    lost += count_work(contact.lambda * wall_speed(contact.key));
+    lost += count_push(contact, contact.lambda * contact.normal.norm(), wall_speed(contact.key));
     if (kick > 0) contact.force = contact.lambda * contact.normal.norm() / kick;
   }
   return lost;
+}
+
+/// Counts the impulse of a wall that holds a sphere while it moves at this speed; returns the work, 0 for a pair.
+template <int D>
+double ContactScan<D>::count_push(const RestingContact<D>& contact, double impulse, double speed) {
+  if (contact.key.kind == EventKind::pair || impulse == 0) return 0;
+  WallTally& wall = counters_->wall(contact.key.hi);
+  wall.impulse.add(impulse);
+  if (speed == 0) return 0;
+  wall.work.add(impulse * speed);
+  counters_->work.add(impulse * speed);
+  return impulse * speed;
 }
 
 template <int D>
@@ -390,7 +402,8 @@ template <int D>
 void ContactScan<D>::remember(double length) {
   if (resting_.empty() && reactions_.empty()) return;
   for (const auto& contact : resting_)
-    if (contact.key.kind == EventKind::wall) count_work(contact.force * length * mean_speed(contact.key.hi, length));
+    if (contact.key.kind == EventKind::wall)
+      count_push(contact, contact.force * length, mean_speed(contact.key.hi, length));
   reactions_.clear();
   for (const auto& contact : resting_)
     if (contact.force > 0) reactions_.push_back({contact.key, contact.force});

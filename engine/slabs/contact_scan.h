@@ -170,10 +170,7 @@ class ContactScan {
   double wall_speed(const EventKey<D>& key, double later = 0) const {
     return key.kind == EventKind::wall ? box_.wall(key.hi).velocity_at(later) : 0.0;
   }
-  double count_work(double work) {
-    if (work != 0) counters_->work.add(work);
-    return work;
-  }
+  double count_push(const RestingContact<D>& contact, double impulse, double speed);
   double stop_rounding(Vectors<D> v) const;
   Vec<D> normal(const EventKey<D>& key, Positions<D> x) const;
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;

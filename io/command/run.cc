@@ -140,6 +140,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
   write_file_atomically(directory / run_file::deck, origin + deck.toml_text);
 
   const auto summary = [&] {
+    outcome.walls = WallRecord::all(simulation.system().box);
     write_file_atomically(directory / run_file::summary, summary_text(deck, outcome, statistics));
   };
   std::optional<RunFiles<D>> files;

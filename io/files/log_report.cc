@@ -146,6 +146,9 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
       s.stopped_early ? "stopped" : "done", s.end_time, s.steps, c.sphere_sphere, c.sphere_wall,
       clock_text(s.wall_seconds), s.wall_seconds > 0 ? static_cast<double>(c.sphere_sphere) / s.wall_seconds : 0.0,
       s.energy_final, s.max_energy_error, s.max_energy_error / scale);
+  if (c.dissipated.value() != 0 || c.work.value() != 0 || c.heat.value() != 0)
+    text += fmt::format("\ndissipated {:.10g}, work {:.10g}, heat {:.10g}", c.dissipated.value(), c.work.value(),
+                        c.heat.value());
   if (s.max_shadow_energy_error)
     text += fmt::format("\nshadow energy, largest error {:.2e}", *s.max_shadow_energy_error);
   if (s.max_momentum_error) text += fmt::format("\nmomentum, largest error {:.2e}", *s.max_momentum_error);

@@ -75,6 +75,7 @@ CheckpointHead RunRecord<D>::checkpoint() {
 
 template <int D>
 void RunRecord<D>::write_summary() {
+  outcome_.walls = WallRecord::all(simulation_.system().box);
   write_file_atomically(deck_.output.directory / run_file::summary,
                         summary_text(deck_, outcome_, simulation_.statistics()));
 }

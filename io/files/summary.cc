@@ -38,6 +38,9 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
         {"final", s.energy_final},
         {"reference", s.energy_reference},
         {"max_abs_error", s.max_energy_error},
+        {"dissipated", c.dissipated.value()},
+        {"work", c.work.value()},
+        {"heat", c.heat.value()},
         {"folded", s.energy_reference > 0 ? c.folded / s.energy_reference : 0.0}}},
       {"tail", {{"energy", s.tail_energy}, {"pressure", s.tail_pressure}}},
       {"shadow_energy", {{"max_abs_error", number_or_null(s.max_shadow_energy_error)}}},
@@ -57,6 +60,18 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"collisions_per_second", rate},
       {"peak_memory_bytes", std::max(outcome.peak_memory_bytes, peak_memory_bytes())},
   };
+  for (const WallRecord& wall : outcome.walls) {  // both sides of a wall have one name
+    const WallTally none, &tally = wall.number < c.walls.size() ? c.walls[wall.number] : none;
+    Json& entry = json["walls"][wall.name];
+    if (entry.is_null()) entry = Json::object();
+    const auto add = [&](const char* key, double value) { entry[key] = entry.value(key, 0.0) + value; };
+    const double force = s.end_time > s.start_time ? tally.impulse.value() / (s.end_time - s.start_time) : 0;
+    entry["collisions"] = entry.value("collisions", std::uint64_t{0}) + tally.contacts;
+    add("force", force);
+    if (wall.area > 0) add("pressure", force / wall.area);
+    add("work", tally.work.value());
+    add("heat", tally.heat.value());
+  }
   if (!outcome.branched_from.empty())
     json["branched_from"] = {{"checkpoint", outcome.branched_from}, {"step", s.start_steps}, {"time", s.start_time}};
   for (const SpeciesValue& value : outcome.species_values)

@@ -13,6 +13,25 @@
 namespace carom {
 
 /// Data for the summary that are not in the run's statistics.
+/// A wall, for the numbers of its contacts.
+struct WallRecord {
+  Id number = 0;
+  std::string name;
+  double area = 0;  ///< of a face of the box at the end of the run [length^(D−1)]; 0 for a further wall
+
+  /// The walls of a box.
+  template <int D>
+  static std::vector<WallRecord> all(const Box<D>& box) {
+    std::vector<WallRecord> records;
+    for (const Wall<D>& wall : box.walls()) {
+      Vec<D> lengths = box.lengths(box.time);
+      if (wall.axis >= 0) lengths[wall.axis] = 1;
+      records.push_back({wall.number, box.name_of(wall.number), wall.axis < 0 ? 0 : lengths.prod()});
+    }
+    return records;
+  }
+};
+
 struct RunOutcome {
   std::string status;                   ///< "done", "interrupted" (on request; can be continued), "failed"
   std::string error{};                  ///< why it failed; empty otherwise
@@ -21,7 +40,8 @@ struct RunOutcome {
   std::size_t particles = 0;
   int ranks = 1;
   std::vector<SpeciesValue> species_values{};  ///< of the averages
-  std::uint64_t peak_memory_bytes = 0;         ///< largest of all ranks; 0: that of this process
+  std::vector<WallRecord> walls{};
+  std::uint64_t peak_memory_bytes = 0;  ///< largest of all ranks; 0: that of this process
 };
 
 /// The summary as JSON text; names as in the manual. Values that a method does not have are null.

@@ -14,7 +14,7 @@ namespace carom {
 
 namespace {
 constexpr ColumnChart kError{"error", "largest |H − H₁| so far", true}, kTemperature{"temperature", "temperature"},
-    kPressure{"pressure", "pressure"};
+    kPressure{"pressure", "pressure"}, kLedger{"ledger", "energy that left and came in"};
 }  // namespace
 
 template <int D>
@@ -44,7 +44,15 @@ const std::vector<Column<D>>& columns() {
       {"temperature", number, "energy", "2K/(D N), k_B = 1",  //
        [](S s, int) { return s.temperature; }, "temperature", "temperature", "12.6g", &kTemperature},
       {"pressure", number, "energy/length^D", "virial pressure, with the collisions since the last row",  //
-       [](S s, int) { return s.pressure; }, "pressure", "pressure", "12.6g", &kPressure}};
+       [](S s, int) { return s.pressure; }, "pressure", "pressure", "12.6g", &kPressure},
+      {"conserved", number, "energy", "H + dissipated − work − heat",  //
+       [](S s, int) { return s.conserved(); }, "conserved", "conserved_energy", nullptr, &kLedger},
+      {"dissipated", number, "energy", "energy lost at inelastic contacts so far",  //
+       [](S s, int) { return s.dissipated; }, "dissipated", "dissipated_energy", nullptr, &kLedger},
+      {"work", number, "energy", "work of moving walls so far",  //
+       [](S s, int) { return s.work; }, "work", "work", nullptr, &kLedger},
+      {"heat", number, "energy", "heat from thermal walls and baths so far",  //
+       [](S s, int) { return s.heat; }, "heat", "heat", nullptr, &kLedger}};
   return all;
 }
 template const std::vector<Column<2>>& columns();

@@ -48,11 +48,11 @@ TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   std::getline(in, row);
   EXPECT_EQ(header,
             "time,step,collisions,kinetic,potential,total,shadow,max_energy_error,momentum_x,momentum_y,momentum_z,"
-            "temperature,pressure");
+            "temperature,pressure,conserved,dissipated,work,heat");
   std::vector<double> values;
   for (std::istringstream cells(row); std::getline(cells, cell, ',');)
     values.push_back(std::strtod(cell.c_str(), nullptr));
-  ASSERT_EQ(values.size(), 13U);
+  ASSERT_EQ(values.size(), 17U);
   EXPECT_EQ(values[0], 0.1);
   EXPECT_EQ(values[2], 21);
   EXPECT_EQ(values[5], 1.25);
@@ -301,7 +301,8 @@ TEST(Summary, HasEveryValueByItsName) {
                            .warnings = {"a warning"},
                            .particles = 3,
                            .ranks = 2,
-                           .species_values = {{"contact_value", {"small", "large"}, "g", 1.5}}};
+                           .species_values = {{"contact_value", {"small", "large"}, "g", 1.5}},
+                           .walls = {{1, "x+", 4.0}, {2, "y-", 8.0}}};
   Statistics s;
   s.steps = 10, s.end_time = 11.5, s.force_passes = 12.5, s.energy_initial = 13.5;
   s.energy_after_first_step = 14.5, s.energy_final = 15.5, s.energy_reference = 16;
@@ -310,16 +311,21 @@ TEST(Summary, HasEveryValueByItsName) {
   s.mean_free_time = 24.5, s.mean_free_path = 25.5, s.wall_seconds = 0.5;
   Counters& c = s.counters;
   c.sphere_sphere = 30, c.sphere_wall = 31, c.max_overlap = 32.5, c.sweeps = 33, c.pieces = 34, c.slabs_halved = 35;
-  c.frozen = 36, c.fallbacks = 37, c.folded = 4;
+  c.frozen = 36, c.fallbacks = 37, c.folded = 4, c.kicks = 38;
+  c.dissipated.add(5.5), c.work.add(6.5), c.heat.add(7.5);
+  WallTally& floor = c.wall(2);
+  floor.contacts = 31, floor.impulse.add(23), floor.work.add(6.5), floor.heat.add(7.5);
   auto json = nlohmann::json::parse(summary_text(test::sample_deck(2), outcome, s));
   EXPECT_GT(json["peak_memory_bytes"], 1000000);
   EXPECT_NE(json["version"], "");
   json.erase("peak_memory_bytes"), json.erase("version");
   EXPECT_EQ(json, nlohmann::json::parse(R"({"status": "failed", "error": "disk \ufffd full", "warnings": ["a warning"],
     "deck": "sample.toml", "title": "three spheres", "integrator": "free-flight", "dimension": 2, "particles": 3,
-    "ranks": 2, "steps": 10, "end_time": 11.5, "events": {"sphere_sphere": 30, "sphere_wall": 31},
+    "ranks": 2, "steps": 10, "end_time": 11.5, "events": {"sphere_sphere": 30, "sphere_wall": 31, "kicks": 38},
     "energy": {"initial": 13.5, "after_first_step": 14.5, "final": 15.5, "reference": 16.0, "max_abs_error": 17.5,
-               "folded": 0.25},
+               "dissipated": 5.5, "work": 6.5, "heat": 7.5, "folded": 0.25},
+    "walls": {"x+": {"collisions": 0, "force": 0.0, "pressure": 0.0, "work": 0.0, "heat": 0.0},
+              "y-": {"collisions": 31, "force": 2.0, "pressure": 0.25, "work": 6.5, "heat": 7.5}},
     "tail": {"energy": 18.5, "pressure": 19.5}, "shadow_energy": {"max_abs_error": 20.5},
     "momentum": {"max_abs_error": 21.5}, "max_overlap": 32.5, "pressure": 22.5, "collision_rate": 23.5,
     "mean_free_time": 24.5, "mean_free_path": 25.5, "force_passes": 12.5, "sweeps": 33, "pieces": 34,

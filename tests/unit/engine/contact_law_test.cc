@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Contacts that dissipate: the ledger H + dissipated, Haff's law, spheres that come to rest.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/base/contact_options.h"
+#include "engine/base/error.h"
+#include "engine/events/collision.h"
+#include "tests/support/experiments.h"
+
+namespace carom {
+namespace {
+
+template <int D>
+void set_law(System<D>& system, const Parameters& given) {
+  Parameters all = given;
+  if (!all.has("between")) all.set("between", std::vector<std::string>{"*", "*"});
+  add_contact<D>(system.box, system.species, completed("contact", contact_parameters(), all));
+}
+
+std::string message_of(const auto& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ContactLaws, ImpulseGivesBackAFractionOfTheNormalSpeed) {
+  ContactLaws laws;
+  laws.resize(2, 1);
+  const auto law = laws.add({.restitution = 0.6});
+  laws.set_pair(0, 1, law);
+  laws.set_wall(1, 0, law);
+  const Vec<2> d{0.6, 0.8}, v{-1, -3};
+  const auto [factor, lost] = pair_impulse<2>(laws, 1, 0, d, v, 2.0, 3.0);
+  const Vec<2> after = v + factor * (1 / 2.0 + 1 / 3.0) * d;
+  EXPECT_NEAR(after.dot(d), -0.6 * v.dot(d), 1e-15);
+  EXPECT_NEAR(lost, 0.5 * 1.2 * (1 - 0.36) * v.dot(d) * v.dot(d), 1e-14);
+  EXPECT_EQ((pair_impulse<2>(laws, 0, 0, d, v, 2.0, 3.0).dissipated), 0);
+  Wall<2> wall{.axis = 0, .normal = {1, 0}, .velocity = 0.5};
+  const auto bounced = wall_impulse<2>(laws, wall, 1, 2.0, v, {});
+  EXPECT_NEAR(bounced.v[0], 0.5 + 0.6 * 1.5, 1e-15);
+  EXPECT_NEAR(0.5 * 2 * (bounced.v.squaredNorm() - v.squaredNorm()),
+              bounced.exchange.work - bounced.exchange.dissipated, 1e-14);
+}
+
+TEST(ContactLaws, PowerLawIsElasticForSlowApproaches) {
+  const ContactLaw ice{.v0 = 0.01, .exponent = 0.234};
+  EXPECT_EQ(ice.at(0.005, 1, 0), 1);
+  EXPECT_NEAR(ice.at(0.1, 1, 0), std::pow(10, -0.234), 1e-15);
+  EXPECT_EQ((ContactLaw{.restitution = 0.5, .rest_speed = 1e-3}.at(9e-4, 1, 1)), 1);
+  EXPECT_EQ((ContactLaw{.restitution = 0.5}.at(2e-8, 1, 1)), 0.5);
+  EXPECT_EQ((ContactLaw{.restitution = 0.5}.at(0.5e-8, 1, 0)), 0);
+}
+
+TEST(ContactLaws, MistakesAreErrorsWithARemedy) {
+  auto system = test::make_system<2>({9, 9}, Boundary::wall, {{2, 2}, {5, 5}}, {{1, 0}, {0, 0}});
+  const auto given = [&](const Parameters& law) { return message_of([&] { set_law(*system, law); }); };
+  EXPECT_NE(given({{"restitution", 1.5}}).find("'restitution' is 1.5; take at most 1"), std::string::npos)
+      << given({{"restitution", 1.5}});
+  EXPECT_NE(given({{"restitution", -0.1}}).find("'restitution'"), std::string::npos);
+  EXPECT_EQ(given({{"between", std::vector<std::string>{"sand", "*"}}}),
+            "'sand' is neither a species nor a wall; give one of: sphere, x-, x+, y-, y+, *");
+  EXPECT_NE(given({{"between", std::vector<std::string>{"x-", "x+"}}}).find("are both walls"), std::string::npos);
+  EXPECT_NE(given({{"between", std::vector<std::string>{"*"}}}).find("two partners"), std::string::npos);
+  set_law(*system, {{"restitution", 0.5}, {"rest_speed", 2.0}});
+  const std::string fast = message_of([&] { test::run_steps<2>(std::move(system), "psa", 0.01, 1); });
+  EXPECT_NE(fast.find("above the thermal speed at the start, 0.5"), std::string::npos) << fast;
+}
+
+/// Conserved: H + dissipated; to rounding in exact methods, at the order of the others.
+TEST(DissipativeContacts, LedgerIsClosedInAllMethods) {
+  for (const std::string method : {"free-flight", "edda", "cdda", "psa", "cva", "mcva"}) {
+    const auto error = [&](double h) {
+      auto system = test::hard_spheres<3>(2, 0.3);
+      set_law(*system, {{"restitution", 0.8}});
+      if (method != "free-flight")
+        add_interaction(*system, "yukawa",
+                        {{"amplitude", 1.0}, {"kappa", 3.0}, {"cutoff", 1.6}, {"cut", std::string("force-shifted")}});
+      auto run = test::run_until<3>(std::move(system), method, h, 1.0);
+      const Statistics& s = run->statistics();
+      EXPECT_GT(s.counters.dissipated.value(), 0.1 * s.energy_initial) << method;
+      EXPECT_NEAR(s.energy_final + s.counters.dissipated.value(), s.energy_initial,
+                  2 * s.max_energy_error + 1e-12 * s.energy_reference + s.first_step_error)
+          << method;
+      return s.max_energy_error / s.energy_reference;
+    };
+    const bool exact = method == "free-flight" || method == "edda" || method == "cdda";
+    const double coarse = error(0.01);
+    EXPECT_LT(coarse, exact ? 1e-13 : 1e-2) << method;
+    if (!exact) {
+      EXPECT_LT(error(0.0025), 0.5 * coarse) << method;
+    }
+  }
+}
+
+/// In the homogeneous cooling state d ln T/d(collisions of a sphere) = −(1 − e²)/3 for a Maxwellian; the first Sonine
+/// correction is (1 + 3 a₂/16)/(1 + 3 a₂/16)-like and below 1 % at e = 0.9 (van Noije, Ernst, Granul. Matter 1 (1998)
+/// 57). One run of 2048 spheres: the error of ln T is about √(2/(3 N)) = 0.018.
+TEST(DissipativeContacts, GasCoolsByHaffsLawOverTenDecades) {
+  auto system = test::hard_spheres<3>(8, 0.05);
+  const double n = static_cast<double>(system->size());
+  set_law(*system, {{"restitution", 0.9}});
+  const auto collisions = static_cast<std::uint64_t>(120 * n);
+  auto run = test::make_run<3>(std::move(system), "free-flight", {.step = 1.0, .collisions = collisions});
+  run->run();
+  const Statistics& s = run->statistics();
+  const double fall = std::log(s.energy_initial / s.energy_final), of_sphere = 2.0 * 120;
+  EXPECT_NEAR(fall / of_sphere, (1 - 0.81) / 3, 0.03 * (1 - 0.81) / 3);
+  EXPECT_LT(s.max_energy_error, 1e-14 * s.energy_reference);
+  EXPECT_LT(s.steps, 1e6);
+}
+
+/// Two spheres of mass 1 and radius 2 at ±10 attract each other, G = 1: they end at rest in contact, at H = −1/4.
+TEST(DissipativeContacts, TwoSpheresFallTogetherAndStay) {
+  for (const std::string method : {"edda", "cdda", "psa"}) {
+    auto system = test::make_system<3>({60, 60, 60}, Boundary::open, {{20, 30, 30}, {40, 30, 30}},
+                                       {Vec<3>::Zero(), Vec<3>::Zero()}, {2, 2});
+    set_law(*system, {{"restitution", 0.5}, {"rest_speed", 1e-6}});
+    add_interaction(*system, "gravity", {{"constant", 1.0}});
+    auto run = test::run_until<3>(std::move(system), method, 0.05, 150);
+    const Statistics& s = run->statistics();
+    const auto& p = run->system().particles;
+    EXPECT_NEAR((p.x[1] - p.x[0]).norm(), 4, 1e-12) << method;
+    EXPECT_LT((p.v[1] - p.v[0]).norm(), 1e-12) << method;
+    EXPECT_NEAR(s.energy_final, -0.25, 1e-12) << method;
+    if (method == "psa") continue;
+    EXPECT_NEAR(s.counters.dissipated.value(), 0.2, 1e-12) << method;
+    EXPECT_LT(s.max_energy_error, 1e-12) << method;
+  }
+}
+
+/// Three bodies in a line collapse for e < 7 − 4√3 (Zhou, Kadanoff, Phys. Rev. E 54 (1996) 623): the run must end.
+TEST(DissipativeContacts, CollapseOfThreeBodiesEnds) {
+  for (const std::string method : {"free-flight", "psa", "edda", "cdda"})
+    for (const double e : {0.05, 0.09}) {
+      auto system =
+          test::make_system<2>({40, 4}, Boundary::open, {{10, 2}, {20, 2}, {30, 2}}, {{1, 0}, {0, 0}, {-1, 0}});
+      set_law(*system, {{"restitution", e}});
+      auto run = test::run_until<2>(std::move(system), method, 0.1, 30);
+      const Statistics& s = run->statistics();
+      EXPECT_LT(s.max_energy_error, 1e-13) << method;
+      EXPECT_LT(s.energy_final, 0.1) << method;
+    }
+}
+
+}  // namespace
+}  // namespace carom
