@@ -43,7 +43,9 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     scan_->begin_slab(report.counters, report.contacts, &piece_->a(), slab.length, watch_);
     if (watch_) watch_->cut();  // a solve changes the accelerations that the next one starts from
     auto& p = system.particles;
-    const auto contact = [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, p); };
+    const auto contact = [&](const Touch<D>& touch) {
+      return resolve_contact<D>(touch.key, touch.normal, system.box, p);
+    };
     double done = 0, longest = slab.length;
     bool ended = false;
     while (!ended) {

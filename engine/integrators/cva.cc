@@ -28,7 +28,9 @@ class CollisionVerlet : public Integrator<D> {
     pieces_->begin_slab(report, slab.length);
     double done = 0;
     for (bool contact = true; contact;) {
-      pieces_->collide(done, [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, system.particles); });
+      pieces_->collide(done, [&](const Touch<D>& touch) {
+        return resolve_contact<D>(touch.key, touch.normal, system.box, system.particles);
+      });
       const double rest = slab.length - done, tau = pieces_->next_contact(rest);
       contact = tau < rest;
       pieces_->advance(contact ? tau : rest);

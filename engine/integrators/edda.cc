@@ -137,7 +137,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       const bool resolved = found_.touching;
       if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(p.x, p.v)))) {
         system.decomposition.need_all();
-        owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, p); });
+        owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) {
+          return resolve_contact<D>(touch.key, touch.normal, system.box, p);
+        });
         found_.touching = !scan.resting().empty();
       }
       const double rest = slab.length - done, piece = std::min({longest, contact, rest});

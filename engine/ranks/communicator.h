@@ -70,7 +70,7 @@ std::vector<Value> gather_values(Communicator& ranks, std::span<const Value> min
 template <class Sums>
 Sums sum_of_all(Communicator& ranks, const Sums& mine) {
   Sums all;
-  if constexpr (requires(Sums sums, Archive& archive) { sums.archive(archive); }) {
+  if constexpr (requires(Sums sums, Archive & archive) { sums.archive(archive); }) {
     Archive out;
     Sums(mine).archive(out);
     for (const Bytes& each : ranks.gather(out.bytes())) {

@@ -23,7 +23,9 @@ struct Scene {
   }
   void resolve() {
     auto& p = system->particles;
-    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles); });
+    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) {
+      return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles);
+    });
   }
   Touch<2> earliest(double rest) { return scan.earliest(system->particles.x, system->particles.v, a, rest); }
 
@@ -72,7 +74,9 @@ TEST(ContactScan, LeavesAPairThatAnEarlierImpulseHasParted) {
   ContactScan<2> scan(*system, 100, reactions);
   scan.begin_slab(counters, nullptr, nullptr, 1.0);
   auto& p = system->particles;
-  scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles); });
+  scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) {
+    return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles);
+  });
   EXPECT_EQ(counters.sphere_sphere, 1u);
   EXPECT_EQ(p.v[2], Vec<2>(0, 0));
 }
@@ -147,8 +151,9 @@ TEST(ContactScan, WhatHasBeenStoppedMayRunIntoSomethingElse) {
   // 0 is pressed on 1 and stops at it; 2, on which no force acts, was slower to leave than 1 is then.
   Scene scene({{3, 3}, {4, 3}, {5, 3}}, {{1e-6, 0}, {0, 0}, {1e-9, 0}}, {{2, 0}, {0, 0}, {0, 0}});
   auto& p = scene.system->particles;
-  const double lost =
-      scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { return resolve_contact<2>(touch.key, touch.normal, scene.system->box, scene.system->particles); });
+  const double lost = scene.scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) {
+    return resolve_contact<2>(touch.key, touch.normal, scene.system->box, scene.system->particles);
+  });
   ASSERT_EQ(scene.contacts.size(), 1u);
   EXPECT_EQ(scene.contacts[0].key.lo, 1u);
   EXPECT_EQ(scene.contacts[0].key.hi, 2u);
@@ -169,7 +174,9 @@ TEST(ContactScan, SlidingKeepsEnergyAndMomentumOfUnequalMasses) {
     const std::vector<Vec<2>> a = {{2, 0}, {-2, 0}};
     scan.begin_slab(counters, nullptr, &a, 1.0);
     auto& p = system->particles;
-    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) { return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles); });
+    scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) {
+      return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles);
+    });
     auto held = a;
     scan.hold(p.v, held, 0.1);
     ASSERT_EQ(scan.resting().size(), 1u);

@@ -82,7 +82,8 @@ TEST(Library, MistakesAreErrorsWithARemedy) {
               "position of particle 0");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.x[1][0] = 2.5; }),
               "particles 0 and 1 overlap");
-  expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.x[1][0] = 5.8; }), "beyond the upper wall of axis 0");
+  expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.x[1][0] = 5.8; }),
+              "beyond the upper wall of axis 0");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.box.edges[1] = 0; }), "edge of the box along axis 1");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.species[1] = 1; }),
               "species of particle 1");
