@@ -14,7 +14,7 @@ namespace carom {
 
 namespace {
 constexpr ColumnChart kError{"error", "largest |H − H₁| so far", true}, kTemperature{"temperature", "temperature"},
-    kPressure{"pressure", "pressure"}, kLedger{"ledger", "energy that left and came in"};
+    kPressure{"pressure", "pressure"};
 }  // namespace
 
 template <int D>
@@ -46,13 +46,13 @@ const std::vector<Column<D>>& columns() {
       {"pressure", number, "energy/length^D", "virial pressure, with the collisions since the last row",  //
        [](S s, int) { return s.pressure; }, "pressure", "pressure", "12.6g", &kPressure},
       {"conserved", number, "energy", "H + dissipated − work − heat",  //
-       [](S s, int) { return s.conserved(); }, "conserved", "conserved_energy", nullptr, &kLedger},
+       [](S s, int) { return s.conserved(); }, "conserved", "conserved_energy"},
       {"dissipated", number, "energy", "energy lost at inelastic contacts so far",  //
-       [](S s, int) { return s.dissipated; }, "dissipated", "dissipated_energy", nullptr, &kLedger},
+       [](S s, int) { return s.dissipated; }, "dissipated", "dissipated_energy"},
       {"work", number, "energy", "work of moving walls so far",  //
-       [](S s, int) { return s.work; }, "work", "work", nullptr, &kLedger},
+       [](S s, int) { return s.work; }, "work", "work"},
       {"heat", number, "energy", "heat from thermal walls and baths so far",  //
-       [](S s, int) { return s.heat; }, "heat", "heat", nullptr, &kLedger}};
+       [](S s, int) { return s.heat; }, "heat", "heat"}};
   return all;
 }
 template const std::vector<Column<2>>& columns();
