@@ -47,7 +47,8 @@ PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np
               "image": "npt.NDArray[np.int32]", "unwrapped": "npt.NDArray[np.float64]", "mass": "npt.NDArray[np.float64]",
               "radius": "npt.NDArray[np.float64]", "charge": "npt.NDArray[np.float64]",
               "species": "npt.NDArray[np.uint16]", "momentum": "npt.NDArray[np.float64]", "species_names": "list[str]",
-              "box": "list[float]", "boundary": "list[str]", "walls": "list[dict[str, Any]]", "contacts": "list[dict[str, Any]]", "bath": "dict[str, Any] | None", "bath_temperature": "float | list[float] | None",
+              "box": "list[float]", "boundary": "list[str]", "walls": "list[dict[str, Any]]", "contacts": "list[dict[str, Any]]",
+              "bath": "dict[str, Any] | None", "bath_temperature": "float | list[float] | None",
               "step": "int", "collisions": "int", "directory": "str | None",
               "averages": "dict[str, dict[str, npt.NDArray[np.float64]]]"}
 VALUES = {"list[float]": "npt.ArrayLike", "list[str]": "Sequence[str]", "list[tuple[int, int]]": "npt.ArrayLike"}
