@@ -20,8 +20,7 @@ const std::vector<Parameter>& contact_parameters() {
         restitution,
         {"rest_speed", real, "none", "length/time",
          "slower approaches end at rest in methods with steps and are elastic in free flight; 1e-8 of the thermal "
-         "speed "
-         "where absent",
+         "speed where absent",
          Range::non_negative}};
   }();
   return all;

@@ -27,7 +27,7 @@ struct Impulse {
   double dissipated;  ///< energy lost
 };
 
-/// A contact of two spheres whose contact distance grows at the rate w; d as above.
+/// A contact of two spheres, with d as above; the contact distance grows at the rate w.
 template <int D>
 Impulse pair_impulse(const ContactLaws& laws, std::uint16_t species_i, std::uint16_t species_j, const Vec<D>& d,
                      const Vec<D>& v, double mass_i, double mass_j, double sigma = 0, double w = 0) {

@@ -54,9 +54,8 @@ class PrimitiveSplitting : public Integrator<D> {
     scan.stop_within(length);
     settle(system, 0);
     kick(p.v, accelerations_.a, 0.5 * length);
-    bool touching = !scan.resting().empty();
-    if (touching) scan.stop_approach(p.x, p.v, 0.5 * length);
-    touching = settle(system, 0);
+    if (!scan.resting().empty()) scan.stop_approach(p.x, p.v, 0.5 * length);
+    bool touching = settle(system, 0);
     for (double done = 0, contact = kNever; done < length;) {
       const double rest = length - done, piece = std::min(rest, contact);
       kicked_ = p.v;
