@@ -129,6 +129,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   const auto make_monitor = [&] {
     monitor_ = std::make_unique<Monitor<D>>(*system_, info_, plan_, observers_, s);
     system_->fields.add_value("quiet since", quiet_since_);
+    system_->fields.add_value("bath", system_->box.bath);
     system_->fields.add_value("step count", count_);
   };
   const bool again = monitor_ != nullptr;

@@ -49,6 +49,7 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   walls_at_ = std::numeric_limits<double>::quiet_NaN();  // they may move otherwise from now on
   events_ = 0;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
+  fallen_back_.clear();
   note_pressed();
 }
 
@@ -107,7 +108,7 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
     const double speed = normal_speed(touch, v);
     if (speed < -stopping_speed(touch, v) && !(all_stop && dissipates(touch.key)))
       approaching_.push_back(touch);
-    else if (speed <= resting_speed(touch, v))
+    else if (speed <= holding_speed(touch, v))
       resting_.push_back({.key = without_time(touch.key), .normal = touch.normal});
   }
 }
@@ -120,6 +121,15 @@ double ContactScan<D>::known_force(const EventKey<D>& key) const {
 }
 
 template <int D>
+bool ContactScan<D>::falls_back(const EventKey<D>& key, double closing, double speed, double sigma) {
+  if (!(closing > 0) || speed > std::max(speed_of_rest(closing, sigma), slowest_bounce(key, closing))) return false;
+  const EventKey<D> partners = without_time(key);
+  if (std::ranges::find(fallen_back_, partners, &std::pair<EventKey<D>, double>::first) != fallen_back_.end()) return false;
+  fallen_back_.push_back({partners, closing});
+  return true;
+}
+
+template <int D>
 double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
                                      const Vec<D>& v_hi) const {
   const bool pair = key.kind == EventKind::pair;
@@ -129,8 +139,7 @@ double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& norma
   const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
   const double closing = pressing(key, normal);
   if (!(closing > 0)) return rounding;
-  return std::max(rounding,
-                  std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces));
+  return std::max(rounding, speed_of_rest(closing, sigma));
 }
 
 template <int D>
@@ -139,9 +148,7 @@ double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& norm
   const double resting = resting_speed(key, normal, v_lo, v_hi);
   if (resting < 0 || !dissipates(key)) return resting;
   const double closing = std::max(0.0, pressing(key, normal));
-  const auto& species = particles_.species;
-  const ContactLaw& law = key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
-                                                      : box_.contacts.of_wall(species[key.lo], key.hi);
+  const ContactLaw& law = law_of(key);
   // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
   const double kick = kick_ * closing, e = law.at(kick, 0, 0);
   return std::max(resting, law.slowest(box_.contacts.thermal_speed) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces));
@@ -149,10 +156,29 @@ double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& norm
 
 template <int D>
 bool ContactScan<D>::dissipates(const EventKey<D>& key) const {
-  if (box_.contacts.elastic()) return false;
+  return !box_.contacts.elastic() && !law_of(key).elastic();
+}
+
+template <int D>
+const ContactLaw& ContactScan<D>::law_of(const EventKey<D>& key) const {
   const auto& species = particles_.species;
-  return key.kind == EventKind::pair ? !box_.contacts.of_pair(species[key.lo], species[key.hi]).elastic()
-                                     : !box_.contacts.of_wall(species[key.lo], key.hi).elastic();
+  return key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
+                                     : box_.contacts.of_wall(species[key.lo], key.hi);
+}
+
+/// A contact that dissipates, and opens more slowly than this, closes again within the step so slowly that it stops.
+template <int D>
+double ContactScan<D>::slowest_bounce(const EventKey<D>& key, double closing) const {
+  if (!dissipates(key) || !(closing > 0)) return 0;
+  return std::min(law_of(key).slowest(box_.contacts.thermal_speed), 0.5 * closing * length_);
+}
+
+/// A contact is held if it opens more slowly than this.
+template <int D>
+double ContactScan<D>::holding_speed(const Touch<D>& touch, Positions<D> v) const {
+  const double resting = resting_speed(touch, v);
+  if (resting < 0 || !dissipates(touch.key)) return resting;
+  return std::max(resting, slowest_bounce(touch.key, pressing(touch.key, touch.normal)));
 }
 
 /// The acceleration at which a contact would close by forces and, if contacts dissipate, by other reactions.
@@ -164,7 +190,9 @@ double ContactScan<D>::pressing(const EventKey<D>& key, const Vec<D>& normal) co
   if (a_ && key.lo < a_->size()) a = between(*a_);
   if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
   const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
-  const double closing = std::max(known_force(key) * inverse_mass, -a.dot(normal) / normal.norm());
+  double closing = std::max(known_force(key) * inverse_mass, -a.dot(normal) / normal.norm());
+  for (const auto& [partners, acceleration] : fallen_back_)
+    if (partners == without_time(key)) closing = std::max(closing, acceleration);
   return held_.empty() ? closing : std::max(closing, -(a + between(held_)).dot(normal) / normal.norm());
 }
 

@@ -144,12 +144,22 @@ class ContactScan {
   /// speed of its law.
   double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
 
+  /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end of
+  /// the step. False if this is known already.
+  bool falls_back(const EventKey<D>& key, double closing, double speed, double sigma);
+
   /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
   void stop_within(double time) { kick_ = time; }
 
  private:
   double pressing(const EventKey<D>& key, const Vec<D>& normal) const;
+  double speed_of_rest(double closing, double sigma) const {
+    return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);
+  }
   bool dissipates(const EventKey<D>& key) const;
+  const ContactLaw& law_of(const EventKey<D>& key) const;  // unless all contacts are elastic
+  double slowest_bounce(const EventKey<D>& key, double closing) const;
+  double holding_speed(const Touch<D>& touch, Positions<D> v) const;
   double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);
   void sort_out(Positions<D> v, bool all_stop = false);
@@ -194,6 +204,7 @@ class ContactScan {
   std::vector<Reaction<D>>& reactions_;
   std::vector<double> pressed_;  // by particle: Σ |acceleration| over its reactions
   std::vector<Vec<D>> held_;     // by particle: its acceleration by reactions; empty if no contact dissipates
+  std::vector<std::pair<EventKey<D>, double>> fallen_back_;  // contacts, and the accelerations that closed them again
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
 };

@@ -186,10 +186,11 @@ void Session<D>::add_wall(Parameters given) {
 
 template <int D>
 void Session<D>::add_contact(Parameters given) {
+  if (running_) refuse("a run is going on; change the laws of contacts before it or after it");
   auto all = contacts_;
   all.push_back(completed("contact", contact_parameters(), std::move(given)));
-  change("add contacts");
   set_contacts(std::move(all));
+  if (shown_until_ < 0) change("add contacts");
 }
 
 /// Sets these laws for the present species and walls.
@@ -231,7 +232,10 @@ bool Session<D>::reached(const Plan& plan) const {
 
 /// A part of the saved state, with the next due times recomputed if the interval has changed.
 template <int D>
-Bytes Session<D>::saved(const std::string& name, double interval) const {
+Bytes Session<D>::saved(const std::string& name, double interval) {
+  Archive present;  // which may have changed since the state was saved
+  if (name == "bath") present(box_.bath);
+  if (!present.bytes().empty()) return present.bytes();
   if (checkpoint_) return checkpoint_->read(name);
   if ((name != "next frame" && name != "next row") || interval == interval_ || interval == 0) return state_.at(name);
   auto next = static_cast<std::int64_t>(std::floor((state_time_ + 1e-9 * step_) / interval)) + 1;
@@ -371,6 +375,13 @@ const Snapshot<D>& Session<D>::shot() {
   shot_->collisions = statistics_.counters.sphere_sphere;
   shot_->max_energy_error = statistics_.max_energy_error;
   return *shot_;
+}
+
+template <int D>
+std::map<std::string, double> Session<D>::wall_loads() {
+  std::map<std::string, double> loads;
+  for (const WallLoad& each : shot().walls) loads[box_.name_of(each.number)] += each.load();
+  return loads;
 }
 
 template class Session<2>;

@@ -64,7 +64,7 @@ class Session {
   void set_bath(Parameters given);
   /// Changes its temperature; the next run() goes on.
   void set_bath_temperature(double temperature);
-  /// Sets the law of contacts between two partners, which must be there already.
+  /// Sets the law of contacts between two partners, which must be there already; the next run() goes on.
   void add_contact(Parameters given);
   void add_force(std::string_view type, Parameters given);
   void set_integrator(std::string_view name, Parameters given);
@@ -101,6 +101,8 @@ class Session {
   const std::vector<Force>& forces() const { return terms_.all(); }
   const std::vector<Parameters>& walls() const { return walls_; }
   const std::vector<Parameters>& contacts() const { return contacts_; }
+  /// By name: the pressure on each face of the box that is a wall, and the force on each further wall, since the last row.
+  std::map<std::string, double> wall_loads();
   /// None, or one.
   const std::vector<Parameters>& baths() const { return baths_; }
   /// During a run: only in RunHooks::show.
@@ -118,7 +120,7 @@ class Session {
   void set_contacts(std::vector<Parameters> all);
   void set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what);
   bool reached(const Plan& plan) const;
-  Bytes saved(const std::string& name, double interval) const;
+  Bytes saved(const std::string& name, double interval);
   void rest(Particles<D>& particles);
   void show(const Snapshot<D>& shot, const RunHooks& hooks);
   void describe(Plan& plan, bool begun, const RunHooks& hooks);

@@ -62,6 +62,8 @@ Session<D>::Session(Deck& deck, Resumed& from) {
   views_.rest(system_->particles);
 
   Archive(from.checkpoint->read("statistics"))(statistics_);
+  Archive(from.checkpoint->read("bath"))(box_.bath);
+  system_->box = box_;
   checkpoint_ = std::make_shared<Checkpoint>(std::move(*from.checkpoint));
   head_ = from.head;
   state_time_ = shown_until_ = statistics_.end_time;

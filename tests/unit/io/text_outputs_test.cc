@@ -40,7 +40,7 @@ std::string contents(const fs::path& path) {
 TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   const auto path = fresh_directory() / "thermo.csv";
   const auto system = test::sample_system<3>();
-  ThermoWriter<3> writer(path);
+  ThermoWriter<3> writer(path, system->box);
   writer.thermo(test::sample_snapshot<3>(system->particles, 0.1, 7));
   std::istringstream in(contents(path));  // before the file is closed
   std::string header, row, cell;
