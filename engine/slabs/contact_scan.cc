@@ -97,6 +97,12 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
       note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
     }
   std::ranges::sort(touching_, {}, &Touch<D>::key);
+  auto known = reactions_.begin();  // in the order of keys too, so each touch finds its reaction from there on
+  for (Touch<D>& touch : touching_) {
+    const EventKey<D> partners = without_time(touch.key);
+    while (known != reactions_.end() && known->key < partners) ++known;
+    touch.force = known != reactions_.end() && known->key == partners ? known->force : 0.0;
+  }
 }
 
 /// Sorts the contacts into approaching and resting ones. `all_stop`: contacts that dissipate rest if they approach.
@@ -105,11 +111,11 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   approaching_.clear();
   resting_.clear();
   for (const Touch<D>& touch : touching_) {
-    const double speed = normal_speed(touch, v);
-    if (speed < -stopping_speed(touch, v) && !(all_stop && dissipates(touch.key)))
+    const double speed = normal_speed(touch, v), resting = resting_speed(touch, v);
+    if (speed < -stopping_speed(touch.key, touch.normal, touch.force, resting) && !(all_stop && dissipates(touch.key)))
       approaching_.push_back(touch);
-    else if (speed <= holding_speed(touch, v))
-      resting_.push_back({.key = without_time(touch.key), .normal = touch.normal});
+    else if (speed <= holding_speed(touch, resting))
+      resting_.push_back({.key = without_time(touch.key), .normal = touch.normal, .force = touch.force});
   }
 }
 
@@ -130,14 +136,14 @@ bool ContactScan<D>::falls_back(const EventKey<D>& key, double closing, double s
 }
 
 template <int D>
-double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
+double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
                                      const Vec<D>& v_hi) const {
   const bool pair = key.kind == EventKind::pair;
   // Nothing rests on a thermal wall.
   if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) return -std::numeric_limits<double>::min();
   const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
   const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
-  const double closing = pressing(key, normal);
+  const double closing = pressing(key, normal, force);
   if (!(closing > 0)) return rounding;
   return std::max(rounding, speed_of_rest(closing, sigma));
 }
@@ -145,9 +151,15 @@ double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& norma
 template <int D>
 double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
                                       const Vec<D>& v_hi) const {
-  const double resting = resting_speed(key, normal, v_lo, v_hi);
+  const double force = known_force(key);
+  return stopping_speed(key, normal, force, resting_speed(key, normal, force, v_lo, v_hi));
+}
+
+template <int D>
+double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
+                                      double resting) const {
   if (resting < 0 || !dissipates(key)) return resting;
-  const double closing = std::max(0.0, pressing(key, normal));
+  const double closing = std::max(0.0, pressing(key, normal, force));
   const ContactLaw& law = law_of(key);
   // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
   const double kick = kick_ * closing, e = law.at(kick, 0, 0);
@@ -175,22 +187,21 @@ double ContactScan<D>::slowest_bounce(const EventKey<D>& key, double closing) co
 
 /// A contact is held if it opens more slowly than this.
 template <int D>
-double ContactScan<D>::holding_speed(const Touch<D>& touch, Positions<D> v) const {
-  const double resting = resting_speed(touch, v);
+double ContactScan<D>::holding_speed(const Touch<D>& touch, double resting) const {
   if (resting < 0 || !dissipates(touch.key)) return resting;
-  return std::max(resting, slowest_bounce(touch.key, pressing(touch.key, touch.normal)));
+  return std::max(resting, slowest_bounce(touch.key, pressing(touch.key, touch.normal, touch.force)));
 }
 
 /// The acceleration at which a contact would close by forces and, if contacts dissipate, by other reactions.
 template <int D>
-double ContactScan<D>::pressing(const EventKey<D>& key, const Vec<D>& normal) const {
+double ContactScan<D>::pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const {
   const bool pair = key.kind == EventKind::pair;
   const auto between = [&](const std::vector<Vec<D>>& w) { return pair ? Vec<D>(w[key.lo] - w[key.hi]) : w[key.lo]; };
   Vec<D> a = Vec<D>::Zero();
   if (a_ && key.lo < a_->size()) a = between(*a_);
   if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
   const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
-  double closing = std::max(known_force(key) * inverse_mass, -a.dot(normal) / normal.norm());
+  double closing = std::max(force * inverse_mass, -a.dot(normal) / normal.norm());
   for (const auto& [partners, acceleration] : fallen_back_)
     if (partners == without_time(key)) closing = std::max(closing, acceleration);
   return held_.empty() ? closing : std::max(closing, -(a + between(held_)).dot(normal) / normal.norm());
@@ -246,7 +257,6 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
       break;
     if (!approaching_.empty()) count_event(approaching_.front().key);
   }
-  for (auto& contact : resting_) contact.force = known_force(contact.key);
   return lost;
 }
 
