@@ -285,8 +285,8 @@ std::vector<WallLoad> Monitor<D>::wall_loads(double time) {
     const double impulse = wall.number < tallies.size() ? tallies[wall.number].impulse.value() : 0;
     if (last_row_impulses_.size() <= wall.number) last_row_impulses_.resize(wall.number + 1);
     const double since = impulse - std::exchange(last_row_impulses_[wall.number], impulse);
-    loads.push_back({wall.number, elapsed > 0 ? since / elapsed : 0,
-                     wall.axis >= 0 ? lengths.prod() / lengths[wall.axis] : 0});
+    loads.push_back(
+        {wall.number, elapsed > 0 ? since / elapsed : 0, wall.axis >= 0 ? lengths.prod() / lengths[wall.axis] : 0});
   }
   return loads;
 }

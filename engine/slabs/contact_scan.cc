@@ -67,20 +67,25 @@ void ContactScan<D>::note_pressed() {
   }
 }
 
-/// Finds all contacts at x, in the order of their keys.
+/// Finds all contacts at x, in the order of their keys, and gaps so small that contacts may be held there.
 template <int D>
 void ContactScan<D>::find_touching(double time, Positions<D> x) {
   touching_.clear();
+  widest_ = 0;
+  if (!box_.contacts.elastic())
+    for (const ContactLaw& law : box_.contacts.all())
+      if (!law.elastic())
+        widest_ = std::max(widest_, law.slowest(box_.contacts.thermal_speed) * length_ / kMostBounces);
   const auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma, double speed = 0) {
     counters_->max_overlap = std::max(counters_->max_overlap, -gap / sigma);
-    touching_.push_back({key, normal, speed});
+    touching_.push_back({.key = key, .normal = normal, .speed = speed, .gap = gap});
   };
   EventKey<D> key;
   key.time = time;
-  for (const auto& pair : list_.cover(x)) {
+  for (const auto& pair : list_.cover(x, 0.5 * widest_)) {
     const Vec<D> d = x[pair.i] - x[pair.j] + box_.shift(pair.image);
-    const double sigma = contact_distance(pair.i, pair.j);
-    if (!touches(d, sigma)) continue;
+    const double sigma = contact_distance(pair.i, pair.j), reach = sigma + std::max(tolerance(sigma), widest_);
+    if (d.squaredNorm() > reach * reach) continue;
     key.lo = pair.i;
     key.hi = pair.j;
     key.image = pair.image;
@@ -91,7 +96,7 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   for (Id i = 0; i < x.size(); ++i)
     for (const Wall<D>& wall : walls()) {
       const double gap = wall.gap(x[i], particles_.radius[i]);
-      if (gap > tolerance(particles_.radius[i])) continue;
+      if (gap > std::max(tolerance(particles_.radius[i]), widest_)) continue;
       key.lo = i;
       key.hi = wall.number;
       note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
@@ -103,6 +108,7 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
     while (known != reactions_.end() && known->key < partners) ++known;
     touch.force = known != reactions_.end() && known->key == partners ? known->force : 0.0;
   }
+  std::erase_if(touching_, [&](const Touch<D>& touch) { return open(touch) && touch.gap > holding_gap(touch); });
 }
 
 /// Sorts the contacts into approaching and resting ones. `all_stop`: contacts that dissipate rest if they approach.
@@ -112,7 +118,9 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   resting_.clear();
   for (const Touch<D>& touch : touching_) {
     const double speed = normal_speed(touch, v), resting = resting_speed(touch, v);
-    if (speed < -stopping_speed(touch.key, touch.normal, touch.force, resting) && !(all_stop && dissipates(touch.key)))
+    if (passes_by(touch, speed)) continue;
+    if (!open(touch) && speed < -stopping_speed(touch.key, touch.normal, touch.force, resting) &&
+        !(all_stop && dissipates(touch.key)))
       approaching_.push_back(touch);
     else if (speed <= holding_speed(touch, resting))
       resting_.push_back({.key = without_time(touch.key), .normal = touch.normal, .force = touch.force});
@@ -130,7 +138,8 @@ template <int D>
 bool ContactScan<D>::falls_back(const EventKey<D>& key, double closing, double speed, double sigma) {
   if (!(closing > 0) || speed > std::max(speed_of_rest(closing, sigma), slowest_bounce(key, closing))) return false;
   const EventKey<D> partners = without_time(key);
-  if (std::ranges::find(fallen_back_, partners, &std::pair<EventKey<D>, double>::first) != fallen_back_.end()) return false;
+  if (std::ranges::find(fallen_back_, partners, &std::pair<EventKey<D>, double>::first) != fallen_back_.end())
+    return false;
   fallen_back_.push_back({partners, closing});
   return true;
 }
@@ -183,6 +192,15 @@ template <int D>
 double ContactScan<D>::slowest_bounce(const EventKey<D>& key, double closing) const {
   if (!dissipates(key) || !(closing > 0)) return 0;
   return std::min(law_of(key).slowest(box_.contacts.thermal_speed), 0.5 * closing * length_);
+}
+
+/// A contact that dissipates is held where it is if the gap is as small as this: a bounce at an eighth of the speed at
+/// which approaches end opens it as far.
+template <int D>
+double ContactScan<D>::holding_gap(const Touch<D>& touch) const {
+  if (!dissipates(touch.key)) return 0;
+  const double closing = pressing(touch.key, touch.normal, touch.force), slowest = slowest_bounce(touch.key, closing);
+  return closing > 0 ? slowest * slowest / (2 * kMostBounces * closing) : 0;
 }
 
 /// A contact is held if it opens more slowly than this.
@@ -252,7 +270,10 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
     lost += stop_rounding(v) + stop_approach(x, v);
     if (dissipative) lost -= count_dissipated(before, v);
     sort_out(v, all_stop);  // a sphere that was stopped may have been moving away from another contact
-    const auto slow = [&](const Touch<D>& touch) { return normal_speed(touch, v) < -resting_speed(touch, v); };
+    const auto slow = [&](const Touch<D>& touch) {
+      const double speed = normal_speed(touch, v);
+      return speed < -resting_speed(touch, v) && !passes_by(touch, speed);
+    };
     if (approaching_.empty() && !(dissipative && generation < kMostRounds && std::ranges::any_of(touching_, slow)))
       break;
     if (!approaching_.empty()) count_event(approaching_.front().key);
@@ -371,7 +392,7 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     contact.bound = pair ? 0.0 : length < 0 ? -mean_speed(hi, length) : mean_speed(hi, length);
     contact.slack = 0.125 * normal_slack(contact, w_before);  // about 30 ε of the speeds, as good as a new solution
     const double touching = tolerance(sigma);
-    if (std::abs(gap) <= 0.5 * touching) continue;
+    if (std::abs(gap) <= 0.5 * touching || (gap > 0 && dissipates(contact.key))) continue;
     // The rounding of many pieces has opened or closed the contact. It is corrected at a speed that counts as rest. In
     // short pieces the rounding of positions, ε x, would undo this; so from an overlap beyond the tolerance the contact
     // returns by a few ε x at once, unless the piece is so short that this takes more than 10⁻⁶ of the speeds: the work
@@ -416,8 +437,9 @@ template <int D>
 void ContactScan<D>::drop_open(Positions<D> x) {
   std::erase_if(resting_, [&](const auto& contact) {
     const auto& [key, x_lo] = std::pair(contact.key, x[contact.key.lo]);
-    if (key.kind == EventKind::pair) return !touches(normal(key, x), contact_distance(key.lo, key.hi));
-    return box_.wall(key.hi).gap(x_lo, particles_.radius[key.lo]) > tolerance(particles_.radius[key.lo]);
+    const double gap = key.kind == EventKind::pair ? normal(key, x).norm() - distance(key)
+                                                   : box_.wall(key.hi).gap(x_lo, distance(key));
+    return gap > std::max(tolerance(distance(key)), widest_);
   });
 }
 

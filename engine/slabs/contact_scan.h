@@ -33,6 +33,7 @@ struct Touch {
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
   double speed = 0;  ///< of a wall along the normal
   double force = 0;  ///< the reaction of a present contact in the last piece [force]
+  double gap = 0;    ///< of a present contact [length]
   bool pair() const { return key.kind == EventKind::pair; }
 };
 
@@ -142,8 +143,8 @@ class ContactScan {
   /// speed of its law. `normal` may have any length.
   double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
 
-  /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end of
-  /// the step. False if this is known already.
+  /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end
+  /// of the step. False if this is known already.
   bool falls_back(const EventKey<D>& key, double closing, double speed, double sigma);
 
   /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
@@ -163,6 +164,15 @@ class ContactScan {
   const ContactLaw& law_of(const EventKey<D>& key) const;  // unless all contacts are elastic
   double slowest_bounce(const EventKey<D>& key, double closing) const;
   double holding_speed(const Touch<D>& touch, double resting) const;
+  double holding_gap(const Touch<D>& touch) const;
+  bool open(const Touch<D>& touch) const { return touch.gap > tolerance(distance(touch.key)); }
+  /// Whether a contact that is open closes too fast to be held where it is.
+  bool passes_by(const Touch<D>& touch, double speed) const {
+    return open(touch) && speed < -law_of(touch.key).slowest(box_.contacts.thermal_speed);
+  }
+  double distance(const EventKey<D>& key) const {
+    return key.kind == EventKind::pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
+  }
   double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);
   void sort_out(Positions<D> v, bool all_stop = false);
@@ -205,6 +215,7 @@ class ContactScan {
   SlabWatch* watch_ = nullptr;
   const std::vector<Vec<D>>* a_ = nullptr;
   double length_ = 0, kick_ = 0;
+  double widest_ = 0;  // gap of a contact that may be held
   std::vector<Reaction<D>>& reactions_;
   std::vector<double> pressed_;  // by particle: Σ |acceleration| over its reactions
   std::vector<Vec<D>> held_;     // by particle: its acceleration by reactions; empty if no contact dissipates

@@ -212,11 +212,11 @@ FlightEnd<D> SlabCore<D>::serve() {
     const bool pair = key.kind == EventKind::pair;
     if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
     if (resolved_ && !(key.time > 0)) continue;  // rounding
+    if (!box_.contacts.elastic() && at_the_end(key)) continue;
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses no spheres together: elastic contacts that do not approach need no impulse.
     if (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key))) {
       if (falls_back(key)) return {.complete = false, .key = key, .falls_back = true};
-      if (at_the_end(key)) continue;
       return {.complete = false, .time = box_.contacts.elastic() ? key.time : end_before(key), .key = key};
     }
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
@@ -330,16 +330,20 @@ double SlabCore<D>::end_before(const EventKey<D>& key) const {
   return end > both_fly_from ? end : key.time;
 }
 
-/// Whether a contact is so close to the end of the slab that the spheres overlap there by less than a quarter of the
-/// tolerance: it belongs to the next slab.
+/// Whether a contact is so close to the end of the slab, or so slow, that the spheres overlap there by less than a
+/// quarter of the tolerance: it belongs to the next slab.
 template <int D>
 bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
-  return -meeting.speed * (length_ - key.time) <= 0.25 * scan_->tolerance(meeting.sigma);
+  const double gap = key.kind == EventKind::pair
+                         ? meeting.normal.norm() - meeting.sigma
+                         : box_.wall(key.hi).gap(position(key.lo, key.time), meeting.sigma, key.time);
+  return gap + meeting.speed * (length_ - key.time) >= -0.25 * scan_->tolerance(meeting.sigma);
 }
 
-/// Whether the spheres touch at the start and come together again before the contact has opened by what a contact at rest
-/// may: then it rests, which the accelerations before this flight did not show. True once for each contact in a step.
+/// Whether the spheres touch at the start and come together again before the contact has opened by what a contact at
+/// rest may: then it rests, which the accelerations before this flight did not show. True once for each contact in a
+/// step.
 template <int D>
 bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   const bool pair = key.kind == EventKind::pair;
@@ -347,8 +351,8 @@ bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   EventKey<D> at_start = key;
   at_start.time = 0;
   const Meeting meeting(*this, key), before(*this, at_start);
-  const double gap = pair ? before.normal.norm() - before.sigma
-                          : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
+  const double gap =
+      pair ? before.normal.norm() - before.sigma : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
   if (!(gap <= scan_->tolerance(before.sigma)) || !(before.speed > 0)) return false;
   return scan_->falls_back(key, (before.speed - meeting.speed) / key.time, before.speed, before.sigma);
 }

@@ -63,7 +63,9 @@ std::string columns_page() {
   for (const Column<3>& column : columns<3>())
     text += fmt::format("    {}{} [{}]: {}\n", column.name, column.components() > 1 ? "_x, _y, _z" : "", column.unit,
                         column.meaning);
-  text += "    pressure_x-, … [energy/length^D]: mean force per area on a face of the box that is a wall, since the last row\n";
+  text +=
+      "    pressure_x-, … [energy/length^D]: mean force per area on a face of the box that is a wall, since the last "
+      "row\n";
   text += "    force_NAME [energy/length]: mean force on a further wall, since the last row\n";
   return text;
 }
@@ -89,7 +91,8 @@ ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path, const Box<D>& b
   std::vector<std::string> names;
   for (const Wall<D>& wall : box.walls()) {
     std::string name = (wall.axis >= 0 ? "pressure_" : "force_") + box.name_of(wall.number);
-    std::ranges::replace_if(name, [](char c) { return c == ',' || c == '"' || c == '\n' || c == '\r'; }, '_');
+    std::ranges::replace_if(
+        name, [](char c) { return c == ',' || c == '"' || c == '\n' || c == '\r'; }, '_');
     const auto known = std::ranges::find(names, name);
     column_of_wall_.push_back(static_cast<std::size_t>(known - names.begin()));
     if (known == names.end()) names.push_back(std::move(name));

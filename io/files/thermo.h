@@ -63,8 +63,8 @@ ThermoPoint last_thermo_point(const std::filesystem::path& path);
 template <int D>
 class ThermoWriter : public Observer<D> {
  public:
-  /// Creates the file with its header, which has a column for each wall of the box, or opens it again and continues from
-  /// the mark. Throws Error(Failure::file).
+  /// Creates the file with its header, which has a column for each wall of the box, or opens it again and continues
+  /// from the mark. Throws Error(Failure::file).
   ThermoWriter(const std::filesystem::path& path, const Box<D>& box, const std::optional<FileMark>& mark = {});
 
   /// Appends a row. Throws Error(Failure::file).

@@ -232,10 +232,7 @@ bool Session<D>::reached(const Plan& plan) const {
 
 /// A part of the saved state, with the next due times recomputed if the interval has changed.
 template <int D>
-Bytes Session<D>::saved(const std::string& name, double interval) {
-  Archive present;  // which may have changed since the state was saved
-  if (name == "bath") present(box_.bath);
-  if (!present.bytes().empty()) return present.bytes();
+Bytes Session<D>::saved(const std::string& name, double interval) const {
   if (checkpoint_) return checkpoint_->read(name);
   if ((name != "next frame" && name != "next row") || interval == interval_ || interval == 0) return state_.at(name);
   auto next = static_cast<std::int64_t>(std::floor((state_time_ + 1e-9 * step_) / interval)) + 1;

@@ -101,7 +101,8 @@ class Session {
   const std::vector<Force>& forces() const { return terms_.all(); }
   const std::vector<Parameters>& walls() const { return walls_; }
   const std::vector<Parameters>& contacts() const { return contacts_; }
-  /// By name: the pressure on each face of the box that is a wall, and the force on each further wall, since the last row.
+  /// By name: the pressure on each face of the box that is a wall, and the force on each further wall, since the last
+  /// row.
   std::map<std::string, double> wall_loads();
   /// None, or one.
   const std::vector<Parameters>& baths() const { return baths_; }
@@ -120,7 +121,7 @@ class Session {
   void set_contacts(std::vector<Parameters> all);
   void set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what);
   bool reached(const Plan& plan) const;
-  Bytes saved(const std::string& name, double interval);
+  Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);
   void show(const Snapshot<D>& shot, const RunHooks& hooks);
   void describe(Plan& plan, bool begun, const RunHooks& hooks);

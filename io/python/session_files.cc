@@ -24,6 +24,17 @@ void set_ends(Deck& deck, const Plan& plan) {
   deck.toml_text = write_deck(deck.source->values);
 }
 
+/// Sets the tables of this name in a deck.
+void set_tables(Deck& deck, const std::string& name, const std::vector<Parameters>& all) {
+  auto& tables = deck.source->values.list(name);
+  tables.clear();
+  for (const Parameters& each : all) {
+    ValueTable& table = tables.emplace_back();
+    table.schema = &table_schema(name);
+    table.values = each;
+  }
+}
+
 /// Changes a value of a run's state by its name.
 template <class T>
 void change_value(const Fields& fields, const std::string& name, const std::function<void(T&)>& change) {
@@ -62,8 +73,6 @@ Session<D>::Session(Deck& deck, Resumed& from) {
   views_.rest(system_->particles);
 
   Archive(from.checkpoint->read("statistics"))(statistics_);
-  Archive(from.checkpoint->read("bath"))(box_.bath);
-  system_->box = box_;
   checkpoint_ = std::make_shared<Checkpoint>(std::move(*from.checkpoint));
   head_ = from.head;
   state_time_ = shown_until_ = statistics_.end_time;
@@ -96,6 +105,8 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
     build_system<D>(deck);
     deck_ = std::move(deck);
   } else {
+    set_tables(*deck_, "contact", contacts_);  // laws and the bath may have changed since the last run
+    set_tables(*deck_, "bath", baths_);
     set_ends(*deck_, plan);
   }
   const Plan& of = deck_->plan;

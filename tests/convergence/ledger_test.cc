@@ -24,9 +24,9 @@ void set_law(System<D>& system, const Parameters& given) {
   add_contact<D>(system.box, system.species, completed("contact", contact_parameters(), all));
 }
 
-/// The fall of ln T per collision of a sphere in the homogeneous cooling state of a dilute gas, with the excess a₂ of the
-/// fourth moment to first order: (1 − e²)/3 · (1 + 3a₂/16) per collision at the Maxwellian rate, which is 1 + a₂/16 times
-/// the true one (van Noije, Ernst, Granul. Matter 1 (1998) 57, eq. 8 and 10).
+/// The fall of ln T per collision of a sphere in the homogeneous cooling state of a dilute gas, with the excess a₂ of
+/// the fourth moment to first order: (1 − e²)/3 · (1 + 3a₂/16) per collision at the Maxwellian rate, which is 1 + a₂/16
+/// times the true one (van Noije, Ernst, Granul. Matter 1 (1998) 57, eq. 8 and 10).
 double excess(double e) { return 16 * (1 - e) * (1 - 2 * e * e) / (81 - 17 * e + 30 * e * e * (1 - e)); }
 double cooling(double e) { return (1 - e * e) / 3 * (1 + 3 * excess(e) / 16) / (1 - excess(e) / 16); }
 
@@ -62,8 +62,8 @@ class Rows : public Observer<D> {
   const Simulation<D>& run_;
 };
 
-/// Independent gases of 500 spheres at packing fraction 0.02, too few to form clusters, over 40 collisions of a sphere from
-/// the tenth on.
+/// Independent gases of 500 spheres at packing fraction 0.02, too few to form clusters, over 40 collisions of a sphere
+/// from the tenth on.
 TEST(Haff, CoolingRateWithTheFirstSonineCorrection) {
   for (const double e : {0.95, 0.8, 0.6}) {
     std::vector<double> rates;
@@ -82,16 +82,16 @@ TEST(Haff, CoolingRateWithTheFirstSonineCorrection) {
       EXPECT_LE(s.max_energy_error, 1e-13 * s.energy_reference);
     }
     const auto [rate, error] = mean_of(rates);
-    std::printf("e = %.2f: cooling %.5f ± %.5f a collision, literature %.5f, Maxwellian %.5f\n", e, rate, error, cooling(e),
-                (1 - e * e) / 3);
+    std::printf("e = %.2f: cooling %.5f ± %.5f a collision, literature %.5f, Maxwellian %.5f\n", e, rate, error,
+                cooling(e), (1 - e * e) / 3);
     EXPECT_LT(error, 0.004 * rate);
     EXPECT_NEAR(rate, cooling(e), 4 * error);
   }
 }
 
-/// A plain code for three point masses on a line, of which the outer ones approach: the relative speeds (closing) of the two
-/// gaps change by each collision, until all gaps open or a collision is slower than `slow`. Returns the kinetic energy
-/// relative to the centre of mass.
+/// A plain code for three point masses on a line, of which the outer ones approach: the relative speeds (closing) of
+/// the two gaps change by each collision, until all gaps open or a collision is slower than `slow`. Returns the kinetic
+/// energy relative to the centre of mass.
 double three_in_a_row(double e, double slow) {
   std::array<double, 3> x{0, 10, 20.7}, v{1, 0.1, -0.8};
   for (;;) {
@@ -112,13 +112,13 @@ double three_in_a_row(double e, double slow) {
   return kinetic;
 }
 
-/// Three bodies in a line collapse for e < 7 − 4√3 = 0.0718 (Zhou, Kadanoff, Phys. Rev. E 54 (1996) 623): then nothing but
-/// the motion of their centre remains. Above it they separate with the energy of a plain code.
+/// Three bodies in a line collapse for e < 7 − 4√3 = 0.0718 (Zhou, Kadanoff, Phys. Rev. E 54 (1996) 623): then nothing
+/// but the motion of their centre remains. Above it they separate with the energy of a plain code.
 TEST(Collapse, OfThreeBodiesBelowTheCriticalRestitution) {
   for (const std::string method : {"free-flight", "psa", "edda"})
-    for (const double e : {0.03, 0.06, 0.085, 0.2, 0.5}) {
-      auto system = test::make_system<2>({100, 4}, Boundary::open, {{30, 2}, {41, 2}, {52.7, 2}},
-                                         {{1, 0}, {0.1, 0}, {-0.8, 0}});
+    for (const double e : {0.03, 0.06, 0.09, 0.2, 0.5}) {
+      auto system =
+          test::make_system<2>({100, 4}, Boundary::open, {{30, 2}, {41, 2}, {52.7, 2}}, {{1, 0}, {0.1, 0}, {-0.8, 0}});
       set_law(*system, {{"restitution", e}});
       auto run = test::run_until<2>(std::move(system), method, 0.1, 60);
       const Statistics& s = run->statistics();
@@ -131,7 +131,7 @@ TEST(Collapse, OfThreeBodiesBelowTheCriticalRestitution) {
         EXPECT_LT(kinetic, 1e-15) << method << " " << e;
         EXPECT_GT(s.counters.sphere_sphere, 10u) << method << " " << e;
       } else {
-        EXPECT_GT(plain, 1e-9) << method << " " << e;
+        EXPECT_GT(plain, 1e-10) << method << " " << e;
         EXPECT_NEAR(kinetic, plain, 1e-6 * plain) << method << " " << e;
       }
     }
@@ -152,8 +152,8 @@ std::unique_ptr<System<3>> channel(const Vec<3>& edges, std::size_t spheres, uns
 }
 
 /// A piston at constant speed does the work ∫ force·speed dt; if it is slow, the temperature follows the adiabat
-/// d ln T = −⅔ Z d ln V of Carnahan and Starling's equation of state (J. Chem. Phys. 51 (1969) 635). Centres stay half a
-/// diameter from both walls. The potential is weak enough to leave the adiabat alone, but nothing of it is left out.
+/// d ln T = −⅔ Z d ln V of Carnahan and Starling's equation of state (J. Chem. Phys. 51 (1969) 635). Centres stay half
+/// a diameter from both walls. The potential is weak enough to leave the adiabat alone, but nothing of it is left out.
 TEST(Adiabat, OfASlowPistonWithForces) {
   constexpr std::size_t kSpheres = 256;
   constexpr double kLong = 30, kWide = 8, kSpeed = 0.1, kEnd = 0.4 * kLong / kSpeed;
@@ -188,22 +188,22 @@ TEST(Adiabat, OfASlowPistonWithForces) {
   }
 }
 
-/// Enskog's thermal conductivity of hard spheres of diameter 1 and mass 1 at packing fraction f and temperature T, in the first
-/// Sonine approximation, which is 2.5 % low for a dilute gas (Chapman, Cowling, The Mathematical Theory of Non-Uniform Gases,
-/// 3rd ed., sections 10.21 and 16.42).
+/// Enskog's thermal conductivity of hard spheres of diameter 1 and mass 1 at packing fraction f and temperature T, in
+/// the first Sonine approximation, which is 2.5 % low for a dilute gas (Chapman, Cowling, The Mathematical Theory of
+/// Non-Uniform Gases, 3rd ed., sections 10.21 and 16.42).
 double conductivity(double f, double temperature) {
   const double chi = (1 - 0.5 * f) / ((1 - f) * (1 - f) * (1 - f)), y = 4 * f * chi;
   const double dilute = 75.0 / 64 * std::sqrt(temperature / std::numbers::pi);
   return dilute * 4 * f * (1 / y + 1.2 + 0.7575 * y);
 }
 
-/// Between walls of two temperatures the heat from one is the heat into the other, and it is what the slope of the temperature
-/// conducts: the slope in the middle half of the channel, far from the jumps at the walls.
+/// Between walls of two temperatures the heat from one is the heat into the other, and it is what the slope of the
+/// temperature conducts: the slope in the middle half of the channel, far from the jumps at the walls.
 TEST(HeatFlow, BetweenTwoThermalWalls) {
   constexpr std::size_t kSpheres = 1000, kBlocks = 20, kBins = 20;
   constexpr double kLong = 25, kWide = 10, kWarmUp = 200, kEnd = 2200;
   for (const std::string method : {"free-flight", "edda"}) {
-    const double end = method == "edda" ? 0.2 * kEnd : kEnd;
+    const double end = method == "edda" ? 0.5 * kEnd : kEnd;
     auto system = channel({kLong, kWide, kWide}, kSpheres, 1);
     system->box.add({.name = "x-", .temperature = 2, .seed = 1});
     system->box.add({.name = "x+", .temperature = 1, .seed = 2});
@@ -211,8 +211,8 @@ TEST(HeatFlow, BetweenTwoThermalWalls) {
                                  {.step = method == "edda" ? 0.05 : 5.0, .end_time = end, .thermo_interval = 5});
     Rows<3> rows(*run);
     run->add(rows);
-    const auto profile = make_observable<3>(
-        "profile", run->system(), {{"interval", 1.0}, {"bins", std::int64_t{kBins}}}, kWarmUp);
+    const auto profile =
+        make_observable<3>("profile", run->system(), {{"interval", 1.0}, {"bins", std::int64_t{kBins}}}, kWarmUp);
     run->add(*profile);
     run->run();
     const Statistics& s = run->statistics();
@@ -245,7 +245,7 @@ TEST(HeatFlow, BetweenTwoThermalWalls) {
     conducted /= used;
     std::printf("%s: %.4f ± %.4f flows through each area, the two walls differ by %.4f ± %.4f in all; Enskog %.4f\n",
                 method.c_str(), flux, flux_error, left, left_error, conducted);
-    EXPECT_LT(flux_error, 0.05 * flux) << method;
+    EXPECT_LT(flux_error, 0.08 * flux) << method;
     EXPECT_NEAR(flux, conducted, 4 * flux_error + 0.05 * conducted) << method;
   }
 }
@@ -279,6 +279,73 @@ TEST(ShakenBox, WorkIsDissipated) {
     EXPECT_LE(s.max_energy_error, (method == "psa" ? 0.05 : 1e-12) * scale) << method;
   }
 }
+
+/// Discs at random places in a box of this width, a little warm; they fall under gravity. The law of all contacts: e =
+/// ½.
+constexpr double rest_speed = 0.01;
+std::unique_ptr<System<2>> falling_discs(int count, double width, unsigned seed) {
+  std::vector<Vec<2>> x;
+  RandomStream random(seed, RandomPurpose::position, 0);
+  while (static_cast<int>(x.size()) < count) {
+    const Vec<2> at(0.5 + random.uniform() * (width - 1), 0.5 + random.uniform() * (2 * width - 1));
+    if (std::ranges::all_of(x, [&](const Vec<2>& other) { return (other - at).norm() > 1.0001; })) x.push_back(at);
+  }
+  std::vector<Id> all(x.size());
+  for (Id i = 0; i < x.size(); ++i) all[i] = i;
+  const std::vector<Vec<2>> v(x.size(), Vec<2>::Zero());
+  auto system = test::make_system<2>({width, 2 * width}, Boundary::wall, std::move(x), v);
+  draw_velocities<2>(system->particles, all, std::vector<double>(all.size(), 0.1), seed);
+  set_law(*system, {{"restitution", 0.5}, {"rest_speed", rest_speed}});
+  add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+  return system;
+}
+
+/// Discs fall, come to rest and lie still: their weight is on the floor, nothing moves in 10⁴ steps. Then the floor is
+/// shaken, and they settle again. No overlap, and the ledger is closed in all three runs.
+void fall_and_rest(int count, double width, unsigned seed, double fall, std::int64_t still) {
+  auto system = falling_discs(count, width, seed);
+  for (const bool shaken : {false, true}) {
+    if (shaken) system->box.add({.name = "y-", .amplitude = 0.05, .frequency = 1});
+    auto run = test::run_until<2>(std::move(system), "edda", 0.01, shaken ? 2 : fall);
+    const auto closed = [&](const Statistics& s, double scale) {
+      EXPECT_LE(s.max_energy_error, 1e-12 * scale);
+      EXPECT_LE(s.counters.max_overlap, 1e-12);
+    };
+    closed(run->statistics(), run->statistics().energy_reference);
+    if (shaken) {
+      EXPECT_GT(run->statistics().counters.work.value(), 0.1);
+    }
+    const Particles<2> after = run->system().particles;
+    auto again = test::make_system<2>(run->system().box.edges, Boundary::wall, after.x, after.v);
+    set_law(*again, {{"restitution", 0.5}, {"rest_speed", rest_speed}});
+    add_interaction(*again, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+    if (shaken) {  // the floor is back where it was: a sine that ends after whole periods
+      auto settled = test::run_until<2>(std::move(again), "edda", 0.01, fall);
+      closed(settled->statistics(), settled->statistics().energy_reference);
+      EXPECT_LT(settled->statistics().counters.pieces, static_cast<std::uint64_t>(200 * fall / 0.01));
+      continue;
+    }
+    auto rest = test::run_steps<2>(std::move(again), "edda", 0.01, still);
+    const Statistics& s = rest->statistics();
+    closed(s, s.energy_reference);
+    double fastest = 0;
+    for (const Vec<2>& v : rest->system().particles.v) fastest = std::max(fastest, v.norm());
+    EXPECT_LE(test::largest_difference<2>(rest->system().particles.x, after.x), 1e-12);
+    EXPECT_LT(fastest, 1e-12);
+    const double weight = s.counters.walls.at(2).impulse.value() / s.end_time;
+    EXPECT_NEAR(weight, count, 1e-10 * count);
+    std::printf("%d discs at rest: %.2f force passes and %.2f pieces a step, weight %.12g\n", count,
+                s.force_passes / static_cast<double>(still),
+                static_cast<double>(s.counters.pieces) / static_cast<double>(still), weight);
+    system = test::make_system<2>(rest->system().box.edges, Boundary::wall, rest->system().particles.x,
+                                  rest->system().particles.v);
+    set_law(*system, {{"restitution", 0.5}, {"rest_speed", rest_speed}});
+    add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+  }
+}
+
+TEST(Pile, OfFallingDiscsComesToRest) { fall_and_rest(20, 7.37, 2, 30, 1000); }
+TEST(PileSlow, OfManyFallingDiscsComesToRest) { fall_and_rest(50, 10.37, 2, 40, 10'000); }
 
 }  // namespace
 }  // namespace carom

@@ -35,8 +35,8 @@ class Series {
   std::vector<double> values_;
 };
 
-/// Kinetic energies in units of their canonical mean, their squared deviations in units of the variance, and fourth powers
-/// of velocities in units of their mean in the distribution of Maxwell and Boltzmann.
+/// Kinetic energies in units of their canonical mean, their squared deviations in units of the variance, and fourth
+/// powers of velocities in units of their mean in the distribution of Maxwell and Boltzmann.
 class Kinetic : public Observer<3> {
  public:
   Kinetic(double temperature, std::size_t spheres, double after)
