@@ -330,15 +330,17 @@ double SlabCore<D>::end_before(const EventKey<D>& key) const {
   return end > both_fly_from ? end : key.time;
 }
 
-/// Whether a contact is so close to the end of the slab, or so slow, that the spheres overlap there by less than a
-/// quarter of the tolerance: it belongs to the next slab.
+/// Whether a contact is so close to the end of the slab, or so slow, that without it the spheres would overlap there by
+/// less than a quarter of the tolerance: it belongs to the next slab.
 template <int D>
 bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
-  const Meeting meeting(*this, key);
+  EventKey<D> at_end = key;
+  at_end.time = length_;
+  const Meeting meeting(*this, at_end);
   const double gap = key.kind == EventKind::pair
                          ? meeting.normal.norm() - meeting.sigma
-                         : box_.wall(key.hi).gap(position(key.lo, key.time), meeting.sigma, key.time);
-  return gap + meeting.speed * (length_ - key.time) >= -0.25 * scan_->tolerance(meeting.sigma);
+                         : box_.wall(key.hi).gap(position(key.lo, length_), meeting.sigma, length_);
+  return gap >= -0.25 * scan_->tolerance(meeting.sigma);
 }
 
 /// Whether the spheres touch at the start and come together again before the contact has opened by what a contact at
