@@ -13,7 +13,7 @@ namespace carom {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMostCells = 65536;
+constexpr double kMostCells = 65536;  // 256 kB of indices
 
 /// The spline's slopes at its knots, from the continuity of V″ inside and a given slope or V″ = 0 at either end. The
 /// matrix is tridiagonal and diagonally dominant.
