@@ -108,7 +108,7 @@ def main(arguments=None):
     title = f"{deck.get('title', options.deck.stem)}\n{', '.join(what + options.set)}"
     if options.counts:
         draw(rows, "particles", ["passes_per_step", "seconds_per_step"],
-             [{"title": title, "xlabel": "particles", "ylabel": what} for what in ("force passes a step", "processor time a step [s]")],
+             [{"title": title, "xlabel": "particles", "ylabel": what} for what in ("force passes per step", "processor time per step [s]")],
              figure)
     else:
         errors = {"energy_error": r"largest $|H - H_1|$ / $E_{\mathrm{ref}}$"}
