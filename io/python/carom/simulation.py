@@ -398,7 +398,7 @@ class Simulation:
     boundary = property(lambda self: self._session.boundary, doc="The name of the boundary on each axis.")
 
     energy_error = property(lambda self: self._session.energy_error,
-                            doc="The largest |H - H_1| so far, over max(|H_1|, K_1 + sum |V|).")
+                            doc="The largest change of H + dissipated - work - heat since the first step, over max(|H_1|, K_1 + sum |V|).")
     force_passes = property(lambda self: self._session.force_passes, doc="Number of force passes: evaluations of pairs / interacting pairs.")
     wall_seconds = property(lambda self: self._session.wall_seconds, doc="Duration of the run [s].")
 
