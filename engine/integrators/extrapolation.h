@@ -59,8 +59,8 @@ class Extrapolation {
   const std::vector<Vec<D>>& last() const { return past_[0]; }
 
  private:
-  /// Growth of the slab's length up to which all past slabs are used: the magnitudes of their weights, which multiply the
-  /// noise of the past, add up to 18 there, and to 7 without growth.
+  /// Growth of the slab's length up to which all past slabs are used: the magnitudes of their weights, which multiply
+  /// the noise of the past, add up to 18 there, and to 7 without growth.
   static constexpr double kMostGrowth = 3;
 
   std::array<std::vector<Vec<D>>, kOrder + 1> past_;

@@ -12,7 +12,7 @@
 namespace carom {
 namespace {
 
-constexpr double kTarget = 1 + 1e-13;    // final factor: a gap of rounding size, so that no spheres overlap
+constexpr double kTarget = 1 + 1e-13;  // final factor: a gap of rounding size, so that no spheres overlap
 // Z is measured once a slab. Growth into a tenth of the free volume raises Z ≈ 1/(1 − s/s_J) by a ninth meanwhile.
 constexpr double kFreePart = 0.1;
 constexpr double kMaxLength = 10;  // longest slab, in diameters at the thermal speed, for growth rates below 0.01

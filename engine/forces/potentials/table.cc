@@ -140,7 +140,8 @@ InteractionInfo table() {
       .formula = "sum over pairs of the cubic spline in r^2 through the given points",
       .documentation =
           "Any pair potential, given by points. It ends at the last point, or at a smaller cutoff, where it is cut "
-          "like other potentials; for a table that goes to zero by itself use cut = 'shifted'. Below the first point it "
+          "like other potentials; for a table that goes to zero by itself use cut = 'shifted'. Below the first point "
+          "it "
           "continues as a parabola in r^2: let the table begin at a distance that no pair reaches.",
       .source = "de Boor, A Practical Guide to Splines, 1978",
       .in_2d = make<2>,
