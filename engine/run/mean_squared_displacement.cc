@@ -27,7 +27,7 @@ void MeanSquaredDisplacement<D>::add_sample(double time, const Particles<D>& par
     decades_.push_back({time, now_, {}});
     return;
   }
-  std::uint64_t spacing = 1;  // of the lags of a decade, in samples
+  std::uint64_t spacing = 1;  // distance between the lags of a decade, in samples
   for (std::size_t n = 0; index % spacing == 0; ++n, spacing *= kLags) {
     const std::uint64_t lag = index / spacing % kLags;
     if (lag != 0) {

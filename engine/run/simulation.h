@@ -228,7 +228,7 @@ class Simulation {
   StepCount count_;
   double quiet_since_ = 0;  // end of the last slab with pair collisions
   std::uint64_t most_collisions_ = std::max<std::uint64_t>(500'000, 4 * system_->size());  // per slab of an epoch
-  std::optional<std::uint64_t> last_collisions_;  // of the last slab, if this run() executed it
+  std::optional<std::uint64_t> last_collisions_;  // in the last slab, if this run() executed it
   std::unique_ptr<Monitor<D>> monitor_;           // from the first run() on
   std::size_t first_of_integrator_ = 0;           // its first entry in Fields::of_run()
 };
