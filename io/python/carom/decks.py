@@ -46,12 +46,7 @@ def deck_of(sim, of, ends):
     if sim._session.method == "verlet":
         for species in deck["particles"]:
             species["display_radius"] = species.pop("radius")
-    if sim.walls:
-        deck["wall"] = sim.walls
-    if sim._session.baths:
-        deck["bath"] = sim._session.baths
-    if sim.contacts:
-        deck["contact"] = sim.contacts
+    deck |= surroundings_of(sim)
     if sim._session.forces:
         deck["interaction"] = [{"type": name} | given for name, given in sim._session.forces]
     deck["integrator"] = {"type": sim._session.method} | sim._session.method_parameters
@@ -61,6 +56,12 @@ def deck_of(sim, of, ends):
 
 def system_of(sim):
     return {"dimension": len(sim.box), "box": sim.box, "boundary": sim.boundary}
+
+
+def surroundings_of(sim):
+    """The tables [[wall]], [[bath]] and [[contact]] of a deck."""
+    tables = {"wall": sim.walls, "bath": sim._session.baths, "contact": sim.contacts}
+    return {name: given for name, given in tables.items() if given}
 
 
 def species_of(sim, of):

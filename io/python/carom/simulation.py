@@ -10,7 +10,7 @@ import numpy as np
 
 from carom import files, formats, notebook, page, potentials
 from carom.checks import name_of, numbers, one_or_each, refuse_masked
-from carom.decks import deck_of, overrides, species_of, system_of, toml_text, toml_value, write_deck
+from carom.decks import deck_of, overrides, species_of, surroundings_of, system_of, toml_text, toml_value, write_deck
 from carom.errors import UsageError
 from carom.progress import Progress
 
@@ -71,6 +71,7 @@ class Simulation:
     def _start(self, session, title=""):
         self._session, self.title, self.warnings = session, title, []
         self._cores = False  # a radius was given
+        self._output = None  # the arguments of set_output()
         self._edges_known, self._counted, self.bonds = True, [], np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
@@ -186,7 +187,7 @@ class Simulation:
             del system["box"]
         deck = {"format": 1, "system": system, "particles": (species_of(self, "place") if old.size else []) + self._counted,
                 "placement": {"type": name_of("place", type), "seed": seed} | parameters,
-                "integrator": {"type": "free-flight"}, "run": {"collisions": 1}}
+                "integrator": {"type": "free-flight"}, "run": {"collisions": 1}} | surroundings_of(self)
         if packing_fraction is not None:
             deck["placement"]["packing_fraction"] = packing_fraction
         session, texts, _ = _carom.from_deck("place", [], toml_text(deck))
@@ -195,6 +196,8 @@ class Simulation:
             session.add_force(name, given)
         if old.method:
             session.set_integrator(old.method, old.method_parameters)
+        if self._output:
+            session.set_output(*self._output)
         self._session, self._edges_known, self._counted = session, True, []
         self._warn(texts)
         return range(len(self))
@@ -288,7 +291,8 @@ class Simulation:
         """
         given = {"directory": os.path.abspath(os.fspath(directory)), "thermo_interval": thermo_interval} | keys
         refuse_masked("output", given)
-        self._session.set_output([f"output.{key}={toml_value(value)}" for key, value in given.items()], float(thermo_interval))
+        self._output = [f"output.{key}={toml_value(value)}" for key, value in given.items()], float(thermo_interval)
+        self._session.set_output(*self._output)
 
     @property
     def directory(self):
