@@ -46,7 +46,8 @@ class Session {
  public:
   /// All members throw Error.
   Session(std::span<const double> edges, const std::vector<std::string>& boundary);
-  explicit Session(Deck& deck);
+  /// The initial state of a deck, or a given state.
+  explicit Session(Deck& deck, const std::optional<GivenState>& given = {});
   /// The last checkpoint of a run that wrote files to a directory; the next run() continues the run and its files.
   Session(Deck& deck, Resumed& from);
 
