@@ -77,7 +77,7 @@ std::string write(int version, const TrajectoryReader& trajectory, std::span<con
     file.append(grid + "</Grid>\n");
   }
   file.append("</Grid>\n</Domain>\n</Xdmf>\n");
-  return "It refers to " + trajectory.path().string() + ": keep the two where they are to each other";
+  return "It refers to " + trajectory.path().string() + ", beside which it must stay";
 }
 
 }  // namespace
