@@ -5,16 +5,17 @@
     tools/rank_study.py
     tools/rank_study.py --ranks 8,64 --per-rank 500,2000 --collisions 20 --rate 1e6
 
-Measured, for a deck of free flight on so many ranks: windows, rounds a window, events run twice at borders, events redone,
-and the imbalance of the whole run, as in run.log. Where there are more ranks than cores, `. tools/mpi-env.sh` first. Spheres
-start at random places (--placement): cut between the layers of a crystal, ranks get unequal shares until the box is divided again.
+The script measures free flight of a deck on these numbers of ranks: windows, rounds per window, events run twice at borders, events
+redone, and the imbalance of the whole run, as in run.log. If there are more ranks than cores, run `. tools/mpi-env.sh` first. Spheres
+start at random positions (--placement): a crystal would be cut between its layers, and ranks would get unequal shares until the box
+is divided again.
 
-Fitted to the runs with ranks that have neighbours on all sides, with s = (spheres per rank)^(-1/D):
-events run twice (1 + h s)^D - 1, a shell around a cube; events redone r s, a surface; rounds a window a + b log2(spheres
-at all borders), a chain of repairs that gets longer by one with a probability. In the picture runs with fewer ranks, which
-are not in the fit, are hollow; bars are standard errors of the counts if events are independent.
+It fits these formulas to the runs in which ranks have neighbours on all sides, with s = (spheres per rank)^(-1/D): events run twice,
+(1 + h s)^D - 1, a shell around a cube; events redone, r s, a surface; rounds per window, a + b log2(spheres at all borders), a chain of
+repairs that becomes longer by one with a certain probability. In the picture, hollow symbols are runs with fewer ranks, which are not
+in the fit; bars are standard errors of the counts for independent events.
 
-Modelled from that: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a rank.
+The model that follows: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a rank.
 The work is its collisions by --rate. The imbalance is that of independent events, sqrt(2 ln P / events), times
 --imbalance. Messages: a window has rounds + 1 exchanges and rounds + 3 reductions; a reduction takes
 log2 P times --latency, an exchange --latency and --overhead for each of 3^D - 1 neighbours. The model neglects the volume of data,
