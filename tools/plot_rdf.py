@@ -10,7 +10,8 @@ Along periodic axes the nearest image counts, so r ends at half the shortest per
 the region that the centres can reach (the average over directions u of the product of 1 - r |u_k| / L_k over the walled axes), so
 that g = 1 without correlations, also near the walls (approximately if radii differ). The band is one standard error, from four parts
 of the run, each averaged separately; an rdf.csv has no parts and is drawn without a band.
-The script writes a CSV with r, g and error beside the picture, by default rdf-frames.csv. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
+The script writes a CSV with r, g and error beside the picture, by default rdf-frames.csv.
+(Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
 """
 
 import argparse
