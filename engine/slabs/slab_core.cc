@@ -82,7 +82,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
 template <int D>
 void SlabCore<D>::limit_margin() {
   for (int k = 0; k < D; ++k)
-    if (box_.periodic(k) && !a_.empty() && margin_ > box_.edges[k]) margin_ = kNever;
+    if (box_.periodic(k) && !a_.empty() && margin_ > 0.25 * box_.edges[k]) margin_ = kNever;
 }
 
 /// Finds the candidate pairs within margin_, and which of them may meet before any other collision.
@@ -93,8 +93,15 @@ void SlabCore<D>::find_near() {
   near_.clear();
   for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
     const auto& [i, j, image] = pairs_[k];
-    const double sigma = scan_->contact_distance(i, j), near = sigma + scan_->tolerance(sigma) + reach_[i] + reach_[j];
-    if ((x[i] - x[j] + box_.shift(image)).squaredNorm() <= near * near) near_.push_back(k);
+    const double sigma = scan_->contact_distance(i, j), touching = sigma + scan_->tolerance(sigma);
+    const double near = touching + reach_[i] + reach_[j];
+    const Vec<D> d = x[i] - x[j] + box_.shift(image);
+    if (!(d.squaredNorm() <= near * near)) continue;
+    // Each path bends off its straight line by no more than largest_bend_.
+    const Vec<D> v = start_v_[i] - start_v_[j];
+    const double b = d.dot(v), passing = touching + largest_bend_[i] + largest_bend_[j];
+    const double closest = b < 0 ? std::min(length_, -b / v.squaredNorm()) : 0.0;
+    if ((d + closest * v).squaredNorm() <= passing * passing) near_.push_back(k);
   }
 }
 
