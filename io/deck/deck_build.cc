@@ -113,9 +113,7 @@ void take_bonds(Deck::Source& source, const std::vector<PairList>& bonds) {
 }  // namespace
 
 bool built_in_blocks(const Deck::Source& source) {
-  const std::string& type = source.placement.type;
-  const bool lattice = !type.empty() && type != "file" && type != "random" && type != "compressed";
-  return lattice && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
+  return source.placement.lattice() && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
            return species.placed && species.radius.size() == 1 && species.mass.size() == 1;
          });
 }

@@ -415,9 +415,7 @@ class Interpreter {
       if (parameters.has("interval") && parameters.real("interval") > 0)
         deck_.output.observables.push_back({&info, std::move(parameters)});
     }
-    const std::string& start = source_.placement.type;
-    const bool lattice = !start.empty() && start != "random" && start != "compressed" && start != "file";
-    if (lattice && !deck_.output.observables.empty() && deck_.output.sample_start == 0)
+    if (source_.placement.lattice() && !deck_.output.observables.empty() && deck_.output.sample_start == 0)
       problems_.warning(table->at, "the averages include the initial lattice, on which g(r) has sharp peaks",
                         "set sample_start to a time at which the lattice has melted");
     if (const auto* units = table->find<TableValue>("units"))

@@ -30,6 +30,8 @@ struct PlacementConfig {
   std::filesystem::path file;
   std::vector<std::vector<double>> positions;  ///< from the file
   double growth_rate = 0, max_collisions = 0;  ///< compressed: engine/setup/compression.h
+
+  bool lattice() const { return !type.empty() && type != "random" && type != "compressed" && type != "file"; }
 };
 
 struct InteractionConfig {

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/deck/deck_source.h"
 #include "io/files/directory_lock.h"
 #include "io/files/progress.h"
 #include "io/files/thermo.h"
@@ -152,8 +153,10 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
   if (s.max_shadow_energy_error)
     text += fmt::format("\nshadow energy, largest error {:.2e}", *s.max_shadow_energy_error);
   if (s.max_momentum_error) text += fmt::format("\nmomentum, largest error {:.2e}", *s.max_momentum_error);
-  text += fmt::format("\npressure {:.6g}, collision rate of a sphere {:.6g}, deepest overlap {:.1e}", s.mean_pressure,
-                      s.collision_rate, c.max_overlap);
+  text += fmt::format(
+      "\nmean pressure {:.6g}{}, collision rate of a sphere {:.6g}, deepest overlap {:.1e}", s.mean_pressure,
+      deck.source && deck.source->placement.lattice() && s.start_steps == 0 ? ", from the initial lattice on" : "",
+      s.collision_rate, c.max_overlap);
   if (s.mean_free_time)
     text += fmt::format("\nmean free time {:.6g}, mean free path {:.6g}", *s.mean_free_time, *s.mean_free_path);
   if (s.force_passes > 0)

@@ -275,6 +275,10 @@ def test_averages_of_the_initial_lattice(tmp_path):
     sampled = FLUID + "\n[output]\nrdf_interval = 1.0\n"
     assert "the averages include the initial lattice" in validate(tmp_path, sampled).stderr
     assert "lattice" not in validate(tmp_path, sampled + "sample_start = 2.0\n").stderr
+    (tmp_path / "deck.toml").write_text(FLUID)
+    for place, says in (("fcc", True), ("random", False)):
+        assert carom("run", "deck.toml", "-o", place, "--set", f"placement.type={place}", cwd=tmp_path).returncode == 0
+        assert (", from the initial lattice on, collision rate" in (tmp_path / place / "run.log").read_text()) == says
 
 
 def test_warnings(tmp_path):
