@@ -14,7 +14,7 @@ namespace carom {
 
 namespace {
 constexpr double kPathMargin = 1.25;         // paths under later accelerations, relative to the first paths
-constexpr double kMostBend = 4;              // ½ h² a, in mean distances of the particles
+constexpr double kMostBend = 4;              // ½ h² a, in mean distances: a particle then has 10³ candidates
 constexpr std::size_t kBetweenLooks = 1024;  // events between two checks for a request to stop
 // Contacts of one particle on parabolas in a slab: a light sphere between two approaching heavy ones collides about
 // π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A sweep costs as much as its
