@@ -17,9 +17,9 @@ constexpr double kPathMargin = 1.25;         // paths under later accelerations,
 constexpr double kMostBend = 4;              // ½ h² a, in mean distances: a particle then has 10³ candidates
 constexpr std::size_t kBetweenLooks = 1024;  // events between two checks for a request to stop
 // Contacts of one particle on parabolas in a slab: a light sphere between two approaching heavy ones collides about
-// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A shorter slab is tried
-// rather than a flight with more contacts, which costs too much as long as the accelerations are not right.
-constexpr std::uint32_t kMostContactsOfParticle = 1000;
+// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A sweep costs as much as its
+// contacts, and a shorter slab takes fewer sweeps, so flights with more contacts than this are not tried.
+constexpr std::uint32_t kMostContactsOfParticle = 100;
 }  // namespace
 
 template <int D>
@@ -78,7 +78,8 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   if (std::isfinite(margin_)) find_near();
 }
 
-/// Rejects accelerations under which parabolas may cross a whole periodic box: there would be too many images.
+/// Rejects accelerations under which a parabola may be longer than a quarter of a periodic box, so that two particles may
+/// approach each other by more than half of it: beyond that each pair has several images within reach.
 template <int D>
 void SlabCore<D>::limit_margin() {
   for (int k = 0; k < D; ++k)
