@@ -29,7 +29,7 @@ class PrimitiveSplitting : public Integrator<D> {
     auto& p = system.particles;
     core_->begin_step(report.counters, report.contacts, &accelerations_.a, slab.length, report.watch);
     if (!system.box.contacts.elastic()) {
-      settling_slab(system, slab.length, report);
+      inelastic_slab(system, slab.length, report);
     } else {
       kicked_ = p.v;
       kick(kicked_, accelerations_.a, 0.5 * slab.length);
@@ -46,16 +46,16 @@ class PrimitiveSplitting : public Integrator<D> {
   }
 
  private:
-  /// A slab of spheres that come to rest: the drift is cut where a slow contact stops or a resting one is hit, and the
+  /// A slab with inelastic contacts: the drift is cut where a slow contact stops or a resting one is hit, and the
   /// kicks do not make resting contacts approach.
-  void settling_slab(System<D>& system, double length, SlabReport<D>& report) {
+  void inelastic_slab(System<D>& system, double length, SlabReport<D>& report) {
     auto& p = system.particles;
     auto& scan = core_->scan();
     scan.stop_within(length);
-    settle(system, 0);
+    resolve_contacts(system, 0);
     kick(p.v, accelerations_.a, 0.5 * length);
     if (!scan.resting().empty()) scan.stop_approach(p.x, p.v, 0.5 * length);
-    bool touching = settle(system, 0);
+    bool touching = resolve_contacts(system, 0);
     for (double done = 0, contact = kNever; done < length;) {
       const double rest = length - done, piece = std::min(rest, contact);
       kicked_ = p.v;
@@ -65,14 +65,14 @@ class PrimitiveSplitting : public Integrator<D> {
         system.decomposition.need_all();
         scan.count_event(end.key);
         contact = end.time > 0 ? end.time : kNever;
-        if (contact == kNever) touching = settle(system, done);
+        if (contact == kNever) touching = resolve_contacts(system, done);
         continue;
       }
       core_->commit(done);
       core_->finish(p);
       done = piece == rest ? length : done + piece;
       contact = kNever;
-      if (done < length) touching = settle(system, done);
+      if (done < length) touching = resolve_contacts(system, done);
     }
     system.decomposition.update_halo();
     accelerations_.update(system, report.counters);
@@ -83,7 +83,7 @@ class PrimitiveSplitting : public Integrator<D> {
   }
 
   /// Resolves the contacts at the present positions; returns whether any contact approached or rests. Collective.
-  bool settle(System<D>& system, double time) {
+  bool resolve_contacts(System<D>& system, double time) {
     auto& p = system.particles;
     auto& scan = core_->scan();
     if (!system.decomposition.any(!scan.quiet(p.x, p.v))) return false;
