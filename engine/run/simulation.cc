@@ -133,6 +133,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   };
   const bool again = monitor_ != nullptr;
   if (!again) {
+    system_->need_spins();
     if (!hooks.restore) check_rest_speeds(*system_);
     if (info_.smooth_forces) {
       system_->quanta = quanta(*system_);

@@ -324,7 +324,8 @@ template <int D>
 typename SlabCore<D>::Flight& SlabCore<D>::flight(Id i, const EventKey<D>& key) {
   const Vec<D> x = position(i, key.time), v = velocity(i, key.time);
   if (slot_[i] == 0) {
-    flights_.push_back({x, v, key.time, i, 0, 0, 0});
+    flights_.push_back({x, v, key.time, i, 0, 0, 0, Spin<D>::Zero()});
+    if (box_.contacts.rough()) flights_.back().spin = particles_.spin[i];
     slot_[i] = static_cast<std::uint32_t>(flights_.size());
   }
   Flight& f = flights_[slot_[i] - 1];
@@ -358,7 +359,8 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     // Sweeps change the time of a contact, not its random numbers.
     const Draw draw{.id = particles_.id_of(key.lo), .time = box_.time, .number = std::uint64_t{lo.version} << 32};
     const auto [after, impulse, exchange] =
-        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, draw, key.time);
+        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, draw, key.time, 0,
+                        particles_.radius[key.lo], box_.contacts.rough() ? &lo.spin : nullptr);
     contact.impulse = impulse;
     contact.exchange = exchange;
     lo.v = after;
@@ -368,13 +370,24 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     const double mass_hi = particles_.mass[key.hi];
     const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
     if (!(d.dot(v) < 0)) return;
-    const auto [g, dissipated] =
+    const auto [g, dissipated, rough] =
         pair_impulse<D>(box_.contacts, particles_.species[key.lo], particles_.species[key.hi], d, v, mass, mass_hi);
     contact.impulse = g * d;
     contact.x_hi = hi.x - box_.shift(key.image);
     contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse), .dissipated = dissipated};
     lo.v += (g / mass) * d;
     hi.v -= (g / mass_hi) * d;
+    if (rough) {
+      const auto sphere = [&](Flight& f) {
+        return RoughSphere<D>{particles_.mass[f.id], particles_.radius[f.id],
+                              box_.contacts.inertia(particles_.species[f.id], D), &f.spin};
+      };
+      const Rubbed<D> rubbed = rub_pair<D>(*rough, d, v, g * d.norm(), sphere(lo), sphere(hi));
+      lo.v += rubbed.impulse / mass;
+      hi.v -= rubbed.impulse / mass_hi;
+      contact.impulse += rubbed.impulse;
+      contact.exchange.dissipated += rubbed.dissipated;
+    }
     checks_path(hi);
   }
   checks_path(lo);

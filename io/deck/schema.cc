@@ -116,7 +116,14 @@ std::vector<TableSchema> make_schema() {
         {"display_radius", real_or_list, "none", "length", "with verlet: what pictures show instead of points; 0.5",
          Range::positive},
         {"mass", real_or_list, "1.0", "mass", "", Range::positive},
-        {"charge", real_or_list, "0.0", "charge", "for the interactions that know charges"}}},
+        {"charge", real_or_list, "0.0", "charge", "for the interactions that know charges"},
+        {"spin", vector_list, "none", "1/time",
+         "angular velocities that go with explicit positions where contacts have 'tangential': [z] in two dimensions, "
+         "[x, y, z] in three; without spin where absent"},
+        {"inertia", real, "none", "-",
+         "reduced moment of inertia 4I/(m sigma^2), sigma the diameter: 0.5 for homogeneous discs, 0.4 for homogeneous "
+         "spheres, which is the default; 1 for rings, 2/3 for shells",
+         Range::positive}}},
       {"placement",
        false,
        false,

@@ -164,6 +164,14 @@ class Trajectory:
     def velocity(self, frame):
         return self._read("velocity", frame)
 
+    def spin(self, frame):
+        """Angular velocities [1/time], (N,) in two dimensions; zeros where no contact changes them."""
+        columns = slice(None) if self.dimension == 3 else 2
+        with reading(self.path):
+            if "angular_velocity" not in self._group:
+                return np.zeros((len(self.species), 3))[:, columns]
+            return self._group["angular_velocity/value"][frame][:, columns]
+
     def image(self, frame):
         """How many times each particle has been carried round each periodic axis."""
         return self._read("image", frame)
@@ -191,6 +199,7 @@ class Frame:
 
     position = property(lambda self: self._trajectory.position(self._number), doc="Wrapped centres [length].")
     velocity = property(lambda self: self._trajectory.velocity(self._number), doc="[length/time]")
+    spin = property(lambda self: self._trajectory.spin(self._number), doc="Angular velocities [1/time].")
     image = property(lambda self: self._trajectory.image(self._number), doc="Turns round each periodic axis.")
     unwrapped = property(lambda self: self._trajectory.unwrapped(self._number), doc="Centres, images undone [length].")
     edges = property(lambda self: self._trajectory.edges(self._number), doc="Of the box [length].")
