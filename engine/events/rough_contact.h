@@ -9,7 +9,8 @@
 // β = ±1.
 //
 // The arms from the two centres add up to d = x_i − x_j, not to the sum of the radii, from which |d| differs by
-// rounding. So the angular momentum, Σ m x × v + I ω, is conserved to rounding.
+// rounding. So the angular momentum, Σ m x × v + I ω, is conserved to rounding. Exchanging the spheres gives the
+// same bits.
 
 #include <cmath>
 
@@ -45,11 +46,12 @@ Rubbed<D> rub(const ContactLaw& law, const Vec<D>& slip, double resisting, doubl
 template <int D>
 Rubbed<D> rub_pair(const ContactLaw& law, const Vec<D>& d, const Vec<D>& v, double pressing, const RoughSphere<D>& a,
                    const RoughSphere<D>& b) {
-  const Vec<D> arm_a = (a.radius / (a.radius + b.radius)) * d, arm_b = d - arm_a;
-  Vec<D> slip = v - turned<D>(*a.spin, arm_a) - turned<D>(*b.spin, arm_b);
+  const double sigma = a.radius + b.radius;
+  const Vec<D> arm_a = (a.radius / sigma) * d, arm_b = (b.radius / sigma) * d;
+  Vec<D> slip = v - (turned<D>(*a.spin, arm_a) + turned<D>(*b.spin, arm_b));
   slip -= (slip.dot(d) / d.squaredNorm()) * d;
   const double resisting =
-      1 / a.mass + 1 / b.mass + arm_a.squaredNorm() / a.moment() + arm_b.squaredNorm() / b.moment();
+      (1 / a.mass + 1 / b.mass) + (arm_a.squaredNorm() / a.moment() + arm_b.squaredNorm() / b.moment());
   const Rubbed<D> rubbed = rub<D>(law, slip, resisting, pressing);
   *a.spin -= torque<D>(arm_a, rubbed.impulse) / a.moment();
   *b.spin -= torque<D>(arm_b, rubbed.impulse) / b.moment();

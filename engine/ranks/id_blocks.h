@@ -91,6 +91,7 @@ Particles<D> gathered(Communicator& ranks, const Particles<D>& block) {
   });
   Particles<D> all;
   for (const Bytes& bytes : gather_on_first(ranks, std::move(mine))) {
+    if (bytes.empty()) continue;
     Reader from(bytes);
     const auto n = from.get<std::size_t>();
     for (auto spins = from.get<std::size_t>(); spins > 0; --spins) all.spin.push_back(from.get<Spin<D>>());

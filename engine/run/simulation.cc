@@ -153,7 +153,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   }
   if (again) {
     // The last slab was shortened to meet the previous end of the run.
-    if (s.end_time != next_slab().start) count_ = {s.steps, s.end_time};
+    if (s.end_time != next_slab().start) count_.steps = s.steps, count_.time = s.end_time, count_.within = 0;
     return;
   }
   if (hooks.branch) {

@@ -79,7 +79,7 @@ DECK_ERRORS = {
         walled('name = "y+"\ntemperature = 0'), 11, ["'temperature' must be positive (is 0)"]),
     "contact rougher than rough": (rough("tangential = 1.5"), 11, ["'tangential' is 1.5; take at most 1"]),
     "contact smoother than smooth": (rough("tangential = -1.5"), 9, ["at least -1 (is -1.5)", "from -1, smooth"]),
-    "negative friction": (rough("tangential = 0.5\nfriction = -0.1"), 12, ["'friction' must not be negative (is -0.1)"]),
+    "negative friction": (rough("tangential = 0.5\nfriction = -0.1"), 12, ["'friction' must be zero or positive (is -0.1)"]),
     "friction of smooth spheres": (rough("friction = 0.1"), 9, ["'friction' without 'tangential'", "give both"]),
     "spin of smooth spheres": (
         rough("restitution = 0.5", "spin = [[1.0], [0.0]]"), 18, ["'spin' has no effect, all contacts are smooth", "give a [[contact]]"]),

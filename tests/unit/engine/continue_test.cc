@@ -245,6 +245,23 @@ TEST(Continue, RoughSpheres) {
     compare<2>(rough(springs(method, given)), {{0, 0}, {2, 3}}, {9});
 }
 
+/// A halo that is too small is noticed after psa's first kick, which must not be applied twice.
+TEST(Continue, AStepIsRepeatedFromItsStart) {
+  const Scene<2> scene{
+      [] {
+        auto system = test::hard_spheres<2>(60, 0.7);
+        test::add_interaction(*system, "yukawa", {{"amplitude", 1.0}, {"kappa", 2.0}, {"cutoff", 1.5}});
+        ContactLaws& laws = system->box.contacts;
+        laws.resize(1, 0);
+        laws.set_pair(0, 0, laws.add({.restitution = 0.9, .tangential = 0.5, .rest_speed = 0.5}));
+        return system;
+      },
+      "psa", plan_of(0.05, 3)};
+  const Outcome<2> whole = run<2>(scene, 0, scene.plan, {}), parts = run<2>(scene, 2, scene.plan, {});
+  EXPECT_GT(parts.statistics.counters.slabs_again, 0u) << parts.statistics.counters.divisions << " " << parts.statistics.counters.sphere_sphere;
+  expect_continued(whole, parts);
+}
+
 /// Stops at each of several checks within steps: the run continues from the step's start.
 template <int D>
 void compare_within_steps(const Scene<D>& scene, std::vector<std::array<int, 2>> ranks, int leaves) {

@@ -252,7 +252,7 @@ Case<D> rough(Case<D> c) {
 
 TEST(WindowedFlight, RoughSpheres) {
   expect_the_same_however_divided<3>(rough<3>({.system = test::hard_spheres<3>(5, 0.49), .slab = 0.3, .slabs = 2}),
-                                     3500);
+                                     2000);
   expect_the_same_however_divided<2>(rough<2>({.system = test::hard_spheres<2>(14, 0.69), .slab = 0.4, .slabs = 2}),
                                      900);
   expect_the_same_however_divided<3>(
