@@ -188,8 +188,9 @@ TEST(RoughContacts, LedgerIsClosedInAllMethods) {
   }
 }
 
-/// In the cooling state T_rot/T_tr = h + √(1 + h²) for Maxwellian velocities (Santos, Kremer, Garzó, Prog. Theor. Phys.
-/// Suppl. 184 (2010) 31): 0.867 at κ = 0.4, e = 0.9, β = 0.5.
+/// In the cooling state T_rot/T_tr = h + √(1 + h²) for Maxwellian velocities: 0.867 at κ = 0.4, e = 0.9, β = 0.5. The
+/// Sonine approximation differs little from this (Santos, Kremer, dos Santos, Phys. Fluids 23 (2011) 030604, arXiv
+/// 1009.6180); the gas here is not quite dilute, with a packing fraction of 0.05.
 double cooling_ratio(double kappa, double e, double beta) {
   const double h = (1 + kappa) * (1 + kappa) / (2 * kappa * (1 + beta) * (1 + beta)) *
                    (1 - e * e - (1 - beta * beta) * (1 - kappa) / (1 + kappa));
