@@ -24,21 +24,19 @@ double collision_factor(const Vec<D>& d, const Vec<D>& v, double mass_i, double 
 
 /// What a contact does to the first sphere.
 struct Impulse {
-  double factor;                      ///< the impulse is factor·d, or of a wall factor·normal, and what rub() adds
-  double dissipated;                  ///< energy lost
-  const ContactLaw* rough = nullptr;  ///< the law for rub(); null: none
+  double factor;      ///< the impulse is factor·d, or of a wall factor·normal, and what rub_pair() or rub_wall() adds
+  double dissipated;  ///< energy lost
 };
 
-/// A contact of two spheres, with d as above; the contact distance grows at the rate w.
+/// The normal part of a contact of two spheres, with d as above; the contact distance grows at the rate w.
 template <int D>
 Impulse pair_impulse(const ContactLaws& laws, std::uint16_t species_i, std::uint16_t species_j, const Vec<D>& d,
                      const Vec<D>& v, double mass_i, double mass_j, double sigma = 0, double w = 0) {
   if (laws.elastic()) return {collision_factor<D>(d, v, mass_i, mass_j, sigma, w), 0};
   const double closing = -(d.dot(v) - sigma * w), square = closing * closing / d.squaredNorm();
-  const ContactLaw& law = laws.of_pair(species_i, species_j);
-  const double speed = std::sqrt(square), e = law.at(speed, laws.thermal_speed, laws.slow);
+  const double e = laws.of_pair(species_i, species_j).at(std::sqrt(square), laws.thermal_speed, laws.slow);
   return {collision_factor<D>(d, v, mass_i, mass_j, sigma, w, e),
-          0.5 * (1 - e * e) * square / (1 / mass_i + 1 / mass_j), law.rubs(speed, laws.thermal_speed) ? &law : nullptr};
+          0.5 * (1 - e * e) * square / (1 / mass_i + 1 / mass_j)};
 }
 
 /// The velocity of a sphere after a contact with a wall, and what was exchanged.
@@ -69,10 +67,8 @@ Bounced<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, std::uint1
                       .work = wall.work(impulse, t),
                       .dissipated = 0.5 * (1 - e * e) * mass * closing * closing}};
   if (!spin) return bounced;
-  const ContactLaw& law = laws.of_wall(species, wall.number);
-  if (!law.rubs(closing, laws.thermal_speed)) return bounced;
   const Rubbed<D> rubbed =
-      rub_wall<D>(law, wall.normal, v, bounced.exchange.impulse, {mass, radius, laws.inertia(species, D), spin});
+      rub_wall<D>(laws, wall.number, wall.normal, v, closing, bounced.exchange.impulse, {mass, radius, species, spin});
   bounced.v += rubbed.impulse / mass;
   bounced.impulse += rubbed.impulse;
   bounced.exchange.dissipated += rubbed.dissipated;
@@ -98,15 +94,13 @@ double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& bo
     return exchange.dissipated;
   }
   const Vec<D> v = p.v[lo] - p.v[hi];
-  const auto [g, dissipated, rough] =
+  const auto [g, dissipated] =
       pair_impulse<D>(box.contacts, p.species[lo], p.species[hi], d, v, p.mass[lo], p.mass[hi]);
   p.v[lo] += (g / p.mass[lo]) * d;
   p.v[hi] -= (g / p.mass[hi]) * d;
-  if (!rough) return dissipated;
-  const auto sphere = [&](Id i) {
-    return RoughSphere<D>{p.mass[i], p.radius[i], box.contacts.inertia(p.species[i], D), &p.spin[i]};
-  };
-  const Rubbed<D> rubbed = rub_pair<D>(*rough, d, v, g * d.norm(), sphere(lo), sphere(hi));
+  if (!box.contacts.rough()) return dissipated;
+  const auto sphere = [&](Id i) { return RoughSphere<D>{p.mass[i], p.radius[i], p.species[i], &p.spin[i]}; };
+  const Rubbed<D> rubbed = rub_pair<D>(box.contacts, d, v, g, sphere(lo), sphere(hi));
   p.v[lo] += rubbed.impulse / p.mass[lo];
   p.v[hi] -= rubbed.impulse / p.mass[hi];
   return dissipated + rubbed.dissipated;

@@ -195,13 +195,12 @@ Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Rec
   const Vec<D> d = a.x - b.x + shift;
   const double mass_a = mass(i), mass_b = mass(j);
   const double radii = radius(i) + radius(j), sigma = grown(radii, t);
-  auto [factor, dissipated, rough] =
+  auto [factor, dissipated] =
       pair_impulse<D>(laws(), a.species, b.species, d, a.v - b.v, mass_a, mass_b, sigma, radii * growth_);
   Vec<D> impulse = factor * d;
-  if (rough) {
-    const Rubbed<D> rubbed =
-        rub_pair<D>(*rough, d, a.v - b.v, factor * d.norm(), {mass_a, radius(i), laws().inertia(a.species, D), spin_a},
-                    {mass_b, radius(j), laws().inertia(b.species, D), spin_b});
+  if (rough_) [[unlikely]] {
+    const Rubbed<D> rubbed = rub_pair<D>(laws(), d, a.v - b.v, factor, {mass_a, radius(i), a.species, spin_a},
+                                         {mass_b, radius(j), b.species, spin_b});
     impulse += rubbed.impulse;
     dissipated += rubbed.dissipated;
   }

@@ -91,11 +91,13 @@ class Flights {
 
   /// Executes the collision of two spheres at time t.
   Impact<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
-    return collide(i, records_[i], spin_at(i), j, records_[j], spin_at(j), shift, t, generation);
+    if (rough_) [[unlikely]]
+      return collide(i, records_[i], &spins_[i], j, records_[j], &spins_[j], shift, t, generation);
+    return collide(i, records_[i], nullptr, j, records_[j], nullptr, shift, t, generation);
   }
   /// Executes the collision of a sphere with a wall at time t; the second "centre" is the point touched.
   Impact<D> bounce(Slot i, const Wall<D>& wall, double t, std::uint32_t generation) {
-    return bounce(i, records_[i], spin_at(i), wall, t, generation);
+    return bounce(i, records_[i], rough_ ? &spins_[i] : nullptr, wall, t, generation);
   }
 
   // The functions above for records other than the present ones. Spins, which change, matter for rough contacts only.
@@ -129,7 +131,6 @@ class Flights {
                         double slack) const;
   /// The spheres of a compression, which grow, are elastic.
   const ContactLaws& laws() const { return growth_ == 0 ? box_.contacts : elastic_; }
-  Spin<D>* spin_at(Slot i) { return rough_ ? &spins_[i] : nullptr; }
   double grown(double length, double t) const { return length * (1 + growth_ * t); }
   double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
   double mass(Slot i) const { return mass_.empty() ? common_mass_ : mass_[i]; }

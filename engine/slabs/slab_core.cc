@@ -370,19 +370,18 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     const double mass_hi = particles_.mass[key.hi];
     const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
     if (!(d.dot(v) < 0)) return;
-    const auto [g, dissipated, rough] =
+    const auto [g, dissipated] =
         pair_impulse<D>(box_.contacts, particles_.species[key.lo], particles_.species[key.hi], d, v, mass, mass_hi);
     contact.impulse = g * d;
     contact.x_hi = hi.x - box_.shift(key.image);
     contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse), .dissipated = dissipated};
     lo.v += (g / mass) * d;
     hi.v -= (g / mass_hi) * d;
-    if (rough) {
+    if (box_.contacts.rough()) {
       const auto sphere = [&](Flight& f) {
-        return RoughSphere<D>{particles_.mass[f.id], particles_.radius[f.id],
-                              box_.contacts.inertia(particles_.species[f.id], D), &f.spin};
+        return RoughSphere<D>{particles_.mass[f.id], particles_.radius[f.id], particles_.species[f.id], &f.spin};
       };
-      const Rubbed<D> rubbed = rub_pair<D>(*rough, d, v, g * d.norm(), sphere(lo), sphere(hi));
+      const Rubbed<D> rubbed = rub_pair<D>(box_.contacts, d, v, g, sphere(lo), sphere(hi));
       lo.v += rubbed.impulse / mass;
       hi.v -= rubbed.impulse / mass_hi;
       contact.impulse += rubbed.impulse;

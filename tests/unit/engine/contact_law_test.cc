@@ -36,8 +36,7 @@ TEST(ContactLaws, ImpulseGivesBackAFractionOfTheNormalSpeed) {
   laws.set_pair(0, 1, law);
   laws.set_wall(1, 0, law);
   const Vec<2> d{0.6, 0.8}, v{-1, -3};
-  const auto [factor, lost, rough] = pair_impulse<2>(laws, 1, 0, d, v, 2.0, 3.0);
-  EXPECT_EQ(rough, nullptr);
+  const auto [factor, lost] = pair_impulse<2>(laws, 1, 0, d, v, 2.0, 3.0);
   const Vec<2> after = v + factor * (1 / 2.0 + 1 / 3.0) * d;
   EXPECT_NEAR(after.dot(d), -0.6 * v.dot(d), 1e-15);
   EXPECT_NEAR(lost, 0.5 * 1.2 * (1 - 0.36) * v.dot(d) * v.dot(d), 1e-14);
