@@ -220,13 +220,13 @@ IntegratorInfo mcva() {
                       .type = Parameter::Type::text,
                       .fallback = "\"grid\"",
                       .unit = "-",
-                      .meaning = "grid: finish the step that a collision cuts; restart: begin a new full step after "
-                                 "each collision, output by a side copy",
+                      .meaning = "grid: complete the step that a collision cuts; restart: begin a new full step after "
+                                 "each collision",
                       .choices = {"grid", "restart"}},
                      parameter::max_events_per_step()},
       .documentation =
-          "CVA with an impulse that keeps the second-order shadow Hamiltonian of Verlet, so that the "
-          "energy does not wander from collision to collision. An impulse that would hardly part the spheres "
+          "CVA with impulses that conserve the second-order shadow Hamiltonian of Verlet, so that the "
+          "energy does not drift from collision to collision. An impulse that would hardly separate the spheres "
           "is replaced by the elastic one and counted as a fallback.",
       .source = "Bond, Leimkuhler, SIAM J. Sci. Comput. 30 (2007) 134",
       .shadow = true,

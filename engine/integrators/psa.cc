@@ -111,12 +111,12 @@ IntegratorInfo psa() {
   return {.name = "psa",
           .title = "Primitive Splitting Algorithm",
           .order = "1",
-          .conserves = "linear momentum to rounding; energy to order 1, lost at collisions",
+          .conserves = "linear momentum to rounding; energy to order 1, with an error at each collision",
           .parameters = {parameter::step(), parameter::max_events_per_step()},
           .documentation =
-              "Verlet with a drift that is resolved event by event: half a kick, free flight with all its "
-              "collisions, half a kick. Collisions see velocities that lack the force of the step's other "
-              "half: first order, and the cheapest.",
+              "Verlet with a drift that resolves each collision: half a kick, free flight with all its "
+              "collisions, half a kick. The velocities at a collision lack the second half of the kick, so the "
+              "method is of first order. It is the cheapest one.",
           .source = "Suh, Mier-y-Teran, White, Davis, Chem. Phys. 142 (1990) 203",
           .local = true,
           .shadow = true,

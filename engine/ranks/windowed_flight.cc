@@ -223,7 +223,7 @@ void WindowedFlight<D>::give_back(double time, Particles<D>& particles) {
   collect(time, particles, &work_);
 }
 
-/// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events a sphere.
+/// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events per sphere.
 template <int D>
 void WindowedFlight<D>::measure_work() {
   const std::uint64_t events = subdomain_ ? subdomain_->run_events() - run_before_ : 0;

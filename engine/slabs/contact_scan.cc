@@ -96,6 +96,12 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
       note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
     }
   std::ranges::sort(touching_, {}, &Touch<D>::key);
+  auto known = reactions_.begin();  // in the order of keys too, so each touch finds its reaction from there on
+  for (Touch<D>& touch : touching_) {
+    const EventKey<D> partners = without_time(touch.key);
+    while (known != reactions_.end() && known->key < partners) ++known;
+    touch.force = known != reactions_.end() && known->key == partners ? known->force : 0.0;
+  }
 }
 
 /// Sorts the contacts into approaching and resting ones. `all_stop`: contacts that dissipate rest if they approach.
@@ -104,11 +110,11 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   approaching_.clear();
   resting_.clear();
   for (const Touch<D>& touch : touching_) {
-    const double speed = normal_speed(touch, v);
-    if (speed < -stopping_speed(touch, v) && !(all_stop && dissipates(touch.key)))
+    const double speed = normal_speed(touch, v), resting = resting_speed(touch, v);
+    if (speed < -stopping_speed(touch.key, touch.normal, touch.force, resting) && !(all_stop && dissipates(touch.key)))
       approaching_.push_back(touch);
-    else if (speed <= resting_speed(touch, v))
-      resting_.push_back({.key = without_time(touch.key), .normal = touch.normal});
+    else if (speed <= resting)
+      resting_.push_back({.key = without_time(touch.key), .normal = touch.normal, .force = touch.force});
   }
 }
 
@@ -120,14 +126,14 @@ double ContactScan<D>::known_force(const EventKey<D>& key) const {
 }
 
 template <int D>
-double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
+double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
                                      const Vec<D>& v_hi) const {
   const bool pair = key.kind == EventKind::pair;
   // Nothing rests on a thermal wall.
   if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) return -std::numeric_limits<double>::min();
   const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
   const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
-  const double closing = pressing(key, normal);
+  const double closing = pressing(key, normal, force);
   if (!(closing > 0)) return rounding;
   return std::max(rounding,
                   std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces));
@@ -136,9 +142,15 @@ double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& norma
 template <int D>
 double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
                                       const Vec<D>& v_hi) const {
-  const double resting = resting_speed(key, normal, v_lo, v_hi);
+  const double force = known_force(key);
+  return stopping_speed(key, normal, force, resting_speed(key, normal, force, v_lo, v_hi));
+}
+
+template <int D>
+double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
+                                      double resting) const {
   if (resting < 0 || !dissipates(key)) return resting;
-  const double closing = std::max(0.0, pressing(key, normal));
+  const double closing = std::max(0.0, pressing(key, normal, force));
   const auto& species = particles_.species;
   const ContactLaw& law = key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
                                                       : box_.contacts.of_wall(species[key.lo], key.hi);
@@ -157,14 +169,14 @@ bool ContactScan<D>::dissipates(const EventKey<D>& key) const {
 
 /// The acceleration at which a contact would close by forces and, if contacts dissipate, by other reactions.
 template <int D>
-double ContactScan<D>::pressing(const EventKey<D>& key, const Vec<D>& normal) const {
+double ContactScan<D>::pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const {
   const bool pair = key.kind == EventKind::pair;
   const auto between = [&](const std::vector<Vec<D>>& w) { return pair ? Vec<D>(w[key.lo] - w[key.hi]) : w[key.lo]; };
   Vec<D> a = Vec<D>::Zero();
   if (a_ && key.lo < a_->size()) a = between(*a_);
   if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
   const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
-  const double closing = std::max(known_force(key) * inverse_mass, -a.dot(normal) / normal.norm());
+  const double closing = std::max(force * inverse_mass, -a.dot(normal) / normal.norm());
   return held_.empty() ? closing : std::max(closing, -(a + between(held_)).dot(normal) / normal.norm());
 }
 
@@ -218,7 +230,6 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
       break;
     if (!approaching_.empty()) count_event(approaching_.front().key);
   }
-  for (auto& contact : resting_) contact.force = known_force(contact.key);
   return lost;
 }
 

@@ -31,7 +31,8 @@ template <int D>
 struct Touch {
   EventKey<D> key;  ///< key.time counts from now for a future contact
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
-  double speed = 0;  ///< of a wall along the normal
+  double speed = 0;  ///< velocity of a wall along its normal
+  double force = 0;  ///< the reaction of a present contact in the last piece [force]
   bool pair() const { return key.kind == EventKind::pair; }
 };
 
@@ -137,18 +138,20 @@ class ContactScan {
     if (!pressed_.empty()) speed += length_ * pressed_[i];
     return kRounding * speed;
   }
-  /// A contact rests below this normal speed: the rounding error, or a speed at which the forces on the spheres close
-  /// the contact again before it has opened by kRestingGap. `normal` may have any length.
-  double resting_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
   /// A contact stops if the spheres approach more slowly than this: the resting speed or, if it dissipates, the rest
-  /// speed of its law.
+  /// speed of its law. `normal` may have any length.
   double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
 
   /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
   void stop_within(double time) { kick_ = time; }
 
  private:
-  double pressing(const EventKey<D>& key, const Vec<D>& normal) const;
+  /// A contact rests below this normal speed: the rounding error, or a speed at which the forces on the spheres close
+  /// the contact again before it has opened by kRestingGap. `force`: its reaction in the last piece.
+  double resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
+                       const Vec<D>& v_hi) const;
+  double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
+  double pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const;
   bool dissipates(const EventKey<D>& key) const;
   double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);
@@ -158,10 +161,11 @@ class ContactScan {
     return rounding_speed(key.lo, v[key.lo]) + (key.kind == EventKind::pair ? rounding_speed(key.hi, v[key.hi]) : 0.0);
   }
   double resting_speed(const Touch<D>& touch, Positions<D> v) const {
-    return resting_speed(touch.key, touch.normal, v[touch.key.lo], v[touch.pair() ? touch.key.hi : touch.key.lo]);
+    return resting_speed(touch.key, touch.normal, touch.force, v[touch.key.lo],
+                         v[touch.pair() ? touch.key.hi : touch.key.lo]);
   }
   double stopping_speed(const Touch<D>& touch, Positions<D> v) const {
-    return stopping_speed(touch.key, touch.normal, v[touch.key.lo], v[touch.pair() ? touch.key.hi : touch.key.lo]);
+    return stopping_speed(touch.key, touch.normal, touch.force, resting_speed(touch, v));
   }
   void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
   /// `gained`: the change of the kinetic energy of lo.

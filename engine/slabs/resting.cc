@@ -28,17 +28,18 @@ class Problem {
  public:
   Problem(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w, bool tied)
       : contacts_(contacts), w_(w), tied_(tied) {
-    std::vector<Id> ids;
+    std::vector<int> place(mass.size(), kWall);  // by particle: its place in bodies_
     for (const auto& contact : contacts) {
-      ids.push_back(contact.key.lo);
-      if (pair(contact)) ids.push_back(contact.key.hi);
+      place[contact.key.lo] = 0;
+      if (pair(contact)) place[contact.key.hi] = 0;
     }
-    std::ranges::sort(ids);
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-    for (const Id id : ids) bodies_.push_back({id, 1 / mass[id]});
-    const auto place = [&](Id id) { return static_cast<int>(std::ranges::lower_bound(ids, id) - ids.begin()); };
+    for (Id id = 0; id < place.size(); ++id) {
+      if (place[id] == kWall) continue;
+      place[id] = static_cast<int>(bodies_.size());
+      bodies_.push_back({id, 1 / mass[id]});
+    }
     for (const auto& contact : contacts) {
-      Arm arm{place(contact.key.lo), pair(contact) ? place(contact.key.hi) : kWall};
+      Arm arm{place[contact.key.lo], pair(contact) ? place[contact.key.hi] : kWall};
       const double inverse_mass = bodies_[arm.lo].inverse_mass + (arm.hi == kWall ? 0.0 : bodies_[arm.hi].inverse_mass);
       arm.scale = std::sqrt(contact.normal.squaredNorm() * inverse_mass);
       arms_.push_back(arm);

@@ -14,12 +14,12 @@ namespace carom {
 
 namespace {
 constexpr double kPathMargin = 1.25;         // paths under later accelerations, relative to the first paths
-constexpr double kMostBend = 4;              // ½ h² a, in mean distances of the particles
+constexpr double kMostBend = 4;              // ½ h² a, in mean distances: a particle then has 10³ candidates
 constexpr std::size_t kBetweenLooks = 1024;  // events between two checks for a request to stop
 // Contacts of one particle on parabolas in a slab: a light sphere between two approaching heavy ones collides about
-// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A shorter slab is tried
-// rather than a flight with more contacts, which costs too much as long as the accelerations are not right.
-constexpr std::uint32_t kMostContactsOfParticle = 1000;
+// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A sweep costs as much as its
+// contacts, and a shorter slab takes fewer sweeps, so flights with more contacts than this are not tried.
+constexpr std::uint32_t kMostContactsOfParticle = 100;
 }  // namespace
 
 template <int D>
@@ -78,11 +78,12 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   if (std::isfinite(margin_)) find_near();
 }
 
-/// Rejects accelerations under which parabolas may cross a whole periodic box: there would be too many images.
+/// Rejects accelerations under which a parabola may be longer than a quarter of a periodic box, so that two particles may
+/// approach each other by more than half of it: beyond that each pair has several images within reach.
 template <int D>
 void SlabCore<D>::limit_margin() {
   for (int k = 0; k < D; ++k)
-    if (box_.periodic(k) && !a_.empty() && margin_ > box_.edges[k]) margin_ = kNever;
+    if (box_.periodic(k) && !a_.empty() && margin_ > 0.25 * box_.edges[k]) margin_ = kNever;
 }
 
 /// Finds the candidate pairs within margin_, and which of them may meet before any other collision.
@@ -93,8 +94,15 @@ void SlabCore<D>::find_near() {
   near_.clear();
   for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
     const auto& [i, j, image] = pairs_[k];
-    const double sigma = scan_->contact_distance(i, j), near = sigma + scan_->tolerance(sigma) + reach_[i] + reach_[j];
-    if ((x[i] - x[j] + box_.shift(image)).squaredNorm() <= near * near) near_.push_back(k);
+    const double sigma = scan_->contact_distance(i, j), touching = sigma + scan_->tolerance(sigma);
+    const double near = touching + reach_[i] + reach_[j];
+    const Vec<D> d = x[i] - x[j] + box_.shift(image);
+    if (!(d.squaredNorm() <= near * near)) continue;
+    // Each path bends off its straight line by no more than largest_bend_.
+    const Vec<D> v = start_v_[i] - start_v_[j];
+    const double b = d.dot(v), passing = touching + largest_bend_[i] + largest_bend_[j];
+    const double closest = b < 0 ? std::min(length_, -b / v.squaredNorm()) : 0.0;
+    if ((d + closest * v).squaredNorm() <= passing * passing) near_.push_back(k);
   }
 }
 

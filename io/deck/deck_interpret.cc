@@ -11,7 +11,7 @@
 namespace carom {
 namespace {
 
-constexpr std::int64_t kMostParticles = 1'000'000'000;  // of a species; ids have 32 bits
+constexpr std::int64_t kMostParticles = 1'000'000'000;  // in a species; ids have 32 bits
 
 /// "1 particle", "2 particles"
 std::string count_of(std::size_t n, const std::string& what) {

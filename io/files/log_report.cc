@@ -71,7 +71,7 @@ std::string windows_text(std::span<const RankAccount> ranks) {
   WindowCounts all;
   std::uint64_t most = 0;
   for (const RankAccount& rank : ranks) {
-    all.windows = rank.windows.windows;  // the same everywhere, like rounds
+    all.windows = rank.windows.windows;  // equal on all ranks, like the number of rounds
     all.rounds = rank.windows.rounds;
     all.events += rank.windows.events;
     all.run_events += rank.windows.run_events;

@@ -13,7 +13,7 @@
 namespace carom {
 
 namespace {
-constexpr ColumnChart kError{"error", "largest |H − H₁| so far", true}, kTemperature{"temperature", "temperature"},
+constexpr ColumnChart kError{"error", "largest energy error so far", true}, kTemperature{"temperature", "temperature"},
     kPressure{"pressure", "pressure"};
 }  // namespace
 
@@ -37,7 +37,7 @@ const std::vector<Column<D>>& columns() {
        [](S s, int) { return s.total(); }, "energy", "total_energy", "16.10g"},
       {"shadow", number, "energy", "S_h of Verlet types; NaN for other methods",  //
        [](S s, int) { return s.shadow; }, "shadow_energy", "shadow_energy"},
-      {"max_energy_error", number, "energy", kError.title,  //
+      {"max_energy_error", number, "energy", "largest change of `conserved` since the first step",  //
        [](S s, int) { return s.max_energy_error; }, nullptr, "max_energy_error", "10.2e", &kError, "max |ΔE|"},
       {"momentum", vector, "mass length/time", "total momentum",  //
        [](S s, int axis) { return s.momentum[axis]; }, "momentum", "momentum"},

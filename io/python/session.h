@@ -47,7 +47,8 @@ class Session {
  public:
   /// All members throw Error.
   Session(std::span<const double> edges, const std::vector<std::string>& boundary);
-  explicit Session(Deck& deck);
+  /// The initial state of a deck, or a given state.
+  explicit Session(Deck& deck, const std::optional<GivenState>& given = {});
   /// The last checkpoint of a run that wrote files to a directory; the next run() continues the run and its files.
   Session(Deck& deck, Resumed& from);
 
@@ -148,11 +149,11 @@ class Session {
   std::atomic<bool> running_ = false;
   std::thread::id runner_;  // the thread in run(), in which callbacks may set velocities
   ParticleViews<D> views_;
-  std::string failure_;  // of the last run
+  std::string failure_;  // why the last run failed
 
   std::optional<Snapshot<D>> shot_;
-  Statistics statistics_;               // of the last run
-  const Statistics* live_ = nullptr;    // of the active run
+  Statistics statistics_;               // statistics of the last run
+  const Statistics* live_ = nullptr;    // statistics of the active run
   std::map<std::string, Bytes> state_;  // to continue from
   std::int64_t state_steps_ = 0;
   double state_time_ = 0, interval_ = 0, step_ = 0;
@@ -164,10 +165,10 @@ class Session {
 
   std::optional<std::vector<std::string>> output_;  // overrides of [output]; nullopt: no files
   std::string text_, file_;                         // the deck that the particles came from, and its file
-  std::optional<Deck> deck_;                        // of the run that writes files
+  std::optional<Deck> deck_;                        // deck of the run that writes files
   CheckpointHead head_;                             // positions in its files at the state to continue from
   std::shared_ptr<Checkpoint> checkpoint_;          // holds that state until the first run
-  const RunRecord<D>* record_ = nullptr;            // of the active run
+  const RunRecord<D>* record_ = nullptr;            // record of the active run
   Averages averages_;
   std::vector<std::string> warnings_;
 };

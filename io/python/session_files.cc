@@ -45,22 +45,11 @@ void change_value(const Fields& fields, const std::string& name, const std::func
 }  // namespace
 
 template <int D>
-Session<D>::Session(Deck& deck, Resumed& from) {
-  const GivenState given{from.reader(), from.head.bonds, from.head.time};
-  system_ = build_system<D>(deck, nullptr, &given);
-  plan_ = deck.plan;
-  box_ = system_->box;
-  for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
-  for (const auto& contact : deck.source->contacts) contacts_.push_back(contact.parameters);
-  for (const auto& bath : deck.source->baths) baths_.push_back(bath.parameters);
-  species_ = system_->species;
-  size_ = system_->size();
-  integrator_ = &find_integrator(deck.integrator);
-  parameters_ = deck.integrator_parameters;
-  terms_ = Terms<D>(deck, *system_);
+Session<D>::Session(Deck& deck, Resumed& from)
+    : Session(deck, GivenState{from.reader(), from.head.bonds, from.head.time}) {
+  text_.clear();
+  file_.clear();
   system_->quanta = {};
-  views_.rest(system_->particles);
-
   Archive(from.checkpoint->read("statistics"))(statistics_);
   checkpoint_ = std::make_shared<Checkpoint>(std::move(*from.checkpoint));
   head_ = from.head;
