@@ -29,7 +29,13 @@ class PrimitiveSplitting : public Integrator<D> {
     auto& p = system.particles;
     core_->begin_step(report.counters, report.contacts, &accelerations_.a, slab.length, report.watch);
     if (!system.box.contacts.elastic()) {
-      inelastic_slab(system, slab.length, report);
+      const std::vector<Vec<D>> before = p.v;
+      try {
+        inelastic_slab(system, slab.length, report);
+      } catch (const HaloTooSmall&) {  // only the first kick has changed anything
+        p.v = before;
+        throw;
+      }
     } else {
       kicked_ = p.v;
       kick(kicked_, accelerations_.a, 0.5 * slab.length);

@@ -42,12 +42,14 @@ struct Snapshot {
   std::int64_t step = 0;                    ///< slabs completed (free flight: epochs begun or completed)
   std::uint64_t collisions = 0;             ///< pair collisions so far
   const Particles<D>* particles = nullptr;  ///< all particles; with several ranks this rank's block (with ids)
-  double kinetic = 0, potential = 0;        ///< [energy]; V with its long-range corrections
+  double kinetic = 0, potential = 0;        ///< [energy]; K with that of spins, V with its long-range corrections
+  double rotational = 0;                    ///< the part of K that is in spins, ½ Σ I ω² [energy]
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN if the method has none
   double max_energy_error = 0;                               ///< as in Statistics, so far [energy]
   Vec<D> momentum = Vec<D>::Zero();
-  double temperature = 0;  ///< 2K/(D N), in units of energy (k_B = 1); total momentum is not subtracted
-  double pressure = 0;     ///< virial: (2K + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
+  double temperature = 0;  ///< Σ m v²/(D N), in units of energy (k_B = 1); total momentum is not subtracted
+  double rotational_temperature = 0;  ///< Σ I ω²/(f N), f = 1 in two dimensions, 3 in three [energy]
+  double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
   double total() const { return kinetic + potential; }
   /// What stays constant, whatever contacts, walls and baths do.

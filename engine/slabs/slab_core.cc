@@ -332,7 +332,8 @@ template <int D>
 typename SlabCore<D>::Flight& SlabCore<D>::flight(Id i, const EventKey<D>& key) {
   const Vec<D> x = position(i, key.time), v = velocity(i, key.time);
   if (slot_[i] == 0) {
-    flights_.push_back({x, v, key.time, i, 0, 0, 0});
+    flights_.push_back({x, v, key.time, i, 0, 0, 0, Spin<D>::Zero()});
+    if (box_.contacts.rough()) flights_.back().spin = particles_.spin[i];
     slot_[i] = static_cast<std::uint32_t>(flights_.size());
   }
   Flight& f = flights_[slot_[i] - 1];
@@ -366,7 +367,8 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     // Sweeps change the time of a contact, not its random numbers.
     const Draw draw{.id = particles_.id_of(key.lo), .time = box_.time, .number = std::uint64_t{lo.version} << 32};
     const auto [after, impulse, exchange] =
-        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, draw, key.time);
+        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, draw, key.time, 0,
+                        particles_.radius[key.lo], box_.contacts.rough() ? &lo.spin : nullptr);
     contact.impulse = impulse;
     contact.exchange = exchange;
     lo.v = after;
@@ -383,6 +385,16 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse), .dissipated = dissipated};
     lo.v += (g / mass) * d;
     hi.v -= (g / mass_hi) * d;
+    if (box_.contacts.rough()) {
+      const auto sphere = [&](Flight& f) {
+        return RoughSphere<D>{particles_.mass[f.id], particles_.radius[f.id], particles_.species[f.id], &f.spin};
+      };
+      const Rubbed<D> rubbed = rub_pair<D>(box_.contacts, d, v, g, sphere(lo), sphere(hi));
+      lo.v += rubbed.impulse / mass;
+      hi.v -= rubbed.impulse / mass_hi;
+      contact.impulse += rubbed.impulse;
+      contact.exchange.dissipated += rubbed.dissipated;
+    }
     checks_path(hi);
   }
   checks_path(lo);

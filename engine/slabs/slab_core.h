@@ -84,6 +84,8 @@ class SlabCore {
   void finish(Particles<D>& particles) {
     particles.x.swap(x_);
     particles.v.swap(v_);
+    if (box_.contacts.rough())
+      for (const Flight& each : flights_) particles.spin[each.id] = each.spin;
     system_.box.time += length_;
   }
 
@@ -98,6 +100,7 @@ class SlabCore {
     Id id;
     std::uint32_t version, generation;
     std::uint64_t hash;  ///< hash of the particle's sequence of partners
+    Spin<D> spin;        ///< if contacts are rough
   };
   struct Planned {
     EventKey<D> key;

@@ -117,7 +117,14 @@ std::vector<TableSchema> make_schema() {
         {"display_radius", real_or_list, "none", "length", "with verlet: the radius that pictures show; default: 0.5",
          Range::positive},
         {"mass", real_or_list, "1.0", "mass", "mass of a particle", Range::positive},
-        {"charge", real_or_list, "0.0", "charge", "charge of a particle, for interactions between charges"}}},
+        {"charge", real_or_list, "0.0", "charge", "charge of a particle, for interactions between charges"},
+        {"spin", vector_list, "none", "1/time",
+         "angular velocities that go with explicit positions where contacts have 'tangential': [z] in two dimensions, "
+         "[x, y, z] in three; without spin where absent"},
+        {"inertia", real, "none", "-",
+         "reduced moment of inertia 4I/(m sigma^2), sigma the diameter: 0.5 for homogeneous discs, 0.4 for homogeneous "
+         "spheres, which is the default; 1 for rings, 2/3 for shells",
+         Range::positive}}},
       {"placement",
        false,
        false,

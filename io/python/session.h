@@ -24,11 +24,12 @@
 
 namespace carom::python {
 
-/// The data of N particles for add_particles(): N·D numbers for x; N·D or none for v; N, one or none for the other
-/// columns.
+/// The data of N particles for add_particles(): N·D numbers for x; N·D or none for v; one or three for each particle or
+/// none for spin; N, one or none for the other columns.
 struct Columns {
-  std::span<const double> x, v, radius, mass, charge;
+  std::span<const double> x, v, radius, mass, charge, spin;
   std::string species;
+  double inertia = 0;  ///< reduced, of the species; 0: as before, homogeneous if the species is new
 };
 
 /// Callbacks of run().
@@ -56,6 +57,9 @@ class Session {
   void set_position(std::span<const double> x);
   /// In RunHooks::show at the end of a step this begins no new run: the velocities apply when show returns.
   void set_velocity(std::span<const double> v);
+  void set_spin(std::span<const double> spin);
+  /// The reduced moment of inertia of a species.
+  void set_inertia(const std::string& species, double inertia);
   /// N velocities, drawn from the Maxwell–Boltzmann distribution for particles with a temperature (not NaN) [energy];
   /// the present velocities for the rest.
   std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
@@ -93,6 +97,10 @@ class Session {
   std::span<const Vec<D>> position() { return views_.position(); }
   std::span<const Vec<D>> velocity() { return views_.velocity(); }
   std::span<const Image<D>> image() { return views_.image(); }
+  /// Empty if there never was a spin.
+  std::span<const Spin<D>> spin() { return views_.spin(); }
+  /// By species; 0 or missing: homogeneous.
+  const std::vector<double>& inertias() const { return box_.contacts.inertias; }
   Constants constants() { return views_.constants(); }
   const Box<D>& box() const { return box_; }
   const std::vector<std::string>& species() const { return species_; }
@@ -117,7 +125,8 @@ class Session {
   class Shown;
   void change(const char* what);
   void set_contacts(std::vector<Parameters> all);
-  void set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what);
+  template <class T>
+  void set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what);
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes decks as text."""
 
+import itertools
 import json
 import pathlib
 
@@ -71,8 +72,16 @@ def species_of(sim, of):
         raise UsageError(f"{of}: the particles of a species do not follow one another, which a deck needs; add species "
                          "after species")
     columns = {name: getattr(sim, name) for name in ("position", "velocity", "radius", "mass", "charge")}
-    return [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
-            for kind, name in enumerate(sim.species_names)]
+    species = [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
+               for kind, name in enumerate(sim.species_names)]
+    if not any("tangential" in contact for contact in sim.contacts):
+        return species
+    spins = sim.spin.reshape(len(sim), -1)
+    for kind, (one, inertia) in enumerate(itertools.zip_longest(species, sim._session.inertias, fillvalue=0)):
+        one["spin"] = spins[kinds == kind]
+        if inertia:
+            one["inertia"] = inertia
+    return species
 
 
 def write_deck(sim, file, ends, every):

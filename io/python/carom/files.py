@@ -166,6 +166,14 @@ class Trajectory:
         """Velocities, (N, D) [length/time]."""
         return self._read("velocity", frame)
 
+    def spin(self, frame):
+        """Angular velocities [1/time], (N,) in two dimensions; zeros where no contact changes them."""
+        columns = slice(None) if self.dimension == 3 else 2
+        with reading(self.path):
+            if "angular_velocity" not in self._group:
+                return np.zeros((len(self.species), 3))[:, columns]
+            return self._group["angular_velocity/value"][frame][:, columns]
+
     def image(self, frame):
         """How many box edges each particle has crossed along each periodic axis, (N, D)."""
         return self._read("image", frame)
@@ -193,6 +201,7 @@ class Frame:
 
     position = property(lambda self: self._trajectory.position(self._number), doc="Wrapped centres [length].")
     velocity = property(lambda self: self._trajectory.velocity(self._number), doc="Velocities [length/time].")
+    spin = property(lambda self: self._trajectory.spin(self._number), doc="Angular velocities [1/time].")
     image = property(lambda self: self._trajectory.image(self._number), doc="Numbers of box edges crossed along each periodic axis.")
     unwrapped = property(lambda self: self._trajectory.unwrapped(self._number), doc="Unwrapped centres [length].")
     edges = property(lambda self: self._trajectory.edges(self._number), doc="Edges of the box [length].")

@@ -2,6 +2,7 @@
 """Simulations. Arrays and keywords are checked here; the engine checks all other input and writes the messages about it."""
 
 import collections.abc
+import numbers as numbers_type
 import operator
 import os
 import warnings
@@ -72,7 +73,7 @@ class Simulation:
         self._session, self.title, self.warnings = session, title, []
         self._cores = False  # a radius was given
         self._output = None  # the arguments of set_output()
-        self._edges_known, self._counted, self.bonds = True, [], np.empty((0, 2), int)
+        self._edges_known, self._counted, self._inertias, self.bonds = True, [], {}, np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
         self.warnings = list(texts)
@@ -115,12 +116,14 @@ class Simulation:
         return formats.read(cls, file, frame, radius, boundary)
 
     def add_particles(self, position=None, velocity=None, radius=None, mass=1.0, charge=0.0, species="particle", count=None,
-                      temperature=None):
+                      temperature=None, spin=None, inertia=None):
         """Adds N particles; returns the range of their ids.
 
         position, velocity: arrays of shape (N, D) [length, length/time]; the default velocity is 0.
         radius, mass, charge: one number for all, or N numbers. The default radius is 0.5; leave it out for verlet, which has no hard
         cores. species: the name of their species, for forces between species.
+        spin: angular velocities [1/time], (N,) in two dimensions, about z, and (N, 3) in three. Contacts with "tangential" change them.
+        inertia: reduced moment of inertia 4I/(m sigma²) of the species; the default is that of a homogeneous body.
         count, temperature: replace positions and velocities, which place() then chooses.
 
             sim.add_particles(position=[[1, 1], [3, 1]], velocity=[[0, 0], [0.5, 0]], radius=0.5)
@@ -130,7 +133,7 @@ class Simulation:
         radius = 0.5 if radius is None else radius
         if count is not None:
             return self._count(count, position, velocity, temperature,
-                               {"name": species, "radius": radius, "mass": mass, "charge": charge})
+                               {"name": species, "radius": radius, "mass": mass, "charge": charge}, spin, inertia)
         if position is None:
             raise UsageError("add_particles: there is no 'position'; give one of shape (N, D), or a count for place()")
         if temperature is not None:
@@ -152,11 +155,29 @@ class Simulation:
                   for name, values in (("radius", radius), ("mass", mass), ("charge", charge))]
         if not isinstance(species, str):
             raise UsageError(f"add_particles: 'species' is {species!r}; give one name, and call again for other species")
+        turning = np.empty(0) if spin is None else self._spins("add_particles", spin, len(x))
         first = self._session.size
-        self._session.add_particles(x, v, *others, species)
+        self._session.add_particles(x, v, *others, turning, species, self._inertia(inertia))
         return range(first, self._session.size)
 
-    def _count(self, count, position, velocity, temperature, table):
+    @staticmethod
+    def _inertia(value):
+        if value is None:
+            return 0.0
+        if not isinstance(value, numbers_type.Real) or isinstance(value, bool) or not value > 0:
+            raise UsageError(f"add_particles: 'inertia' is {value!r}; give one positive number for the species")
+        return float(value)
+
+    def _spins(self, of, values, count):
+        array, shape = numbers(of, "spin", values), (count,) if len(self.box) == 2 else (count, 3)
+        if array.shape != shape:
+            raise UsageError(f"{of}: 'spin' has shape {array.shape}; give {shape}")
+        return array
+
+    def _count(self, count, position, velocity, temperature, table, spin, inertia):
+        if spin is not None:
+            raise UsageError("add_particles: 'spin' goes with 'position'; assign simulation.spin after place()")
+        self._inertias[table["name"]] = self._inertia(inertia)
         if position is not None or velocity is not None:
             raise UsageError("add_particles: 'count' excludes 'position' and 'velocity'; leave it out, or them")
         if temperature is None:
@@ -181,24 +202,33 @@ class Simulation:
         """
         if not self._counted:
             raise UsageError("place: no particles were given by count; call add_particles(count=…, temperature=…) first")
-        old = self._session
+        old, spin = self._session, self._session.spin()
         system = system_of(self)
         if not self._edges_known:
             del system["box"]
-        deck = {"format": 1, "system": system, "particles": (species_of(self, "place") if old.size else []) + self._counted,
+        placed = species_of(self, "place") if old.size else []
+        for one in placed:
+            self._inertias[one["name"]] = one.pop("inertia", 0.0)
+            one.pop("spin", None)
+        deck = {"format": 1, "system": system, "particles": placed + self._counted,
                 "placement": {"type": name_of("place", type), "seed": seed} | parameters,
                 "integrator": {"type": "free-flight"}, "run": {"collisions": 1}} | surroundings_of(self)
         if packing_fraction is not None:
             deck["placement"]["packing_fraction"] = packing_fraction
         session, texts, _ = _carom.from_deck("place", [], toml_text(deck))
         session.forget_run()
+        for name, inertia in self._inertias.items():
+            if inertia:
+                session.set_inertia(name, inertia)
+        if spin.any():
+            session.set_spin(np.concatenate([spin, np.zeros((session.size - len(spin),) + spin.shape[1:])]))
         for name, given in old.forces:
             session.add_force(name, given)
         if old.method:
             session.set_integrator(old.method, old.method_parameters)
         if self._output:
             session.set_output(*self._output)
-        self._session, self._edges_known, self._counted = session, True, []
+        self._session, self._edges_known, self._counted, self._inertias = session, True, [], {}
         self._warn(texts)
         return range(len(self))
 
@@ -230,9 +260,11 @@ class Simulation:
         """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all of them.
         Add species and walls first; a later law replaces an earlier one.
 
-        Parameters are those of [[contact]] in decks: restitution, rest_speed, …; see carom.describe("contact").
+        Parameters are those of [[contact]] in decks: restitution, tangential, friction, rest_speed; see
+        carom.describe("contact").
 
             sim.add_contact("*", "*", restitution=0.9)
+            sim.add_contact("*", "*", restitution=0.9, tangential=0.5, friction=0.3)     # rough spheres, which spin
             sim.add_contact("ice", "ice", restitution={"form": "power", "v0": 0.01, "exponent": 0.234})
         """
         given = refuse_masked("add_contact", dict(parameters))
@@ -376,6 +408,17 @@ class Simulation:
     @velocity.setter
     def velocity(self, values):
         self._session.set_velocity(self._rows("velocity", values))
+
+    @property
+    def spin(self):
+        """Angular velocities [1/time], (N,), about z, in two dimensions and (N, 3) in three; like position. Only contacts with
+        "tangential" change them; zeros where there are none."""
+        values = self._session.spin()
+        return values if len(values) == len(self) else np.zeros((len(self),) + values.shape[1:])
+
+    @spin.setter
+    def spin(self, values):
+        self._session.set_spin(self._spins("Simulation", values, len(self)))
 
     @property
     def image(self):
