@@ -41,7 +41,8 @@ Measurement<D> measure(const System<D>& system, const Particles<D>& state, const
   for (int k = 0; k < D; ++k) found.shot.momentum[k] = motion.momentum[k].value();
   if (const auto total = static_cast<double>(system.size()); total > 0) {
     found.shot.temperature = 2 * kinetic / (D * total);
-    found.shot.rotational_temperature = 2 * rotational / (Spin<D>::SizeAtCompileTime * total);
+    constexpr int freedoms = Spin<D>::SizeAtCompileTime;
+    found.shot.rotational_temperature = 2 * rotational / (freedoms * total);
     found.speed = motion.speed.value() / total;
   }
   return found;

@@ -78,8 +78,8 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   if (std::isfinite(margin_)) find_near();
 }
 
-/// Rejects accelerations under which a parabola may be longer than a quarter of a periodic box, so that two particles may
-/// approach each other by more than half of it: beyond that each pair has several images within reach.
+/// Rejects accelerations under which a parabola may be longer than a quarter of a periodic box, so that two particles
+/// may approach each other by more than half of it: beyond that each pair has several images within reach.
 template <int D>
 void SlabCore<D>::limit_margin() {
   for (int k = 0; k < D; ++k)
