@@ -26,7 +26,8 @@ from carom_files import TRAJECTORY, as_text, one_line, open_hdf5, reading
 
 PARTICLES = "particles/trajectory"
 # The elements with units if the deck names units, by their paths in the group of particles.
-UNITS = {"position/value": "length", "box/edges/value": "length", "radius": "length", "velocity/value": "velocity"}
+UNITS = {"position/value": "length", "box/edges/value": "length", "radius": "length", "velocity/value": "velocity",
+         "angular_velocity/value": "frequency"}
 UNITS |= {f"{clock}/time": "time" for clock in ("position", "velocity", "image", "box/edges")}
 OVERHANG = 1e-12  # how far a sphere may extend beyond a wall, relative to the edge
 
@@ -102,7 +103,7 @@ class Checker:
             if self.units:
                 length, time = self.units["length"], self.units["time"]
                 kind = UNITS.get(name.removeprefix(f"{PARTICLES}/")) or ("time" if name.endswith("/time") else None)
-                wanted = {"length": length, "time": time, "velocity": f"{length} {time}-1", None: None}[kind]
+                wanted = {"length": length, "time": time, "velocity": f"{length} {time}-1", "frequency": f"{time}-1", None: None}[kind]
                 self.expect(found == wanted, f"/{name}: attribute 'unit' is {found}, by the deck {wanted}")
             else:
                 self.expect(found is None, f"/{name}: attribute 'unit', but units are reduced")
@@ -120,7 +121,8 @@ class Checker:
         if not self.expect(position.ndim == 3 and position.shape[2] == 3, "position: must be [frames][particles][3]"):
             return False
         self.expect(position.dtype == np.float64, "position: must be in double precision")
-        for name in ("velocity", "image"):
+        rough = ["angular_velocity"] if "angular_velocity" in self.file[PARTICLES] else []
+        for name in ["velocity", "image", *rough]:
             if self.element(f"{PARTICLES}/{name}"):
                 value = self.file[f"{PARTICLES}/{name}/value"]
                 self.expect(value.shape[1:] == position.shape[1:], f"{name}: shape {value.shape}, position's is {position.shape}")

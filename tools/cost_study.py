@@ -6,13 +6,15 @@
     tools/cost_study.py inputs/spring-lattice.toml --counts 64,256,1024,4096 --methods cva,cdda,edda --end-time 1
     tools/cost_study.py inputs/yukawa-fluid.toml --set particles.count=256 --end-time 0.5 --steps 0.02,0.01,0.005
 
-Without --counts: errors at the end time, of the energy (the largest |H - H1| / E_ref on the way) and of the positions (the
-largest difference of a coordinate from --reference at a fifth of the smallest step), against the time of the run. With
---counts: time and force passes of a step against the number of particles of the deck's only species, at the largest of
---steps. Times are the processor's, of the run's loop with its measuring: at most what the clock says of the loop and what the
-system says of the command, so the lesser of both is taken, and the least of --repeats runs one after the other (of fewer where
-they take long), with bars up to the largest of them. The table goes to the terminal and, with the figure, to the output
-directory; runs that fail are reported and left out.
+Without --counts, the figure shows two errors against the time of the run: that of the energy (the largest |H - H1| / E_ref until
+the end time), and that of the positions at the end time (the largest difference of a coordinate from --reference, which runs at a
+fifth of the smallest step). With --counts, it shows the time and the force passes of a step against the number of particles of
+the only species of the deck, at the largest of --steps.
+
+Times are processor times of the loop of a run, including its measurements. Neither the clock of the loop nor the processor time of
+the command can be less, so the script takes the smaller one of them, and the smallest of --repeats runs (of fewer if they take
+long); bars extend to the largest one. The table is printed and, like the figure, written to the output directory. Runs that
+fail are reported and left out.
 """
 
 import pathlib
@@ -108,7 +110,7 @@ def main(arguments=None):
     title = f"{deck.get('title', options.deck.stem)}\n{', '.join(what + options.set)}"
     if options.counts:
         draw(rows, "particles", ["passes_per_step", "seconds_per_step"],
-             [{"title": title, "xlabel": "particles", "ylabel": what} for what in ("force passes a step", "processor time a step [s]")],
+             [{"title": title, "xlabel": "particles", "ylabel": what} for what in ("force passes per step", "processor time per step [s]")],
              figure)
     else:
         errors = {"energy_error": r"largest $|H - H_1|$ / $E_{\mathrm{ref}}$"}

@@ -6,13 +6,14 @@
     tools/energy_study.py inputs/nine-gravity.toml --methods cva,mcva:variant=restart,cdda:order=4
     tools/energy_study.py inputs/five-springs.toml --methods psa,cva --end-time 6 --starts 16 --steps 0.03,0.01,0.003,0.001
 
-Every run makes 5000 steps (--count), or, for a clean order, goes to a fixed --end-time, from --starts perturbed copies of
-the deck's initial state (seeded; start 0 is the deck's own). Drawn is the largest |H - H1|, H1 the energy after the first
-step, as a geometric mean over the starts; the CSV also has it relative to E_ref = max(|H1|, K1 + sum |V|). The order is the
-slope over the steps not above --fit-below, at a fixed end time. With a fixed number of steps larger ones also run longer: the
-legend then says how the error grows with the step, which is more than the order where it also grows with time.
-Errors at rounding level have none. Runs that fail are reported, kept as
-rows without an error, and left out of the figure. The decks of all runs are left beside the CSV.
+Every run makes 5000 steps (--count) or, for a clean order, goes to a fixed --end-time. Runs start from --starts perturbed copies of
+the initial state of the deck (seeded; start 0 is the state itself). The figure shows the largest |H - H1|, where H1 is the energy
+after the first step, as a geometric mean over the starts; the CSV also has it relative to E_ref = max(|H1|, K1 + sum |V|).
+
+With a fixed end time, the order is fitted to the steps up to --fit-below. With a fixed number of steps, runs with longer steps last
+longer; the legend then gives the growth of the error with the step, which exceeds the order if the error also grows with time.
+Errors at the level of rounding have no order. Runs that fail are reported, kept as rows without an error, and left out of the
+figure. The decks of all runs are written beside the CSV.
 """
 
 import concurrent.futures

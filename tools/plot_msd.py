@@ -6,14 +6,16 @@
     tools/plot_msd.py runs/hard-discs --fit 5,20 -o msd.png
     tools/plot_msd.py runs/hard-discs/msd.csv --dimension 2   # averages of the run itself (output.msd_interval)
 
-Averaged over particles and over all time origins, with displacements followed through periodic boundaries. Needs frames
-at equal times. D = slope / (2 d) of a line through the lags of --fit, by default from a twentieth to an eighth of the length of
-the run, each weighted by its error msd sqrt(2 / (d n)), n particles times windows of that lag that follow each other in the run.
-The error of D (one standard deviation) comes from four parts of the run, each fitted alone; of an msd.csv, which has no parts,
-it is the relative error of the msd at the first lag of the fit, were particles independent: neighbours that move together make
-the true one larger, in a fluid about twice. Error bars of the picture are of that kind. Where velocities stay correlated for
-long, the slope still rises with the lag: compare --fit.
-A CSV with lag, msd stands beside the picture, msd-frames.csv by default.
+The average is over all particles and all time origins; displacements are continuous across periodic boundaries. The frames must be
+at equal distances in time. D = slope / (2 d) is fitted to the lags of --fit, by default from a twentieth to an eighth of the length
+of the run. Each lag is weighted by its error msd sqrt(2 / (d n)), where n is the number of particles times the number of successive
+windows of this lag in the run.
+
+The error of D (one standard deviation) comes from four parts of the run, each fitted separately. An msd.csv has no parts; the error is
+then the relative error of the msd at the first lag of the fit, as for independent particles. In a fluid, where neighbours move
+together, the true error is about twice as large. The error bars of the picture are also those of independent particles. If velocities
+stay correlated for a long time, the slope still rises with the lag: try other values of --fit.
+The script writes a CSV with lag and msd beside the picture, by default msd-frames.csv.
 (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.7.)
 """
 

@@ -6,11 +6,12 @@
     tools/plot_rdf.py runs/primitive-electrolyte --species cation,anion --bins 200 --first-frame 20 -o rdf.png
     tools/plot_rdf.py runs/hard-sphere-fluid/rdf.csv          # averages of the run itself (output.rdf_interval)
 
-Periodic axes use the nearest image, so r ends at half the shortest periodic edge. Along walls the count expected of an
-ideal gas is the exact one of the region the centres can reach (the average over directions u of the product over the
-walled axes of 1 - r |u_k| / L_k), so that g = 1 without correlations up to the walls (for unequal radii: nearly). The band
-is one standard error, from four parts of the run, each averaged alone; the run's own rdf.csv, which has no parts, is drawn without.
-A CSV with r, g, error is written beside the picture, rdf-frames.csv by default. (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
+Along periodic axes the nearest image counts, so r ends at half the shortest periodic edge. Along walls, g refers to an ideal gas in
+the region that the centres can reach (the average over directions u of the product of 1 - r |u_k| / L_k over the walled axes), so
+that g = 1 without correlations, also near the walls (approximately if radii differ). The band is one standard error, from four parts
+of the run, each averaged separately; an rdf.csv has no parts and is drawn without a band.
+The script writes a CSV with r, g and error beside the picture, by default rdf-frames.csv.
+(Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
 """
 
 import argparse

@@ -5,16 +5,17 @@
     tools/rank_study.py
     tools/rank_study.py --ranks 8,64 --per-rank 500,2000 --collisions 20 --rate 1e6
 
-Measured, for a deck of free flight on so many ranks: windows, rounds a window, events run twice at borders, events redone,
-and the imbalance of the whole run, as in run.log. Where there are more ranks than cores, `. tools/mpi-env.sh` first. Spheres
-start at random places (--placement): cut between the layers of a crystal, ranks get unequal shares until the box is divided again.
+The script measures free flight of a deck on these numbers of ranks: windows, rounds per window, events run twice at borders, events
+redone, and the imbalance of the whole run, as in run.log. If there are more ranks than cores, run `. tools/mpi-env.sh` first. Spheres
+start at random positions (--placement): a crystal would be cut between its layers, and ranks would get unequal shares until the box
+is divided again.
 
-Fitted to the runs with ranks that have neighbours on all sides, with s = (spheres a rank)^(-1/D):
-events run twice (1 + h s)^D - 1, a shell around a cube; events redone r s, a surface; rounds a window a + b log2(spheres
-at all borders), a chain of repairs that gets longer by one with a probability. In the picture runs with fewer ranks, which
-are not in the fit, are hollow; bars are standard errors of the counts if events are independent.
+It fits these formulas to the runs in which ranks have neighbours on all sides, with s = (spheres per rank)^(-1/D): events run twice,
+(1 + h s)^D - 1, a shell around a cube; events redone, r s, a surface; rounds per window, a + b log2(spheres at all borders), a chain of
+repairs that becomes longer by one with a certain probability. In the picture, hollow symbols are runs with fewer ranks, which are not
+in the fit; bars are standard errors of the counts for independent events.
 
-Modelled from that: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a rank.
+The model that follows: efficiency = work / (work (1 + twice + redone + imbalance) + messages), for one window of a rank.
 The work is its collisions by --rate. The imbalance is that of independent events, sqrt(2 ln P / events), times
 --imbalance. Messages: a window has rounds + 1 exchanges and rounds + 3 reductions; a reduction takes
 log2 P times --latency, an exchange --latency and --overhead for each of 3^D - 1 neighbours. The model neglects the volume of data,
@@ -45,13 +46,13 @@ def parse_arguments(arguments=None):
     default = pathlib.Path(__file__).resolve().parent.parent / "inputs" / "hard-sphere-fluid.toml"
     parser.add_argument("deck", type=pathlib.Path, nargs="?", default=default, help="default: inputs/hard-sphere-fluid.toml")
     parser.add_argument("--ranks", default="2,4,8,16,32,64", help="numbers of ranks, a rank each")
-    parser.add_argument("--per-rank", default="500,2000,10000", help="spheres a rank")
+    parser.add_argument("--per-rank", default="500,2000,10000", help="spheres per rank")
     parser.add_argument("--most", type=int, default=130000, help="spheres of a run; larger ones are left out")
     parser.add_argument("--collisions", type=float, default=10, help="of a sphere in a run")
     parser.add_argument("--placement", default="random", help="of the spheres, instead of the deck's")
     parser.add_argument("--imbalance", type=float,
                         help="factor by which the imbalance exceeds that of independent events; default: fitted")
-    parser.add_argument("--rate", type=float, help="collisions a second of one core; default: measured without ranks")
+    parser.add_argument("--rate", type=float, help="collisions per second of one core; default: measured without ranks")
     parser.add_argument("--latency", type=float, default=5e-6, help="of a message [s], an assumption")
     parser.add_argument("--overhead", type=float, default=5e-7, help="of each further message of an exchange [s], likewise")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="changes the deck, as in carom run")
@@ -150,9 +151,9 @@ def counting_error(row, name):
 
 def draw(rows, fitted, options, title, file):
     sizes = np.geomspace(min(row["per_rank"] for row in rows), 1e6)
-    with panels(file, {"title": f"{title}\nevents at borders: measured, and the fit", "xlabel": "spheres a rank",
+    with panels(file, {"title": f"{title}\nevents at borders: measured, and the fit", "xlabel": "spheres per rank",
                        "ylabel": "share of the events", "xscale": "log", "yscale": "log"},
-                {"title": f"{title}\nefficiency, modelled", "xlabel": "spheres a rank", "ylabel": "efficiency",
+                {"title": f"{title}\nefficiency, modelled", "xlabel": "spheres per rank", "ylabel": "efficiency",
                  "xscale": "log"}) as (left, right):
         curves = [modelled(fitted, options, options.ranks[-1], size) for size in sizes]
         for name, colour, label in (("twice", "C0", "run twice"), ("redone", "C1", "redone")):
@@ -180,7 +181,7 @@ def main(arguments=None):
     if options.rate is None:
         options.rate, particles = measured_rate(options, deck)
         how = f"measured with {particles} spheres"
-    print("Fitted: h {h:.2f}, r {r:.3f}, rounds {a:.2f} + {b:.3f} log2(border), {events:.3f} events a sphere and window, "
+    print("Fitted: h {h:.2f}, r {r:.3f}, rounds {a:.2f} + {b:.3f} log2(border), {events:.3f} events per sphere and window, "
           "imbalance {imbalance:.2f} of independent events".format(**fitted))
     print(f"One core: {options.rate:.3g} collisions/s ({how}). Assumed: {options.latency:.1e} s a message, "
           f"{options.overhead:.1e} s each further one")

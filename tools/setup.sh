@@ -3,7 +3,7 @@
 # Sourced by tools/run, tools/test and tools/renew-regression: from a bare Debian 12 to a built Carom.
 #
 #   source tools/setup.sh
-#   install_packages [LIST…]        # what tools/packages.txt, or these lists, name and is not there yet
+#   install_packages [LIST…]        # the packages of these lists that are missing; default: build-packages.txt and packages.txt
 #   build release carom             # a CMake preset and its targets; none = all
 #
 # Both return at once where there is nothing to do. Messages go to standard error.
@@ -22,11 +22,11 @@ missing_packages() {
 
 install_packages() {
   if ! command -v dpkg-query >/dev/null; then
-    echo "Not a Debian system: taking the packages of tools/packages.txt for granted." >&2
+    echo "Not a Debian system: taking the packages of tools/build-packages.txt and tools/packages.txt for granted." >&2
     return
   fi
   local missing as_root=()
-  if [ $# = 0 ]; then set -- "$carom_root/tools/packages.txt"; fi
+  if [ $# = 0 ]; then set -- "$carom_root"/tools/{build-packages,packages}.txt; fi
   missing=$(missing_packages "$@" | tr '\n' ' ')
   if [ -z "$missing" ]; then return; fi
   if [ "$(id -u)" != 0 ]; then

@@ -60,7 +60,7 @@ def shown(arguments):
 
 
 def processor_time(process, between=lambda: None):
-    """Seconds of the process alone until it ends, without its children; `between` is called ten times a second."""
+    """Seconds of the process alone until it ends, without its children; `between` is called ten times per second."""
     ticks = 0
     while process.poll() is None:
         with contextlib.suppress(OSError, IndexError):
@@ -127,7 +127,7 @@ def drawing(carom, folder):
                     before = processor_seconds(browser.service.process.pid)
                     milliseconds = browser.execute_script(DRAW, count, distance)
                     used = (processor_seconds(browser.service.process.pid) - before) / 12
-                    print(f"{count} spheres, window of {width} by {height}, distance {distance}: {1000 / milliseconds:.1f} frames a second, "
+                    print(f"{count} spheres, window of {width} by {height}, distance {distance}: {1000 / milliseconds:.1f} frames per second, "
                           f"at most {1000 * used:.0f} ms of processor time each", flush=True)
 
 

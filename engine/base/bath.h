@@ -21,8 +21,8 @@ struct Bath {
   Type type = Type::none;
   double temperature = 1, last_temperature = 1;  ///< at the start and at the end of a linear ramp [energy]
   double ramp_start = 0, ramp_end = 0;           ///< set by Simulation [time]
-  double rate = 1;         ///< kicks of a particle per unit time; of rescaling: 1/relaxation time [1/time]
-  std::uint64_t seed = 1;  ///< of its random numbers
+  double rate = 1;         ///< kicks of a particle per unit time; rescaling: 1/relaxation time [1/time]
+  std::uint64_t seed = 1;  ///< seed of the random numbers
 
   bool kicks() const { return type == Type::andersen; }
   bool rescales() const { return type == Type::rescaling; }

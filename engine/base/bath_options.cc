@@ -20,9 +20,8 @@ const std::vector<Parameter>& bath_parameters() {
        {"andersen", "rescaling"}},
       {"temperature", real_or_list, "", "energy", "a number, or [first, last]: a linear ramp over the run",
        Range::positive},
-      {"rate", real, "", "1/time", "kicks of a particle per unit time; of rescaling: 1/relaxation time",
-       Range::positive},
-      {"seed", integer, "none", "-", "of the random numbers; that of [placement] where absent", Range::non_negative}};
+      {"rate", real, "", "1/time", "kicks of a particle per unit time; rescaling: 1/relaxation time", Range::positive},
+      {"seed", integer, "none", "-", "seed of the random numbers; default: that of [placement]", Range::non_negative}};
   return all;
 }
 

@@ -9,9 +9,9 @@ namespace carom {
 
 const std::vector<BoundaryInfo>& boundaries() {
   static const std::vector<BoundaryInfo> all = {
-      {Boundary::wall, "wall", "hard and elastic; a sphere touches it when its centre is a radius away", "none"},
-      {Boundary::periodic, "periodic", "what leaves on one side comes in on the other", "periodic"},
-      {Boundary::open, "open", "nothing there; the edge is only where the box is drawn", "none"}};
+      {Boundary::wall, "wall", "a hard wall; a sphere touches it when its centre is a radius away", "none"},
+      {Boundary::periodic, "periodic", "a particle that leaves on one side enters on the other", "periodic"},
+      {Boundary::open, "open", "no wall; the edge only determines how the box is drawn", "none"}};
   return all;
 }
 

@@ -20,14 +20,14 @@ namespace carom {
 template <int D>
 struct WallOptions {
   std::string name;                ///< a face of the box: "x-", "x+", "y-", …; another name: a further wall
-  Vec<D> normal = Vec<D>::Zero();  ///< of a further wall: into the space of the spheres, of any length
-  double offset = 0;               ///< of a further wall: normal·x = offset at time 0
+  Vec<D> normal = Vec<D>::Zero();  ///< a further wall: points to the side of the spheres; any length
+  double offset = 0;               ///< a further wall: normal·x = offset at time 0
   double velocity = 0;             ///< along the normal [length/time]
   double amplitude = 0;    ///< shaken: the displacement along the normal is amplitude·sin(2π·frequency·time)
   double frequency = 0;    ///< [1/time]
   bool one_sided = true;   ///< false: it acts on the spheres on both sides
-  double temperature = 0;  ///< of a thermal wall [energy]; 0: none
-  std::uint64_t seed = 1;  ///< of its random numbers
+  double temperature = 0;  ///< a thermal wall has one [energy]; 0: the wall is not thermal
+  std::uint64_t seed = 1;  ///< seed of the random numbers of a thermal wall
   double moved = 0;        ///< displacement before time 0 [length]
   Id number = 0;           ///< set by add(); the rear of a wall with two sides has the next number
 
@@ -44,10 +44,10 @@ template <int D>
 struct Box {
   Vec<D> edges = Vec<D>::Ones();  ///< at time 0 [length]
   std::array<Boundary, D> boundary{};
-  std::vector<WallOptions<D>> options{};  ///< of walls; use add()
+  std::vector<WallOptions<D>> options{};  ///< the walls that add() has added or changed
   Bath bath{};
-  double time = 0;                  ///< of the start of the slab, since the start of the run
-  double step_start = 0, step = 0;  ///< of a stepping method; 0: shaken walls move on a sine
+  double time = 0;                  ///< the start of the slab, since the start of the run
+  double step_start = 0, step = 0;  ///< the step of a stepping method; step = 0: shaken walls move on a sine
   ContactLaws contacts{};
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }

@@ -15,9 +15,16 @@ const std::vector<Parameter>& contact_parameters() {
     restitution.keys = {{"form", text, "", "-", "of the law", Range::any, {"power"}},
                         {"v0", real, "", "length/time", "the largest approach speed that is elastic", Range::positive},
                         {"exponent", real, "", "-", "0.234 for ice of planetary rings", Range::positive}};
+    Parameter tangential{"tangential", real, "none", "-",
+                         "makes the spheres rough: the tangential velocity of the surfaces times -tangential is what "
+                         "the contact leaves; -1 smooth, 0 they stick, 1 perfectly rough. Spheres then have a spin"};
+    tangential.most = 1;
     return std::vector<Parameter>{
         {"between", text_list, "", "-", "two species, or a species and a wall (x-, x+, … or its name); \"*\" for any"},
         restitution,
+        tangential,
+        {"friction", real, "none", "-",
+         "the largest tangential impulse over the normal one (Coulomb); no limit where absent", Range::non_negative},
         {"rest_speed", real, "none", "length/time",
          "slower approaches end at rest in methods with steps and are elastic in free flight; 1e-8 of the thermal "
          "speed where absent",
@@ -41,6 +48,13 @@ void add_contact(Box<D>& box, std::span<const std::string> species, const Parame
     law.v0 = std::get<double>(power->at("v0"));
     law.exponent = std::get<double>(power->at("exponent"));
   }
+  if (const auto* beta = given.find<double>("tangential")) law.tangential = *beta;
+  if (law.tangential && *law.tangential < -1)
+    refuse("'tangential' must be at least -1 (is " + short_text(*law.tangential) + ")",
+           "give a number from -1, smooth, to 1, perfectly rough");
+  if (const auto* mu = given.find<double>("friction")) law.friction = *mu;
+  if (given.has("friction") && !given.has("tangential"))
+    refuse("'friction' without 'tangential'", "give both, for instance tangential = 0.0: surfaces that stick");
   if (const auto* speed = given.find<double>("rest_speed")) law.rest_speed = *speed;
 
   const std::vector<Wall<D>> walls = box.walls();
@@ -78,6 +92,17 @@ void add_contact(Box<D>& box, std::span<const std::string> species, const Parame
     for (const Id wall : other_wall) box.contacts.set_wall(a, wall, number);
   for (const std::size_t b : other)
     for (const Id wall : one_wall) box.contacts.set_wall(b, wall, number);
+}
+
+void check_inertia(double inertia, int dimension) {
+  const double most = ContactLaws::largest_inertia(dimension);
+  if (inertia > 0 && inertia <= most) return;
+  throw Error(Failure::deck,
+              "'inertia' is " + short_text(inertia) +
+                  (inertia > 0 ? ", more than the " + short_text(most) + (dimension == 2 ? " of a ring" : " of a shell")
+                               : ", not positive") +
+                  "; give 4I/(m sigma^2), sigma the diameter; a homogeneous body has " +
+                  short_text(ContactLaws::homogeneous(dimension)));
 }
 
 template void add_contact(Box<2>&, std::span<const std::string>, const Parameters&);

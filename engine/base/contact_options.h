@@ -17,4 +17,7 @@ const std::vector<Parameter>& contact_parameters();
 template <int D>
 void add_contact(Box<D>& box, std::span<const std::string> species, const Parameters& given);
 
+/// Throws Error(Failure::deck) unless a body may have this reduced moment of inertia.
+void check_inertia(double inertia, int dimension);
+
 }  // namespace carom

@@ -36,7 +36,7 @@ struct WallTally {
 struct ContactTally {
   std::uint64_t sphere_sphere = 0;  ///< executed pair collisions
   std::uint64_t sphere_wall = 0;    ///< executed wall collisions
-  std::uint64_t kicks = 0;          ///< of a bath
+  std::uint64_t kicks = 0;          ///< kicks by a bath
   double max_overlap = 0;           ///< deepest overlap at a contact, relative to the contact distance
   ExactSum collision_virial;        ///< Σ d·impulse over pair collisions [mass·length²/time]
   ExactSum dissipated;              ///< energy lost at contacts [energy]

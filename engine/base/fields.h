@@ -121,7 +121,8 @@ class Fields {
  private:
   template <class T>
   static constexpr Scalar scalar_of() {
-    if constexpr (std::is_same_v<T, double> || std::is_same_v<T, Vec<2>> || std::is_same_v<T, Vec<3>>)
+    if constexpr (std::is_same_v<T, double> || std::is_same_v<T, Vec<1>> || std::is_same_v<T, Vec<2>> ||
+                  std::is_same_v<T, Vec<3>>)
       return Scalar::float64;
     else if constexpr (std::is_same_v<T, Image<2>> || std::is_same_v<T, Image<3>>)
       return Scalar::int32;

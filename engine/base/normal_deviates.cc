@@ -68,7 +68,7 @@ constexpr Series<12> kSine([](int k) { return inverse_factorial(2 * k + 1); }); 
 constexpr Series<12> kCosine([](int k) { return inverse_factorial(2 * k); });               // cos(r) of r²
 constexpr Number kLn2{0x1.62e42fefa39efp-1, 0x1.abc9e3b39803fp-56};
 constexpr Number kHalfPi{0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
-constexpr Number kTwoPi{0x1.921fb54442d18p+2, 0x1.1a8p-52};  // of 64 bits
+constexpr Number kTwoPi{0x1.921fb54442d18p+2, 0x1.1a8p-52};  // rounded to 64 bits
 
 /// log u for a positive, normal u. u = m 2^k with m in [√½, √2), and log m = 2 artanh((m − 1)/(m + 1)).
 Number logarithm(double u) {

@@ -47,7 +47,7 @@ struct Parameter {
   std::vector<std::string> choices{};  ///< for text: the allowed values; empty = any
   std::vector<std::array<std::string, 2>> former{};       ///< for text: former values, each with what to write instead
   double most = std::numeric_limits<double>::infinity();  ///< for numbers: the largest allowed value
-  std::vector<Parameter> keys{};                          ///< of a table: numbers and texts, all required
+  std::vector<Parameter> keys{};                          ///< a table has these keys: numbers and texts, all required
 
   bool required() const { return fallback.empty(); }
   bool has_default() const { return !required() && fallback != "none"; }

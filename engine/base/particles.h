@@ -17,12 +17,13 @@ namespace carom {
 /// The argument of Particles::add().
 template <int D>
 struct Particle {
-  Vec<D> x;                   ///< position of the centre [length]
-  Vec<D> v = Vec<D>::Zero();  ///< velocity [length/time]
-  double radius = 0.5;        ///< hard core [length]
-  double mass = 1;            ///< [mass]
-  double charge = 0;          ///< [charge]
-  std::uint16_t species = 0;  ///< index into System::species
+  Vec<D> x;                        ///< position of the centre [length]
+  Vec<D> v = Vec<D>::Zero();       ///< velocity [length/time]
+  double radius = 0.5;             ///< hard core [length]
+  double mass = 1;                 ///< [mass]
+  double charge = 0;               ///< [charge]
+  std::uint16_t species = 0;       ///< index into System::species
+  Spin<D> spin = Spin<D>::Zero();  ///< angular velocity [1/time]
 };
 
 template <int D>
@@ -34,6 +35,7 @@ struct Particles {
   std::vector<double> charge;          ///< [charge]
   std::vector<std::uint16_t> species;  ///< index into System::species
   std::vector<Image<D>> image;  ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
+  std::vector<Spin<D>> spin{};  ///< angular velocity [1/time]; may be empty unless contacts are rough
   std::vector<char> ghost{};    ///< 1: another rank owns it; empty: this rank owns all
   std::vector<Id> id{};         ///< ascending; empty: 0, 1, …
 
@@ -47,6 +49,10 @@ struct Particles {
     charge.push_back(particle.charge);
     species.push_back(particle.species);
     image.push_back({});
+    if (!spin.empty() || particle.spin != Spin<D>::Zero()) {
+      spin.resize(x.size(), Spin<D>::Zero());
+      spin.back() = particle.spin;
+    }
     return static_cast<Id>(x.size() - 1);
   }
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }

@@ -21,17 +21,17 @@ template <int D>
 struct Wall {
   Id number = 0;  ///< in event keys and files: 2·axis for the lower face of the box, 2·axis + 1 for the upper one, 2·D
                   ///< and more for further walls
-  int axis = -1;                   ///< of a face of the box; −1 for a further wall
+  int axis = -1;                   ///< a face of the box is normal to this axis; −1: a further wall
   Vec<D> normal = Vec<D>::Zero();  ///< unit vector into the space of the spheres
   bool one_sided = true;           ///< false: does not act on spheres whose centres are behind the plane
   double offset = 0;               ///< level at time 0, the start of the slab [length]
   double velocity = 0;             ///< along the normal, at time 0 [length/time]
   double acceleration = 0;         ///< along the normal [length/time²]
-  double amplitude = 0;            ///< of the sine; 0: none [length]
-  double frequency = 0;            ///< of the sine [1/time]
-  double turns = 0;                ///< of the sine at time 0
-  double temperature = 0;          ///< of a thermal wall [energy]; 0: none
-  std::uint64_t seed = 1;          ///< of its random numbers
+  double amplitude = 0;            ///< amplitude of the sine; 0: no sine [length]
+  double frequency = 0;            ///< frequency of the sine [1/time]
+  double turns = 0;                ///< phase of the sine at time 0, in turns
+  double temperature = 0;          ///< a thermal wall has one [energy]; 0: the wall is not thermal
+  std::uint64_t seed = 1;          ///< seed of the random numbers of a thermal wall
   const Bath* bath = nullptr;      ///< not null: no wall at all, its contacts are the kicks of this bath
 
   double along_normal(const Vec<D>& v) const { return axis >= 0 ? normal[axis] * v[axis] : normal.dot(v); }

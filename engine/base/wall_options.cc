@@ -11,22 +11,23 @@ const std::vector<Parameter>& wall_parameters() {
                        "along the normal, constant; or { amplitude, frequency }: shaken, displaced along the normal by "
                        "amplitude·sin(2π·frequency·time)"};
     velocity.keys = {{"amplitude", real, "", "length", "the largest displacement"},
-                     {"frequency", real, "", "1/time", "oscillations a unit of time", Range::positive}};
+                     {"frequency", real, "", "1/time", "oscillations per unit of time", Range::positive}};
     return std::vector<Parameter>{
         {"name", text, "", "-",
-         "of a face of the box, to change it: x-, x+, y-, y+, z-, z+, where its boundary is a wall; any other name: a "
-         "further wall"},
-        {"normal", real_list, "none", "-", "of a further wall: a vector, of any length, into the space of the spheres"},
-        {"offset", real, "0.0", "length", "of a further wall: at the start it is where normal·x = offset"},
+         "x-, x+, y-, y+, z-, z+: a face of the box whose boundary is a wall, to be changed; any other name: a further "
+         "wall"},
+        {"normal", real_list, "none", "-",
+         "a further wall: a vector of any length that points to the side of the spheres"},
+        {"offset", real, "0.0", "length", "a further wall: at the start it is at normal·x = offset"},
         velocity,
         {"temperature", real, "none", "energy",
-         "of a thermal wall: after a contact the velocity relative to the wall is that of a gas of this temperature "
-         "behind it",
+         "makes a thermal wall: after a contact the velocity relative to the wall is that of a gas of this temperature "
+         "behind the wall",
          Range::positive},
-        {"seed", integer, "none", "-", "of the random numbers of a thermal wall; that of [placement] where absent",
+        {"seed", integer, "none", "-", "seed of the random numbers of a thermal wall; default: that of [placement]",
          Range::non_negative},
         {"one_sided", boolean, "true", "-",
-         "false: a further wall with spheres on both sides; true: all spheres are on the side of its normal"}};
+         "true: all spheres are on the side of the normal; false: a further wall with spheres on both sides"}};
   }();
   return all;
 }

@@ -62,21 +62,23 @@ void EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double h
 
 template <int D>
 void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now,
-                        double max_displacement) {
+                        double max_displacement, const std::vector<Spin<D>>& spins) {
   const auto order = along_curve<D>(records.size(), [&](std::size_t i) -> const Vec<D>& { return records[i].x; });
   std::vector<Record<D>> sorted(records.size());
   for (std::size_t i = 0; i < records.size(); ++i) sorted[i] = records[order[i]];
   std::vector<Record<D>>().swap(records);
+  std::vector<Spin<D>> sorted_spins(spins.size());
+  for (std::size_t i = 0; i < spins.size(); ++i) sorted_spins[i] = spins[order[i]];
   events_ = since_sort_ = 0;
   now_ = now;
   free_.clear();
   search_.clear();
-  flights_.load(sorted, *sizes_, g, horizon);
+  flights_.load(sorted, *sizes_, g, horizon, sorted_spins);
   search_.start(now, max_displacement);
 }
 
 template <int D>
-bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
+bool EventCore<D>::admit(const Record<D>& r, const Spin<D>& spin, double now, Slot& slot) {
   if (!free_.empty()) {
     slot = free_.back();
     free_.pop_back();
@@ -85,7 +87,7 @@ bool EventCore<D>::admit(const Record<D>& r, double now, Slot& slot) {
     slot = static_cast<Slot>(flights_.size());
   }
   const double radius = sizes_->radius_of(r);
-  flights_.admit(slot, r, radius, sizes_->mass_of(r));
+  flights_.admit(slot, r, radius, sizes_->mass_of(r), spin);
   queue_.admit(slot);
   search_.admit(slot, radius, now);
   queue_.read_versions();
@@ -102,14 +104,14 @@ void EventCore<D>::dismiss(Slot i) {
 }
 
 template <int D>
-void EventCore<D>::put(std::span<const std::pair<Slot, Record<D>>> records, double now) {
-  for (const auto& [i, r] : records) {
-    flights_.set(i, r);
+void EventCore<D>::put(std::span<const Changed> spheres, double now) {
+  for (const auto& [i, r, spin] : spheres) {
+    flights_.set(i, r, spin);
     ++queue_[i].version;
   }
-  for (const auto& [i, r] : records) search_.move(i, now);
-  for (const auto& [i, r] : records) {
-    search_.plan(i, now);
+  for (const Changed& each : spheres) search_.move(each.slot, now);
+  for (const Changed& each : spheres) {
+    search_.plan(each.slot, now);
     queue_.read_versions();
   }
 }
@@ -164,6 +166,9 @@ void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
     copies.x[r.id] = r.x;
     copies.v[r.id] = r.v;
   }
+  if (!flights_.rough()) return;
+  copies.spin.resize(flights_.size());
+  for (Slot i = 0; i < flights_.size(); ++i) copies.spin[flights_[i].id] = flights_.spin(i);
 }
 
 template <int D>
@@ -172,10 +177,10 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
   const std::uint32_t partner = queue_[i].partner;
   const Slot j = packing.slot(partner);
   if (report.trace) {
-    if (flights_[i].id < flights_[j].id)
-      report.trace->begin(i, flights_[i], j, flights_[j], partner, generation);
-    else
-      report.trace->begin(j, flights_[j], i, flights_[i], packing.reversed(i, partner), generation);
+    const auto [lo, hi] = flights_[i].id < flights_[j].id ? std::pair(i, j) : std::pair(j, i);
+    report.trace->begin(lo, flights_[lo], hi, flights_[hi], lo == i ? partner : packing.reversed(i, partner),
+                        generation);
+    if (flights_.rough()) report.trace->note_spins(flights_.spin(lo), flights_.spin(hi));
   }
   Vec<D> shift = Vec<D>::Zero();
   if (packing.linear(partner) != 0) shift = box_.shift(packing.image(partner));
@@ -193,7 +198,10 @@ void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, c
 template <int D>
 void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = queue_.key_of(i);
-  if (report.trace) report.trace->begin(i, flights_[i], Trace<D>::kNoEntry, flights_[i], key.hi, generation);
+  if (report.trace) {
+    report.trace->begin(i, flights_[i], Trace<D>::kNoEntry, flights_[i], key.hi, generation);
+    if (flights_.rough()) report.trace->note_spins(flights_.spin(i), flights_.spin(i));
+  }
   const Wall<D> wall = box_.wall(key.hi);
   const Impact<D> impact = flights_.bounce(i, wall, time, generation);
   ++queue_[i].version;

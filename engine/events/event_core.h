@@ -72,15 +72,22 @@ class EventCore {
   // For a core that runs part of a larger system (engine/ranks/subdomain.h). No event before the time `now` may be
   // pending.
 
-  /// Starts with these spheres; no record may be later than `now`. find_near() uses `max_displacement`.
-  void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double max_displacement);
+  /// Starts with these spheres; no record may be later than `now`. find_near() uses `max_displacement`. `spins`: of
+  /// each, if contacts are rough.
+  void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double max_displacement,
+            const std::vector<Spin<D>>& spins = {});
   const Flights<D>& flights() const { return flights_; }
   /// Adds a sphere; false if there is no room: load again.
-  bool admit(const Record<D>& r, double now, Slot& slot);
+  bool admit(const Record<D>& r, const Spin<D>& spin, double now, Slot& slot);
   /// Removes a sphere; its slot can be reused.
   void dismiss(Slot i);
-  /// Replaces the records of these spheres.
-  void put(std::span<const std::pair<Slot, Record<D>>> records, double now);
+  /// Replaces the records and spins of these spheres.
+  struct Changed {
+    Slot slot;
+    Record<D> record;
+    Spin<D> spin;
+  };
+  void put(std::span<const Changed> spheres, double now);
   /// Sets the spheres at the border of a subdomain. Their lists contain each other however far they move in a window,
   /// so find_near_at_border() needs no search.
   void set_border(std::span<const Slot> slots, double now) { search_.set_border(slots, now); }

@@ -34,6 +34,7 @@ void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double hor
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = growth;
+  rough_ = laws().rough();
   horizon_ = horizon;
   common_radius_ = common(particles.radius);
   common_mass_ = common(particles.mass);
@@ -44,6 +45,9 @@ void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double hor
     if (common_mass_ == 0) mass_.push_back(particles.mass[r.id]);
     r = {particles.x[r.id], particles.v[r.id], 0.0, r.id, 0, particles.species[r.id]};
   }
+  spins_.clear();
+  if (rough_)
+    for (const Record<D>& r : records_) spins_.push_back(particles.spin[r.id]);
 }
 
 /// The walls of the box, and the kicks of its bath.
@@ -98,11 +102,13 @@ void Flights<D>::advance(Record<D>& r, double t) const {
 }
 
 template <int D>
-void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon) {
+void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
+                      std::span<const Spin<D>> spins) {
   set_walls();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
+  rough_ = laws().rough();
   horizon_ = horizon;
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
@@ -112,18 +118,23 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   records_.reserve(capacity_);
   radius_.clear();
   mass_.clear();
-  for (const Record<D>& r : records) admit(static_cast<Slot>(records_.size()), r, sizes.radius_of(r), sizes.mass_of(r));
+  spins_.clear();
+  for (const Record<D>& r : records) {
+    const auto i = static_cast<Slot>(records_.size());
+    admit(i, r, sizes.radius_of(r), sizes.mass_of(r), spins.empty() ? Spin<D>(Spin<D>::Zero()) : spins[i]);
+  }
 }
 
 template <int D>
-void Flights<D>::admit(Slot i, const Record<D>& r, double radius, double mass) {
+void Flights<D>::admit(Slot i, const Record<D>& r, double radius, double mass, const Spin<D>& spin) {
   if (i == records_.size()) {
     records_.push_back(r);
     if (common_radius_ == 0) radius_.push_back(radius);
     if (common_mass_ == 0) mass_.push_back(mass);
+    if (rough_) spins_.push_back(spin);
     return;
   }
-  records_[i] = r;
+  set(i, r, spin);
   if (common_radius_ == 0) radius_[i] = radius;
   if (common_mass_ == 0) mass_[i] = mass;
 }
@@ -177,16 +188,22 @@ double Flights<D>::shaken_contact(const Record<D>& r, double radius, double rate
 }
 
 template <int D>
-Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
-                              std::uint32_t generation) const {
+Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b,
+                              const Vec<D>& shift, double t, std::uint32_t generation) const {
   advance(a, t);
   advance(b, t);
   const Vec<D> d = a.x - b.x + shift;
   const double mass_a = mass(i), mass_b = mass(j);
   const double radii = radius(i) + radius(j), sigma = grown(radii, t);
-  const auto [factor, dissipated] =
+  auto [factor, dissipated] =
       pair_impulse<D>(laws(), a.species, b.species, d, a.v - b.v, mass_a, mass_b, sigma, radii * growth_);
-  const Vec<D> impulse = factor * d;
+  Vec<D> impulse = factor * d;
+  if (rough_) [[unlikely]] {
+    const Rubbed<D> rubbed = rub_pair<D>(laws(), d, a.v - b.v, factor, {mass_a, radius(i), a.species, spin_a},
+                                         {mass_b, radius(j), b.species, spin_b});
+    impulse += rubbed.impulse;
+    dissipated += rubbed.dissipated;
+  }
   if (common_mass_ == 1) {  // gives the same bits without divisions
     a.v += impulse;
     b.v -= impulse;
@@ -199,11 +216,13 @@ Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const 
 }
 
 template <int D>
-Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const {
+Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, Spin<D>* spin, const Wall<D>& wall, double t,
+                             std::uint32_t generation) const {
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
-  const auto [after, impulse, exchange] = wall_impulse<D>(
-      laws(), wall, r.species, mass(i), r.v, {.id = r.id, .time = box_.time + t, .number = generation}, t, rate);
+  const auto [after, impulse, exchange] =
+      wall_impulse<D>(laws(), wall, r.species, mass(i), r.v, {.id = r.id, .time = box_.time + t, .number = generation},
+                      t, rate, at_contact, rough_ ? spin : nullptr);
   r.v = after;
   r.generation = static_cast<std::uint16_t>(generation);
   const double overlap = wall.bath ? 0 : -wall.gap(r.x, at_contact, t) / at_contact;

@@ -39,14 +39,20 @@ class Flights {
   /// Starts a slab: all spheres at time 0, in the slots assigned before.
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
 
-  /// Loads records of various times, in their order, with room for spheres that are admitted later.
-  void load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon);
+  /// Loads records of various times, in their order, with room for spheres that are admitted later. `spins`: of each,
+  /// if contacts are rough.
+  void load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
+            std::span<const Spin<D>> spins = {});
 
   std::size_t size() const { return records_.size(); }
   std::size_t capacity() const { return capacity_; }
   const Packing<D>& packing() const { return packing_; }
   const Record<D>& operator[](Slot i) const { return records_[i]; }
   std::span<const Record<D>> records() const { return records_; }
+  /// Whether contacts change spins.
+  bool rough() const { return rough_; }
+  /// The spin of a sphere, 0 if no contact is rough.
+  Spin<D> spin(Slot i) const { return rough_ ? spins_[i] : Spin<D>(Spin<D>::Zero()); }
   const Vec<D>& g() const { return g_; }
   bool field() const { return field_; }
   double horizon() const { return horizon_; }
@@ -85,23 +91,28 @@ class Flights {
 
   /// Executes the collision of two spheres at time t.
   Impact<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
-    return collide(i, records_[i], j, records_[j], shift, t, generation);
+    if (rough_) [[unlikely]]
+      return collide(i, records_[i], &spins_[i], j, records_[j], &spins_[j], shift, t, generation);
+    return collide(i, records_[i], nullptr, j, records_[j], nullptr, shift, t, generation);
   }
   /// Executes the collision of a sphere with a wall at time t; the second "centre" is the point touched.
   Impact<D> bounce(Slot i, const Wall<D>& wall, double t, std::uint32_t generation) {
-    return bounce(i, records_[i], wall, t, generation);
+    return bounce(i, records_[i], rough_ ? &spins_[i] : nullptr, wall, t, generation);
   }
 
-  // The functions above for records other than the present ones.
+  // The functions above for records other than the present ones. Spins, which change, matter for rough contacts only.
   double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
   double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
-  Impact<D> collide(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
-                    std::uint32_t generation) const;
-  Impact<D> bounce(Slot i, Record<D>& r, const Wall<D>& wall, double t, std::uint32_t generation) const;
+  Impact<D> collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b, const Vec<D>& shift,
+                    double t, std::uint32_t generation) const;
+  Impact<D> bounce(Slot i, Record<D>& r, Spin<D>* spin, const Wall<D>& wall, double t, std::uint32_t generation) const;
 
-  void set(Slot i, const Record<D>& r) { records_[i] = r; }
+  void set(Slot i, const Record<D>& r, const Spin<D>& spin) {
+    records_[i] = r;
+    if (rough_) spins_[i] = spin;
+  }
   /// Stores a sphere in slot `i`, an existing one or the next.
-  void admit(Slot i, const Record<D>& r, double radius, double mass);
+  void admit(Slot i, const Record<D>& r, double radius, double mass, const Spin<D>& spin);
 
   /// The contact reported to observers after a collision of two spheres, or of a sphere with a wall.
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
@@ -128,13 +139,14 @@ class Flights {
   ContactLaws elastic_;
   std::vector<Wall<D>> walls_;
   Vec<D> g_ = Vec<D>::Zero();
-  bool field_ = false;
+  bool field_ = false, rough_ = false;
   double growth_ = 0, horizon_ = 0;
   GapTolerance gap_tolerance_;
   PageVector<Record<D>> records_;  // by slot
   std::size_t capacity_ = 0;       // largest number of spheres
   Packing<D> packing_;
   std::vector<double> radius_, mass_;  // by slot; empty if all are equal
+  std::vector<Spin<D>> spins_;         // by slot; empty if no contact is rough
   double common_radius_ = 0, common_mass_ = 0;
 };
 

@@ -12,7 +12,7 @@ namespace carom {
 
 /// What the random numbers of a contact depend on, beside the seed.
 struct Draw {
-  Id id = 0;                 ///< of the particle
+  Id id = 0;                 ///< the particle
   double time = 0;           ///< since the start of the run
   std::uint64_t number = 0;  ///< tells the contacts of a particle apart that have the same `time`
 };

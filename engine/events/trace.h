@@ -22,7 +22,8 @@ struct Node {
   Record<D> after;
   EventKey<D> key;
   PackedExchange exchange{};
-  double overlap = 0;  ///< at contact, relative to the contact distance
+  double overlap = 0;              ///< at contact, relative to the contact distance
+  Spin<D> spin = Spin<D>::Zero();  ///< of the sphere after the event; 0 if no contact is rough
 
   /// The other sphere's id; kNoPartner at a wall.
   static constexpr Id kNoPartner = std::numeric_limits<Id>::max();
@@ -36,7 +37,7 @@ struct Node {
 template <int D>
 bool operator==(const Node<D>& a, const Node<D>& b) {
   return a.key == b.key && a.after.x == b.after.x && a.after.v == b.after.v && a.after.t == b.after.t &&
-         a.after.id == b.after.id;
+         a.after.id == b.after.id && a.spin == b.spin;
 }
 
 /// Thrown before an event for which the log has no room; the events in the log stay valid.
@@ -69,6 +70,7 @@ class Trace {
     latest_.resize(slots, 0);
     events_.clear();
     before_.clear();
+    spins_before_.clear();
     fastest_squared_ = 0;
     most_ = kMaxEvents + kMaxEventsPerSphere * slots;
   }
@@ -88,6 +90,8 @@ class Trace {
     before_.push_back(a);
     before_.push_back(b);
   }
+  /// Call after begin() if contacts are rough.
+  void note_spins(const Spin<D>& a, const Spin<D>& b) { spins_before_.insert(spins_before_.end(), {a, b}); }
   /// Call after the event.
   void end(const Record<D>& a, const Record<D>& b, const PackedExchange& exchange, double overlap) {
     Event& event = events_.back();
@@ -101,6 +105,10 @@ class Trace {
   const Event& event_of(std::uint32_t entry) const { return events_[entry / 2]; }
   /// The sphere's record before its entry in an event.
   const Record<D>& before(std::uint32_t entry) const { return before_[entry]; }
+  /// Its spin before; 0 if none was noted.
+  Spin<D> spin_before(std::uint32_t entry) const {
+    return spins_before_.empty() ? Spin<D>(Spin<D>::Zero()) : spins_before_[entry];
+  }
   bool has(Slot i) const { return latest_[i] >= base_; }
   /// The entries of a sphere in order of time; valid until the next call.
   std::span<const std::uint32_t> entries(Slot i) const {
@@ -125,6 +133,7 @@ class Trace {
 
   std::vector<Event> events_;
   PageVector<Record<D>> before_;       // by entry
+  std::vector<Spin<D>> spins_before_;  // by entry; empty if no contact is rough
   std::vector<std::uint32_t> latest_;  // by slot: base_ + entry; smaller values are from earlier windows
   std::uint32_t base_ = 1;
   std::size_t most_ = 0;

@@ -139,11 +139,13 @@ double sum_over_all(const System<D>& system, auto&& term) {
 template <int D>
 struct MotionSums {
   ExactSum kinetic;                  ///< ½ m v² [energy]
+  ExactSum rotational;               ///< ½ I ω² if contacts are rough [energy]
   ExactSum speed;                    ///< |v| [length/time]
   std::array<ExactSum, D> momentum;  ///< m v [mass·length/time]
 
   void add(const MotionSums& other) {
     kinetic.add(other.kinetic);
+    rotational.add(other.rotational);
     speed.add(other.speed);
     for (int k = 0; k < D; ++k) momentum[k].add(other.momentum[k]);
   }
@@ -161,7 +163,15 @@ MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state
     speed.add(std::sqrt(squared));
     for (int k = 0; k < D; ++k) momentum[k].add(state.mass[i] * state.v[i][k]);
   }
-  MotionSums<D> sums{kinetic.sum(), speed.sum(), {}};
+  MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}};
+  if (system.box.contacts.rough()) {
+    ExactSeries rotational;
+    for (Id i = 0; i < at.size(); ++i)
+      if (system.particles.owns(i))
+        rotational.add(0.5 * system.box.contacts.inertia(at.species[i], D) * at.mass[i] * at.radius[i] * at.radius[i] *
+                       at.spin[i].squaredNorm());
+    sums.rotational = rotational.sum();
+  }
   for (int k = 0; k < D; ++k) sums.momentum[k] = momentum[k].sum();
   return system.decomposition.sum(sums);
 }

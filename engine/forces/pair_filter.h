@@ -63,7 +63,7 @@ struct SpeciesRule {
   std::uint16_t a = 0, b = 0;
 
   bool all() const { return species_of == nullptr; }
-  /// The code of a particle for PartnerSearch; partner_code(): bits of which the code of a partner must have one.
+  /// The code of a particle in a PartnerSearch. The code of a partner must have one of the bits of partner_code().
   std::uint64_t code(Id i) const {
     if (all()) return PartnerSearch::kFirst;
     const std::uint16_t s = (*species_of)[i];

@@ -8,7 +8,9 @@
 namespace carom {
 
 /// The largest |ω²| [1/time²] of small vibrations about the present positions, an eigenvalue of M⁻¹V″, by power
-/// iteration from random directions. 0 without forces. Does not depend on the number of ranks; collective.
+/// iteration from random directions. 0 without forces. Does not depend on the number of ranks; collective. The mean
+/// relative error is at most 0.871 ln(D N)/(kRounds − 1): 0.2 for 10³ particles (Kuczyński, Woźniakowski, SIAM J.
+/// Matrix Anal. Appl. 13 (1992) 1094).
 template <int D>
 double largest_squared_frequency(const System<D>& system) {
   constexpr int kRounds = 40;

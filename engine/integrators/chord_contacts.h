@@ -64,8 +64,8 @@ class ChordContacts {
  private:
   /// A piece ends in contact within this fraction of the tolerance, so that its rounded positions touch, too.
   static constexpr double kClosed = 0.5;
-  static constexpr double kProlongation =
-      4;  // (length of the extended chord / length of the chord)², within which contacts are found
+  /// Contacts are found up to twice the reach of the chord, squared here; only those near its end matter for c(τ) = τ.
+  static constexpr double kProlongation = 4;
 
   static void violate(const EventKey<D>& key, PieceEnd<D>& end) {
     end.violates = true;

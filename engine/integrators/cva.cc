@@ -54,7 +54,7 @@ IntegratorInfo cva() {
           .conserves = "linear momentum to rounding; energy to order 2, with a random walk from collision to collision",
           .parameters = {parameter::step(), parameter::max_events_per_step()},
           .documentation =
-              "Verlet with the step cut, for all particles, at each collision. Between collisions spheres "
+              "Verlet with a step that is cut for all particles at each collision. Between collisions spheres "
               "move on parabolas, so the contact is the first root of a quartic. Each collision costs a "
               "whole force pass.",
           .source = "Houndonougbo, Laird, Leimkuhler, Mol. Phys. 98 (2000) 309",

@@ -35,7 +35,7 @@ class DiscreteGradient {
   const System<D>& system_;
   std::vector<double> fractions_;
   std::vector<std::vector<Vec<D>>>
-      mean_acceleration_;  // of each stage of the last solve; the next solve starts from them
+      mean_acceleration_;  // for each stage of the last solve; the next solve starts from them
   std::vector<Vec<D>> x_, v_, chord_, trial_, force_, mean_, next_;
 };
 

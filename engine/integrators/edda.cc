@@ -39,7 +39,7 @@ namespace carom::integrator {
 namespace {
 
 constexpr int kMostSweeps = 60;
-constexpr int kMostPieces = 1 << 14;         // of a step
+constexpr int kMostPieces = 1 << 17;         // of a step
 constexpr int kPiecesBeforeGrowth = 4;       // pieces that take few sweeps, before twice the length is tried
 constexpr int kFewSweeps = kMostSweeps / 3;  // two pieces of half the length would take hardly more in all
 constexpr std::uint64_t kPartialUpdate = 5;  // if fewer than one particle in 5 moved, only its pairs are evaluated
@@ -170,9 +170,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       contact = kNever;
       if (longest * kMostPieces < slab.length && !end_.complete && end_.too_strong && end_.time > 0)
         throw Error(Failure::numerical,
-                    partners(end_.key, system.box) + " collide again and again without moving, even in pieces of a " +
+                    partners(end_.key, system.box) + " collide again and again without moving, even in pieces of 1/" +
                         std::to_string(kMostPieces) +
-                        "th of the step: they have no room between their neighbours or walls; leave gaps between "
+                        " of the step: they have no room between their neighbours or walls; leave gaps between "
                         "spheres that fill a box from wall to wall, or use a smaller integrator.step");
       if (longest * kMostPieces < slab.length)
         throw Error(Failure::numerical, "the sweeps do not converge even in " + std::to_string(kMostPieces) +

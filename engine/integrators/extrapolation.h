@@ -59,7 +59,9 @@ class Extrapolation {
   const std::vector<Vec<D>>& last() const { return past_[0]; }
 
  private:
-  static constexpr double kMostGrowth = 3;  // of the length of slabs; beyond it only the last slab is used
+  /// Growth of the slab's length up to which all past slabs are used: the magnitudes of their weights, which multiply
+  /// the noise of the past, add up to 18 there, and to 7 without growth.
+  static constexpr double kMostGrowth = 3;
 
   std::array<std::vector<Vec<D>>, kOrder + 1> past_;
   std::array<double, kOrder + 1> length_{};

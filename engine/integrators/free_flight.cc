@@ -104,11 +104,11 @@ IntegratorInfo free_flight() {
   Parameter epoch = parameter::step();
   epoch.fallback = "none";
   epoch.meaning =
-      "length of an epoch, after which all particles are brought to one time; about forty mean free times where it is "
-      "absent, and at most a tenth of the relaxation time of a bath of type rescaling, which acts at the ends of "
+      "length of an epoch, after which all particles are moved to the same time; default: about forty mean free times, "
+      "but at most a tenth of the relaxation time of a bath of type rescaling, which acts at the ends of "
       "epochs";
   Parameter limit = parameter::max_events_per_step();
-  limit.meaning = "collisions that one epoch may need, per particle, before the run ends with an error";
+  limit.meaning = "largest number of collisions per particle in an epoch; more end the run with an error";
   return {
       .name = "free-flight",
       .title = "Event-driven hard spheres",
@@ -117,7 +117,7 @@ IntegratorInfo free_flight() {
       .parameters = {epoch, limit},
       .documentation =
           "Exact flight between elastic collisions, for hard spheres without forces or in a uniform field. There is "
-          "no time step: the trajectory is exact but for rounding. `step` is only the length of an epoch.",
+          "no time step: the trajectory is exact to rounding. `step` is only the length of an epoch.",
       .source =
           "Alder, Wainwright, J. Chem. Phys. 31 (1959) 459; Rapaport, J. Comput. Phys. 34 (1980) 184; "
           "Lubachevsky, J. Comput. Phys. 94 (1991) 255",

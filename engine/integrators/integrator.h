@@ -19,7 +19,7 @@ namespace carom {
 
 /// One step of a stepping integrator; an epoch of free flight, or the rest of one.
 struct Slab {
-  std::int64_t index = 0;  ///< of the step or epoch
+  std::int64_t index = 0;  ///< number of the step or epoch
   double start = 0;        ///< simulated time at its start
   double length = 0;       ///< > 0
   std::int64_t steps = 1;  ///< in this length; more than one only in free flight of a gas that has cooled

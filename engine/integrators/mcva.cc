@@ -104,6 +104,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     system.wrap();
     lag_ = length - node_time;
     take_motion(node_, p);
+    node_.spin = p.spin;  // no contact comes after the node
     if (lag_ <= 0) return;
     system.box.time += lag_;
     for (std::size_t i = 0; i < p.size(); ++i) {
@@ -135,7 +136,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
   double impulse(System<D>& system, const Touch<D>& touch) {
     auto& p = system.particles;
     const Id lo = touch.key.lo, hi = touch.key.hi;
-    if (!touch.pair() && system.box.wall(hi).thermal())
+    if ((!touch.pair() && system.box.wall(hi).thermal()) || law_of(system, touch).rough())
       return resolve_contact<D>(touch.key, touch.normal, system.box, p);
     const Vec<D>& n = touch.normal;
     w_[lo] = n / p.mass[lo];
@@ -172,6 +173,14 @@ class ModifiedCollisionVerlet : public Integrator<D> {
       w_[hi].setZero();
     }
     return dissipated;
+  }
+
+  static ContactLaw law_of(const System<D>& system, const Touch<D>& touch) {
+    const ContactLaws& laws = system.box.contacts;
+    const auto& species = system.particles.species;
+    if (laws.elastic()) return {};
+    return touch.pair() ? laws.of_pair(species[touch.key.lo], species[touch.key.hi])
+                        : laws.of_wall(species[touch.key.lo], touch.key.hi);
   }
 
   /// The impulse of the law of this contact, in multiples of the normal.
@@ -211,13 +220,13 @@ IntegratorInfo mcva() {
                       .type = Parameter::Type::text,
                       .fallback = "\"grid\"",
                       .unit = "-",
-                      .meaning = "grid: finish the step that a collision cuts; restart: begin a new full step after "
-                                 "each collision, output by a side copy",
+                      .meaning = "grid: complete the step that a collision cuts; restart: begin a new full step after "
+                                 "each collision",
                       .choices = {"grid", "restart"}},
                      parameter::max_events_per_step()},
       .documentation =
-          "CVA with an impulse that keeps the second-order shadow Hamiltonian of Verlet, so that the "
-          "energy does not wander from collision to collision. An impulse that would hardly part the spheres "
+          "CVA with impulses that conserve the second-order shadow Hamiltonian of Verlet, so that the "
+          "energy does not drift from collision to collision. An impulse that would hardly separate the spheres "
           "is replaced by the elastic one and counted as a fallback.",
       .source = "Bond, Leimkuhler, SIAM J. Sci. Comput. 30 (2007) 134",
       .shadow = true,

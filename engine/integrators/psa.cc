@@ -29,7 +29,13 @@ class PrimitiveSplitting : public Integrator<D> {
     auto& p = system.particles;
     core_->begin_step(report.counters, report.contacts, &accelerations_.a, slab.length, report.watch);
     if (!system.box.contacts.elastic()) {
-      settling_slab(system, slab.length, report);
+      const std::vector<Vec<D>> before = p.v;
+      try {
+        inelastic_slab(system, slab.length, report);
+      } catch (const HaloTooSmall&) {  // only the first kick has changed anything
+        p.v = before;
+        throw;
+      }
     } else {
       kicked_ = p.v;
       kick(kicked_, accelerations_.a, 0.5 * slab.length);
@@ -46,16 +52,16 @@ class PrimitiveSplitting : public Integrator<D> {
   }
 
  private:
-  /// A slab of spheres that come to rest: the drift is cut where a slow contact stops or a resting one is hit, and the
+  /// A slab with inelastic contacts: the drift is cut where a slow contact stops or a resting one is hit, and the
   /// kicks do not make resting contacts approach.
-  void settling_slab(System<D>& system, double length, SlabReport<D>& report) {
+  void inelastic_slab(System<D>& system, double length, SlabReport<D>& report) {
     auto& p = system.particles;
     auto& scan = core_->scan();
     scan.stop_within(length);
-    settle(system, 0);
+    resolve_contacts(system, 0);
     kick(p.v, accelerations_.a, 0.5 * length);
     if (!scan.resting().empty()) scan.stop_approach(p.x, p.v, 0.5 * length);
-    bool touching = settle(system, 0);
+    bool touching = resolve_contacts(system, 0);
     for (double done = 0, contact = kNever; done < length;) {
       const double rest = length - done, piece = std::min(rest, contact);
       kicked_ = p.v;
@@ -65,14 +71,14 @@ class PrimitiveSplitting : public Integrator<D> {
         system.decomposition.need_all();
         scan.count_event(end.key);
         contact = end.time > 0 ? end.time : kNever;
-        if (contact == kNever) touching = settle(system, done);
+        if (contact == kNever) touching = resolve_contacts(system, done);
         continue;
       }
       core_->commit(done);
       core_->finish(p);
       done = piece == rest ? length : done + piece;
       contact = kNever;
-      if (done < length) touching = settle(system, done);
+      if (done < length) touching = resolve_contacts(system, done);
     }
     system.decomposition.update_halo();
     accelerations_.update(system, report.counters);
@@ -83,7 +89,7 @@ class PrimitiveSplitting : public Integrator<D> {
   }
 
   /// Resolves the contacts at the present positions; returns whether any contact approached or rests. Collective.
-  bool settle(System<D>& system, double time) {
+  bool resolve_contacts(System<D>& system, double time) {
     auto& p = system.particles;
     auto& scan = core_->scan();
     if (!system.decomposition.any(!scan.quiet(p.x, p.v))) return false;
@@ -105,12 +111,12 @@ IntegratorInfo psa() {
   return {.name = "psa",
           .title = "Primitive Splitting Algorithm",
           .order = "1",
-          .conserves = "linear momentum to rounding; energy to order 1, lost at collisions",
+          .conserves = "linear momentum to rounding; energy to order 1, with an error at each collision",
           .parameters = {parameter::step(), parameter::max_events_per_step()},
           .documentation =
-              "Verlet with a drift that is resolved event by event: half a kick, free flight with all its "
-              "collisions, half a kick. Collisions see velocities that lack the force of the step's other "
-              "half: first order, and the cheapest.",
+              "Verlet with a drift that resolves each collision: half a kick, free flight with all its "
+              "collisions, half a kick. The velocities at a collision lack the second half of the kick, so the "
+              "method is of first order. It is the cheapest one.",
           .source = "Suh, Mier-y-Teran, White, Davis, Chem. Phys. 142 (1990) 203",
           .local = true,
           .shadow = true,

@@ -29,7 +29,7 @@ Parameter max_events_per_step() {
           .type = Parameter::Type::integer,
           .fallback = "100000",
           .unit = "-",
-          .meaning = "collisions that one step may need before the run ends with an error",
+          .meaning = "largest number of collisions in a step; more end the run with an error",
           .range = Parameter::Range::positive};
 }
 

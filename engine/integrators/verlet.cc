@@ -42,8 +42,8 @@ IntegratorInfo verlet() {
           .conserves = "linear and angular momentum to rounding; the shadow energy S_h to order 4",
           .parameters = {parameter::step()},
           .documentation =
-              "The velocity Verlet method (kick-drift-kick) for particles without hard cores: spheres are "
-              "points, their radii are not looked at.",
+              "The velocity Verlet method (kick-drift-kick) for points, which have no hard cores and no "
+              "radius.",
           .source = "Verlet, Phys. Rev. 159 (1967) 98; Swope, Andersen, Berens, Wilson, J. Chem. Phys. 76 (1982) 637",
           .hard_cores = false,
           .local = true,

@@ -30,8 +30,11 @@ void Decomposition<D>::join(Communicator& ranks) {
   Particles<D>& p = system_.particles;
   join(ranks, Sizes(p));
   const Id first = blocks().first(ranks.rank()), end = blocks().first(ranks.rank() + 1);
-  for_each_array(
-      p, [&](auto& all) { all = std::remove_reference_t<decltype(all)>(all.begin() + first, all.begin() + end); });
+  const auto keep = [&](auto& all) {
+    all = std::remove_reference_t<decltype(all)>(all.begin() + first, all.begin() + end);
+  };
+  for_each_array(p, keep);
+  if (!p.spin.empty()) keep(p.spin);
   for (Id i = first; i < end; ++i) p.id.push_back(i);
 }
 
@@ -83,6 +86,14 @@ const Particles<D>& Decomposition<D>::block() {
         block_.v[place] = state.v;
         block_.image[place] = state.image;
       });
+  if (system_.box.contacts.rough())
+    to_id_blocks<Spin<D>>(
+        blocks(), *ranks_,
+        [&](auto&& send) {
+          for (Id i = 0; i < p.size(); ++i)
+            if (p.owns(i)) send(p.id_of(i), p.spin[i]);
+        },
+        [&](std::size_t place, const Spin<D>& spin) { block_.spin[place] = spin; });
   return block_;
 }
 
@@ -242,7 +253,9 @@ void Decomposition<D>::need_deeper_halo() {
 
 template <int D>
 void Decomposition<D>::update_halo() {
-  if (!knows_all()) update(std::span(system_.particles.x), std::span(system_.particles.v));
+  if (knows_all()) return;
+  update(std::span(system_.particles.x), std::span(system_.particles.v));
+  if (system_.box.contacts.rough()) update(std::span(system_.particles.spin));
 }
 
 template class Decomposition<2>;

@@ -116,8 +116,8 @@ class Decomposition {
   void update(std::span<T>... values) const {
     if (by_place_) halo_.update(*ranks_, values...);
   }
-  /// Ghosts get positions and velocities of their owners, since some at the rim may be wrong. Does nothing if all ranks
-  /// have all particles.
+  /// Ghosts get positions, velocities and spins of their owners, since some at the rim may be wrong. Does nothing if
+  /// all ranks have all particles.
   void update_halo();
 
  private:

@@ -56,7 +56,7 @@ void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, auto&& for_each, 
       });
 }
 
-/// Calls visit(vector) for all arrays of the particles except id and ghost.
+/// Calls visit(vector) for all arrays of the particles except spin, id and ghost.
 template <int D, class Visit>
 void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.x);
@@ -82,16 +82,19 @@ void one_after_the_other(Communicator& ranks, Pack&& pack, Visit&& visit) {
 template <int D>
 Particles<D> gathered(Communicator& ranks, const Particles<D>& block) {
   Bytes mine;
+  put(mine, block.size());
+  put(mine, block.spin.size());
+  for (const Spin<D>& spin : block.spin) put(mine, spin);
   for_each_array(const_cast<Particles<D>&>(block), [&](const auto& array) {
     const auto bytes = std::as_bytes(std::span(array));
     mine.insert(mine.end(), bytes.begin(), bytes.end());
   });
   Particles<D> all;
   for (const Bytes& bytes : gather_on_first(ranks, std::move(mine))) {
-    std::size_t each = 0;
-    for_each_array(all, [&](const auto& array) { each += sizeof(array[0]); });
-    const std::size_t n = bytes.size() / each;
+    if (bytes.empty()) continue;
     Reader from(bytes);
+    const auto n = from.get<std::size_t>();
+    for (auto spins = from.get<std::size_t>(); spins > 0; --spins) all.spin.push_back(from.get<Spin<D>>());
     for_each_array(all, [&](auto& array) {
       const std::size_t before = array.size();
       array.resize(before + n);

@@ -91,10 +91,10 @@ typename Ownership<D>::Watched Ownership<D>::look_at(Slot i, double now) {
 }
 
 template <int D>
-bool Ownership<D>::admit(const Record<D>& r, double now) {
+bool Ownership<D>::admit(const Record<D>& r, double now, const Spin<D>& spin) {
   if (slots_.find(r.id) != IdTable::kNowhere) return true;
   Slot slot = 0;
-  if (!core_.admit(r, now, slot)) return false;
+  if (!core_.admit(r, spin, now, slot)) return false;
   enlist(slot, Role::ghost);
   watched_.push_back({slot, 0});
   return true;

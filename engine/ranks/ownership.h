@@ -37,7 +37,7 @@ class Ownership {
   std::vector<Slot> own() const;
   std::uint64_t holders(Slot i) const { return holders_[i]; }
   Slot slot_of(Id id) const { return slots_.find(id); }
-  bool admit(const Record<D>& r, double now);
+  bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero());
   /// As in Subdomain, after a window of this `length` [time]. Only spheres with deflected(slot) true may have changed
   /// their velocities in it.
   template <class Deflected, class Send>

@@ -7,8 +7,9 @@ namespace carom {
 
 template <int D>
 void Subdomain<D>::load(std::vector<Record<D>> records, const Bisection<D>& bisection, std::uint32_t number,
-                        const Vec<D>& g, double horizon, double now, double max_displacement) {
-  core_.load(std::move(records), g, horizon, now, 2 * max_displacement);
+                        const Vec<D>& g, double horizon, double now, double max_displacement,
+                        const std::vector<Spin<D>>& spins) {
+  core_.load(std::move(records), g, horizon, now, 2 * max_displacement, spins);
   const std::size_t slots = core_.flights().capacity();
   ownership_.load(bisection, number, max_displacement);
   paths_.load(slots);
@@ -38,7 +39,7 @@ double Subdomain<D>::run(double now, double end) {
 template <int D>
 void Subdomain<D>::commit() {
   other_ = paths_.finish();
-  for (const auto& [slot, record] : other_) disturbed_[slot] = 1;
+  for (const auto& each : other_) disturbed_[each.slot] = 1;
   core_.put(other_, end_);
   changed_.clear();
 }
@@ -47,16 +48,18 @@ template <int D>
 Contact<D> Subdomain<D>::contact_of(Slot lo, std::size_t k) {
   const EventKey<D> key = path(lo)[k].key;
   Record<D> a = before(lo, k);
+  Spin<D> spin_a = paths_.spin_before(lo, k);
   if (key.kind == EventKind::wall) {
-    const Impact<D> impact = flights().bounce(lo, a, box_.wall(key.hi), key.time, key.generation);
+    const Impact<D> impact = flights().bounce(lo, a, &spin_a, box_.wall(key.hi), key.time, key.generation);
     return flights().contact_of(key, a, impact);
   }
   const Slot hi = slot_of(key.hi);
   const auto nodes = path(hi);
   const auto met = std::ranges::find(nodes, key, &Node<D>::key) - nodes.begin();
   Record<D> b = before(hi, static_cast<std::size_t>(met));
+  Spin<D> spin_b = paths_.spin_before(hi, static_cast<std::size_t>(met));
   const Vec<D> shift = box_.shift(key.image);
-  const Impact<D> impact = flights().collide(lo, a, hi, b, shift, key.time, key.generation);
+  const Impact<D> impact = flights().collide(lo, a, &spin_a, hi, b, &spin_b, shift, key.time, key.generation);
   return flights().contact_of(key, a, b, shift, impact);
 }
 

@@ -16,7 +16,7 @@
 //   subdomain.run(now, end);
 //   while (…) { subdomain.follow(id, message); …; subdomain.repair(); … subdomain.changed() … }
 //   subdomain.commit();
-//   subdomain.sort_out(now, send); …; subdomain.admit(record, now);
+//   subdomain.sort_out(now, send); …; subdomain.admit(record, now, spin);
 
 #include "engine/ranks/window_repair.h"
 
@@ -36,7 +36,7 @@ class Subdomain {
   /// Starts at time `now` as subdomain `number` of a bisection, with all spheres near it. In no window may a sphere
   /// move farther than `max_displacement`.
   void load(std::vector<Record<D>> records, const Bisection<D>& bisection, std::uint32_t number, const Vec<D>& g,
-            double horizon, double now, double max_displacement);
+            double horizon, double now, double max_displacement, const std::vector<Spin<D>>& spins = {});
 
   // Between windows: no event before the time `now` may be pending.
 
@@ -48,10 +48,12 @@ class Subdomain {
   void sort_out(double now, Send&& send) {
     const auto deflected = [&](Slot i) { return paths_.trace().has(i) || disturbed_[i] != 0; };
     ownership_.sort_out(now, length_, deflected, send);
-    for (const auto& [slot, record] : other_) disturbed_[slot] = 0;
+    for (const auto& each : other_) disturbed_[each.slot] = 0;
   }
   /// Adds a ghost; false if there is no room: load again.
-  bool admit(const Record<D>& r, double now) { return ownership_.admit(r, now); }
+  bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero()) {
+    return ownership_.admit(r, now, spin);
+  }
 
   // In a window.
 
@@ -69,6 +71,7 @@ class Subdomain {
   const Record<D>& before(Slot i, std::size_t k) { return paths_.before(i, k); }
   /// The sphere's record after the last node.
   const Record<D>& after(Slot i) const { return paths_.after(i); }
+  Spin<D> spin_after(Slot i) const { return paths_.spin_after(i); }
   /// Calls visit(slot) for each own sphere that had events in any version of the window.
   template <class Visit>
   void for_each_touched(Visit&& visit) const {
@@ -113,8 +116,8 @@ class Subdomain {
   WindowRepair<D> repair_;
   double end_ = 0, length_ = 0;  // the present window
   std::vector<Slot> changed_;
-  std::vector<std::pair<Slot, Record<D>>> other_;  // after the last window: records that differ from the core's
-  std::vector<std::uint8_t> disturbed_;            // by slot: whether it is in other_
+  std::vector<typename EventCore<D>::Changed> other_;  // after the last window: what differs from the core's
+  std::vector<std::uint8_t> disturbed_;                // by slot: whether it is in other_
   std::uint64_t run_events_ = 0;
 };
 

@@ -29,6 +29,7 @@ void System<D>::check() const {
   same_length("charge", p.charge.size());
   same_length("species", p.species.size());
   same_length("image", p.image.size());
+  if (!p.spin.empty()) same_length("spin", p.spin.size());
   for (int k = 0; k < D; ++k)
     if (!(box.edges[k] > 0) || !std::isfinite(box.edges[k]))
       refuse("the edge of the box along axis " + std::to_string(k) + " is " + short_text(box.edges[k]),
@@ -40,6 +41,7 @@ void System<D>::check() const {
     };
     if (!p.x[i].allFinite()) wrong("position", "give finite coordinates");
     if (!p.v[i].allFinite()) wrong("velocity", "give finite components");
+    if (!p.spin.empty() && !p.spin[i].allFinite()) wrong("spin", "give finite components");
     if (!(p.mass[i] > 0) || !std::isfinite(p.mass[i])) wrong("mass", "give a positive one");
     if (!(p.radius[i] > 0) || !std::isfinite(p.radius[i])) wrong("radius", "give a positive one");
     if (!std::isfinite(p.charge[i])) wrong("charge", "give a finite one");

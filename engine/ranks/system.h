@@ -54,6 +54,14 @@ struct System {
            std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
   }
 
+  /// Registers the spins if contacts are rough; they are zero where none are given. Call before the particles are
+  /// divided among ranks or restored.
+  void need_spins() {
+    if (!box.contacts.rough()) return;
+    particles.spin.resize(particles.mass.size(), Spin<D>::Zero());
+    fields.add("spin", particles.spin);
+  }
+
   /// Wraps all particles into the periodic box. Called only at the ends of slabs.
   void wrap() {
     for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i]);

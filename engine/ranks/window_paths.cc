@@ -39,14 +39,16 @@ std::vector<Slot> WindowPaths<D>::end() {
 }
 
 template <int D>
-std::vector<std::pair<Slot, Record<D>>> WindowPaths<D>::finish() {
-  std::vector<std::pair<Slot, Record<D>>> other;
+std::vector<typename EventCore<D>::Changed> WindowPaths<D>::finish() {
+  std::vector<typename EventCore<D>::Changed> other;
   for (const Slot slot : paths_.slots()) {
     if (rewritten_[slot] == 0) continue;
     rewritten_[slot] = 0;
     const Record<D>&now = after(slot), &known = flights_[slot];
-    if (now.t != known.t || now.x != known.x || now.v != known.v || now.generation != known.generation)
-      other.emplace_back(slot, now);
+    const Spin<D> spin = spin_after(slot);
+    if (now.t != known.t || now.x != known.x || now.v != known.v || now.generation != known.generation ||
+        spin != flights_.spin(slot))
+      other.push_back({slot, now, spin});
   }
   paths_.clear();
   scripts_.clear();
@@ -63,7 +65,8 @@ Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, s
                      ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
                      : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner)),
           .exchange = event.exchange,
-          .overlap = event.overlap};
+          .overlap = event.overlap,
+          .spin = k + 1 < entries.size() ? trace_.spin_before(entries[k + 1]) : flights_.spin(i)};
 }
 
 template <int D>
@@ -72,6 +75,7 @@ typename WindowPaths<D>::Path& WindowPaths<D>::path_of(Slot i) {
   const View logged = view(i);
   Path& path = paths_.add(i);
   path.start = logged.entries.empty() ? flights_[i] : trace_.before(logged.entries[0]);
+  path.spin = logged.entries.empty() ? flights_.spin(i) : trace_.spin_before(logged.entries[0]);
   path.nodes.clear();
   for (std::size_t k = 0; k < logged.size(); ++k) path.nodes.push_back(logged.node(k));
   return path;
@@ -82,6 +86,13 @@ const Record<D>& WindowPaths<D>::after(Slot i) const {
   if (!paths_.has(i)) return flights_[i];
   const Path& path = paths_.at(i);
   return path.nodes.empty() ? path.start : path.nodes.back().after;
+}
+
+template <int D>
+Spin<D> WindowPaths<D>::spin_after(Slot i) const {
+  if (!paths_.has(i)) return flights_.spin(i);
+  const Path& path = paths_.at(i);
+  return path.nodes.empty() ? path.spin : path.nodes.back().spin;
 }
 
 template <int D>
@@ -102,22 +113,26 @@ template <int D>
 void WindowPaths<D>::write(Slot i, Bytes& to) const {
   const View path = view(i);
   put(to, path.size());
-  for (std::size_t k = 0; k < path.size(); ++k) put(to, path.node(k));
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    const Node<D> node = path.node(k);
+    const auto* bytes = reinterpret_cast<const std::byte*>(&node);
+    to.insert(to.end(), bytes, bytes + node_bytes());
+  }
 }
 
 template <int D>
 void WindowPaths<D>::read_script(Slot g, Reader& message) {
   Script& script = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
   script.count = message.get<std::uint32_t>();
-  script.bytes = message.skip(script.count * sizeof(Node<D>));
+  script.bytes = message.skip(script.count * node_bytes());
   script.nodes.clear();
   matched_in_[g] = 0;
 }
 
 template <int D>
-Node<D> WindowPaths<D>::Script::node(std::size_t k) const {
+Node<D> WindowPaths<D>::node_of(const Script& script, std::size_t k) const {
   Node<D> node;
-  std::memcpy(static_cast<void*>(&node), bytes + k * sizeof node, sizeof node);
+  std::memcpy(static_cast<void*>(&node), script.bytes + k * node_bytes(), node_bytes());
   return node;
 }
 
@@ -125,7 +140,7 @@ template <int D>
 std::span<const Node<D>> WindowPaths<D>::script(Slot g) {
   if (!scripts_.has(g)) return {};
   Script& script = scripts_.at(g);
-  while (script.nodes.size() < script.count) script.nodes.push_back(script.node(script.nodes.size()));
+  while (script.nodes.size() < script.count) script.nodes.push_back(node_of(script, script.nodes.size()));
   return script.nodes;
 }
 
@@ -136,7 +151,7 @@ bool WindowPaths<D>::matches(Slot g) {
   const std::size_t count = scripts_.has(g) ? scripts_.at(g).count : 0;
   if (path.size() != count) return false;
   for (std::size_t k = 0; k < count; ++k)
-    if (!(path.node(k) == scripts_.at(g).node(k))) return false;
+    if (!(path.node(k) == node_of(scripts_.at(g), k))) return false;
   matched_in_[g] = window_;
   return true;
 }

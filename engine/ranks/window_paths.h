@@ -28,7 +28,7 @@ class WindowPaths {
   /// Call when the log is complete. Returns the own spheres with events that are ghosts elsewhere.
   std::vector<Slot> end();
   /// Ends the window; returns the records that differ from the core's.
-  std::vector<std::pair<Slot, Record<D>>> finish();
+  std::vector<typename EventCore<D>::Changed> finish();
 
   const Trace<D>& trace() const { return trace_; }
   bool has_no_events(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
@@ -39,6 +39,11 @@ class WindowPaths {
     return k > 0 ? path.nodes[k - 1].after : path.start;
   }
   const Record<D>& after(Slot i) const;
+  Spin<D> spin_before(Slot i, std::size_t k) {
+    const Path& path = path_of(i);
+    return k > 0 ? path.nodes[k - 1].spin : path.spin;
+  }
+  Spin<D> spin_after(Slot i) const;
   /// The path of a sphere, to be changed.
   Nodes& rewrite(Slot i);
   /// Removes all events after `last`.
@@ -68,6 +73,7 @@ class WindowPaths {
   static constexpr std::uint32_t kNoEntry = Trace<D>::kNoEntry;
   struct Path {
     Record<D> start;  // at the start of the window
+    Spin<D> spin;     // there
     Nodes nodes;
   };
   /// The script of a ghost. Most are compared with the path and never decoded.
@@ -75,7 +81,6 @@ class WindowPaths {
     const std::byte* bytes;
     std::uint32_t count;
     Nodes nodes;  // empty until decoded
-    Node<D> node(std::size_t k) const;
   };
   /// A path, stored or read from the log; valid until another path is viewed.
   struct View {
@@ -91,6 +96,9 @@ class WindowPaths {
     if (paths_.has(i)) return {*this, i, &paths_.at(i).nodes, {}};
     return {*this, i, nullptr, trace_.entries(i)};
   }
+  /// The bytes of a node in a message: without the spin if no contact is rough.
+  std::size_t node_bytes() const { return flights_.rough() ? sizeof(Node<D>) : offsetof(Node<D>, spin); }
+  Node<D> node_of(const Script& script, std::size_t k) const;
   Node<D> logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const;
   Path& path_of(Slot i);
 

@@ -67,6 +67,7 @@ typename WindowRepair<D>::Repaired& WindowRepair<D>::begin(Slot i, const EventKe
   m.old.assign(from, path.end());
   path.erase(from, path.end());
   m.now = paths_.before(i, m.kept);
+  m.spin = paths_.spin_before(i, m.kept);
   if (ownership_.is_ghost(i)) {
     const auto script = paths_.script(i);
     m.script = m.kept;
@@ -159,19 +160,19 @@ void WindowRepair<D>::contact(const Task& task) {
   if (version(task.a) != task.version_a || (pair && version(task.b) != task.version_b)) return;
   ++events_;
   Repaired& a = repaired_at(task.a, key);
-  Node<D> of_a{a.now, key};
+  Node<D> of_a{.after = a.now, .key = key, .spin = a.spin};
   if (!pair) {
     const Wall<D> wall = box_.wall(key.hi);
-    const Impact<D> impact = flights_.bounce(a.slot, of_a.after, wall, key.time, key.generation);
+    const Impact<D> impact = flights_.bounce(a.slot, of_a.after, &of_a.spin, wall, key.time, key.generation);
     of_a.exchange = {key.kind, impact.exchange};
     of_a.overlap = impact.overlap;
     append(a, of_a);
     return predict(a, key);
   }
   Repaired& b = repaired_at(task.b, key);
-  Node<D> of_b{b.now, key};
-  const Impact<D> impact =
-      flights_.collide(a.slot, of_a.after, b.slot, of_b.after, box_.shift(task.image), key.time, key.generation);
+  Node<D> of_b{.after = b.now, .key = key, .spin = b.spin};
+  const Impact<D> impact = flights_.collide(a.slot, of_a.after, &of_a.spin, b.slot, of_b.after, &of_b.spin,
+                                            box_.shift(task.image), key.time, key.generation);
   of_a.exchange = of_b.exchange = {key.kind, impact.exchange};
   of_a.overlap = of_b.overlap = impact.overlap;
   append(a, of_a);
@@ -185,6 +186,7 @@ template <int D>
 void WindowRepair<D>::append(Repaired& m, const Node<D>& node) {
   paths_.rewrite(m.slot).push_back(node);
   m.now = node.after;
+  m.spin = node.spin;
   fastest_squared_ = std::max(fastest_squared_, node.after.v.squaredNorm());
   ++m.version;
   if (!ownership_.is_ghost(m.slot) || m.left_script) return;

@@ -40,6 +40,7 @@ class WindowRepair {
   /// The repair of one sphere's path.
   struct Repaired {
     Record<D> now;  // at the time that the repair has reached
+    Spin<D> spin;   // there
     Slot slot;
     std::uint32_t version = 0;           // incremented with every change; older plans are invalid
     bool left_script = false;            // a ghost that no longer follows its script

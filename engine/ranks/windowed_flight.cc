@@ -59,7 +59,8 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   exchange_.start(*bisection_);
   load(0, [&](auto&& add) {
     for (Id i = 0; i < particles.size(); ++i)
-      add({particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]});
+      add({particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]},
+          rough() ? particles.spin[i] : Spin<D>(Spin<D>::Zero()));
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
@@ -75,15 +76,25 @@ Vec<D> WindowedFlight<D>::place(const Record<D>& r, double now) const {
   return bisection_->wrapped(x);
 }
 
-/// Loads all subdomains. `spheres(add)` calls add(record) for each sphere, on one of the ranks.
+/// Loads all subdomains. `spheres(add)` calls add(record, spin) for each sphere, on one of the ranks.
 template <int D>
 template <class Spheres>
 void WindowedFlight<D>::load(double now, Spheres&& spheres) {
-  auto near = sent_to_near<Record<D>>(
-      *bisection_, ranks_, [&](auto&& send) { spheres([&](const Record<D>& r) { send(place(r, now), r); }); });
+  std::vector<std::pair<Vec<D>, Spin<D>>> own;  // places and spins
+  auto near = sent_to_near<Record<D>>(*bisection_, ranks_, [&](auto&& send) {
+    spheres([&](const Record<D>& r, const Spin<D>& spin) {
+      send(place(r, now), r);
+      if (rough()) own.emplace_back(place(r, now), spin);
+    });
+  });
+  std::vector<Spin<D>> spins;  // in the order of the records
+  if (rough())
+    spins = sent_to_near<Spin<D>>(*bisection_, ranks_, [&](auto&& send) {
+      for (const auto& [x, spin] : own) send(x, spin);
+    });
   if (subdomain_)
     subdomain_->load(std::move(near), *bisection_, static_cast<std::uint32_t>(ranks_.rank()), g_, horizon_, now,
-                     length_.max_displacement());
+                     length_.max_displacement(), spins);
   now_ = now;
   cut_ = false;
   sort_out(true);
@@ -94,7 +105,7 @@ template <int D>
 void WindowedFlight<D>::reload() {
   load(now_, [&](auto&& add) {
     if (subdomain_)
-      for (const Slot i : subdomain_->own()) add(subdomain_->after(i));
+      for (const Slot i : subdomain_->own()) add(subdomain_->after(i), subdomain_->spin_after(i));
   });
 }
 
@@ -105,13 +116,17 @@ void WindowedFlight<D>::sort_out(bool loaded) {
   sorted_ = true;
   if (subdomain_)
     subdomain_->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
-      if (!loaded) exchange_.add(neighbour, record);
+      if (loaded) return;
+      exchange_.add(neighbour, record);
+      if (rough()) exchange_.add(neighbour, subdomain_->flights().spin(subdomain_->slot_of(record.id)));
     });
   if (loaded) return;
   double full = 0;
   for (const Bytes& bytes : exchange_.swap())
-    for (Reader reader(bytes); reader.more();)
-      if (!subdomain_->admit(reader.get<Record<D>>(), now_)) full = 1;
+    for (Reader reader(bytes); reader.more();) {
+      const auto record = reader.get<Record<D>>();
+      if (!subdomain_->admit(record, now_, rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero()))) full = 1;
+    }
   ranks_.largest({&full, 1});
   if (full > 0) reload();
 }
@@ -208,7 +223,7 @@ void WindowedFlight<D>::give_back(double time, Particles<D>& particles) {
   collect(time, particles, &work_);
 }
 
-/// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events a sphere.
+/// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events per sphere.
 template <int D>
 void WindowedFlight<D>::measure_work() {
   const std::uint64_t events = subdomain_ ? subdomain_->run_events() - run_before_ : 0;
@@ -246,6 +261,15 @@ void WindowedFlight<D>::collect(double time, Particles<D>& copies, std::vector<s
         copies.v[place] = state.v;
         if (work) (*work)[place] = state.work;
       });
+  if (!rough()) return;
+  copies.spin.resize(here);
+  to_id_blocks<Spin<D>>(
+      blocks(), ranks_,
+      [&](auto&& send) {
+        if (!subdomain_) return;
+        for (const Slot i : subdomain_->own()) send(subdomain_->after(i).id, subdomain_->spin_after(i));
+      },
+      [&](std::size_t place, const Spin<D>& spin) { copies.spin[place] = spin; });
 }
 
 template <int D>

@@ -46,6 +46,7 @@ class WindowedFlight {
   WindowCounts window_counts() const;
 
  private:
+  bool rough() const { return box_.contacts.rough(); }
   IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(ranks_.size())}; }
   void make_subdomain(std::size_t subdomains);
   void measure_work();

@@ -27,7 +27,7 @@ void MeanSquaredDisplacement<D>::add_sample(double time, const Particles<D>& par
     decades_.push_back({time, now_, {}});
     return;
   }
-  std::uint64_t spacing = 1;  // of the lags of a decade, in samples
+  std::uint64_t spacing = 1;  // distance between the lags of a decade, in samples
   for (std::size_t n = 0; index % spacing == 0; ++n, spacing *= kLags) {
     const std::uint64_t lag = index / spacing % kLags;
     if (lag != 0) {
@@ -89,18 +89,19 @@ template class MeanSquaredDisplacement<3>;
 namespace observable {
 
 ObservableInfo msd() {
-  return {.name = "msd",
-          .title = "mean squared displacement",
-          .parameters = {parameter::interval(
-              "the shortest lag of the mean squared displacement, averaged into msd.csv; 0: none. Lags are 1 … 9, 10, "
-              "20 … 90, 100 … times this, up to the length of the run")},
-          .documentation =
-              "Of all particles, and where there are several species of each, followed through periodic boundaries. "
-              "Columns: time (the lag), origins (of time, averaged over), msd, msd_A. A drift of the whole system is "
-              "not taken out.",
-          .source = "Frenkel, Smit, Understanding Molecular Simulation, 2nd ed., section 4.4.2",
-          .in_2d = maker<MeanSquaredDisplacement, 2>(),
-          .in_3d = maker<MeanSquaredDisplacement, 3>()};
+  return {
+      .name = "msd",
+      .title = "mean squared displacement",
+      .parameters = {parameter::interval(
+          "the shortest lag of the mean squared displacement, averaged into msd.csv; 0: none. Lags are 1 … 9, 10, "
+          "20 … 90, 100 … times this, up to the length of the run")},
+      .documentation =
+          "The mean squared displacement of all particles and, if there are several species, of each of them; it is "
+          "continuous across periodic boundaries. Columns: time (the lag), origins (the number of time origins), "
+          "msd, msd_A. A drift of the whole system is not subtracted.",
+      .source = "Frenkel, Smit, Understanding Molecular Simulation, 2nd ed., section 4.4.2",
+      .in_2d = maker<MeanSquaredDisplacement, 2>(),
+      .in_3d = maker<MeanSquaredDisplacement, 3>()};
 }
 
 }  // namespace observable

@@ -31,7 +31,7 @@ class MeanSquaredDisplacement : public Observable<D> {
   struct Row {
     double time = 0;            ///< the mean lag: steps may not end at the due times
     std::uint64_t origins = 0;  ///< number of origins averaged over
-    double msd = 0;             ///< of all particles [length²]
+    double msd = 0;             ///< average over all particles [length²]
     std::vector<double> of;     ///< by species
   };
   /// The rows by ascending lag.

@@ -11,7 +11,7 @@ template <int D>
 struct Measurement {
   Snapshot<D> shot;      ///< its energies, momentum and temperature
   double magnitude = 0;  ///< K + Σ|V| [energy]
-  double virial = 0;     ///< 2K + Σ d·F, with its long-range corrections [energy]
+  double virial = 0;     ///< Σ m v² + Σ d·F, with its long-range corrections [energy]
   double speed = 0;      ///< mean |v| [length/time]
 };
 
@@ -31,15 +31,18 @@ template <int D>
 Measurement<D> measure(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
                        const PotentialSums& sums, const Tail& tail) {
   const MotionSums<D> motion = evaluate_motion(system, state, at);
-  const double kinetic = motion.kinetic.value();
+  const double kinetic = motion.kinetic.value(), rotational = motion.rotational.value();
   Measurement<D> found;
-  found.magnitude = kinetic + sums.magnitude.value();
+  found.magnitude = kinetic + rotational + sums.magnitude.value();
   found.virial = 2 * kinetic + sums.virial.value() + tail.virial;
-  found.shot.kinetic = kinetic;
+  found.shot.kinetic = kinetic + rotational;
+  found.shot.rotational = rotational;
   found.shot.potential = sums.energy.value() + tail.energy;
   for (int k = 0; k < D; ++k) found.shot.momentum[k] = motion.momentum[k].value();
   if (const auto total = static_cast<double>(system.size()); total > 0) {
     found.shot.temperature = 2 * kinetic / (D * total);
+    constexpr int freedoms = Spin<D>::SizeAtCompileTime;
+    found.shot.rotational_temperature = 2 * rotational / (freedoms * total);
     found.speed = motion.speed.value() / total;
   }
   return found;

@@ -56,6 +56,9 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
                        archive(shot_.time, shot_.step, shot_.collisions, shot_.kinetic, shot_.potential, shot_.shadow,
                                shot_.momentum, shot_.temperature, shot_.dissipated, shot_.work, shot_.heat);
                      }});
+  if (system.box.contacts.rough())
+    fields.add_of_run(
+        {"last rotation", [this](Archive& archive) { archive(shot_.rotational, shot_.rotational_temperature); }});
   fields.add_value("next frame", frames_.next());
   fields.add_value("next row", rows_.next());
   for (std::size_t k = 0; k < samplers_.size(); ++k) {

@@ -94,8 +94,8 @@ class Monitor {
   struct Account {
     double last_frame = -1, last_row = -1;      // when they were last shown; −1: never
     double last_row_virial = 0;                 // collision virial up to the last row
-    double energy = 0;                          // H of the last measurement
-    double magnitude = 0, virial = 0;           // of the last measurement: K + Σ|V|, 2K + Σ d·F
+    double energy = 0;                          // H + dissipated − work − heat at the last measurement
+    double magnitude = 0, virial = 0;           // K + Σ|V| and 2K + Σ d·F at the last measurement
     double virial_time = 0;                     // ∫ (2K + Σ d·F) dt
     double speed = 0, path = 0;                 // mean |v| at the last slab's end; ∫ mean |v| dt
     double first_energy = 0, first_shadow = 0;  // H₁ and S_h,1

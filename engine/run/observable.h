@@ -81,7 +81,7 @@ struct ObservableMaker {
 
 /// The declaration of an observable; engine/run/observables.cc lists them all.
 struct ObservableInfo {
-  std::string_view name;  ///< of the file and of the keys: `profile` writes profile.csv
+  std::string_view name;  ///< begins the names of the file and the keys: `profile` writes profile.csv
   std::string_view title;
   std::vector<Parameter> parameters;  ///< must include `interval` (parameter::interval)
   std::string_view documentation;     ///< a paragraph for the manual

@@ -351,30 +351,31 @@ namespace observable {
 ObservableInfo rdf() {
   using enum Parameter::Type;
   using enum Parameter::Range;
-  return {.name = "rdf",
-          .title = "radial distribution function",
-          .parameters = {parameter::interval(
-                             "simulated time between samples of the radial distribution function, averaged into "
-                             "rdf.csv; 0: none. A sample costs O(count); configurations a hundred mean free times "
-                             "apart are about independent"),
-                         {"range", real, "none", "length",
-                          "the largest distance of rdf.csv, at most half the shortest periodic edge; three of the "
-                          "largest diameters, if there is room, where it is absent",
-                          positive},
-                         {.name = "bins",
-                          .type = integer,
-                          .fallback = "200",
-                          .unit = "-",
-                          .meaning = "shells of equal thickness from 0 to rdf_range",
-                          .range = positive,
-                          .most = 1e6}},
-          .documentation =
-              "Of all particles, and where there are several species between each two. Columns: r (middle of a shell), "
-              "g, g_A_B. The summary has g at contact, extrapolated, as contact_value. Along walls the ideal gas is "
-              "that of the region which the centres can reach.",
-          .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6",
-          .in_2d = maker<RadialDistribution, 2>(complete<2>),
-          .in_3d = maker<RadialDistribution, 3>(complete<3>)};
+  return {
+      .name = "rdf",
+      .title = "radial distribution function",
+      .parameters = {parameter::interval(
+                         "simulated time between samples of the radial distribution function, averaged into "
+                         "rdf.csv; 0: none. A sample costs O(count); configurations a hundred mean free times "
+                         "apart are about independent"),
+                     {"range", real, "none", "length",
+                      "the largest distance of rdf.csv, at most half the shortest periodic edge; default: three of "
+                      "the largest diameters, or less if the box is small",
+                      positive},
+                     {.name = "bins",
+                      .type = integer,
+                      .fallback = "200",
+                      .unit = "-",
+                      .meaning = "shells of equal thickness from 0 to rdf_range",
+                      .range = positive,
+                      .most = 1e6}},
+      .documentation =
+          "g(r) of all particles and, if there are several species, of each pair of species. Columns: r (middle of a "
+          "shell), g, g_A_B. `contact_value` in the summary is g extrapolated to contact. Along walls, g refers to "
+          "an ideal gas in the region that the centres can reach.",
+      .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6",
+      .in_2d = maker<RadialDistribution, 2>(complete<2>),
+      .in_3d = maker<RadialDistribution, 3>(complete<3>)};
 }
 
 }  // namespace observable

@@ -134,6 +134,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   };
   const bool again = monitor_ != nullptr;
   if (!again) {
+    system_->need_spins();
     if (!hooks.restore) check_rest_speeds(*system_);
     if (info_.smooth_forces) {
       system_->quanta = quanta(*system_);
@@ -153,7 +154,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   }
   if (again) {
     // The last slab was shortened to meet the previous end of the run.
-    if (s.end_time != next_slab().start) count_ = {s.steps, s.end_time};
+    if (s.end_time != next_slab().start) count_.steps = s.steps, count_.time = s.end_time, count_.within = 0;
     return;
   }
   if (hooks.branch) {

@@ -51,12 +51,14 @@ struct Snapshot {
   std::int64_t step = 0;                    ///< slabs completed (free flight: epochs begun or completed)
   std::uint64_t collisions = 0;             ///< pair collisions so far
   const Particles<D>* particles = nullptr;  ///< all particles; with several ranks this rank's block (with ids)
-  double kinetic = 0, potential = 0;        ///< [energy]; V with its long-range corrections
+  double kinetic = 0, potential = 0;        ///< [energy]; K with that of spins, V with its long-range corrections
+  double rotational = 0;                    ///< the part of K that is in spins, ½ Σ I ω² [energy]
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN if the method has none
-  double max_energy_error = 0;                               ///< largest |H − H₁| so far [energy]
+  double max_energy_error = 0;                               ///< as in Statistics, so far [energy]
   Vec<D> momentum = Vec<D>::Zero();
-  double temperature = 0;  ///< 2K/(D N), in units of energy (k_B = 1); total momentum is not subtracted
-  double pressure = 0;     ///< virial: (2K + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
+  double temperature = 0;  ///< Σ m v²/(D N), in units of energy (k_B = 1); total momentum is not subtracted
+  double rotational_temperature = 0;  ///< Σ I ω²/(f N), f = 1 in two dimensions, 3 in three [energy]
+  double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
   std::vector<WallLoad> walls{};              ///< in thermo rows: of all walls, in the order of Box::walls()
   double total() const { return kinetic + potential; }
@@ -95,7 +97,7 @@ class Observer {
 struct Statistics {
   std::int64_t steps = 0;
   double end_time = 0;       ///< simulated time reached
-  double fraction_done = 0;  ///< of the plan, 0…1
+  double fraction_done = 0;  ///< part of the plan that is done, 0…1
   /// Where a branch started. Its sums, means and extremes are of the steps after this state.
   std::int64_t start_steps = 0;
   double start_time = 0;
@@ -109,8 +111,8 @@ struct Statistics {
   /// The long-range corrections (engine/forces/potentials/tail.h), which the energies above and the pressures include.
   /// They are constants; energy_reference and the errors of H exclude them.
   double tail_energy = 0, tail_pressure = 0;
-  double max_energy_error = 0;  ///< max over all steps of |H − H₁|, H₁ after the first step (free flight: at the
-                                ///< start); H less the work of walls that move
+  double max_energy_error = 0;  ///< max over all steps of |E − E₁|, E = H + dissipated − work − heat, E₁ after the
+                                ///< first step (free flight: at the start)
   std::optional<double>
       max_shadow_energy_error;  ///< Verlet types; with more than 100 particles only at thermo rows and frames
   std::optional<double> max_momentum_error;  ///< if momentum is conserved (no walls, no fields): max |P − P₀|
@@ -120,8 +122,8 @@ struct Statistics {
   /// time × the mean speed. The mean of |v| over all particles is computed at slab ends and averaged over time by the
   /// trapezoidal rule. Absent if there was no collision.
   std::optional<double> mean_free_time, mean_free_path;
-  double wall_seconds = 0;     ///< of the loop of run()
-  bool stopped_early = false;  ///< by should_stop
+  double wall_seconds = 0;     ///< spent in the loop of run()
+  bool stopped_early = false;  ///< should_stop has ended it
 
   void archive(Archive& archive) {
     archive(steps, end_time, fraction_done, start_steps, start_time, counters, force_passes, energy_initial,
@@ -238,7 +240,7 @@ class Simulation {
   StepCount count_;
   double quiet_since_ = 0;  // end of the last slab with pair collisions
   std::uint64_t most_collisions_ = std::max<std::uint64_t>(500'000, 4 * system_->size());  // per slab of an epoch
-  std::optional<std::uint64_t> last_collisions_;  // of the last slab, if this run() executed it
+  std::optional<std::uint64_t> last_collisions_;  // in the last slab, if this run() executed it
   std::unique_ptr<Monitor<D>> monitor_;           // from the first run() on
   std::size_t first_of_integrator_ = 0;           // its first entry in Fields::of_run()
 };

@@ -83,11 +83,11 @@ ObservableInfo profile() {
                       .type = integer,
                       .fallback = "0",
                       .unit = "-",
-                      .meaning = "across which the slabs lie, counted from 0",
+                      .meaning = "the axis, counted from 0, that is normal to the slabs",
                       .range = Parameter::Range::non_negative}},
       .documentation =
-          "Columns: x (middle of a slab), density (of centres), temperature 2K/(D n) of the n particles there, with "
-          "the mean velocity in it.",
+          "Columns: x (middle of a slab), density (of centres), temperature 2K/(D n) of the n particles in the slab; "
+          "their mean velocity is not subtracted.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.12",
       .in_2d = maker<TemperatureProfile, 2>(complete<2>),
       .in_3d = maker<TemperatureProfile, 3>(complete<3>)};

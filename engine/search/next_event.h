@@ -25,7 +25,7 @@ struct alignas(64) NextEvent {
   double contact = std::numeric_limits<double>::infinity();
   double update = std::numeric_limits<double>::infinity();  ///< when it leaves its cell, or its list's region
   union Where {
-    double centre[D];   ///< of the region: the sphere's position when its list was made
+    double centre[D];   ///< centre of the region: the sphere's position when its list was made
     CellPlace<D> cell;  ///< if the core uses cells alone
   } where{};
   std::uint32_t partner = 0;          ///< as a candidate (Packing); for a wall, its number

@@ -51,7 +51,7 @@ class SearchTuning {
   void choose(const SearchSituation& situation, const EventCounts& counts);
 
   bool lists() const { return lists_; }
-  double skin() const { return skin_; }  ///< of the lists
+  double skin() const { return skin_; }  ///< skin of the lists
   double cell() const { return cell_; }  ///< smallest edge of the cells
 
  private:

@@ -13,7 +13,8 @@
 
 namespace carom {
 namespace {
-/// The longest epoch, relative to the relaxation time of a bath that rescales at the ends of epochs.
+/// The longest epoch, relative to the relaxation time of a bath that rescales at the ends of epochs: the kinetic energy
+/// moves by at most a tenth of its distance from the mean at once.
 constexpr double kEpochOfRelaxation = 0.1;
 }  // namespace
 

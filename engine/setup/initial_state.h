@@ -7,7 +7,7 @@
 
 namespace carom {
 
-/// Pairs closer than their contact distance, and the ids of the pair that overlaps most, the lowest of equal ones. Does
+/// Pairs closer than their contact distance, and the ids of the pair that overlaps most, the first one in a tie. Does
 /// not depend on the number of ranks; collective.
 template <int D>
 Overlaps find_overlaps(const System<D>& system);

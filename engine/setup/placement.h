@@ -63,9 +63,9 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
 /// images; pairs are ignored if `beyond` marks the sphere with the larger index.
 struct Overlaps {
   std::size_t pairs = 0;
-  Id lo = 0, hi = 0;    ///< the pair that overlaps most, relative to its contact distance; of equals the lowest ids
-  double distance = 0;  ///< of that pair [length]
-  double contact = 1;   ///< its contact distance [length]
+  Id lo = 0, hi = 0;    ///< the pair that overlaps most, relative to its contact distance; the first one in a tie
+  double distance = 0;  ///< distance of that pair [length]
+  double contact = 1;   ///< contact distance of that pair [length]
 
   /// The overlap of that pair, relative to its contact distance; 0 if there is none.
   double depth() const { return pairs == 0 ? 0 : 1 - distance / contact; }

@@ -31,7 +31,7 @@ template <int D>
 struct Touch {
   EventKey<D> key;  ///< key.time counts from now for a future contact
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
-  double speed = 0;  ///< of a wall along the normal
+  double speed = 0;  ///< velocity of a wall along its normal
   double force = 0;  ///< the reaction of a present contact in the last piece [force]
   double gap = 0;    ///< of a present contact [length]
   bool pair() const { return key.kind == EventKind::pair; }

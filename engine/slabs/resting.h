@@ -31,7 +31,7 @@ inline constexpr int kMostBounces = 64;
 
 template <int D>
 struct RestingContact {
-  EventKey<D> key;    ///< of the pair, or of the sphere and the wall
+  EventKey<D> key;    ///< names the pair, or the sphere and the wall
   Vec<D> normal;      ///< gradient of the gap up to a positive factor, acting on lo and, negated, on hi
   double bound = 0;   ///< see above
   double slack = 0;   ///< by how much n·(w_lo − w_hi) may miss the bound before known reactions are solved again

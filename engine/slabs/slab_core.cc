@@ -14,12 +14,12 @@ namespace carom {
 
 namespace {
 constexpr double kPathMargin = 1.25;         // paths under later accelerations, relative to the first paths
-constexpr double kMostBend = 4;              // ½ h² a, in mean distances of the particles
+constexpr double kMostBend = 4;              // ½ h² a, in mean distances: a particle then has 10³ candidates
 constexpr std::size_t kBetweenLooks = 1024;  // events between two checks for a request to stop
 // Contacts of one particle on parabolas in a slab: a light sphere between two approaching heavy ones collides about
-// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A shorter slab is tried
-// rather than a flight with more contacts, which costs too much as long as the accelerations are not right.
-constexpr std::uint32_t kMostContactsOfParticle = 1000;
+// π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A sweep costs as much as its
+// contacts, and a shorter slab takes fewer sweeps, so flights with more contacts than this are not tried.
+constexpr std::uint32_t kMostContactsOfParticle = 100;
 }  // namespace
 
 template <int D>
@@ -78,7 +78,8 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   if (std::isfinite(margin_)) find_near();
 }
 
-/// Rejects accelerations under which parabolas may cross a whole periodic box: there would be too many images.
+/// Rejects accelerations under which a parabola may be longer than a quarter of a periodic box, so that two particles
+/// may approach each other by more than half of it: beyond that each pair has several images within reach.
 template <int D>
 void SlabCore<D>::limit_margin() {
   for (int k = 0; k < D; ++k)
@@ -364,7 +365,8 @@ template <int D>
 typename SlabCore<D>::Flight& SlabCore<D>::flight(Id i, const EventKey<D>& key) {
   const Vec<D> x = position(i, key.time), v = velocity(i, key.time);
   if (slot_[i] == 0) {
-    flights_.push_back({x, v, key.time, i, 0, 0, 0});
+    flights_.push_back({x, v, key.time, i, 0, 0, 0, Spin<D>::Zero()});
+    if (box_.contacts.rough()) flights_.back().spin = particles_.spin[i];
     slot_[i] = static_cast<std::uint32_t>(flights_.size());
   }
   Flight& f = flights_[slot_[i] - 1];
@@ -398,7 +400,8 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     // Sweeps change the time of a contact, not its random numbers.
     const Draw draw{.id = particles_.id_of(key.lo), .time = box_.time, .number = std::uint64_t{lo.version} << 32};
     const auto [after, impulse, exchange] =
-        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, draw, key.time);
+        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, draw, key.time, 0,
+                        particles_.radius[key.lo], box_.contacts.rough() ? &lo.spin : nullptr);
     contact.impulse = impulse;
     contact.exchange = exchange;
     lo.v = after;
@@ -415,6 +418,16 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse), .dissipated = dissipated};
     lo.v += (g / mass) * d;
     hi.v -= (g / mass_hi) * d;
+    if (box_.contacts.rough()) {
+      const auto sphere = [&](Flight& f) {
+        return RoughSphere<D>{particles_.mass[f.id], particles_.radius[f.id], particles_.species[f.id], &f.spin};
+      };
+      const Rubbed<D> rubbed = rub_pair<D>(box_.contacts, d, v, g, sphere(lo), sphere(hi));
+      lo.v += rubbed.impulse / mass;
+      hi.v -= rubbed.impulse / mass_hi;
+      contact.impulse += rubbed.impulse;
+      contact.exchange.dissipated += rubbed.dissipated;
+    }
     checks_path(hi);
   }
   checks_path(lo);

@@ -30,8 +30,8 @@ struct FlightEnd {
   bool complete = true;
   bool too_strong = false;  ///< if incomplete: an acceleration bends paths far too much for the slab, or is NaN, or
                             ///< there are so many contacts that the end of the flight would be meaningless
-  double time = 0;          ///< if incomplete otherwise: the slab must end here, because a contact comes to rest or a
-                            ///< resting one is hit; the spheres touch then, with a gap that leaves room for rounding
+  double time = 0;          ///< if incomplete for another reason: the slab must end here, because a contact comes to
+                    ///< rest or a resting one is hit; the spheres touch then, with a gap that leaves room for rounding
   EventKey<D> key{};        ///< the event that made the flight incomplete
   bool falls_back = false;  ///< it is a contact that has opened by less than a contact at rest may
 };
@@ -85,6 +85,8 @@ class SlabCore {
   void finish(Particles<D>& particles) {
     particles.x.swap(x_);
     particles.v.swap(v_);
+    if (box_.contacts.rough())
+      for (const Flight& each : flights_) particles.spin[each.id] = each.spin;
     system_.box.time += length_;
   }
 
@@ -98,7 +100,8 @@ class SlabCore {
     double t;
     Id id;
     std::uint32_t version, generation;
-    std::uint64_t hash;  ///< of the particle's sequence of partners
+    std::uint64_t hash;  ///< hash of the particle's sequence of partners
+    Spin<D> spin;        ///< if contacts are rough
   };
   struct Planned {
     EventKey<D> key;
@@ -154,7 +157,7 @@ class SlabCore {
   std::vector<Contact<D>>* log_ = nullptr;
   SlabWatch* watch_ = nullptr;
   double length_ = 0, margin_ = 0, own_reach_ = 0;
-  double longest_path_ = 0;  // of this flight, if beyond margin_; else 0
+  double longest_path_ = 0;  // the longest path of this flight that exceeds margin_; 0: none
   bool too_many_contacts_ = false, resolved_ = false;
   bool left_ = false;         // this rank was asked to stop during this flight
   Positions<D> start_v_, a_;  // velocities at the slab's start, accelerations

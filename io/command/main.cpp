@@ -34,7 +34,7 @@ constexpr int usage_error = 2;
 /// Former commands, and what to do instead.
 constexpr const char* kFormer[][2] = {
     {"bench",
-     "carom bench is a program of its own now; from the sources: cmake --build build/release --target carom_bench && "
+     "carom bench is now a separate program; from the sources: cmake --build build/release --target carom_bench && "
      "build/release/tests/benchmarks/carom_bench, with the same options (--state and --save-state are gone: a deck "
      "describes a state)"},
     {"completion",
@@ -55,10 +55,10 @@ int print(const std::string& page) {
 }
 
 void add_page(CLI::App& command, std::uint16_t& port, bool& browser, CLI::Option* needs = nullptr) {
-  auto* at = command.add_option("--port", port, "Of the page: this port of 127.0.0.1, instead of any free one");
+  auto* at = command.add_option("--port", port, "Port of the page on 127.0.0.1; default: any free one");
   at->type_name("PORT")->check(CLI::Range(0, 65535));
   auto* none = command.add_flag_callback(
-      "--no-browser", [&] { browser = false; }, "Print the address of the page, open no browser");
+      "--no-browser", [&] { browser = false; }, "Only print the address of the page; do not open a browser");
   if (needs != nullptr) at->needs(needs), none->needs(needs);
 }
 
@@ -69,20 +69,25 @@ struct Views {
   std::optional<std::filesystem::path> directory;
 
   explicit Views(CLI::App& app)
-      : view(app.add_subcommand("view",
-                                "A page in the browser with the spheres and curves of runs, also while they go on")),
-        demo(app.add_subcommand("demo", "Two methods from one start, seen side by side")) {
-    view->add_option("run", options.runs, "Directories of runs, shown side by side")->required()->type_name("RUN");
-    auto* to = view->add_option("--export", options.export_to, "Write a page that needs no server to this file");
+      : view(app.add_subcommand(
+            "view", "Show runs on a page in the browser, with spheres and curves, also while they are active")),
+        demo(app.add_subcommand("demo", "Show two methods side by side from the same start")) {
+    view->add_option("run", options.runs, "Directories of runs, which are shown side by side")
+        ->required()
+        ->type_name("RUN");
+    auto* to =
+        view->add_option("--export", options.export_to, "Write a page with its data to this file; it needs no server");
     to->type_name("FILE");
-    view->add_option("--max-size", options.most_megabytes, "Of --export: with as many frames as fit into so many MB")
+    view->add_option("--max-size", options.most_megabytes,
+                     "Largest size of the exported file; determines how many frames it has")
         ->needs(to)
         ->capture_default_str()
         ->type_name("MB")
         ->check(CLI::Range(1, 4000));
     view->add_flag("--led", options.led, "The run is about to begin; end with standard input")->group("");
     add_page(*view, options.port, options.browser);
-    demo->add_option("directory", directory, "Where the runs are left, instead of nowhere")->type_name("DIR");
+    demo->add_option("directory", directory, "Directory for the files of the runs; default: they are not kept")
+        ->type_name("DIR");
     add_page(*demo, options.port, options.browser);
   }
 };
@@ -114,16 +119,16 @@ int carom_main(int argc, char** argv) {
   CLI::App& run = *app.add_subcommand("run", "Run a deck");
   auto* const run_deck = run.add_option("deck", options.deck, "The deck (TOML)")->type_name("DECK");
   auto* const go_on =
-      run.add_option("--continue", options.go_on, "Go on with the run in this directory from its last checkpoint");
+      run.add_option("--continue", options.go_on, "Continue the run in this directory from its last checkpoint");
   go_on->type_name("DIR")->excludes(run_deck);
   run.add_flag("--take-over", options.take_over,
-               "Of --continue: the process that had the directory on another host has ended")
+               "With --continue: states that the process of the run on another host has ended")
       ->needs(go_on);
   run.add_option("-o,--output", options.output, "Output directory, instead of output.directory")
       ->type_name("DIR")
       ->excludes(go_on);
   CLI::App& branch = *app.add_subcommand("branch", "Start a new run from a checkpoint, with a changed deck");
-  branch.add_option("from", options.branch, "The checkpoint, or the directory of a run: its last one")
+  branch.add_option("from", options.branch, "A checkpoint, or the directory of a run, whose last checkpoint is used")
       ->required()
       ->type_name("CHECKPOINT");
   branch.add_option("-o,--output", options.output, "Directory of the new run")->type_name("DIR")->required();
@@ -139,36 +144,38 @@ int carom_main(int argc, char** argv) {
         ->type_name("HH:MM:SS");
     command
         ->add_option("--silence", options.silence,
-                     "Of several ranks: give up after so many seconds without a word from one; 0: never")
+                     "End the run when a rank has not answered for so many seconds; 0: never")
         ->capture_default_str()
         ->type_name("SECONDS")
         ->check(CLI::NonNegativeNumber);
     command->add_flag("--quiet", options.quiet, "No banner and no progress line");
   }
-  auto* const seen = run.add_flag("--view", options.view, "Show the run on a page in the browser while it goes on");
+  auto* const seen = run.add_flag("--view", options.view, "Show the run on a page in the browser");
   add_page(run, options.port, options.browser, seen);
 
   std::filesystem::path deck, file;
   std::vector<std::string> set;
-  CLI::App& validate = *app.add_subcommand("validate", "Parse, check, build the initial state, say what would run");
+  CLI::App& validate =
+      *app.add_subcommand("validate", "Read and check a deck, build its initial state, and print what would run");
   validate.add_option("deck", deck, "The deck (TOML)")->required()->type_name("DECK");
   add_set(validate, set);
 
   bool markdown = false;
-  CLI::App& schema = *app.add_subcommand("schema", "Every key of a deck: type, unit, default, meaning");
-  schema.add_flag("--markdown", markdown, "As Markdown");
-  CLI::App& methods =
-      *app.add_subcommand("methods", "Every integrator: order, conserved quantities, parameters, source; the averages");
+  CLI::App& schema = *app.add_subcommand("schema", "Print all keys of a deck: type, unit, default, meaning");
+  schema.add_flag("--markdown", markdown, "Print Markdown");
+  CLI::App& methods = *app.add_subcommand(
+      "methods", "Print all integrators with order, conserved quantities, parameters and source, and all averages");
   CLI::App& info =
-      *app.add_subcommand("info", "What is in a trajectory, a file of events, a checkpoint or the directory of a run");
+      *app.add_subcommand("info", "Describe a trajectory, a file of events, a checkpoint or the directory of a run");
   info.add_option("file", file, "The file or directory")->required()->type_name("FILE");
 
   carom::ConvertOptions to;
-  CLI::App& convert = *app.add_subcommand("convert", "Frames of a run in a format of other programs");
+  CLI::App& convert = *app.add_subcommand("convert", "Write frames of a run in the format of another program");
   convert.add_option("run", to.run, "The directory of a run, or a trajectory")->required()->type_name("RUN");
   convert.add_option("--to", to.format, "The format")->required()->check(CLI::IsMember(carom::format_names()));
-  convert.add_option("-o,--output", to.output, "The file; beside the trajectory")->type_name("FILE");
-  convert.add_option("--frames", to.frames, "One, as 7 or -1, or a slice, as 0:100:10; all, lammps-data: the last")
+  convert.add_option("-o,--output", to.output, "The file; default: beside the trajectory")->type_name("FILE");
+  convert
+      .add_option("--frames", to.frames, "A frame (7, -1) or a slice (0:100:10); default: all, lammps-data: the last")
       ->type_name("FRAMES");
   Views views(app);
 

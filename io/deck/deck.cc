@@ -83,13 +83,15 @@ Deck read_deck(const std::filesystem::path& file, std::span<const std::string> o
 }
 
 Deck read_branch(const Deck& of, std::span<const std::string> overrides, const TextReader& reader, bool& same_motion) {
-  constexpr std::array kKept = {"system", "particles", "placement"};
+  constexpr std::array kKept = {"system", "particles", "placement", "wall"};
   Problems problems;
   for (const std::string& text : overrides) {
     const std::string key = text.substr(0, text.find('=')), table = key.substr(0, key.find('.'));
     if (std::ranges::find(kKept, table) != kKept.end())
-      problems.error({"--set " + key}, "a branch has the particles and the box of its checkpoint",
-                     "set [integrator], [[interaction]], [run] or [output]; for other particles start a new run");
+      problems.error(
+          {"--set " + key}, "a branch has the particles and the box of its checkpoint",
+          "set [integrator], [[interaction]], [[contact]], [[bath]], [run] or [output]; for other particles or walls "
+          "start a new run");
   }
   problems.throw_errors(Failure::deck);
   Deck deck = read_deck(of.source->values.file, overrides, reader, true);

@@ -64,6 +64,7 @@ void give_velocities(const Deck::Source& source, System<D>& system) {
   for (const SpeciesConfig& species : source.species) {
     for (; i < p.size() && p.id_of(i) < first + species.count; ++i) {
       if (!species.velocity.empty()) p.v[i] = Eigen::Map<const Vec<D>>(species.velocity[p.id_of(i) - first].data());
+      if (!species.spin.empty()) p.spin[i] = Eigen::Map<const Spin<D>>(species.spin[p.id_of(i) - first].data());
       if (!species.temperature) continue;
       drawn.push_back(i);
       temperature.push_back(*species.temperature);
@@ -113,9 +114,7 @@ void take_bonds(Deck::Source& source, const std::vector<PairList>& bonds) {
 }  // namespace
 
 bool built_in_blocks(const Deck::Source& source) {
-  const std::string& type = source.placement.type;
-  const bool lattice = !type.empty() && type != "file" && type != "random" && type != "compressed";
-  return lattice && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
+  return source.placement.lattice() && std::ranges::all_of(source.species, [](const SpeciesConfig& species) {
            return species.placed && species.radius.size() == 1 && species.mass.size() == 1;
          });
 }
@@ -129,7 +128,10 @@ void fill_box(const Deck::Source& source, System<D>& system) {
   for (const TableConfig& bath : source.baths)
     if (!bath.wrong) system.box.bath = bath_of(bath.parameters, source.placement.seed);
   system.species.clear();
-  for (const SpeciesConfig& species : source.species) system.species.push_back(species.name);
+  for (const SpeciesConfig& species : source.species) {
+    system.species.push_back(species.name);
+    system.box.contacts.inertias.push_back(species.inertia);
+  }
   for (const TableConfig& contact : source.contacts)
     if (!contact.wrong) add_contact<D>(system.box, system.species, contact.parameters);
 }
@@ -196,6 +198,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   const int share = ranks ? ranks->size() : 1;
   check_memory(source, source.edges.empty() ? nullptr : &system->box, share);
   fill_particles(source, *system, ranks);
+  system->need_spins();
   if (given) {
     if (ranks && !system->decomposition.joined()) system->decomposition.join(*ranks);
     restore_particles(*system, given->read);

@@ -11,7 +11,7 @@
 namespace carom {
 namespace {
 
-constexpr std::int64_t kMostParticles = 1'000'000'000;  // of a species; ids have 32 bits
+constexpr std::int64_t kMostParticles = 1'000'000'000;  // in a species; ids have 32 bits
 
 /// "1 particle", "2 particles"
 std::string count_of(std::size_t n, const std::string& what) {
@@ -129,6 +129,7 @@ class Interpreter {
       problems_.error(table.place("name"), "two species are called '" + species.name + "'", "give each its own name");
     positions(table, species);
     velocities(table, species);
+    spins(table, species);
     if (species.count > 0) {
       for (const char* key : {"display_radius", "radius"})
         if (table.given(key)) species.radius = numbers(table, key, species.count);
@@ -142,6 +143,11 @@ class Interpreter {
   /// Spheres have a radius, and points have none.
   void cores() {
     if (source_.integrator == nullptr) return;
+    for (const ValueTable& table : values_.list("contact"))
+      if (!source_.integrator->hard_cores && table.given("tangential"))
+        problems_.error(table.place("tangential"),
+                        "'" + deck_.integrator + "' treats particles as points, which do not touch",
+                        "take psa or edda, where spheres collide, or leave the contact out");
     for (const ValueTable& table : values_.list("particles")) {
       if (source_.integrator->hard_cores && !table.given("radius"))
         problems_.error(table.at, "missing key 'radius' in [[particles]]", "give the radius of the hard core");
@@ -199,13 +205,44 @@ class Interpreter {
                       "a species given by count needs it; 0 leaves the particles at rest");
   }
 
+  void spins(const ValueTable& table, SpeciesConfig& species) {
+    const auto* list = table.find<std::vector<std::vector<double>>>("spin");
+    if (list != nullptr) {
+      species.spin = *list;
+      vectors(table, "spin", *list, dimension_ == 2 ? 1 : dimension_);
+      if (species.placed)
+        problems_.error(table.place("spin"), "'spin' goes with explicit positions only",
+                        "leave it out: particles given by count start without spin");
+      else if (species.count > 0 && list->size() != species.count)
+        problems_.error(
+            table.place("spin"),
+            "'spin' has " + count_of(list->size(), "vector") + " for " + count_of(species.count, "particle"),
+            "give one for each");
+    }
+    if (const auto* inertia = table.find<double>("inertia")) {
+      species.inertia = *inertia;
+      if (dimension_ != 0)
+        report(table.place("inertia"), [&] { check_inertia(*inertia, static_cast<int>(dimension_)); });
+    }
+    const auto rough = [](const ValueTable& contact) { return contact.given("tangential"); };
+    const auto& contacts = values_.list("contact");
+    for (const char* key : {"spin", "inertia"})
+      if (table.given(key) && std::ranges::none_of(contacts, rough))
+        problems_.error(table.place(key), std::string("'") + key + "' has no effect, all contacts are smooth",
+                        "give a [[contact]] with 'tangential', or leave it out");
+  }
+
   void vectors(const ValueTable& table, const std::string& key, const std::vector<std::vector<double>>& list) {
+    vectors(table, key, list, dimension_);
+  }
+  void vectors(const ValueTable& table, const std::string& key, const std::vector<std::vector<double>>& list,
+               std::size_t size) {
     for (std::size_t n = 0; n < list.size() && dimension_ != 0; ++n)
-      if (list[n].size() != dimension_)
+      if (list[n].size() != size)
         problems_.error(
             table.place(key),
             "vector " + std::to_string(n) + " (from 0) of '" + key + "' has " + count_of(list[n].size(), "number"),
-            "system.dimension asks for " + std::to_string(dimension_));
+            "system.dimension asks for " + std::to_string(size));
   }
 
   std::vector<double> numbers(const ValueTable& table, const std::string& key, std::size_t count) {
@@ -415,9 +452,7 @@ class Interpreter {
       if (parameters.has("interval") && parameters.real("interval") > 0)
         deck_.output.observables.push_back({&info, std::move(parameters)});
     }
-    const std::string& start = source_.placement.type;
-    const bool lattice = !start.empty() && start != "random" && start != "compressed" && start != "file";
-    if (lattice && !deck_.output.observables.empty() && deck_.output.sample_start == 0)
+    if (source_.placement.lattice() && !deck_.output.observables.empty() && deck_.output.sample_start == 0)
       problems_.warning(table->at, "the averages include the initial lattice, on which g(r) has sharp peaks",
                         "set sample_start to a time at which the lattice has melted");
     if (const auto* units = table->find<TableValue>("units"))

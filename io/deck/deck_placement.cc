@@ -131,7 +131,7 @@ void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& sy
   for (const SpeciesConfig& species : source.species)
     margin = std::max(margin, *std::ranges::max_element(species.radius));
   const std::size_t n = source.particles();
-  std::vector<Id> next(counts.size());  // of each species
+  std::vector<Id> next(counts.size());  // the next particle of each species
   for (std::size_t s = 1; s < counts.size(); ++s) next[s] = next[s - 1] + static_cast<Id>(counts[s - 1]);
   const std::size_t sites = fit_lattice(lattice, system.box, n, margin).sites;
   // A single species that fills all sites needs no drawing.

@@ -15,9 +15,10 @@ struct SpeciesConfig {
   Place at;
   std::size_t count = 0;
   bool placed = false;  ///< given by count: [placement] finds the positions
-  std::vector<std::vector<double>> position, velocity;
+  std::vector<std::vector<double>> position, velocity, spin;
   std::optional<double> temperature;
   std::vector<double> radius, mass, charge;  ///< one for each particle, or one for all
+  double inertia = 0;                        ///< reduced; 0: homogeneous
 
   static double of(const std::vector<double>& values, std::size_t n) { return values[values.size() == 1 ? 0 : n]; }
 };
@@ -30,6 +31,8 @@ struct PlacementConfig {
   std::filesystem::path file;
   std::vector<std::vector<double>> positions;  ///< from the file
   double growth_rate = 0, max_collisions = 0;  ///< compressed: engine/setup/compression.h
+
+  bool lattice() const { return !type.empty() && type != "random" && type != "compressed" && type != "file"; }
 };
 
 struct InteractionConfig {

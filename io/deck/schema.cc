@@ -34,8 +34,8 @@ Parameter units_key() {
                                  times = {"fs", "ps", "ns", "us", "ms", "s"};
   Parameter units = {
       "units", table, "none", "-",
-      "what the trajectory says its lengths and times are in, as { length = \"Angstrom\", time = \"ps\" }, "
-      "for programs that want to know; numbers are written as they are; none: reduced units"};
+      "the units of length and time that the trajectory states for other programs, as { length = \"Angstrom\", time = "
+      "\"ps\" }; no number depends on them; none: reduced units"};
   units.keys = {{"length", text, "", "-", "the unit of length", Range::any, lengths},
                 {"time", text, "", "-", "the unit of time", Range::any, times}};
   return units;
@@ -44,11 +44,11 @@ Parameter units_key() {
 std::vector<Parameter> output_keys() {
   std::vector<Parameter> keys = {
       {"directory", text, "none", "-",
-       "where to; relative to the working directory; by default runs/ and the deck's name"},
+       "where the run writes its files, relative to the working directory; default: runs/ and the name of the deck"},
       {"frame_interval", real, "0.0", "time", "simulated time between frames of the trajectory; 0: first and last only",
        Range::non_negative},
-      {"thermo_interval", real, "0.0", "time",
-       "simulated time between rows of the table of observables; 0: first and last only", Range::non_negative}};
+      {"thermo_interval", real, "0.0", "time", "simulated time between rows of thermo.csv; 0: first and last only",
+       Range::non_negative}};
   for (const ObservableInfo& info : observables())
     for (const Parameter& parameter : info.parameters) {
       keys.push_back(parameter);
@@ -56,7 +56,7 @@ std::vector<Parameter> output_keys() {
     }
   keys.push_back(
       {"sample_start", real, "0.0", "time",
-       "simulated time of the first sample for " + averages_of_all() + ": what comes before is equilibration",
+       "simulated time of the first sample for " + averages_of_all() + "; the time before is for equilibration",
        Range::non_negative});
   keys.push_back({"checkpoint_wall", text, "\"00:05:00\"", "-",
                   "wall time between checkpoints, hh:mm:ss; empty: only when the run ends or is stopped"});
@@ -66,7 +66,7 @@ std::vector<Parameter> output_keys() {
 }
 
 Parameter boundary_key() {
-  Parameter key = {"boundary", text_list, "", "-", "for each axis"};
+  Parameter key = {"boundary", text_list, "", "-", "the boundary along each axis"};
   for (const BoundaryInfo& info : boundaries()) {
     key.meaning += "; " + std::string(info.name) + ": " + std::string(info.meaning);
     key.choices.emplace_back(info.name);
@@ -81,52 +81,60 @@ std::vector<TableSchema> make_schema() {
       {"",
        false,
        true,
-       "at the top of the deck",
+       "keys at the top of the deck",
        {{"format", integer, "", "-", "version of the deck format: 1", Range::positive},
         {"title", text, "\"\"", "-", "one line that says what the run shows"},
-        {"description", text, "\"\"", "-", "more about it: source, what to look at"}}},
+        {"description", text, "\"\"", "-", "a longer description: the source of the system, what to look at"}}},
       {"system",
        false,
        true,
        "the box",
        {{"dimension", integer, "", "-", "2 or 3", Range::positive},
         {"box", real_list, "none", "length",
-         "edges of the box, which begins at the origin; may be left out where placement.packing_fraction sets it",
+         "edges of the box, whose lower corner is the origin; may be absent if placement.packing_fraction determines "
+         "them",
          Range::positive},
         boundary_key()}},
       {"contact", true, false, "the law of all contacts between two partners; contacts without one are elastic",
        contact_parameters()},
-      {"wall", true, false, "a wall beside those of the box, or a face of the box that is more than a fixed hard wall",
+      {"wall", true, false, "a further wall, or a face of the box that is more than a fixed hard wall",
        wall_parameters()},
       {"bath", true, false, "a heat bath for all particles; at most one", bath_parameters()},
       {"particles",
        true,
        true,
-       "a species, by explicit positions or by count; ids number all particles from 0 in deck order",
+       "a species, given by positions or by count; ids number all particles from 0 in the order of the deck",
        {{"name", text, "", "-", "name of the species"},
         {"position", vector_list, "none", "length", "centres, one vector for each particle"},
         {"velocity", vector_list, "none", "length/time",
-         "velocities that go with explicit positions; at rest where neither velocity nor temperature is given"},
-        {"count", integer, "none", "-", "number of particles, placed as [placement] says", Range::positive},
+         "velocities of particles with positions; without velocity and temperature they are at rest"},
+        {"count", integer, "none", "-", "number of particles, which [placement] places", Range::positive},
         {"temperature", real, "none", "energy",
-         "draws Maxwell–Boltzmann velocities, total momentum removed and scaled to this temperature (k_B = 1)",
+         "draws Maxwell–Boltzmann velocities with zero total momentum and exactly this temperature (k_B = 1)",
          Range::non_negative},
-        {"radius", real_or_list, "none", "length", "of the hard core; required but for verlet, which has points",
+        {"radius", real_or_list, "none", "length",
+         "radius of the hard core; required, except with verlet, which has points", Range::positive},
+        {"display_radius", real_or_list, "none", "length", "with verlet: the radius that pictures show; default: 0.5",
          Range::positive},
-        {"display_radius", real_or_list, "none", "length", "with verlet: what pictures show instead of points; 0.5",
-         Range::positive},
-        {"mass", real_or_list, "1.0", "mass", "", Range::positive},
-        {"charge", real_or_list, "0.0", "charge", "for the interactions that know charges"}}},
+        {"mass", real_or_list, "1.0", "mass", "mass of a particle", Range::positive},
+        {"charge", real_or_list, "0.0", "charge", "charge of a particle, for interactions between charges"},
+        {"spin", vector_list, "none", "1/time",
+         "angular velocities that go with explicit positions where contacts have 'tangential': [z] in two dimensions, "
+         "[x, y, z] in three; without spin where absent"},
+        {"inertia", real, "none", "-",
+         "reduced moment of inertia 4I/(m sigma^2), sigma the diameter: 0.5 for homogeneous discs, 0.4 for homogeneous "
+         "spheres, which is the default; 1 for rings, 2/3 for shells",
+         Range::positive}}},
       {"placement",
        false,
        false,
-       "where the particles of species given by count stand at the start",
-       {type_key("the arrangement"),
+       "the initial positions of particles given by count",
+       {type_key("the kind of placement"),
         {"packing_fraction", real, "none", "-",
-         "sets the box, as a cube or square (hexagonal: in the lattice's "
-         "proportions), where system.box is absent",
+         "determines the box if system.box is absent: a cube or a square (hexagonal: a rectangle that fits "
+         "the lattice)",
          Range::positive},
-        {"seed", integer, "1", "-", "of the random places and velocities", Range::non_negative}},
+        {"seed", integer, "1", "-", "seed of random positions and velocities", Range::non_negative}},
        {{"fcc", {}},
         {"simple-cubic", {}},
         {"hexagonal", {}},
@@ -134,26 +142,26 @@ std::vector<TableSchema> make_schema() {
         {"random", {}},
         {"compressed",
          {{"growth_rate", real, "0.1", "-",
-           "speed at which the largest diameter grows, over the thermal speed; divided by the reduced pressure "
-           "PV/(NkT) as that rises. The slower, the denser the spheres jam",
+           "speed at which the largest diameter grows, relative to the thermal speed; it is divided by the reduced "
+           "pressure PV/(NkT). Slower growth leads to denser jammed states",
            Range::positive},
-          {"max_collisions", real, "100000.0", "-", "for each particle, before compression gives up",
+          {"max_collisions", real, "100000.0", "-", "collisions per particle after which compression gives up",
            Range::positive}}},
         {"file",
          {{"file", text, "", "-",
-           "table of positions, separated by commas or blanks, one particle a line; "
-           "relative to the deck's folder"}}}}},
+           "file with a line of coordinates for each particle, separated by commas or blanks; relative to the "
+           "folder of the deck"}}}}},
       {"interaction",
        true,
        false,
-       "a smooth force between or on the particles, besides their hard cores",
-       {type_key("which one")},
+       "a smooth force between the particles or on them",
+       {type_key("the kind of force")},
        variants_of(interactions())},
       {"integrator",
        false,
        true,
-       "the method; `carom methods` describes each",
-       {type_key("which one")},
+       "the method; `carom methods` describes all of them",
+       {type_key("the name of the method")},
        variants_of(integrators()),
        {{"acdda", "write \"edda\", which keeps the energy as exactly"},
         {"acva", "write \"edda\", which keeps the energy exactly, or \"cva\""},
@@ -161,11 +169,11 @@ std::vector<TableSchema> make_schema() {
       {"run",
        false,
        true,
-       "when the run ends: at the first of these that is reached; at least one is needed",
+       "the end of the run: the first of these that it reaches; at least one is required",
        {{"steps", integer, "none", "-", "number of steps (free-flight: epochs)", Range::positive},
         {"end_time", real, "none", "time", "simulated time; the last step is shortened to meet it", Range::positive},
         {"collisions", integer, "none", "-", "number of pair collisions", Range::positive}}},
-      {"output", false, false, "what the run leaves behind", output_keys()}};
+      {"output", false, false, "the files of the run", output_keys()}};
 }
 
 }  // namespace

@@ -57,7 +57,7 @@ bool periodic(const TrajectoryReader& trajectory, std::size_t axis) {
 std::span<const ExportFormat> export_formats() {
   static constexpr std::array<ExportFormat, 5> formats = {{
       {"extxyz", "extxyz", false, write_extxyz},         // extended XYZ, for OVITO and ASE
-      {"gsd", "gsd", false, write_gsd},                  // of HOOMD-blue, for OVITO, freud and MDAnalysis
+      {"gsd", "gsd", false, write_gsd},                  // the format of HOOMD-blue, for OVITO, freud and MDAnalysis
       {"lammps-data", "data", true, write_lammps_data},  // a data file of LAMMPS
       {"xdmf", "xmf", false, write_xdmf},                // refers to the trajectory, for ParaView
       {"xdmf2", "xmf", false, write_xdmf2},              // likewise, for programs with an older reader

@@ -18,7 +18,7 @@ namespace carom {
 
 struct ExportFormat {
   std::string_view name;       ///< the name on the command line
-  std::string_view extension;  ///< of the file name
+  std::string_view extension;  ///< extension of the file name
   bool one_frame;              ///< holds a single frame only
   /// Writes the frames (indices, at least one) to `out`, which will have the name `file`; returns a message for the
   /// user, or "". Throws Error(Failure::file).

@@ -19,7 +19,7 @@ std::string escaped(const std::string& text) {
 
 struct Numbers {
   std::string file;        // the trajectory, as the XML names it
-  std::uint64_t rows = 0;  // of its series
+  std::uint64_t rows = 0;  // length of its series
   std::size_t particles = 0;
   int version = 3;  // version of XDMF
 
@@ -77,7 +77,7 @@ std::string write(int version, const TrajectoryReader& trajectory, std::span<con
     file.append(grid + "</Grid>\n");
   }
   file.append("</Grid>\n</Domain>\n</Xdmf>\n");
-  return "It refers to " + trajectory.path().string() + ": keep the two where they are to each other";
+  return "It refers to " + trajectory.path().string() + ", beside which it must stay";
 }
 
 }  // namespace

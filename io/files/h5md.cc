@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <optional>
 
 #include "io/files/hdf5.h"
 #include "io/files/thermo.h"
@@ -37,6 +38,21 @@ Bytes packed(const Arrays&... arrays) {
   const auto add = [&](std::span<const std::byte> more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
   (add(std::as_bytes(std::span(arrays))), ...);
   return bytes;
+}
+
+/// The variable data of a block of particles as a message.
+template <int D>
+Bytes frame_of(const Particles<D>& p, bool spins) {
+  return packed(p.x, p.v, p.image, std::span(p.spin).first(spins ? p.spin.size() : 0));
+}
+
+/// Spins as rows of three columns.
+template <int D>
+std::vector<double> spin_columns(std::span<const Spin<D>> spins) {
+  std::vector<double> rows(3 * spins.size());
+  for (std::size_t i = 0; i < spins.size(); ++i)
+    std::ranges::copy(spins[i], rows.begin() + static_cast<std::ptrdiff_t>(3 * i + (D == 2 ? 2 : 0)));
+  return rows;
 }
 
 /// Unpacks the next `n` values of a message.
@@ -142,7 +158,7 @@ void write_bonds(File& file, const System<D>& system) {
 }
 
 /// Writes the H5MD module `units`, which uses texts of variable length.
-void write_units(File& file, const Units& units) {
+void write_units(File& file, const Units& units, bool spins) {
   const Handle type(H5Tcopy(H5T_C_S1), H5Tclose), scalar(H5Screate(H5S_SCALAR), H5Sclose);
   H5Tset_size(type.id(), H5T_VARIABLE);
   const auto write = [&](const std::string& name, const std::string& unit) {
@@ -158,6 +174,7 @@ void write_units(File& file, const Units& units) {
   write(particles + "box/edges/value", units.length);
   write(particles + "radius", units.length);
   write(particles + "velocity/value", units.length + " " + units.time + "-1");
+  if (spins) write(particles + "angular_velocity/value", units.time + "-1");
   write(particles + "position/time", units.time);
 }
 
@@ -197,7 +214,10 @@ struct TrajectoryWriter<D>::Contents {
       const std::string name = std::string("observables/").append(column.element);
       observables.push_back({{file, name, std::vector<hsize_t>(vector ? 1 : 0, 3), stored}, &column});
     }
+    if (system.box.contacts.rough())
+      spin.emplace(file, "particles/trajectory/angular_velocity", std::vector<hsize_t>{system.size(), 3});
     for (auto* element : {&velocity, &edges}) element->share_clock(file, position.group);
+    if (spin) spin->share_clock(file, position.group);
     image.share_clock(file, position.group);
     for (auto& [element, column] : observables) element.share_clock(file, position.group);
   }
@@ -209,12 +229,13 @@ struct TrajectoryWriter<D>::Contents {
     write_box(system.box);
     write_fixed(system);
     write_bonds(file, system);
-    if (deck.output.units) write_units(file, *deck.output.units);
+    if (deck.output.units) write_units(file, *deck.output.units, spin.has_value());
     file.flush();
   }
 
   void cut(std::uint64_t frames) {
     for (auto* element : {&position, &velocity, &edges}) element->value.cut(frames);
+    if (spin) spin->value.cut(frames);
     for (auto& [element, column] : observables) element.value.cut(frames);
     image.value.cut(frames);
     time.cut(frames);
@@ -270,29 +291,34 @@ struct TrajectoryWriter<D>::Contents {
   void write_particles(const Particles<D>& p) {
     for (auto* element : {&position, &velocity}) element->value.append_row();
     image.value.append_row();
+    if (spin) spin->value.append_row();
     if (ranks.size() == 1) {
-      write_part(0, p.x, p.v, p.image);
+      write_part(0, p.x, p.v, p.image, p.spin);
       return;
     }
     std::size_t first = 0;
     try {
       one_after_the_other(
-          ranks, [&] { return packed(p.x, p.v, p.image); },
+          ranks, [&] { return frame_of(p, spin.has_value()); },
           [&](int /*rank*/, const Bytes& message) {
-            const std::size_t n = message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>));
+            const std::size_t n =
+                message.size() / (2 * sizeof(Vec<D>) + sizeof(Image<D>) + (spin ? sizeof(Spin<D>) : 0));
             Reader reader(message);
             const auto x = next<Vec<D>>(reader, n), v = next<Vec<D>>(reader, n);
-            write_part(first, x, v, next<Image<D>>(reader, n));
+            const auto images = next<Image<D>>(reader, n);
+            write_part(first, x, v, images, next<Spin<D>>(reader, spin ? n : 0));
             first += n;
           });
     } catch (...) {  // a rank is lost: the frame is dropped
       for (auto* element : {&position, &velocity}) element->value.drop_row();
       image.value.drop_row();
+      if (spin) spin->value.drop_row();
       throw;
     }
   }
   void write_part(std::size_t first, std::span<const Vec<D>> x, std::span<const Vec<D>> v,
-                  std::span<const Image<D>> images) {
+                  std::span<const Image<D>> images, std::span<const Spin<D>> spins) {
+    if (spin) spin->value.write_part(first, spin_columns<D>(spins));
     velocity.value.write_part(first, three_columns<double>(v, D));
     image.value.write_part(first, three_columns<std::int32_t>(images, D));
     position.value.write_part(first, three_columns<double>(x, D));
@@ -301,6 +327,7 @@ struct TrajectoryWriter<D>::Contents {
   File file;
   Element<double> position, velocity;
   Element<std::int32_t> image;
+  std::optional<Element<double>> spin;  // if contacts are rough
   Series<std::int64_t> step;
   Series<double> time;
   Handle box;
@@ -356,7 +383,8 @@ void TrajectoryWriter<D>::close() {
 }
 
 template <int D>
-BlockSender<D>::BlockSender(Communicator& ranks, const System<D>& system, bool creates) : ranks_(ranks) {
+BlockSender<D>::BlockSender(Communicator& ranks, const System<D>& system, bool creates)
+    : ranks_(ranks), spins_(system.box.contacts.rough()) {
   if (!creates) return;
   const Particles<D>& p = system.particles;
   one_after_the_other(
@@ -366,7 +394,7 @@ BlockSender<D>::BlockSender(Communicator& ranks, const System<D>& system, bool c
 template <int D>
 void BlockSender<D>::frame(const Snapshot<D>& s) {
   one_after_the_other(
-      ranks_, [&] { return packed(s.particles->x, s.particles->v, s.particles->image); }, [](int, const Bytes&) {});
+      ranks_, [&] { return frame_of(*s.particles, spins_); }, [](int, const Bytes&) {});
 }
 
 template class TrajectoryWriter<2>;

@@ -72,6 +72,7 @@ class BlockSender : public Observer<D> {
 
  private:
   Communicator& ranks_;
+  bool spins_;
 };
 
 }  // namespace carom

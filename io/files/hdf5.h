@@ -156,7 +156,7 @@ class SeriesBase {
   std::string label_;  // what is being done, for messages
   const File* file_;
   Handle dataset_;
-  std::vector<hsize_t> shape_;  // of one row, with a leading axis for the rows
+  std::vector<hsize_t> shape_;  // shape of one row, with a leading axis for the rows
   std::uint64_t row_elements_ = 1, rows_ = 0;
 };
 

@@ -39,7 +39,7 @@ std::size_t elements_of(const File& file, const std::string& name, const Handle&
   const std::vector<hsize_t> shape = shape_of_space(space.id());
   const hsize_t elements = product(shape);
   if (std::find(shape.begin(), shape.end(), 0) != shape.end()) return 0;
-  hsize_t size = 0;  // of the open file, since a checkpoint may be renamed meanwhile
+  hsize_t size = 0;  // size of the open file; its name may belong to another checkpoint meanwhile
   file.check(H5Fget_filesize(file.id(), &size), "measure");
   hsize_t room = bytes == 0 ? 0 : size / bytes;
   for (const hsize_t n : shape) room /= n;

@@ -89,9 +89,9 @@ struct Journaled : H5FD_t {
   bool is_new = false;  // still called path.part
   int file = -1, journal = -1;
   haddr_t eoa = 0;            // the end of what HDF5 has allocated
-  std::uint64_t size = 0;     // of the file, as HDF5 sees it
-  std::uint64_t on_disk = 0;  // of the file, as the operating system sees it
-  std::uint64_t flushed = 0;  // of the file, by the last flush
+  std::uint64_t size = 0;     // size of the file, as HDF5 sees it
+  std::uint64_t on_disk = 0;  // size of the file, as the operating system sees it
+  std::uint64_t flushed = 0;  // size of the file after the last flush
   Blocks waiting, last;       // to be written by the next flush; written by the last one
   Bytes buffer;               // the journal of the last flush
   // After a failed write nothing more is written: HDF5 can close the file, which then has the state of the last flush,
@@ -147,7 +147,7 @@ struct Journaled : H5FD_t {
     if (durable && !sync(file)) return fail();
     torn = false;
     if (is_new) {
-      std::filesystem::remove(journal_of(path));  // of an older file
+      std::filesystem::remove(journal_of(path));  // left by an older file
       put_in_place(name_now(), path);
       is_new = false;
       if (!open_journal()) return fail();

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/deck/deck_source.h"
 #include "io/files/directory_lock.h"
 #include "io/files/progress.h"
 #include "io/files/thermo.h"
@@ -71,7 +72,7 @@ std::string windows_text(std::span<const RankAccount> ranks) {
   WindowCounts all;
   std::uint64_t most = 0;
   for (const RankAccount& rank : ranks) {
-    all.windows = rank.windows.windows;  // the same everywhere, like rounds
+    all.windows = rank.windows.windows;  // equal on all ranks, like the number of rounds
     all.rounds = rank.windows.rounds;
     all.events += rank.windows.events;
     all.run_events += rank.windows.run_events;
@@ -152,8 +153,10 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
   if (s.max_shadow_energy_error)
     text += fmt::format("\nshadow energy, largest error {:.2e}", *s.max_shadow_energy_error);
   if (s.max_momentum_error) text += fmt::format("\nmomentum, largest error {:.2e}", *s.max_momentum_error);
-  text += fmt::format("\npressure {:.6g}, collision rate of a sphere {:.6g}, deepest overlap {:.1e}", s.mean_pressure,
-                      s.collision_rate, c.max_overlap);
+  text += fmt::format(
+      "\nmean pressure {:.6g}{}, collision rate of a sphere {:.6g}, deepest overlap {:.1e}", s.mean_pressure,
+      deck.source && deck.source->placement.lattice() && s.start_steps == 0 ? ", from the initial lattice on" : "",
+      s.collision_rate, c.max_overlap);
   if (s.mean_free_time)
     text += fmt::format("\nmean free time {:.6g}, mean free path {:.6g}", *s.mean_free_time, *s.mean_free_path);
   if (s.force_passes > 0)

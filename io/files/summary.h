@@ -12,12 +12,11 @@
 
 namespace carom {
 
-/// Data for the summary that are not in the run's statistics.
 /// A wall, for the numbers of its contacts.
 struct WallRecord {
   Id number = 0;
   std::string name;
-  double area = 0;  ///< of a face of the box at the end of the run [length^(D−1)]; 0 for a further wall
+  double area = 0;  ///< area of a face of the box at the end of the run [length^(D−1)]; 0: a further wall
 
   /// The walls of a box.
   template <int D>
@@ -32,14 +31,15 @@ struct WallRecord {
   }
 };
 
+/// Data for the summary that are not in the run's statistics.
 struct RunOutcome {
   std::string status;                   ///< "done", "interrupted" (on request; can be continued), "failed"
   std::string error{};                  ///< why it failed; empty otherwise
-  std::vector<std::string> warnings{};  ///< of the deck and of the run
+  std::vector<std::string> warnings{};  ///< about the deck and the run
   std::string branched_from{};          ///< the checkpoint that a branch started from; else empty
   std::size_t particles = 0;
   int ranks = 1;
-  std::vector<SpeciesValue> species_values{};  ///< of the averages
+  std::vector<SpeciesValue> species_values{};  ///< from the averages
   std::vector<WallRecord> walls{};
   std::uint64_t peak_memory_bytes = 0;  ///< largest of all ranks; 0: that of this process
 };

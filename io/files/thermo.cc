@@ -13,7 +13,7 @@
 namespace carom {
 
 namespace {
-constexpr ColumnChart kError{"error", "largest |H − H₁| so far", true}, kTemperature{"temperature", "temperature"},
+constexpr ColumnChart kError{"error", "largest energy error so far", true}, kTemperature{"temperature", "temperature"},
     kPressure{"pressure", "pressure"};
 }  // namespace
 
@@ -29,7 +29,7 @@ const std::vector<Column<D>>& columns() {
        [](S s, int) { return static_cast<double>(s.step); }, "step", nullptr, "10.0f"},
       {"collisions", count, "-", "pair collisions so far",  //
        [](S s, int) { return static_cast<double>(s.collisions); }, "collisions", "collisions", "12.0f"},
-      {"kinetic", number, "energy", "K",  //
+      {"kinetic", number, "energy", "K, with the energy of spins",  //
        [](S s, int) { return s.kinetic; }, "kinetic", "kinetic_energy", "14.8g"},
       {"potential", number, "energy", "V with its long-range corrections",  //
        [](S s, int) { return s.potential; }, "potential", "potential_energy", "14.8g"},
@@ -37,11 +37,11 @@ const std::vector<Column<D>>& columns() {
        [](S s, int) { return s.total(); }, "energy", "total_energy", "16.10g"},
       {"shadow", number, "energy", "S_h of Verlet types; NaN for other methods",  //
        [](S s, int) { return s.shadow; }, "shadow_energy", "shadow_energy"},
-      {"max_energy_error", number, "energy", kError.title,  //
+      {"max_energy_error", number, "energy", "largest change of `conserved` since the first step",  //
        [](S s, int) { return s.max_energy_error; }, nullptr, "max_energy_error", "10.2e", &kError, "max |ΔE|"},
       {"momentum", vector, "mass length/time", "total momentum",  //
        [](S s, int axis) { return s.momentum[axis]; }, "momentum", "momentum"},
-      {"temperature", number, "energy", "2K/(D N), k_B = 1",  //
+      {"temperature", number, "energy", "Σ m v²/(D N), k_B = 1; without spins",  //
        [](S s, int) { return s.temperature; }, "temperature", "temperature", "12.6g", &kTemperature},
       {"pressure", number, "energy/length^D", "virial pressure, with the collisions since the last row",  //
        [](S s, int) { return s.pressure; }, "pressure", "pressure", "12.6g", &kPressure},
@@ -52,7 +52,11 @@ const std::vector<Column<D>>& columns() {
       {"work", number, "energy", "work of moving walls so far",  //
        [](S s, int) { return s.work; }, "work", "work"},
       {"heat", number, "energy", "heat from thermal walls and baths so far",  //
-       [](S s, int) { return s.heat; }, "heat", "heat"}};
+       [](S s, int) { return s.heat; }, "heat", "heat"},
+      {"rotational", number, "energy", "the part of K that is in spins",  //
+       [](S s, int) { return s.rotational; }, "rotational_energy", "rotational_energy"},
+      {"rotational_temperature", number, "energy", "Σ I ω²/(f N), f = 1 in two dimensions, 3 in three",  //
+       [](S s, int) { return s.rotational_temperature; }, "rotational_temperature", "rotational_temperature"}};
   return all;
 }
 template const std::vector<Column<2>>& columns();

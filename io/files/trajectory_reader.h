@@ -43,7 +43,7 @@ class TrajectoryReader {
   std::string title;
   std::vector<std::string> boundary;       ///< for each of `dimension` axes: wall, periodic or open
   std::vector<std::string> species_names;  ///< at least one
-  std::vector<std::int32_t> species;       ///< of each particle: index of its name
+  std::vector<std::int32_t> species;       ///< for each particle the index of its name
   std::vector<double> mass, radius, charge;
   std::vector<std::array<std::uint32_t, 2>> bonds;  ///< ids, which count from 0
 

@@ -102,4 +102,4 @@ def digest(content):
 def run(*command):
     done = subprocess.run([str(part) for part in command])
     if done.returncode != 0:
-        raise SystemExit(f"{' '.join(map(str, command))} failed; tools/packages.txt lists the Debian packages that the build needs")
+        raise SystemExit(f"{' '.join(map(str, command))} failed; tools/build-packages.txt lists the Debian packages that the build needs")

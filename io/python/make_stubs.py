@@ -38,12 +38,13 @@ ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]"
              "seed": "int", "parameters": "Any", "thermo_interval": "float", "keys": "Any", "port": "int", "browser": "bool",
              "expression": "str | Callable[..., Any]", "start": "float", "cutoff": "float", "tolerance": "float",
              "options": "Mapping[str, Any]", "constants": "Any", "name": "str", "normal": "npt.ArrayLike",
-             "one": "str", "other": "str", "rate": "float"}
+             "one": "str", "other": "str", "rate": "float", "spin": "npt.ArrayLike", "inertia": "float"}
 RESULTS = {"__init__": "None", "from_deck": "Simulation", "from_run": "Simulation", "from_file": "Simulation",
            "add_particles": "range", "add_wall": "None", "add_contact": "None", "add_bath": "None", "place": "range", "thermalize": "None",
            "add_potential": "Sampled", "output": "None",
            "open": "Run", "view": "Page", "run": "None", "write_deck": "None", "__len__": "int", "__repr__": "str"}
 PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np.float64]",
+              "spin": "npt.NDArray[np.float64]",
               "image": "npt.NDArray[np.int32]", "unwrapped": "npt.NDArray[np.float64]", "mass": "npt.NDArray[np.float64]",
               "radius": "npt.NDArray[np.float64]", "charge": "npt.NDArray[np.float64]",
               "species": "npt.NDArray[np.uint16]", "momentum": "npt.NDArray[np.float64]", "species_names": "list[str]",

@@ -121,16 +121,20 @@ void bind(py::module_& module, const char* name) {
       }))
       .def("add_particles",
            [](S& session, const Array& x, const Array& v, const Array& radius, const Array& mass, const Array& charge,
-              const std::string& species) {
+              const Array& spin, const std::string& species, double inertia) {
              session.add_particles({.x = span_of(x),
                                     .v = span_of(v),
                                     .radius = span_of(radius),
                                     .mass = span_of(mass),
                                     .charge = span_of(charge),
-                                    .species = species});
+                                    .spin = span_of(spin),
+                                    .species = species,
+                                    .inertia = inertia});
            })
       .def("set_position", [](S& session, const Array& x) { session.set_position(span_of(x)); })
       .def("set_velocity", [](S& session, const Array& v) { session.set_velocity(span_of(v)); })
+      .def("set_spin", [](S& session, const Array& spin) { session.set_spin(span_of(spin)); })
+      .def("set_inertia", &S::set_inertia)
       .def("add_wall",
            [](S& session, const py::dict& given) { session.add_wall(parameters_of("wall", wall_parameters(), given)); })
       .def("set_bath",
@@ -197,6 +201,12 @@ void bind(py::module_& module, const char* name) {
              const auto image = self.cast<S&>().image();
              return view<std::int32_t>(image.data(), image.size(), D, self);
            })
+      .def("spin",
+           [](const py::object& self) {
+             const auto spin = self.cast<S&>().spin();
+             return view<double>(spin.data(), spin.size(), D == 2 ? 0 : 3, self);
+           })
+      .def_property_readonly("inertias", &S::inertias)
       .def("constant",
            [](const py::object& self, const std::string& which) -> py::array {
              const Constants all = self.cast<S&>().constants();

@@ -30,8 +30,8 @@ Vec<D> vector_at(std::span<const double> values, std::size_t i) {
   return Eigen::Map<const Vec<D>>(values.data() + i * D);
 }
 
-template <int D>
-void need_finite(std::span<const Vec<D>> rows, const char* what) {
+template <class T>
+void need_finite(std::span<const T> rows, const char* what) {
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (!rows[i].allFinite())
       throw Error(Failure::initial_state, std::string(what) + ": those of particle " + std::to_string(i) +
@@ -63,8 +63,8 @@ Session<D>::Session(std::span<const double> edges, const std::vector<std::string
 }
 
 template <int D>
-Session<D>::Session(Deck& deck) {
-  system_ = build_system<D>(deck);
+Session<D>::Session(Deck& deck, const std::optional<GivenState>& given) {
+  system_ = build_system<D>(deck, nullptr, given ? &*given : nullptr);
   plan_ = deck.plan;
   box_ = system_->box;
   for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
@@ -100,6 +100,7 @@ void Session<D>::change(const char* what) {
 
 template <int D>
 void Session<D>::add_particles(const Columns& columns) {
+  if (columns.inertia != 0) check_inertia(columns.inertia, D);
   change("add particles");
   Particles<D>& all = system_->particles;
   const std::size_t before = size_, added = columns.x.size() / D, kinds = species_.size();
@@ -111,7 +112,9 @@ void Session<D>::add_particles(const Columns& columns) {
   }
   system_->species = species_;
   views_.detach(all);
+  const bool spins = !all.spin.empty() || !columns.spin.empty();
   const auto resize = [&](std::size_t n) {
+    if (spins) all.spin.resize(n, Spin<D>::Zero());
     all.x.resize(n), all.v.resize(n), all.image.resize(n);
     all.mass.resize(n), all.radius.resize(n), all.charge.resize(n), all.species.resize(n);
     size_ = n;
@@ -128,8 +131,11 @@ void Session<D>::add_particles(const Columns& columns) {
       all.radius[id] = value_of(columns.radius, i, fallback.radius);
       all.charge[id] = value_of(columns.charge, i, fallback.charge);
       all.species[id] = kind;
+      if (!columns.spin.empty())
+        all.spin[id] = Eigen::Map<const Spin<D>>(columns.spin.data() + i * Spin<D>::SizeAtCompileTime);
     }
     system_->check();
+    if (columns.inertia != 0) set_inertia(columns.species, columns.inertia);
     system_->wrap();
     terms_.make(*system_);
   } catch (...) {
@@ -157,18 +163,37 @@ void Session<D>::set_velocity(std::span<const double> v) {
           "integrator(\"free-flight\", step=every)");
     pushed_.resize(size_);
     for (std::size_t i = 0; i < size_; ++i) pushed_[i] = vector_at<D>(v, i);
-    need_finite<D>(pushed_, "velocities");
+    need_finite<Vec<D>>(pushed_, "velocities");
     return;
   }
   set(&Particles<D>::v, v, "velocities");
 }
 
 template <int D>
-void Session<D>::set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what) {
+void Session<D>::set_spin(std::span<const double> spin) {
+  if (system_ && system_->particles.spin.empty()) system_->particles.spin.resize(size_, Spin<D>::Zero());
+  set(&Particles<D>::spin, spin, "spins");
+}
+
+template <int D>
+void Session<D>::set_inertia(const std::string& species, double inertia) {
+  check_inertia(inertia, D);
+  const auto kind = static_cast<std::size_t>(std::ranges::find(species_, species) - species_.begin());
+  change("set the inertia");
+  auto& all = box_.contacts.inertias;
+  if (all.size() <= kind) all.resize(kind + 1);
+  all[kind] = inertia;
+  system_->box = box_;
+}
+
+template <int D>
+template <class T>
+void Session<D>::set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what) {
   change(("set " + std::string(what)).c_str());
-  std::vector<Vec<D>> rows(size_);
-  for (std::size_t i = 0; i < size_; ++i) rows[i] = vector_at<D>(values, i);
-  need_finite<D>(rows, what);
+  constexpr std::size_t kEach = T::SizeAtCompileTime;
+  std::vector<T> rows(size_);
+  for (std::size_t i = 0; i < size_; ++i) rows[i] = Eigen::Map<const T>(values.data() + i * kEach);
+  need_finite<T>(rows, what);
   std::ranges::copy(rows, (system_->particles.*member).begin());
 }
 
@@ -189,8 +214,20 @@ void Session<D>::add_contact(Parameters given) {
   if (running_) refuse("a run is going on; change the laws of contacts before it or after it");
   auto all = contacts_;
   all.push_back(completed("contact", contact_parameters(), std::move(given)));
+  const bool rough = box_.contacts.rough();
+  need_state_at_end("a law of contacts");
   set_contacts(std::move(all));
-  if (shown_until_ < 0) change("add contacts");
+  if (shown_until_ < 0 || box_.contacts.rough() != rough) change("add contacts");
+}
+
+/// To be called before a change that lets the run go on: the state from which it continues must be the present one.
+template <int D>
+void Session<D>::need_state_at_end(const char* what) const {
+  if (shown_until_ < 0 || state_time_ == statistics_.end_time) return;
+  refuse(
+      std::string(what) + ": the last run ended at time " + short_text(statistics_.end_time) +
+      ", within a step or an epoch of free flight; end runs at whole steps, for example by integrator(\"free-flight\", "
+      "step=…)");
 }
 
 /// Sets these laws for the present species and walls.
@@ -198,6 +235,7 @@ template <int D>
 void Session<D>::set_contacts(std::vector<Parameters> all) {
   Box<D> box = box_;
   box.contacts = {};
+  box.contacts.inertias = box_.contacts.inertias;
   for (const Parameters& each : all) carom::add_contact<D>(box, species_, each);
   system_->box = box_ = box;
   contacts_ = std::move(all);

@@ -24,11 +24,12 @@
 
 namespace carom::python {
 
-/// The data of N particles for add_particles(): N·D numbers for x; N·D or none for v; N, one or none for the other
-/// columns.
+/// The data of N particles for add_particles(): N·D numbers for x; N·D or none for v; one or three for each particle or
+/// none for spin; N, one or none for the other columns.
 struct Columns {
-  std::span<const double> x, v, radius, mass, charge;
+  std::span<const double> x, v, radius, mass, charge, spin;
   std::string species;
+  double inertia = 0;  ///< reduced, of the species; 0: as before, homogeneous if the species is new
 };
 
 /// Callbacks of run().
@@ -46,7 +47,8 @@ class Session {
  public:
   /// All members throw Error.
   Session(std::span<const double> edges, const std::vector<std::string>& boundary);
-  explicit Session(Deck& deck);
+  /// The initial state of a deck, or a given state.
+  explicit Session(Deck& deck, const std::optional<GivenState>& given = {});
   /// The last checkpoint of a run that wrote files to a directory; the next run() continues the run and its files.
   Session(Deck& deck, Resumed& from);
 
@@ -55,6 +57,9 @@ class Session {
   void set_position(std::span<const double> x);
   /// In RunHooks::show at the end of a step this begins no new run: the velocities apply when show returns.
   void set_velocity(std::span<const double> v);
+  void set_spin(std::span<const double> spin);
+  /// The reduced moment of inertia of a species.
+  void set_inertia(const std::string& species, double inertia);
   /// N velocities, drawn from the Maxwell–Boltzmann distribution for particles with a temperature (not NaN) [energy];
   /// the present velocities for the rest.
   std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
@@ -92,6 +97,10 @@ class Session {
   std::span<const Vec<D>> position() { return views_.position(); }
   std::span<const Vec<D>> velocity() { return views_.velocity(); }
   std::span<const Image<D>> image() { return views_.image(); }
+  /// Empty if there never was a spin.
+  std::span<const Spin<D>> spin() { return views_.spin(); }
+  /// By species; 0 or missing: homogeneous.
+  const std::vector<double>& inertias() const { return box_.contacts.inertias; }
   Constants constants() { return views_.constants(); }
   const Box<D>& box() const { return box_; }
   const std::vector<std::string>& species() const { return species_; }
@@ -118,8 +127,10 @@ class Session {
  private:
   class Shown;
   void change(const char* what);
+  void need_state_at_end(const char* what) const;
   void set_contacts(std::vector<Parameters> all);
-  void set(std::vector<Vec<D>> Particles<D>::*member, std::span<const double> values, const char* what);
+  template <class T>
+  void set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what);
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);
@@ -142,11 +153,11 @@ class Session {
   std::atomic<bool> running_ = false;
   std::thread::id runner_;  // the thread in run(), in which callbacks may set velocities
   ParticleViews<D> views_;
-  std::string failure_;  // of the last run
+  std::string failure_;  // why the last run failed
 
   std::optional<Snapshot<D>> shot_;
-  Statistics statistics_;               // of the last run
-  const Statistics* live_ = nullptr;    // of the active run
+  Statistics statistics_;               // statistics of the last run
+  const Statistics* live_ = nullptr;    // statistics of the active run
   std::map<std::string, Bytes> state_;  // to continue from
   std::int64_t state_steps_ = 0;
   double state_time_ = 0, interval_ = 0, step_ = 0;
@@ -158,10 +169,10 @@ class Session {
 
   std::optional<std::vector<std::string>> output_;  // overrides of [output]; nullopt: no files
   std::string text_, file_;                         // the deck that the particles came from, and its file
-  std::optional<Deck> deck_;                        // of the run that writes files
+  std::optional<Deck> deck_;                        // deck of the run that writes files
   CheckpointHead head_;                             // positions in its files at the state to continue from
   std::shared_ptr<Checkpoint> checkpoint_;          // holds that state until the first run
-  const RunRecord<D>* record_ = nullptr;            // of the active run
+  const RunRecord<D>* record_ = nullptr;            // record of the active run
   Averages averages_;
   std::vector<std::string> warnings_;
 };

@@ -56,22 +56,11 @@ void change_value(const Fields& fields, const std::string& name, const std::func
 }  // namespace
 
 template <int D>
-Session<D>::Session(Deck& deck, Resumed& from) {
-  const GivenState given{from.reader(), from.head.bonds, from.head.time};
-  system_ = build_system<D>(deck, nullptr, &given);
-  plan_ = deck.plan;
-  box_ = system_->box;
-  for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
-  for (const auto& contact : deck.source->contacts) contacts_.push_back(contact.parameters);
-  for (const auto& bath : deck.source->baths) baths_.push_back(bath.parameters);
-  species_ = system_->species;
-  size_ = system_->size();
-  integrator_ = &find_integrator(deck.integrator);
-  parameters_ = deck.integrator_parameters;
-  terms_ = Terms<D>(deck, *system_);
+Session<D>::Session(Deck& deck, Resumed& from)
+    : Session(deck, GivenState{from.reader(), from.head.bonds, from.head.time}) {
+  text_.clear();
+  file_.clear();
   system_->quanta = {};
-  views_.rest(system_->particles);
-
   Archive(from.checkpoint->read("statistics"))(statistics_);
   checkpoint_ = std::make_shared<Checkpoint>(std::move(*from.checkpoint));
   head_ = from.head;
@@ -171,6 +160,7 @@ void Session<D>::set_bath_temperature(double temperature) {
   if (baths_.empty()) refuse("there is no bath; call add_bath() first");
   if (running_ && !(showing_ && std::this_thread::get_id() == runner_))
     refuse("a run is going on; change the temperature of the bath in its callback, before it or after it");
+  if (!running_) need_state_at_end("the temperature of the bath");
   Parameters given = baths_[0];
   given.set("temperature", temperature);
   baths_[0] = completed("bath", bath_parameters(), std::move(given));

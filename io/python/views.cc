@@ -11,6 +11,7 @@ void ParticleViews<D>::each(auto&& action) {
   action(&Particles<D>::x, x_);
   action(&Particles<D>::v, v_);
   action(&Particles<D>::image, image_);
+  action(&Particles<D>::spin, spin_);
 }
 
 template <int D>
@@ -39,6 +40,11 @@ std::span<const Vec<D>> ParticleViews<D>::velocity() {
 template <int D>
 std::span<const Image<D>> ParticleViews<D>::image() {
   return view(&Particles<D>::image, image_);
+}
+
+template <int D>
+std::span<const Spin<D>> ParticleViews<D>::spin() {
+  return view(&Particles<D>::spin, spin_);
 }
 
 template <int D>

@@ -27,6 +27,7 @@ class ParticleViews {
   std::span<const Vec<D>> position();
   std::span<const Vec<D>> velocity();
   std::span<const Image<D>> image();
+  std::span<const Spin<D>> spin();
   Constants constants();
 
   /// Views the particles in place, which no run changes from now on.
@@ -55,6 +56,7 @@ class ParticleViews {
 
   Kept<Vec<D>> x_, v_;
   Kept<Image<D>> image_;
+  Kept<Spin<D>> spin_;
   bool constants_viewed_ = false, lent_ = false;
   const Particles<D>*particles_ = nullptr, *shown_ = nullptr;
   std::list<Particles<D>> detached_;  // old arrays that still have views

@@ -49,7 +49,7 @@ class RunSource {
 
   std::filesystem::path directory_, trajectory_;
   nlohmann::json head_;          // the constant data of the trajectory file
-  std::string seen_, identity_;  // of the trajectory file: version at the last check; identity
+  std::string seen_, identity_;  // version of the trajectory file at the last check, and its identity
   std::uint64_t particles_ = 0, frames_ = 0;
   std::vector<std::uint32_t> counts_;  // collisions of each particle among the first `counted_` events
   std::uint64_t counted_ = 0;

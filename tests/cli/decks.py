@@ -92,6 +92,12 @@ def bathed(keys):
     return changed("[[particles]]", f"[[bath]]\n{keys}\n[[particles]]")
 
 
+def rough(keys, of_particles=""):
+    """GOOD with a contact between all, at line 9, and more keys of the particles."""
+    return changed("mass = 1.0", f"mass = 1.0\n{of_particles}",
+                   changed("[[particles]]", f'[[contact]]\nbetween = ["*", "*"]\n{keys}\n[[particles]]'))
+
+
 def table(more):
     return lennard_jones(more).replace('"lennard-jones"\nepsilon = 1\nsigma = 1', '"table"')
 

@@ -3,7 +3,7 @@
 
 import pytest
 
-from decks import FLUID, GOOD, bathed, carom, changed, lennard_jones, table, touching, validate, walled
+from decks import FLUID, GOOD, bathed, carom, changed, lennard_jones, rough, table, touching, validate, walled
 from runs import needs_carom
 
 pytestmark = needs_carom
@@ -97,6 +97,21 @@ DECK_ERRORS = {
         touching('between = ["*", "*"]\nrestituton = 0.5'), 11, ["unknown key 'restituton'", "did you mean 'restitution'?"]),
     "contact with a negative rest speed": (
         touching('between = ["*", "*"]\nrest_speed = -1'), 11, ["'rest_speed' must not be negative (is -1)"]),
+    "contact rougher than rough": (rough("tangential = 1.5"), 11, ["'tangential' is 1.5; take at most 1"]),
+    "contact smoother than smooth": (rough("tangential = -1.5"), 9, ["at least -1 (is -1.5)", "from -1, smooth"]),
+    "negative friction": (rough("tangential = 0.5\nfriction = -0.1"), 12, ["'friction' must be zero or positive (is -0.1)"]),
+    "friction of smooth spheres": (rough("friction = 0.1"), 9, ["'friction' without 'tangential'", "give both"]),
+    "spin of smooth spheres": (
+        rough("restitution = 0.5", "spin = [[1.0], [0.0]]"), 18, ["'spin' has no effect, all contacts are smooth", "give a [[contact]]"]),
+    "spin of one of two": (rough("tangential = 0.5", "spin = [[1.0]]"), 18, ["'spin' has 1 vector for 2 particles"]),
+    "spin about x and y": (
+        rough("tangential = 0.5", "spin = [[1.0, 0.0], [1.0, 0.0]]"), 18, ["of 'spin' has 2 numbers", "asks for 1"]),
+    "inertia of more than a ring": (
+        rough("tangential = 0.5", "inertia = 1.5"), 18, ["'inertia' is 1.5, more than the 1 of a ring", "has 0.5"]),
+    "no inertia": (rough("tangential = 0.5", "inertia = 0"), 18, ["'inertia' must be positive (is 0)"]),
+    "rough points": (
+        rough("tangential = 0.5").replace("radius = 0.5", "display_radius = 0.5").replace('"cdda"', '"verlet"'),
+        11, ["'verlet' treats particles as points", "take psa or edda"]),
     "bath without a type": (bathed("temperature = 1.0\nrate = 1.0"), 9, ["missing key 'type' in [[bath]]"]),
     "bath of an unknown type": (
         bathed('type = "berendsen"\ntemperature = 1.0\nrate = 1.0'), 10, ["'berendsen'", "andersen, rescaling"]),
@@ -295,6 +310,10 @@ def test_averages_of_the_initial_lattice(tmp_path):
     sampled = FLUID + "\n[output]\nrdf_interval = 1.0\n"
     assert "the averages include the initial lattice" in validate(tmp_path, sampled).stderr
     assert "lattice" not in validate(tmp_path, sampled + "sample_start = 2.0\n").stderr
+    (tmp_path / "deck.toml").write_text(FLUID)
+    for place, says in (("fcc", True), ("random", False)):
+        assert carom("run", "deck.toml", "-o", place, "--set", f"placement.type={place}", cwd=tmp_path).returncode == 0
+        assert (", from the initial lattice on, collision rate" in (tmp_path / place / "run.log").read_text()) == says
 
 
 def test_warnings(tmp_path):

@@ -153,6 +153,7 @@ def test_the_checkpoint_before(half, tmp_path):
 
 @pytest.mark.parametrize("changes, code, words", [
     (["system.box=[9.0,9.0]"], 2, "--set system.box: error: a branch has the particles and the box of its checkpoint"),
+    (["wall.0.velocity=0.1"], 2, "--set wall.0.velocity: error: a branch has the particles and the box of its checkpoint"),
     (["particles.0.radius=0.4"], 2, "--set particles.0.radius: error"),
     (["placement.seed=3", "particles.0.count=9"], 2, "--set particles.0.count: error"),
     (["interaction.2.within=1.5"], 2, "--set interaction.2.within: error"),

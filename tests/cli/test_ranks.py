@@ -13,7 +13,7 @@ from runs import CAROM, ROOT, SPHERES, SPRINGS, command, mpirun, needs_carom, ru
 
 sys.path.insert(0, str(ROOT / "tools"))
 import compare
-from carom_files import toml_text
+from carom_files import Trajectory, toml_text
 
 pytestmark = needs_carom
 
@@ -112,6 +112,28 @@ def test_baths_are_those_of_one_rank_and_continue(method, bath, tmp_path):
     run(deck, tmp_path / "half", output + ["run.end_time=1.5"])
     subprocess.run([CAROM, "run", "--continue", tmp_path / "half", "--quiet", "--set", "run.end_time=3.0"], check=True)
     assert filecmp.cmp(tmp_path / "plain" / "thermo.csv", tmp_path / "half" / "thermo.csv", shallow=False)
+
+
+@pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
+def test_rough_spheres_are_those_of_one_rank_and_continue(method, tmp_path):
+    contact = {"contact": [{"between": ["*", "*"], "restitution": 0.95, "tangential": 0.5, "friction": 0.3}]}
+    deck = write_deck(tmp_path, toml_text(tomllib.loads(DISCS) | contact | {"run": {"end_time": 3.0}}))
+    output = ["output.events=true", "integrator.step=" + ("0.25" if method == "free-flight" else "0.02"), f"integrator.type={method}",
+              "particles.1.inertia=0.9"]
+    run(deck, tmp_path / "plain", output)
+    energy = summary(tmp_path / "plain")["energy"]
+    assert energy["dissipated"] > 0.1 * energy["initial"]
+    if method != "psa":
+        assert energy["max_abs_error"] < 1e-12 * energy["reference"]
+    for ranks in 2, 4:
+        assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
+        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
+    run(deck, tmp_path / "half", output + ["run.end_time=1.5"])
+    subprocess.run([CAROM, "run", "--continue", tmp_path / "half", "--quiet", "--set", "run.end_time=3.0"], check=True)
+    assert differences(tmp_path / "plain", tmp_path / "half") == []
+    with Trajectory(tmp_path / "half") as trajectory:
+        spin = trajectory._group["angular_velocity/value"][-1]
+        assert abs(spin[:, 2]).max() > 0.1 and (spin[:, :2] == 0).all()
 
 
 @pytest.mark.parametrize("text", [SPHERES, DISCS], ids=["spheres", "discs"])

@@ -8,7 +8,8 @@ import subprocess
 import pytest
 
 SETUP = pathlib.Path(__file__).resolve().parents[2] / "tools" / "setup.sh"
-WANTED = [line for line in (SETUP.parent / "packages.txt").read_text().split("\n") if line and not line.startswith("#")]
+WANTED = [line for name in ("build-packages.txt", "packages.txt") for line in (SETUP.parent / name).read_text().split("\n")
+          if line and not line.startswith("#")]
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 #include "engine/run/state.h"
 #include "tests/support/experiments.h"
@@ -285,16 +286,31 @@ TEST(Edda, FiveSpringsForwardsAndBack) {
   }
 }
 
-/// The missing energy that a run carries over to its next step.
-double carried_over(const System<2>& system) {
-  double energy = 0;
+/// The missing energy that a run carries over to its next step; or sets it to `energy`.
+double carried_over(const System<2>& system, std::optional<double> energy = {}) {
   for (const auto& entry : system.fields.of_run()) {
     if (entry.name != "edda owed") continue;
-    Archive taken;
-    entry.archive(taken);
-    Archive(taken.bytes())(energy);
+    Archive archive;
+    if (energy) {
+      archive(*energy);
+      archive = Archive(archive.bytes());
+      entry.archive(archive);
+    } else {
+      entry.archive(archive);
+      Archive(archive.bytes())(energy.emplace());
+    }
   }
-  return energy;
+  return energy.value();
+}
+
+/// Runs one step of 0.1, before which this energy is carried over.
+std::unique_ptr<Simulation<2>> step_with(double owed, std::unique_ptr<System<2>> system) {
+  auto run = test::make_run<2>(std::move(system), "edda", {.step = 0.1, .steps = 1});
+  run->run([&] {
+    if (run->statistics().steps == 0) carried_over(run->system(), owed);
+    return false;
+  });
+  return run;
 }
 
 /// Seven particles that repel each other, start from rest, have moved for a step of 0.1 and turn back: at the end of
@@ -328,6 +344,35 @@ TEST(Edda, AtATurningPointTheMissingEnergyIsCarriedOverToTheNextStep) {
   EXPECT_EQ(carried_over(twice->system()), 0.0);
   EXPECT_GT(second.counters.folded, 1e-13);
   EXPECT_NEAR(second.energy_final, second.energy_initial, 1e-14);
+
+  // What was carried over before stays, too.
+  EXPECT_NEAR(carried_over(step_with(1e-10, before_a_turning_point())->system()), 1e-10 + missing, 1e-14);
+}
+
+TEST(Edda, EnergyThatIsTooMuchForTheVelocitiesStaysCarriedOver) {
+  const auto moving = [] {
+    auto system = before_a_turning_point();
+    for (auto& v : system->particles.v) v *= 2;
+    return system;
+  };
+  const auto kinetic_at_the_end = [](const Simulation<2>& run) {
+    double sum = 0;
+    for (const auto& v : run.system().particles.v) sum += 0.5 * v.squaredNorm();
+    return sum;
+  };
+  const double kinetic = kinetic_at_the_end(*step_with(0, moving()));
+  ASSERT_GT(kinetic, 0);
+  for (const double owed : {0.5 * kinetic, -0.5 * kinetic}) {
+    const auto run = step_with(owed, moving());
+    EXPECT_EQ(carried_over(run->system()), owed);
+    EXPECT_GT(run->statistics().counters.folded, 0.0);  // the residual of this step
+    EXPECT_LT(run->statistics().counters.folded, 1e-9);
+    EXPECT_EQ(run->statistics().counters.slabs_halved, 0u);
+  }
+  const double little = 1e-7 * kinetic;
+  const auto run = step_with(little, moving());
+  EXPECT_EQ(carried_over(run->system()), 0.0);
+  EXPECT_NEAR(run->statistics().energy_final - run->statistics().energy_initial, little, 1e-13);
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ def test_a_change_of_a_continued_run_begins_another_without_files(tmp_path):
     before = (tmp_path / "run" / "thermo.csv").read_bytes()
     later.run(time=0.1)
     assert (tmp_path / "run" / "thermo.csv").read_bytes() == before
-    with pytest.raises(carom.UsageError, match="leaves no files; call output"):
+    with pytest.raises(carom.UsageError, match="writes no files; call output"):
         later.open()
 
 
@@ -190,7 +190,7 @@ def test_a_velocity_that_is_no_number_is_refused_in_a_callback():
 
 def test_a_page_shows_the_run(tmp_path):
     sim = five_springs()
-    with pytest.raises(carom.UsageError, match="leaves no files"):
+    with pytest.raises(carom.UsageError, match="writes no files"):
         sim.view()
     sim.output(tmp_path / "run", thermo_interval=0.1, frame_interval=0.1)
     sim.run(time=1)

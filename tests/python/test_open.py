@@ -85,7 +85,7 @@ except ImportError as error:
 """
     out = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True,
                          env={"PATH": "/usr/bin"}).stdout.splitlines()
-    assert int(out[0]) == len(run.frames) and "the compiled part of carom is not there" in out[1] and "tools/python" in out[1]
+    assert int(out[0]) == len(run.frames) and "the compiled part of carom is missing" in out[1] and "tools/python" in out[1]
 
 
 def test_a_damaged_file_is_a_file_error(run, tmp_path):

@@ -43,6 +43,22 @@ def test_particles_are_placed_between_others_that_have_bonds():
     assert sim.energy == pytest.approx(five_springs().energy) and sim.energy_error < 1e-13
 
 
+def test_walls_contacts_baths_and_files_stay_when_particles_are_placed(tmp_path):
+    sim = carom.Simulation(box=[8, 8, 8], boundary="wall")
+    sim.add_particles(position=[[4, 4, 4]], radius=0.5, species="a")
+    sim.add_wall("x+", velocity=0.25)
+    sim.add_contact("a", "*", restitution=0.9)
+    sim.add_bath("andersen", temperature=1.0, rate=0.5)
+    sim.integrator("free-flight")
+    sim.output(tmp_path / "run")
+    before = sim.walls, sim.contacts, sim.bath
+    sim.add_particles(count=20, temperature=1.0, radius=0.5, species="b")
+    sim.place("random", seed=1)
+    assert (sim.walls, sim.contacts, sim.bath) == before
+    sim.run(time=2)
+    assert sim.work > 0 and sim.dissipated > 0 and sim.heat != 0 and len(sim.open().frames) == 2
+
+
 @pytest.mark.parametrize("call, message", [
     (lambda s: s.place("fcc"), "no particles were given by count"),
     (lambda s: s.add_particles(count=3), "needs a 'temperature'"),

@@ -219,7 +219,7 @@ def test_walls_move_and_stay_where_they_are_in_the_next_run():
 
 def test_a_bath_changes_its_temperature_between_runs():
     def heated(first, second):
-        sim = gas()
+        sim = gas(step=1.0)
         sim.add_bath("andersen", temperature=1.0, rate=5.0)
         assert sim.bath["type"] == "andersen" and sim.bath_temperature == 1.0
         sim.run(time=4)
@@ -246,7 +246,7 @@ def test_a_bath_changes_its_temperature_between_runs():
 
 def test_a_law_of_contacts_changes_between_runs(tmp_path):
     def cooled(second, directory=None):
-        sim = gas()
+        sim = gas(step=1.0)
         sim.add_contact("*", "*", restitution=0.7)
         if directory:
             sim.output(directory, thermo_interval=0.5)
@@ -272,6 +272,11 @@ def test_a_law_of_contacts_changes_between_runs(tmp_path):
     assert np.array_equal(again.position, first.position)
     with pytest.raises(carom.UsageError, match="a run is going on; change the laws of contacts before it or after it"):
         elastic.run(time=8, every=1.0, callback=lambda s: s.add_contact("*", "*", restitution=0.5))
+    unready = gas()
+    unready.add_contact("*", "*", restitution=0.7)
+    unready.run(time=2)
+    with pytest.raises(carom.UsageError, match="a law of contacts: the last run ended at time 2, within a step or an epoch"):
+        unready.add_contact("*", "*", restitution=1.0)
     for given, text in [({"restitution": 1.5}, "'restitution' is 1.5; take at most 1"), ({"restitution": -1.0}, "'restitution'"),
                         ({"rest_speed": -1.0}, "'rest_speed'")]:
         with pytest.raises(carom.UsageError, match=text):
@@ -308,3 +313,50 @@ def test_thermal_walls_heat():
     before = sim.energy
     sim.run(time=100)
     assert sim.energy > 2 * before and sim.energy_error < 1e-12
+
+
+def test_rough_spheres_spin():
+    sim = carom.Simulation(box=[10, 6])
+    sim.add_particles([[2, 3], [5, 3], [8, 3]], velocity=[[1, 0.2], [0, -0.1], [-0.5, 0]], radius=0.5, spin=[0, 1, -2], inertia=0.8)
+    assert (sim.spin == [0, 1, -2]).all()
+    sim.add_contact("*", "*", restitution=0.95, tangential=0.5, friction=0.4)
+    sim.integrator("edda", step=0.05)
+    seen = []
+    sim.run(time=20, every=5, callback=lambda s: seen.append(s.spin.copy()))
+    assert len(seen) == 5 and (seen[0] == [0, 1, -2]).all() and (seen[1] != seen[0]).any() and (seen[-1] == sim.spin).all()
+    moment = 0.8 * sim.mass * sim.radius**2
+    assert sim.rotational_energy == pytest.approx(0.5 * (moment * sim.spin**2).sum(), rel=1e-14)
+    assert sim.rotational_temperature == pytest.approx(2 * sim.rotational_energy / 3, rel=1e-14)
+    assert sim.dissipated > 0 and sim.energy_error < 1e-13
+    sim.spin = [1.0, 2.0, 3.0]
+    assert (sim.spin == [1, 2, 3]).all() and not (seen[0] == sim.spin).all()
+    with pytest.raises(carom.UsageError, match=r"'spin' has shape \(3, 2\); give \(3,\)"):
+        sim.spin = np.zeros((3, 2))
+    with pytest.raises(carom.UsageError, match="'inertia' is 1.5, more than the 1 of a ring"):
+        sim.add_particles([[2, 1]], radius=0.5, inertia=1.5)
+
+
+def test_rough_spheres_that_are_placed_and_written(tmp_path):
+    def grains():
+        sim = carom.Simulation(dimension=3, boundary="periodic")
+        sim.add_particles(count=108, temperature=1.0, radius=0.5, species="grain", inertia=0.6)
+        sim.place("fcc", packing_fraction=0.3)
+        sim.add_contact("grain", "grain", tangential=0.8)
+        sim.integrator("free-flight")
+        return sim
+
+    sim, whole = grains(), grains()
+    assert sim.spin.shape == (108, 3) and not sim.spin.any()
+    sim.output(tmp_path / "run", frame_interval=0.2)
+    sim.run(time=1)
+    with carom.files.Trajectory(tmp_path / "run") as trajectory:
+        spin = trajectory.spin(-1)
+    assert spin.shape == (108, 3) and (spin == sim.spin).all() and sim.spin.any()
+    sim.write_deck(tmp_path / "deck.toml", time=1.0)
+    other = carom.Simulation.from_deck(tmp_path / "deck.toml")
+    assert (other.spin == sim.spin).all() and other.rotational_energy == sim.rotational_energy
+    sim.run(time=2)
+    again = carom.Simulation.from_run(tmp_path / "run")
+    again.run(time=3)
+    whole.run(time=3)
+    assert (again.spin == whole.spin).all() and again.energy_error < 1e-13

@@ -54,3 +54,12 @@ def test_a_new_entry_is_no_deviation_but_a_lost_one_is():
 def test_every_deck_has_a_result():
     decks = {deck.stem for deck in (regression.HERE / "decks").glob("*.toml")}
     assert decks and decks == {result.stem for result in (regression.HERE / "results").glob("*.json")}
+
+
+def test_bits_are_those_of_the_stored_state(capsys):
+    writes_the_state = [sys.executable, "-c", "import json, sys; import numpy as np; deck = sys.argv[1]\n"
+                        "state = json.load(open(deck.replace('/decks/', '/results/').replace('.toml', '.json')))['state']\n"
+                        "sys.stdout.buffer.write(np.array([state['x'], state['v']]).tobytes() + b'0' * int('2d' not in deck))"]
+    assert regression.check_bits(writes_the_state, "cva-2d") == 0
+    assert regression.check_bits(writes_the_state, "cva-3d") == 1  # one byte more
+    assert capsys.readouterr().out == "cva-2d: the stored bits\ncva-3d: other bits\n"

@@ -44,9 +44,9 @@ InteractionInfo coulomb() {
            {"cutoff", Type::real, "none", "length", "where the form damped-shifted ends", Range::positive}}),
       .formula = "sum over pairs of C q q'/r, or of C q q' [erfc(alpha r)/r - polynomial in r^2] up to the cutoff",
       .documentation =
-          "Charges in vacuum (plain, all pairs summed directly, not in periodic boxes), or the damped-shifted sum that "
-          "stands for the long-ranged potential in neutral periodic systems: the real-space part of an Ewald sum, cut "
-          "so that V, V' and V'' go to zero at the cutoff. Usual values: alpha times cutoff between 2 and 3.",
+          "Charges in vacuum (plain: all pairs are summed directly; not in periodic boxes), or the damped-shifted sum "
+          "that replaces the long-ranged potential in neutral periodic systems: the real-space part of an Ewald sum, "
+          "cut so that V, V' and V'' go to zero at the cutoff. Usual values: alpha times cutoff between 2 and 3.",
       .source = "Wolf et al., J. Chem. Phys. 110 (1999) 8254; Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104",
       .in_2d = make<2>,
       .in_3d = make<3>};

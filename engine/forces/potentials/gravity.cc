@@ -19,7 +19,7 @@ InteractionInfo gravity() {
           .kind = InteractionInfo::Kind::pair,
           .parameters = options::with_filter({{"constant", Type::real, "1.0", "energy*length/mass^2", "G"}}),
           .formula = "sum over pairs of -G m m'/r",
-          .documentation = "Newton's gravitation between all pairs, summed directly. Not in periodic boxes.",
+          .documentation = "Newton's gravitation; all pairs are summed directly. Not in periodic boxes.",
           .source = "Enomoto, thesis, 2011, experiment 2",
           .in_2d = make<2>,
           .in_3d = make<3>};

@@ -24,7 +24,7 @@ InteractionInfo inverse_power() {
                {"exponent", Type::real, "", "-", "n, any positive number", Range::positive}}),
           .formula = "sum over pairs of eps (sigma/r)^n",
           .documentation =
-              "Soft spheres: n = 12 is the usual choice, n of 36 and more is nearly hard; a negative epsilon attracts.",
+              "Soft spheres: n = 12 is the usual choice, n = 36 or more is nearly hard; a negative epsilon attracts.",
           .source = "Hoover et al., J. Chem. Phys. 52 (1970) 4931",
           .in_2d = make<2>,
           .in_3d = make<3>};

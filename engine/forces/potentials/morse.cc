@@ -24,9 +24,9 @@ InteractionInfo morse() {
                {"r0", Type::real, "", "length", "distance at which V is least", Range::non_negative}}),
           .formula = "sum over pairs of D [(1 - exp(-alpha (r - r0)))^2 - 1]",
           .documentation =
-              "Bonds that can break, metals, colloids with a short attraction: alpha r0 = 6 has the well of "
-              "Lennard-Jones, 14 and more that of sticky spheres. At r = 0 it is finite, so alpha r0 is to be well "
-              "above 1 where cores are to hold.",
+              "Bonds that can break, metals, colloids with a short-ranged attraction. alpha r0 = 6 gives the width of "
+              "the Lennard-Jones well, 14 and more that of sticky spheres. V is finite at r = 0: cores that must not "
+              "be penetrated need an alpha r0 well above 1.",
           .source = "Morse, Phys. Rev. 34 (1929) 57",
           .in_2d = make<2>,
           .in_3d = make<3>};

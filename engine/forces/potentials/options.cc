@@ -10,12 +10,12 @@ namespace carom::options {
 std::vector<Parameter> with_filter(std::vector<Parameter> own) {
   using enum Parameter::Type;
   own.push_back({"species", text_list, "none", "-",
-                 "two species names: the term acts only between these; absent: between all particles"});
+                 "the names of two species between which the term acts; absent: all particles"});
   own.push_back({"exclude",
                  text,
                  "\"none\"",
                  "-",
-                 "'bonded': pairs joined by any harmonic-bond do not feel this term",
+                 "'bonded': the term does not act between particles that a harmonic-bond joins",
                  Parameter::Range::any,
                  {"none", "bonded"}});
   return own;
@@ -30,12 +30,12 @@ std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view abs
        text,
        "\"switch\"",
        "-",
-       "how it ends: 'switch' leaves V as it is up to switch_from and brings V, V' and V'' to zero from there; "
-       "'shifted' subtracts V(cutoff), so that the force jumps at the cutoff and time steps lose their order "
-       "there; 'force-shifted' subtracts a function linear in r, so that V and the force go to zero",
+       "how it ends: 'switch' leaves V unchanged up to switch_from, beyond which V, V' and V'' go to zero smoothly; "
+       "'shifted' subtracts V(cutoff), so that the force jumps at the cutoff, which reduces the order of time-stepping "
+       "methods; 'force-shifted' subtracts a function linear in r, so that V and the force go to zero",
        Parameter::Range::any,
        {"switch", "shifted", "force-shifted"},
-       {{"smooth", "write cut = \"switch\", which leaves V as it is up to switch_from"}}});
+       {{"smooth", "write cut = \"switch\", which leaves V unchanged up to switch_from"}}});
   own.push_back({"switch_from", real, "none", "length",
                  "where cut = 'switch' begins to differ from V; absent: 0.9 of the cutoff",
                  Parameter::Range::positive});
@@ -44,10 +44,11 @@ std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view abs
 
 std::vector<Parameter> with_pair_options(std::vector<Parameter> own) {
   own = with_cut(std::move(own),
-                 "distance at which the potential ends; absent: never, which a periodic box does not allow");
-  own.push_back({"tail", Parameter::Type::boolean, "false", "-",
-                 "add the long-range correction of a uniform fluid for what the cutoff takes away to the energy and "
-                 "pressure that are reported; of 'shifted' that of the truncated potential, not the shift"});
+                 "distance at which the potential ends; required in a periodic box; absent: it does not end");
+  own.push_back(
+      {"tail", Parameter::Type::boolean, "false", "-",
+       "whether the reported energies and pressures include the contribution of a uniform fluid beyond the cutoff; "
+       "with 'shifted' it is that of the truncated potential, without the shift"});
   return own;
 }
 

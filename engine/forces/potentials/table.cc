@@ -13,7 +13,7 @@ namespace carom {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMostCells = 65536;
+constexpr double kMostCells = 65536;  // 256 kB of indices
 
 /// The spline's slopes at its knots, from the continuity of V″ inside and a given slope or V″ = 0 at either end. The
 /// matrix is tridiagonal and diagonally dominant.
@@ -139,9 +139,10 @@ InteractionInfo table() {
           "distance at which the potential ends, at most that of the last point; absent: there"),
       .formula = "sum over pairs of the cubic spline in r^2 through the given points",
       .documentation =
-          "Any pair potential, from points. It ends at the last point, or at the cutoff where one is given before, and "
-          "it is cut there like other potentials; for a table that ends by itself take cut = 'shifted'. Below the "
-          "first point it goes on as a parabola in r^2: begin where no pair comes.",
+          "Any pair potential, given by points. It ends at the last point, or at a smaller cutoff, where it is cut "
+          "like other potentials; for a table that goes to zero by itself use cut = 'shifted'. Below the first point "
+          "it "
+          "continues as a parabola in r^2: let the table begin at a distance that no pair reaches.",
       .source = "de Boor, A Practical Guide to Splines, 1978",
       .in_2d = make<2>,
       .in_3d = make<3>};

@@ -50,8 +50,8 @@ InteractionInfo uniform_field() {
           .parameters = {{"acceleration", Type::real_list, "", "length/time^2", "g, one number an axis"}},
           .formula = "sum over particles of -m g.x",
           .documentation =
-              "The same acceleration for every particle: a weight, seen from a box at rest. Flights stay exact "
-              "parabolas, so the free-flight integrator can carry it.",
+              "The same acceleration for all particles, such as that of gravity on the ground. Flights stay exact "
+              "parabolas, so free-flight handles this field, too.",
           .source = "textbook",
           .in_2d = make<2>,
           .in_3d = make<3>};

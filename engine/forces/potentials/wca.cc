@@ -24,7 +24,7 @@ InteractionInfo wca() {
                                 {"sigma", Type::real, "", "length", "distance at which V = eps", Range::positive}}),
       .formula = "sum over pairs of 4 eps [(sigma/r)^12 - (sigma/r)^6] + eps up to r = 2^(1/6) sigma",
       .documentation =
-          "The repulsive part of Lennard-Jones. V'' jumps at the cutoff: claims of order above 2 do not hold with it.",
+          "The repulsive part of Lennard-Jones. V'' jumps at the cutoff, so no method has an order above 2 with it.",
       .source = "Weeks, Chandler, Andersen, J. Chem. Phys. 54 (1971) 5237",
       .in_2d = make<2>,
       .in_3d = make<3>};

@@ -110,7 +110,7 @@ struct PairFormula {
 
 /// A search for the partners of one particle in a range of places, when a list is built.
 struct PartnerSearch {
-  // Bits of a particle's code: may be wrapped, ghost, of the first species, of the second; kOdd: one of the former two.
+  // Bits of a particle's code: may be wrapped, ghost, first species, second species; kOdd: may be wrapped or ghost.
   static constexpr std::uint64_t kMoving = 1, kGhost = 2, kFirst = 4, kSecond = 8, kOdd = 1ULL << 63;
   const double* x[3] = {};  ///< coordinates in the box
   const std::uint64_t* code = nullptr;

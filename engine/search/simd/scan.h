@@ -18,7 +18,7 @@ struct ScanSetting {
   const double* records = nullptr;
   const double* radius = nullptr;  ///< by slot; null if all spheres have one diameter
   double diameter = 0;
-  double edges[3] = {0, 0, 0};  ///< of the box, to compute the shifts of images
+  double edges[3] = {0, 0, 0};  ///< edges of the box, which determine the shifts of images
   double g[3] = {0, 0, 0};      ///< common acceleration
   double growth = 0;            ///< contact distances are multiplied by 1 + growth·t
   std::uint32_t slot_mask = 0;  ///< selects the slot of a candidate (Packing)
@@ -27,7 +27,7 @@ struct ScanSetting {
 };
 
 struct ScanResult {
-  double time;          ///< of the first contact; ∞: none; −∞: two spheres overlap, test each
+  double time;          ///< time of the first contact; ∞: none; −∞: two spheres overlap, test each
   std::uint32_t which;  ///< index of the partner among the candidates, if there is one
   bool tied;            ///< another contact may have the same time: test each
 };

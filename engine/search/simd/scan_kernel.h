@@ -234,7 +234,7 @@ typedef float Floats __attribute__((vector_size(4 * kInts)));
     away[found++] = boxes;
   };
   const auto flush = [&] {
-    std::uint64_t hits = 0;  // of eight lines, one bit for each sphere
+    std::uint64_t hits = 0;  // in eight lines, one bit for each sphere
     for (unsigned l = 0; l < lines; ++l) {
       const Place& at = places[l];
       hits |= static_cast<std::uint64_t>(within(at, task.lines[at.line])) << (8 * l);

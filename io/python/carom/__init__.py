@@ -7,10 +7,10 @@
     sim.add_force("harmonic-bond", pairs=[[0, 1], [1, 2]], stiffness=1.0, rest_length=2.0)
     sim.integrator("edda", step=0.01)
     sim.run(time=50, every=0.1, callback=lambda s: print(s.time, s.energy_error))
-    run = carom.open("runs/five-springs")                      # what `carom run` has left
+    run = carom.open("runs/five-springs")                      # the files of a run
 
-Names, defaults and units are those of decks: carom.describe("edda"). Units are your own, k_B = 1. What goes wrong raises
-carom.Error, with a message that says what to do. `Simulation` and `describe` need the compiled part, `open` does not.
+Names and defaults are those of decks; carom.describe("edda") prints them. Units are your own, with k_B = 1. All errors are
+carom.Error, and their messages say what to do. `Simulation` and `describe` need the compiled part of the package, and `open` does not.
 """
 
 from carom.errors import Error, FileError, InitialStateError, NumericalError, UsageError
@@ -21,7 +21,7 @@ __all__ = ["Error", "FileError", "InitialStateError", "NumericalError", "Run", "
 
 
 def __getattr__(name):
-    """The compiled part is loaded when it is first used."""
+    """Loads the compiled part when it is first used."""
     if name not in ("Simulation", "describe", "version"):
         raise AttributeError(f"module 'carom' has no attribute '{name}'")
     from carom import simulation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What users give, checked before the engine gets it."""
+"""Checks of arguments, before they reach the engine."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from carom.errors import UsageError
 
 
 def numbers(of, name, values):
-    """Numbers as an array of doubles without gaps; one that is so already is not copied."""
+    """The values as a contiguous array of doubles; an array that is one already is not copied."""
     refuse_masked(of, {name: values})
     try:
         array = np.asarray(values)
@@ -19,7 +19,7 @@ def numbers(of, name, values):
 
 
 def refuse_masked(of, given):
-    """The given values by name; numpy would take what stands below a mask, too."""
+    """Returns `given`; raises UsageError if a value has masked entries, because numpy would use the numbers below the mask."""
     for name, values in given.items():
         rows = values if isinstance(values, (list, tuple)) else [values]
         if any(isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row) for row in rows):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decks as text."""
+"""Writes decks as text."""
 
+import itertools
 import json
 import pathlib
 
@@ -10,7 +11,7 @@ from carom.errors import FileError, UsageError
 
 
 def toml_text(deck):
-    """A deck given as a dictionary (as tomllib reads it) in TOML."""
+    """The TOML text of a deck given as a dictionary, in the form that tomllib returns."""
     lines = [f"{key} = {toml_value(value)}" for key, value in deck.items() if not _is_table(value)]
     for key, value in deck.items():
         if not _is_table(value):
@@ -22,7 +23,7 @@ def toml_text(deck):
 
 
 def toml_value(value):
-    """One value; the digits of a number give it back."""
+    """A value in TOML; numbers have the fewest digits that reproduce them exactly."""
     if isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     if isinstance(value, (list, tuple)):
@@ -30,7 +31,7 @@ def toml_value(value):
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + "}"
     if isinstance(value, (bool, str)):
-        return json.dumps(value, ensure_ascii=False)  # a JSON string or boolean is one of TOML
+        return json.dumps(value, ensure_ascii=False)  # JSON and TOML write strings and booleans alike
     return repr(value)
 
 
@@ -39,19 +40,14 @@ def _is_table(value):
 
 
 def deck_of(sim, of, ends):
-    """The present state, forces and integrator of a simulation, and the end of a run, as a deck. Images are not in it."""
+    """The deck of a simulation: its present state without the images, forces, integrator, and the end of a run."""
     if not sim._session.method:
         raise UsageError(f"{of}: there is no integrator; call integrator(name, step=…) first")
     deck = {"format": 1, "title": sim.title, "system": system_of(sim), "particles": species_of(sim, of)}
     if sim._session.method == "verlet":
         for species in deck["particles"]:
             species["display_radius"] = species.pop("radius")
-    if sim.walls:
-        deck["wall"] = sim.walls
-    if sim._session.baths:
-        deck["bath"] = sim._session.baths
-    if sim.contacts:
-        deck["contact"] = sim.contacts
+    deck |= surroundings_of(sim)
     if sim._session.forces:
         deck["interaction"] = [{"type": name} | given for name, given in sim._session.forces]
     deck["integrator"] = {"type": sim._session.method} | sim._session.method_parameters
@@ -63,19 +59,33 @@ def system_of(sim):
     return {"dimension": len(sim.box), "box": sim.box, "boundary": sim.boundary}
 
 
+def surroundings_of(sim):
+    """The tables [[wall]], [[bath]] and [[contact]] of a deck."""
+    tables = {"wall": sim.walls, "bath": sim._session.baths, "contact": sim.contacts}
+    return {name: given for name, given in tables.items() if given}
+
+
 def species_of(sim, of):
-    """The particles as the [[particles]] of a deck, one table for each species."""
+    """The tables [[particles]] of a deck, one for each species."""
     kinds = sim.species
     if np.any(np.diff(kinds.astype(int)) < 0):
         raise UsageError(f"{of}: the particles of a species do not follow one another, which a deck needs; add species "
                          "after species")
     columns = {name: getattr(sim, name) for name in ("position", "velocity", "radius", "mass", "charge")}
-    return [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
-            for kind, name in enumerate(sim.species_names)]
+    species = [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
+               for kind, name in enumerate(sim.species_names)]
+    if not any("tangential" in contact for contact in sim.contacts):
+        return species
+    spins = sim.spin.reshape(len(sim), -1)
+    for kind, (one, inertia) in enumerate(itertools.zip_longest(species, sim._session.inertias, fillvalue=0)):
+        one["spin"] = spins[kinds == kind]
+        if inertia:
+            one["inertia"] = inertia
+    return species
 
 
 def write_deck(sim, file, ends, every):
-    """The deck of Simulation.write_deck()."""
+    """See Simulation.write_deck()."""
     if all(end is None for end in ends.values()):
         raise UsageError("write_deck: the deck has no end; give time or steps")
     deck = deck_of(sim, "write_deck", ends)
@@ -87,5 +97,5 @@ def write_deck(sim, file, ends, every):
 
 
 def overrides(values):
-    """Values as `--set` gives them to the command; a text stands for itself."""
+    """The values in the form of the option `--set`; texts are not quoted."""
     return [f"{key}={value if isinstance(value, str) else toml_value(value)}" for key, value in values.items()]

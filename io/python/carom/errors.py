@@ -1,33 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What goes wrong, by kind; `exit_code` is that of the command for the same failure."""
+"""The exceptions of the package. `exit_code` is the exit code of the command for the same failure."""
 
 
 class Error(Exception):
-    """The message says what happened, where, and what to do about it."""
+    """The base class. The message says what happened, where, and what to do about it."""
 
     exit_code = 1
 
 
 class UsageError(Error, ValueError):
-    """Names, parameters, shapes, calls at the wrong time, or a deck with mistakes."""
+    """A wrong name, parameter or shape, a call at the wrong time, or a mistake in a deck."""
 
     exit_code = 2
 
 
 class InitialStateError(Error, ValueError):
-    """A state that cannot be: overlapping spheres, spheres outside walls, values that are not finite."""
+    """An impossible initial state: spheres that overlap or are outside the walls, or values that are not finite."""
 
     exit_code = 3
 
 
 class NumericalError(Error, ArithmeticError):
-    """The run can mean nothing any more, mostly because its step is too long."""
+    """The results of the run have become meaningless, in most cases because the step is too long."""
 
     exit_code = 4
 
 
 class FileError(Error, OSError):
-    """A file that cannot be read or written, or is not what it should be."""
+    """A file cannot be read or written, is damaged, or is of another kind."""
 
     exit_code = 5
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run leaves in its directory, as arrays: thermo.csv, trajectory.h5md, events.h5, summary.json, deck.toml.
+"""Reads the files of a run into arrays: thermo.csv, trajectory.h5md, events.h5, summary.json, deck.toml.
 
-Needs Debian's python3-h5py and python3-numpy, not the compiled part of the package. Everything is in the units of the deck.
+Needs h5py and numpy (Debian's python3-h5py and python3-numpy), but not the compiled part of the package. All numbers are in the
+units of the deck.
 """
 
 import builtins
@@ -28,7 +29,7 @@ AVERAGES = ("rdf", "msd", "profile")
 
 @contextlib.contextmanager
 def reading(path):
-    """What goes wrong while a file is read becomes a FileError that names the file."""
+    """Turns errors that occur while a file is read into a FileError that names the file."""
     try:
         yield
     except FileError:
@@ -44,7 +45,7 @@ def reading(path):
 
 
 def open_hdf5(path):
-    """A file of HDF5, opened for reading; a flush that a kill has interrupted is completed first."""
+    """Opens an HDF5 file for reading. If a kill has interrupted a flush of the file, the flush is completed first."""
     try:
         import h5py
     except ImportError as error:
@@ -56,7 +57,7 @@ def open_hdf5(path):
 
 
 def complete_flush(path):
-    """Writes what a complete journal beside the file holds to the file, and removes the journal (io/files/journal.h)."""
+    """Copies the contents of a complete journal beside the file to the file, and removes the journal (io/files/journal.h)."""
     journal = pathlib.Path(f"{pathlib.Path(path).resolve()}.journal")
     if not journal.exists():
         return
@@ -85,12 +86,12 @@ def read_summary(directory):
 
 
 def read_thermo(directory):
-    """thermo.csv as a dictionary of columns; an empty cell becomes NaN."""
+    """thermo.csv as a dictionary of columns; empty cells become NaN."""
     return read_table(pathlib.Path(directory) / "thermo.csv")
 
 
 def read_table(path):
-    """A CSV file of a run (thermo.csv, rdf.csv, msd.csv) as a dictionary of columns; an empty cell becomes NaN."""
+    """A CSV file of a run (thermo.csv, rdf.csv, msd.csv) as a dictionary of columns; empty cells become NaN."""
     with reading(path), builtins.open(path, newline="") as file:
         rows = list(csv.reader(line for line in file if line.endswith("\n")))  # a kill may have left a part of a row
         values = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows[1:]])
@@ -99,14 +100,14 @@ def read_table(path):
 
 
 def as_text(value):
-    """The text of a string of HDF5."""
+    """A string from HDF5 as text."""
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
 class Trajectory:
-    """A trajectory.h5md, opened for reading; takes the file or the directory of its run.
+    """A trajectory, open for reading. `path` is the file trajectory.h5md or the directory of its run.
 
-    Frames are numbered from 0; -1 is the last. Arrays have as many columns as the run had dimensions.
+    Frames are numbered from 0; -1 is the last one. Positions, velocities and images have shape (N, D).
     """
 
     def __init__(self, path):
@@ -148,7 +149,7 @@ class Trajectory:
 
     @property
     def bonds(self):
-        """The pairs that any interaction joins by bonds, (bonds, 2) ids."""
+        """The bonds of all interactions, as pairs of ids, (bonds, 2)."""
         with reading(self.path):
             ends = [self._file.get(f"parameters/vmd_structure/bond_{end}") for end in ("from", "to")]
             return np.empty((0, 2), int) if ends[0] is None else np.column_stack([end[:] for end in ends]).astype(int) - 1
@@ -158,18 +159,27 @@ class Trajectory:
         return np.array([rule == "periodic" for rule in self.boundary])
 
     def position(self, frame):
-        """Centres, wrapped into the box along its periodic axes [length]."""
+        """Centres of the particles, wrapped into the box along periodic axes, (N, D) [length]."""
         return self._read("position", frame)
 
     def velocity(self, frame):
+        """Velocities, (N, D) [length/time]."""
         return self._read("velocity", frame)
 
+    def spin(self, frame):
+        """Angular velocities [1/time], (N,) in two dimensions; zeros where no contact changes them."""
+        columns = slice(None) if self.dimension == 3 else 2
+        with reading(self.path):
+            if "angular_velocity" not in self._group:
+                return np.zeros((len(self.species), 3))[:, columns]
+            return self._group["angular_velocity/value"][frame][:, columns]
+
     def image(self, frame):
-        """How many times each particle has been carried round each periodic axis."""
+        """How many box edges each particle has crossed along each periodic axis, (N, D)."""
         return self._read("image", frame)
 
     def unwrapped(self, frame):
-        """Centres, followed through the periodic boundaries [length]."""
+        """Unwrapped centres, continuous across periodic boundaries, (N, D) [length]."""
         return self.position(frame) + self._read("image", frame) * self.edges(frame)
 
     def edges(self, frame=0):
@@ -183,17 +193,18 @@ class Trajectory:
 
 
 class Frame:
-    """One frame of a trajectory; each array of shape (N, D) is read when it is asked for."""
+    """One frame of a trajectory. Each of its arrays, of shape (N, D), is read from the file when it is accessed."""
 
     def __init__(self, trajectory, number):
         self._trajectory, self._number = trajectory, number
         self.time, self.step = float(trajectory.time[number]), int(trajectory.step[number])
 
     position = property(lambda self: self._trajectory.position(self._number), doc="Wrapped centres [length].")
-    velocity = property(lambda self: self._trajectory.velocity(self._number), doc="[length/time]")
-    image = property(lambda self: self._trajectory.image(self._number), doc="Turns round each periodic axis.")
-    unwrapped = property(lambda self: self._trajectory.unwrapped(self._number), doc="Centres, images undone [length].")
-    edges = property(lambda self: self._trajectory.edges(self._number), doc="Of the box [length].")
+    velocity = property(lambda self: self._trajectory.velocity(self._number), doc="Velocities [length/time].")
+    spin = property(lambda self: self._trajectory.spin(self._number), doc="Angular velocities [1/time].")
+    image = property(lambda self: self._trajectory.image(self._number), doc="Numbers of box edges crossed along each periodic axis.")
+    unwrapped = property(lambda self: self._trajectory.unwrapped(self._number), doc="Unwrapped centres [length].")
+    edges = property(lambda self: self._trajectory.edges(self._number), doc="Edges of the box [length].")
 
     def __repr__(self):
         return f"<frame {self._number} at time {self.time:.6g}>"
@@ -216,7 +227,7 @@ class Frames(collections.abc.Sequence):
 
 
 class Run:
-    """The directory of a run. Everything is read when it is first asked for, and kept, but for the frames."""
+    """The directory of a run. Each file is read when it is first needed and then kept in memory, except for the frames."""
 
     def __init__(self, directory):
         self.directory = pathlib.Path(directory)
@@ -238,8 +249,8 @@ class Run:
         return notebook.table("carom.Run", rows)
 
     def view(self, port=0, browser=None, export=None):
-        """A page that shows the run in a browser, in a notebook in place; export: one file that works without a server
-        instead. See carom.page.Page. Needs the compiled part of the package."""
+        """Shows the run on a page, in a browser or in the notebook. `export` names a file to write instead, which shows the run
+        without a server. See carom.page.Page. Needs the compiled part of the package."""
         if export is not None:
             return page.export([self.directory], export)
         return page.Page([self.directory], port, browser)
@@ -249,30 +260,31 @@ class Run:
 
     @functools.cached_property
     def summary(self):
-        """summary.json: the account of the run, nested dictionaries; ["energy"]["max_abs_error"]."""
+        """summary.json, the results of the run, as nested dictionaries: ["energy"]["max_abs_error"]."""
         return read_summary(self.directory)
 
     @functools.cached_property
     def deck(self):
-        """The resolved deck, nested dictionaries; ["integrator"]["step"]."""
+        """The resolved deck as nested dictionaries: ["integrator"]["step"]."""
         path = self.directory / "deck.toml"
         with reading(path):
             return tomllib.loads(path.read_text())
 
     @functools.cached_property
     def thermo(self):
-        """thermo.csv, one array a column: time, step, collisions, kinetic, potential, total, …"""
+        """The columns of thermo.csv as arrays: time, step, collisions, kinetic, potential, total, …"""
         return read_thermo(self.directory)
 
     @functools.cached_property
     def averages(self):
-        """The tables of averages that the run took, by name: ["rdf"]["r"]."""
+        """The averages that the run has taken, by name and column: ["rdf"]["r"]."""
         files = {name: self.directory / f"{name}.csv" for name in AVERAGES}
         return {name: read_table(path) for name, path in files.items() if path.exists()}
 
     @functools.cached_property
     def events(self):
-        """Every collision, one array a column (time, kind, lo, hi, …; io/files/events.h); None where it kept none."""
+        """All collisions, one array for each column of events.h5 (time, kind, lo, hi, …; io/files/events.h); None if the run has
+        not recorded them."""
         path = self.directory / "events.h5"
         if not path.exists():
             return None
@@ -281,29 +293,29 @@ class Run:
 
     @functools.cached_property
     def trajectory(self):
-        """The trajectory, open: mass, radius, charge, species, time of all frames, boundary."""
+        """The trajectory, with the data that all frames share: mass, radius, charge, species, boundary, and the times of the frames."""
         return Trajectory(self.directory)
 
     @property
     def frames(self):
-        """Its frames: frames[-1].position."""
+        """The frames of the trajectory: frames[-1].position."""
         return Frames(self.trajectory)
 
     @functools.cached_property
     def bonds(self):
-        """The pairs that any interaction joins by bonds, (bonds, 2) ids."""
+        """The bonds of all interactions, as pairs of ids, (bonds, 2)."""
         return self.trajectory.bonds
 
     def universe(self):
-        """The trajectory as an MDAnalysis Universe, in the units of the deck, with masses, charges, radii, bonds, and species
-        as names and types. Two-dimensional runs have z = 0. See carom.mdanalysis."""
+        """The trajectory as a Universe of MDAnalysis, in the units of the deck, with masses, charges, radii and bonds; names and types
+        are the species. In two dimensions z is 0. See carom.mdanalysis."""
         import MDAnalysis
 
-        from carom import mdanalysis  # noqa: F401, makes files of Carom known to MDAnalysis
+        from carom import mdanalysis  # noqa: F401, teaches MDAnalysis the files of Carom
         with reading(self.trajectory.path):
             return MDAnalysis.Universe(str(self.trajectory.path), format="H5MD", topology_format="H5MD", convert_units=False)
 
 
 def open(directory):
-    """What a run has left in a directory: .thermo, .frames, .events, .summary, .deck, .averages, .universe()."""
+    """Opens the directory of a run: .thermo, .frames, .events, .summary, .deck, .averages, .universe()."""
     return Run(directory)

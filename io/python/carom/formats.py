@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulations from the files of other programs: GSD (HOOMD-blue), extended XYZ (OVITO, ASE) and LAMMPS data files.
+"""Makes simulations from the files of other programs: GSD (HOOMD-blue), extended XYZ (OVITO, ASE) and LAMMPS data files.
 
-Numbers are taken as they are, in whatever units they have. GSD needs Debian's python3-gsd, extended XYZ python3-ase.
+Numbers keep the units that they have in the file. GSD needs Debian's python3-gsd, and extended XYZ needs python3-ase.
 """
 
 import importlib
@@ -12,7 +12,7 @@ import numpy as np
 
 from carom.errors import FileError, UsageError
 
-# The columns of an atom in a LAMMPS data file, between its id and its image.
+# The columns of an atom in a LAMMPS data file between its id and its image, by atom style.
 SPHERE = ("type", "diameter", "density", "x", "y", "z")
 STYLES = {"atomic": ("type", "x", "y", "z"), "charge": ("type", "charge", "x", "y", "z"), "sphere": SPHERE,
           "bond": ("molecule", "type", "x", "y", "z"), "angle": ("molecule", "type", "x", "y", "z"),
@@ -35,7 +35,7 @@ def read_gsd(path, frame):
         snapshot = file[frame]
     p, box = snapshot.particles, np.asarray(snapshot.configuration.box, dtype=float)
     flat = snapshot.configuration.dimensions == 2
-    # The origin of GSD is in the middle of the box; its numbers are single, and may lie beyond the edge by a rounding.
+    # In GSD the origin is in the middle of the box. Single precision may put a position beyond an edge by its rounding.
     return {"edges": box[:3], "tilt": box[3:], "flat": flat, "periodic": [True, True, not flat],
             "position": np.asarray(p.position, dtype=float) + box[:3] / 2, "velocity": p.velocity, "mass": p.mass,
             "charge": p.charge, "radius": np.asarray(p.diameter, dtype=float) / 2, "kind": p.typeid, "names": list(p.types),
@@ -50,7 +50,7 @@ def read_extxyz(path, frame):
     if velocity is None and atoms.has("momenta"):
         velocity = atoms.get_velocities()
     stated = str(atoms.info.get("species_names", "")).split(",")
-    if len(stated) == len(names):  # in the order of the elements that stand for them
+    if len(stated) == len(names):  # in the order of the elements that replace them in the file
         order = np.argsort(np.argsort([atoms.numbers[kind == k][0] for k in range(len(names))]))
         names = [stated[rank] for rank in order]
     return {"edges": np.diag(cell), "tilt": cell - np.diag(np.diag(cell)), "flat": False, "periodic": list(atoms.pbc),
@@ -60,7 +60,7 @@ def read_extxyz(path, frame):
 
 
 def read_lammps(path, frame):
-    """ASE's reader knows no spheres, and converts units."""
+    """Replaces the reader of ASE, which does not read radii and converts units."""
     sections, head, name, style = {}, {}, None, ""
     for line in path.read_text().splitlines()[1:]:
         words, comment = line.partition("#")[0].split(), line.partition("#")[2].split()
@@ -116,13 +116,14 @@ READERS = {".gsd": read_gsd, ".extxyz": read_extxyz, ".xyz": read_extxyz, ".data
 
 
 def read(kind_of_simulation, file, frame, radius, boundary):
-    """The particles of a file as a simulation, without forces and integrator.
+    """A simulation with the particles of a file, without forces and integrator.
 
-    file: its ending says what it is: .gsd, .extxyz or .xyz, .data or .lammps. frame: which, -1 the last. radius: of the
-    cores, one number or N, where the file has none or another. boundary: where the file does not say (LAMMPS: periodic).
+    file: its ending determines the format: .gsd, .extxyz or .xyz, .data or .lammps. frame: the number of the frame; -1 is the last
+    one. radius: the radii of the hard cores, one number or N; needed if the file has none, and replaces those of the file. boundary:
+    replaces the boundaries of the file (LAMMPS data files name none: periodic).
 
-    Particles are numbered species by species. `simulation.bonds` holds the bonds, (bonds, 2) ids, for add_force().
-    Raises FileError about the file, ImportError where a package is missing, UsageError about a box that is not rectangular.
+    Particles are numbered species by species. `simulation.bonds` holds the bonds of the file, (bonds, 2) ids, for add_force().
+    Raises FileError if the file cannot be read, ImportError if a package is missing, and UsageError if the box is not rectangular.
     """
     path = pathlib.Path(file)
     if path.suffix not in READERS:

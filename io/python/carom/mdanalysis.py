@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes MDAnalysis open trajectories of Carom as they are: with their bonds, and without units.
+"""Makes MDAnalysis open trajectories of Carom unaided: with their bonds, and also without units.
 
     import MDAnalysis, carom.mdanalysis
     universe = MDAnalysis.Universe("runs/polymer/trajectory.h5md")
 
-MDAnalysis itself knows no topology of H5MD, and refuses files without units. The import gives it a reader that takes
-numbers as they are where a file has no units, and a parser of what Carom writes beside the frames.
+By itself, MDAnalysis reads no topology from H5MD files and refuses files without units. This module registers a reader that converts
+no numbers if the file has no units, and a parser of the data that Carom writes beside the frames.
 """
 
 import h5py
@@ -24,7 +24,7 @@ def _has_units(file):
 
 
 class Reader(H5MDReader):
-    """That of MDAnalysis, which converts units where there are some."""
+    """The reader of MDAnalysis, which converts units only if the file has units."""
 
     format = "H5MD"
 
@@ -35,7 +35,7 @@ class Reader(H5MDReader):
 
 
 class Parser(TopologyReaderBase):
-    """Species as names and types, masses, charges, radii, bonds of a trajectory.h5md."""
+    """Reads the masses, charges, radii and bonds of a trajectory; names and types are the species."""
 
     format = ["H5MD"]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What notebooks show of simulations and runs."""
+"""Displays simulations, runs and progress in notebooks."""
 
 import html
 
@@ -7,7 +7,7 @@ from carom.errors import Error
 
 
 def in_notebook():
-    """Whether this Python works for a notebook."""
+    """Whether this Python is the kernel of a notebook."""
     try:
         return get_ipython().has_trait("kernel")
     except NameError:  # no IPython
@@ -15,7 +15,7 @@ def in_notebook():
 
 
 def show_progress(bar, done, text):
-    """Shows a bar below the cell, or moves the one that is there; returns it."""
+    """Shows a bar of progress below the cell, or updates `bar`; returns the bar."""
     from IPython.display import HTML, display
 
     shown = HTML(f"<progress value='{done:.4f}' max='1' style='width: 20em'></progress> {html.escape(text)}")
@@ -32,7 +32,7 @@ def end_progress(bar):
 
 
 def table_of(sim):
-    """A simulation as a table of HTML."""
+    """An HTML table that describes a simulation."""
     rows = {"particles": f"{len(sim)} in {len(sim.box)} dimensions ({', '.join(sim.species_names)})",
             "box": f"{' × '.join(f'{edge:.6g}' for edge in sim.box)}, {', '.join(dict.fromkeys(sim.boundary))}",
             "forces": ", ".join(name for name, _ in sim._session.forces) or "none",
@@ -40,13 +40,13 @@ def table_of(sim):
     try:
         rows |= {"time": f"{sim.time:.6g}, step {sim.step}", "collisions": str(sim.collisions),
                  "energy": f"{sim.energy:.10g}, error {sim.energy_error:.1e}", "temperature": f"{sim.temperature:.6g}"}
-    except Error:  # there are no particles, or a run goes on in another thread
+    except Error:  # there are no particles, or another thread is in run()
         pass
     return table(f"carom.Simulation {sim.title}", rows)
 
 
 def table(title, rows):
-    """Names and values as a table of HTML."""
+    """An HTML table of names and values."""
     left = "style='text-align: left'"
     lines = "".join(f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(value)}</td></tr>" for name, value in rows.items())
     return f"<table><caption>{html.escape(title)}</caption>{lines}</table>"

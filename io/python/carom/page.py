@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page that shows runs in a browser: what `carom view` serves, from Python and in notebooks."""
+"""The page of `carom view`, which shows runs in a browser or in a notebook."""
 
 import os
 import pathlib
@@ -13,7 +13,11 @@ SERVE = "import sys; from carom import _carom; _carom.view(sys.argv[3:], None, i
 
 
 class Page:
-    """A page that is served until close(), or until this Python ends; shown in place where a notebook displays it."""
+    """A page that is served until close() is called or this Python ends. A notebook displays it below the cell.
+
+    runs: directories. port: 0 chooses any free port. browser: whether to open the page in a browser; by default outside notebooks.
+    address: the address of the page.
+    """
 
     def __init__(self, runs, port=0, browser=None):
         from carom import _carom  # noqa: F401, an ImportError here is clearer than one in the other process
@@ -29,7 +33,7 @@ class Page:
             raise FileError(problem[-1].partition("Error: ")[2] if problem else "the page ended before it had an address")
 
     def close(self):
-        """Ends the server."""
+        """Stops the server."""
         if self._process.poll() is None:
             self._process.stdin.close()
             self._process.wait(timeout=10)
@@ -48,7 +52,7 @@ class Page:
 
 
 def export(runs, file):
-    """One file that shows the runs without a server."""
+    """Writes one file that shows the runs without a server."""
     from carom import _carom
 
     _carom.view([str(run) for run in runs], os.fspath(file), 0, False, False)

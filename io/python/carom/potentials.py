@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pair potentials given as expressions, sampled into the points of a table with a known error."""
+"""Samples pair potentials that are given as expressions, so that the error of the resulting table is known."""
 
 import math
 
@@ -15,8 +15,8 @@ FUNCTIONS |= {name: np.vectorize(getattr(math, name), otypes=[float]) for name i
 
 
 class Sampled:
-    """The points of a table: r, value (N,) [length, energy], slope at both ends, and how far the spline through them is
-    from the expression: error [energy] and force_error [energy/length], the largest between `start` and `cutoff`."""
+    """The points of a table: r (N,) [length], value (N,) [energy], and slope at both ends [energy/length]. `error` [energy] and
+    `force_error` [energy/length] are the largest differences between the spline and the expression from `start` to `cutoff`."""
 
     def __init__(self, r, value, slope, error, force_error):
         self.r, self.value, self.slope, self.error, self.force_error = r, value, slope, error, force_error
@@ -27,7 +27,7 @@ class Sampled:
 
 
 def function_of(expression, constants):
-    """V(r) of arrays, from an expression of r and constants, or from a function of r."""
+    """A function V(r) that accepts arrays, from an expression of r and constants or from a function of r."""
     if callable(expression):
         return lambda r: np.broadcast_to(np.asarray(expression(r, **constants), dtype=float), np.shape(r))
     if not isinstance(expression, str):
@@ -57,11 +57,11 @@ def derivative(value, r):
 
 
 def sample(expression, start, cutoff, tolerance=1e-8, **constants):
-    """The points of a table for V(r) between start and cutoff, as many as the tolerance takes.
+    """Samples V(r) from `start` to `cutoff` at as many points as the tolerance requires; returns a Sampled.
 
-    expression: a text with r, the functions of numpy (exp, sqrt, …) and constants given by keyword, or a function of r.
-    start, cutoff: from and to which distance [length]; below start the table goes on as a parabola. tolerance: the
-    largest error of the spline, relative to the largest |V| there. Raises UsageError where 8192 points do not suffice.
+    expression: a text with r, functions of numpy (exp, sqrt, …) and constants given by keyword, or a function of r.
+    start, cutoff: the ends of the table [length]; below `start` it continues as a parabola. tolerance: the largest error of the
+    spline, relative to the largest |V| in this range. Raises UsageError if 8192 points do not suffice.
 
         sample("epsilon*exp(-(r/sigma)**2)", start=0.2, cutoff=3.0, epsilon=2.0, sigma=1.0)
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A line that shows how far a run has come, in terminals and notebooks."""
+"""Shows the progress of a run in terminals and notebooks."""
 
 import sys
 import time as clock
@@ -7,12 +7,12 @@ import time as clock
 from carom import notebook
 from carom.notebook import in_notebook
 
-QUIET = 0.5  # seconds that a run may take without a line
+QUIET = 0.5  # seconds of a run before the line appears
 WIDTH = 30
 
 
 class Progress:
-    """Called with the part of the run that is done and the simulated time; ends with close()."""
+    """To be called with the fraction of the run that is done and the simulated time; close() removes the line."""
 
     def __init__(self, stream=None):
         self._stream = stream or sys.stderr
@@ -21,7 +21,7 @@ class Progress:
 
     @staticmethod
     def wanted():
-        """In a terminal or a notebook."""
+        """Whether progress is shown by default: in terminals and notebooks."""
         return in_notebook() or sys.stderr.isatty()
 
     def __call__(self, done, time):
@@ -39,7 +39,7 @@ class Progress:
         self._shown = len(line)
 
     def close(self):
-        """Takes the line away."""
+        """Removes the line."""
         if self._bar:
             notebook.end_progress(self._bar)
         if self._shown:

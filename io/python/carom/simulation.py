@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulations: arrays and keywords checked here, everything else by the engine, with its texts."""
+"""Simulations. Arrays and keywords are checked here; the engine checks all other input and writes the messages about it."""
 
 import collections.abc
+import numbers as numbers_type
 import operator
 import os
 import warnings
@@ -10,7 +11,7 @@ import numpy as np
 
 from carom import files, formats, notebook, page, potentials
 from carom.checks import name_of, numbers, one_or_each, refuse_masked
-from carom.decks import deck_of, overrides, species_of, system_of, toml_text, toml_value, write_deck
+from carom.decks import deck_of, overrides, species_of, surroundings_of, system_of, toml_text, toml_value, write_deck
 from carom.errors import UsageError
 from carom.progress import Progress
 
@@ -18,14 +19,14 @@ try:
     from carom import _carom
 except ImportError as error:
     raise ImportError(
-        "the compiled part of carom is not there, or does not fit this Python: build it (cmake --build build/release "
+        "the compiled part of carom is missing, or was built for another Python: build it (cmake --build build/release "
         f"--target carom_python) and start tools/python, or install it (cmake --install); {error}") from error
 
 version = _carom.version
 
 
 def describe(name=None):
-    """What a force or an integrator is and can be given, as text; without a name, the names there are."""
+    """Describes a force, an integrator, a wall, a contact or a bath, with its parameters, as text. Without a name: lists all names."""
     known = {one["name"]: (kind, one) for kind, all in _carom.descriptors().items() for one in all}
     if name is None:
         kinds = {}
@@ -44,12 +45,13 @@ def describe(name=None):
 
 
 class Simulation:
-    """Hard spheres, in two or three dimensions, in a box from the origin to `box`.
+    """Hard spheres in two or three dimensions, in a box whose lower corner is the origin.
 
-    box: the edges, 2 or 3 lengths. boundary: "wall", "periodic" or "open", one for all axes or one each.
+    box: the lengths of the 2 or 3 edges. boundary: "wall", "periodic" or "open", one for all axes or one for each. dimension: 2 or 3,
+    instead of `box`, if place() is to choose the box.
 
-    Particles are numbered from 0 in the order of their addition. A change of particles, forces or integrator after a run
-    begins a new run, at time 0, from the present state.
+    Particles are numbered from 0 in the order in which they are added. If particles, forces or the integrator are changed after a
+    run, a new run begins from the present state at time 0.
     """
 
     def __init__(self, box=None, boundary="wall", dimension=None):
@@ -70,7 +72,8 @@ class Simulation:
     def _start(self, session, title=""):
         self._session, self.title, self.warnings = session, title, []
         self._cores = False  # a radius was given
-        self._edges_known, self._counted, self.bonds = True, [], np.empty((0, 2), int)
+        self._output = None  # the arguments of set_output()
+        self._edges_known, self._counted, self._inertias, self.bonds = True, [], {}, np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
         self.warnings = list(texts)
@@ -79,9 +82,9 @@ class Simulation:
 
     @classmethod
     def from_deck(cls, deck, set=None):
-        """The simulation that a deck describes, with some of its values changed: set={"integrator.step": 0.02}.
+        """The simulation that a deck describes. `set` changes values of the deck: set={"integrator.step": 0.02}.
 
-        deck: the path of a file, or its tables as a dictionary, such as tomllib.load() reads them.
+        deck: the path of a file, or a dictionary in the form that tomllib.load() returns.
         """
         self = cls.__new__(cls)
         refuse_masked("from_deck", set or {})
@@ -93,11 +96,11 @@ class Simulation:
 
     @classmethod
     def from_run(cls, directory, take_over=False):
-        """The simulation that left its files in a directory, by output() or by the command, as its last checkpoint has it.
+        """The simulation in the last checkpoint of a directory, which output() or the command `carom run` has written.
 
-        The next run(), to a later end, goes on with its files and with the bits of an undisturbed run. A change of
-        particles, forces or integrator instead begins a new run from that state, at time 0 and without files.
-        take_over: as in `carom run --continue`. Raises FileError where there is no checkpoint.
+        The next run() to a later end continues the run and its files, with the bits of an undisturbed run. If particles, forces or the
+        integrator are changed first, a new run begins from the state of the checkpoint, at time 0 and without files.
+        take_over: as in `carom run --continue`. Raises FileError if there is no checkpoint.
 
             sim = carom.Simulation.from_run("runs/fluid")
             sim.run(time=200)
@@ -109,16 +112,19 @@ class Simulation:
 
     @classmethod
     def from_file(cls, file, frame=-1, radius=None, boundary=None):
-        """The particles of a GSD, extended XYZ or LAMMPS data file; see carom.formats.read()."""
+        """A simulation with the particles of a GSD, extended XYZ or LAMMPS data file; see carom.formats.read()."""
         return formats.read(cls, file, frame, radius, boundary)
 
     def add_particles(self, position=None, velocity=None, radius=None, mass=1.0, charge=0.0, species="particle", count=None,
-                      temperature=None):
-        """Adds N particles; returns their ids, a range.
+                      temperature=None, spin=None, inertia=None):
+        """Adds N particles; returns the range of their ids.
 
-        position, velocity: arrays of shape (N, D) [length, length/time]; velocities are 0 where there are none.
-        radius, mass, charge: one number for all, or N; the radius is 0.5 if it is left out, as it is for verlet. species: a name, for forces between species.
-        count, temperature: instead of positions and velocities; place() then finds them, and returns all ids.
+        position, velocity: arrays of shape (N, D) [length, length/time]; the default velocity is 0.
+        radius, mass, charge: one number for all, or N numbers. The default radius is 0.5; leave it out for verlet, which has no hard
+        cores. species: the name of their species, for forces between species.
+        spin: angular velocities [1/time], (N,) in two dimensions, about z, and (N, 3) in three. Contacts with "tangential" change them.
+        inertia: reduced moment of inertia 4I/(m sigma²) of the species; the default is that of a homogeneous body.
+        count, temperature: replace positions and velocities, which place() then chooses.
 
             sim.add_particles(position=[[1, 1], [3, 1]], velocity=[[0, 0], [0.5, 0]], radius=0.5)
             sim.add_particles(count=500, temperature=1.0, radius=0.5, species="solvent")
@@ -127,7 +133,7 @@ class Simulation:
         radius = 0.5 if radius is None else radius
         if count is not None:
             return self._count(count, position, velocity, temperature,
-                               {"name": species, "radius": radius, "mass": mass, "charge": charge})
+                               {"name": species, "radius": radius, "mass": mass, "charge": charge}, spin, inertia)
         if position is None:
             raise UsageError("add_particles: there is no 'position'; give one of shape (N, D), or a count for place()")
         if temperature is not None:
@@ -149,11 +155,29 @@ class Simulation:
                   for name, values in (("radius", radius), ("mass", mass), ("charge", charge))]
         if not isinstance(species, str):
             raise UsageError(f"add_particles: 'species' is {species!r}; give one name, and call again for other species")
+        turning = np.empty(0) if spin is None else self._spins("add_particles", spin, len(x))
         first = self._session.size
-        self._session.add_particles(x, v, *others, species)
+        self._session.add_particles(x, v, *others, turning, species, self._inertia(inertia))
         return range(first, self._session.size)
 
-    def _count(self, count, position, velocity, temperature, table):
+    @staticmethod
+    def _inertia(value):
+        if value is None:
+            return 0.0
+        if not isinstance(value, numbers_type.Real) or isinstance(value, bool) or not value > 0:
+            raise UsageError(f"add_particles: 'inertia' is {value!r}; give one positive number for the species")
+        return float(value)
+
+    def _spins(self, of, values, count):
+        array, shape = numbers(of, "spin", values), (count,) if len(self.box) == 2 else (count, 3)
+        if array.shape != shape:
+            raise UsageError(f"{of}: 'spin' has shape {array.shape}; give {shape}")
+        return array
+
+    def _count(self, count, position, velocity, temperature, table, spin, inertia):
+        if spin is not None:
+            raise UsageError("add_particles: 'spin' goes with 'position'; assign simulation.spin after place()")
+        self._inertias[table["name"]] = self._inertia(inertia)
         if position is not None or velocity is not None:
             raise UsageError("add_particles: 'count' excludes 'position' and 'velocity'; leave it out, or them")
         if temperature is None:
@@ -166,11 +190,11 @@ class Simulation:
         return range(first, first + int(count))
 
     def place(self, type, packing_fraction=None, seed=1, **parameters):
-        """Places the particles that add_particles() was given by count, and draws their velocities; returns all ids.
+        """Places the particles that were added by count, and draws their velocities; returns the range of all ids.
 
-        type: "fcc", "simple-cubic", "hexagonal", "square", "random" or "compressed", as in the [placement] of decks, with
-        its parameters. packing_fraction: sets the box, where the simulation was made without one.
-        Raises InitialStateError where there is no room.
+        type: "fcc", "simple-cubic", "hexagonal", "square", "random" or "compressed". It and further parameters are those of
+        [placement] in decks. packing_fraction: determines the box if the simulation was made without one.
+        Raises InitialStateError if there is not enough room.
 
             sim = carom.Simulation(dimension=3, boundary="periodic")
             sim.add_particles(count=500, temperature=1.0, radius=0.5)
@@ -178,29 +202,40 @@ class Simulation:
         """
         if not self._counted:
             raise UsageError("place: no particles were given by count; call add_particles(count=…, temperature=…) first")
-        old = self._session
+        old, spin = self._session, self._session.spin()
         system = system_of(self)
         if not self._edges_known:
             del system["box"]
-        deck = {"format": 1, "system": system, "particles": (species_of(self, "place") if old.size else []) + self._counted,
+        placed = species_of(self, "place") if old.size else []
+        for one in placed:
+            self._inertias[one["name"]] = one.pop("inertia", 0.0)
+            one.pop("spin", None)
+        deck = {"format": 1, "system": system, "particles": placed + self._counted,
                 "placement": {"type": name_of("place", type), "seed": seed} | parameters,
-                "integrator": {"type": "free-flight"}, "run": {"collisions": 1}}
+                "integrator": {"type": "free-flight"}, "run": {"collisions": 1}} | surroundings_of(self)
         if packing_fraction is not None:
             deck["placement"]["packing_fraction"] = packing_fraction
         session, texts, _ = _carom.from_deck("place", [], toml_text(deck))
         session.forget_run()
+        for name, inertia in self._inertias.items():
+            if inertia:
+                session.set_inertia(name, inertia)
+        if spin.any():
+            session.set_spin(np.concatenate([spin, np.zeros((session.size - len(spin),) + spin.shape[1:])]))
         for name, given in old.forces:
             session.add_force(name, given)
         if old.method:
             session.set_integrator(old.method, old.method_parameters)
-        self._session, self._edges_known, self._counted = session, True, []
+        if self._output:
+            session.set_output(*self._output)
+        self._session, self._edges_known, self._counted, self._inertias = session, True, [], {}
         self._warn(texts)
         return range(len(self))
 
     def thermalize(self, temperature, seed=1, species=None):
-        """Draws velocities of Maxwell and Boltzmann, of exactly this temperature [energy] and without total momentum.
+        """Draws Maxwell-Boltzmann velocities with zero total momentum and exactly this temperature [energy].
 
-        species: the name of the only one that gets them. In a callback, too: see `velocity`.
+        species: the name of the only species that gets new velocities. May be called in a callback: see `velocity`.
         """
         each = np.full(len(self), np.nan)
         if species is not None and species not in self.species_names:
@@ -210,9 +245,9 @@ class Simulation:
         self._session.set_velocity(self._session.drawn_velocities(each, seed))
 
     def add_wall(self, name, normal=None, **parameters):
-        """Adds a wall, or changes a face of the box: "x-", "x+", "y-", … where its boundary is a wall.
+        """Adds a wall, or changes a face of the box whose boundary is a wall: "x-", "x+", "y-", …
 
-        normal: of a further wall, into the space of the spheres. Other parameters are those of [[wall]] in decks: offset,
+        normal: the normal of a further wall, which points to the side of the spheres. Other parameters are those of [[wall]] in decks: offset,
         velocity (a number along the normal, or {"amplitude": …, "frequency": …}), one_sided, …; see carom.describe("wall").
 
             sim.add_wall("x+", velocity=0.05)                         # a piston
@@ -222,12 +257,14 @@ class Simulation:
         self._session.add_wall(given if normal is None else given | {"normal": numbers("add_wall", "normal", normal)})
 
     def add_contact(self, one, other, **parameters):
-        """Sets the law of contacts between two species, or a species and a wall ("x-", or its name); "*" for any. They must
-        be there already; a later law replaces an earlier one. Between two runs, the next one goes on at its time.
+        """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all of them.
+        Add species and walls first; a later law replaces an earlier one. Between two runs, the second one continues the first.
 
-        Parameters are those of [[contact]] in decks: restitution, rest_speed, …; see carom.describe("contact").
+        Parameters are those of [[contact]] in decks: restitution, tangential, friction, rest_speed; see
+        carom.describe("contact").
 
             sim.add_contact("*", "*", restitution=0.9)
+            sim.add_contact("*", "*", restitution=0.9, tangential=0.5, friction=0.3)     # rough spheres, which spin
             sim.add_contact("ice", "ice", restitution={"form": "power", "v0": 0.01, "exponent": 0.234})
         """
         given = refuse_masked("add_contact", dict(parameters))
@@ -238,12 +275,12 @@ class Simulation:
 
         type: "andersen": at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann;
         "rescaling": all velocities are scaled by a common random factor, so that the kinetic energy is canonical.
-        temperature: a number [energy], or [first, last]: a linear ramp over the next run. rate: kicks of a particle per
-        unit time; of rescaling 1/relaxation time.
+        temperature: a number [energy], or [first, last] for a linear ramp over the next run. rate: kicks of a particle per
+        unit time; for rescaling, 1/relaxation time.
 
             sim.add_bath("andersen", temperature=1.0, rate=0.5)
             sim.run(time=100)
-            sim.bath_temperature = 2.0       # the next run() goes on
+            sim.bath_temperature = 2.0       # the next run() continues the run
         """
         given = {"type": type, "temperature": temperature, "rate": rate, "seed": seed}
         self._session.set_bath(refuse_masked("add_bath", given))
@@ -252,17 +289,17 @@ class Simulation:
         self._session.set_bath_temperature(value)
 
     def add_force(self, type, **parameters):
-        """Adds a term of V by its name in decks; see carom.describe(type). Ids and species in it must be there already."""
+        """Adds a term of V by its name in decks; see carom.describe(type). Add the particles and species that it names first."""
         self._session.add_force(name_of("add_force", type), refuse_masked(type, parameters))
 
     def add_potential(self, expression, start, cutoff, tolerance=1e-8, options=None, **constants):
-        """Adds a pair potential given as an expression of r; returns the points of its table, with the errors.
+        """Adds a pair potential given as an expression of r; returns the points of its table and their errors, a Sampled.
 
-        expression: a text such as "epsilon*exp(-(r/sigma)**2)", with functions of numpy and constants by keyword, or a
-        function of r [length] that returns V [energy]. start: from this distance on it is sampled; no pair should come
-        nearer. cutoff: where it ends. tolerance: the largest error of V, relative to the largest |V|. options: other
+        expression: a text such as "epsilon*exp(-(r/sigma)**2)", with functions of numpy and constants given by keyword, or a
+        function of r [length] that returns V [energy]. start: the smallest distance at which it is sampled; pairs should not come
+        nearer. cutoff: the distance at which it ends. tolerance: the largest error of V, relative to the largest |V|. options: other
         parameters of "table", such as {"species": ["a", "b"], "cut": "shifted"}.
-        Raises UsageError where the tolerance cannot be met.
+        Raises UsageError if the tolerance cannot be met.
 
             print(sim.add_potential("epsilon*exp(-r**2)", start=0.2, cutoff=3.0, epsilon=2.0))
         """
@@ -272,12 +309,12 @@ class Simulation:
         return points
 
     def output(self, directory, thermo_interval=0, **keys):
-        """From the next run on, files are written to a directory, as the command writes them: see carom.open().
+        """Makes the next runs write the files of `carom run` to a directory: see carom.open().
 
-        thermo_interval: time between rows of thermo.csv; callbacks then come with each row. Other keys are those of
+        thermo_interval: time between rows of thermo.csv; callbacks are then called at each row. Other keys are those of
         [output] in decks: frame_interval, events, rdf_interval, msd_interval, profile_interval, sample_start,
         checkpoint_wall, units, … (`carom schema`). Each run() ends with a checkpoint, from which from_run() and
-        `carom run --continue` go on. Begins a new run, at time 0; the files of an earlier run in the directory are moved
+        `carom run --continue` continue. Begins a new run, at time 0; the files of an earlier run in the directory are moved
         to its backup.N.
 
             sim.output("runs/fluid", thermo_interval=0.1, frame_interval=1.0, rdf_interval=0.1)
@@ -286,30 +323,31 @@ class Simulation:
         """
         given = {"directory": os.path.abspath(os.fspath(directory)), "thermo_interval": thermo_interval} | keys
         refuse_masked("output", given)
-        self._session.set_output([f"output.{key}={toml_value(value)}" for key, value in given.items()], float(thermo_interval))
+        self._output = [f"output.{key}={toml_value(value)}" for key, value in given.items()], float(thermo_interval)
+        self._session.set_output(*self._output)
 
     @property
     def directory(self):
-        """Where the files of the run are; None where it leaves none."""
+        """The directory with the files of the run; None if it writes no files."""
         return self._session.directory or None
 
     def open(self):
-        """What the run has left in its directory, a carom.Run."""
+        """Opens the directory of the run; returns a carom.Run."""
         return files.open(self._need_directory("open"))
 
     def view(self, port=0, browser=None):
-        """A page that shows the run in a browser, also while it goes on; in a notebook, in place. See carom.page.Page."""
+        """Shows the run on a page, in a browser or in the notebook, also during the run. See carom.page.Page."""
         return page.Page([self._need_directory("view")], port, browser)
 
     def _need_directory(self, of):
         if self.directory is None:
-            raise UsageError(f"{of}: the run leaves no files; call output(directory, frame_interval=…) and run() first")
+            raise UsageError(f"{of}: the run writes no files; call output(directory, frame_interval=…) and run() first")
         return self.directory
 
     @property
     def averages(self):
-        """The averages up to now, by name and column: ["rdf"]["g"]; those that output() has asked for by an interval. New
-        arrays, also in callbacks."""
+        """The averages that output() has requested, up to now, by name and column: ["rdf"]["g"]. The arrays are copies; callbacks may
+        read them, too."""
         return self._session.averages()
 
     def integrator(self, type, **parameters):
@@ -317,14 +355,14 @@ class Simulation:
         self._session.set_integrator(name_of("integrator", type), refuse_masked(type, parameters))
 
     def run(self, time=None, steps=None, collisions=None, every=None, callback=None, progress=None):
-        """Runs to a time, a number of steps, or a number of pair collisions, counted from the start of the run: a later
-        call with a later end goes on, with the bits of one undisturbed run. Without any of them: to the end of the deck.
+        """Runs to a time, a number of steps or a number of pair collisions, all counted from the start of the run. A later call with a
+        later end continues the run, with the bits of one undisturbed run. Without any end: runs to the end of the deck.
 
-        time [time], steps, collisions: where the run ends; the first that is reached.
-        callback(simulation) is called every so much simulated time, and at the start and the end; what it raises ends the
-        run at the end of the step (in free flight: after 500 000 collisions of the epoch, or its end). So does
-        Ctrl-C, with KeyboardInterrupt; the simulation can be looked at and run on. A callback may set velocities.
-        progress: whether to show a line of progress; by default in terminals and notebooks.
+        time [time], steps, collisions: the run ends at the first of them that it reaches.
+        callback(simulation) is called at intervals of `every` units of simulated time, and at the start and the end; it may set
+        velocities. An exception in it ends the run at the end of the step (in free flight: after 500 000 collisions, or at the end of
+        the epoch) and is passed on. So does Ctrl-C, as KeyboardInterrupt; the simulation can be used and continued afterwards.
+        progress: whether to show the progress; by default in terminals and notebooks.
         """
         if callback is not None and not callable(callback):
             raise UsageError(f"run: 'callback' is {callback!r}; give a function of one argument, the simulation")
@@ -346,14 +384,14 @@ class Simulation:
             self._warn(self._session.warnings)
 
     def write_deck(self, file, time=None, steps=None, every=None):
-        """Writes a deck that `carom run` and from_deck() take: the present state, forces, integrator and this end, with
-        frames and rows of thermo `every` so much time. Images are not in it."""
+        """Writes a deck for `carom run` and from_deck() with the present state (without images), the forces, the integrator and this
+        end; `every` is the time between frames, and between rows of thermo.csv."""
         write_deck(self, file, {"end_time": time, "steps": steps}, every or 0)
 
     @property
     def position(self):
-        """Centres, wrapped into the box along periodic axes, (N, D) [length]: a read-only view, no copy, which follows the
-        run; .copy() keeps it. Assigning sets all of them."""
+        """Centres of the particles, wrapped into the box along periodic axes, (N, D) [length]. A read-only view that follows the run;
+        .copy() keeps the present values. An assignment sets all rows."""
         return self._session.position()
 
     @position.setter
@@ -362,9 +400,9 @@ class Simulation:
 
     @property
     def velocity(self):
-        """Velocities, (N, D) [length/time]; like position. Assigned in a callback, they hold from then on, and the run goes on
-        at its time: what this adds to H is no part of energy_error. In free flight the callback must come at the end of
-        an epoch: integrator("free-flight", step=every)."""
+        """Velocities, (N, D) [length/time]; a view like `position`. An assignment in a callback changes them from then on, and the run
+        continues at its time; the energy that it adds to H is no part of energy_error. In free flight the callback must be called at the
+        end of an epoch: integrator("free-flight", step=every)."""
         return self._session.velocity()
 
     @velocity.setter
@@ -372,26 +410,37 @@ class Simulation:
         self._session.set_velocity(self._rows("velocity", values))
 
     @property
+    def spin(self):
+        """Angular velocities [1/time], (N,), about z, in two dimensions and (N, 3) in three; like position. Only contacts with
+        "tangential" change them; zeros where there are none."""
+        values = self._session.spin()
+        return values if len(values) == len(self) else np.zeros((len(self),) + values.shape[1:])
+
+    @spin.setter
+    def spin(self, values):
+        self._session.set_spin(self._spins("Simulation", values, len(self)))
+
+    @property
     def image(self):
-        """How many times each particle has been carried round each periodic axis, (N, D); a view."""
+        """How many box edges each particle has crossed along each periodic axis, (N, D); a view."""
         return self._session.image()
 
     @property
     def unwrapped(self):
-        """Centres, followed through the periodic boundaries, (N, D) [length]; a new array."""
+        """Unwrapped centres, continuous across periodic boundaries, (N, D) [length]; a new array."""
         return self.position + self.image * np.array(self.box)
 
-    mass = property(lambda self: self._session.constant("mass"), doc="(N,) [mass]; a view")
-    radius = property(lambda self: self._session.constant("radius"), doc="Of the hard cores, (N,) [length]; a view")
-    charge = property(lambda self: self._session.constant("charge"), doc="(N,) [charge]; a view")
-    species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view")
+    mass = property(lambda self: self._session.constant("mass"), doc="Masses, (N,) [mass]; a view.")
+    radius = property(lambda self: self._session.constant("radius"), doc="Radii of the hard cores, (N,) [length]; a view.")
+    charge = property(lambda self: self._session.constant("charge"), doc="Charges, (N,) [charge]; a view.")
+    species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view.")
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
-    box = property(lambda self: self._session.box, doc="Edges [length].")
+    box = property(lambda self: self._session.box, doc="Edges of the box [length].")
     contacts = property(lambda self: self._session.contacts, doc="The laws of contacts, as dictionaries of their options.")
     bath = property(lambda self: next(iter(self._session.baths), None),
                     doc="The heat bath, as a dictionary of its options; None: there is none.")
     bath_temperature = property(lambda self: self.bath and self.bath["temperature"], _set_bath_temperature,
-                                doc="The temperature of the bath [energy]; may be set between runs, which go on.")
+                                doc="The temperature of the bath [energy]. If it is set between two runs, the second one continues the first.")
     walls = property(lambda self: self._session.walls, doc="The walls that were added, as dictionaries of their options.")
     wall_loads = property(lambda self: self._session.wall_loads,
                           doc="By wall: the pressure on a face of the box [energy/length^D], the force on a further wall, since "
@@ -399,9 +448,9 @@ class Simulation:
     boundary = property(lambda self: self._session.boundary, doc="The name of the boundary on each axis.")
 
     energy_error = property(lambda self: self._session.energy_error,
-                            doc="The largest |H - H_1| so far, over max(|H_1|, K_1 + sum |V|).")
-    force_passes = property(lambda self: self._session.force_passes, doc="Pair evaluations / interacting pairs.")
-    wall_seconds = property(lambda self: self._session.wall_seconds, doc="What the run has taken [s].")
+                            doc="The largest change of H + dissipated - work - heat since the first step, over max(|H_1|, K_1 + sum |V|).")
+    force_passes = property(lambda self: self._session.force_passes, doc="Number of force passes: evaluations of pairs / interacting pairs.")
+    wall_seconds = property(lambda self: self._session.wall_seconds, doc="Duration of the run [s].")
 
     def __len__(self):
         return self._session.size

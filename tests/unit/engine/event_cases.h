@@ -54,6 +54,7 @@ void expect_same(const Outcome<D>& a, const Outcome<D>& b, const std::string& wh
   }
   EXPECT_EQ(bits_of<D>(a.particles.x), bits_of<D>(b.particles.x)) << what;
   EXPECT_EQ(bits_of<D>(a.particles.v), bits_of<D>(b.particles.v)) << what;
+  EXPECT_EQ(a.particles.spin, b.particles.spin) << what;
 }
 
 /// Spheres at random positions in a box, with radii in the given range.

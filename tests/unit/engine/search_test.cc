@@ -153,7 +153,8 @@ TEST(Search, BlowsFromBothSides) {  // two touching spheres are hit at one insta
                                          100);
 }
 
-/// Lists are used in dense fluids and in mixtures, because cells for the largest spheres would hold many small ones.
+/// Lists are used in dense fluids, and in mixtures whose cells, as large as the largest spheres, would hold many small
+/// ones.
 TEST(SearchTuning, TakesListsForDenseFluidsAndForMixtures) {
   const auto lists = [](const SearchSituation& situation, Method method = Method::automatic) {
     SearchTuning tuning({.method = method});
@@ -166,13 +167,30 @@ TEST(SearchTuning, TakesListsForDenseFluidsAndForMixtures) {
   };
   for (const auto& [dimension, filled, largest, expected] : {std::tuple{3, 0.2, 1.0, false},
                                                              {3, 0.4, 1.0, true},
-                                                             {3, 0.2, 1.5, true},
+                                                             {3, 0.2, 1.5, false},
+                                                             {3, 0.2, 5.0, true},
+                                                             {3, 0.02, 5.0, false},
                                                              {2, 0.4, 1.0, false},
                                                              {2, 0.6, 1.0, true},
-                                                             {2, 0.4, 1.5, true}}) {
+                                                             {2, 0.4, 1.5, false},
+                                                             {2, 0.4, 5.0, true}}) {
     EXPECT_EQ(lists(fluid(dimension, filled, largest)), expected) << dimension << ' ' << filled << ' ' << largest;
     EXPECT_TRUE(lists(fluid(dimension, filled, largest), Method::lists));
     EXPECT_FALSE(lists(fluid(dimension, filled, largest), Method::cells));
+  }
+}
+
+/// In a dilute gas most candidates are those of crossings, which are no sign of a crowded region.
+TEST(SearchTuning, KeepsCellsInADiluteGasUnlessARegionIsCrowded) {
+  const SearchSituation dilute{3, 0.002 / 0.524, 0.002, 1, 1};
+  EventCounts counts{.predictions = 100000, .crossings = 3000000};
+  for (const auto& [candidates_of_a_scan, lists] : {std::pair{20, false}, {60, true}}) {
+    SearchTuning tuning({});
+    tuning.choose(dilute, {});
+    ASSERT_FALSE(tuning.lists());
+    counts.candidates = static_cast<std::uint64_t>(candidates_of_a_scan) * (counts.predictions + counts.crossings / 3);
+    tuning.choose(dilute, counts);
+    EXPECT_EQ(tuning.lists(), lists) << candidates_of_a_scan;
   }
 }
 

@@ -234,6 +234,38 @@ TEST(WindowedFlight, ExactTies) {
   }
 }
 
+/// The spheres of a case, with spins and a rough law for all contacts.
+template <int D>
+Case<D> rough(Case<D> c) {
+  ContactLaws& laws = c.system->box.contacts;
+  const auto walls = c.system->box.walls();
+  laws.resize(1, walls.empty() ? 0 : walls.back().number + std::size_t{1});
+  const auto law = laws.add({.restitution = 0.95, .tangential = 0.6, .friction = 0.4});
+  laws.set_pair(0, 0, law);
+  for (const Wall<D>& wall : walls) laws.set_wall(0, wall.number, law);
+  Particles<D>& p = c.system->particles;
+  p.spin.resize(p.size());
+  for (Id i = 0; i < p.size(); ++i)
+    for (int k = 0; k < Spin<D>::SizeAtCompileTime; ++k) p.spin[i][k] = std::sin(37.0 * i + k);
+  return c;
+}
+
+TEST(WindowedFlight, RoughSpheres) {
+  expect_the_same_however_divided<3>(rough<3>({.system = test::hard_spheres<3>(5, 0.49), .slab = 0.3, .slabs = 2}),
+                                     2000);
+  expect_the_same_however_divided<2>(rough<2>({.system = test::hard_spheres<2>(14, 0.69), .slab = 0.4, .slabs = 2}),
+                                     900);
+  expect_the_same_however_divided<3>(
+      rough<3>({.system = random_system<3>(150, {6, 6, 9}, {P, P, W}, 0.4, 0.5, 7), .g = {0.1, 0, -1}, .slab = 1}),
+      700);
+  Case<3> fast = rough<3>({.system = random_system<3>(200, {9, 9, 9}, {P, P, P}, 0.4, 0.4, 12), .slab = 1, .slabs = 2});
+  fast.system->particles.v[17] = {300, 20, 1};
+  expect_the_same_however_divided<3>(fast, 1000);
+  const Case<3> c = rough<3>({.system = test::hard_spheres<3>(5, 0.3), .slab = 0.8, .slabs = 3});
+  for (const std::uint64_t limit : {1, 777, 1500})
+    expect_same(whole(c, limit), divided(c, {.subdomains = 3, .limit = limit}), std::to_string(limit));
+}
+
 /// A very fast sphere would cross many subdomains in a window that suits the other spheres.
 TEST(WindowedFlight, OneFastSphere) {
   Case<3> c{.system = random_system<3>(200, {9, 9, 9}, {P, P, P}, 0.4, 0.4, 12), .slab = 1, .slabs = 2};

@@ -64,6 +64,35 @@ TYPED_TEST(Trajectory, HoldsThreeColumnsInAnyDimension) {
   EXPECT_EQ(hdf5::number_at(file, "/parameters/dimension", 0), D);
 }
 
+/// Three columns, the third about z in two dimensions; only if contacts are rough.
+TYPED_TEST(Trajectory, HasSpinsOfRoughSpheres) {
+  constexpr int D = TypeParam::value;
+  const auto path = fresh_directory() / "t.h5md";
+  const auto system = test::sample_system<D>();
+  const std::string name = "/particles/trajectory/angular_velocity/value";
+  TrajectoryWriter<D>(path, test::sample_deck(D), *system).close();
+  EXPECT_FALSE(hdf5::exists(hdf5::File::open(path), name));
+
+  system->box.contacts.resize(2, 0);
+  system->box.contacts.add({.tangential = 0.5});
+  system->need_spins();
+  for (std::size_t i = 0; i < 3; ++i)
+    for (int k = 0; k < Spin<D>::SizeAtCompileTime; ++k)
+      system->particles.spin[i][k] = static_cast<double>(i) + 0.25 * k;
+  TrajectoryWriter<D> writer(path, test::sample_deck(D), *system);
+  for (int f = 0; f < 2; ++f) writer.frame(test::sample_snapshot<D>(system->particles, 0.5 * f, f));
+  writer.close();
+  const hdf5::File file = hdf5::File::open(path);
+  EXPECT_EQ(hdf5::shape(file, name), (std::vector<hsize_t>{2, 3, 3}));
+  const auto spin = all_numbers(file, name);
+  for (std::size_t f = 0; f < 2; ++f)
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_EQ(spin[9 * f + 3 * i + k], D == 3   ? static_cast<double>(i) + 0.25 * static_cast<double>(k)
+                                           : k == 2 ? static_cast<double>(i)
+                                                    : 0.0);
+}
+
 TYPED_TEST(Trajectory, SharesItsClockByHardLinks) {
   constexpr int D = TypeParam::value;
   const auto path = fresh_directory() / "t.h5md";
