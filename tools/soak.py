@@ -120,6 +120,19 @@ def random_bath(dice, end):
     return {"type": dice.choice(["andersen", "rescaling"]), "temperature": temperature, "rate": 10**dice.uniform(-1, 1) / end}
 
 
+def random_contacts(dice, boundary, walls, species):
+    """Laws of contacts between species, and of species with walls."""
+    faces = ["xyz"[axis] + side for axis, kind in enumerate(boundary) if kind == "wall" for side in "-+"]
+    partners, laws = ["*", *species], []
+    for _ in range(dice.choice([1, 1, 2, 3])):
+        ice = {"form": "power", "v0": 10**dice.uniform(-3, 0), "exponent": dice.uniform(0.1, 0.4)}
+        laws.append({"between": [dice.choice(partners), dice.choice(partners + faces + [wall["name"] for wall in walls])],
+                     "restitution": dice.choice([dice.uniform(0, 1), ice])})
+        if dice.random() < 0.5:
+            laws[-1]["rest_speed"] = 10**dice.uniform(-9, -2)
+    return laws
+
+
 def random_deck(dice, seconds):
     """A deck that takes about this long; many cannot run."""
     method = dice.choice(["free-flight", "free-flight", "verlet", "psa", "psa", "cva", "mcva", "cdda", "edda", "edda"])
@@ -166,8 +179,11 @@ def random_deck(dice, seconds):
     if bath and isinstance(bath["temperature"], list) and "collisions" in run:
         bath["temperature"] = bath["temperature"][0]
     walled = method != "verlet" and integrator.get("variant") != "restart" and dice.random() < 0.7
+    walls = random_walls(dice, boundary, end) if walled else []
+    dissipates = method != "verlet" and dice.random() < 0.5
+    contacts = random_contacts(dice, boundary, walls, [each["name"] for each in particles]) if dissipates else []
     return {"format": 1, "system": {"dimension": dimension, "boundary": boundary},
-            "wall": random_walls(dice, boundary, end) if walled else [], "bath": [bath] if bath else [], "particles": particles,
+            "wall": walls, "contact": contacts, "bath": [bath] if bath else [], "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
             "interaction": random_forces(dice, method, dimension, boundary, [each["name"] for each in particles]),
             "integrator": integrator, "run": run, "output": output}
@@ -177,7 +193,8 @@ def words(deck):
     """A deck in a line."""
     n = sum(species["count"] for species in deck["particles"])
     forces = "+".join(term["type"] for term in deck["interaction"]) or "no forces"
-    return f"{deck['integrator']['type']} {deck['system']['dimension']}-D {n} {forces} {'/'.join(deck['system']['boundary'])}"
+    more = "".join(f", {kind}" for kind in ("wall", "contact", "bath") if deck.get(kind))
+    return f"{deck['integrator']['type']} {deck['system']['dimension']}-D {n} {forces} {'/'.join(deck['system']['boundary'])}{more}"
 
 
 # Runs

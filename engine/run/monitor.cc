@@ -51,6 +51,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   Fields& fields = system.fields;
   fields.add_value("statistics", statistics);
   fields.add_value("account", account_);
+  fields.add_value("impulses of walls", last_row_impulses_);
   fields.add_of_run({"last measurement", [this](Archive& archive) {
                        archive(shot_.time, shot_.step, shot_.collisions, shot_.kinetic, shot_.potential, shot_.shadow,
                                shot_.momentum, shot_.temperature, shot_.dissipated, shot_.work, shot_.heat);
@@ -262,6 +263,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
   shot.pressure = pressure_of(account_.virial + collisions, system_.box);
   shot.max_energy_error = statistics_.max_energy_error;
   if (row) {
+    shot.walls = wall_loads(shot.time);
     for (auto* observer : observers_) observer->thermo(shot);
     rows_.pass(now);
     account_.last_row = shot.time;
@@ -273,6 +275,23 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
     frames_.pass(now);
     account_.last_frame = shot.time;
   }
+}
+
+/// The loads on all walls since the last row, which ends now.
+template <int D>
+std::vector<WallLoad> Monitor<D>::wall_loads(double time) {
+  std::vector<WallLoad> loads;
+  const double elapsed = account_.last_row >= 0 ? time - account_.last_row : 0;  // no force before the start
+  const Vec<D> lengths = system_.box.lengths(time);
+  const std::vector<WallTally>& tallies = statistics_.counters.walls;
+  for (const Wall<D>& wall : system_.box.walls()) {
+    const double impulse = wall.number < tallies.size() ? tallies[wall.number].impulse.value() : 0;
+    if (last_row_impulses_.size() <= wall.number) last_row_impulses_.resize(wall.number + 1);
+    const double since = impulse - std::exchange(last_row_impulses_[wall.number], impulse);
+    loads.push_back(
+        {wall.number, elapsed > 0 ? since / elapsed : 0, wall.axis >= 0 ? lengths.prod() / lengths[wall.axis] : 0});
+  }
+  return loads;
 }
 
 /// The overlaps of any two spheres that this rank sees: an independent check that no contact was missed.

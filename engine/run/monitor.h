@@ -75,6 +75,7 @@ class Monitor {
   Snapshot<D> measure(double time, const Particles<D>& state, const Integrator<D>* integrator, bool with_shadow,
                       bool fresh = true);
   void show(Snapshot<D> shot, bool last);
+  std::vector<WallLoad> wall_loads(double time);
   void count_from(const Snapshot<D>& shot);
   void guard(double energy_before, double magnitude_before);
   std::string fastest(const Particles<D>& state) const;
@@ -100,6 +101,7 @@ class Monitor {
     double first_energy = 0, first_shadow = 0;  // H₁ and S_h,1
     std::array<double, D> first_momentum{};
   } account_;
+  std::vector<double> last_row_impulses_;     // of the walls, by number, up to the last row
   Snapshot<D> shot_;                          // at the last slab's end
   Tail tail_;                                 // added to output, not to H and its errors
   std::vector<Vec<D>> scratch_;               // for S_h

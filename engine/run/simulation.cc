@@ -60,10 +60,11 @@ double thermal_speed(const System<D>& system) {
   return std::sqrt(twice_kinetic / (D * sum_over_all<D>(system, [&](Id i) { return p.mass[i]; })));
 }
 
-/// A rest speed above the thermal speed would make most contacts elastic.
+/// A rest speed above the thermal speed would make most contacts elastic. Forces may move spheres that are slow at the
+/// start, such as a pile at rest.
 template <int D>
 void check_rest_speeds(const System<D>& system) {
-  if (system.box.contacts.elastic()) return;
+  if (system.box.contacts.elastic() || !system.interactions.empty()) return;
   const double thermal = thermal_speed(system);
   for (const ContactLaw& law : system.box.contacts.all())
     if (thermal > 0 && law.rest_speed >= thermal)

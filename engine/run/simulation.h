@@ -35,6 +35,15 @@ struct Plan {
   double slack() const { return 1e-9 * step; }  ///< tolerance of due times and ends [time]
 };
 
+/// The load on a wall between two thermo rows.
+struct WallLoad {
+  Id number = 0;
+  double force = 0;  ///< mean force on the spheres, along the normal [force]
+  double area = 0;   ///< of a face of the box [length^(D−1)]; 0 for a further wall
+  /// The pressure on a face of the box [energy/length^D], the force on a further wall.
+  double load() const { return area > 0 ? force / area : force; }
+};
+
 /// What an observer gets: a state and its observables, all at `time`.
 template <int D>
 struct Snapshot {
@@ -51,6 +60,7 @@ struct Snapshot {
   double rotational_temperature = 0;  ///< Σ I ω²/(f N), f = 1 in two dimensions, 3 in three [energy]
   double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
+  std::vector<WallLoad> walls{};              ///< in thermo rows: of all walls, in the order of Box::walls()
   double total() const { return kinetic + potential; }
   /// What stays constant, whatever contacts, walls and baths do.
   double conserved() const { return total() + dissipated - work - heat; }

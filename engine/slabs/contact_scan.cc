@@ -49,6 +49,7 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   walls_at_ = std::numeric_limits<double>::quiet_NaN();  // they may move otherwise from now on
   events_ = 0;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
+  fallen_back_.clear();
   note_pressed();
 }
 
@@ -66,20 +67,25 @@ void ContactScan<D>::note_pressed() {
   }
 }
 
-/// Finds all contacts at x, in the order of their keys.
+/// Finds all contacts at x, in the order of their keys, and gaps so small that contacts may be held there.
 template <int D>
 void ContactScan<D>::find_touching(double time, Positions<D> x) {
   touching_.clear();
+  widest_ = 0;
+  if (!box_.contacts.elastic())
+    for (const ContactLaw& law : box_.contacts.all())
+      if (!law.elastic())
+        widest_ = std::max(widest_, law.slowest(box_.contacts.thermal_speed) * length_ / kMostBounces);
   const auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma, double speed = 0) {
     counters_->max_overlap = std::max(counters_->max_overlap, -gap / sigma);
-    touching_.push_back({key, normal, speed});
+    touching_.push_back({.key = key, .normal = normal, .speed = speed, .gap = gap});
   };
   EventKey<D> key;
   key.time = time;
-  for (const auto& pair : list_.cover(x)) {
+  for (const auto& pair : list_.cover(x, 0.5 * widest_)) {
     const Vec<D> d = x[pair.i] - x[pair.j] + box_.shift(pair.image);
-    const double sigma = contact_distance(pair.i, pair.j);
-    if (!touches(d, sigma)) continue;
+    const double sigma = contact_distance(pair.i, pair.j), reach = sigma + std::max(tolerance(sigma), widest_);
+    if (d.squaredNorm() > reach * reach) continue;
     key.lo = pair.i;
     key.hi = pair.j;
     key.image = pair.image;
@@ -90,7 +96,7 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   for (Id i = 0; i < x.size(); ++i)
     for (const Wall<D>& wall : walls()) {
       const double gap = wall.gap(x[i], particles_.radius[i]);
-      if (gap > tolerance(particles_.radius[i])) continue;
+      if (gap > std::max(tolerance(particles_.radius[i]), widest_)) continue;
       key.lo = i;
       key.hi = wall.number;
       note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
@@ -102,6 +108,7 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
     while (known != reactions_.end() && known->key < partners) ++known;
     touch.force = known != reactions_.end() && known->key == partners ? known->force : 0.0;
   }
+  std::erase_if(touching_, [&](const Touch<D>& touch) { return open(touch) && touch.gap > holding_gap(touch); });
 }
 
 /// Sorts the contacts into approaching and resting ones. `all_stop`: contacts that dissipate rest if they approach.
@@ -111,9 +118,11 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   resting_.clear();
   for (const Touch<D>& touch : touching_) {
     const double speed = normal_speed(touch, v), resting = resting_speed(touch, v);
-    if (speed < -stopping_speed(touch.key, touch.normal, touch.force, resting) && !(all_stop && dissipates(touch.key)))
+    if (passes_by(touch, speed)) continue;
+    if (!open(touch) && speed < -stopping_speed(touch.key, touch.normal, touch.force, resting) &&
+        !(all_stop && dissipates(touch.key)))
       approaching_.push_back(touch);
-    else if (speed <= resting)
+    else if (speed <= holding_speed(touch, resting))
       resting_.push_back({.key = without_time(touch.key), .normal = touch.normal, .force = touch.force});
   }
 }
@@ -126,6 +135,16 @@ double ContactScan<D>::known_force(const EventKey<D>& key) const {
 }
 
 template <int D>
+bool ContactScan<D>::falls_back(const EventKey<D>& key, double closing, double speed, double sigma) {
+  if (!(closing > 0) || speed > std::max(speed_of_rest(closing, sigma), slowest_bounce(key, closing))) return false;
+  const EventKey<D> partners = without_time(key);
+  if (std::ranges::find(fallen_back_, partners, &std::pair<EventKey<D>, double>::first) != fallen_back_.end())
+    return false;
+  fallen_back_.push_back({partners, closing});
+  return true;
+}
+
+template <int D>
 double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
                                      const Vec<D>& v_hi) const {
   const bool pair = key.kind == EventKind::pair;
@@ -135,8 +154,7 @@ double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& norma
   const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
   const double closing = pressing(key, normal, force);
   if (!(closing > 0)) return rounding;
-  return std::max(rounding,
-                  std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces));
+  return std::max(rounding, speed_of_rest(closing, sigma));
 }
 
 template <int D>
@@ -151,9 +169,7 @@ double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& norm
                                       double resting) const {
   if (resting < 0 || !dissipates(key)) return resting;
   const double closing = std::max(0.0, pressing(key, normal, force));
-  const auto& species = particles_.species;
-  const ContactLaw& law = key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
-                                                      : box_.contacts.of_wall(species[key.lo], key.hi);
+  const ContactLaw& law = law_of(key);
   // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
   const double kick = kick_ * closing, e = law.at(kick, 0, 0);
   return std::max(resting, law.slowest(box_.contacts.thermal_speed) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces));
@@ -161,10 +177,37 @@ double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& norm
 
 template <int D>
 bool ContactScan<D>::dissipates(const EventKey<D>& key) const {
-  if (box_.contacts.elastic()) return false;
+  return !box_.contacts.elastic() && !law_of(key).elastic();
+}
+
+template <int D>
+const ContactLaw& ContactScan<D>::law_of(const EventKey<D>& key) const {
   const auto& species = particles_.species;
-  return key.kind == EventKind::pair ? !box_.contacts.of_pair(species[key.lo], species[key.hi]).elastic()
-                                     : !box_.contacts.of_wall(species[key.lo], key.hi).elastic();
+  return key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
+                                     : box_.contacts.of_wall(species[key.lo], key.hi);
+}
+
+/// A contact that dissipates, and opens more slowly than this, closes again within the step so slowly that it stops.
+template <int D>
+double ContactScan<D>::slowest_bounce(const EventKey<D>& key, double closing) const {
+  if (!dissipates(key) || !(closing > 0)) return 0;
+  return std::min(law_of(key).slowest(box_.contacts.thermal_speed), 0.5 * closing * length_);
+}
+
+/// A contact that dissipates is held where it is if the gap is as small as this: a bounce at an eighth of the speed at
+/// which approaches end opens it as far.
+template <int D>
+double ContactScan<D>::holding_gap(const Touch<D>& touch) const {
+  if (!dissipates(touch.key)) return 0;
+  const double closing = pressing(touch.key, touch.normal, touch.force), slowest = slowest_bounce(touch.key, closing);
+  return closing > 0 ? slowest * slowest / (2 * kMostBounces * closing) : 0;
+}
+
+/// A contact is held if it opens more slowly than this.
+template <int D>
+double ContactScan<D>::holding_speed(const Touch<D>& touch, double resting) const {
+  if (resting < 0 || !dissipates(touch.key)) return resting;
+  return std::max(resting, slowest_bounce(touch.key, pressing(touch.key, touch.normal, touch.force)));
 }
 
 /// The acceleration at which a contact would close by forces and, if contacts dissipate, by other reactions.
@@ -176,7 +219,9 @@ double ContactScan<D>::pressing(const EventKey<D>& key, const Vec<D>& normal, do
   if (a_ && key.lo < a_->size()) a = between(*a_);
   if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
   const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
-  const double closing = std::max(force * inverse_mass, -a.dot(normal) / normal.norm());
+  double closing = std::max(force * inverse_mass, -a.dot(normal) / normal.norm());
+  for (const auto& [partners, acceleration] : fallen_back_)
+    if (partners == without_time(key)) closing = std::max(closing, acceleration);
   return held_.empty() ? closing : std::max(closing, -(a + between(held_)).dot(normal) / normal.norm());
 }
 
@@ -225,7 +270,10 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
     lost += stop_rounding(v) + stop_approach(x, v);
     if (dissipative) lost -= count_dissipated(before, v);
     sort_out(v, all_stop);  // a sphere that was stopped may have been moving away from another contact
-    const auto slow = [&](const Touch<D>& touch) { return normal_speed(touch, v) < -resting_speed(touch, v); };
+    const auto slow = [&](const Touch<D>& touch) {
+      const double speed = normal_speed(touch, v);
+      return speed < -resting_speed(touch, v) && !passes_by(touch, speed);
+    };
     if (approaching_.empty() && !(dissipative && generation < kMostRounds && std::ranges::any_of(touching_, slow)))
       break;
     if (!approaching_.empty()) count_event(approaching_.front().key);
@@ -344,7 +392,7 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     contact.bound = pair ? 0.0 : length < 0 ? -mean_speed(hi, length) : mean_speed(hi, length);
     contact.slack = 0.125 * normal_slack(contact, w_before);  // about 30 ε of the speeds, as good as a new solution
     const double touching = tolerance(sigma);
-    if (std::abs(gap) <= 0.5 * touching) continue;
+    if (std::abs(gap) <= 0.5 * touching || (gap > 0 && dissipates(contact.key))) continue;
     // The rounding of many pieces has opened or closed the contact. It is corrected at a speed that counts as rest. In
     // short pieces the rounding of positions, ε x, would undo this; so from an overlap beyond the tolerance the contact
     // returns by a few ε x at once, unless the piece is so short that this takes more than 10⁻⁶ of the speeds: the work
@@ -389,8 +437,9 @@ template <int D>
 void ContactScan<D>::drop_open(Positions<D> x) {
   std::erase_if(resting_, [&](const auto& contact) {
     const auto& [key, x_lo] = std::pair(contact.key, x[contact.key.lo]);
-    if (key.kind == EventKind::pair) return !touches(normal(key, x), contact_distance(key.lo, key.hi));
-    return box_.wall(key.hi).gap(x_lo, particles_.radius[key.lo]) > tolerance(particles_.radius[key.lo]);
+    const double gap = key.kind == EventKind::pair ? normal(key, x).norm() - distance(key)
+                                                   : box_.wall(key.hi).gap(x_lo, distance(key));
+    return gap > std::max(tolerance(distance(key)), widest_);
   });
 }
 

@@ -33,6 +33,7 @@ struct Touch {
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
   double speed = 0;  ///< velocity of a wall along its normal
   double force = 0;  ///< the reaction of a present contact in the last piece [force]
+  double gap = 0;    ///< of a present contact [length]
   bool pair() const { return key.kind == EventKind::pair; }
 };
 
@@ -142,6 +143,10 @@ class ContactScan {
   /// speed of its law. `normal` may have any length.
   double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
 
+  /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end
+  /// of the step. False if this is known already.
+  bool falls_back(const EventKey<D>& key, double closing, double speed, double sigma);
+
   /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
   void stop_within(double time) { kick_ = time; }
 
@@ -152,7 +157,22 @@ class ContactScan {
                        const Vec<D>& v_hi) const;
   double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
   double pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const;
+  double speed_of_rest(double closing, double sigma) const {
+    return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);
+  }
   bool dissipates(const EventKey<D>& key) const;
+  const ContactLaw& law_of(const EventKey<D>& key) const;  // unless all contacts are elastic
+  double slowest_bounce(const EventKey<D>& key, double closing) const;
+  double holding_speed(const Touch<D>& touch, double resting) const;
+  double holding_gap(const Touch<D>& touch) const;
+  bool open(const Touch<D>& touch) const { return touch.gap > tolerance(distance(touch.key)); }
+  /// Whether a contact that is open closes too fast to be held where it is.
+  bool passes_by(const Touch<D>& touch, double speed) const {
+    return open(touch) && speed < -law_of(touch.key).slowest(box_.contacts.thermal_speed);
+  }
+  double distance(const EventKey<D>& key) const {
+    return key.kind == EventKind::pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
+  }
   double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);
   void sort_out(Positions<D> v, bool all_stop = false);
@@ -195,9 +215,11 @@ class ContactScan {
   SlabWatch* watch_ = nullptr;
   const std::vector<Vec<D>>* a_ = nullptr;
   double length_ = 0, kick_ = 0;
+  double widest_ = 0;  // gap of a contact that may be held
   std::vector<Reaction<D>>& reactions_;
   std::vector<double> pressed_;  // by particle: Σ |acceleration| over its reactions
   std::vector<Vec<D>> held_;     // by particle: its acceleration by reactions; empty if no contact dissipates
+  std::vector<std::pair<EventKey<D>, double>> fallen_back_;  // contacts, and the accelerations that closed them again
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
 };

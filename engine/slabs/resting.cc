@@ -16,6 +16,9 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 // relevant eigenvalue, so that each repetition reduces the error by several digits.
 constexpr double kFirstProximal = 1e-2, kProximalRatio = 0.03, kLastProximal = 1e-10;
 constexpr int kRepetitions = 40;
+// A solution is sought to the rounding of the two spheres of each contact. In a cluster with light loads beside heavy
+// ones this may be less than the rounding of the factors; then a solution is accepted that would also be kept.
+constexpr int kStrictRepetitions = 8;
 constexpr int kExchanges = 50;
 constexpr int kFruitlessExchanges = 5;          // of all wrong contacts, before only one is exchanged at a time
 constexpr double kFewRoundings = 8 * kEpsilon;  // relative error of a sum of a few terms
@@ -233,6 +236,7 @@ class Problem {
       for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
       // One more repetition: beside the large terms of a light sphere the error of a heavy one is invisible.
       if (std::exchange(solved, settled(cluster)) && solved) return true;
+      if (repetition >= kStrictRepetitions && settled(cluster, true)) return true;
       proximal = std::max(kProximalRatio * proximal, kLastProximal);
     }
     return false;

@@ -213,10 +213,13 @@ FlightEnd<D> SlabCore<D>::serve() {
     const bool pair = key.kind == EventKind::pair;
     if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
     if (resolved_ && !(key.time > 0)) continue;  // rounding
+    if (!box_.contacts.elastic() && at_the_end(key)) continue;
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses no spheres together: elastic contacts that do not approach need no impulse.
-    if (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key)))
+    if (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key))) {
+      if (falls_back(key)) return {.complete = false, .key = key, .falls_back = true};
       return {.complete = false, .time = box_.contacts.elastic() ? key.time : end_before(key), .key = key};
+    }
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
     const bool too_strong = !a_.empty() && most >= kMostContactsOfParticle;
     too_many_contacts_ = !too_strong && contacts_.size() >= max_events_;
@@ -324,7 +327,37 @@ double SlabCore<D>::end_before(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
   const double early = 0.25 * scan_->tolerance(meeting.sigma);
   const double end = meeting.speed < 0 ? key.time + early / meeting.speed : key.time;
-  return end > 0 ? end : key.time;
+  const double both_fly_from = std::max(start(key.lo), key.kind == EventKind::pair ? start(key.hi) : 0.0);
+  return end > both_fly_from ? end : key.time;
+}
+
+/// Whether a contact is so close to the end of the slab, or so slow, that without it the spheres would overlap there by
+/// less than a quarter of the tolerance: it belongs to the next slab.
+template <int D>
+bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
+  EventKey<D> at_end = key;
+  at_end.time = length_;
+  const Meeting meeting(*this, at_end);
+  const double gap = key.kind == EventKind::pair
+                         ? meeting.normal.norm() - meeting.sigma
+                         : box_.wall(key.hi).gap(position(key.lo, length_), meeting.sigma, length_);
+  return gap >= -0.25 * scan_->tolerance(meeting.sigma);
+}
+
+/// Whether the spheres touch at the start and come together again before the contact has opened by what a contact at
+/// rest may: then it rests, which the accelerations before this flight did not show. True once for each contact in a
+/// step.
+template <int D>
+bool SlabCore<D>::falls_back(const EventKey<D>& key) {
+  const bool pair = key.kind == EventKind::pair;
+  if (!resolved_ || version(key.lo) > 0 || (pair && version(key.hi) > 0)) return false;
+  EventKey<D> at_start = key;
+  at_start.time = 0;
+  const Meeting meeting(*this, key), before(*this, at_start);
+  const double gap =
+      pair ? before.normal.norm() - before.sigma : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
+  if (!(gap <= scan_->tolerance(before.sigma)) || !(before.speed > 0)) return false;
+  return scan_->falls_back(key, (before.speed - meeting.speed) / key.time, before.speed, before.sigma);
 }
 
 /// Starts a new flight of particle i at this event, before the impulse.

@@ -32,7 +32,8 @@ struct FlightEnd {
                             ///< there are so many contacts that the end of the flight would be meaningless
   double time = 0;          ///< if incomplete for another reason: the slab must end here, because a contact comes to
                     ///< rest or a resting one is hit; the spheres touch then, with a gap that leaves room for rounding
-  EventKey<D> key{};  ///< the event that made the flight incomplete
+  EventKey<D> key{};        ///< the event that made the flight incomplete
+  bool falls_back = false;  ///< it is a contact that has opened by less than a contact at rest may
 };
 
 template <int D>
@@ -124,6 +125,8 @@ class SlabCore {
   void predict_walls(Id i);
   void predict_all(Id i);
   bool comes_to_rest(const EventKey<D>& key) const;
+  bool at_the_end(const EventKey<D>& key) const;
+  bool falls_back(const EventKey<D>& key);
   double end_before(const EventKey<D>& key) const;
   void collide(const EventKey<D>& key);
   Flight& flight(Id i, const EventKey<D>& key);

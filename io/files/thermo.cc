@@ -67,6 +67,10 @@ std::string columns_page() {
   for (const Column<3>& column : columns<3>())
     text += fmt::format("    {}{} [{}]: {}\n", column.name, column.components() > 1 ? "_x, _y, _z" : "", column.unit,
                         column.meaning);
+  text +=
+      "    pressure_x-, … [energy/length^D]: mean force per area on a face of the box that is a wall, since the last "
+      "row\n";
+  text += "    force_NAME [energy/length]: mean force on a further wall, since the last row\n";
   return text;
 }
 
@@ -86,13 +90,24 @@ ThermoPoint last_thermo_point(const std::filesystem::path& path) {
 }
 
 template <int D>
-ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path, const std::optional<FileMark>& mark)
+ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path, const Box<D>& box, const std::optional<FileMark>& mark)
     : file_(path, mark) {
+  std::vector<std::string> names;
+  for (const Wall<D>& wall : box.walls()) {
+    std::string name = (wall.axis >= 0 ? "pressure_" : "force_") + box.name_of(wall.number);
+    std::ranges::replace_if(
+        name, [](char c) { return c == ',' || c == '"' || c == '\n' || c == '\r'; }, '_');
+    const auto known = std::ranges::find(names, name);
+    column_of_wall_.push_back(static_cast<std::size_t>(known - names.begin()));
+    if (known == names.end()) names.push_back(std::move(name));
+  }
+  wall_columns_ = names.size();
   if (mark) return;
   std::string head;
   for (const Column<D>& column : columns<D>())
     for (int axis = 0; axis < column.components(); ++axis)
       head += fmt::format("{}{}{}", head.empty() ? "" : ",", column.name, column.suffix(axis));
+  for (const std::string& name : names) head += "," + name;
   file_.append(head + '\n');
 }
 
@@ -102,6 +117,10 @@ void ThermoWriter<D>::thermo(const Snapshot<D>& s) {
   for (const Column<D>& column : columns<D>())
     for (int axis = 0; axis < column.components(); ++axis)
       row += fmt::format("{}{}", row.empty() ? "" : ",", column.of(s, axis));
+  std::vector<double> loads(wall_columns_, 0.0);
+  for (std::size_t k = 0; k < std::min(s.walls.size(), column_of_wall_.size()); ++k)
+    loads[column_of_wall_[k]] += s.walls[k].load();
+  for (const double load : loads) row += fmt::format(",{}", load);
   file_.append(row + '\n');
 }
 

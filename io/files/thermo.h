@@ -63,8 +63,9 @@ ThermoPoint last_thermo_point(const std::filesystem::path& path);
 template <int D>
 class ThermoWriter : public Observer<D> {
  public:
-  /// Creates the file with its header, or opens it again and continues from the mark. Throws Error(Failure::file).
-  explicit ThermoWriter(const std::filesystem::path& path, const std::optional<FileMark>& mark = {});
+  /// Creates the file with its header, which has a column for each wall of the box, or opens it again and continues
+  /// from the mark. Throws Error(Failure::file).
+  ThermoWriter(const std::filesystem::path& path, const Box<D>& box, const std::optional<FileMark>& mark = {});
 
   /// Appends a row. Throws Error(Failure::file).
   void thermo(const Snapshot<D>& snapshot) override;
@@ -75,6 +76,8 @@ class ThermoWriter : public Observer<D> {
 
  private:
   TextFile file_;
+  std::vector<std::size_t> column_of_wall_;  // in the order of Box::walls(); both sides of a wall have one column
+  std::size_t wall_columns_ = 0;
 };
 
 }  // namespace carom

@@ -49,6 +49,7 @@ PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np
               "radius": "npt.NDArray[np.float64]", "charge": "npt.NDArray[np.float64]",
               "species": "npt.NDArray[np.uint16]", "momentum": "npt.NDArray[np.float64]", "species_names": "list[str]",
               "box": "list[float]", "boundary": "list[str]", "walls": "list[dict[str, Any]]", "contacts": "list[dict[str, Any]]",
+              "wall_loads": "dict[str, float]",
               "bath": "dict[str, Any] | None", "bath_temperature": "float | list[float] | None",
               "step": "int", "collisions": "int", "directory": "str | None",
               "averages": "dict[str, dict[str, npt.NDArray[np.float64]]]"}

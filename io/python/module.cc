@@ -241,6 +241,7 @@ void bind(py::module_& module, const char* name) {
                                for (const Parameters& wall : s.walls()) all.append(values_of(wall));
                                return all;
                              })
+      .def_property_readonly("wall_loads", &S::wall_loads)
       .def_property_readonly("contacts",
                              [](const S& s) {
                                py::list all;

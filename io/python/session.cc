@@ -211,10 +211,23 @@ void Session<D>::add_wall(Parameters given) {
 
 template <int D>
 void Session<D>::add_contact(Parameters given) {
+  if (running_) refuse("a run is going on; change the laws of contacts before it or after it");
   auto all = contacts_;
   all.push_back(completed("contact", contact_parameters(), std::move(given)));
-  change("add contacts");
+  const bool rough = box_.contacts.rough();
+  need_state_at_end("a law of contacts");
   set_contacts(std::move(all));
+  if (shown_until_ < 0 || box_.contacts.rough() != rough) change("add contacts");
+}
+
+/// To be called before a change that lets the run go on: the state from which it continues must be the present one.
+template <int D>
+void Session<D>::need_state_at_end(const char* what) const {
+  if (shown_until_ < 0 || state_time_ == statistics_.end_time) return;
+  refuse(
+      std::string(what) + ": the last run ended at time " + short_text(statistics_.end_time) +
+      ", within a step or an epoch of free flight; end runs at whole steps, for example by integrator(\"free-flight\", "
+      "step=…)");
 }
 
 /// Sets these laws for the present species and walls.
@@ -397,6 +410,13 @@ const Snapshot<D>& Session<D>::shot() {
   shot_->collisions = statistics_.counters.sphere_sphere;
   shot_->max_energy_error = statistics_.max_energy_error;
   return *shot_;
+}
+
+template <int D>
+std::map<std::string, double> Session<D>::wall_loads() {
+  std::map<std::string, double> loads;
+  for (const WallLoad& each : shot().walls) loads[box_.name_of(each.number)] += each.load();
+  return loads;
 }
 
 template class Session<2>;

@@ -69,7 +69,7 @@ class Session {
   void set_bath(Parameters given);
   /// Changes its temperature; the next run() goes on.
   void set_bath_temperature(double temperature);
-  /// Sets the law of contacts between two partners, which must be there already.
+  /// Sets the law of contacts between two partners, which must be there already; the next run() goes on.
   void add_contact(Parameters given);
   void add_force(std::string_view type, Parameters given);
   void set_integrator(std::string_view name, Parameters given);
@@ -110,6 +110,9 @@ class Session {
   const std::vector<Force>& forces() const { return terms_.all(); }
   const std::vector<Parameters>& walls() const { return walls_; }
   const std::vector<Parameters>& contacts() const { return contacts_; }
+  /// By name: the pressure on each face of the box that is a wall, and the force on each further wall, since the last
+  /// row.
+  std::map<std::string, double> wall_loads();
   /// None, or one.
   const std::vector<Parameters>& baths() const { return baths_; }
   /// During a run: only in RunHooks::show.
@@ -124,6 +127,7 @@ class Session {
  private:
   class Shown;
   void change(const char* what);
+  void need_state_at_end(const char* what) const;
   void set_contacts(std::vector<Parameters> all);
   template <class T>
   void set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what);

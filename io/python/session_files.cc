@@ -24,6 +24,17 @@ void set_ends(Deck& deck, const Plan& plan) {
   deck.toml_text = write_deck(deck.source->values);
 }
 
+/// Sets the tables of this name in a deck.
+void set_tables(Deck& deck, const std::string& name, const std::vector<Parameters>& all) {
+  auto& tables = deck.source->values.list(name);
+  tables.clear();
+  for (const Parameters& each : all) {
+    ValueTable& table = tables.emplace_back();
+    table.schema = &table_schema(name);
+    table.values = each;
+  }
+}
+
 /// Changes a value of a run's state by its name.
 template <class T>
 void change_value(const Fields& fields, const std::string& name, const std::function<void(T&)>& change) {
@@ -83,6 +94,8 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
     build_system<D>(deck);
     deck_ = std::move(deck);
   } else {
+    set_tables(*deck_, "contact", contacts_);  // laws and the bath may have changed since the last run
+    set_tables(*deck_, "bath", baths_);
     set_ends(*deck_, plan);
   }
   const Plan& of = deck_->plan;
@@ -147,6 +160,7 @@ void Session<D>::set_bath_temperature(double temperature) {
   if (baths_.empty()) refuse("there is no bath; call add_bath() first");
   if (running_ && !(showing_ && std::this_thread::get_id() == runner_))
     refuse("a run is going on; change the temperature of the bath in its callback, before it or after it");
+  if (!running_) need_state_at_end("the temperature of the bath");
   Parameters given = baths_[0];
   given.set("temperature", temperature);
   baths_[0] = completed("bath", bath_parameters(), std::move(given));

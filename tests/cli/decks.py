@@ -84,6 +84,10 @@ def walled(keys):
     return changed("[[particles]]", f"[[wall]]\n{keys}\n[[particles]]")
 
 
+def touching(keys):
+    return changed("[[particles]]", f"[[contact]]\n{keys}\n[[particles]]")
+
+
 def bathed(keys):
     return changed("[[particles]]", f"[[bath]]\n{keys}\n[[particles]]")
 

@@ -3,7 +3,7 @@
 
 import pytest
 
-from decks import FLUID, GOOD, bathed, carom, changed, lennard_jones, rough, table, validate, walled
+from decks import FLUID, GOOD, bathed, carom, changed, lennard_jones, rough, table, touching, validate, walled
 from runs import needs_carom
 
 pytestmark = needs_carom
@@ -77,6 +77,26 @@ DECK_ERRORS = {
         walled('name = "lid"\nnormal = [0, -1]\noffset = 0.5'), 9, ["the wall 'lid' leave no room", "move them apart"]),
     "thermal wall without heat": (
         walled('name = "y+"\ntemperature = 0'), 11, ["'temperature' must be positive (is 0)"]),
+    "contact that gains energy": (
+        touching('between = ["disc", "disc"]\nrestitution = 1.01'), 11, ["'restitution' must be at most 1 (is 1.01)"]),
+    "contact with a negative restitution": (
+        touching('between = ["disc", "disc"]\nrestitution = -0.1'), 11, ["'restitution' must not be negative (is -0.1)"]),
+    "contact without partners": (touching("restitution = 0.5"), 9, ["missing key 'between' in [[contact]]"]),
+    "contact of one partner": (touching('between = ["disc"]'), 9, ["a contact is between two partners", "give two species"]),
+    "contact of an unknown species": (
+        touching('between = ["disc", "sand"]\nrestitution = 0.5'),
+        9, ["'sand' is neither a species nor a wall", "give one of: disc, x-, x+, y-, y+, *"]),
+    "contact of two walls": (touching('between = ["x-", "x+"]\nrestitution = 0.5'), 9, ["are both walls", "give at least one species"]),
+    "contact by an unknown law": (
+        touching('between = ["*", "*"]\nrestitution = { form = "spring", v0 = 1, exponent = 1 }'), 11, ["'form' cannot be 'spring'", "power"]),
+    "contact without an exponent": (
+        touching('between = ["*", "*"]\nrestitution = { form = "power", v0 = 1 }'), 11, ["'restitution' has no 'exponent'"]),
+    "contact with a speed of 0": (
+        touching('between = ["*", "*"]\nrestitution = { form = "power", v0 = 0, exponent = 1 }'), 11, ["'v0' must be positive (is 0)"]),
+    "contact with an unknown key": (
+        touching('between = ["*", "*"]\nrestituton = 0.5'), 11, ["unknown key 'restituton'", "did you mean 'restitution'?"]),
+    "contact with a negative rest speed": (
+        touching('between = ["*", "*"]\nrest_speed = -1'), 11, ["'rest_speed' must not be negative (is -1)"]),
     "contact rougher than rough": (rough("tangential = 1.5"), 11, ["'tangential' is 1.5; take at most 1"]),
     "contact smoother than smooth": (rough("tangential = -1.5"), 9, ["at least -1 (is -1.5)", "from -1, smooth"]),
     "negative friction": (rough("tangential = 0.5\nfriction = -0.1"), 12, ["'friction' must be zero or positive (is -0.1)"]),

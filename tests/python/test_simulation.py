@@ -219,7 +219,7 @@ def test_walls_move_and_stay_where_they_are_in_the_next_run():
 
 def test_a_bath_changes_its_temperature_between_runs():
     def heated(first, second):
-        sim = gas()
+        sim = gas(step=1.0)
         sim.add_bath("andersen", temperature=1.0, rate=5.0)
         assert sim.bath["type"] == "andersen" and sim.bath_temperature == 1.0
         sim.run(time=4)
@@ -242,6 +242,67 @@ def test_a_bath_changes_its_temperature_between_runs():
     sim.add_bath("rescaling", temperature=[1.0, 2.0], rate=10.0)
     sim.run(time=5)
     assert 1.4 < sim.temperature < 2.6
+
+
+def test_a_law_of_contacts_changes_between_runs(tmp_path):
+    def cooled(second, directory=None):
+        sim = gas(step=1.0)
+        sim.add_contact("*", "*", restitution=0.7)
+        if directory:
+            sim.output(directory, thermo_interval=0.5)
+        sim.run(time=2)
+        before = sim.dissipated
+        assert before > 0
+        sim.add_contact("*", "*", restitution=second)
+        assert [law["restitution"] for law in sim.contacts] == [0.7, second]
+        sim.run(time=4)
+        assert sim.time == 4 and sim.energy_error < 1e-12
+        return sim, before
+
+    elastic, before = cooled(1.0)
+    assert elastic.dissipated == before
+    other, before = cooled(0.6)
+    assert other.dissipated > before
+    # A continued run has the law that it had, not that of its deck.
+    first, before = cooled(1.0, tmp_path / "run")
+    again = carom.Simulation.from_run(tmp_path / "run")
+    again.run(time=6)
+    first.run(time=6)
+    assert again.dissipated == first.dissipated == before
+    assert np.array_equal(again.position, first.position)
+    with pytest.raises(carom.UsageError, match="a run is going on; change the laws of contacts before it or after it"):
+        elastic.run(time=8, every=1.0, callback=lambda s: s.add_contact("*", "*", restitution=0.5))
+    unready = gas()
+    unready.add_contact("*", "*", restitution=0.7)
+    unready.run(time=2)
+    with pytest.raises(carom.UsageError, match="a law of contacts: the last run ended at time 2, within a step or an epoch"):
+        unready.add_contact("*", "*", restitution=1.0)
+    for given, text in [({"restitution": 1.5}, "'restitution' is 1.5; take at most 1"), ({"restitution": -1.0}, "'restitution'"),
+                        ({"rest_speed": -1.0}, "'rest_speed'")]:
+        with pytest.raises(carom.UsageError, match=text):
+            gas().add_contact("*", "*", **given)
+    with pytest.raises(carom.UsageError, match="'sand' is neither a species nor a wall"):
+        gas().add_contact("sand", "*", restitution=0.5)
+    hasty = gas()
+    hasty.add_contact("*", "*", restitution=0.5, rest_speed=5.0)
+    with pytest.raises(carom.UsageError, match="rest_speed 5 of a contact is above the thermal speed"):
+        hasty.run(time=1)
+
+
+def test_walls_carry_a_load(tmp_path):
+    sim = carom.Simulation(box=[10, 6])
+    sim.add_particles([[5, 3]], velocity=[[2, 0]], radius=0.5)
+    sim.add_wall("middle", normal=[1, 0], offset=-1.0)
+    sim.integrator("free-flight")
+    loads = []
+    sim.output(tmp_path / "run", thermo_interval=9.0)
+    sim.run(time=90, callback=lambda s: loads.append(s.wall_loads))
+    # Each face is hit every 9 units of time with an impulse of 4, and has an area of 6.
+    assert loads[0] == dict.fromkeys(["x-", "x+", "y-", "y+", "middle"], 0)
+    assert all(load["x-"] == pytest.approx(4 / 9 / 6) and load["x+"] == pytest.approx(4 / 9 / 6) for load in loads[1:])
+    assert all(load["y+"] == load["middle"] == 0 for load in loads)
+    thermo = sim.open().thermo
+    assert thermo["pressure_x-"][1:] == pytest.approx(4 / 9 / 6) and "force_middle" in thermo and len(thermo["pressure_y+"]) == 11
 
 
 def test_thermal_walls_heat():

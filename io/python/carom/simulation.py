@@ -258,7 +258,7 @@ class Simulation:
 
     def add_contact(self, one, other, **parameters):
         """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all of them.
-        Add species and walls first; a later law replaces an earlier one.
+        Add species and walls first; a later law replaces an earlier one. Between two runs, the second one continues the first.
 
         Parameters are those of [[contact]] in decks: restitution, tangential, friction, rest_speed; see
         carom.describe("contact").
@@ -442,6 +442,9 @@ class Simulation:
     bath_temperature = property(lambda self: self.bath and self.bath["temperature"], _set_bath_temperature,
                                 doc="The temperature of the bath [energy]. If it is set between two runs, the second one continues the first.")
     walls = property(lambda self: self._session.walls, doc="The walls that were added, as dictionaries of their options.")
+    wall_loads = property(lambda self: self._session.wall_loads,
+                          doc="By wall: the pressure on a face of the box [energy/length^D], the force on a further wall, since "
+                              "the last row or callback; between runs those of the last one.")
     boundary = property(lambda self: self._session.boundary, doc="The name of the boundary on each axis.")
 
     energy_error = property(lambda self: self._session.energy_error,

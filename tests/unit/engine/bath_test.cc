@@ -35,7 +35,8 @@ class Series {
   std::vector<double> values_;
 };
 
-/// Kinetic energies in units of their canonical mean, and their squared deviations in units of the variance.
+/// Kinetic energies in units of their canonical mean, their squared deviations in units of the variance, and fourth
+/// powers of velocities in units of their mean in the distribution of Maxwell and Boltzmann.
 class Kinetic : public Observer<3> {
  public:
   Kinetic(double temperature, std::size_t spheres, double after)
@@ -45,8 +46,12 @@ class Kinetic : public Observer<3> {
     const double relative = shot.kinetic / expected_;
     mean.add(relative);
     variance.add((relative - 1) * (relative - 1) * freedoms_ / 2);
+    double sum = 0;
+    for (const Vec<3>& v : shot.particles->v) sum += v.array().pow(4).sum();
+    const double thermal = 2 * expected_ / freedoms_;  // of spheres of mass 1
+    fourth.add(sum / (3 * freedoms_ * thermal * thermal));
   }
-  Series mean, variance;
+  Series mean, variance, fourth;
 
  private:
   double freedoms_, expected_, after_;
@@ -67,7 +72,8 @@ struct Case {
 
 class Canonical : public testing::TestWithParam<Case> {};
 
-/// The kinetic energy has the mean and the variance of the canonical ensemble, and the ledger closes. The times between
+/// The kinetic energy has the mean and the variance of the canonical ensemble, velocities have the fourth moment of the
+/// distribution of Maxwell and Boltzmann, and the ledger closes. The times between
 /// rows are longer than the correlations; blocks give the standard errors.
 TEST_P(Canonical, MeanAndVariance) {
   const auto& [type, method] = GetParam();
@@ -87,6 +93,8 @@ TEST_P(Canonical, MeanAndVariance) {
   const auto spheres = static_cast<double>(n);
   EXPECT_NEAR(kinetic.variance.mean(), 1, 4 * kinetic.variance.error());
   EXPECT_LT(kinetic.variance.error(), 0.15);
+  EXPECT_NEAR(kinetic.fourth.mean(), 1, 4 * kinetic.fourth.error());
+  EXPECT_LT(kinetic.fourth.error(), 0.015);
   EXPECT_LT(s.max_energy_error, (method == "psa" ? 1 : 1e-12) * s.energy_reference);
   EXPECT_NE(s.counters.heat.value(), 0);
   const double kicks = 4 * kEnd * spheres;

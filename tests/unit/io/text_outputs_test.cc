@@ -40,7 +40,7 @@ std::string contents(const fs::path& path) {
 TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   const auto path = fresh_directory() / "thermo.csv";
   const auto system = test::sample_system<3>();
-  ThermoWriter<3> writer(path);
+  ThermoWriter<3> writer(path, system->box);
   writer.thermo(test::sample_snapshot<3>(system->particles, 0.1, 7));
   std::istringstream in(contents(path));  // before the file is closed
   std::string header, row, cell;
@@ -48,11 +48,12 @@ TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   std::getline(in, row);
   EXPECT_EQ(header,
             "time,step,collisions,kinetic,potential,total,shadow,max_energy_error,momentum_x,momentum_y,momentum_z,"
-            "temperature,pressure,conserved,dissipated,work,heat,rotational,rotational_temperature");
+            "temperature,pressure,conserved,dissipated,work,heat,rotational,rotational_temperature,"
+            "pressure_y-,pressure_y+,pressure_z-,pressure_z+");
   std::vector<double> values;
   for (std::istringstream cells(row); std::getline(cells, cell, ',');)
     values.push_back(std::strtod(cell.c_str(), nullptr));
-  ASSERT_EQ(values.size(), 19U);
+  ASSERT_EQ(values.size(), 23U);
   EXPECT_EQ(values[0], 0.1);
   EXPECT_EQ(values[2], 21);
   EXPECT_EQ(values[5], 1.25);

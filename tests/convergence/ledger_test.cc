@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Contacts that lose, walls that push, walls and baths that heat: the literature's results, within error bars, and the
+// ledger H + dissipated − work − heat.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/base/contact_options.h"
+#include "engine/run/observable.h"
+#include "engine/setup/placement.h"
+#include "tests/convergence/fluid.h"
+#include "tests/support/experiments.h"
+
+namespace carom {
+namespace {
+
+template <int D>
+void set_law(System<D>& system, const Parameters& given) {
+  Parameters all = given;
+  if (!all.has("between")) all.set("between", std::vector<std::string>{"*", "*"});
+  add_contact<D>(system.box, system.species, completed("contact", contact_parameters(), all));
+}
+
+/// The fall of ln T per collision of a sphere in the homogeneous cooling state of a dilute gas, with the excess a₂ of
+/// the fourth moment to first order: (1 − e²)/3 · (1 + 3a₂/16) per collision at the Maxwellian rate, which is 1 + a₂/16
+/// times the true one (van Noije, Ernst, Granul. Matter 1 (1998) 57, eq. 8 and 10).
+double excess(double e) { return 16 * (1 - e) * (1 - 2 * e * e) / (81 - 17 * e + 30 * e * e * (1 - e)); }
+double cooling(double e) { return (1 - e * e) / 3 * (1 + 3 * excess(e) / 16) / (1 - excess(e) / 16); }
+
+/// The mean of independent values.
+test::Mean mean_of(const std::vector<double>& values) { return test::blocked_mean(values, 0, values.size()); }
+
+/// The sums of the ledger at rows, and the temperature of the last row.
+template <int D>
+class Rows : public Observer<D> {
+ public:
+  explicit Rows(const Simulation<D>& run) : run_(run) {}
+  void thermo(const Snapshot<D>& shot) override {
+    time.push_back(shot.time), kinetic.push_back(shot.kinetic), potential.push_back(shot.potential);
+    work.push_back(shot.work), dissipated.push_back(shot.dissipated);
+    temperature = shot.temperature;
+    std::vector<double> of_walls(2 * D, 0.0);
+    const auto& walls = run_.statistics().counters.walls;
+    for (std::size_t k = 0; k < std::min<std::size_t>(2 * D, walls.size()); ++k) of_walls[k] = walls[k].heat.value();
+    heat.push_back(std::move(of_walls));
+  }
+  /// What a sum has grown by in each of the blocks of equal length into which the rows from `first` on are divided.
+  std::vector<double> growth(const std::vector<double>& sum, std::size_t first, std::size_t blocks) const {
+    std::vector<double> grown;
+    const std::size_t length = (sum.size() - 1 - first) / blocks;
+    for (std::size_t b = 0; b < blocks; ++b) grown.push_back(sum[first + (b + 1) * length] - sum[first + b * length]);
+    return grown;
+  }
+  std::vector<double> time, kinetic, potential, work, dissipated;
+  std::vector<std::vector<double>> heat;  // by row and face
+  double temperature = 0;
+
+ private:
+  const Simulation<D>& run_;
+};
+
+/// Independent gases of 500 spheres at packing fraction 0.02, too few to form clusters, over 40 collisions of a sphere
+/// from the tenth on.
+TEST(Haff, CoolingRateWithTheFirstSonineCorrection) {
+  for (const double e : {0.95, 0.8, 0.6}) {
+    std::vector<double> rates;
+    for (unsigned seed = 1; seed <= 24; ++seed) {
+      auto system = test::hard_spheres<3>(5, 0.02, seed);
+      const auto n = static_cast<double>(system->size());
+      set_law(*system, {{"restitution", e}});
+      auto run = test::make_run<3>(std::move(system), "free-flight",
+                                   {.step = 5.0, .collisions = static_cast<std::uint64_t>(5 * n)});
+      run->run();
+      const double before = std::log(run->statistics().energy_final);
+      run->extend({.collisions = static_cast<std::uint64_t>(25 * n)});
+      run->run();
+      const Statistics& s = run->statistics();
+      rates.push_back((before - std::log(s.energy_final)) / 40);
+      EXPECT_LE(s.max_energy_error, 1e-13 * s.energy_reference);
+    }
+    const auto [rate, error] = mean_of(rates);
+    std::printf("e = %.2f: cooling %.5f ± %.5f a collision, literature %.5f, Maxwellian %.5f\n", e, rate, error,
+                cooling(e), (1 - e * e) / 3);
+    EXPECT_LT(error, 0.004 * rate);
+    EXPECT_NEAR(rate, cooling(e), 4 * error);
+  }
+}
+
+/// A plain code for three point masses on a line, of which the outer ones approach: the relative speeds (closing) of
+/// the two gaps change by each collision, until all gaps open or a collision is slower than `slow`. Returns the kinetic
+/// energy relative to the centre of mass.
+double three_in_a_row(double e, double slow) {
+  std::array<double, 3> x{0, 10, 20.7}, v{1, 0.1, -0.8};
+  for (;;) {
+    const auto time = [&](int k) {
+      return v[k] > v[k + 1] ? (x[k + 1] - x[k]) / (v[k] - v[k + 1]) : std::numeric_limits<double>::infinity();
+    };
+    const int k = time(0) < time(1) ? 0 : 1;
+    const double t = time(k);
+    if (!(t < 1e300) || v[k] - v[k + 1] < slow) break;
+    for (int i = 0; i < 3; ++i) x[i] += t * v[i];
+    const double turn = 0.5 * (1 + e) * (v[k] - v[k + 1]);
+    v[k] -= turn, v[k + 1] += turn;
+    x[k + 1] = std::max(x[k], x[k + 1]);
+  }
+  const double mean = (v[0] + v[1] + v[2]) / 3;
+  double kinetic = 0;
+  for (const double each : v) kinetic += 0.5 * (each - mean) * (each - mean);
+  return kinetic;
+}
+
+/// Three bodies in a line collapse for e < 7 − 4√3 = 0.0718 (Zhou, Kadanoff, Phys. Rev. E 54 (1996) 623): then nothing
+/// but the motion of their centre remains. Above it they separate with the energy of a plain code.
+TEST(Collapse, OfThreeBodiesBelowTheCriticalRestitution) {
+  for (const std::string method : {"free-flight", "psa", "edda"})
+    for (const double e : {0.03, 0.06, 0.09, 0.2, 0.5}) {
+      auto system =
+          test::make_system<2>({100, 4}, Boundary::open, {{30, 2}, {41, 2}, {52.7, 2}}, {{1, 0}, {0.1, 0}, {-0.8, 0}});
+      set_law(*system, {{"restitution", e}});
+      auto run = test::run_until<2>(std::move(system), method, 0.1, 60);
+      const Statistics& s = run->statistics();
+      const auto& v = run->system().particles.v;
+      const double mean = 0.1, plain = three_in_a_row(e, 1e-8);
+      double kinetic = 0;
+      for (const Vec<2>& each : v) kinetic += 0.5 * (each[0] - mean) * (each[0] - mean);
+      EXPECT_LE(s.max_energy_error, 1e-13) << method;
+      if (e < 7 - 4 * std::sqrt(3.0)) {
+        EXPECT_LT(kinetic, 1e-15) << method << " " << e;
+        EXPECT_GT(s.counters.sphere_sphere, 10u) << method << " " << e;
+      } else {
+        EXPECT_GT(plain, 1e-10) << method << " " << e;
+        EXPECT_NEAR(kinetic, plain, 1e-6 * plain) << method << " " << e;
+      }
+    }
+}
+
+/// Spheres in a channel between two faces of axis 0, which are walls; periodic along the others.
+std::unique_ptr<System<3>> channel(const Vec<3>& edges, std::size_t spheres, unsigned seed) {
+  auto system = std::make_unique<System<3>>();
+  system->box.edges = edges;
+  system->box.boundary = {Boundary::wall, Boundary::periodic, Boundary::periodic};
+  auto sites = lattice_sites<3>(Lattice::centred, system->box, spheres, 0.5);
+  sites.resize(spheres);
+  for (const auto& x : sites) system->particles.add({.x = x});
+  std::vector<Id> all(spheres);
+  for (Id i = 0; i < spheres; ++i) all[i] = i;
+  draw_velocities<3>(system->particles, all, std::vector<double>(spheres, 1.0), seed);
+  return system;
+}
+
+/// A piston at constant speed does the work ∫ force·speed dt; if it is slow, the temperature follows the adiabat
+/// d ln T = −⅔ Z d ln V of Carnahan and Starling's equation of state (J. Chem. Phys. 51 (1969) 635). Centres stay half
+/// a diameter from both walls. The potential is weak enough to leave the adiabat alone, but nothing of it is left out.
+TEST(Adiabat, OfASlowPistonWithForces) {
+  constexpr std::size_t kSpheres = 256;
+  constexpr double kLong = 30, kWide = 8, kSpeed = 0.1, kEnd = 0.4 * kLong / kSpeed;
+  const auto filled = [](double length) { return kSpheres * std::numbers::pi / 6 / ((length - 1) * kWide * kWide); };
+  const auto integral = [](double f) { return std::log(f) + (4 * f - 3 * f * f) / ((1 - f) * (1 - f)); };  // ∫ Z df/f
+  const double expected = std::exp(2.0 / 3 * (integral(filled(0.6 * kLong)) - integral(filled(kLong))));
+  for (const std::string method : {"free-flight", "psa", "edda"}) {
+    std::vector<double> temperatures;
+    for (unsigned seed = 1; seed <= 8; ++seed) {
+      auto system = channel({kLong, kWide, kWide}, kSpheres, seed);
+      system->box.add({.name = "x+", .velocity = kSpeed});
+      if (method != "free-flight")
+        add_interaction(*system, "yukawa",
+                        {{"amplitude", 0.01}, {"kappa", 3.0}, {"cutoff", 2.0}, {"cut", std::string("force-shifted")}});
+      const double step = method == "free-flight" ? 10 : 0.05;
+      auto run = test::make_run<3>(std::move(system), method, {.step = step, .end_time = kEnd, .thermo_interval = 1});
+      Rows<3> rows(*run);
+      run->add(rows);
+      run->run();
+      const Statistics& s = run->statistics();
+      temperatures.push_back(rows.temperature);
+      const WallTally& piston = s.counters.walls.at(1);
+      EXPECT_NEAR(piston.work.value(), kSpeed * piston.impulse.value(), 1e-12 * s.energy_reference);
+      EXPECT_EQ(piston.work.value(), s.counters.work.value());
+      EXPECT_LE(s.max_energy_error, (method == "psa" ? 1e-2 : 1e-12) * s.energy_reference) << method;
+    }
+    const auto [temperature, error] = mean_of(temperatures);
+    std::printf("%s: temperature %.4f ± %.4f, adiabat %.4f\n", method.c_str(), temperature, error, expected);
+    EXPECT_LT(error, 0.02 * expected) << method;
+    // The piston's speed is a tenth of the thermal speed; what it adds beyond the adiabat is of this order squared.
+    EXPECT_NEAR(temperature, expected, 4 * error + 0.01 * expected) << method;
+  }
+}
+
+/// Enskog's thermal conductivity of hard spheres of diameter 1 and mass 1 at packing fraction f and temperature T, in
+/// the first Sonine approximation, which is 2.5 % low for a dilute gas (Chapman, Cowling, The Mathematical Theory of
+/// Non-Uniform Gases, 3rd ed., sections 10.21 and 16.42).
+double conductivity(double f, double temperature) {
+  const double chi = (1 - 0.5 * f) / ((1 - f) * (1 - f) * (1 - f)), y = 4 * f * chi;
+  const double dilute = 75.0 / 64 * std::sqrt(temperature / std::numbers::pi);
+  return dilute * 4 * f * (1 / y + 1.2 + 0.7575 * y);
+}
+
+/// Between walls of two temperatures the heat from one is the heat into the other, and it is what the slope of the
+/// temperature conducts: the slope in the middle half of the channel, far from the jumps at the walls.
+TEST(HeatFlow, BetweenTwoThermalWalls) {
+  constexpr std::size_t kSpheres = 1000, kBlocks = 20, kBins = 20;
+  constexpr double kLong = 25, kWide = 10, kWarmUp = 200, kEnd = 2200;
+  for (const std::string method : {"free-flight", "edda"}) {
+    const double end = method == "edda" ? 0.5 * kEnd : kEnd;
+    auto system = channel({kLong, kWide, kWide}, kSpheres, 1);
+    system->box.add({.name = "x-", .temperature = 2, .seed = 1});
+    system->box.add({.name = "x+", .temperature = 1, .seed = 2});
+    auto run = test::make_run<3>(std::move(system), method,
+                                 {.step = method == "edda" ? 0.05 : 5.0, .end_time = end, .thermo_interval = 5});
+    Rows<3> rows(*run);
+    run->add(rows);
+    const auto profile =
+        make_observable<3>("profile", run->system(), {{"interval", 1.0}, {"bins", std::int64_t{kBins}}}, kWarmUp);
+    run->add(*profile);
+    run->run();
+    const Statistics& s = run->statistics();
+    const auto first = static_cast<std::size_t>(kWarmUp / 5);
+    const auto in_time = [&](std::size_t face) {
+      std::vector<double> sum;
+      for (const auto& row : rows.heat) sum.push_back(row[face]);
+      return rows.growth(sum, first, kBlocks);
+    };
+    const auto hot = in_time(0), cold = in_time(1);
+    std::vector<double> both, flow;
+    const double length = (end - kWarmUp) / kBlocks;
+    for (std::size_t b = 0; b < kBlocks; ++b) {
+      both.push_back((hot[b] + cold[b]) / length);
+      flow.push_back(0.5 * (hot[b] - cold[b]) / length / (kWide * kWide));
+    }
+    const auto [left, left_error] = mean_of(both);
+    const auto [flux, flux_error] = mean_of(flow);
+    EXPECT_NEAR(left, 0, 4 * left_error) << method;
+    EXPECT_LE(s.max_energy_error, 1e-12 * (s.energy_reference + std::abs(hot[0]) * kBlocks));
+    const auto table = profile->table();
+    const auto &x = table[0].values, &density = table[1].values, &temperature = table[2].values;
+    for (std::size_t b = 1; b + 2 < kBins; ++b) EXPECT_GT(temperature[b], temperature[b + 1]) << method << " " << b;
+    double conducted = 0, used = 0;  // the mean of −λ dT/dx over the middle
+    for (std::size_t b = kBins / 4; b < 3 * kBins / 4; ++b) {
+      const double slope = (temperature[b + 1] - temperature[b - 1]) / (x[b + 1] - x[b - 1]);
+      conducted -= conductivity(density[b] * std::numbers::pi / 6, temperature[b]) * slope;
+      used += 1;
+    }
+    conducted /= used;
+    std::printf("%s: %.4f ± %.4f flows through each area, the two walls differ by %.4f ± %.4f in all; Enskog %.4f\n",
+                method.c_str(), flux, flux_error, left, left_error, conducted);
+    EXPECT_LT(flux_error, 0.08 * flux) << method;
+    EXPECT_NEAR(flux, conducted, 4 * flux_error + 0.05 * conducted) << method;
+  }
+}
+
+/// Inelastic discs under gravity on a shaken floor reach a steady state, in which the floor's work is dissipated.
+TEST(ShakenBox, WorkIsDissipated) {
+  constexpr std::size_t kBlocks = 20;
+  for (const std::string method : {"free-flight", "psa", "edda"}) {
+    auto system = test::make_system<2>({12, 200}, Boundary::wall, {}, {});
+    for (int k = 0; k < 60; ++k)
+      system->particles.add({.x = {0.8 + 1.1 * (k % 10), 1 + 1.1 * static_cast<double>(k / 10)},
+                             .v = {0.1 * (k * 7 % 13 - 6), 0.1 * (k * 5 % 11 - 5)}});
+    system->box.add({.name = "y-", .amplitude = 0.3, .frequency = 1.1});
+    set_law(*system, {{"restitution", 0.8}, {"rest_speed", 1e-3}});
+    add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+    auto run = test::make_run<2>(std::move(system), method, {.step = 0.02, .end_time = 800, .thermo_interval = 1});
+    Rows<2> rows(*run);
+    run->add(rows);
+    run->run();
+    const Statistics& s = run->statistics();
+    const auto work = rows.growth(rows.work, 100, kBlocks), lost = rows.growth(rows.dissipated, 100, kBlocks);
+    std::vector<double> left;
+    for (std::size_t b = 0; b < kBlocks; ++b) left.push_back((work[b] - lost[b]) / 35);
+    const auto [power, power_error] = mean_of(work);
+    const auto [rest, rest_error] = mean_of(left);
+    std::printf("%s: the work of %.3f ± %.3f per unit time less what is dissipated: %.4f ± %.4f\n", method.c_str(),
+                power / 35, power_error / 35, rest, rest_error);
+    EXPECT_NEAR(rest, 0, 4 * rest_error) << method;
+    EXPECT_LT(rest_error, 0.05 * power / 35) << method;
+    const double scale = s.energy_reference + s.counters.work.value();
+    EXPECT_LE(s.max_energy_error, (method == "psa" ? 0.05 : 1e-12) * scale) << method;
+  }
+}
+
+/// Discs at random places in a box of this width, a little warm; they fall under gravity. The law of all contacts: e =
+/// ½.
+constexpr double rest_speed = 0.01;
+std::unique_ptr<System<2>> falling_discs(int count, double width, unsigned seed) {
+  std::vector<Vec<2>> x;
+  RandomStream random(seed, RandomPurpose::position, 0);
+  while (static_cast<int>(x.size()) < count) {
+    const Vec<2> at(0.5 + random.uniform() * (width - 1), 0.5 + random.uniform() * (2 * width - 1));
+    if (std::ranges::all_of(x, [&](const Vec<2>& other) { return (other - at).norm() > 1.0001; })) x.push_back(at);
+  }
+  std::vector<Id> all(x.size());
+  for (Id i = 0; i < x.size(); ++i) all[i] = i;
+  const std::vector<Vec<2>> v(x.size(), Vec<2>::Zero());
+  auto system = test::make_system<2>({width, 2 * width}, Boundary::wall, std::move(x), v);
+  draw_velocities<2>(system->particles, all, std::vector<double>(all.size(), 0.1), seed);
+  set_law(*system, {{"restitution", 0.5}, {"rest_speed", rest_speed}});
+  add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+  return system;
+}
+
+/// Discs fall, come to rest and lie still: their weight is on the floor, nothing moves in 10⁴ steps. Then the floor is
+/// shaken, and they settle again. No overlap, and the ledger is closed in all three runs.
+void fall_and_rest(int count, double width, unsigned seed, double fall, std::int64_t still) {
+  auto system = falling_discs(count, width, seed);
+  for (const bool shaken : {false, true}) {
+    if (shaken) system->box.add({.name = "y-", .amplitude = 0.05, .frequency = 1});
+    auto run = test::run_until<2>(std::move(system), "edda", 0.01, shaken ? 2 : fall);
+    const auto closed = [&](const Statistics& s, double scale) {
+      EXPECT_LE(s.max_energy_error, 1e-12 * scale);
+      EXPECT_LE(s.counters.max_overlap, 1e-12);
+    };
+    closed(run->statistics(), run->statistics().energy_reference);
+    if (shaken) {
+      EXPECT_GT(run->statistics().counters.work.value(), 0.1);
+    }
+    const Particles<2> after = run->system().particles;
+    auto again = test::make_system<2>(run->system().box.edges, Boundary::wall, after.x, after.v);
+    set_law(*again, {{"restitution", 0.5}, {"rest_speed", rest_speed}});
+    add_interaction(*again, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+    if (shaken) {  // the floor is back where it was: a sine that ends after whole periods
+      auto settled = test::run_until<2>(std::move(again), "edda", 0.01, fall);
+      closed(settled->statistics(), settled->statistics().energy_reference);
+      EXPECT_LT(settled->statistics().counters.pieces, static_cast<std::uint64_t>(200 * fall / 0.01));
+      continue;
+    }
+    auto rest =
+        test::run_steps<2>(std::move(again), "edda", 0.01, 100);  // the reactions of a new run are not known yet
+    const std::vector<Vec<2>> where = rest->system().particles.x;
+    const auto pushed = [&] { return rest->statistics().counters.walls.at(2).impulse.value(); };
+    const double before = pushed();
+    rest->extend({.steps = 100 + still});
+    rest->run();
+    const Statistics& s = rest->statistics();
+    closed(s, s.energy_reference);
+    double fastest = 0;
+    for (const Vec<2>& v : rest->system().particles.v) fastest = std::max(fastest, v.norm());
+    EXPECT_LE(test::largest_difference<2>(rest->system().particles.x, where), 1e-12);
+    EXPECT_LT(fastest, 1e-12);
+    const double weight = (pushed() - before) / (0.01 * static_cast<double>(still));
+    EXPECT_NEAR(weight, count, 1e-10 * count);
+    std::printf("%d discs at rest: %.2f force passes and %.2f pieces a step, weight %.12g\n", count,
+                s.force_passes / static_cast<double>(still),
+                static_cast<double>(s.counters.pieces) / static_cast<double>(still), weight);
+    system = test::make_system<2>(rest->system().box.edges, Boundary::wall, rest->system().particles.x,
+                                  rest->system().particles.v);
+    set_law(*system, {{"restitution", 0.5}, {"rest_speed", rest_speed}});
+    add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+  }
+}
+
+TEST(Pile, OfFallingDiscsComesToRest) { fall_and_rest(20, 7.37, 2, 30, 1000); }
+TEST(PileSlow, OfManyFallingDiscsComesToRest) { fall_and_rest(50, 10.37, 2, 40, 10'000); }
+
+}  // namespace
+}  // namespace carom
