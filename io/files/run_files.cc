@@ -22,7 +22,8 @@ template <int D>
 RunFiles<D>::RunFiles(const Deck& deck, const System<D>& system, const std::optional<FileMarks>& marks)
     : trajectory_(deck.output.directory / run_file::trajectory, deck, system,
                   marks ? std::optional(marks->frames) : std::nullopt),
-      thermo_(deck.output.directory / run_file::thermo, system.box, marks ? std::optional(marks->thermo) : std::nullopt) {
+      thermo_(deck.output.directory / run_file::thermo, system.box,
+              marks ? std::optional(marks->thermo) : std::nullopt) {
   if (deck.plan.events)
     events_ = std::make_unique<EventWriter<D>>(deck.output.directory / run_file::events, deck,
                                                marks ? std::optional(marks->events) : std::nullopt);

@@ -78,9 +78,9 @@ DECK_ERRORS = {
     "thermal wall without heat": (
         walled('name = "y+"\ntemperature = 0'), 11, ["'temperature' must be positive (is 0)"]),
     "contact that gains energy": (
-        touching('between = ["disc", "disc"]\nrestitution = 1.01'), 11, ["'restitution' must be at most 1 (is 1.01)"]),
+        touching('between = ["disc", "disc"]\nrestitution = 1.01'), 11, ["'restitution' is 1.01; take at most 1"]),
     "contact with a negative restitution": (
-        touching('between = ["disc", "disc"]\nrestitution = -0.1'), 11, ["'restitution' must not be negative (is -0.1)"]),
+        touching('between = ["disc", "disc"]\nrestitution = -0.1'), 11, ["'restitution' must be zero or positive (is -0.1)"]),
     "contact without partners": (touching("restitution = 0.5"), 9, ["missing key 'between' in [[contact]]"]),
     "contact of one partner": (touching('between = ["disc"]'), 9, ["a contact is between two partners", "give two species"]),
     "contact of an unknown species": (
@@ -96,7 +96,7 @@ DECK_ERRORS = {
     "contact with an unknown key": (
         touching('between = ["*", "*"]\nrestituton = 0.5'), 11, ["unknown key 'restituton'", "did you mean 'restitution'?"]),
     "contact with a negative rest speed": (
-        touching('between = ["*", "*"]\nrest_speed = -1'), 11, ["'rest_speed' must not be negative (is -1)"]),
+        touching('between = ["*", "*"]\nrest_speed = -1'), 11, ["'rest_speed' must be zero or positive (is -1)"]),
     "contact rougher than rough": (rough("tangential = 1.5"), 11, ["'tangential' is 1.5; take at most 1"]),
     "contact smoother than smooth": (rough("tangential = -1.5"), 9, ["at least -1 (is -1.5)", "from -1, smooth"]),
     "negative friction": (rough("tangential = 0.5\nfriction = -0.1"), 12, ["'friction' must be zero or positive (is -0.1)"]),

@@ -68,23 +68,22 @@ def test_walls_are_those_of_one_rank_and_continue(method, tmp_path):
 GRAINS = toml_text(tomllib.loads(DISCS) | {
     "title": "grains",
     "system": {"dimension": 2, "box": [30.0, 20.0], "boundary": ["wall", "wall"]},
-    "contact": [{"between": ["*", "*"], "restitution": 0.4, "rest_speed": 1e-3},
-                {"between": ["large", "large"], "restitution": {"form": "power", "v0": 0.1, "exponent": 0.25}, "rest_speed": 1e-3}],
+    "contact": [{"between": ["*", "*"], "restitution": 0.4, "rest_speed": 0.02},
+                {"between": ["large", "large"], "restitution": {"form": "power", "v0": 0.1, "exponent": 0.25}, "rest_speed": 0.02}],
     "interaction": [{"type": "uniform-field", "acceleration": [0.1, -1.0]}],
-    "run": {"end_time": 4.0}})
+    "run": {"end_time": 3.0}})
 
 
 @pytest.mark.parametrize("method", ["free-flight", "psa", "edda", "cdda", "cva", "mcva"])
 def test_inelastic_contacts_are_those_of_one_rank_and_continue(method, tmp_path):
     output = ["output.events=true", f"integrator.type={method}", "integrator.step=" + ("0.5" if method == "free-flight" else "0.02")]
-    end = 4.0
+    end = 3.0
     if method in ("cdda", "cva", "mcva"):  # which cut the step of all discs at each contact
-        output += ["particles.0.count=30", "particles.1.count=20", "run.end_time=2.0"]
-        end = 2.0
+        output += ["particles.0.count=30", "particles.1.count=20"]
     deck = write_deck(tmp_path, GRAINS)
     run(deck, tmp_path / "plain", output)
     energy = summary(tmp_path / "plain")["energy"]
-    assert energy["dissipated"] > 0.2 * energy["reference"]
+    assert energy["dissipated"] > 0.05 * energy["reference"]
     for ranks in 2, 3, 4:
         assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
         assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
