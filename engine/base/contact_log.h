@@ -36,12 +36,6 @@ EventKey<D> pair_key(double time, std::uint32_t generation, Id first, Id second,
   return {.time = time, .generation = generation, .lo = first, .hi = second, .image = image};
 }
 
-/// Whether two events have the same partners, whatever their times.
-template <int D>
-bool same_partners(const EventKey<D>& a, const EventKey<D>& b) {
-  return a.kind == b.kind && a.lo == b.lo && a.hi == b.hi && a.image == b.image;
-}
-
 /// Names the partners for messages: "particles 3 and 7", "particle 3 and the upper wall of axis 1".
 template <int D>
 std::string partners(const EventKey<D>& key, const Box<D>& box) {

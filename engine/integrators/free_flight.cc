@@ -109,23 +109,22 @@ IntegratorInfo free_flight() {
       "epochs";
   Parameter limit = parameter::max_events_per_step();
   limit.meaning = "largest number of collisions per particle in an epoch; more end the run with an error";
-  return {
-      .name = "free-flight",
-      .title = "Event-driven hard spheres",
-      .order = "exact",
-      .conserves = "energy and linear momentum, to rounding",
-      .parameters = {epoch, limit},
-      .documentation =
-          "Exact flight between elastic collisions, for hard spheres without forces or in a uniform field. There is "
-          "no time step: the trajectory is exact to rounding. `step` is only the length of an epoch.",
-      .source =
-          "Alder, Wainwright, J. Chem. Phys. 31 (1959) 459; Rapaport, J. Comput. Phys. 34 (1980) 184; "
-          "Lubachevsky, J. Comput. Phys. 94 (1991) 255",
-      .stepping = false,
-      .smooth_forces = false,
-      .exact = true,
-      .in_2d = make<FreeFlight, 2>,
-      .in_3d = make<FreeFlight, 3>};
+  return {.name = "free-flight",
+          .title = "Event-driven hard spheres",
+          .order = "exact",
+          .conserves = "energy and linear momentum, to rounding",
+          .parameters = {epoch, limit},
+          .documentation =
+              "Exact flight between collisions, for hard spheres without forces or in a uniform field. There is "
+              "no time step: the trajectory is exact to rounding. `step` is only the length of an epoch.",
+          .source =
+              "Alder, Wainwright, J. Chem. Phys. 31 (1959) 459; Rapaport, J. Comput. Phys. 34 (1980) 184; "
+              "Lubachevsky, J. Comput. Phys. 94 (1991) 255",
+          .stepping = false,
+          .smooth_forces = false,
+          .exact = true,
+          .in_2d = make<FreeFlight, 2>,
+          .in_3d = make<FreeFlight, 3>};
 }
 
 }  // namespace carom::integrator

@@ -2,6 +2,7 @@
 """The Python tools against files with known contents."""
 
 import fcntl
+import re
 import subprocess
 import sys
 import tomllib
@@ -346,3 +347,11 @@ def test_decks_survive_being_written():
     for file in sorted((ROOT / "inputs").glob("*.toml")):
         deck = tomllib.loads(file.read_text())
         assert tomllib.loads(toml_text(deck)) == deck
+
+
+def test_the_site_has_every_page():
+    """tools/docs ends with an error if a page is in no list of the home page; the tutorials make their own."""
+    listed = re.findall(r"^(?:\w+ <)?([\w./-]+)>?$", (ROOT / "tools/site/index.md").read_text(), re.MULTILINE)
+    pages = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    pages = [page for page in pages if not page.startswith(("inputs/tutorials/", "tools/site/"))]
+    assert len(pages) > 10 and [page for page in pages if page.removesuffix(".md") not in listed] == []

@@ -167,7 +167,7 @@ TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
     };
     const Vec<3> x = s.flights.at(3, now).x, other = s.flights.at(40, now).x;
     for (const auto& [i, at] : {std::pair<Slot, Vec<3>>{3, other}, {40, x}}) {  // they exchange positions
-      s.flights.set(i, {at, -2.0 * s.flights[i].v, now, s.flights[i].id, 0, s.flights[i].species});
+      s.flights.set(i, {at, -2.0 * s.flights[i].v, now, s.flights[i].id, 0, s.flights[i].species}, Spin<3>::Zero());
       s.search.move(i, now);
     }
     plan_all();

@@ -231,7 +231,7 @@ TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
   EXPECT_GT(before, 5u);
   EXPECT_LT(before, all);
   std::vector<Slot> other;
-  for (const auto& [slot, record] : paths.finish()) {
+  for (const auto& [slot, record, spin] : paths.finish()) {
     EXPECT_LE(record.t, kEnd / 2);
     if (d.parts[0]->ownership.owns(slot)) other.push_back(slot);
   }
