@@ -34,7 +34,7 @@ Rubbed<D> rub_pair(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, do
   slip -= (slip.dot(d) / square) * d;
   const double resisting =
       (1 / a.mass + 1 / b.mass) + (arm_a.squaredNorm() / moment_a + arm_b.squaredNorm() / moment_b);
-  const Rubbed<D> rubbed = rub<D>(law, slip, resisting, factor * std::sqrt(square));
+  Rubbed<D> rubbed = rub<D>(law, slip, resisting, factor * std::sqrt(square));
   *a.spin -= torque<D>(arm_a, rubbed.impulse) / moment_a;
   *b.spin -= torque<D>(arm_b, rubbed.impulse) / moment_b;
   return rubbed;
@@ -49,7 +49,7 @@ Rubbed<D> rub_wall(const ContactLaws& laws, std::uint32_t wall, const Vec<D>& no
   const Vec<D> arm = a.radius * normal;
   Vec<D> slip = v - turned<D>(*a.spin, arm);
   slip -= slip.dot(normal) * normal;
-  const Rubbed<D> rubbed = rub<D>(law, slip, 1 / a.mass + arm.squaredNorm() / moment, pressing);
+  Rubbed<D> rubbed = rub<D>(law, slip, 1 / a.mass + arm.squaredNorm() / moment, pressing);
   *a.spin -= torque<D>(arm, rubbed.impulse) / moment;
   return rubbed;
 }
