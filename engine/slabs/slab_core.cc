@@ -19,7 +19,7 @@ constexpr std::size_t kBetweenLooks = 1024;  // events between two checks for a 
 // Contacts of one particle on parabolas in a slab: a light sphere between two approaching heavy ones collides about
 // π √(M/m) times (Galperin, Regul. Chaotic Dyn. 8 (2003) 375), 10³ for masses of 1 : 10⁵. A sweep costs as much as its
 // contacts, and a shorter slab takes fewer sweeps, so flights with more contacts than this are not tried.
-constexpr std::uint32_t kMostContactsOfParticle = 100;
+constexpr std::uint32_t kMostContactsOfParticle = 1000;
 }  // namespace
 
 template <int D>
