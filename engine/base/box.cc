@@ -70,7 +70,8 @@ std::vector<Wall<D>> Box<D>::walls() const {
 
 /// Sets where the wall is and how it moves. In a step of length h a shaken wall moves on a parabola. That of an
 /// oscillator with the acceleration −Ω²(X + X')/2, where X and X' are its positions at the two ends and Ω =
-/// (2/h)·tan(πfh), has the positions of the sine at the ends of all steps and a continuous velocity, of order 2.
+/// (2/h)·tan(πfh), has the positions of the sine at the ends of all steps and a continuous velocity, of order 2. Where
+/// spheres fly straight, it moves straight too: a sphere that is carried along neither sinks in nor gets ahead.
 template <int D>
 void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
   if (its.amplitude == 0) {
@@ -89,6 +90,11 @@ void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
   const auto [cos, sin] = cosine_and_sine(its.frequency * step_start);
   const double omega = 2 / step * (sin_half / cos_half), s = time - step_start;
   const double end = cosine_and_sine(its.frequency * (step_start + step))[1];
+  if (straight) {
+    wall.velocity = its.amplitude * (end - sin) / step;
+    wall.offset += its.amplitude * sin + s * wall.velocity;
+    return;
+  }
   wall.acceleration = -0.5 * omega * omega * its.amplitude * (sin + end);
   wall.velocity = omega * its.amplitude * cos + s * wall.acceleration;
   wall.offset += its.amplitude * (sin + s * omega * cos) + 0.5 * s * s * wall.acceleration;

@@ -48,6 +48,7 @@ struct Box {
   Bath bath{};
   double time = 0;                  ///< the start of the slab, since the start of the run
   double step_start = 0, step = 0;  ///< the step of a stepping method; step = 0: shaken walls move on a sine
+  bool straight = false;            ///< shaken walls move straight over each step
   ContactLaws contacts{};
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }

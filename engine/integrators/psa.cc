@@ -19,6 +19,7 @@ class PrimitiveSplitting : public Integrator<D> {
 
   void start(System<D>& system, Counters& counters) override {
     core_.emplace(system, max_events_);
+    system.box.straight = true;
     accelerations_.start(system, counters);
   }
 
@@ -57,7 +58,7 @@ class PrimitiveSplitting : public Integrator<D> {
   void inelastic_slab(System<D>& system, double length, SlabReport<D>& report) {
     auto& p = system.particles;
     auto& scan = core_->scan();
-    scan.stop_within(length);
+    scan.rest().stop_within(length);
     resolve_contacts(system, 0);
     kick(p.v, accelerations_.a, 0.5 * length);
     if (!scan.resting().empty()) scan.stop_approach(p.x, p.v, 0.5 * length);

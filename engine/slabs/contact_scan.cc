@@ -16,14 +16,6 @@ namespace {
 constexpr std::uint32_t kMostRounds = 30000;
 constexpr double kMostCorrection = 1e-6 / kRounding;  // of an overlap, relative to the rounding of the speeds
 
-/// The key of a resting contact: its partners alone.
-template <int D>
-EventKey<D> without_time(EventKey<D> key) {
-  key.time = 0;
-  key.generation = 0;
-  return key;
-}
-
 }  // namespace
 
 template <int D>
@@ -36,7 +28,8 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events, s
       list_(system.box, system.particles.radius),
       keeps_momentum_(system.keeps_momentum()),
       max_events_(max_events),
-      reactions_(reactions) {}
+      reactions_(reactions),
+      rest_(system.box, system.particles, reactions) {}
 
 template <int D>
 void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a,
@@ -44,38 +37,17 @@ void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* con
   counters_ = &counters;
   contacts_ = contacts;
   watch_ = watch;
-  a_ = a;
-  length_ = length;
   walls_at_ = std::numeric_limits<double>::quiet_NaN();  // they may move otherwise from now on
   events_ = 0;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
-  fallen_back_.clear();
-  note_pressed();
-}
-
-template <int D>
-void ContactScan<D>::note_pressed() {
-  pressed_.assign(reactions_.empty() ? 0 : particles_.size(), 0.0);
-  held_.assign(box_.contacts.elastic() ? 0 : pressed_.size(), Vec<D>::Zero());
-  for (const auto& [key, force] : reactions_) {
-    pressed_[key.lo] += force / particles_.mass[key.lo];
-    if (key.kind == EventKind::pair) pressed_[key.hi] += force / particles_.mass[key.hi];
-    if (held_.empty()) continue;
-    const Vec<D> along = normal(key, particles_.x).normalized();
-    held_[key.lo] += force / particles_.mass[key.lo] * along;
-    if (key.kind == EventKind::pair) held_[key.hi] -= force / particles_.mass[key.hi] * along;
-  }
+  rest_.begin_step(a, length);
 }
 
 /// Finds all contacts at x, in the order of their keys, and gaps so small that contacts may be held there.
 template <int D>
 void ContactScan<D>::find_touching(double time, Positions<D> x) {
   touching_.clear();
-  widest_ = 0;
-  if (!box_.contacts.elastic())
-    for (const ContactLaw& law : box_.contacts.all())
-      if (!law.elastic())
-        widest_ = std::max(widest_, law.slowest(box_.contacts.thermal_speed) * length_ / kMostBounces);
+  widest_ = rest_.widest_gap();
   const auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma, double speed = 0) {
     counters_->max_overlap = std::max(counters_->max_overlap, -gap / sigma);
     touching_.push_back({.key = key, .normal = normal, .speed = speed, .gap = gap});
@@ -108,7 +80,22 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
     while (known != reactions_.end() && known->key < partners) ++known;
     touch.force = known != reactions_.end() && known->key == partners ? known->force : 0.0;
   }
-  std::erase_if(touching_, [&](const Touch<D>& touch) { return open(touch) && touch.gap > holding_gap(touch); });
+  if (widest_ > 0) note_open();
+}
+
+/// Decides what may happen to contacts with a small gap.
+template <int D>
+void ContactScan<D>::note_open() {
+  std::erase_if(touching_, [&](const Touch<D>& touch) { return open(touch) && !rest_.dissipates(touch.key); });
+  std::vector<char> touched(particles_.size(), 0);
+  for (const Touch<D>& touch : touching_)
+    if (!open(touch)) touched[touch.key.lo] = touched[touch.pair() ? touch.key.hi : touch.key.lo] = 1;
+  for (Touch<D>& touch : touching_) {
+    if (!open(touch)) continue;
+    touch.holds =
+        rest_.kicks() || touch.force > 0 || touch.gap <= rest_.holding_gap(touch.key, touch.normal, touch.force);
+    touch.hits = touched[touch.key.lo] || (touch.pair() && touched[touch.key.hi]);
+  }
 }
 
 /// Sorts the contacts into approaching and resting ones. `all_stop`: contacts that dissipate rest if they approach.
@@ -118,118 +105,20 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   resting_.clear();
   for (const Touch<D>& touch : touching_) {
     const double speed = normal_speed(touch, v), resting = resting_speed(touch, v);
-    if (passes_by(touch, speed)) continue;
-    if (!open(touch) && speed < -stopping_speed(touch.key, touch.normal, touch.force, resting) &&
-        !(all_stop && dissipates(touch.key)))
+    const bool fast = speed < -rest_.stopping_speed(touch.key, touch.normal, touch.force, resting);
+    if (!(fast ? touch.hits : speed < 0 || touch.holds)) continue;
+    if (fast && !(all_stop && rest_.dissipates(touch.key)))
       approaching_.push_back(touch);
-    else if (speed <= holding_speed(touch, resting))
+    else if (speed <= rest_.holding_speed(touch.key, touch.normal, touch.force, resting))
       resting_.push_back({.key = without_time(touch.key), .normal = touch.normal, .force = touch.force});
   }
 }
 
 template <int D>
-double ContactScan<D>::known_force(const EventKey<D>& key) const {
-  const EventKey<D> wanted = without_time(key);
-  const auto known = std::ranges::lower_bound(reactions_, wanted, {}, &Reaction<D>::key);
-  return known != reactions_.end() && known->key == wanted ? known->force : 0.0;
-}
-
-template <int D>
-bool ContactScan<D>::falls_back(const EventKey<D>& key, double closing, double speed, double sigma) {
-  if (!(closing > 0) || speed > std::max(speed_of_rest(closing, sigma), slowest_bounce(key, closing))) return false;
-  const EventKey<D> partners = without_time(key);
-  if (std::ranges::find(fallen_back_, partners, &std::pair<EventKey<D>, double>::first) != fallen_back_.end())
-    return false;
-  fallen_back_.push_back({partners, closing});
-  return true;
-}
-
-template <int D>
-double ContactScan<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
-                                     const Vec<D>& v_hi) const {
-  const bool pair = key.kind == EventKind::pair;
-  // Nothing rests on a thermal wall.
-  if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) return -std::numeric_limits<double>::min();
-  const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
-  const double sigma = pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
-  const double closing = pressing(key, normal, force);
-  if (!(closing > 0)) return rounding;
-  return std::max(rounding, speed_of_rest(closing, sigma));
-}
-
-template <int D>
 double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
                                       const Vec<D>& v_hi) const {
-  const double force = known_force(key);
-  return stopping_speed(key, normal, force, resting_speed(key, normal, force, v_lo, v_hi));
-}
-
-template <int D>
-double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
-                                      double resting) const {
-  if (resting < 0 || !dissipates(key)) return resting;
-  const double closing = std::max(0.0, pressing(key, normal, force));
-  const ContactLaw& law = law_of(key);
-  // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
-  const double kick = kick_ * closing, e = law.at(kick, 0, 0);
-  return std::max(resting, law.slowest(box_.contacts.thermal_speed) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces));
-}
-
-template <int D>
-bool ContactScan<D>::dissipates(const EventKey<D>& key) const {
-  return !box_.contacts.elastic() && !law_of(key).elastic();
-}
-
-template <int D>
-const ContactLaw& ContactScan<D>::law_of(const EventKey<D>& key) const {
-  const auto& species = particles_.species;
-  return key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
-                                     : box_.contacts.of_wall(species[key.lo], key.hi);
-}
-
-/// A contact that dissipates, and opens more slowly than this, closes again within the step so slowly that it stops.
-template <int D>
-double ContactScan<D>::slowest_bounce(const EventKey<D>& key, double closing) const {
-  if (!dissipates(key) || !(closing > 0)) return 0;
-  return std::min(law_of(key).slowest(box_.contacts.thermal_speed), 0.5 * closing * length_);
-}
-
-/// A contact that dissipates is held where it is if the gap is as small as this: a bounce at an eighth of the speed at
-/// which approaches end opens it as far.
-template <int D>
-double ContactScan<D>::holding_gap(const Touch<D>& touch) const {
-  if (!dissipates(touch.key)) return 0;
-  const double closing = pressing(touch.key, touch.normal, touch.force), slowest = slowest_bounce(touch.key, closing);
-  return closing > 0 ? slowest * slowest / (2 * kMostBounces * closing) : 0;
-}
-
-/// A contact is held if it opens more slowly than this.
-template <int D>
-double ContactScan<D>::holding_speed(const Touch<D>& touch, double resting) const {
-  if (resting < 0 || !dissipates(touch.key)) return resting;
-  return std::max(resting, slowest_bounce(touch.key, pressing(touch.key, touch.normal, touch.force)));
-}
-
-/// The acceleration at which a contact would close by forces and, if contacts dissipate, by other reactions.
-template <int D>
-double ContactScan<D>::pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const {
-  const bool pair = key.kind == EventKind::pair;
-  const auto between = [&](const std::vector<Vec<D>>& w) { return pair ? Vec<D>(w[key.lo] - w[key.hi]) : w[key.lo]; };
-  Vec<D> a = Vec<D>::Zero();
-  if (a_ && key.lo < a_->size()) a = between(*a_);
-  if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
-  const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
-  double closing = std::max(force * inverse_mass, -a.dot(normal) / normal.norm());
-  for (const auto& [partners, acceleration] : fallen_back_)
-    if (partners == without_time(key)) closing = std::max(closing, acceleration);
-  return held_.empty() ? closing : std::max(closing, -(a + between(held_)).dot(normal) / normal.norm());
-}
-
-/// The gradient of the gap of a contact at x, up to a positive factor.
-template <int D>
-Vec<D> ContactScan<D>::normal(const EventKey<D>& key, Positions<D> x) const {
-  if (key.kind == EventKind::wall) return box_.wall(key.hi).normal;
-  return x[key.lo] - x[key.hi] + box_.shift(key.image);
+  const double force = rest_.known_force(key);
+  return rest_.stopping_speed(key, normal, force, rest_.resting_speed(key, normal, force, v_lo, v_hi));
 }
 
 template <int D>
@@ -267,12 +156,20 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
     if (watch_) watch_->cut();
     const bool dissipative = !box_.contacts.elastic();
     const std::vector<Vec<D>> before(dissipative ? v.begin() : v.end(), v.end());
-    lost += stop_rounding(v) + stop_approach(x, v);
+    lost += stop_rounding(v);
+    if (dissipative) {  // a sphere that stops may approach another one that it was leaving
+      std::vector<RestingContact<D>> all;
+      for (const Touch<D>& touch : touching_)
+        if (rest_.dissipates(touch.key) || rests(touch.key))
+          all.push_back({.key = without_time(touch.key), .normal = touch.normal, .force = touch.force});
+      resting_.swap(all);
+    }
+    lost += stop_approach(x, v);
     if (dissipative) lost -= count_dissipated(before, v);
     sort_out(v, all_stop);  // a sphere that was stopped may have been moving away from another contact
     const auto slow = [&](const Touch<D>& touch) {
       const double speed = normal_speed(touch, v);
-      return speed < -resting_speed(touch, v) && !passes_by(touch, speed);
+      return speed < -resting_speed(touch, v) && (touch.hits || speed >= -stopping_speed(touch, v));
     };
     if (approaching_.empty() && !(dissipative && generation < kMostRounds && std::ranges::any_of(touching_, slow)))
       break;
@@ -392,7 +289,7 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     contact.bound = pair ? 0.0 : length < 0 ? -mean_speed(hi, length) : mean_speed(hi, length);
     contact.slack = 0.125 * normal_slack(contact, w_before);  // about 30 ε of the speeds, as good as a new solution
     const double touching = tolerance(sigma);
-    if (std::abs(gap) <= 0.5 * touching || (gap > 0 && dissipates(contact.key))) continue;
+    if (std::abs(gap) <= 0.5 * touching || (gap > 0 && rest_.dissipates(contact.key))) continue;
     // The rounding of many pieces has opened or closed the contact. It is corrected at a speed that counts as rest. In
     // short pieces the rounding of positions, ε x, would undo this; so from an overlap beyond the tolerance the contact
     // returns by a few ε x at once, unless the piece is so short that this takes more than 10⁻⁶ of the speeds: the work
@@ -415,7 +312,7 @@ double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v, double kick) 
   double lost = 0;
   solve_reactions<D>(resting_, particles_.mass, v, &lost);
   for (auto& contact : resting_) {
-    lost += count_push(contact, contact.lambda * contact.normal.norm(), wall_speed(contact.key));
+    lost += count_push(contact, contact.lambda * contact.normal.norm(), contact.bound);
     if (kick > 0) contact.force = contact.lambda * contact.normal.norm() / kick;
   }
   return lost;
@@ -437,9 +334,9 @@ template <int D>
 void ContactScan<D>::drop_open(Positions<D> x) {
   std::erase_if(resting_, [&](const auto& contact) {
     const auto& [key, x_lo] = std::pair(contact.key, x[contact.key.lo]);
-    const double gap = key.kind == EventKind::pair ? normal(key, x).norm() - distance(key)
-                                                   : box_.wall(key.hi).gap(x_lo, distance(key));
-    return gap > std::max(tolerance(distance(key)), widest_);
+    const double gap = key.kind == EventKind::pair ? normal(key, x).norm() - rest_.distance(key)
+                                                   : box_.wall(key.hi).gap(x_lo, rest_.distance(key));
+    return gap > std::max(tolerance(rest_.distance(key)), widest_);
   });
 }
 
@@ -449,10 +346,10 @@ template <int D>
 double ContactScan<D>::count_dissipated(Positions<D> before, Positions<D> after) {
   double all = 0;
   for (const auto& contact : resting_) {
-    if (contact.lambda == 0 || !dissipates(contact.key)) continue;
+    if (contact.lambda == 0 || !rest_.dissipates(contact.key)) continue;
     Vec<D> both = before[contact.key.lo] + after[contact.key.lo];
     if (contact.key.kind == EventKind::pair) both -= before[contact.key.hi] + after[contact.key.hi];
-    all += contact.lambda * (wall_speed(contact.key) - 0.5 * contact.normal.dot(both));
+    all += contact.lambda * (contact.bound - 0.5 * contact.normal.dot(both));
   }
   if (all != 0) counters_->dissipated.add(all);
   return all;
@@ -467,7 +364,7 @@ void ContactScan<D>::remember(double length) {
   reactions_.clear();
   for (const auto& contact : resting_)
     if (contact.force > 0) reactions_.push_back({contact.key, contact.force});
-  note_pressed();
+  rest_.note_reactions();
 }
 
 template <int D>

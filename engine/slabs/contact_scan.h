@@ -14,26 +14,21 @@
 #include "engine/events/contact.h"
 #include "engine/ranks/system.h"
 #include "engine/search/neighbour_list.h"
-#include "engine/slabs/resting.h"
+#include "engine/slabs/rest_criterion.h"
 #include "engine/slabs/slab_watch.h"
 
 namespace carom {
-
-/// A resting contact and the force that keeps its spheres apart.
-template <int D>
-struct Reaction {
-  EventKey<D> key;   ///< without time and generation
-  double force = 0;  ///< on lo along the normal, and its negative on hi [force]
-};
 
 /// A present or future contact and its normal: the gradient of the gap, up to a positive factor.
 template <int D>
 struct Touch {
   EventKey<D> key;  ///< key.time counts from now for a future contact
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
-  double speed = 0;  ///< velocity of a wall along its normal
-  double force = 0;  ///< the reaction of a present contact in the last piece [force]
-  double gap = 0;    ///< of a present contact [length]
+  double speed = 0;   ///< velocity of a wall along its normal
+  double force = 0;   ///< the reaction of a present contact in the last piece [force]
+  double gap = 0;     ///< of a present contact [length]
+  bool holds = true;  ///< an open contact: whether the gap is so small that a slow contact is held
+  bool hits = true;   ///< an open contact: whether it gets an impulse at once, because a partner has a contact now
   bool pair() const { return key.kind == EventKind::pair; }
 };
 
@@ -131,72 +126,39 @@ class ContactScan {
   /// Counts and logs contacts that the caller has found and executed; their times count from `time` in the slab.
   void commit(double time, std::span<const Contact<D>> executed);
 
-  /// Upper bound of the rounding error of a contact's normal speed that the motion of sphere i and the forces on it
-  /// cause; for a pair, add the values of both spheres [length/time].
-  double rounding_speed(Id i, const Vec<D>& v) const {
-    double speed = v.norm();
-    if (a_ && i < a_->size()) speed += length_ * (*a_)[i].norm();
-    if (!pressed_.empty()) speed += length_ * pressed_[i];
-    return kRounding * speed;
-  }
+  /// See RestCriterion::rounding_speed.
+  double rounding_speed(Id i, const Vec<D>& v) const { return rest_.rounding_speed(i, v); }
   /// A contact stops if the spheres approach more slowly than this: the resting speed or, if it dissipates, the rest
   /// speed of its law. `normal` may have any length.
   double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
 
-  /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end
-  /// of the step. False if this is known already.
-  bool falls_back(const EventKey<D>& key, double closing, double speed, double sigma);
-
-  /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
-  void stop_within(double time) { kick_ = time; }
+  RestCriterion<D>& rest() { return rest_; }
 
  private:
-  /// A contact rests below this normal speed: the rounding error, or a speed at which the forces on the spheres close
-  /// the contact again before it has opened by kRestingGap. `force`: its reaction in the last piece.
-  double resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
-                       const Vec<D>& v_hi) const;
-  double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
-  double pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const;
-  double speed_of_rest(double closing, double sigma) const {
-    return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);
-  }
-  bool dissipates(const EventKey<D>& key) const;
-  const ContactLaw& law_of(const EventKey<D>& key) const;  // unless all contacts are elastic
-  double slowest_bounce(const EventKey<D>& key, double closing) const;
-  double holding_speed(const Touch<D>& touch, double resting) const;
-  double holding_gap(const Touch<D>& touch) const;
-  bool open(const Touch<D>& touch) const { return touch.gap > tolerance(distance(touch.key)); }
-  /// Whether a contact that is open closes too fast to be held where it is.
-  bool passes_by(const Touch<D>& touch, double speed) const {
-    return open(touch) && speed < -law_of(touch.key).slowest(box_.contacts.thermal_speed);
-  }
-  double distance(const EventKey<D>& key) const {
-    return key.kind == EventKind::pair ? contact_distance(key.lo, key.hi) : particles_.radius[key.lo];
-  }
+  bool open(const Touch<D>& touch) const { return touch.gap > tolerance(rest_.distance(touch.key)); }
+  void note_open();
   double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);
   void sort_out(Positions<D> v, bool all_stop = false);
-  void note_pressed();
   double rounding_speed(const EventKey<D>& key, Positions<D> v) const {
     return rounding_speed(key.lo, v[key.lo]) + (key.kind == EventKind::pair ? rounding_speed(key.hi, v[key.hi]) : 0.0);
   }
   double resting_speed(const Touch<D>& touch, Positions<D> v) const {
-    return resting_speed(touch.key, touch.normal, touch.force, v[touch.key.lo],
-                         v[touch.pair() ? touch.key.hi : touch.key.lo]);
+    return rest_.resting_speed(touch.key, touch.normal, touch.force, v[touch.key.lo],
+                               v[touch.pair() ? touch.key.hi : touch.key.lo]);
   }
   double stopping_speed(const Touch<D>& touch, Positions<D> v) const {
-    return stopping_speed(touch.key, touch.normal, touch.force, resting_speed(touch, v));
+    return rest_.stopping_speed(touch.key, touch.normal, touch.force, resting_speed(touch, v));
   }
   void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
   /// `gained`: the change of the kinetic energy of lo.
   void record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated, double gained);
-  double known_force(const EventKey<D>& key) const;
   double wall_speed(const EventKey<D>& key, double later = 0) const {
     return key.kind == EventKind::wall ? box_.wall(key.hi).velocity_at(later) : 0.0;
   }
   double count_push(const RestingContact<D>& contact, double impulse, double speed);
   double stop_rounding(Vectors<D> v) const;
-  Vec<D> normal(const EventKey<D>& key, Positions<D> x) const;
+  Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, key, x); }
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;
   bool press_apart(Vectors<D> w, double force);
   double normal_speed(const Touch<D>& touch, Positions<D> v) const;
@@ -213,13 +175,9 @@ class ContactScan {
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* contacts_ = nullptr;
   SlabWatch* watch_ = nullptr;
-  const std::vector<Vec<D>>* a_ = nullptr;
-  double length_ = 0, kick_ = 0;
-  double widest_ = 0;  // gap of a contact that may be held
+  double widest_ = 0;  // gap of an open contact in touching_
   std::vector<Reaction<D>>& reactions_;
-  std::vector<double> pressed_;  // by particle: Σ |acceleration| over its reactions
-  std::vector<Vec<D>> held_;     // by particle: its acceleration by reactions; empty if no contact dissipates
-  std::vector<std::pair<EventKey<D>, double>> fallen_back_;  // contacts, and the accelerations that closed them again
+  RestCriterion<D> rest_;
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
 };

@@ -15,7 +15,7 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 // the contacts under pressure; the last is 10⁶ times the rounding of the factors, and small compared with the smallest
 // relevant eigenvalue, so that each repetition reduces the error by several digits.
 constexpr double kFirstProximal = 1e-2, kProximalRatio = 0.03, kLastProximal = 1e-10;
-constexpr int kRepetitions = 40;
+constexpr int kRepetitions = 400;
 // A solution is sought to the rounding of the two spheres of each contact. In a cluster with light loads beside heavy
 // ones this may be less than the rounding of the factors; then a solution is accepted that would also be kept.
 constexpr int kStrictRepetitions = 8;
@@ -211,11 +211,12 @@ class Problem {
     return solve(cluster, last, kLastProximal) || solve(cluster, std::vector<double>(m, 0.0), kFirstProximal);
   }
 
-  /// Starts from these reactions; if all are zero, from all contacts under pressure.
+  /// Starts from these reactions. If all are zero, it starts from the contacts that approach, and with the first
+  /// proximal term from all contacts.
   bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal) {
     const int m = static_cast<int>(cluster.size());
     const bool known = std::ranges::any_of(start, [](double lambda) { return lambda > 0; });
-    if (!known && !tied_ && proximal == kLastProximal) return false;
+    const bool all = tied_ || proximal == kFirstProximal;
     Eigen::VectorXd reaction(m), before(m), gap(m);
     active_.assign(m, 0);
     factored_.clear();
@@ -226,25 +227,34 @@ class Problem {
     push(cluster);
     for (int k = 0; k < m; ++k) {
       gap[k] = excess(cluster[k]) / arms_[cluster[k]].scale;
-      active_[k] = tied_ || !known || start[k] > 0;
+      active_[k] = all || (known ? start[k] > 0 : gap[k] < 0);
     }
     bool solved = false;
+    double last = kLastProximal;
     for (int repetition = 0; repetition < kRepetitions; ++repetition) {
       before = reaction;
       proximal_ = proximal;
-      if (!pivot(cluster, gap, before, reaction)) return false;
+      const std::vector<char> active = active_;
+      if (!pivot(cluster, gap, before, reaction, proximal == kFirstProximal)) {
+        if (repetition == 0 || proximal == kFirstProximal) return false;
+        reaction = before;
+        active_ = active;
+        proximal = last = std::min(proximal / kProximalRatio, kFirstProximal);
+        continue;
+      }
       for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
       // One more repetition: beside the large terms of a light sphere the error of a heavy one is invisible.
       if (std::exchange(solved, settled(cluster)) && solved) return true;
       if (repetition >= kStrictRepetitions && settled(cluster, true)) return true;
-      proximal = std::max(kProximalRatio * proximal, kLastProximal);
+      proximal = std::max(kProximalRatio * proximal, last);
     }
     return false;
   }
 
-  /// Block principal pivoting: makes (A + δ) λ + gap − δ λ_before zero where λ > 0, and non-negative elsewhere.
+  /// Block principal pivoting: makes (A + δ) λ + gap − δ λ_before zero where λ > 0, and non-negative elsewhere. Gives
+  /// up without progress unless `patient`.
   bool pivot(const std::vector<int>& cluster, const Eigen::VectorXd& gap, const Eigen::VectorXd& before,
-             Eigen::VectorXd& reaction) {
+             Eigen::VectorXd& reaction, bool patient) {
     const int m = static_cast<int>(cluster.size());
     // Exchanging all wrong contacts takes few rounds but may cycle. Where it makes no progress, only the last wrong
     // contact is exchanged, which terminates (Murty, Linear Algebra Appl. 7 (1974) 65).
@@ -281,6 +291,7 @@ class Problem {
         fewest = count;
         exchanges_left = kFruitlessExchanges;
       } else if (exchanges_left-- <= 0) {
+        if (!patient) return false;
         wrong.erase(wrong.begin(), wrong.end() - 1);
       }
       for (const int k : wrong) active_[k] ^= 1;

@@ -357,7 +357,7 @@ bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   const double gap =
       pair ? before.normal.norm() - before.sigma : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
   if (!(gap <= scan_->tolerance(before.sigma)) || !(before.speed > 0)) return false;
-  return scan_->falls_back(key, (before.speed - meeting.speed) / key.time, before.speed, before.sigma);
+  return scan_->rest().falls_back(key, (before.speed - meeting.speed) / key.time, before.speed);
 }
 
 /// Starts a new flight of particle i at this event, before the impulse.

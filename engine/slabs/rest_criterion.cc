@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/slabs/rest_criterion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace carom {
+
+template <int D>
+void RestCriterion<D>::begin_step(const std::vector<Vec<D>>* a, double length) {
+  a_ = a;
+  length_ = length;
+  fallen_back_.clear();
+  note_reactions();
+}
+
+template <int D>
+void RestCriterion<D>::note_reactions() {
+  pressed_.assign(reactions_.empty() ? 0 : particles_.size(), 0.0);
+  held_.assign(box_.contacts.elastic() ? 0 : pressed_.size(), Vec<D>::Zero());
+  for (const auto& [key, force] : reactions_) {
+    pressed_[key.lo] += force / particles_.mass[key.lo];
+    if (key.kind == EventKind::pair) pressed_[key.hi] += force / particles_.mass[key.hi];
+    if (held_.empty()) continue;
+    const Vec<D> along = contact_normal<D>(box_, key, particles_.x).normalized();
+    held_[key.lo] += force / particles_.mass[key.lo] * along;
+    if (key.kind == EventKind::pair) held_[key.hi] -= force / particles_.mass[key.hi] * along;
+  }
+}
+
+template <int D>
+double RestCriterion<D>::known_force(const EventKey<D>& key) const {
+  const EventKey<D> wanted = without_time(key);
+  const auto known = std::ranges::lower_bound(reactions_, wanted, {}, &Reaction<D>::key);
+  return known != reactions_.end() && known->key == wanted ? known->force : 0.0;
+}
+
+template <int D>
+bool RestCriterion<D>::dissipates(const EventKey<D>& key) const {
+  if (box_.contacts.elastic() || law_of(key).elastic()) return false;
+  return key.kind == EventKind::pair || box_.options.empty() || !box_.wall(key.hi).thermal();
+}
+
+template <int D>
+const ContactLaw& RestCriterion<D>::law_of(const EventKey<D>& key) const {
+  const auto& species = particles_.species;
+  return key.kind == EventKind::pair ? box_.contacts.of_pair(species[key.lo], species[key.hi])
+                                     : box_.contacts.of_wall(species[key.lo], key.hi);
+}
+
+/// The acceleration at which a contact would close by forces and, if contacts dissipate, by other reactions.
+template <int D>
+double RestCriterion<D>::pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const {
+  const bool pair = key.kind == EventKind::pair;
+  const auto between = [&](const std::vector<Vec<D>>& w) { return pair ? Vec<D>(w[key.lo] - w[key.hi]) : w[key.lo]; };
+  Vec<D> a = Vec<D>::Zero();
+  if (a_ && key.lo < a_->size()) a = between(*a_);
+  if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
+  const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
+  double closing = std::max(force * inverse_mass, -a.dot(normal) / normal.norm());
+  if (!fallen_back_.empty())
+    for (const auto& [partners, acceleration] : fallen_back_)
+      if (partners == without_time(key)) closing = std::max(closing, acceleration);
+  return held_.empty() ? closing : std::max(closing, -(a + between(held_)).dot(normal) / normal.norm());
+}
+
+template <int D>
+double RestCriterion<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
+                                       const Vec<D>& v_hi) const {
+  const bool pair = key.kind == EventKind::pair;
+  // Nothing rests on a thermal wall.
+  if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) return -std::numeric_limits<double>::min();
+  const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
+  const double closing = pressing(key, normal, force);
+  if (!(closing > 0)) return rounding;
+  return std::max(rounding, speed_of_rest(closing, distance(key)));
+}
+
+template <int D>
+double RestCriterion<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
+                                        double resting) const {
+  if (resting < 0 || !dissipates(key)) return resting;
+  return std::max(resting, slowest_impact(key, pressing(key, normal, force)));
+}
+
+template <int D>
+double RestCriterion<D>::holding_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
+                                       double resting) const {
+  if (resting < 0 || !dissipates(key)) return resting;
+  return std::max(resting, slowest_bounce(key, pressing(key, normal, force)));
+}
+
+/// A contact that dissipates stops if it approaches more slowly than this.
+template <int D>
+double RestCriterion<D>::slowest_impact(const EventKey<D>& key, double closing) const {
+  const ContactLaw& law = law_of(key);
+  // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
+  const double kick = kick_ * std::max(0.0, closing), e = law.at(kick, 0, 0);
+  return law.slowest(box_.contacts.thermal_speed) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces);
+}
+
+/// A contact that opens more slowly than this closes again within the step so slowly that it stops.
+template <int D>
+double RestCriterion<D>::slowest_bounce(const EventKey<D>& key, double closing) const {
+  if (!dissipates(key) || !(closing > 0)) return 0;
+  return std::min(slowest_impact(key, closing), 0.5 * closing * length_);
+}
+
+template <int D>
+double RestCriterion<D>::holding_gap(const EventKey<D>& key, const Vec<D>& normal, double force) const {
+  if (!dissipates(key)) return 0;
+  const double closing = pressing(key, normal, force), slowest = slowest_bounce(key, closing);
+  return closing > 0 ? slowest * slowest / (2 * kMostBounces * closing) : 0;
+}
+
+/// Kicks would close a gap that is smaller than what a bounce within a step opens with more energy than the fall gives,
+/// and that energy would keep a pile moving. So with kicks the gap is h²/8 times the largest relative acceleration.
+template <int D>
+double RestCriterion<D>::widest_gap() const {
+  if (box_.contacts.elastic()) return 0;
+  double widest = 0;
+  if (kicks()) {
+    for (const Vec<D>& a : *a_) widest = std::max(widest, a.squaredNorm());
+    return 0.25 * length_ * length_ * std::sqrt(widest);
+  }
+  for (const ContactLaw& law : box_.contacts.all())
+    if (!law.elastic()) widest = std::max(widest, law.slowest(box_.contacts.thermal_speed) * length_ / kMostBounces);
+  return widest;
+}
+
+template <int D>
+bool RestCriterion<D>::falls_back(const EventKey<D>& key, double closing, double speed) {
+  if (!(closing > 0) || speed > std::max(speed_of_rest(closing, distance(key)), slowest_bounce(key, closing)))
+    return false;
+  const EventKey<D> partners = without_time(key);
+  if (std::ranges::find(fallen_back_, partners, &std::pair<EventKey<D>, double>::first) != fallen_back_.end())
+    return false;
+  fallen_back_.push_back({partners, closing});
+  return true;
+}
+
+template class RestCriterion<2>;
+template class RestCriterion<3>;
+
+}  // namespace carom

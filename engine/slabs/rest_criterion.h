@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// When a contact counts as at rest. Contacts without a law rest at the level of rounding, because bouncing would repeat
+// without end. Contacts that dissipate also rest below the rest speed of their law.
+
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "engine/base/box.h"
+#include "engine/base/interaction.h"
+#include "engine/base/particles.h"
+#include "engine/events/contact.h"
+#include "engine/slabs/resting.h"
+
+namespace carom {
+
+/// A resting contact and the force that keeps its spheres apart.
+template <int D>
+struct Reaction {
+  EventKey<D> key;   ///< without time and generation
+  double force = 0;  ///< on lo along the normal, and its negative on hi [force]
+};
+
+/// The key of a resting contact: its partners alone.
+template <int D>
+EventKey<D> without_time(EventKey<D> key) {
+  key.time = 0;
+  key.generation = 0;
+  return key;
+}
+
+/// The gradient of the gap of a contact at x, up to a positive factor.
+template <int D>
+Vec<D> contact_normal(const Box<D>& box, const EventKey<D>& key, Positions<D> x) {
+  if (key.kind == EventKind::wall) return box.wall(key.hi).normal;
+  return x[key.lo] - x[key.hi] + box.shift(key.image);
+}
+
+template <int D>
+class RestCriterion {
+ public:
+  /// `reactions`: of the last piece, in the order of their keys.
+  RestCriterion(const Box<D>& box, const Particles<D>& particles, const std::vector<Reaction<D>>& reactions)
+      : box_(box), particles_(particles), reactions_(reactions) {}
+
+  /// Starts a step of this length with these accelerations, without reactions; they may be null, or empty.
+  void begin_step(const std::vector<Vec<D>>* a, double length);
+  /// Call this when the reactions have changed.
+  void note_reactions();
+  /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
+  void stop_within(double time) { kick_ = time; }
+  bool kicks() const { return kick_ > 0; }
+
+  /// The sum of the radii, or the radius at a wall.
+  double distance(const EventKey<D>& key) const {
+    return particles_.radius[key.lo] + (key.kind == EventKind::pair ? particles_.radius[key.hi] : 0.0);
+  }
+  /// The reaction of the last piece; 0 if there is none.
+  double known_force(const EventKey<D>& key) const;
+  /// Whether the law of the contact takes energy. That of a thermal wall has no effect.
+  bool dissipates(const EventKey<D>& key) const;
+
+  /// Upper bound of the rounding error of a contact's normal speed that the motion of sphere i and the forces on it
+  /// cause; for a pair, add the values of both spheres [length/time].
+  double rounding_speed(Id i, const Vec<D>& v) const {
+    double speed = v.norm();
+    if (a_ && i < a_->size()) speed += length_ * (*a_)[i].norm();
+    if (!pressed_.empty()) speed += length_ * pressed_[i];
+    return kRounding * speed;
+  }
+  /// A contact with this normal (of any length) and reaction rests below this normal speed: the rounding error, or a
+  /// speed at which the forces on the spheres close the contact again before it has opened by kRestingGap.
+  double resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
+                       const Vec<D>& v_hi) const;
+  /// It stops if the spheres approach more slowly than this: the resting speed or, if it dissipates, the rest speed of
+  /// its law.
+  double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
+  /// It is held if it opens more slowly than this: the resting speed or, if it dissipates, one at which it closes again
+  /// within the step so slowly that it stops.
+  double holding_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
+  /// If it dissipates it is held where it is if the gap is as small as this: a bounce at an eighth of the speed at
+  /// which approaches end opens it as far. 0 if nothing presses it.
+  double holding_gap(const EventKey<D>& key, const Vec<D>& normal, double force) const;
+  /// The largest gap of a contact that dissipates, from which a slow approach stops.
+  double widest_gap() const;
+
+  /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end
+  /// of the step. False if this is known already.
+  bool falls_back(const EventKey<D>& key, double closing, double speed);
+
+ private:
+  const ContactLaw& law_of(const EventKey<D>& key) const;  // unless all contacts are elastic
+  double pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const;
+  double slowest_impact(const EventKey<D>& key, double closing) const;
+  double slowest_bounce(const EventKey<D>& key, double closing) const;
+  double speed_of_rest(double closing, double sigma) const {
+    return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);
+  }
+
+  const Box<D>& box_;
+  const Particles<D>& particles_;
+  const std::vector<Reaction<D>>& reactions_;
+  const std::vector<Vec<D>>* a_ = nullptr;
+  double length_ = 0, kick_ = 0;
+  std::vector<double> pressed_;  // by particle: Σ |acceleration| over its reactions
+  std::vector<Vec<D>> held_;     // by particle: its acceleration by reactions; empty if no contact dissipates
+  std::vector<std::pair<EventKey<D>, double>> fallen_back_;  // contacts, and the accelerations that closed them again
+};
+
+}  // namespace carom
