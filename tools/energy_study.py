@@ -8,7 +8,8 @@
 
 Every run makes 5000 steps (--count) or, for a clean order, goes to a fixed --end-time. Runs start from --starts perturbed copies of
 the initial state of the deck (seeded; start 0 is the state itself). The figure shows the largest |H - H1|, where H1 is the energy
-after the first step (in decks with contacts that dissipate, moving walls or baths, H + dissipated - work - heat), as a geometric mean over the starts; the CSV also has it relative to E_ref = max(|H1|, K1 + sum |V|).
+after the first step (in decks with contacts that dissipate, moving walls or baths, H + dissipated - work - heat), as a geometric
+mean over the starts; the CSV also has it relative to E_ref = max(|H1|, K1 + sum |V|).
 
 With a fixed end time, the order is fitted to the steps up to --fit-below. With a fixed number of steps, runs with longer steps last
 longer; the legend then gives the growth of the error with the step, which exceeds the order if the error also grows with time.
