@@ -12,7 +12,7 @@ import tomllib
 import pytest
 
 from going_on import go_on
-from runs import CAROM, ROOT, SPHERES, SPRINGS, command, killer_library, mpirun, needs_carom, run, summary, write_deck
+from runs import CAROM, ROOT, ROUGH, SPHERES, SPRINGS, command, killer_library, mpirun, needs_carom, run, summary, write_deck
 
 sys.path.insert(0, str(ROOT / "tools"))
 import compare
@@ -113,10 +113,10 @@ def test_inelastic_contacts_are_those_of_one_rank_and_continue(method, tmp_path)
     assert filecmp.cmp(tmp_path / "plain" / "thermo.csv", tmp_path / "half" / "thermo.csv", shallow=False)
 
 
-@pytest.mark.parametrize("text", [SPHERES, DISCS], ids=["spheres", "discs"])
+@pytest.mark.parametrize("text", [ROUGH, DISCS], ids=["rough spheres", "discs"])
 def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
     output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11", "output.profile_interval=0.13", "output.sample_start=0.05"]
-    if text is SPHERES:
+    if text is ROUGH:
         output += ["particles.0.count=500", "run.end_time=1.0"]
     run(write_deck(tmp_path, text), tmp_path / "plain", output)
     assert summary(tmp_path / "plain")["events"]["sphere_sphere"] >= 1500
