@@ -126,7 +126,7 @@ class Checker:
             if self.element(f"{PARTICLES}/{name}"):
                 value = self.file[f"{PARTICLES}/{name}/value"]
                 self.expect(value.shape[1:] == position.shape[1:], f"{name}: shape {value.shape}, position's is {position.shape}")
-        for name in ("mass", "radius", "charge", "species", "id"):
+        for name in ("mass", "radius", "charge", "species", "id", *(["moment_of_inertia"] if rough else [])):
             if self.has(f"{PARTICLES}/{name}", h5py.Dataset):
                 values = self.file[f"{PARTICLES}/{name}"]
                 self.expect(values.shape == position.shape[1:2], f"{name}: must be [particles]")

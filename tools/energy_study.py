@@ -8,7 +8,8 @@
 
 Every run makes 5000 steps (--count) or, for a clean order, goes to a fixed --end-time. Runs start from --starts perturbed copies of
 the initial state of the deck (seeded; start 0 is the state itself). The figure shows the largest |H - H1|, where H1 is the energy
-after the first step, as a geometric mean over the starts; the CSV also has it relative to E_ref = max(|H1|, K1 + sum |V|).
+after the first step (in decks with contacts that dissipate, moving walls or baths, H + dissipated - work - heat), as a geometric
+mean over the starts; the CSV also has it relative to E_ref = max(|H1|, K1 + sum |V|).
 
 With a fixed end time, the order is fitted to the steps up to --fit-below. With a fixed number of steps, runs with longer steps last
 longer; the legend then gives the growth of the error with the step, which exceeds the order if the error also grows with time.
@@ -127,10 +128,13 @@ def describe(rows, method, options):
     return f"{method}: order {order:.2f}" if options.end_time else f"{method}: error ~ step$^{{{order:.2f}}}$"
 
 
-def draw(rows, options, title, file):
+def draw(rows, options, deck, file):
+    title = deck.get("title", options.deck.stem)
+    driven = any(deck.get(table) for table in ("contact", "wall", "bath"))
+    error = r"$|E - E_1|$, $E = H$ + dissipated − work − heat" if driven else r"$|H - H_1|$ [energy]"
     length = f"to t = {options.end_time:g}" if options.end_time else f"{options.count} steps"
     starts = f", {options.starts} starts" if options.starts > 1 else ""
-    with picture(file, xlabel="step [time]", ylabel=r"largest $|H - H_1|$ [energy]", title=f"{title}\n{length}{starts}") as axes:
+    with picture(file, xlabel="step [time]", ylabel=f"largest {error}", title=f"{title}\n{length}{starts}") as axes:
         for method, marker in with_markers(options.methods):
             steps, errors = curve(rows, method)
             axes.loglog(steps, errors, marker=marker, label=describe(rows, method, options))
@@ -149,7 +153,7 @@ def main(arguments=None):
         rows = list(pool.map(lambda case: run_one(options, deck, *case), cases))
     table, figure = options.output / "energy.csv", options.output / "energy.png"
     write_table(table, COLUMNS, rows)
-    draw(rows, options, deck.get("title", options.deck.stem), figure)
+    draw(rows, options, deck, figure)
     for method in options.methods:
         line = describe(rows, method, options).replace(r"$E_{\mathrm{ref}}$", "E_ref")
         print(re.sub(r"error ~ step\$\^{(.*)}\$", r"error ~ step^\1 after a fixed number of steps, which is no order: give --end-time", line))

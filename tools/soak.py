@@ -130,6 +130,10 @@ def random_contacts(dice, boundary, walls, species):
                      "restitution": dice.choice([dice.uniform(0, 1), ice])})
         if dice.random() < 0.5:
             laws[-1]["rest_speed"] = 10**dice.uniform(-9, -2)
+        if dice.random() < 0.4:
+            laws[-1]["tangential"] = dice.uniform(-1, 1)
+            if dice.random() < 0.5:
+                laws[-1]["friction"] = dice.uniform(0, 1)
     return laws
 
 
@@ -182,6 +186,8 @@ def random_deck(dice, seconds):
     walls = random_walls(dice, boundary, end) if walled else []
     dissipates = method != "verlet" and dice.random() < 0.5
     contacts = random_contacts(dice, boundary, walls, [each["name"] for each in particles]) if dissipates else []
+    if any("tangential" in law for law in contacts) and dice.random() < 0.7:
+        particles[0] |= {"rotational_temperature": dice.uniform(0, 2.0), "inertia": dice.uniform(0.1, 0.6)}
     return {"format": 1, "system": {"dimension": dimension, "boundary": boundary},
             "wall": walls, "contact": contacts, "bath": [bath] if bath else [], "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
@@ -194,6 +200,7 @@ def words(deck):
     n = sum(species["count"] for species in deck["particles"])
     forces = "+".join(term["type"] for term in deck["interaction"]) or "no forces"
     more = "".join(f", {kind}" for kind in ("wall", "contact", "bath") if deck.get(kind))
+    more += ", spins" if any("tangential" in law for law in deck.get("contact", [])) else ""
     return f"{deck['integrator']['type']} {deck['system']['dimension']}-D {n} {forces} {'/'.join(deck['system']['boundary'])}{more}"
 
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/base/box.h"
 
+#include "engine/base/wall_options.h"
+
 namespace carom {
 namespace {
 
@@ -114,17 +116,7 @@ void Box<D>::check(Failure failure) const {
       throw Error(failure, wall_name(each.number) + " is shaken with the period " + short_text(1 / each.frequency) +
                                ", too short for steps of " + short_text(step) + "; take a step of at most " +
                                short_text(kLongestStep / each.frequency));
-  const auto all = walls();
-  for (std::size_t i = 0; i < all.size(); ++i)
-    for (std::size_t j = i + 1; j < all.size(); ++j) {
-      const Wall<D>&one = all[i], &other = all[j];
-      const bool front_and_rear = one.number >= 2 * D && find(one.number) == find(other.number);
-      const bool facing = (one.normal + other.normal).norm() < 1e-6;
-      if (front_and_rear || !facing || one.level(0) + other.level(0) < 0) continue;
-      throw Error(failure, wall_name(one.number) + " and " + wall_name(other.number) +
-                               " leave no room between them at time " + short_text(time) +
-                               "; move them apart, or end the run before they meet");
-    }
+  if (const std::string cramped = no_room(*this, 0, 0); !cramped.empty()) throw Error(failure, cramped);
 }
 
 template <int D>

@@ -65,6 +65,10 @@ class ContactLaws {
   double inertia(std::size_t species, int dimension) const {
     return species < inertias.size() && inertias[species] > 0 ? inertias[species] : homogeneous(dimension);
   }
+  /// The moment of inertia of a sphere of this species [mass · length²].
+  double moment(std::size_t species, double mass, double radius, int dimension) const {
+    return inertia(species, dimension) * mass * radius * radius;
+  }
   /// For this many species and wall numbers; all are elastic until set.
   void resize(std::size_t species, std::size_t walls) {
     species_ = species;

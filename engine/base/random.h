@@ -40,7 +40,8 @@ enum class RandomPurpose : std::uint32_t {
   rescaling = 6,
   kick_time = 7,
   kick = 8,
-  thermal_wall = 9
+  thermal_wall = 9,
+  spin = 10
 };
 
 /// The numbers of one purpose and one id, in sequence.

@@ -52,6 +52,26 @@ void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed) {
   box.add(std::move(wall));
 }
 
+template <int D>
+std::string no_room(const Box<D>& box, double diameter, double after) {
+  const auto all = box.walls();
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (std::size_t j = i + 1; j < all.size(); ++j) {
+      const Wall<D>&one = all[i], &other = all[j];
+      const bool front_and_rear = one.number >= 2 * D && box.find(one.number) == box.find(other.number);
+      const bool facing = (one.normal + other.normal).norm() < 1e-6;
+      const double gap = -(one.level(after) + other.level(after));
+      if (front_and_rear || !facing || (diameter > 0 && !(one.one_sided && other.one_sided))) continue;
+      if (gap > 0 && gap >= diameter - box.gap_tolerance()(diameter)) continue;
+      return box.wall_name(one.number) + " and " + box.wall_name(other.number) + " leave no room " +
+             (diameter > 0 ? "for a diameter of " + short_text(diameter) + " " : "") + "between them at time " +
+             short_text(box.time + after) + "; move them apart, or end the run before they meet";
+    }
+  return {};
+}
+
+template std::string no_room(const Box<2>&, double, double);
+template std::string no_room(const Box<3>&, double, double);
 template void add_wall(Box<2>&, const Parameters&, std::uint64_t);
 template void add_wall(Box<3>&, const Parameters&, std::uint64_t);
 

@@ -14,4 +14,9 @@ const std::vector<Parameter>& wall_parameters();
 template <int D>
 void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed = 1);
 
+/// Two parallel walls that leave less room than this diameter between them at a time of the slab, for messages; empty
+/// if there are none. Walls with spheres behind them count for a diameter of 0 only.
+template <int D>
+std::string no_room(const Box<D>& box, double diameter, double after);
+
 }  // namespace carom

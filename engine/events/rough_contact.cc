@@ -8,7 +8,7 @@ namespace {
 
 template <int D>
 double moment_of(const ContactLaws& laws, const RoughSphere<D>& a) {
-  return laws.inertia(a.species, D) * a.mass * a.radius * a.radius;
+  return laws.moment(a.species, a.mass, a.radius, D);
 }
 
 /// `resisting`: 1/m of the header; `pressing`: the normal impulse.

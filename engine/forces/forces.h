@@ -168,7 +168,7 @@ MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state
     ExactSeries rotational;
     for (Id i = 0; i < at.size(); ++i)
       if (system.particles.owns(i))
-        rotational.add(0.5 * system.box.contacts.inertia(at.species[i], D) * at.mass[i] * at.radius[i] * at.radius[i] *
+        rotational.add(0.5 * system.box.contacts.moment(at.species[i], at.mass[i], at.radius[i], D) *
                        at.spin[i].squaredNorm());
     sums.rotational = rotational.sum();
   }

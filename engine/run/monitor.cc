@@ -57,8 +57,10 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
                                shot_.momentum, shot_.temperature, shot_.dissipated, shot_.work, shot_.heat);
                      }});
   if (system.box.contacts.rough())
-    fields.add_of_run(
-        {"last rotation", [this](Archive& archive) { archive(shot_.rotational, shot_.rotational_temperature); }});
+    fields.add_of_run({"last rotation", [this](Archive& archive) {
+                         archive(shot_.rotational, shot_.rotational_temperature);
+                         statistics_.rotational_energy = shot_.rotational;
+                       }});
   fields.add_value("next frame", frames_.next());
   fields.add_value("next row", rows_.next());
   for (std::size_t k = 0; k < samplers_.size(); ++k) {
@@ -86,6 +88,7 @@ void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
   for (Sampler& sampler : samplers_) sampler.due.pass(time - plan_.slack());
   shot_ = measure(time, system_.particles, &integrator, info_.shadow, fresh);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
+  if (system_.box.contacts.rough()) statistics_.rotational_energy = shot_.rotational;
   std::copy_n(shot_.momentum.begin(), D, account_.first_momentum.begin());
   count_from(shot_);
   statistics_.first_step_error = 0;
@@ -178,6 +181,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   const double speed = account_.speed, energy = account_.energy, magnitude = account_.magnitude;
   shot_ = measure(s.end_time, system_.particles, &integrator, with_shadow);
   s.energy_final = shot_.total();
+  if (s.rotational_energy) s.rotational_energy = shot_.rotational;
   if (first && info_.stepping) count_from(shot_);
   s.max_energy_error = std::max(s.max_energy_error, std::abs(account_.energy - account_.first_energy));
   if (with_shadow)

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "engine/base/error.h"
+#include "engine/base/wall_options.h"
 #include "engine/forces/forces.h"
 #include "engine/run/baths.h"
 #include "engine/run/monitor.h"
@@ -22,9 +23,14 @@ constexpr double kLongestEpoch = 1e9;
 constexpr double kFarApart = 1e4;
 
 template <int D>
-void check_spheres(const System<D>& system) {
+double largest_diameter(const System<D>& system) {
   const auto radii = system.decomposition.radii();
-  const double diameter = radii.empty() ? 0 : 2 * *std::ranges::max_element(radii);
+  return radii.empty() ? 0 : 2 * *std::ranges::max_element(radii);
+}
+
+template <int D>
+void check_spheres(const System<D>& system) {
+  const double diameter = largest_diameter(system);
   for (int k = 0; k < D; ++k)
     if (system.box.periodic(k) && system.box.edges[k] < diameter)
       throw Error(Failure::initial_state, "the periodic box is " + short_text(system.box.edges[k]) + " long on axis " +
@@ -254,6 +260,17 @@ void Simulation<D>::run(const Hooks& hooks) {
 template <int D>
 bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
   Decomposition<D>& decomposition = system_->decomposition;
+  const double diameter = info_.hard_cores && !system_->box.plain() ? largest_diameter(*system_) : 0;
+  const auto cramped = [&](double after) {
+    system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
+    return diameter > 0 ? no_room(system_->box, diameter, after) : "";
+  };
+  const auto error = [&](const std::string& what) {
+    return Error(Failure::numerical,
+                 what + " (in step " + std::to_string(slab.index + 1) + ", from time " + short_text(slab.start) + ")");
+  };
+  // An epoch of free flight may end before the walls meet, after a given number of collisions.
+  if (const std::string what = info_.stepping ? cramped(slab.length) : ""; !what.empty()) throw error(what);
   for (Counters before = report.counters;;) try {
       watch.begin();
       system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
@@ -276,8 +293,9 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       return false;
     } catch (const Error& e) {
       if (e.failure() != Failure::numerical) throw;
-      throw Error(Failure::numerical, std::string(e.what()) + " (in step " + std::to_string(slab.index + 1) +
-                                          ", from time " + short_text(slab.start) + ")");
+      const std::string what =
+          cramped(2 * slab.length);  // squeezed spheres collide ever faster before there is no room
+      throw error(what.empty() ? e.what() : what);
     }
 }
 

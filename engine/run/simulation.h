@@ -105,9 +105,10 @@ struct Statistics {
   double force_passes = 0;  ///< pair evaluations / interacting pairs
 
   double energy_initial = 0, energy_after_first_step = 0, energy_final = 0;
-  double first_step_error = 0;  ///< |H + drained| after the first step less that before it
-  double energy_reference = 0;  ///< max(|H₁|, K₁ + Σ|V|), the divisor for energy errors
-  double energy_scale = 0;      ///< max(|H₀|, K₀ + Σ|V|) at the start; energy_reference if this is 0
+  std::optional<double> rotational_energy;  ///< the part of energy_final that is in spins, if contacts are rough
+  double first_step_error = 0;              ///< |H + drained| after the first step less that before it
+  double energy_reference = 0;              ///< max(|H₁|, K₁ + Σ|V|), the divisor for energy errors
+  double energy_scale = 0;                  ///< max(|H₀|, K₀ + Σ|V|) at the start; energy_reference if this is 0
   /// The long-range corrections (engine/forces/potentials/tail.h), which the energies above and the pressures include.
   /// They are constants; energy_reference and the errors of H exclude them.
   double tail_energy = 0, tail_pressure = 0;

@@ -57,6 +57,12 @@ std::size_t sites_a_cell(Lattice lattice) {
   return lattice == Lattice::simple ? 1 : D == 2 ? 2 : 4;
 }
 
+std::array<double, 4> four_deviates(std::uint64_t seed, RandomPurpose purpose, Id id) {
+  RandomStream random(seed, purpose, id);
+  const auto first = random.normal_pair(), second = random.normal_pair();
+  return {first[0], first[1], second[0], second[1]};
+}
+
 }  // namespace
 
 template <int D>
@@ -229,9 +235,7 @@ void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::s
   Communicator alone;
   for (std::size_t n = 0; n < chosen.size(); ++n) {
     const Id i = chosen[n];
-    RandomStream random(seed, purpose, particles.id_of(i));
-    const auto first = random.normal_pair(), second = random.normal_pair();
-    const std::array<double, 4> normal{first[0], first[1], second[0], second[1]};
+    const auto normal = four_deviates(seed, purpose, particles.id_of(i));
     for (int k = 0; k < D; ++k) particles.v[i][k] = std::sqrt(temperature[n] / particles.mass[i]) * normal[k];
   }
   struct Sums {
@@ -259,6 +263,28 @@ void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::s
 }
 
 template <int D>
+void draw_spins(Particles<D>& particles, const ContactLaws& laws, std::span<const Id> chosen,
+                std::span<const double> temperature, std::uint64_t seed, Communicator* ranks) {
+  Communicator alone;
+  constexpr int axes = Spin<D>::SizeAtCompileTime;
+  struct Sums {
+    double wanted = 0, drawn = 0;  // Σ I w²
+  };
+  const Sums sums = accumulated_in_order(ranks ? *ranks : alone, Sums{}, [&](Sums& sum) {
+    for (std::size_t n = 0; n < chosen.size(); ++n) {
+      const Id i = chosen[n];
+      const double moment = laws.moment(particles.species[i], particles.mass[i], particles.radius[i], D);
+      const auto normal = four_deviates(seed, RandomPurpose::spin, particles.id_of(i));
+      for (int k = 0; k < axes; ++k) particles.spin[i][k] = std::sqrt(temperature[n] / moment) * normal[k];
+      sum.wanted += axes * temperature[n];
+      sum.drawn += moment * particles.spin[i].squaredNorm();
+    }
+  });
+  const double scale = sums.drawn > 0 ? std::sqrt(sums.wanted / sums.drawn) : 0;
+  for (const Id i : chosen) particles.spin[i] *= scale;
+}
+
+template <int D>
 double packing_fraction(double volume, std::span<const double> radius, Communicator* ranks) {
   Communicator alone;
   const double filled = accumulated_in_order(ranks ? *ranks : alone, 0.0, [&](double& sum) {
@@ -278,6 +304,8 @@ template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::spa
 template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
 template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
                               Communicator*);
+template void draw_spins(Particles<2>&, const ContactLaws&, std::span<const Id>, std::span<const double>, std::uint64_t,
+                         Communicator*);
 template double packing_fraction<2>(double, std::span<const double>, Communicator*);
 
 template LatticeCells<3> fit_lattice(Lattice, const Box<3>&, std::size_t, double);
@@ -291,6 +319,8 @@ template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::spa
 template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
 template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
                               Communicator*);
+template void draw_spins(Particles<3>&, const ContactLaws&, std::span<const Id>, std::span<const double>, std::uint64_t,
+                         Communicator*);
 template double packing_fraction<3>(double, std::span<const double>, Communicator*);
 
 }  // namespace carom

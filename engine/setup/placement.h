@@ -98,6 +98,13 @@ void draw_velocities(Particles<D>& particles, std::span<const Id> chosen, std::s
                      std::uint64_t seed, RandomPurpose purpose = RandomPurpose::velocity,
                      Communicator* ranks = nullptr);
 
+/// Spins for the particles `chosen`, with a rotational temperature for each: components drawn at random with the
+/// variance T/I, I the moment of inertia, and scaled so that Σ I w² = (1 or, in three dimensions, 3) Σ T up to
+/// rounding. With `ranks`, each rank sets its block of the particles, with the same bits; collective.
+template <int D>
+void draw_spins(Particles<D>& particles, const ContactLaws& laws, std::span<const Id> chosen,
+                std::span<const double> temperature, std::uint64_t seed, Communicator* ranks = nullptr);
+
 /// The fraction of the box filled by spheres, 0 … 1; with `ranks`, by the spheres of all ranks.
 template <int D>
 double packing_fraction(double volume, std::span<const double> radius, Communicator* ranks = nullptr);

@@ -106,7 +106,11 @@ Deck read_branch(const Deck& of, std::span<const std::string> overrides, const T
                      "give the bonds as 'pairs', or leave 'within' as it is");
   }
   problems.throw_errors(Failure::deck);
-  same_motion = same_tables(of, deck, "integrator") && same_tables(of, deck, "interaction");
+  const auto rough = [](const Deck& each) {
+    return std::ranges::any_of(each.source->values.list("contact"),
+                               [](const ValueTable& contact) { return contact.given("tangential"); });
+  };
+  same_motion = same_tables(of, deck, "integrator") && same_tables(of, deck, "interaction") && rough(of) == rough(deck);
   return deck;
 }
 

@@ -53,11 +53,11 @@ void fill_particles(const Deck::Source& source, System<D>& system, Communicator*
   all.image.assign(n, Image<D>{});
 }
 
-/// Velocities as given, or drawn for the species that have a temperature.
+/// Velocities and spins as given, or drawn for the species that have a temperature of them.
 template <int D>
-void give_velocities(const Deck::Source& source, System<D>& system) {
-  std::vector<Id> drawn;
-  std::vector<double> temperature;
+void give_motion(const Deck::Source& source, System<D>& system) {
+  std::vector<Id> drawn, turning;
+  std::vector<double> temperature, rotational_temperature;
   Particles<D>& p = system.particles;
   std::size_t first = 0;  // id of the species
   Id i = 0;
@@ -65,14 +65,17 @@ void give_velocities(const Deck::Source& source, System<D>& system) {
     for (; i < p.size() && p.id_of(i) < first + species.count; ++i) {
       if (!species.velocity.empty()) p.v[i] = Eigen::Map<const Vec<D>>(species.velocity[p.id_of(i) - first].data());
       if (!species.spin.empty()) p.spin[i] = Eigen::Map<const Spin<D>>(species.spin[p.id_of(i) - first].data());
-      if (!species.temperature) continue;
-      drawn.push_back(i);
-      temperature.push_back(*species.temperature);
+      if (species.temperature) drawn.push_back(i), temperature.push_back(*species.temperature);
+      if (species.rotational_temperature)
+        turning.push_back(i), rotational_temperature.push_back(*species.rotational_temperature);
     }
     first += species.count;
   }
   draw_velocities<D>(p, drawn, temperature, source.placement.seed, RandomPurpose::velocity,
                      system.decomposition.others());
+  if (system.box.contacts.rough())
+    draw_spins<D>(p, system.box.contacts, turning, rotational_temperature, source.placement.seed,
+                  system.decomposition.others());
 }
 
 /// Writes the values that depend on the initial state into the deck. Reports parameters of [output] that are not valid
@@ -202,13 +205,14 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   if (given) {
     if (ranks && !system->decomposition.joined()) system->decomposition.join(*ranks);
     restore_particles(*system, given->read);
+    if (system->box.contacts.rough()) system->particles.spin.resize(system->particles.size(), Spin<D>::Zero());
     take_bonds(*deck.source, given->bonds);
     system->box.begin_step(given->time, 0);
   } else {
     place_particles(source, *system);
     check_memory(source, &system->box, share);
     system->wrap();
-    give_velocities(source, *system);
+    give_motion(source, *system);
   }
 
   Problems problems;

@@ -212,13 +212,17 @@ class Interpreter {
       vectors(table, "spin", *list, dimension_ == 2 ? 1 : dimension_);
       if (species.placed)
         problems_.error(table.place("spin"), "'spin' goes with explicit positions only",
-                        "leave it out: particles given by count start without spin");
+                        "give a rotational_temperature with a count");
       else if (species.count > 0 && list->size() != species.count)
         problems_.error(
             table.place("spin"),
             "'spin' has " + count_of(list->size(), "vector") + " for " + count_of(species.count, "particle"),
             "give one for each");
     }
+    table.read<double>("rotational_temperature", species.rotational_temperature);
+    if (table.given("spin") && table.given("rotational_temperature"))
+      problems_.error(table.place("rotational_temperature"), "'spin' and 'rotational_temperature' exclude each other",
+                      "leave one of them out");
     if (const auto* inertia = table.find<double>("inertia")) {
       species.inertia = *inertia;
       if (dimension_ != 0)
@@ -226,7 +230,7 @@ class Interpreter {
     }
     const auto rough = [](const ValueTable& contact) { return contact.given("tangential"); };
     const auto& contacts = values_.list("contact");
-    for (const char* key : {"spin", "inertia"})
+    for (const char* key : {"spin", "rotational_temperature", "inertia"})
       if (table.given(key) && std::ranges::none_of(contacts, rough))
         problems_.error(table.place(key), std::string("'") + key + "' has no effect, all contacts are smooth",
                         "give a [[contact]] with 'tangential', or leave it out");

@@ -16,7 +16,7 @@ struct SpeciesConfig {
   std::size_t count = 0;
   bool placed = false;  ///< given by count: [placement] finds the positions
   std::vector<std::vector<double>> position, velocity, spin;
-  std::optional<double> temperature;
+  std::optional<double> temperature, rotational_temperature;
   std::vector<double> radius, mass, charge;  ///< one for each particle, or one for all
   double inertia = 0;                        ///< reduced; 0: homogeneous
 

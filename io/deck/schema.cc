@@ -120,7 +120,11 @@ std::vector<TableSchema> make_schema() {
         {"charge", real_or_list, "0.0", "charge", "charge of a particle, for interactions between charges"},
         {"spin", vector_list, "none", "1/time",
          "angular velocities that go with explicit positions where contacts have 'tangential': [z] in two dimensions, "
-         "[x, y, z] in three; without spin where absent"},
+         "[x, y, z] in three; without it and rotational_temperature particles start without spin"},
+        {"rotational_temperature", real, "none", "energy",
+         "where contacts have 'tangential': draws angular velocities from a normal distribution with exactly this mean "
+         "energy, T/2 for each axis of rotation (k_B = 1): z in two dimensions, x, y and z in three",
+         Range::non_negative},
         {"inertia", real, "none", "-",
          "reduced moment of inertia 4I/(m sigma^2), sigma the diameter: 0.5 for homogeneous discs, 0.4 for homogeneous "
          "spheres, which is the default; 1 for rings, 2/3 for shells",

@@ -165,6 +165,10 @@ Checkpoint::Checkpoint(const std::filesystem::path& file) : path_(file) {
 Checkpoint::Checkpoint(Checkpoint&&) noexcept = default;
 Checkpoint::~Checkpoint() = default;
 
+bool Checkpoint::has(const std::string& name) const {
+  return hdf5::exists(*contents_, "/particles/" + name) || hdf5::exists(*contents_, "/run/" + name);
+}
+
 Bytes Checkpoint::read(const std::string& name) const {
   for (const char* group : {"/particles/", "/run/"})
     if (hdf5::exists(*contents_, group + name)) return hdf5::bytes(*contents_, group + name);

@@ -63,6 +63,8 @@ class Checkpoint {
 
   const std::filesystem::path& file() const { return path_; }
   const CheckpointHead& head() const { return head_; }
+  /// Whether there is a field or a value of this name.
+  bool has(const std::string& name) const;
   /// A field, or a value of the run as a whole. Throws Error(Failure::file) if it is missing.
   Bytes read(const std::string& name) const;
 

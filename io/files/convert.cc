@@ -75,17 +75,20 @@ std::string write_extxyz(const TrajectoryReader& trajectory, std::span<const std
     fmt::format_to(out, "{}\nLattice=\"{} 0 0 0 {} 0 0 0 {}\"", trajectory.particles(), f.edges[0], f.edges[1],
                    f.edges[2]);
     fmt::format_to(
-        out, " Properties=species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:charge:R:1:image:I:3 Time={} Step={} pbc=\"",
-        f.time, f.step);
+        out,
+        " Properties=species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:charge:R:1:image:I:3{} Time={} Step={} pbc=\"",
+        f.spin.empty() ? "" : ":angular_velocity:R:3", f.time, f.step);
     for (std::size_t k = 0; k < 3; ++k)
       fmt::format_to(out, "{}{}", k > 0 ? " " : "", periodic(trajectory, k) ? 'T' : 'F');
     fmt::format_to(out, "\" species_names={}\n", quoted_for_extxyz(joined(trajectory.species_names)));
     for (std::size_t i = 0; i < trajectory.particles(); ++i) {
       const auto *x = &f.position[3 * i], *v = &f.velocity[3 * i];
       const auto* image = &f.image[3 * i];
-      fmt::format_to(out, "{} {} {} {} {} {} {} {} {} {} {} {} {}\n",
+      fmt::format_to(out, "{} {} {} {} {} {} {} {} {} {} {} {} {}",
                      symbols[static_cast<std::size_t>(trajectory.species[i])], x[0], x[1], x[2], v[0], v[1], v[2],
                      trajectory.radius[i], trajectory.mass[i], trajectory.charge[i], image[0], image[1], image[2]);
+      if (!f.spin.empty()) fmt::format_to(out, " {} {} {}", f.spin[3 * i], f.spin[3 * i + 1], f.spin[3 * i + 2]);
+      text.push_back('\n');
       if (text.size() < kBytesPerWrite) continue;
       file.append({text.data(), text.size()});
       text.clear();
@@ -153,8 +156,9 @@ std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<cons
   }
   fmt::format_to(out, "\nVelocities\n\n");
   for (std::size_t i = 0; i < n; ++i) {
-    const auto* v = &f.velocity[3 * i];
-    fmt::format_to(out, "{} {} {} {} 0 0 0\n", i + 1, v[0], v[1], v[2]);
+    constexpr std::array<double, 3> still{};
+    const double *v = &f.velocity[3 * i], *w = f.spin.empty() ? still.data() : &f.spin[3 * i];
+    fmt::format_to(out, "{} {} {} {} {} {} {}\n", i + 1, v[0], v[1], v[2], w[0], w[1], w[2]);
     write(false);
   }
   if (bonded) fmt::format_to(out, "\nBonds\n\n");

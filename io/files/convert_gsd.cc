@@ -62,6 +62,15 @@ void each_chunk(const TrajectoryReader& t, std::uint64_t number, const Trajector
   chunk("particles/position", position, 3);
   chunk("particles/velocity", single(f.velocity), 3);
   chunk("particles/image", f.image, 3);
+  if (!f.spin.empty()) {
+    // HOOMD's conjugate quaternion of the angular momentum L in the frame of the body is 2 q (0, L); the orientation q
+    // of a sphere, which Carom does not follow, is the default (1, 0, 0, 0).
+    std::vector<float> momentum(4 * t.particles());
+    for (std::size_t i = 0; i < t.particles(); ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        momentum[4 * i + 1 + k] = static_cast<float>(2 * t.moment[i] * f.spin[3 * i + k]);
+    chunk("particles/angmom", momentum, 4);
+  }
   if (number > 0) return;  // the chunks below never change, and readers take them from the first frame
   chunk("configuration/dimensions", std::vector{static_cast<std::uint8_t>(t.dimension)}, 1);
   const auto names = [&](const std::string& name, const std::vector<std::string>& all) {
@@ -81,6 +90,12 @@ void each_chunk(const TrajectoryReader& t, std::uint64_t number, const Trajector
   std::vector<float> diameter(t.particles());
   std::ranges::transform(t.radius, diameter.begin(), [](double r) { return static_cast<float>(2 * r); });
   chunk("particles/diameter", diameter, 1);
+  if (!t.moment.empty()) {
+    std::vector<float> moments(3 * t.particles());  // HOOMD turns bodies about axes with a moment only
+    for (std::size_t i = 0; i < moments.size(); ++i)
+      moments[i] = flat && i % 3 < 2 ? 0.0f : static_cast<float>(t.moment[i / 3]);
+    chunk("particles/moment_inertia", moments, 3);
+  }
   if (t.bonds.empty()) return;
   chunk("bonds/N", std::vector{static_cast<std::uint32_t>(t.bonds.size())}, 1);
   names("bonds/types", {"bond"});

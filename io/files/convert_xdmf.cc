@@ -70,6 +70,8 @@ std::string write(int version, const TrajectoryReader& trajectory, std::span<con
                       name, type, item);
     };
     attribute("velocity", "Vector", numbers.row("velocity", "Float", 8, index));
+    if (!trajectory.moment.empty())
+      attribute("angular_velocity", "Vector", numbers.row("angular_velocity", "Float", 8, index));
     attribute("image", "Vector", numbers.row("image", "Int", 4, index));
     for (const char* name : {"radius", "mass", "charge"}) attribute(name, "Scalar", numbers.fixed(name, "Float", 8));
     attribute("species", "Scalar", numbers.fixed("species", "Int", 4));

@@ -256,6 +256,9 @@ struct TrajectoryWriter<D>::Contents {
     const hdf5::Array<std::int32_t> species(file, group, "species", n);
     const hdf5::Array<double> mass(file, group, "mass", n), radius(file, group, "radius", n),
         charge(file, group, "charge", n);
+    const ContactLaws& contacts = system.box.contacts;
+    std::optional<hdf5::Array<double>> moment;
+    if (contacts.rough()) moment.emplace(file, group, "moment_of_inertia", n);
     std::size_t first = 0;
     std::vector<SpeciesRadius> species_radii(system.species.size());
     const auto write = [&](std::span<const std::uint16_t> kinds, std::span<const double> masses,
@@ -267,7 +270,12 @@ struct TrajectoryWriter<D>::Contents {
       mass.write(first, masses);
       radius.write(first, radii);
       charge.write(first, charges);
-      for (std::size_t i = 0; i < kinds.size(); ++i) species_radii[kinds[i]].add(radii[i]);
+      std::vector<double> moments(kinds.size());
+      for (std::size_t i = 0; i < kinds.size(); ++i) {
+        species_radii[kinds[i]].add(radii[i]);
+        moments[i] = contacts.moment(kinds[i], masses[i], radii[i], D);
+      }
+      if (moment) moment->write(first, moments);
       first += kinds.size();
     };
     const Particles<D>& p = system.particles;

@@ -60,6 +60,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"collisions_per_second", rate},
       {"peak_memory_bytes", std::max(outcome.peak_memory_bytes, peak_memory_bytes())},
   };
+  if (s.rotational_energy) json["energy"]["rotational"] = *s.rotational_energy;
   for (const WallRecord& wall : outcome.walls) {  // both sides of a wall have one name
     const WallTally none, &tally = wall.number < c.walls.size() ? c.walls[wall.number] : none;
     Json& entry = json["walls"][wall.name];

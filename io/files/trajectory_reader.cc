@@ -34,9 +34,12 @@ TrajectoryReader::TrajectoryReader(const std::filesystem::path& path) : file_(op
   mass = hdf5::numbers<double>(file_, kParticles + "mass");
   radius = hdf5::numbers<double>(file_, kParticles + "radius");
   charge = hdf5::numbers<double>(file_, kParticles + "charge");
+  if (hdf5::exists(file_, kParticles + "moment_of_inertia"))
+    moment = hdf5::numbers<double>(file_, kParticles + "moment_of_inertia");
   if (shape.size() != 3 || shape[0] < frames_ || shape[2] != 3) damaged("positions of another shape");
   for (const std::size_t size : {species.size(), mass.size(), radius.size(), charge.size()})
     if (size != shape[1]) damaged("data sets of different numbers of particles");
+  if (!moment.empty() && moment.size() != shape[1]) damaged("moments of inertia of another number of particles");
 
   dimension = static_cast<int>(hdf5::number_at(file_, "/parameters/dimension", 0));
   title = hdf5::text(file_, "/parameters/title");
@@ -71,6 +74,10 @@ TrajectoryFrame TrajectoryReader::frame(std::uint64_t index) const {
   frame.position = hdf5::rows<double>(file_, kParticles + "position/value", index, 1);
   frame.velocity = hdf5::rows<double>(file_, kParticles + "velocity/value", index, 1);
   frame.image = hdf5::rows<std::int32_t>(file_, kParticles + "image/value", index, 1);
+  if (!moment.empty()) {
+    frame.spin = hdf5::rows<double>(file_, kParticles + "angular_velocity/value", index, 1);
+    if (frame.spin.size() != 3 * particles()) damaged("angular velocities of another number of particles");
+  }
   for (const std::size_t size : {frame.position.size(), frame.velocity.size(), frame.image.size()})
     if (size != 3 * particles()) damaged("data sets of different numbers of particles");
   return frame;

@@ -21,6 +21,7 @@ struct TrajectoryFrame {
   std::int64_t step = 0;
   std::array<double, 3> edges{};           ///< in two dimensions 1 along z
   std::vector<double> position, velocity;  ///< positions wrapped into the box
+  std::vector<double> spin;                ///< angular velocities; empty if contacts are smooth
   std::vector<std::int32_t> image;
 };
 
@@ -45,6 +46,7 @@ class TrajectoryReader {
   std::vector<std::string> species_names;  ///< at least one
   std::vector<std::int32_t> species;       ///< for each particle the index of its name
   std::vector<double> mass, radius, charge;
+  std::vector<double> moment;                       ///< of inertia; empty if contacts are smooth
   std::vector<std::array<std::uint32_t, 2>> bonds;  ///< ids, which count from 0
 
  private:

@@ -32,6 +32,7 @@ PATHS = "str | os.PathLike[str]"
 ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]", "dimension": "Literal[2, 3]",
              "position": "npt.ArrayLike", "velocity": "npt.ArrayLike", "radius": "npt.ArrayLike", "mass": "npt.ArrayLike",
              "charge": "npt.ArrayLike", "species": "str", "count": "int", "temperature": "float | Sequence[float]",
+             "rotational_temperature": "float",
              "deck": f"{PATHS} | Mapping[str, Any]", "file": PATHS, "set": "Mapping[str, Any]", "directory": PATHS,
              "take_over": "bool", "frame": "int", "time": "float", "steps": "int", "collisions": "int", "every": "float",
              "callback": "Callable[[Simulation], object]", "progress": "bool", "type": "str", "packing_fraction": "float",

@@ -39,6 +39,17 @@ py::array view(const void* data, std::size_t rows, int columns, const py::object
   return array;
 }
 
+/// An array of vectors; one axis if each is one number.
+template <class V>
+Array array_of(const std::vector<V>& all) {
+  constexpr int columns = V::SizeAtCompileTime;
+  std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(all.size())};
+  if (columns > 1) shape.push_back(columns);
+  Array array(shape);
+  for (std::size_t i = 0; i < all.size(); ++i) std::copy_n(all[i].begin(), columns, array.mutable_data() + i * columns);
+  return array;
+}
+
 Plan plan_of(const py::dict& ends, double every) {
   using enum Parameter::Type;
   using enum Parameter::Range;
@@ -169,11 +180,10 @@ void bind(py::module_& module, const char* name) {
       .def("forget_run", &S::forget_run)
       .def("drawn_velocities",
            [](S& session, const Array& temperature, std::uint64_t seed) {
-             const auto v = session.drawn_velocities(span_of(temperature), seed);
-             Array all({static_cast<py::ssize_t>(v.size()), static_cast<py::ssize_t>(D)});
-             for (std::size_t i = 0; i < v.size(); ++i) std::copy_n(v[i].begin(), D, all.mutable_data(i));
-             return all;
+             return array_of(session.drawn_velocities(span_of(temperature), seed));
            })
+      .def("drawn_spins", [](S& session, const Array& temperature,
+                             std::uint64_t seed) { return array_of(session.drawn_spins(span_of(temperature), seed)); })
       .def("averages",
            [](const S& session) {
              py::dict all;

@@ -63,6 +63,8 @@ class Session {
   /// N velocities, drawn from the Maxwell–Boltzmann distribution for particles with a temperature (not NaN) [energy];
   /// the present velocities for the rest.
   std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
+  /// The same for spins and rotational temperatures.
+  std::vector<Spin<D>> drawn_spins(std::span<const double> temperature, std::uint64_t seed);
   /// Adds a wall or changes a face of the box.
   void add_wall(Parameters given);
   /// Sets the bath, in place of an earlier one.

@@ -11,6 +11,20 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& what_and_remedy) { throw Error(Failure::deck, what_and_remedy); }
 
+/// The particles with a temperature (not NaN), and their temperatures.
+std::pair<std::vector<Id>, std::vector<double>> heated(std::span<const double> temperature) {
+  std::pair<std::vector<Id>, std::vector<double>> all;
+  for (Id i = 0; i < temperature.size(); ++i) {
+    if (std::isnan(temperature[i])) continue;
+    if (!(temperature[i] >= 0) || std::isinf(temperature[i]))
+      refuse("thermalize: the temperature of particle " + std::to_string(i) + " is " + short_text(temperature[i]) +
+             "; give 0 or more");
+    all.first.push_back(i);
+    all.second.push_back(temperature[i]);
+  }
+  return all;
+}
+
 /// Changes the end of a deck's run, in the resolved deck too.
 void set_ends(Deck& deck, const Plan& plan) {
   deck.plan.steps = plan.steps;
@@ -176,18 +190,25 @@ std::vector<Vec<D>> Session<D>::drawn_velocities(std::span<const double> tempera
   const auto v = views_.velocity();
   p.v.assign(v.begin(), v.end());
   p.x.resize(p.v.size());
-  std::vector<Id> chosen;
-  std::vector<double> each;
-  for (Id i = 0; i < p.v.size(); ++i) {
-    if (std::isnan(temperature[i])) continue;
-    if (!(temperature[i] >= 0) || std::isinf(temperature[i]))
-      refuse("thermalize: the temperature of particle " + std::to_string(i) + " is " + short_text(temperature[i]) +
-             "; give 0 or more");
-    chosen.push_back(i);
-    each.push_back(temperature[i]);
-  }
+  const auto [chosen, each] = heated(temperature);
   draw_velocities<D>(p, chosen, each, seed);
   return std::move(p.v);
+}
+
+template <int D>
+std::vector<Spin<D>> Session<D>::drawn_spins(std::span<const double> temperature, std::uint64_t seed) {
+  const Constants constants = views_.constants();
+  Particles<D> p;
+  p.mass.assign(constants.mass.begin(), constants.mass.end());
+  p.radius.assign(constants.radius.begin(), constants.radius.end());
+  p.species.assign(constants.species.begin(), constants.species.end());
+  const auto spin = views_.spin();
+  p.spin.assign(spin.begin(), spin.end());
+  p.x.resize(p.mass.size());
+  p.spin.resize(p.mass.size(), Spin<D>::Zero());
+  const auto [chosen, each] = heated(temperature);
+  draw_spins<D>(p, box_.contacts, chosen, each, seed);
+  return std::move(p.spin);
 }
 
 template class Session<2>;

@@ -219,7 +219,7 @@ std::string RunSource::path(std::uint64_t particle, std::uint64_t first) const {
 }
 
 std::string RunSource::frame(std::uint64_t number) {
-  std::vector<float> x, v;
+  std::vector<float> x, v, spin;
   double head[8] = {};
   hdf5::read_between_flushes(trajectory_, [&] {
     const auto file = hdf5::File::open_unlocked(trajectory_);
@@ -229,15 +229,21 @@ std::string RunSource::frame(std::uint64_t number) {
     for (int k = 0; k < 3; ++k) head[3 + k] = hdf5::diagonal_at(file, kParticles + "/box/edges/value", number, k);
     x = hdf5::rows<float>(file, kParticles + "/position/value", number, 1);
     v = hdf5::rows<float>(file, kParticles + "/velocity/value", number, 1);
+    if (hdf5::exists(file, kParticles + "/angular_velocity"))
+      spin = hdf5::rows<float>(file, kParticles + "/angular_velocity/value", number, 1);
   });
   count_collisions(head[0]);
   head[6] = counts_.empty() ? 0 : 1;
+  head[7] = spin.empty() ? 0 : 1;
   std::string bytes;
   bytes.reserve(sizeof head + 5 * sizeof(float) * particles_);
   append<double>(bytes, head);
   append<float>(bytes, x);
-  for (std::size_t i = 0; i < particles_; ++i) v[i] = std::hypot(v[3 * i], v[3 * i + 1], v[3 * i + 2]);
-  append<float>(bytes, std::span(v).first(particles_));
+  for (auto* rows : {&v, &spin}) {
+    const std::size_t n = rows->size() / 3;
+    for (std::size_t i = 0; i < n; ++i) (*rows)[i] = std::hypot((*rows)[3 * i], (*rows)[3 * i + 1], (*rows)[3 * i + 2]);
+    append<float>(bytes, std::span(*rows).first(n));
+  }
   append<float>(bytes, std::vector<float>(counts_.begin(), counts_.end()));
   return bytes;
 }

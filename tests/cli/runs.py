@@ -88,6 +88,10 @@ frame_interval = 0.5
 thermo_interval = 0.1
 """
 
+# The same spheres, rough and with spin.
+ROUGH = SPHERES.replace("[[particles]]", '[[contact]]\nbetween = ["*", "*"]\ntangential = 0.5\n[[particles]]').replace(
+    "temperature = 1.0", "temperature = 1.0\nrotational_temperature = 0.5")
+
 
 def mpi_environment():
     """The environment with the settings of tools/mpi-env.sh."""

@@ -106,6 +106,14 @@ DECK_ERRORS = {
     "spin of one of two": (rough("tangential = 0.5", "spin = [[1.0]]"), 18, ["'spin' has 1 vector for 2 particles"]),
     "spin about x and y": (
         rough("tangential = 0.5", "spin = [[1.0, 0.0], [1.0, 0.0]]"), 18, ["of 'spin' has 2 numbers", "asks for 1"]),
+    "rotational temperature of smooth spheres": (
+        rough("restitution = 0.5", "rotational_temperature = 1.0"),
+        18, ["'rotational_temperature' has no effect, all contacts are smooth", "give a [[contact]]"]),
+    "rotational temperature below 0": (
+        rough("tangential = 0.5", "rotational_temperature = -1.0"), 18, ["must be zero or positive (is -1)"]),
+    "spin and rotational temperature": (
+        rough("tangential = 0.5", "spin = [[1.0], [0.0]]\nrotational_temperature = 1.0"),
+        19, ["'spin' and 'rotational_temperature' exclude each other", "leave one of them out"]),
     "inertia of more than a ring": (
         rough("tangential = 0.5", "inertia = 1.5"), 18, ["'inertia' is 1.5, more than the 1 of a ring", "has 0.5"]),
     "no inertia": (rough("tangential = 0.5", "inertia = 0"), 18, ["'inertia' must be positive (is 0)"]),

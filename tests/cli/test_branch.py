@@ -126,6 +126,25 @@ def test_changes(changes, half, tmp_path):
     run(whole / "deck.toml", tmp_path / "again", ["run.steps=2"])  # it is a deck
 
 
+@pytest.mark.parametrize("method", ["cdda", "free-flight"])
+def test_smooth_contacts_become_rough_and_smooth_again(method, tmp_path):
+    """Without spin at first; with tangential = -1 contacts change no spin, and spins stay."""
+    half, rough, parts, smooth = (tmp_path / name for name in ("half", "rough", "parts", "smooth"))
+    start = 6 if method == "free-flight" else 20
+    run(write_deck(tmp_path, box(method, 3, start) + '\n[[contact]]\nbetween = ["*", "*"]\nrestitution = 0.95\n'), half)
+    branch(half, rough, ["contact.0.tangential=0.5", f"run.steps={2 * start}"])
+    branch(half, parts, ["contact.0.tangential=0.5", f"run.steps={start + 2}"], ranks=2)
+    go_on(parts, ["--set", f"run.steps={2 * start}"])
+    expect_same(rough, parts)
+    spin = data_sets(rough / "trajectory.h5md")["particles/trajectory/angular_velocity/value"]
+    energy = summary(rough)["energy"]
+    assert not spin[0].any() and spin[-1].any()
+    assert energy["dissipated"] > 0 and energy["rotational"] > 0 and energy["max_abs_error"] < 1e-12 * energy["reference"]
+    branch(rough, smooth, ["contact.0.tangential=-1", f"run.steps={3 * start}"])
+    after = data_sets(smooth / "trajectory.h5md")["particles/trajectory/angular_velocity/value"]
+    assert (after == spin[-1]).all() and summary(smooth)["energy"]["rotational"] == pytest.approx(energy["rotational"], rel=1e-14)
+
+
 def test_continue_names_the_command(half, tmp_path):
     """Runs the command that the message names, which must succeed."""
     mine = tmp_path / "a run"

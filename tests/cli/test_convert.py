@@ -16,13 +16,13 @@ import pytest
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "tools"))
 from carom_files import Trajectory
-from runs import CAROM, SPHERES, SPRINGS, mpi_environment, mpirun, needs_carom, run, write_deck
+from runs import CAROM, ROUGH, SPHERES, SPRINGS, mpi_environment, mpirun, needs_carom, run, write_deck
 
 warnings.filterwarnings("ignore", category=DeprecationWarning)
 pytestmark = needs_carom
 
 # Two species, one of them charged, in a periodic box.
-SALT = SPHERES.replace("count = 108", "count = 100") + """
+ION = """
 [[particles]]
 name = "ion"
 count = 8
@@ -31,7 +31,9 @@ radius = 0.25
 mass = 0.125
 charge = -0.75
 """
-DECKS = {"springs": SPRINGS, "salt": SALT}
+SALT = SPHERES.replace("count = 108", "count = 100") + ION
+ROUGH_SALT = ROUGH.replace("count = 108", "count = 100") + ION + "rotational_temperature = 0.5\ninertia = 0.6\n"
+DECKS = {"springs": SPRINGS, "salt": ROUGH_SALT}
 
 
 @pytest.fixture(scope="module", params=DECKS)
@@ -54,6 +56,10 @@ def whole(trajectory, name, frame):
     return trajectory._group[name]["value"][frame]
 
 
+def rough(trajectory):
+    return "angular_velocity" in trajectory._group
+
+
 def images(trajectory):
     return trajectory._group["image/value"][:]
 
@@ -72,6 +78,8 @@ def test_ase_reads_extended_xyz(trajectory):
         assert np.array_equal(atoms.positions, whole(trajectory, "position", frame))
         assert np.array_equal(atoms.arrays["velo"], whole(trajectory, "velocity", frame))
         assert np.array_equal(atoms.arrays["image"], whole(trajectory, "image", frame))
+        assert ("angular_velocity" in atoms.arrays) == rough(trajectory)
+        assert not rough(trajectory) or np.array_equal(atoms.arrays["angular_velocity"], whole(trajectory, "angular_velocity", frame))
         assert np.array_equal(atoms.arrays["radius"], trajectory.radius)
         assert np.array_equal(atoms.arrays["mass"], trajectory.mass)
         assert np.array_equal(atoms.get_initial_charges(), trajectory._group["charge"][:])
@@ -106,6 +114,13 @@ def test_gsd_reads_gsd(trajectory):
             assert np.array_equal(snapshot.configuration.box, (*edges[:2].astype(single), 0 if flat else single(edges[2]), 0, 0, 0))
             assert (snapshot.configuration.step, snapshot.configuration.dimensions) == (trajectory.step[frame], trajectory.dimension)
             p = snapshot.particles
+            if rough(trajectory):  # I = kappa m r^2, of the salt 0.4 and 0.6
+                moment = np.where(trajectory.species == 0, 0.4, 0.6) * trajectory.mass * trajectory.radius**2
+                assert np.array_equal(p.moment_inertia, np.repeat(moment, 3).reshape(-1, 3).astype(single))
+                assert (p.orientation == [1, 0, 0, 0]).all() and (p.angmom[:, 0] == 0).all()
+                assert p.angmom[:, 1:] == pytest.approx(2 * moment[:, None] * whole(trajectory, "angular_velocity", frame), rel=1e-6)
+            else:
+                assert not p.angmom.any() and not p.moment_inertia.any()
             assert p.types == trajectory.species_names and np.array_equal(p.typeid, trajectory.species)
             for name, values in (("mass", trajectory.mass), ("diameter", 2 * trajectory.radius),
                                  ("charge", trajectory._group["charge"][:])):
@@ -124,7 +139,7 @@ def test_lammps_reads_its_data(trajectory, tmp_path):
     # LAMMPS's 2-D runs are periodic along z, and pair style zero needs a cutoff.
     script += ["pair_style zero 2.5", "pair_coeff * *"] + (["bond_style zero", "bond_coeff *"] if paired else [])
     script += ["comm_modify cutoff 4.0", "compute b all property/local batom1 batom2"] if paired else []
-    columns = "id type x y z vx vy vz ix iy iz radius mass" + (" q" if "charge" in said else "")
+    columns = "id type x y z vx vy vz ix iy iz omegax omegay omegaz radius mass" + (" q" if "charge" in said else "")
     script += [f"dump 1 all custom 1 {dump} {columns}", "dump_modify 1 sort id format float %.17g", "run 0"]
     if paired:
         script[-1:] = [f"dump 2 all local 1 {dump}.bonds c_b[1] c_b[2]", "run 0"]
@@ -143,6 +158,8 @@ def test_lammps_reads_its_data(trajectory, tmp_path):
     for name, series in (("", "position"), ("v", "velocity"), ("i", "image")):
         axes = ["x", "y", "z"] if name == "" else [name + axis for axis in "xyz"]
         assert np.array_equal(np.stack([read[axis] for axis in axes], axis=1), whole(trajectory, series, frame)), series
+    spin = np.stack([read["omega" + axis] for axis in "xyz"], axis=1)
+    assert np.array_equal(spin, whole(trajectory, "angular_velocity", frame)) if rough(trajectory) else not spin.any()
     assert np.array_equal(read["radius"], trajectory.radius)
     assert read["mass"] == pytest.approx(trajectory.mass, rel=1e-14)  # LAMMPS computes it from the density
     if "q" in read:
@@ -167,8 +184,9 @@ for k, time in enumerate(reader.TimestepValues):
         grid = grid.GetBlock(0)
     found[f"time/{k}"] = time
     found[f"position/{k}"] = vtk_to_numpy(grid.GetPoints().GetData())
-    for name in ("velocity", "image", "radius", "mass", "charge", "species"):
-        found[f"{name}/{k}"] = vtk_to_numpy(grid.GetPointData().GetArray(name))
+    for name in ("velocity", "image", "angular_velocity", "radius", "mass", "charge", "species"):
+        if grid.GetPointData().HasArray(name):
+            found[f"{name}/{k}"] = vtk_to_numpy(grid.GetPointData().GetArray(name))
 np.savez(sys.argv[2], **found)
 """
 
@@ -188,7 +206,7 @@ def test_paraview_reads_xdmf(trajectory, tmp_path, form):
     read = np.load(tmp_path / "read.npz")
     assert [read[f"time/{k}"] for k in range(2)] == list(trajectory.time[[2, 5]]) and "time/2" not in read
     for k, frame in enumerate((2, 5)):
-        for name in ("position", "velocity", "image"):
+        for name in ("position", "velocity", "image", *(["angular_velocity"] if rough(trajectory) else [])):
             assert np.array_equal(read[f"{name}/{k}"], whole(trajectory, name, frame)), name
         for name in ("radius", "mass", "charge", "species"):
             assert np.array_equal(read[f"{name}/{k}"], trajectory._group[name][:]), name
@@ -202,7 +220,7 @@ def test_what_xdmf_refers_to_is_there(trajectory, form):
     assert [float(time.get("Value")) for time in tree.iter("Time")] == list(trajectory.time)
     sizes = {("Float", 8): "f8", ("Int", 4): "i4", ("UInt", 4): "u4"}
     items = [item for item in tree.iter("DataItem") if item.get("Format") == "HDF"]
-    assert len(items) == 8 * len(trajectory)
+    assert len(items) == (9 if rough(trajectory) else 8) * len(trajectory)
     for item in items:
         name, place, *selection = item.text.replace("|", ":").split(":")
         assert name == trajectory.path.name
@@ -213,7 +231,7 @@ def test_what_xdmf_refers_to_is_there(trajectory, form):
     slabs = [item[0].text.split() for item in tree.iter("DataItem") if item.get("ItemType") == "HyperSlab"] if form == "xdmf2" else \
         [" ".join(item.text.split("|")[1].split(":")[:3]).split() for item in items if "|" in item.text]
     n = str(len(trajectory.species))
-    assert slabs == [[str(frame), "0", "0", "1", "1", "1", "1", n, "3"] for frame in range(len(trajectory)) for _ in range(3)]
+    assert slabs == [[str(frame), "0", "0", "1", "1", "1", "1", n, "3"] for frame in range(len(trajectory)) for _ in range(4 if rough(trajectory) else 3)]
 
 
 @pytest.mark.parametrize("length, factor", [("Angstrom", 1), ("nm", 10)])

@@ -4,6 +4,7 @@
 Each must end well, keep its energy, leave a sound file, and not care how it is observed.
 """
 
+import math
 import sys
 import tomllib
 
@@ -59,6 +60,22 @@ def test_deck(file, tmp_path):
     with Trajectory(tmp_path) as trajectory:
         assert len(trajectory) >= 4
         assert trajectory.title == deck["title"]
+
+
+def test_a_patch_of_a_ring_cools_and_clumps(tmp_path):
+    """A quarter of planetary-ring. At first ln T falls per collision and disc as in a Maxwellian gas, by the mean of (1 - e^2) v^2/4T
+    over v exp(-v^2/4T), 0.92; then ever more slowly, while the discs gather."""
+    deck = ROOT / "inputs" / "planetary-ring.toml"
+    summary = run_carom(find_carom(), deck, tmp_path, ["particles.count=100", "run.end_time=25.0", "output.frame_interval=0.0"])
+    assert summary["energy"]["max_abs_error"] < 1e-12 * summary["energy"]["reference"] and summary["momentum"]["max_abs_error"] < 1e-12
+    rows = read_thermo(tmp_path)
+    temperature, potential, turns = rows["temperature"], rows["potential"], rows["collisions"] / 100
+    early = int((temperature < 0.5).argmax())
+    rate = -math.log(temperature[early]) / turns[early]
+    assert abs(rate - 0.92) < 3 * rate / math.sqrt(100 * turns[early])  # the loss of a collision has a standard deviation of its mean
+    assert -math.log(temperature[-1] / temperature[early]) < 0.5 * rate * (turns[-1] - turns[early])
+    assert temperature[-1] < 0.03 and potential[-1] < 1.5 * potential[0] < 0
+    assert summary["energy"]["dissipated"] == pytest.approx(summary["energy"]["initial"] - summary["energy"]["final"], abs=1e-11)
 
 
 @pytest.mark.parametrize("file", DECKS, ids=lambda file: file.stem)

@@ -3,17 +3,20 @@
 
 import filecmp
 import os
+import pathlib
+import signal
 import subprocess
 import sys
 import tomllib
 
 import pytest
 
-from runs import CAROM, ROOT, SPHERES, SPRINGS, command, mpirun, needs_carom, run, summary, write_deck
+from going_on import go_on
+from runs import CAROM, ROOT, ROUGH, SPHERES, SPRINGS, command, killer_library, mpirun, needs_carom, run, summary, write_deck
 
 sys.path.insert(0, str(ROOT / "tools"))
 import compare
-from carom_files import Trajectory, toml_text
+from carom_files import toml_text
 
 pytestmark = needs_carom
 
@@ -39,29 +42,47 @@ DISCS = toml_text(tomllib.loads(SPHERES) | {
     "output": {"directory": "unused", "frame_interval": 0.7, "thermo_interval": 0.3}})
 
 
-# Discs between a ramp, a shaken floor and a piston.
-WALLS = toml_text(tomllib.loads(DISCS) | {
-    "title": "walls",
+# Every law at once: rough and inelastic discs, some of ice, between a ramp, a shaken floor, a piston and a thermal wall, in a bath.
+LAWS = tomllib.loads(DISCS) | {
+    "title": "laws",
     "system": {"dimension": 2, "box": [30.0, 20.0], "boundary": ["wall", "wall"]},
-    "wall": [{"name": "x+", "velocity": 0.1},
+    "contact": [{"between": ["*", "*"], "restitution": 0.95, "tangential": 0.5, "friction": 0.3},
+                {"between": ["large", "large"], "restitution": {"form": "power", "v0": 0.5, "exponent": 0.25}, "tangential": -0.2}],
+    "wall": [{"name": "x+", "velocity": 0.1}, {"name": "x-", "temperature": 2.0},
              {"name": "ramp", "normal": [1.0, 2.0], "offset": 8.0},
-             {"name": "y-", "velocity": {"amplitude": 0.2, "frequency": 0.5}}]})
+             {"name": "y-", "velocity": {"amplitude": 0.2, "frequency": 0.5}}],
+    "particles": [{"name": "large", "count": 120, "temperature": 1.0, "rotational_temperature": 0.5, "radius": 0.6, "mass": 2.0},
+                  {"name": "small", "count": 80, "temperature": 1.0, "radius": 0.4, "inertia": 0.9}],
+    "run": {"end_time": 2.0}}
+WIDTHS = [width for width, flag in (("sse2", "sse2"), ("avx2", "avx2"), ("avx512", "avx512f"))
+          if flag in pathlib.Path("/proc/cpuinfo").read_text().split()]
 
 
-@pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
-def test_walls_are_those_of_one_rank_and_continue(method, tmp_path):
-    output = ["output.events=true"] if method == "free-flight" else [
-        "output.events=true", f"integrator.type={method}", "integrator.step=0.02", "run.end_time=3.0"]
-    deck = write_deck(tmp_path, WALLS)
-    run(deck, tmp_path / "plain", output)
-    for ranks in 2, 4:
+@pytest.mark.parametrize("method, bath", [(method, "andersen") for method in ("free-flight", "psa", "edda", "cva", "mcva", "cdda")] +
+                         [(method, "rescaling") for method in ("free-flight", "psa", "edda")])
+def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, tmp_path):
+    heated = LAWS | {"bath": [{"type": bath, "temperature": [1.0, 2.0], "rate": 0.5}]}
+    deck, plain, killed = write_deck(tmp_path, toml_text(heated)), tmp_path / "plain", tmp_path / "killed"
+    output = ["output.events=true", "output.checkpoint_wall=\"0\"", f"integrator.type={method}",
+              "integrator.step=" + ("0.25" if method == "free-flight" else "0.02")]
+    library = {"LD_PRELOAD": str(killer_library(tmp_path)), "KILL_IN": f"{plain}/", "KILL_COUNT": str(tmp_path / "changes")}
+    run(deck, plain, output, env=os.environ | library)
+    energy = summary(plain)["energy"]
+    assert energy["dissipated"] > 1 and abs(energy["work"]) > 1 and abs(energy["heat"]) > 1 and energy["rotational"] > 1
+    if method in ("free-flight", "edda", "cdda"):
+        assert energy["max_abs_error"] < 1e-12 * energy["reference"]
+    by_place = method in ("free-flight", "psa", "edda")  # the other methods share the forces only
+    for ranks in (2, 3, 4) if by_place else (3,):
         assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
-        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
-    half = "run.end_time=1.5" if method != "free-flight" else "run.collisions=700"
-    run(deck, tmp_path / "half", output + [half])
-    subprocess.run([CAROM, "run", "--continue", tmp_path / "half", "--quiet", "--set",
-                    "run.end_time=3.0" if method != "free-flight" else "run.collisions=1500"], check=True)
-    assert filecmp.cmp(tmp_path / "plain" / "thermo.csv", tmp_path / "half" / "thermo.csv", shallow=False)
+        assert differences(plain, tmp_path / str(ranks)) == []
+    for width in WIDTHS[:-1]:
+        run(deck, tmp_path / width, output, env=os.environ | {"CAROM_SIMD": width})
+        assert differences(plain, tmp_path / width) == []
+    at = {"KILL_IN": f"{killed}/", "KILL_AT": str(int((tmp_path / "changes").read_text()) // 2)}
+    run(deck, killed, output, env=os.environ | library | at, code=-signal.SIGKILL)
+    go_on(killed, ranks=2)
+    assert differences(plain, killed) == []
+    assert filecmp.cmp(plain / "thermo.csv", killed / "thermo.csv", shallow=False)
 
 
 # Discs that fall on a floor and come to rest there; the large ones are of ice.
@@ -92,53 +113,10 @@ def test_inelastic_contacts_are_those_of_one_rank_and_continue(method, tmp_path)
     assert filecmp.cmp(tmp_path / "plain" / "thermo.csv", tmp_path / "half" / "thermo.csv", shallow=False)
 
 
-@pytest.mark.parametrize("bath", ["andersen", "rescaling", "thermal walls"])
-@pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
-def test_baths_are_those_of_one_rank_and_continue(method, bath, tmp_path):
-    heated = {"bath": [{"type": bath, "temperature": 2.0, "rate": 2.0}]}
-    if bath == "thermal walls":
-        heated = {"wall": [{"name": "y-", "temperature": 2.0}, {"name": "y+", "temperature": 0.5, "velocity": 0.1}]}
-    deck = write_deck(tmp_path, toml_text(tomllib.loads(DISCS) | heated | {"run": {"end_time": 3.0}}))
-    output = ["output.events=true", "integrator.step=" + ("0.25" if method == "free-flight" else "0.02"), f"integrator.type={method}"]
-    run(deck, tmp_path / "plain", output)
-    energy = summary(tmp_path / "plain")["energy"]
-    assert abs(energy["final"] - energy["initial"]) > 0.01 * abs(energy["initial"])
-    if method != "psa":
-        assert energy["max_abs_error"] < 1e-12 * energy["reference"]
-    for ranks in 2, 4:
-        assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
-        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
-    run(deck, tmp_path / "half", output + ["run.end_time=1.5"])
-    subprocess.run([CAROM, "run", "--continue", tmp_path / "half", "--quiet", "--set", "run.end_time=3.0"], check=True)
-    assert filecmp.cmp(tmp_path / "plain" / "thermo.csv", tmp_path / "half" / "thermo.csv", shallow=False)
-
-
-@pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
-def test_rough_spheres_are_those_of_one_rank_and_continue(method, tmp_path):
-    contact = {"contact": [{"between": ["*", "*"], "restitution": 0.95, "tangential": 0.5, "friction": 0.3}]}
-    deck = write_deck(tmp_path, toml_text(tomllib.loads(DISCS) | contact | {"run": {"end_time": 3.0}}))
-    output = ["output.events=true", "integrator.step=" + ("0.25" if method == "free-flight" else "0.02"), f"integrator.type={method}",
-              "particles.1.inertia=0.9"]
-    run(deck, tmp_path / "plain", output)
-    energy = summary(tmp_path / "plain")["energy"]
-    assert energy["dissipated"] > 0.1 * energy["initial"]
-    if method != "psa":
-        assert energy["max_abs_error"] < 1e-12 * energy["reference"]
-    for ranks in 2, 4:
-        assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
-        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
-    run(deck, tmp_path / "half", output + ["run.end_time=1.5"])
-    subprocess.run([CAROM, "run", "--continue", tmp_path / "half", "--quiet", "--set", "run.end_time=3.0"], check=True)
-    assert differences(tmp_path / "plain", tmp_path / "half") == []
-    with Trajectory(tmp_path / "half") as trajectory:
-        spin = trajectory._group["angular_velocity/value"][-1]
-        assert abs(spin[:, 2]).max() > 0.1 and (spin[:, :2] == 0).all()
-
-
-@pytest.mark.parametrize("text", [SPHERES, DISCS], ids=["spheres", "discs"])
+@pytest.mark.parametrize("text", [ROUGH, DISCS], ids=["rough spheres", "discs"])
 def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
     output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11", "output.profile_interval=0.13", "output.sample_start=0.05"]
-    if text is SPHERES:
+    if text is ROUGH:
         output += ["particles.0.count=500", "run.end_time=1.0"]
     run(write_deck(tmp_path, text), tmp_path / "plain", output)
     assert summary(tmp_path / "plain")["events"]["sphere_sphere"] >= 1500

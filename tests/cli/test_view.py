@@ -19,7 +19,7 @@ import h5py
 import numpy as np
 import pytest
 
-from runs import CAROM, SPHERES, SPRINGS, mpi_environment, needs_carom, run, same, data_sets, write_deck
+from runs import CAROM, ROUGH, SPHERES, SPRINGS, mpi_environment, needs_carom, run, same, data_sets, write_deck
 
 pytestmark = needs_carom
 
@@ -255,9 +255,9 @@ def test_frames_are_those_of_the_trajectory(shown, finished):
         assert get(port, f"{path}0/path/{nowhere}")[0] == 404
     for frame in (3, 6, 1):  # forwards and backwards: counts of collisions too
         body = get(port, path + f"0/frame/{frame}")[1]
-        time_, _, collisions, *edges, counted, _ = struct.unpack("<8d", body[:64])
+        time_, _, collisions, *edges, counted, spins = struct.unpack("<8d", body[:64])
         assert (time_, collisions) == (group["position/time"][frame], file["observables/collisions/value"][frame])
-        assert np.array_equal(edges, np.diag(group["box/edges/value"][frame])) and counted == 1
+        assert np.array_equal(edges, np.diag(group["box/edges/value"][frame])) and (counted, spins) == (1, 0)
         values = np.frombuffer(body[64:], "<f4")
         assert np.array_equal(values[:324].reshape(-1, 3), group["position/value"][frame].astype("f4"))
         assert np.allclose(values[324:432], np.linalg.norm(group["velocity/value"][frame], axis=1), rtol=1e-6)
@@ -267,6 +267,17 @@ def test_frames_are_those_of_the_trajectory(shown, finished):
     thermo = (finished / "thermo.csv").read_bytes()
     assert get(port, path + "0/thermo/0")[1] == thermo and get(port, path + "0/thermo/100")[1] == thermo[100:]
     assert get(port, path + "0/rdf")[1] == (finished / "rdf.csv").read_bytes()
+
+
+def test_spins_are_those_of_the_trajectory(tmp_path):
+    run(write_deck(tmp_path, ROUGH), tmp_path / "run", ["output.events=true"])
+    group = h5py.File(tmp_path / "run" / "trajectory.h5md")["particles/trajectory"]
+    with page("view", tmp_path / "run", "--no-browser") as (_, port, path):
+        body = get(port, path + "0/frame/3")[1]
+    assert struct.unpack("<8d", body[:64])[6:] == (1, 1)
+    values = np.frombuffer(body[64:], "<f4").reshape(6, 108)
+    assert np.allclose(values[4], np.linalg.norm(group["angular_velocity/value"][3], axis=1), rtol=1e-6) and values[4].min() > 0
+    assert values[5].max() > 1 and (values[5] == values[5].round()).all()
 
 
 def test_bonds_are_those_of_the_trajectory(tmp_path):

@@ -7,9 +7,10 @@ import subprocess
 import time
 
 import numpy as np
+import pytest
 
 from browsing import colour_by, differing, label, lit, picture, wait_for
-from runs import CAROM, ROOT, SPHERES, needs_carom, run, write_deck
+from runs import CAROM, ROOT, ROUGH, SPHERES, needs_carom, run, write_deck
 from test_view import page
 
 pytestmark = needs_carom
@@ -93,7 +94,7 @@ def test_a_wrong_token_gets_nothing(browser, tmp_path):
 
 
 def test_an_export_works_without_a_server(browser, tmp_path):
-    run(write_deck(tmp_path, SPHERES), tmp_path / "run", ["output.rdf_interval=0.5", "output.events=true"])
+    run(write_deck(tmp_path, ROUGH), tmp_path / "run", ["output.rdf_interval=0.5", "output.events=true"])
     target = tmp_path / "page.html"
     subprocess.run([CAROM, "view", str(tmp_path / "run"), str(tmp_path / "run"), "--export", str(target)], check=True, stdout=subprocess.DEVNULL)
     browser.get("about:blank")
@@ -105,7 +106,11 @@ def test_an_export_works_without_a_server(browser, tmp_path):
     browser.execute_script("wanted = 6")
     assert lit(first) > 0.05 and differing(first, picture(browser)) > 0.02
     assert lit(picture(browser, "#curves canvas")) > 0.005 and points(browser, "pressure") > 20
-    assert browser.execute_script("return [...element('colour').options].map(o => o.text).join()") == "speed,species,collisions"
+    assert browser.execute_script("return [...element('colour').options].map(o => o.text).join()") == "speed,species,spin,collisions"
+    colour_by(browser, "spin")
+    spin = "panels[0].frame.spin"
+    assert browser.execute_script(f"return panels[0].spheres.range[1] / Math.sqrt({spin}.reduce((s, w) => s + w * w, 0) / 108)") == pytest.approx(2.2)
+    assert browser.execute_script("return panels[0].key.textContent").startswith("spin 0 ")
     assert requested(browser) == {target.as_uri()}
     assert not [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
 

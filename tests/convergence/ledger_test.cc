@@ -8,7 +8,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "engine/base/contact_options.h"
 #include "engine/run/observable.h"
 #include "engine/setup/placement.h"
 #include "tests/convergence/fluid.h"
@@ -17,12 +16,7 @@
 namespace carom {
 namespace {
 
-template <int D>
-void set_law(System<D>& system, const Parameters& given) {
-  Parameters all = given;
-  if (!all.has("between")) all.set("between", std::vector<std::string>{"*", "*"});
-  add_contact<D>(system.box, system.species, completed("contact", contact_parameters(), all));
-}
+using test::set_law;
 
 /// The fall of ln T per collision of a sphere in the homogeneous cooling state of a dilute gas, with the excess a₂ of
 /// the fourth moment to first order: (1 − e²)/3 · (1 + 3a₂/16) per collision at the Maxwellian rate, which is 1 + a₂/16

@@ -22,6 +22,26 @@ def written(tmp_path, form, make):
     return sim, file
 
 
+def rough_mixture():
+    """Spheres with spin, of two moments of inertia."""
+    sim = carom.Simulation(box=[6, 7, 8], boundary="periodic")
+    sim.add_particles(count=20, temperature=1.0, rotational_temperature=1.0, radius=0.4, species="Na")
+    sim.add_particles(count=10, temperature=1.0, rotational_temperature=1.0, radius=0.3, mass=2.0, inertia=0.6, species="Cl")
+    sim.place("random", seed=2)
+    sim.add_contact("*", "*", tangential=0.5)
+    sim.integrator("free-flight")
+    return sim
+
+
+def rough_discs():
+    sim = carom.Simulation(box=[6, 7], boundary="periodic")
+    sim.add_particles(count=10, temperature=1.0, rotational_temperature=1.0, radius=0.4)
+    sim.place("random", seed=2)
+    sim.add_contact("*", "*", tangential=0.5)
+    sim.integrator("free-flight")
+    return sim
+
+
 def mixture():
     sim = carom.Simulation(box=[6, 7, 8], boundary="periodic")
     sim.add_particles(count=20, temperature=1.0, radius=0.4, charge=1.0, species="Na")
@@ -33,7 +53,7 @@ def mixture():
 
 
 @pytest.mark.parametrize("form", ["gsd", "extxyz", "lammps-data"])
-@pytest.mark.parametrize("make", [mixture, five_springs])
+@pytest.mark.parametrize("make", [mixture, five_springs, rough_mixture, rough_discs])
 def test_what_the_command_writes_comes_back(tmp_path, form, make):
     pytest.importorskip({"gsd": "gsd", "extxyz": "ase", "lammps-data": "numpy"}[form])
     sim, file = written(tmp_path, form, make)
@@ -43,13 +63,14 @@ def test_what_the_command_writes_comes_back(tmp_path, form, make):
     assert len(back) == len(sim) and np.allclose(back.box, sim.box, **single) and len(back.box) == (2 if flat else 3)
     order = np.lexsort((sim.position[:, 0], np.array(sim.species_names)[sim.species]))
     again = np.lexsort((back.position[:, 0], np.array(sim.species_names)[_kinds(sim, back)]))
-    for name in ("position", "velocity", "mass", "radius", "charge"):
+    for name in ("position", "velocity", "mass", "radius", "charge", "spin"):
         assert np.allclose(getattr(back, name)[again], getattr(sim, name)[order], **single), name
-    if form != "extxyz":
+    assert back.spin.any() == (make in (rough_mixture, rough_discs))
+    if form != "extxyz" and sim._session.forces:
         old, new = np.argsort(order), np.argsort(again)
         bonds = sim._session.forces[0][1]["pairs"]
         assert sorted(sorted(old[list(pair)]) for pair in bonds) == sorted(sorted(new[list(pair)]) for pair in back.bonds)
-    if form != "lammps-data" and not flat:
+    if form != "lammps-data" and not flat and len(sim.species_names) > 1:
         assert sorted(back.species_names) == ["Cl", "Na"]
 
 
@@ -71,6 +92,13 @@ def test_what_gsd_and_ase_write_themselves(tmp_path):
     sim = carom.Simulation.from_file(tmp_path / "own.gsd")
     assert sim.species_names == ["A", "B"] and sim.position.tolist() == [[6, 6, 6], [0, 5, 5], [7, 8, 9]]
     assert sim.radius.tolist() == [0.5, 0.5, 0.25] and sim.bonds.tolist() == [[1, 2]] and sim.boundary == ["periodic"] * 3
+    # A quarter turn about x: L = (1, 2, 3) is (1, 3, -2) in the frame of the body; 2 q (0, L_body).
+    s = np.sqrt(0.5)
+    snapshot.particles.orientation, snapshot.particles.moment_inertia = [[s, s, 0, 0]] * 3, [[0.5, 0.5, 0.5]] * 3
+    snapshot.particles.angmom = [[-2 * s, 2 * s, 10 * s, 2 * s]] * 3
+    with hoomd.open(name=str(tmp_path / "turned.gsd"), mode="wb") as file:
+        file.append(snapshot)
+    assert np.allclose(carom.Simulation.from_file(tmp_path / "turned.gsd").spin, [2, 4, 6], atol=1e-6)
     write(tmp_path / "own.extxyz", ase.Atoms("NaCl", positions=[[1, 2, 3], [4, 5, 6]], cell=[9, 9, 9], pbc=[True, True, False]))
     with pytest.raises(carom.UsageError, match="there are no radii in it; give radius"):
         carom.Simulation.from_file(tmp_path / "own.extxyz")

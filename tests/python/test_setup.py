@@ -64,6 +64,7 @@ def test_walls_contacts_baths_and_files_stay_when_particles_are_placed(tmp_path)
     (lambda s: s.add_particles(count=3), "needs a 'temperature'"),
     (lambda s: s.add_particles(count=3, temperature=1, position=[[1, 1]]), "'count' excludes"),
     (lambda s: s.add_particles(temperature=1, position=[[1, 1]]), "call thermalize"),
+    (lambda s: s.add_particles(rotational_temperature=1, position=[[1, 1]]), "call thermalize"),
     (lambda s: s.add_particles(), "there is no 'position'"),
     (lambda s: (s.add_particles(count=3, temperature=1, species="b"), s.place("fcc")), "'fcc' is a lattice of 3 dimensions"),
     (lambda s: carom.Simulation(), "give its edges, or dimension"),
@@ -93,9 +94,17 @@ def test_temperatures_are_exact_and_of_one_species():
     sim.add_particles([[5, 5], [7, 7]], species="b", mass=4)
     sim.thermalize(3.0, species="b")
     assert not sim.velocity[:2].any() and 0.5 * 4 * (sim.velocity[2:] ** 2).sum() == pytest.approx(2 * 3.0)
+    sim.add_contact("a", "b", tangential=0.5)
+    sim.thermalize(3.0, species="b", rotational_temperature=2.0)
+    moment = 0.5 * 4 * 0.25
+    assert not sim.spin[:2].any() and moment * (sim.spin[2:] ** 2).sum() == pytest.approx(2 * 2.0)
     for bad in (-1.0, np.inf):
         with pytest.raises(carom.UsageError, match="give 0 or more"):
             sim.thermalize(bad)
+        with pytest.raises(carom.UsageError, match="give 0 or more"):
+            sim.thermalize(1.0, rotational_temperature=bad)
+        with pytest.raises(carom.UsageError, match="'rotational_temperature' is .*; give 0 or more"):
+            sim.add_particles(count=3, temperature=1.0, rotational_temperature=bad)
     with pytest.raises(carom.UsageError, match="no species 'c'; give one of: a, b"):
         sim.thermalize(1.0, species="c")
 

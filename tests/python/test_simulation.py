@@ -336,6 +336,45 @@ def test_rough_spheres_spin():
         sim.add_particles([[2, 1]], radius=0.5, inertia=1.5)
 
 
+def test_placed_spheres_spin_as_in_a_deck(tmp_path):
+    """The same spins, drawn by place() before the contacts are known; spheres that stand there already keep theirs."""
+    (tmp_path / "deck.toml").write_text("""format = 1
+[system]
+dimension = 3
+box = [8.0, 8.0, 8.0]
+boundary = ["periodic", "periodic", "periodic"]
+[[contact]]
+between = ["grain", "shell"]
+tangential = 0.5
+[[particles]]
+name = "grain"
+position = [[1.0, 2.0, 3.0]]
+radius = 0.5
+spin = [[1.0, 2.0, 3.0]]
+[[particles]]
+name = "shell"
+count = 40
+temperature = 1.0
+rotational_temperature = 0.7
+inertia = 0.6
+radius = 0.4
+[placement]
+type = "random"
+seed = 3
+[integrator]
+type = "free-flight"
+[run]
+end_time = 1.0
+""")
+    deck = carom.Simulation.from_deck(tmp_path / "deck.toml")
+    sim = carom.Simulation(box=[8, 8, 8], boundary="periodic")
+    sim.add_particles([[1, 2, 3]], radius=0.5, species="grain", spin=[[1, 2, 3]])
+    sim.add_particles(count=40, temperature=1.0, rotational_temperature=0.7, inertia=0.6, radius=0.4, species="shell")
+    sim.place("random", seed=3)
+    assert (sim.spin[0] == [1, 2, 3]).all() and (sim.spin == deck.spin).all()
+    assert 0.6 * 0.4**2 * (sim.spin[1:] ** 2).sum() == pytest.approx(3 * 40 * 0.7, rel=1e-13)
+
+
 def test_rough_spheres_that_are_placed_and_written(tmp_path):
     def grains():
         sim = carom.Simulation(dimension=3, boundary="periodic")

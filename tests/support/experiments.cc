@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "engine/base/contact_options.h"
 #include "engine/base/random.h"
 #include "engine/forces/pair_filter.h"
 #include "engine/ranks/id_blocks.h"
@@ -110,6 +111,13 @@ std::unique_ptr<System<D>> hard_spheres(int cells, double packing_fraction, unsi
 }
 
 template <int D>
+void set_law(System<D>& system, const Given& given) {
+  Parameters all = given;
+  if (!all.has("between")) all.set("between", std::vector<std::string>{"*", "*"});
+  add_contact<D>(system.box, system.species, completed("contact", contact_parameters(), all));
+}
+
+template <int D>
 std::unique_ptr<Simulation<D>> make_run(std::unique_ptr<System<D>> system, const std::string& integrator, Plan plan,
                                         const Given& given) {
   Parameters parameters = given;
@@ -155,6 +163,7 @@ double fitted_order(const std::vector<double>& x, const std::vector<double>& y) 
   template std::unique_ptr<System<D>> make_system<D>(const Vec<D>&, Boundary, std::vector<Vec<D>>,                     \
                                                      std::vector<Vec<D>>, std::vector<double>, std::vector<double>);   \
   template std::unique_ptr<System<D>> hard_spheres<D>(int, double, unsigned);                                          \
+  template void set_law<D>(System<D>&, const Given&);                                                                  \
   template std::unique_ptr<Simulation<D>> make_run<D>(std::unique_ptr<System<D>>, const std::string&, Plan,            \
                                                       const Given&);                                                   \
   template std::unique_ptr<Simulation<D>> run_steps<D>(std::unique_ptr<System<D>>, const std::string&, double,         \

@@ -39,6 +39,10 @@ std::unique_ptr<System<3>> gravity_cluster(unsigned start = 0);
 template <int D>
 std::unique_ptr<System<D>> hard_spheres(int cells, double packing_fraction, unsigned seed = 1);
 
+/// Sets the law of the contacts of two partners, "*" and "*" if it has none, with defaults for keys that are not given.
+template <int D>
+void set_law(System<D>& system, const Given& given);
+
 /// A run with the integrator of this name, with defaults for parameters that are not given.
 template <int D>
 std::unique_ptr<Simulation<D>> make_run(std::unique_ptr<System<D>> system, const std::string& integrator, Plan plan,

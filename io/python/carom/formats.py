@@ -38,8 +38,19 @@ def read_gsd(path, frame):
     # In GSD the origin is in the middle of the box. Single precision may put a position beyond an edge by its rounding.
     return {"edges": box[:3], "tilt": box[3:], "flat": flat, "periodic": [True, True, not flat],
             "position": np.asarray(p.position, dtype=float) + box[:3] / 2, "velocity": p.velocity, "mass": p.mass,
-            "charge": p.charge, "radius": np.asarray(p.diameter, dtype=float) / 2, "kind": p.typeid, "names": list(p.types),
+            "charge": p.charge, "spin": _spins_of_gsd(p), "radius": np.asarray(p.diameter, dtype=float) / 2, "kind": p.typeid, "names": list(p.types),
             "bonds": np.asarray(snapshot.bonds.group, dtype=int).reshape(-1, 2)}
+
+
+def _spins_of_gsd(p):
+    """The angular velocities of bodies whose moments of inertia are equal about all their axes, else none. The angular momentum is
+    the vector part of ½ P q*, P the conjugate quaternion of the file and q the orientation."""
+    moment = np.asarray(p.moment_inertia, dtype=float)
+    if not p.angmom.any() or (moment[:, 2] <= 0).any() or any((moment[:, k] != moment[:, 2])[moment[:, k] != 0].any() for k in (0, 1)):
+        return None
+    P, q = np.asarray(p.angmom, dtype=float), np.asarray(p.orientation, dtype=float)
+    momentum = (q[:, :1] * P[:, 1:] - P[:, :1] * q[:, 1:] - np.cross(P[:, 1:], q[:, 1:])) / 2
+    return momentum / moment[:, 2:]
 
 
 def read_extxyz(path, frame):
@@ -55,7 +66,7 @@ def read_extxyz(path, frame):
         names = [stated[rank] for rank in order]
     return {"edges": np.diag(cell), "tilt": cell - np.diag(np.diag(cell)), "flat": False, "periodic": list(atoms.pbc),
             "position": atoms.positions, "velocity": velocity, "mass": arrays.get("mass", atoms.get_masses()),
-            "charge": arrays.get("charge", arrays.get("initial_charges")), "radius": arrays.get("radius"), "kind": kind,
+            "charge": arrays.get("charge", arrays.get("initial_charges")), "spin": arrays.get("angular_velocity"), "radius": arrays.get("radius"), "kind": kind,
             "names": list(names), "bonds": np.empty((0, 2), int)}
 
 
@@ -91,15 +102,16 @@ def read_lammps(path, frame):
     else:
         masses = {int(row[0]): row[1] for row in sections.get("Masses", [])}
         mass = np.array([masses.get(each, 1.0) for each in kind])
-    ids, velocity = atoms[:, 0], None
+    ids, velocity, spin = atoms[:, 0], None, None
     if sections.get("Velocities"):
-        velocity = np.array(sorted(sections["Velocities"]))[:, 1:4]
+        rows = np.array(sorted(sections["Velocities"]))
+        velocity, spin = rows[:, 1:4], rows[:, 4:7] if radius is not None and rows[:, 4:7].any() else None
     bonds = np.array([row[2:4] for row in sections.get("Bonds", [])]).reshape(-1, 2)
     flat = edges[2] == 1 and low[2] == -0.5 and not np.any(of["z"])
     kinds = np.unique(kind)
     return {"edges": edges, "tilt": np.array(head.get("xy xz yz", [0.0])), "flat": flat, "periodic": [True, True, not flat],
             "position": np.column_stack([of[k] for k in "xyz"]) - (0 if flat else low) * np.ones(3), "velocity": velocity,
-            "mass": mass, "charge": of.get("charge"), "radius": radius, "kind": np.searchsorted(kinds, kind),
+            "mass": mass, "charge": of.get("charge"), "spin": spin, "radius": radius, "kind": np.searchsorted(kinds, kind),
             "names": [str(each) for each in kinds], "bonds": np.searchsorted(ids, bonds)}
 
 
@@ -151,7 +163,8 @@ def read(kind_of_simulation, file, frame, radius, boundary):
         each = {name: np.broadcast_to(np.asarray(values, dtype=float), len(order))[rows]
                 for name, values in given.items() if values is not None}
         velocity = None if found["velocity"] is None else np.asarray(found["velocity"], dtype=float)[rows, :columns]
-        simulation.add_particles(position=np.asarray(found["position"], dtype=float)[rows, :columns], velocity=velocity,
+        spin = None if found["spin"] is None else np.asarray(found["spin"], dtype=float)[rows, 2 if flat else slice(None)]
+        simulation.add_particles(position=np.asarray(found["position"], dtype=float)[rows, :columns], velocity=velocity, spin=spin,
                                  species=found["names"][kind], **each)
     simulation._cores = radius is not None
     new = np.empty(len(order), int)

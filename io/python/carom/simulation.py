@@ -73,7 +73,7 @@ class Simulation:
         self._session, self.title, self.warnings = session, title, []
         self._cores = False  # a radius was given
         self._output = None  # the arguments of set_output()
-        self._edges_known, self._counted, self._inertias, self.bonds = True, [], {}, np.empty((0, 2), int)
+        self._edges_known, self._counted, self._spinning, self._inertias, self.bonds = True, [], [], {}, np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
         self.warnings = list(texts)
@@ -116,7 +116,7 @@ class Simulation:
         return formats.read(cls, file, frame, radius, boundary)
 
     def add_particles(self, position=None, velocity=None, radius=None, mass=1.0, charge=0.0, species="particle", count=None,
-                      temperature=None, spin=None, inertia=None):
+                      temperature=None, spin=None, inertia=None, rotational_temperature=None):
         """Adds N particles; returns the range of their ids.
 
         position, velocity: arrays of shape (N, D) [length, length/time]; the default velocity is 0.
@@ -124,7 +124,8 @@ class Simulation:
         cores. species: the name of their species, for forces between species.
         spin: angular velocities [1/time], (N,) in two dimensions, about z, and (N, 3) in three. Contacts with "tangential" change them.
         inertia: reduced moment of inertia 4I/(m sigma²) of the species; the default is that of a homogeneous body.
-        count, temperature: replace positions and velocities, which place() then chooses.
+        count, temperature, rotational_temperature: replace positions, velocities and spins, which place() then chooses. Without
+        rotational_temperature the particles do not spin.
 
             sim.add_particles(position=[[1, 1], [3, 1]], velocity=[[0, 0], [0.5, 0]], radius=0.5)
             sim.add_particles(count=500, temperature=1.0, radius=0.5, species="solvent")
@@ -133,11 +134,13 @@ class Simulation:
         radius = 0.5 if radius is None else radius
         if count is not None:
             return self._count(count, position, velocity, temperature,
-                               {"name": species, "radius": radius, "mass": mass, "charge": charge}, spin, inertia)
+                               {"name": species, "radius": radius, "mass": mass, "charge": charge}, spin, inertia,
+                               rotational_temperature)
         if position is None:
             raise UsageError("add_particles: there is no 'position'; give one of shape (N, D), or a count for place()")
-        if temperature is not None:
-            raise UsageError("add_particles: 'temperature' goes with 'count'; call thermalize() after particles with positions")
+        for name, value in (("temperature", temperature), ("rotational_temperature", rotational_temperature)):
+            if value is not None:
+                raise UsageError(f"add_particles: '{name}' goes with 'count'; call thermalize() after particles with positions")
         if not self._edges_known:
             raise UsageError("add_particles: explicit positions need the 'box' of the simulation; give its edges")
         dimension = len(self.box)
@@ -174,23 +177,26 @@ class Simulation:
             raise UsageError(f"{of}: 'spin' has shape {array.shape}; give {shape}")
         return array
 
-    def _count(self, count, position, velocity, temperature, table, spin, inertia):
+    def _count(self, count, position, velocity, temperature, table, spin, inertia, rotational_temperature):
         if spin is not None:
-            raise UsageError("add_particles: 'spin' goes with 'position'; assign simulation.spin after place()")
+            raise UsageError("add_particles: 'spin' goes with 'position'; give 'rotational_temperature' with 'count'")
         self._inertias[table["name"]] = self._inertia(inertia)
         if position is not None or velocity is not None:
             raise UsageError("add_particles: 'count' excludes 'position' and 'velocity'; leave it out, or them")
         if temperature is None:
             raise UsageError("add_particles: 'count' needs a 'temperature'; 0 leaves the particles at rest")
+        if rotational_temperature is not None and not 0 <= rotational_temperature < np.inf:
+            raise UsageError(f"add_particles: 'rotational_temperature' is {rotational_temperature!r}; give 0 or more")
         first = self._session.size + sum(one["count"] for one in self._counted)
         for name in ("radius", "mass", "charge"):
             values = one_or_each("add_particles", name, table[name], count)
             table[name] = float(values[0]) if len(values) == 1 else values
         self._counted.append(table | {"count": int(count), "temperature": float(temperature)})
+        self._spinning.append(np.full(int(count), np.nan if rotational_temperature is None else float(rotational_temperature)))
         return range(first, first + int(count))
 
     def place(self, type, packing_fraction=None, seed=1, **parameters):
-        """Places the particles that were added by count, and draws their velocities; returns the range of all ids.
+        """Places the particles that were added by count, and draws their velocities and spins; returns the range of all ids.
 
         type: "fcc", "simple-cubic", "hexagonal", "square", "random" or "compressed". It and further parameters are those of
         [placement] in decks. packing_fraction: determines the box if the simulation was made without one.
@@ -222,19 +228,23 @@ class Simulation:
                 session.set_inertia(name, inertia)
         if spin.any():
             session.set_spin(np.concatenate([spin, np.zeros((session.size - len(spin),) + spin.shape[1:])]))
+        spinning = np.concatenate([np.full(old.size, np.nan)] + self._spinning)
+        if not np.isnan(spinning).all():
+            session.set_spin(session.drawn_spins(spinning, seed))
         for name, given in old.forces:
             session.add_force(name, given)
         if old.method:
             session.set_integrator(old.method, old.method_parameters)
         if self._output:
             session.set_output(*self._output)
-        self._session, self._edges_known, self._counted, self._inertias = session, True, [], {}
+        self._session, self._edges_known, self._counted, self._spinning, self._inertias = session, True, [], [], {}
         self._warn(texts)
         return range(len(self))
 
-    def thermalize(self, temperature, seed=1, species=None):
+    def thermalize(self, temperature, seed=1, species=None, rotational_temperature=None):
         """Draws Maxwell-Boltzmann velocities with zero total momentum and exactly this temperature [energy].
 
+        rotational_temperature: draws spins, too, of exactly this mean energy, T/2 for each axis of rotation.
         species: the name of the only species that gets new velocities. May be called in a callback: see `velocity`.
         """
         each = np.full(len(self), np.nan)
@@ -243,6 +253,9 @@ class Simulation:
         chosen = slice(None) if species is None else self.species == self.species_names.index(species)
         each[chosen] = temperature
         self._session.set_velocity(self._session.drawn_velocities(each, seed))
+        if rotational_temperature is not None:
+            each[chosen] = rotational_temperature
+            self._session.set_spin(self._session.drawn_spins(each, seed))
 
     def add_wall(self, name, normal=None, **parameters):
         """Adds a wall, or changes a face of the box whose boundary is a wall: "x-", "x+", "y-", …

@@ -14,13 +14,14 @@ const running = () => panels.some((panel) => ["running", "awaited"].includes(pan
 
 // The quantities that spheres can be coloured by.
 function offerColours() {
-  const choices = ["speed", "species", ...(panels.some((panel) => panel.frame && panel.frame.count) ? ["collisions"] : [])];
+  const some = (name) => panels.some((panel) => panel.frame && panel.frame[name]);
+  const choices = ["speed", "species", ...(some("spin") ? ["spin"] : []), ...(some("count") ? ["collisions"] : [])];
   const select = element("colour");
   if (select.length !== choices.length) {
     const chosen = select.value || "speed";
     select.replaceChildren(...choices.map((name) => new Option(name)));
     select.value = choices.includes(chosen) ? chosen : "speed";
-    select.title = choices.length < 3 ? "by collisions: if the run writes events (output.events = true)" : "";
+    select.title = !some("count") ? "by collisions: if the run writes events (output.events = true)" : "";
   }
 }
 

@@ -85,10 +85,13 @@ class Panel {
   }
   colour() {
     if (!this.frame) return;
-    const { speed, count } = this.frame, choice = element("colour").value;
+    const { speed, spin, count } = this.frame, choice = element("colour").value;
     if (choice === "species") this.spheres.setValues(this.species, { kinds: true });
     else if (choice === "collisions" && count) this.spheres.setValues(count, [0, Math.max(1, count.reduce((a, b) => Math.max(a, b), 0))]);
-    else this.spheres.setValues(speed, [0, 2.2 * Math.sqrt(speed.reduce((sum, v) => sum + v * v, 0) / speed.length) || 1]);
+    else {
+      const values = choice === "spin" && spin ? spin : speed;
+      this.spheres.setValues(values, [0, 2.2 * Math.sqrt(values.reduce((sum, v) => sum + v * v, 0) / values.length) || 1]);
+    }
     this.drawKey();
     dirty = true;
   }
@@ -98,7 +101,7 @@ class Panel {
     if (!range.kinds) {
       const bar = tag("span", { className: "bar" });
       bar.style.background = `linear-gradient(to right, ${VIRIDIS.map(hex).join()})`;
-      const choice = element("colour").value, open = choice === "speed" ? "≥ " : "";
+      const choice = element("colour").value, open = choice === "collisions" ? "" : "≥ ";
       this.key.replaceChildren(`${choice} ${rounded(range[0])} `, bar, ` ${open}${rounded(range[1])}`);
       return;
     }
@@ -127,6 +130,7 @@ class Panel {
     const x = [...frame.position.subarray(3 * chosen, 3 * chosen + 3)], name = (this.state.species || [])[this.species[chosen]];
     const rows = [["position", x.slice(0, this.flat ? 2 : 3).map(rounded).join(", ")], ["speed", rounded(frame.speed[chosen])],
                   ["radius", rounded(this.radii[chosen])], ["mass", rounded(this.mass[chosen])], ["charge", rounded(this.charge[chosen])],
+                  ...(frame.spin ? [["spin", rounded(frame.spin[chosen])]] : []),
                   ...(frame.count ? [["collisions", frame.count[chosen]]] : [])];
     this.numbers.textContent = [`${this.noun} ${chosen}${name ? `, ${name}` : ""}`, ...rows.map((row) => row.join(" "))].join("\n");
     if (path && shown === path.first + path.positions.length / 3) path.positions = Float32Array.of(...path.positions, ...x);

@@ -39,13 +39,14 @@ const source = (() => {
 // One frame; io/view/run_source.h describes the bytes.
 const FRAME_HEAD = 64;
 function readFrame(buffer, particles) {
-  const [time, step, collisions, x, y, z, counted] = new Float64Array(buffer, 0, 8);
+  const [time, step, collisions, x, y, z, counted, spins] = new Float64Array(buffer, 0, 8);
   const floats = (first, n) => new Float32Array(buffer, FRAME_HEAD + 4 * first, n);
   return {
     time, step, collisions, edges: [x, y, z],
     position: floats(0, 3 * particles),
     speed: floats(3 * particles, particles),
-    count: counted ? floats(4 * particles, particles) : null,
+    spin: spins ? floats(4 * particles, particles) : null,
+    count: counted ? floats((spins ? 5 : 4) * particles, particles) : null,
   };
 }
 

@@ -5,7 +5,6 @@
 
 #include <cmath>
 
-#include "engine/base/contact_options.h"
 #include "engine/base/error.h"
 #include "engine/events/collision.h"
 #include "tests/support/experiments.h"
@@ -13,12 +12,7 @@
 namespace carom {
 namespace {
 
-template <int D>
-void set_law(System<D>& system, const Parameters& given) {
-  Parameters all = given;
-  if (!all.has("between")) all.set("between", std::vector<std::string>{"*", "*"});
-  add_contact<D>(system.box, system.species, completed("contact", contact_parameters(), all));
-}
+using test::set_law;
 
 std::string message_of(const auto& work) {
   try {

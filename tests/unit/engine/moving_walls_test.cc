@@ -177,6 +177,27 @@ TEST(ShakenWalls, AreRefusedWhereStepsDoNotFollowThem) {
   EXPECT_EQ(refusal("free-flight", 1, {}), "");
 }
 
+/// A piston that leaves a disc no room: an error that says so, in every method, at elastic and inelastic contacts.
+TEST(Walls, ThatSqueezeASphereEndTheRun) {
+  for (const std::string& method : kMethods)
+    for (const double e : {1.0, 0.5}) {
+      auto system = test::make_system<2>({4, 6}, Boundary::wall, {{1, 3}, {2.5, 3.1}}, {{0.3, 0.1}, {0, -0.2}});
+      system->box.add({.name = "x+", .velocity = 1});
+      test::set_law(*system, {{"restitution", e}});
+      try {
+        test::run_until<2>(std::move(system), method, 0.01, 5);
+        ADD_FAILURE() << method;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.failure(), Failure::numerical);
+        const std::string what = error.what();
+        EXPECT_NE(what.find("the lower wall of axis 0 and the upper wall of axis 0 leave no room for a diameter of 1 "
+                            "between them at time 3"),
+                  std::string::npos)
+            << method << e << what;
+      }
+    }
+}
+
 TEST(Walls, NeedRoomBetweenThem) {
   Box<2> box{.edges = {10, 10}};
   box.add({.name = "x-", .velocity = 0.5});

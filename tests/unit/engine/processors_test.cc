@@ -95,6 +95,18 @@ void expect(const std::string& name, const Hash& hash) {
       {"edda, gravity, 2-D", 0x5af6f16205f8aabd},
       {"edda, bonds, 3-D", 0x80b5c6ecd8f6cb6f},
       {"edda, gravity, 3-D", 0x6d1ca19c04d1c25d},
+      {"free-flight, laws, ledger", 0x76200ac856674593},
+      {"free-flight, laws, 2-D", 0xf5ec03a1817f6c7b},
+      {"psa, laws, ledger", 0xd491e34ba6a69426},
+      {"psa, laws, 2-D", 0xf5efa175b5640e69},
+      {"cva, laws, ledger", 0xf7480ab520ae9260},
+      {"cva, laws, 2-D", 0x486df6092768a813},
+      {"mcva, laws, ledger", 0xf7480ab520ae9260},
+      {"mcva, laws, 2-D", 0x486df6092768a813},
+      {"cdda, laws, ledger", 0x19d08d150ecbcd05},
+      {"cdda, laws, 2-D", 0x32b1ecf7bdeb52b6},
+      {"edda, laws, ledger", 0x6608377546e5c369},
+      {"edda, laws, 2-D", 0x59801f84f5266550},
   };
   const auto found = stored.find(name);
   EXPECT_TRUE(found != stored.end() && found->second == hash.word)
@@ -179,6 +191,40 @@ TEST(Processors, StepTheSameWay) {
     expect_run(name("bonds"), *test::run_steps(test::bonded_cluster(), method, 0.01, 400));
     expect_run(name("gravity"), *test::run_steps(test::gravity_cluster(), method, 0.01, 800));
   }
+}
+
+/// Rough and inelastic contacts, those of discs as of ice, a piston, a thermal and a shaken wall, and a bath.
+std::unique_ptr<System<2>> driven(std::unique_ptr<System<2>> system) {
+  Box<2>& box = system->box;
+  box.add({.name = "x+", .velocity = 0.05});
+  box.add({.name = "y-", .temperature = 1});
+  box.add({.name = "y+", .amplitude = 0.1, .frequency = 0.5});
+  box.bath = {.type = Bath::Type::andersen, .temperature = 1, .last_temperature = 2, .rate = 0.1};
+  const TableValue ice{{"form", std::string("power")}, {"v0", 0.5}, {"exponent", 0.25}};
+  test::set_law(*system, {{"restitution", 0.9}, {"tangential", 0.5}, {"friction", 0.3}});
+  test::set_law(*system,
+                {{"between", std::vector<std::string>(2, "sphere")}, {"restitution", ice}, {"tangential", -0.2}});
+  return system;
+}
+
+void expect_driven(const std::string& name, const Simulation<2>& run) {
+  Hash hash;
+  for (const Spin<2>& spin : run.system().particles.spin) hash.add(spin[0]);
+  const Counters& c = run.statistics().counters;
+  for (const double value : {c.dissipated.value(), c.work.value(), c.heat.value()}) {
+    EXPECT_NE(value, 0) << name;
+    hash.add(value);
+  }
+  expect(name + ", ledger", hash);
+  expect_run(name, run);
+}
+
+TEST(Processors, LoseAndGainTheSameEnergy) {
+  auto free = test::nine_gravity();
+  free->interactions.clear();
+  expect_driven("free-flight, laws", *test::run_until<2>(driven(std::move(free)), "free-flight", 1, 20));
+  for (const std::string method : {"psa", "cva", "mcva", "cdda", "edda"})
+    expect_driven(method + ", laws", *test::run_until<2>(driven(test::five_springs()), method, 0.01, 20));
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 
 #include <cmath>
 
-#include "engine/base/contact_options.h"
 #include "engine/base/error.h"
 #include "engine/events/collision.h"
 #include "tests/support/experiments.h"
@@ -16,12 +15,7 @@
 namespace carom {
 namespace {
 
-template <int D>
-void set_law(System<D>& system, const Parameters& given) {
-  Parameters all = given;
-  if (!all.has("between")) all.set("between", std::vector<std::string>{"*", "*"});
-  add_contact<D>(system.box, system.species, completed("contact", contact_parameters(), all));
-}
+using test::set_law;
 
 /// Two systems in which only the contact of particle 0 with particle 1, or with the lower wall of axis 2, matters.
 std::unique_ptr<System<2>> two_discs(const Parameters& law) {

@@ -206,6 +206,41 @@ TEST(Velocities, SingleParticleKeepsItsMomentum) {
   EXPECT_NEAR(4 * p.v[0].squaredNorm(), 2 * 2, 1e-14);
 }
 
+/// Exact in sum, alike for light and heavy, and by id: a second species does not change the numbers before the scaling.
+TEST(Spins, HaveTheRotationalTemperatureAskedFor) {
+  constexpr std::size_t n = 600;
+  ContactLaws laws;
+  laws.inertias = {0.4, 0.6};
+  Particles<3> p;
+  p.spin.assign(n, Vec<3>(1, 2, 3));
+  std::vector<Id> ids;
+  for (std::size_t i = 0; i < n; ++i) {
+    p.mass.push_back(i % 2 == 0 ? 1 : 7.5), p.radius.push_back(i % 2 == 0 ? 0.5 : 2), p.species.push_back(i % 2);
+    if (i > 0) ids.push_back(static_cast<Id>(i));
+  }
+  const std::vector<double> temperature(ids.size(), 1.7);
+  draw_spins<3>(p, laws, ids, temperature, 11);
+  EXPECT_EQ(p.spin[0], Vec<3>(1, 2, 3));
+  std::array<double, 2> twice_rotational{};
+  for (const Id i : ids) twice_rotational[i % 2] += (i % 2 == 0 ? 0.4 * 0.25 : 0.6 * 7.5 * 4) * p.spin[i].squaredNorm();
+  EXPECT_NEAR((twice_rotational[0] + twice_rotational[1]) / (3.0 * (n - 1)), 1.7, 1e-13);
+  EXPECT_NEAR(twice_rotational[0] / (1.5 * n), 1.7, 5 * 1.7 * std::sqrt(2 / (1.5 * n)));  // five standard deviations
+
+  Particles<3> again = p, other = p;
+  draw_spins<3>(again, laws, ids, temperature, 11);
+  draw_spins<3>(other, laws, ids, temperature, 12);
+  EXPECT_EQ(again.spin, p.spin);
+  EXPECT_NE(other.spin, p.spin);
+  Particles<3> one = p;
+  draw_spins<3>(one, laws, std::vector<Id>{7}, std::vector<double>{1.7}, 11);
+  EXPECT_NEAR((one.spin[7].normalized() - p.spin[7].normalized()).norm(), 0, 1e-14);
+
+  Particles<2> disc;
+  disc.mass = {2}, disc.radius = {3}, disc.species = {0}, disc.spin = {Spin<2>::Zero()};
+  draw_spins<2>(disc, {}, std::vector<Id>{0}, std::vector<double>{0.7}, 11);
+  EXPECT_NEAR(0.5 * 2 * 9 * disc.spin[0].squaredNorm(), 0.7, 1e-15);
+}
+
 TEST(PackingFraction, IsVolumeOfSpheresOverVolume) {
   const std::vector<double> radius{1, 2};
   EXPECT_DOUBLE_EQ(packing_fraction<2>(50, radius), std::numbers::pi * 5 / 50);
