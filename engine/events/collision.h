@@ -30,8 +30,9 @@ struct Impulse {
 
 /// The normal part of a contact of two spheres, with d as above; the contact distance grows at the rate w.
 template <int D>
-Impulse pair_impulse(const ContactLaws& laws, std::uint16_t species_i, std::uint16_t species_j, const Vec<D>& d,
-                     const Vec<D>& v, double mass_i, double mass_j, double sigma = 0, double w = 0) {
+[[gnu::always_inline]] inline Impulse pair_impulse(const ContactLaws& laws, std::uint16_t species_i,
+                                                   std::uint16_t species_j, const Vec<D>& d, const Vec<D>& v,
+                                                   double mass_i, double mass_j, double sigma = 0, double w = 0) {
   if (laws.elastic()) return {collision_factor<D>(d, v, mass_i, mass_j, sigma, w), 0};
   const double closing = -(d.dot(v) - sigma * w), square = closing * closing / d.squaredNorm();
   const double e = laws.of_pair(species_i, species_j).at(std::sqrt(square), laws.thermal_speed, laws.slow);

@@ -146,7 +146,7 @@ double EventCore<D>::run(double end, const Report& report) {
       continue;
     }
     const Slot j = flights_.packing().slot(a.partner);
-    collide_pair(i, now, generation, report);
+    collide_pair(i, j, a.partner, now, generation, report);
     search_.plan_two(i, j, now);
     if (report.counters.sphere_sphere >= report.collision_limit) {
       end = now;
@@ -172,18 +172,20 @@ void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
 }
 
 template <int D>
-void EventCore<D>::collide_pair(Slot i, double time, std::uint32_t generation, const Report& report) {
+void EventCore<D>::begin_trace(Slot i, std::uint32_t partner, std::uint32_t generation, Trace<D>& trace) const {
+  const Slot j = flights_.packing().slot(partner);
+  const auto [lo, hi] = flights_[i].id < flights_[j].id ? std::pair(i, j) : std::pair(j, i);
+  trace.begin(lo, flights_[lo], hi, flights_[hi], lo == i ? partner : flights_.packing().reversed(i, partner),
+              generation);
+  if (flights_.rough()) trace.note_spins(flights_.spin(lo), flights_.spin(hi));
+}
+
+template <int D>
+void EventCore<D>::collide_pair(Slot i, Slot j, std::uint32_t partner, double time, std::uint32_t generation,
+                                const Report& report) {
   const Packing<D>& packing = flights_.packing();
-  const std::uint32_t partner = queue_[i].partner;
-  const Slot j = packing.slot(partner);
-  if (report.trace) {
-    const auto [lo, hi] = flights_[i].id < flights_[j].id ? std::pair(i, j) : std::pair(j, i);
-    report.trace->begin(lo, flights_[lo], hi, flights_[hi], lo == i ? partner : packing.reversed(i, partner),
-                        generation);
-    if (flights_.rough()) report.trace->note_spins(flights_.spin(lo), flights_.spin(hi));
-  }
-  Vec<D> shift = Vec<D>::Zero();
-  if (packing.linear(partner) != 0) shift = box_.shift(packing.image(partner));
+  if (report.trace) begin_trace(i, partner, generation, *report.trace);
+  const Vec<D> shift = packing.linear(partner) != 0 ? box_.shift(packing.image(partner)) : Vec<D>(Vec<D>::Zero());
   const Impact<D> impact = flights_.collide(i, j, shift, time, generation);
   ++queue_[i].version;
   ++queue_[j].version;

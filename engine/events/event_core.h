@@ -101,7 +101,9 @@ class EventCore {
 
  private:
   void read(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
-  void collide_pair(Slot i, double time, std::uint32_t generation, const Report& report);
+  /// Records two spheres before their collision; out of line, for the sake of collisions without a trace.
+  [[gnu::noinline]] void begin_trace(Slot i, std::uint32_t partner, std::uint32_t generation, Trace<D>& trace) const;
+  void collide_pair(Slot i, Slot j, std::uint32_t partner, double time, std::uint32_t generation, const Report& report);
   void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
 
   const Box<D>& box_;

@@ -89,19 +89,6 @@ ScanSetting Flights<D>::setting() const {
 }
 
 template <int D>
-void Flights<D>::advance(Record<D>& r, double t) const {
-  const double s = t - r.t;
-  if (s != 0) {
-    r.x += s * r.v;
-    if (field_) {
-      r.x += (0.5 * s * s) * g_;
-      r.v += s * g_;
-    }
-  }
-  r.t = t;
-}
-
-template <int D>
 void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
                       std::span<const Spin<D>> spins) {
   set_walls();
@@ -188,8 +175,10 @@ double Flights<D>::shaken_contact(const Record<D>& r, double radius, double rate
 }
 
 template <int D>
-Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b,
-                              const Vec<D>& shift, double t, std::uint32_t generation) const {
+template <class... Spins>
+[[gnu::always_inline]] inline Impact<D> Flights<D>::collide_with(Slot i, Record<D>& a, Slot j, Record<D>& b,
+                                                                 const Vec<D>& shift, double t,
+                                                                 std::uint32_t generation, Spins... spins) const {
   advance(a, t);
   advance(b, t);
   const Vec<D> d = a.x - b.x + shift;
@@ -198,7 +187,8 @@ Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Rec
   auto [factor, dissipated] =
       pair_impulse<D>(laws(), a.species, b.species, d, a.v - b.v, mass_a, mass_b, sigma, radii * growth_);
   Vec<D> impulse = factor * d;
-  if (rough_) [[unlikely]] {
+  if constexpr (sizeof...(spins) > 0) {
+    const auto [spin_a, spin_b] = std::pair(spins...);
     const Rubbed<D> rubbed = rub_pair<D>(laws(), d, a.v - b.v, factor, {mass_a, radius(i), a.species, spin_a},
                                          {mass_b, radius(j), b.species, spin_b});
     impulse += rubbed.impulse;
@@ -213,6 +203,19 @@ Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Rec
   }
   a.generation = b.generation = static_cast<std::uint16_t>(generation);
   return {d, impulse, {.virial = d.dot(impulse), .dissipated = dissipated}, 1 - d.norm() / sigma};
+}
+
+template <int D>
+Impact<D> Flights<D>::collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                                     std::uint32_t generation) const {
+  return collide_with(i, a, j, b, shift, t, generation);
+}
+
+template <int D>
+Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b,
+                              const Vec<D>& shift, double t, std::uint32_t generation) const {
+  if (!rough_) return collide_smooth(i, a, j, b, shift, t, generation);
+  return collide_with(i, a, j, b, shift, t, generation, spin_a, spin_b);
 }
 
 template <int D>

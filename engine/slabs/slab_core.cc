@@ -331,17 +331,24 @@ double SlabCore<D>::end_before(const EventKey<D>& key) const {
   return end > both_fly_from ? end : key.time;
 }
 
-/// Whether a contact is so close to the end of the slab, or so slow, that without it the spheres would overlap there by
-/// less than a quarter of the tolerance: it belongs to the next slab.
+/// Whether a contact is so close to the end of the slab, or so slow, that without it the spheres would never overlap by
+/// more than a quarter of the tolerance: it belongs to the next slab. Spheres that graze each other may be apart again
+/// at the end, so the depth is also bounded from the contact on: the gap closes no faster than speed and acceleration
+/// there make it.
 template <int D>
 bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
+  const bool pair = key.kind == EventKind::pair;
+  const Meeting meeting(*this, key);
+  const double most = 0.25 * scan_->tolerance(meeting.sigma), rest = length_ - key.time;
+  const Vec<D> a = acceleration(key.lo);
+  const double opening =
+      pair ? meeting.normal.dot(a - acceleration(key.hi)) / meeting.normal.norm() : box_.wall(key.hi).speeding(a);
+  if (rest * (0.5 * rest * std::max(0.0, -opening) - meeting.speed) > most) return false;
   EventKey<D> at_end = key;
   at_end.time = length_;
-  const Meeting meeting(*this, at_end);
-  const double gap = key.kind == EventKind::pair
-                         ? meeting.normal.norm() - meeting.sigma
-                         : box_.wall(key.hi).gap(position(key.lo, length_), meeting.sigma, length_);
-  return gap >= -0.25 * scan_->tolerance(meeting.sigma);
+  const double gap = pair ? Meeting(*this, at_end).normal.norm() - meeting.sigma
+                          : box_.wall(key.hi).gap(position(key.lo, length_), meeting.sigma, length_);
+  return gap >= -most;
 }
 
 /// Whether the spheres touch at the start and come together again before the contact has opened by what a contact at

@@ -145,15 +145,28 @@ std::unique_ptr<System<3>> channel(const Vec<3>& edges, std::size_t spheres, uns
   return system;
 }
 
-/// A piston at constant speed does the work ∫ force·speed dt; if it is slow, the temperature follows the adiabat
-/// d ln T = −⅔ Z d ln V of Carnahan and Starling's equation of state (J. Chem. Phys. 51 (1969) 635). Centres stay half
-/// a diameter from both walls. The potential is weak enough to leave the adiabat alone, but nothing of it is left out.
+/// The temperature of a gas of spheres (diameter 1, temperature 1) that a slow piston compresses from one length to
+/// another, d ln T = −⅔ P A dL/NT with Carnahan and Starling's pressure (J. Chem. Phys. 51 (1969) 635). `line`: spheres
+/// per area; centres stay half a diameter from both walls. The gas is denser at walls, to first order in its density n
+/// by n² ∫ π (1−z)²(2+z)/3 dz = π n²/4 per wall and area, so the bulk, which determines the pressure, is thinner.
+double adiabat(double line, double from, double to) {
+  constexpr int kSlices = 10000;
+  double ln_t = 0;
+  for (int k = 0; k < kSlices; ++k) {
+    const double change = (to - from) / kSlices, length = from - 1 + (k + 0.5) * change, excess = std::numbers::pi / 2;
+    const double n = (std::sqrt(length * length + 4 * excess * line) - length) / (2 * excess);
+    const double f = n * std::numbers::pi / 6, z = (1 + f + f * f - f * f * f) / ((1 - f) * (1 - f) * (1 - f));
+    ln_t -= 2.0 / 3 * z * n / line * change;
+  }
+  return std::exp(ln_t);
+}
+
+/// A piston at constant speed does the work ∫ force·speed dt; if it is slow, the temperature follows the adiabat. The
+/// potential is weak enough to leave the adiabat alone, but nothing of it is left out.
 TEST(Adiabat, OfASlowPistonWithForces) {
   constexpr std::size_t kSpheres = 256;
   constexpr double kLong = 30, kWide = 8, kSpeed = 0.1, kEnd = 0.4 * kLong / kSpeed;
-  const auto filled = [](double length) { return kSpheres * std::numbers::pi / 6 / ((length - 1) * kWide * kWide); };
-  const auto integral = [](double f) { return std::log(f) + (4 * f - 3 * f * f) / ((1 - f) * (1 - f)); };  // ∫ Z df/f
-  const double expected = std::exp(2.0 / 3 * (integral(filled(0.6 * kLong)) - integral(filled(kLong))));
+  const double expected = adiabat(kSpheres / (kWide * kWide), kLong, 0.6 * kLong);
   for (const std::string method : {"free-flight", "psa", "edda"}) {
     std::vector<double> temperatures;
     for (unsigned seed = 1; seed <= 8; ++seed) {
@@ -177,8 +190,10 @@ TEST(Adiabat, OfASlowPistonWithForces) {
     const auto [temperature, error] = mean_of(temperatures);
     std::printf("%s: temperature %.4f ± %.4f, adiabat %.4f\n", method.c_str(), temperature, error, expected);
     EXPECT_LT(error, 0.02 * expected) << method;
-    // The piston's speed is a tenth of the thermal speed; what it adds beyond the adiabat is of this order squared.
-    EXPECT_NEAR(temperature, expected, 4 * error + 0.01 * expected) << method;
+    // The pressure on a moving piston is higher. With free flight 96 seeds give 1.7103 ± 0.0012, 1.6964 ± 0.0007 and
+    // 1.6920 ± 0.0005 at the speeds 0.2, 0.1 and 0.05: 1.689 at speed 0, and 0.4 % more at 0.1. The excess at walls to
+    // second order in n, and the two components of momentum that are conserved, leave 0.2 % of 1.686, the expectation.
+    EXPECT_NEAR(temperature, expected, 4 * error + 0.008 * expected) << method;
   }
 }
 
@@ -239,7 +254,8 @@ TEST(HeatFlow, BetweenTwoThermalWalls) {
     conducted /= used;
     std::printf("%s: %.4f ± %.4f flows through each area, the two walls differ by %.4f ± %.4f in all; Enskog %.4f\n",
                 method.c_str(), flux, flux_error, left, left_error, conducted);
-    EXPECT_LT(flux_error, 0.12 * flux) << method;
+    // The error of a mean over time; that of edda is over an eighth of the time, so it is √8 times as large.
+    EXPECT_LT(flux_error, (method == "edda" ? 0.12 : 0.04) * flux) << method;
     EXPECT_NEAR(flux, conducted, 4 * flux_error + 0.05 * conducted) << method;
   }
 }

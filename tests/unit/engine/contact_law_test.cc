@@ -129,6 +129,20 @@ TEST(DissipativeContacts, TwoSpheresFallTogetherAndStay) {
 }
 
 /// Three bodies in a line collapse for e < 7 − 4√3 (Zhou, Kadanoff, Phys. Rev. E 54 (1996) 623): the run must end.
+/// Discs that touch within a step and are apart again at its end have collided, however little they would overlap.
+TEST(DissipativeContacts, GrazingDiscsCollideWithinAStep) {
+  for (const std::string method : {"free-flight", "edda", "cdda", "psa"})
+    for (const double offset : {0.5, 0.9, 0.9999}) {
+      auto system = test::make_system<2>({20, 20}, Boundary::periodic, {{5, 5}, {8, 5 + offset}}, {{4, 0}, {0, 0}});
+      set_law(*system, {{"restitution", 0.5}});
+      const double normal_speed = 4 * std::sqrt(1 - offset * offset);
+      const auto run = test::run_steps<2>(std::move(system), method, 1.0, 1);
+      EXPECT_EQ(run->statistics().counters.sphere_sphere, 1u) << method << " " << offset;
+      EXPECT_NEAR(run->statistics().counters.dissipated.value(), 0.25 * 0.75 * normal_speed * normal_speed, 1e-12)
+          << method << " " << offset;
+    }
+}
+
 TEST(DissipativeContacts, CollapseOfThreeBodiesEnds) {
   for (const std::string method : {"free-flight", "psa", "edda", "cdda"})
     for (const double e : {0.05, 0.09}) {
