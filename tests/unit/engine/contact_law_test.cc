@@ -128,7 +128,6 @@ TEST(DissipativeContacts, TwoSpheresFallTogetherAndStay) {
   }
 }
 
-/// Three bodies in a line collapse for e < 7 − 4√3 (Zhou, Kadanoff, Phys. Rev. E 54 (1996) 623): the run must end.
 /// Discs that touch within a step and are apart again at its end have collided, however little they would overlap.
 TEST(DissipativeContacts, GrazingDiscsCollideWithinAStep) {
   for (const std::string method : {"free-flight", "edda", "cdda", "psa"})
@@ -143,6 +142,7 @@ TEST(DissipativeContacts, GrazingDiscsCollideWithinAStep) {
     }
 }
 
+/// Three bodies in a line collapse for e < 7 − 4√3 (Zhou, Kadanoff, Phys. Rev. E 54 (1996) 623): the run must end.
 TEST(DissipativeContacts, CollapseOfThreeBodiesEnds) {
   for (const std::string method : {"free-flight", "psa", "edda", "cdda"})
     for (const double e : {0.05, 0.09}) {
