@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/ewald.h"
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/options.h"
 #include "engine/forces/potentials/types.h"
@@ -11,6 +12,16 @@ template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
   constexpr std::string_view type = "coulomb";
   constexpr PairWeight charges = PairWeight::charges;
+  if (p.text("form") == "ewald") {
+    if (p.has("cutoff") || p.has("damping"))
+      options::refuse(type, "form = \"ewald\" takes 'cutoff' and 'damping' from 'accuracy'; leave them out");
+    if constexpr (D == 3)
+      return ewald(p, context);
+    else
+      options::refuse(type, "form = \"ewald\" is for three dimensions; use form = \"damped-shifted\"");
+  }
+  if (p.has("accuracy") || p.has("surface"))
+    options::refuse(type, "'accuracy' and 'surface' belong to form = \"ewald\"; leave them out or change 'form'");
   if (p.text("form") == "plain") {
     if (p.has("cutoff") || p.has("damping"))
       options::refuse(type,
@@ -37,17 +48,39 @@ InteractionInfo coulomb() {
             Type::text,
             "\"plain\"",
             "-",
-            "plain: C q q'/r between all pairs; damped-shifted: damped and cut, for periodic boxes",
+            "plain: C q q'/r between all pairs; damped-shifted: damped and cut, for periodic boxes; ewald: the sum "
+            "over "
+            "all periodic images",
             Range::any,
-            {"plain", "damped-shifted"}},
+            {"plain", "damped-shifted", "ewald"}},
            {"damping", Type::real, "none", "1/length", "alpha of the form damped-shifted", Range::non_negative},
-           {"cutoff", Type::real, "none", "length", "where the form damped-shifted ends", Range::positive}}),
-      .formula = "sum over pairs of C q q'/r, or of C q q' [erfc(alpha r)/r - polynomial in r^2] up to the cutoff",
+           {"cutoff", Type::real, "none", "length", "where the form damped-shifted ends", Range::positive},
+           {"accuracy", Type::real, "none", "-",
+            "of the form ewald: root mean square error of the forces, relative to C q^2/a^2, q^2 the mean squared "
+            "charge "
+            "and a^3 the volume per charge; from 1e-14 to 0.1; absent: 1e-5",
+            Range::positive},
+           {"surface",
+            Type::text,
+            "none",
+            "-",
+            "of the form ewald: what surrounds the periodic images, an ideal conductor or vacuum; absent: conducting",
+            Range::any,
+            {"conducting", "vacuum"}}}),
+      .formula =
+          "sum over pairs of C q q'/r, or of C q q' [erfc(alpha r)/r - polynomial in r^2] up to the cutoff, or the "
+          "Ewald sum over all pairs and images",
       .documentation =
           "Charges in vacuum (plain: all pairs are summed directly; not in periodic boxes), or the damped-shifted sum "
           "that replaces the long-ranged potential in neutral periodic systems: the real-space part of an Ewald sum, "
-          "cut so that V, V' and V'' go to zero at the cutoff. Usual values: alpha times cutoff between 2 and 3.",
-      .source = "Wolf et al., J. Chem. Phys. 110 (1999) 8254; Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104",
+          "cut so that V, V' and V'' go to zero at the cutoff. Usual values: alpha times cutoff between 2 and 3. The "
+          "form "
+          "ewald sums all periodic images in a box that is periodic along three axes; 'accuracy' sets alpha and both "
+          "cutoffs. If the charges do not add up to zero, a uniform background neutralises them, and its energy is "
+          "part of V. Every rank computes the whole sum over waves.",
+      .source =
+          "Wolf et al., J. Chem. Phys. 110 (1999) 8254; Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104; "
+          "Ewald, Ann. Phys. 369 (1921) 253; Kolafa, Perram, Mol. Simul. 9 (1992) 351",
       .in_2d = make<2>,
       .in_3d = make<3>};
 }

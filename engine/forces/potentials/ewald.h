@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// Charges in a periodic box: the Ewald sum.
+//
+//   V = C { Σ_{i<j, images} q_i q_j erfc(αr)/r + (1/2Ω) Σ_{k≠0} (4π/k²) e^(−k²/4α²) |S(k)|² − (α/√π) Σ q_i²
+//           − π Q²/(2α²Ω) + (2π/3Ω) |Σ q_i x_i|² },   S(k) = Σ q_j e^(ik·x_j),   Q = Σ q_i
+//
+// The fourth term is the uniform background of a charged cell; the last one, with unwrapped positions, is there only if
+// the surface is "vacuum" (de Leeuw, Perram, Smith, Proc. R. Soc. A 373 (1980) 27). The first one is a PairTerm.
+//
+// The discrete gradient of the sum over k follows from |S′|² − |S|² = Re (S′ − S)(S′ + S)* and
+//
+//   e^(ik·x′) − e^(ik·x) = i k·Δ sinc(k·Δ/2) e^(ik·(x + x′)/2),   Δ = x′ − x:
+//   F̄_j = (q_j/Ω) Σ_k A(k) k sinc(k·Δ_j/2) Im[½(S + S′)* e^(ik·(x_j + x′_j)/2)],   A = C (4π/k²) e^(−k²/4α²).
+//
+// |S|² is invariant under translation, so x′ is taken relative to the motion of the charges' centre of mass, and the
+// share (m_j/M) Σ F̄ is taken off each F̄_j; the work remains exact, because Σ m_j Δ_j = 0, and the net force is zero.
+//
+// S(k) is summed in fixed point, so its bits do not depend on the order of the particles.
+
+#include "engine/base/interaction.h"
+#include "engine/forces/potentials/options.h"
+
+namespace carom {
+
+/// The parameters of the two sums.
+struct EwaldSplit {
+  double alpha;        ///< [1/length]
+  double switch_from;  ///< up to here the pair term is erfc(αr)/r [length]
+  double cutoff;       ///< where the switched pair term ends [length]
+  double wave_cutoff;  ///< the largest |k| [1/length]
+};
+
+/// The charges of a system.
+struct ChargeSums {
+  ExactSum total;     ///< Σ q
+  ExactSum absolute;  ///< Σ |q|
+  ExactSum squares;   ///< Σ q²
+  ExactSum count;     ///< number of charged particles
+
+  void add(const ChargeSums& other) {
+    total.add(other.total);
+    absolute.add(other.absolute);
+    squares.add(other.squares);
+    count.add(other.count);
+  }
+};
+
+/// The split in which the root mean square error of the forces, by the estimates of Kolafa and Perram (Mol. Simul. 9
+/// (1992) 351), is `accuracy` times the force between two charges at their mean distance, q²/(Ω/N)^(2/3), q² the mean
+/// of q_i². The pair term reaches at most `longest`.
+EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double longest);
+
+/// The term of `form = "ewald"`. Refuses boxes that are not periodic along all axes.
+std::unique_ptr<Interaction<3>> ewald(const Parameters& parameters, const InteractionContext<3>& context);
+
+}  // namespace carom
