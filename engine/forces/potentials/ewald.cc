@@ -464,9 +464,9 @@ class EwaldTerm final : public Interaction<3> {
 }  // namespace
 
 EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double longest) {
-  const double n = charges.count.value(), q2 = charges.squares.value(), edge = elementary::cbrt(volume);
+  const double n = charges.count.value(), q2 = charges.squares.value();
   const double spacing = elementary::cbrt(volume / n);
-  const double error = accuracy * std::sqrt(0.5) * q2 / n / (spacing * spacing);  // of either sum
+  const double error = 0.5 * accuracy * q2 / n / (spacing * spacing);  // of either sum
   const auto root_log = [](double x) { return std::sqrt(std::max(1.0, elementary::log(x))); };
   double alpha = kPairCost * std::sqrt(kPi) * elementary::pow(n / (volume * volume), 1.0 / 6);
   const auto pairs = [&](double r) { return root_log(2 * q2 / (std::sqrt(n * r * volume) * error)); };
@@ -478,8 +478,7 @@ EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume
   }
   double t = 3;  // k_c/2α
   for (int turn = 0; turn < 20; ++turn) {
-    const double rings = t * alpha * edge / kPi;  // k_c L/2π
-    t = root_log(q2 * alpha / (kPi * edge * edge) * std::sqrt(8 / (rings * n)) / error);
+    t = root_log(q2 * alpha * std::sqrt(8 / (n * volume * 2 * alpha * t)) / error);
   }
   return {alpha, end, end / kSwitchFrom, 2 * alpha * t};
 }
@@ -492,7 +491,7 @@ std::unique_ptr<Interaction<3>> ewald(const Parameters& p, const InteractionCont
       options::refuse(type,
                       "form = \"ewald\" needs a box that is periodic along all three axes; make the boundaries "
                       "'periodic', or use form = \"plain\"");
-  if (p.has("species") || p.has("exclude"))
+  if (p.has("species") || (p.has("exclude") && p.text("exclude") == "bonded"))
     options::refuse(type, "form = \"ewald\" acts between all charges so far; leave out 'species' and 'exclude'");
   const double accuracy = p.has("accuracy") ? p.real("accuracy") : 1e-5;
   if (!(accuracy >= 1e-14 && accuracy <= 0.1))

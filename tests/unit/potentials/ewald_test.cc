@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The Ewald sum: lattice energies, forces and energies against a sum in 50-digit arithmetic with another split, errors
+// against the accuracy asked for, the discrete gradient, and bits that depend on no order.
+
+#include <gtest/gtest.h>
+
+#include <boost/math/constants/constants.hpp>
+#include <boost/math/special_functions/erf.hpp>
+
+#include "engine/base/error.h"
+#include "tests/unit/potentials/precise.h"
+#include "tests/unit/potentials/scene.h"
+
+namespace carom {
+namespace {
+
+using namespace std::string_literals;
+using test::displaced;
+using test::energy;
+using test::forces;
+using test::mean_forces;
+using test::Precise;
+using test::Scene;
+
+std::unique_ptr<Interaction<3>> ewald(const Scene<3>& scene, double accuracy, const std::string& surface = "conducting",
+                                      double constant = 1) {
+  return scene.make("coulomb",
+                    {{"constant", constant}, {"form", "ewald"s}, {"accuracy", accuracy}, {"surface", surface}});
+}
+
+/// A crystal of `cells`³ cubic cells of edge 1, each with these ions.
+Scene<3> crystal(int cells, const std::vector<std::pair<Vec<3>, double>>& ions) {
+  Scene<3> scene(0, cells, Boundary::periodic, 0);
+  auto& p = scene.particles;
+  for (int a = 0; a < cells; ++a)
+    for (int b = 0; b < cells; ++b)
+      for (int c = 0; c < cells; ++c)
+        for (const auto& [x, charge] : ions) {
+          p.x.push_back(x + Vec<3>(a, b, c));
+          p.v.push_back(Vec<3>::Zero());
+          p.mass.push_back(1);
+          p.radius.push_back(0.1);
+          p.charge.push_back(charge);
+          p.species.push_back(charge > 0 ? 0 : 1);
+          p.image.push_back({});
+        }
+  return scene;
+}
+
+TEST(Ewald, GivesTheMadelungConstantsOfRockSaltAndCaesiumChloride) {
+  std::vector<std::pair<Vec<3>, double>> salt;
+  for (int n = 0; n < 8; ++n) {
+    const Vec<3> x(n % 2, n / 2 % 2, n / 4);
+    salt.emplace_back(0.5 * x, std::lround(x.sum()) % 2 == 0 ? 1.0 : -1.0);
+  }
+  const std::vector<std::pair<Vec<3>, double>> caesium = {{Vec<3>::Zero(), 1.0}, {Vec<3>::Constant(0.5), -1.0}};
+  for (const int cells : {1, 2, 3})
+    for (const double accuracy : {1e-13, 1e-14}) {
+      const Scene<3> rock = crystal(cells, salt), cubic = crystal(cells, caesium);
+      // The energy of a pair of ions is −M q²/d, d the distance of neighbours.
+      EXPECT_NEAR(-energy(*ewald(rock, accuracy), rock.particles.x) * 0.5 / (4 * cells * cells * cells),
+                  1.7475645946331821906, 1e-12);
+      EXPECT_NEAR(-energy(*ewald(cubic, accuracy), cubic.particles.x) * std::sqrt(0.75) / (cells * cells * cells),
+                  1.7626747730709883, 1e-12);
+      for (const auto& f : forces(*ewald(rock, accuracy), rock.particles.x)) EXPECT_LE(f.norm(), 1e-12);
+    }
+}
+
+/// V and forces of unit constant in 50-digit arithmetic, to 16 digits: α = 6/L with four images on each side in real
+/// space, where erfc(α 4.5 L)… is below e^(−700), and 18 waves along each axis, e^(−(18π/6)²) = 10^(−38).
+struct PreciseSum {
+  Precise energy = 0;
+  std::vector<std::array<Precise, 3>> force;
+};
+
+PreciseSum precise_sum(const Scene<3>& scene, bool vacuum) {
+  using boost::math::constants::pi;
+  const Precise tau = 2 * pi<Precise>();
+  const auto& p = scene.particles;
+  const Vec<3> edges = scene.box.edges;
+  const Precise alpha = Precise(5) / edges.minCoeff(), a2 = alpha * alpha;
+  const Precise volume = Precise(edges[0]) * edges[1] * edges[2], slope = 2 * alpha / sqrt(pi<Precise>());
+  PreciseSum sum;
+  sum.force.resize(p.size());
+  Precise total = 0;
+  std::array<Precise, 3> dipole{};
+  for (Id i = 0; i < p.size(); ++i) {
+    const Precise q = p.charge[i];
+    total += q;
+    sum.energy -= alpha / sqrt(pi<Precise>()) * q * q;
+    for (int k = 0; k < 3; ++k) dipole[k] += q * p.x[i][k];
+    for (Id j = 0; j <= i; ++j)
+      for (int n = 0; n < 125; ++n) {
+        const std::array<int, 3> image{n % 5 - 2, n / 5 % 5 - 2, n / 25 - 2};
+        if (i == j && n == 62) continue;
+        std::array<Precise, 3> d;
+        Precise squared = 0;
+        for (int k = 0; k < 3; ++k) {
+          d[k] = Precise(p.x[i][k]) - Precise(p.x[j][k]) + Precise(image[k]) * Precise(edges[k]);
+          squared += d[k] * d[k];
+        }
+        if (a2 * squared > 42) continue;  // e^(−42) = 6e-19
+        const Precise r = sqrt(squared), value = boost::math::erfc(Precise(alpha * r)) / r;
+        const Precise qq = q * p.charge[j];
+        sum.energy += (i == j ? Precise(0.5) : Precise(1)) * qq * value;
+        for (int k = 0; i != j && k < 3; ++k) {
+          const Precise f = qq * (value + slope * exp(-a2 * squared)) / squared * d[k];
+          sum.force[i][k] += f;
+          sum.force[j][k] -= f;
+        }
+      }
+  }
+  for (int a = 0; a <= 14; ++a)
+    for (int b = a == 0 ? 0 : -14; b <= 14; ++b)
+      for (int c = a == 0 && b == 0 ? 1 : -14; c <= 14; ++c) {
+        const std::array<Precise, 3> k{tau * a / edges[0], tau * b / edges[1], tau * c / edges[2]};
+        const Precise k2 = k[0] * k[0] + k[1] * k[1] + k[2] * k[2];
+        if (k2 / (4 * a2) > 42) continue;
+        const Precise weight = 2 * tau / k2 * exp(-k2 / (4 * a2)) / volume;
+        std::vector<Precise> cosine, sine;
+        Precise re = 0, im = 0;
+        for (Id j = 0; j < p.size(); ++j) {
+          const Precise phase = k[0] * p.x[j][0] + k[1] * p.x[j][1] + k[2] * p.x[j][2];
+          cosine.push_back(cos(phase));
+          sine.push_back(sin(phase));
+          re += p.charge[j] * cosine[j];
+          im += p.charge[j] * sine[j];
+        }
+        sum.energy += weight * (re * re + im * im);
+        for (Id j = 0; j < p.size(); ++j)
+          for (int m = 0; m < 3; ++m)
+            sum.force[j][m] += 2 * weight * p.charge[j] * k[m] * (re * sine[j] - im * cosine[j]);
+      }
+  sum.energy -= pi<Precise>() * total * total / (2 * a2 * volume);
+  if (!vacuum) return sum;
+  for (int k = 0; k < 3; ++k) {
+    sum.energy += tau / (3 * volume) * dipole[k] * dipole[k];
+    for (Id j = 0; j < p.size(); ++j) sum.force[j][k] -= 2 * tau / (3 * volume) * p.charge[j] * dipole[k];
+  }
+  return sum;
+}
+
+TEST(Ewald, ForcesAndEnergyAreThoseOf50DigitArithmeticWithAnotherSplit) {
+  for (const bool neutral : {true, false})
+    for (const bool vacuum : {false, true}) {
+      if (vacuum && !neutral) continue;
+      Scene<3> scene(6, 4, Boundary::periodic, 0.9);
+      scene.box.edges = {4, 4.5, 5};
+      if (neutral)
+        for (Id i = 0; i < 6; ++i) scene.particles.charge[i] = i < 2 ? 2 : -1;
+      const PreciseSum exact = precise_sum(scene, vacuum);
+      const auto term = ewald(scene, 1e-13, vacuum ? "vacuum" : "conducting");
+      EXPECT_NEAR(energy(*term, scene.particles.x), static_cast<double>(exact.energy), 1e-13 * 30);
+      const auto f = forces(*term, scene.particles.x);
+      for (Id i = 0; i < 6; ++i)
+        for (int k = 0; k < 3; ++k)
+          EXPECT_NEAR(f[i][k], static_cast<double>(exact.force[i][k]), 2e-13) << i << ' ' << k << ' ' << vacuum;
+    }
+}
+
+TEST(Ewald, ErrorsAreBelowTheAccuracyAskedForAndNotFarBelow) {
+  for (const bool neutral : {true, false}) {
+    Scene<3> scene(200, 6, Boundary::periodic, 0.6);
+    auto& q = scene.particles.charge;
+    if (neutral)
+      for (Id i = 0; i < q.size(); ++i) q[i] = i % 2 == 0 ? 1 : -1;
+    double squares = 0;
+    for (const double each : q) squares += each * each;
+    const double n = static_cast<double>(q.size());
+    const double unit = squares / n / std::pow(scene.box.edges.prod() / n, 2.0 / 3);
+    const auto exact = forces(*ewald(scene, 1e-14), scene.particles.x);
+    const double exact_energy = energy(*ewald(scene, 1e-14), scene.particles.x);
+    for (double accuracy = 1e-2; accuracy > 1e-11; accuracy /= 10) {
+      const auto term = ewald(scene, accuracy);
+      const auto f = forces(*term, scene.particles.x);
+      double sum = 0;
+      for (Id i = 0; i < q.size(); ++i) sum += (f[i] - exact[i]).squaredNorm();
+      const double error = std::sqrt(sum / n) / unit, of_energy = energy(*term, scene.particles.x) - exact_energy;
+      EXPECT_LE(error, accuracy);
+      EXPECT_GE(error, 0.02 * accuracy);
+      EXPECT_LE(std::abs(of_energy), accuracy * std::abs(exact_energy)) << accuracy;
+      std::cout << accuracy << ": force " << error << ", energy " << of_energy / exact_energy << '\n';
+    }
+  }
+}
+
+TEST(Ewald, MeanForcesDoExactlyTheWorkAndTheirSumIsZeroBitByBit) {
+  Scene<3> scene(60, 6, Boundary::periodic, 0.7);
+  for (Id i = 0; i < 60; ++i) scene.particles.charge[i] = i % 3 == 0 ? 2 : -1;
+  scene.particles.charge[5] = scene.particles.charge[6] = scene.particles.charge[7] = 0;
+  scene.particles.charge[9] = 1, scene.particles.charge[12] = 3;
+  double total = 0;
+  for (const double q : scene.particles.charge) total += q;
+  scene.particles.charge[0] -= total;
+  const auto& x = scene.particles.x;
+  for (const auto& surface : {"conducting"s, "vacuum"s}) {
+    const auto term = ewald(scene, 1e-6, surface);
+    for (const double size : {1e-9, 1e-4, 0.01, 0.1, 0.4}) {
+      // With a drift: the net force vanishes although all particles move far.
+      auto w = scene.random_vectors(size);
+      for (auto& each : w) each += Vec<3>(0.3, -0.2, 0.1);
+      const auto x_new = displaced(x, w, 1);
+      ForceSums<3> sums(x.size(), test::kQuantum);
+      term->add_mean_forces(x, x_new, sums);
+      std::array<ForceSums<3>::Whole, 3> net{};
+      ExactSum work;
+      double scale = 0;
+      for (Id i = 0; i < x.size(); ++i)
+        for (int k = 0; k < 3; ++k) {
+          net[k] += sums.quanta(i)[k];
+          work.add(sums.value(i)[k] * (x_new[i][k] - x[i][k]));
+          scale += std::abs(sums.value(i)[k]) * scene.box.edges[k];
+        }
+      for (int k = 0; k < 3; ++k) EXPECT_EQ(static_cast<long>(net[k]), 0);
+      const auto before = test::sums(*term, x), after = test::sums(*term, x_new);
+      EXPECT_NEAR(work.value(), before.energy.value() - after.energy.value(),
+                  5e-16 * (scale + before.magnitude.value() + after.magnitude.value()))
+          << size << ' ' << surface;
+    }
+  }
+}
+
+TEST(Ewald, ASubtractedEvaluationLeavesNothing) {
+  Scene<3> scene(40, 6, Boundary::periodic, 0.7);
+  const auto term = ewald(scene, 1e-6);
+  const auto& x = scene.particles.x;
+  const auto first = displaced(x, scene.random_vectors(0.1), 1);
+  auto second = first;
+  std::vector<char> changed(x.size(), 0);
+  changed[3] = 1;
+  second[3] += Vec<3>(0.01, 0, 0.02);
+  ForceSums<3> corrected(x.size(), test::kQuantum);
+  term->add_mean_forces(x, first, corrected);
+  term->add_mean_forces(x, first, corrected, changed.data(), -1);
+  term->add_mean_forces(x, second, corrected, changed.data());
+  const auto again = mean_forces(*ewald(scene, 1e-6), x, second);
+  for (Id i = 0; i < x.size(); ++i) EXPECT_EQ(corrected.value(i), again[i]) << i;
+}
+
+TEST(Ewald, BitsDoNotDependOnTheOrderOfTheParticles) {
+  Scene<3> scene(50, 6, Boundary::periodic, 0.7), other = scene;
+  std::ranges::reverse(other.particles.x);
+  std::ranges::reverse(other.particles.mass);
+  std::ranges::reverse(other.particles.charge);
+  const auto one = ewald(scene, 1e-6), two = ewald(other, 1e-6);
+  EXPECT_EQ(energy(*one, scene.particles.x), energy(*two, other.particles.x));
+}
+
+TEST(Ewald, TheVirialOfCoulombForcesIsTheirEnergy) {
+  Scene<3> scene(60, 6, Boundary::periodic, 0.7);
+  for (Id i = 0; i < 60; ++i) scene.particles.charge[i] = i % 2 == 0 ? 1 : -1;
+  for (const auto& surface : {"conducting"s, "vacuum"s}) {
+    const auto sums = test::sums(*ewald(scene, 1e-12, surface), scene.particles.x);
+    EXPECT_NEAR(sums.virial.value(), sums.energy.value(), 1e-10 * sums.magnitude.value()) << surface;
+  }
+}
+
+TEST(Ewald, TheSurfaceInVacuumSeesUnwrappedPositions) {
+  Scene<3> scene(20, 6, Boundary::periodic, 0.7);
+  for (Id i = 0; i < 20; ++i) scene.particles.charge[i] = i % 2 == 0 ? 1 : -1;
+  const auto term = ewald(scene, 1e-10, "vacuum");
+  const double before = energy(*term, scene.particles.x);
+  scene.particles.x[3][1] -= 6;  // into the next image, as Box::wrap() does
+  scene.particles.image[3][1] += 1;
+  EXPECT_NEAR(energy(*term, scene.particles.x), before, 1e-11);
+  scene.particles.image[3][1] -= 1;  // a particle that really moved there
+  EXPECT_GT(std::abs(energy(*term, scene.particles.x) - before), 0.1);
+}
+
+TEST(Ewald, RefusesWhatItCannotDo) {
+  const auto refusal = [](const Scene<3>& scene, std::vector<std::pair<std::string, ParameterValue>> more) {
+    more.insert(more.begin(), {{"constant", 1.0}, {"form", "ewald"s}});
+    try {
+      scene.make("coulomb", more);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return "accepted"s;
+  };
+  const auto expect = [](const std::string& text, const std::string& part) {
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  Scene<3> scene(10, 6, Boundary::periodic, 0.7);
+  expect(refusal(scene, {{"surface", "vacuum"s}}), "the charges add up to 2.5");
+  expect(refusal(scene, {{"accuracy", 1e-15}}), "give a number from 1e-14 to 0.1");
+  expect(refusal(scene, {{"cutoff", 2.0}}), "from 'accuracy'");
+  expect(refusal(scene, {{"exclude", "bonded"s}}), "leave out 'species' and 'exclude'");
+  expect(refusal(Scene<3>(10, 6, Boundary::wall, 0.7), {}), "periodic along all three axes");
+  scene.box.edges[0] = 1e9;
+  expect(refusal(scene, {}), "waves");
+  std::ranges::fill(scene.particles.charge, 0.0);
+  expect(refusal(scene, {}), "finds no charges");
+}
+
+}  // namespace
+}  // namespace carom
