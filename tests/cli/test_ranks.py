@@ -173,6 +173,18 @@ def test_forces_are_shared(method, tmp_path):
             assert filecmp.cmp(tmp_path / "plain" / name, tmp_path / str(ranks) / name, shallow=False)
 
 
+@pytest.mark.parametrize("method", ["psa", "edda"])
+def test_ewald_sums_are_those_of_one_rank(method, tmp_path):
+    deck = ROOT / "inputs" / "electrolyte-ewald.toml"
+    shorter = ["particles.0.count=54", "particles.1.count=54", "run.steps=20", "output.events=true", "output.frame_interval=0.2",
+               f"integrator.type={method}", "integrator.step=0.05", "interaction.0.surface=\"vacuum\""]
+    run(deck, tmp_path / "plain", shorter)
+    assert summary(tmp_path / "plain")["events"]["sphere_sphere"] > 0
+    for ranks in 2, 3:
+        assert mpirun(ranks, command(deck, tmp_path / str(ranks), shorter)).stderr == ""
+        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
+
+
 def test_bonds_across_ranks(tmp_path):
     deck = ROOT / "inputs" / "spring-lattice.toml"
     stiff = ["particles.count=2500", "interaction.0.stiffness=60.0", "integrator.step=0.05", "run.steps=20",
