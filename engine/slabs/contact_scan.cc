@@ -171,7 +171,7 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
       const double speed = normal_speed(touch, v);
       return speed < -resting_speed(touch, v) && (touch.hits || speed >= -stopping_speed(touch, v));
     };
-    if (approaching_.empty() && !(dissipative && generation < kMostRounds && std::ranges::any_of(touching_, slow)))
+    if (approaching_.empty() && !(dissipative && generation < 2 * kMostBounces && std::ranges::any_of(touching_, slow)))
       break;
     if (!approaching_.empty()) count_event(approaching_.front().key);
   }

@@ -208,12 +208,15 @@ class Problem {
     const int m = static_cast<int>(cluster.size());
     std::vector<double> last(m);
     for (int k = 0; k < m; ++k) last[k] = contacts_[cluster[k]].lambda;
-    return solve(cluster, last, kLastProximal) || solve(cluster, std::vector<double>(m, 0.0), kFirstProximal);
+    const std::vector<double> none(m, 0.0);
+    return solve(cluster, last, kLastProximal, false) || solve(cluster, none, kFirstProximal, false) ||
+           solve(cluster, none, kFirstProximal, true);
   }
 
   /// Starts from these reactions. If all are zero, it starts from the contacts that approach, and with the first
-  /// proximal term from all contacts.
-  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal) {
+  /// proximal term from all contacts. Where pivoting makes no progress, the proximal term is raised again, unless
+  /// `patient`: then contacts are exchanged one by one.
+  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal, bool patient) {
     const int m = static_cast<int>(cluster.size());
     const bool known = std::ranges::any_of(start, [](double lambda) { return lambda > 0; });
     const bool all = tied_ || proximal == kFirstProximal;
@@ -230,23 +233,23 @@ class Problem {
       active_[k] = all || (known ? start[k] > 0 : gap[k] < 0);
     }
     bool solved = false;
-    double last = kLastProximal;
+    double lowest = kLastProximal;
     for (int repetition = 0; repetition < kRepetitions; ++repetition) {
       before = reaction;
       proximal_ = proximal;
       const std::vector<char> active = active_;
-      if (!pivot(cluster, gap, before, reaction, proximal == kFirstProximal)) {
+      if (!pivot(cluster, gap, before, reaction, patient || proximal == kFirstProximal)) {
         if (repetition == 0 || proximal == kFirstProximal) return false;
         reaction = before;
         active_ = active;
-        proximal = last = std::min(proximal / kProximalRatio, kFirstProximal);
+        proximal = lowest = std::min(proximal / kProximalRatio, kFirstProximal);
         continue;
       }
       for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
       // One more repetition: beside the large terms of a light sphere the error of a heavy one is invisible.
       if (std::exchange(solved, settled(cluster)) && solved) return true;
       if (repetition >= kStrictRepetitions && settled(cluster, true)) return true;
-      proximal = std::max(kProximalRatio * proximal, last);
+      proximal = std::max(kProximalRatio * proximal, lowest);
     }
     return false;
   }
