@@ -305,7 +305,7 @@ template <int D>
 double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v, double kick) {
   for (auto& contact : resting_) {
     contact.normal = normal(contact.key, x);
-    contact.lambda = 0;
+    contact.lambda = contact.force * kick / contact.normal.norm();
     contact.bound = wall_speed(contact.key);
     contact.slack = normal_slack(contact, v);
   }

@@ -15,7 +15,8 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 // the contacts under pressure; the last is 10⁶ times the rounding of the factors, and small compared with the smallest
 // relevant eigenvalue, so that each repetition reduces the error by several digits.
 constexpr double kFirstProximal = 1e-2, kProximalRatio = 0.03, kLastProximal = 1e-10;
-constexpr int kRepetitions = 400;
+constexpr int kRepetitions = 400, kPatientRepetitions = 40;
+constexpr int kBeforeLowering = 4;  // repetitions with a raised proximal term, before a lower one is tried again
 // A solution is sought to the rounding of the two spheres of each contact. In a cluster with light loads beside heavy
 // ones this may be less than the rounding of the factors; then a solution is accepted that would also be kept.
 constexpr int kStrictRepetitions = 8;
@@ -234,7 +235,8 @@ class Problem {
     }
     bool solved = false;
     double lowest = kLastProximal;
-    for (int repetition = 0; repetition < kRepetitions; ++repetition) {
+    int raised = 0;  // in this repetition
+    for (int repetition = 0; repetition < (patient ? kPatientRepetitions : kRepetitions); ++repetition) {
       before = reaction;
       proximal_ = proximal;
       const std::vector<char> active = active_;
@@ -243,12 +245,17 @@ class Problem {
         reaction = before;
         active_ = active;
         proximal = lowest = std::min(proximal / kProximalRatio, kFirstProximal);
+        raised = repetition;
         continue;
       }
       for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
       // One more repetition: beside the large terms of a light sphere the error of a heavy one is invisible.
       if (std::exchange(solved, settled(cluster)) && solved) return true;
       if (repetition >= kStrictRepetitions && settled(cluster, true)) return true;
+      if (repetition - raised == kBeforeLowering) {
+        lowest = std::max(kProximalRatio * lowest, kLastProximal);
+        raised = repetition;
+      }
       proximal = std::max(kProximalRatio * proximal, lowest);
     }
     return false;
