@@ -171,7 +171,7 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
       const double speed = normal_speed(touch, v);
       return speed < -resting_speed(touch, v) && (touch.hits || speed >= -stopping_speed(touch, v));
     };
-    if (approaching_.empty() && !(dissipative && generation < kMostRounds && std::ranges::any_of(touching_, slow)))
+    if (approaching_.empty() && !(dissipative && generation < 2 * kMostBounces && std::ranges::any_of(touching_, slow)))
       break;
     if (!approaching_.empty()) count_event(approaching_.front().key);
   }
@@ -305,7 +305,7 @@ template <int D>
 double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v, double kick) {
   for (auto& contact : resting_) {
     contact.normal = normal(contact.key, x);
-    contact.lambda = 0;
+    contact.lambda = contact.force * kick / contact.normal.norm();
     contact.bound = wall_speed(contact.key);
     contact.slack = normal_slack(contact, v);
   }

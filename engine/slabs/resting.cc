@@ -15,7 +15,8 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 // the contacts under pressure; the last is 10⁶ times the rounding of the factors, and small compared with the smallest
 // relevant eigenvalue, so that each repetition reduces the error by several digits.
 constexpr double kFirstProximal = 1e-2, kProximalRatio = 0.03, kLastProximal = 1e-10;
-constexpr int kRepetitions = 400;
+constexpr int kRepetitions = 400, kPatientRepetitions = 40;
+constexpr int kBeforeLowering = 4;  // repetitions with a raised proximal term, before a lower one is tried again
 // A solution is sought to the rounding of the two spheres of each contact. In a cluster with light loads beside heavy
 // ones this may be less than the rounding of the factors; then a solution is accepted that would also be kept.
 constexpr int kStrictRepetitions = 8;
@@ -208,12 +209,15 @@ class Problem {
     const int m = static_cast<int>(cluster.size());
     std::vector<double> last(m);
     for (int k = 0; k < m; ++k) last[k] = contacts_[cluster[k]].lambda;
-    return solve(cluster, last, kLastProximal) || solve(cluster, std::vector<double>(m, 0.0), kFirstProximal);
+    const std::vector<double> none(m, 0.0);
+    return solve(cluster, last, kLastProximal, false) || solve(cluster, none, kFirstProximal, false) ||
+           solve(cluster, none, kFirstProximal, true);
   }
 
   /// Starts from these reactions. If all are zero, it starts from the contacts that approach, and with the first
-  /// proximal term from all contacts.
-  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal) {
+  /// proximal term from all contacts. Where pivoting makes no progress, the proximal term is raised again, unless
+  /// `patient`: then contacts are exchanged one by one.
+  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal, bool patient) {
     const int m = static_cast<int>(cluster.size());
     const bool known = std::ranges::any_of(start, [](double lambda) { return lambda > 0; });
     const bool all = tied_ || proximal == kFirstProximal;
@@ -230,23 +234,29 @@ class Problem {
       active_[k] = all || (known ? start[k] > 0 : gap[k] < 0);
     }
     bool solved = false;
-    double last = kLastProximal;
-    for (int repetition = 0; repetition < kRepetitions; ++repetition) {
+    double lowest = kLastProximal;
+    int raised = 0;  // in this repetition
+    for (int repetition = 0; repetition < (patient ? kPatientRepetitions : kRepetitions); ++repetition) {
       before = reaction;
       proximal_ = proximal;
       const std::vector<char> active = active_;
-      if (!pivot(cluster, gap, before, reaction, proximal == kFirstProximal)) {
+      if (!pivot(cluster, gap, before, reaction, patient || proximal == kFirstProximal)) {
         if (repetition == 0 || proximal == kFirstProximal) return false;
         reaction = before;
         active_ = active;
-        proximal = last = std::min(proximal / kProximalRatio, kFirstProximal);
+        proximal = lowest = std::min(proximal / kProximalRatio, kFirstProximal);
+        raised = repetition;
         continue;
       }
       for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
       // One more repetition: beside the large terms of a light sphere the error of a heavy one is invisible.
       if (std::exchange(solved, settled(cluster)) && solved) return true;
       if (repetition >= kStrictRepetitions && settled(cluster, true)) return true;
-      proximal = std::max(kProximalRatio * proximal, last);
+      if (repetition - raised == kBeforeLowering) {
+        lowest = std::max(kProximalRatio * lowest, kLastProximal);
+        raised = repetition;
+      }
+      proximal = std::max(kProximalRatio * proximal, lowest);
     }
     return false;
   }

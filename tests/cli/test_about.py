@@ -31,7 +31,7 @@ def test_bash_completes_commands_options_and_keys(about):
     assert complete(about, "carom", "val") == ["validate"]
     assert complete(about, "carom", "run", "--max") == ["--max-wall"]
     assert complete(about, "carom", "convert", "-") == ["-h", "--help", "--to", "-o", "--output", "--frames"]
-    assert complete(about, "carom", "run", "--set", "particles.0.r") == ["particles.0.radius="]
+    assert complete(about, "carom", "run", "--set", "particles.0.ra") == ["particles.0.radius="]
     assert complete(about, "carom", "run", "--set", "integrator.st") == ["integrator.step="]
     assert complete(about, "carom", "run", "inp") == []  # then bash offers files
 
