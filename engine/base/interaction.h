@@ -67,9 +67,10 @@ class Interaction {
 
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:
-  /// only pairs with at least one changed particle, and fields on changed particles; sign −1 subtracts exactly what +1
-  /// added. Returns the number of this rank's pairs (or particles, for a field) within reach. A trial step may be far
-  /// too long: forces that are not finite or too large invalidate the sums.
+  /// only pairs with at least one changed particle, and fields on changed particles (a term in which each particle
+  /// feels all others, as the waves of an Ewald sum, adds all its forces); sign −1 subtracts exactly what +1 added.
+  /// Returns the number of this rank's pairs (or particles, for a field) within reach. A trial step may be far too
+  /// long: forces that are not finite or too large invalidate the sums.
   virtual std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces,
                                         const char* changed = nullptr, int sign = 1) const = 0;
 

@@ -47,8 +47,12 @@ struct ChargeSums {
 };
 
 /// The split in which the root mean square error of the forces, by the estimates of Kolafa and Perram (Mol. Simul. 9
-/// (1992) 351), is `accuracy` times the force between two charges at their mean distance, q²/(Ω/N)^(2/3), q² the mean
-/// of q_i². The pair term reaches at most `longest`.
+/// (1992) 351), is at most `accuracy` times the force between two charges at their mean distance, q²/(Ω/N)^(2/3), q²
+/// the mean of q_i²: each sum gets half,
+///
+///   pairs: 2 q² √(N/Ωr) e^(−α²r²),   waves: q² α √(8N/Ωk) e^(−k²/4α²),   r and k where the sums end.
+///
+/// The pair term reaches at most `longest`.
 EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double longest);
 
 /// The term of `form = "ewald"`. Refuses boxes that are not periodic along all axes.

@@ -66,8 +66,8 @@ TEST(Ewald, GivesTheMadelungConstantsOfRockSaltAndCaesiumChloride) {
     }
 }
 
-/// V and forces of unit constant in 50-digit arithmetic, to 16 digits: α = 6/L with four images on each side in real
-/// space, where erfc(α 4.5 L)… is below e^(−700), and 18 waves along each axis, e^(−(18π/6)²) = 10^(−38).
+/// V and forces of unit constant in 50-digit arithmetic, α = 5/L: pairs with e^(−α²r²) and waves with e^(−k²/4α²) below
+/// e^(−42) = 6e-19 are left out.
 struct PreciseSum {
   Precise energy = 0;
   std::vector<std::array<Precise, 3>> force;
