@@ -31,7 +31,6 @@ inline const std::vector<Case>& cases() {
       {"coulomb",
        Boundary::periodic,
        {{"constant", 1.3}, {"form", "damped-shifted"s}, {"damping", 0.9}, {"cutoff", 2.4}}},
-      {"coulomb", Boundary::periodic, {{"constant", 1.3}, {"form", "ewald"s}, {"accuracy", 1e-11}}},
       {"yukawa", Boundary::wall, {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", true}}},
       {"yukawa",
        Boundary::periodic,
@@ -56,6 +55,7 @@ inline const std::vector<Case>& cases() {
        {{"epsilon", 1.0}, {"sigma", 0.8}, {"exponent", 9.5}, {"cutoff", 2.0}, {"cut", "switch"s}}},
       {"uniform-field", Boundary::wall, {}},
       {"harmonic-trap", Boundary::wall, {{"stiffness", 0.7}}},
+      {"coulomb", Boundary::periodic, {{"constant", 1.3}, {"form", "ewald"s}, {"accuracy", 1e-11}}},
   };
   return all;
 }
