@@ -38,10 +38,11 @@ class Ownership {
   std::uint64_t holders(Slot i) const { return holders_[i]; }
   Slot slot_of(Id id) const { return slots_.find(id); }
   bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero());
-  /// As in Subdomain, after a window of this `length` [time]. Only spheres with deflected(slot) true may have changed
-  /// their velocities in it.
-  template <class Deflected, class Send>
-  void sort_out(double now, double length, Deflected&& deflected, Send&& send);
+  /// Call for each sphere whose velocity may have changed in a window.
+  void turn(Slot i) { turned_[i] = 1; }
+  /// As in Subdomain, after a window of this `length` [time].
+  template <class Send>
+  void sort_out(double now, double length, Send&& send);
 
   /// The region, between two corners, in which a ghost with this record can meet own spheres before `end`: own spheres
   /// stay within `max_displacement` of the subdomain, and are known within another two. False if it is empty.
@@ -51,20 +52,24 @@ class Ownership {
   bool may_meet(const Record<D>& r, Slot j, const Vec<D>& shift, double end) const;
 
  private:
-  static constexpr double kUnknown = -1;
   static constexpr double kWindowsBetweenSearches = 20;       // windows between searches for spheres at the border
   enum class Role : std::uint8_t { none, own, seen, ghost };  // none: empty slot; seen: own, and a ghost elsewhere
 
   struct Watched {
     Slot slot;
-    double quiet;             // how far it may move before it must be examined again
-    double speed = kUnknown;  // until its next event; unknown: unlimited
+    double quiet = 0;  // how far it may move before it must be examined again
+    double speed = 0;  // the largest until its next event
   };
 
   void enlist(Slot i, Role role);
   void forget(Slot i);
   void watch(double now);
   Watched look_at(Slot i, double now);
+  /// The largest speed of a sphere until its next event.
+  double speed(Slot i) const {
+    const Flights<D>& flights = core_.flights();
+    return (1 + 1e-6) * (flights[i].v.norm() + flights.g().norm() * flights.horizon());
+  }
   /// The largest distance of a sphere from its record before `end`.
   double way(const Record<D>& r, double end) const {
     const double time = end - r.t;
@@ -78,20 +83,23 @@ class Ownership {
   double unwatched_ = 0;         // the largest displacement of spheres since watch()
   IdTable slots_;
   std::vector<Role> role_;              // by slot
+  std::vector<std::uint8_t> turned_;    // by slot: whether its velocity may have changed since sort_out()
   std::vector<std::uint64_t> holders_;  // by slot
   std::vector<Watched> watched_;        // ghosts, and own spheres that may leave or become ghosts elsewhere
 };
 
 template <int D>
-template <class Deflected, class Send>
-void Ownership<D>::sort_out(double now, double length, Deflected&& deflected, Send&& send) {
+template <class Send>
+void Ownership<D>::sort_out(double now, double length, Send&& send) {
   if (unwatched_ += max_displacement_; unwatched_ > kWindowsBetweenSearches * max_displacement_) watch(now);
   std::size_t stay = 0;
   for (Watched each : watched_) {
     const Slot i = each.slot;
-    if (each.speed >= 0 && deflected(i)) each.speed = kUnknown;
-    each.quiet -= each.speed >= 0 ? each.speed * length : max_displacement_;
-    if (!(each.quiet > 0)) {
+    const bool turned = std::exchange(turned_[i], 0) != 0;
+    each.quiet -= turned ? max_displacement_ : each.speed * length;
+    if (each.quiet > 0) {
+      if (turned) each.speed = speed(i);
+    } else {
       const std::uint64_t before = holders_[i];
       each = look_at(i, now);
       if (role_[i] == Role::none) continue;

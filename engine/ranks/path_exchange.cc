@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ranks/path_exchange.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace carom {
@@ -21,22 +22,19 @@ std::vector<Bytes> PathExchange<D>::swap() {
 }
 
 template <int D>
-std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain) {
+std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain, const std::function<bool(bool)>& agree) {
   received_.clear();
   std::uint64_t rounds = 0;
-  for (double more = 1; more > 0; ++rounds) {
+  for (bool more = true; more; ++rounds) {
     if (subdomain) add_paths(*subdomain);
     for (const Bytes& bytes : received_.emplace_back(swap()))
       for (Reader reader(bytes); subdomain && reader.more();) {
         const auto id = reader.get<Id>();
         subdomain->follow(id, reader);
       }
-    more = 0;
-    if (subdomain) {
-      subdomain->repair();
-      for (const Slot i : subdomain->changed()) more = subdomain->holders(i) != 0 ? 1 : more;
-    }
-    ranks_.largest({&more, 1});
+    if (subdomain) subdomain->repair();
+    more = agree(subdomain &&
+                 std::ranges::any_of(subdomain->changed(), [&](Slot i) { return subdomain->holders(i) != 0; }));
   }
   return rounds;
 }

@@ -15,14 +15,13 @@ void Subdomain<D>::load(std::vector<Record<D>> records, const Bisection<D>& bise
   paths_.load(slots);
   repair_.load(slots);
   changed_.clear();
-  other_.clear();
-  disturbed_.assign(slots, 0);
 }
 
 template <int D>
 double Subdomain<D>::run(double now, double end) {
   end_ = end;
   length_ = end - now;
+  redone_before_ = repair_.events();
   repair_.start(end);
   Counters unused;
   double reached = end;
@@ -38,9 +37,9 @@ double Subdomain<D>::run(double now, double end) {
 
 template <int D>
 void Subdomain<D>::commit() {
-  other_ = paths_.finish();
-  for (const auto& each : other_) disturbed_[each.slot] = 1;
-  core_.put(other_, end_);
+  const auto other = paths_.finish();
+  for (const auto& each : other) ownership_.turn(each.slot);
+  core_.put(other, end_);
   changed_.clear();
 }
 

@@ -46,9 +46,7 @@ class Subdomain {
   /// send(k, record) for spheres that the k-th neighbour lacks and must admit.
   template <class Send>
   void sort_out(double now, Send&& send) {
-    const auto deflected = [&](Slot i) { return paths_.trace().has(i) || disturbed_[i] != 0; };
-    ownership_.sort_out(now, length_, deflected, send);
-    for (const auto& each : other_) disturbed_[each.slot] = 0;
+    ownership_.sort_out(now, length_, send);
   }
   /// Adds a ghost; false if there is no room: load again.
   bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero()) {
@@ -93,6 +91,8 @@ class Subdomain {
   /// A bit for each neighbour that has an own sphere as a ghost.
   std::uint64_t holders(Slot i) const { return ownership_.holders(i); }
   Slot slot_of(Id id) const { return ownership_.slot_of(id); }
+  /// An upper limit of the contacts in tally().
+  std::uint64_t most_events() const { return paths_.trace().events().size() + repair_.events() - redone_before_; }
   /// The contacts of the window; each counts where its lower id is owned.
   ContactTally tally() const { return paths_.tally(); }
   /// The largest speed of any sphere after an event.
@@ -116,9 +116,7 @@ class Subdomain {
   WindowRepair<D> repair_;
   double end_ = 0, length_ = 0;  // the present window
   std::vector<Slot> changed_;
-  std::vector<typename EventCore<D>::Changed> other_;  // after the last window: what differs from the core's
-  std::vector<std::uint8_t> disturbed_;                // by slot: whether it is in other_
-  std::uint64_t run_events_ = 0;
+  std::uint64_t run_events_ = 0, redone_before_ = 0;  // the latter before the present window
 };
 
 }  // namespace carom

@@ -7,7 +7,7 @@
 namespace carom {
 namespace {
 
-constexpr double kCollisionsPerWindow = 0.3;                       // mean collisions of a sphere in a window
+constexpr double kCollisionsPerWindow = 0.15;                      // mean collisions of a sphere in a window
 constexpr double kMaxDisplacement = 1.0, kMinDisplacement = 0.02;  // [largest diameter]
 constexpr double kSpeedAllowance = 1.15;                           // speed allowed for, relative to the largest speed
 
@@ -42,7 +42,8 @@ void WindowLength<D>::start(const Box<D>& box, const Sizes& sizes, Communicator&
   ranks.largest({&fastest_, 1});
   if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(box, sizes, ranks, block);
   fastest_ = kSpeedAllowance * fastest_ + field_;
-  max_displacement_ = std::clamp(1.05 * pace_ * fastest_, kMinDisplacement * diameter_, kMaxDisplacement * diameter_);
+  max_displacement_ = std::clamp(fastest_ > 0 ? 1.05 * pace_ * fastest_ : 0, kMinDisplacement * diameter_,
+                                 kMaxDisplacement * diameter_);
 }
 
 template <int D>
@@ -55,15 +56,16 @@ double WindowLength<D>::window_end(double now, double end) const {
 }
 
 template <int D>
-double WindowLength<D>::first_beyond(Subdomain<D>* subdomain, double now, double end, Communicator& ranks) {
-  double speed = 0, first = std::numeric_limits<double>::infinity();
-  if (subdomain) speed = subdomain->fastest() + field_;
-  if (subdomain && speed > fastest_)
-    subdomain->for_each_touched([&](Slot i) { first = std::min(first, beyond_at(*subdomain, i, now, end)); });
-  std::array<double, 2> worst{speed, -first};
-  ranks.largest(worst);
-  if (worst[0] > fastest_) fastest_ = kSpeedAllowance * worst[0];
-  return -worst[1];
+double WindowLength<D>::first_beyond(Subdomain<D>& subdomain, double now, double end) const {
+  double first = std::numeric_limits<double>::infinity();
+  if (speed_in(subdomain) > fastest_)
+    subdomain.for_each_touched([&](Slot i) { first = std::min(first, beyond_at(subdomain, i, now, end)); });
+  return first;
+}
+
+template <int D>
+void WindowLength<D>::allow_for(double speed) {
+  if (speed > fastest_) fastest_ = kSpeedAllowance * speed;
 }
 
 /// first_beyond() for one sphere, from the length of its path.
@@ -83,10 +85,9 @@ double WindowLength<D>::beyond_at(Subdomain<D>& subdomain, Slot i, double now, d
 
 template <int D>
 void WindowLength<D>::note(double length, std::uint64_t collisions, std::size_t spheres) {
-  if (collisions == 0) return;
   const double pace =
       length * kCollisionsPerWindow * static_cast<double>(spheres) / (2 * static_cast<double>(collisions));
-  pace_ = pace_ > 0 ? 0.9 * pace_ + 0.1 * pace : pace;
+  pace_ = 1 / (0.9 / pace_ + 0.1 / pace);  // the mean of rates: times of windows with few collisions have no bound
 }
 
 template class WindowLength<2>;

@@ -23,9 +23,12 @@ class WindowLength {
   double max_displacement() const { return max_displacement_; }
   /// The end of the next window on the way to `end`.
   double window_end(double now, double end) const;
-  /// The first time at which a sphere may have moved farther than `max_displacement`; infinite if none has. Later
-  /// windows allow for its speed. Null: this rank has no subdomain. Collective.
-  double first_beyond(Subdomain<D>* subdomain, double now, double end, Communicator& ranks);
+  /// The largest speed that a sphere of a subdomain may have reached in a window.
+  double speed_in(const Subdomain<D>& subdomain) const { return subdomain.fastest() + field_; }
+  /// The first time at which a sphere may have moved farther than `max_displacement`; infinite if none has.
+  double first_beyond(Subdomain<D>& subdomain, double now, double end) const;
+  /// Later windows allow for spheres of this speed; the same on all ranks.
+  void allow_for(double speed);
   /// Call after a window of this length in which all `spheres` together had this many collisions.
   void note(double length, std::uint64_t collisions, std::size_t spheres);
 

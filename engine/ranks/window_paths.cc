@@ -28,13 +28,11 @@ std::vector<Slot> WindowPaths<D>::end() {
   std::vector<Slot> seen;
   touched_ghosts_.clear();
   ++window_;
-  for (const auto& event : trace_.events())
-    for (const int which : {0, 1}) {
-      const Slot i = event.slot[which];
-      if (i == kNoEntry || event.last[which] != kNoEntry) continue;
-      if (ownership_.is_seen(i)) seen.push_back(i);
-      if (ownership_.is_ghost(i)) touched_ghosts_.push_back(i);
-    }
+  trace_.link([&](Slot i) {
+    ownership_.turn(i);
+    if (ownership_.is_seen(i)) seen.push_back(i);
+    if (ownership_.is_ghost(i)) touched_ghosts_.push_back(i);
+  });
   return seen;
 }
 
@@ -122,9 +120,12 @@ void WindowPaths<D>::write(Slot i, Bytes& to) const {
 
 template <int D>
 void WindowPaths<D>::read_script(Slot g, Reader& message) {
+  const auto count = message.get<std::uint32_t>();
+  const std::byte* const bytes = message.skip(count * node_bytes());
+  if (g == IdTable::kNowhere) return;  // there was no room for this ghost, so the window will be revoked
   Script& script = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
-  script.count = message.get<std::uint32_t>();
-  script.bytes = message.skip(script.count * node_bytes());
+  script.count = count;
+  script.bytes = bytes;
   script.nodes.clear();
   matched_in_[g] = 0;
 }

@@ -19,13 +19,14 @@ class WindowPaths {
   using Nodes = std::vector<Node<D>>;
 
   /// `flights` must be in the state the core left at the end of the window. Both arguments must outlive this object.
-  WindowPaths(const Flights<D>& flights, const Ownership<D>& ownership) : flights_(flights), ownership_(ownership) {}
+  WindowPaths(const Flights<D>& flights, Ownership<D>& ownership) : flights_(flights), ownership_(ownership) {}
 
   /// Removes everything and makes room for this many slots.
   void load(std::size_t slots);
   /// Starts a window; the core must write to the returned log.
   Trace<D>& start();
-  /// Call when the log is complete. Returns the own spheres with events that are ghosts elsewhere.
+  /// Call when the log is complete; tells the ownership about spheres with events. Returns the own spheres with events
+  /// that are ghosts elsewhere.
   std::vector<Slot> end();
   /// Ends the window; returns the records that differ from the core's.
   std::vector<typename EventCore<D>::Changed> finish();
@@ -103,7 +104,7 @@ class WindowPaths {
   Path& path_of(Slot i);
 
   const Flights<D>& flights_;
-  const Ownership<D>& ownership_;
+  Ownership<D>& ownership_;
   Trace<D> trace_;
   BySlot<Path> paths_;                   // paths in use
   std::vector<std::uint8_t> rewritten_;  // by slot: whether the path differs from the log

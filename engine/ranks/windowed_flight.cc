@@ -120,15 +120,13 @@ void WindowedFlight<D>::sort_out(bool loaded) {
       exchange_.add(neighbour, record);
       if (rough()) exchange_.add(neighbour, subdomain_->flights().spin(subdomain_->slot_of(record.id)));
     });
+  no_room_ = false;
   if (loaded) return;
-  double full = 0;
   for (const Bytes& bytes : exchange_.swap())
     for (Reader reader(bytes); reader.more();) {
       const auto record = reader.get<Record<D>>();
-      if (!subdomain_->admit(record, now_, rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero()))) full = 1;
+      if (!subdomain_->admit(record, now_, rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero()))) no_room_ = true;
     }
-  ranks_.largest({&full, 1});
-  if (full > 0) reload();
 }
 
 /// The key of the n-th pair collision of a window over all ranks, n from 1. Collective.
@@ -146,18 +144,41 @@ EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
 
 template <int D>
 double WindowedFlight<D>::run(double end, const Report& report) {
-  ContactTally sum;
+  ContactTally sum, got;
   std::vector<Contact<D>> contacts;
-  std::uint64_t collisions = report.counters.sphere_sphere;
-  double reached = end, full = std::numeric_limits<double>::infinity();
+  const std::uint64_t events_before = events_;
+  std::uint64_t collisions = report.counters.sphere_sphere;  // in windows before the last one
+  double reached = end, length = 0, full = std::numeric_limits<double>::infinity();
   while (now_ < end && reached == end) {
     if (cut_) reload();
     if (!sorted_) sort_out(false);
     double stop = std::min(length_.window_end(now_, end), full);
-    full = -(subdomain_ ? subdomain_->run(now_, stop) : stop);
-    ranks_.largest({&full, 1});
-    full = -full;
-    if (full < stop) {  // too many events for the log: revoke the window and run it up to there
+    const double ran = subdomain_ ? subdomain_->run(now_, stop) : stop;
+    // Over all ranks: maxima of whether a path changed, a ghost found no room, of the time reached, the time at which a
+    // sphere was too fast (both negated) and of speeds; sums over the window before, and the most collisions of this
+    // one.
+    enum { changed, no_room, earliest, beyond, speed };
+    std::array<double, 5> most;
+    std::array<std::uint64_t, 3> sums;
+    const auto agree = [&](bool paths_changed) {
+      most = {paths_changed ? 1.0 : 0.0, no_room_ ? 1.0 : 0.0, -ran, -std::numeric_limits<double>::infinity(), 0};
+      sums = {got.sphere_sphere, got.contacts(), 0};
+      if (subdomain_) {
+        most[beyond] = -length_.first_beyond(*subdomain_, now_, stop);
+        most[speed] = length_.speed_in(*subdomain_);
+        sums[2] = subdomain_->most_events();
+      }
+      got = {};
+      ranks_.combine(most, sums);
+      collisions += sums[0];
+      events_ += sums[1];
+      if (length > 0) length_.note(std::exchange(length, 0), sums[0], sizes_.spheres);
+      return most[changed] > 0 && most[no_room] == 0 && -most[earliest] == stop;
+    };
+    const std::uint64_t rounds = exchange_.make_consistent(subdomain_.get(), agree);
+    if (events_ > report.max_events) throw_too_many_contacts(report.max_events);
+    full = -most[earliest];
+    if (most[no_room] > 0 || full < stop) {  // revoke the window; if the log has no room for more, run it up to there
       if (!(full > now_)) throw_too_many_contacts(report.max_events);
       cut_at(now_);
       sorted_ = false;
@@ -165,38 +186,35 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     }
     full = std::numeric_limits<double>::infinity();
     ++counts_.windows;
-    counts_.rounds += exchange_.make_consistent(subdomain_.get());
-    if (const double beyond = length_.first_beyond(subdomain_.get(), now_, stop, ranks_); beyond < stop)
-      stop = cut_at(beyond);
+    counts_.rounds += rounds;
+    length_.allow_for(most[speed]);
+    if (-most[beyond] < stop) stop = cut_at(-most[beyond]);
     if (subdomain_ && !subdomain_->consistent(stop))
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
-    ContactTally got = tally();
-    std::uint64_t count = got.sphere_sphere;
-    ranks_.sum({&count, 1});
-    if (collisions + count >= report.collision_limit) {  // collision limit reached
-      count = report.collision_limit - collisions;
-      const EventKey<D> last = key_of_collision(count);
-      if (subdomain_) subdomain_->cut(last);
-      cut_ = true;
-      got = tally();
-      reached = stop = last.time;
+    got = tally();
+    if (collisions + sums[2] >= report.collision_limit) {  // it may have been reached
+      std::uint64_t count = got.sphere_sphere;
+      ranks_.sum({&count, 1});
+      if (collisions + count >= report.collision_limit) {
+        const EventKey<D> last = key_of_collision(report.collision_limit - collisions);
+        if (subdomain_) subdomain_->cut(last);
+        cut_ = true;
+        got = tally();
+        reached = stop = last.time;
+      }
     }
     if (report.contacts && subdomain_)
       subdomain_->for_each_contact([&](Slot i, std::size_t k) { contacts.push_back(subdomain_->contact_of(i, k)); });
     sum.add(got);
     counts_.events += got.contacts();
-    std::uint64_t contacts_of_all = got.contacts();
-    ranks_.sum({&contacts_of_all, 1});
-    if (events_ += contacts_of_all; events_ > report.max_events) throw_too_many_contacts(report.max_events);
-    collisions += count;
-    const double length = stop - now_;
+    if (!cut_) length = stop - now_;
     now_ = stop;
     sorted_ = false;
-    if (cut_) continue;
-    if (subdomain_) subdomain_->commit();
-    length_.note(length, count, sizes_.spheres);
+    if (subdomain_ && !cut_) subdomain_->commit();
   }
-  report.counters.add(sum_of_all(ranks_, sum));
+  const ContactTally all = sum_of_all(ranks_, sum);
+  report.counters.add(all);
+  if (events_ = events_before + all.contacts(); events_ > report.max_events) throw_too_many_contacts(report.max_events);
   if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, packed<D>(contacts)), *report.contacts);
   return reached;
 }

@@ -41,8 +41,7 @@ struct Divided {
       part.ownership.load(bisection, number, kDisplacement);
       part.paths.load(part.core.flights().capacity());
       part.repair.load(part.core.flights().capacity());
-      part.ownership.sort_out(
-          0, 0, [](Slot) { return false; }, [](std::size_t, const Record<3>&) {});
+      part.ownership.sort_out(0, 0, [](std::size_t, const Record<3>&) {});
     }
   }
   /// The first run of a window.
@@ -139,8 +138,7 @@ TEST(Ownership, SpheresThatFallChangeTheirOwners) {
     const double now = window * length;
     std::array<std::vector<Record<3>>, 2> sent;
     for (const int k : {0, 1})
-      d.parts[k]->ownership.sort_out(
-          now, length, [](Slot) { return false; }, [&](std::size_t, const Record<3>& r) { sent[1 - k].push_back(r); });
+      d.parts[k]->ownership.sort_out(now, length, [&](std::size_t, const Record<3>& r) { sent[1 - k].push_back(r); });
     for (const int k : {0, 1})
       for (const Record<3>& r : sent[k]) ASSERT_TRUE(d.parts[k]->ownership.admit(r, now));
     expect_owners(d, now);

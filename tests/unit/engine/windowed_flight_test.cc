@@ -193,7 +193,7 @@ TEST(WindowedFlight, UnevenWork) {
 /// One sphere is so fast that each subdomain would have more neighbours than there are bits.
 TEST(WindowedFlight, MoreRegionsThanTheBoxHasRoomFor) {
   const Case<3> c{.system = test::hard_spheres<3>(6, 0.49), .slab = 0.01, .slabs = 2};
-  c.system->particles.v[5] *= 100;
+  c.system->particles.v[5] *= 200;
   WindowCounts counts;
   expect_same(whole(c), divided(c, {.subdomains = 72}, nullptr, &counts), "72 subdomains");
   EXPECT_GT(counts.subdomains, 20u);
