@@ -22,9 +22,9 @@ template <int D>
 struct Node {
   Record<D> after;
   EventKey<D> key;
-  PackedExchange exchange{};
-  double overlap = 0;              ///< at contact, relative to the contact distance
   Spin<D> spin = Spin<D>::Zero();  ///< of the sphere after the event; 0 if no contact is rough
+  PackedExchange exchange{};       ///< not in scripts, like the overlap
+  double overlap = 0;              ///< at contact, relative to the contact distance
 
   /// The other sphere's id; kNoPartner at a wall.
   static constexpr Id kNoPartner = std::numeric_limits<Id>::max();
@@ -100,16 +100,16 @@ class Trace {
     fastest_squared_ = std::max({fastest_squared_, a.v.squaredNorm(), b.v.squaredNorm()});
   }
 
-  /// Links the entries of each sphere, which the functions below require; calls visit(slot) at its first one. In one
-  /// pass over the complete log the memory of many spheres is fetched at once; event by event, each would be waited
-  /// for.
-  template <class Visit>
-  void link(Visit&& visit) {
+  /// Links the entries of each sphere, which the functions below require; calls visit(slot) at its first one and, some
+  /// events earlier, prefetch(slot). In one pass over the complete log the memory of many spheres is fetched at once;
+  /// event by event, each would be waited for.
+  template <class Prefetch, class Visit>
+  void link(Prefetch&& prefetch, Visit&& visit) {
     constexpr std::size_t kAhead = 8;
     for (std::size_t n = 0; n < events_.size(); ++n) {
       if (n + kAhead < events_.size())
         for (const Slot i : events_[n + kAhead].slot)
-          if (i != kNoEntry) prefetch_line(&latest_[i]);
+          if (i != kNoEntry) prefetch_line(&latest_[i]), prefetch(i);
       for (const std::uint32_t which : {0u, 1u}) {
         const Slot i = events_[n].slot[which];
         if (i == kNoEntry) continue;

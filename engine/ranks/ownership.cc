@@ -16,7 +16,7 @@ void Ownership<D>::load(const Bisection<D>& bisection, std::uint32_t number, dou
   watched_.clear();
   holders_.assign(slots, 0);
   role_.assign(slots, Role::none);
-  turned_.assign(slots, 0);
+  watched_at_.assign(slots, kUnwatched);
   for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, Role::own);
 }
 
@@ -46,12 +46,15 @@ template <int D>
 void Ownership<D>::watch(double now) {
   unwatched_ = 0;
   const double reach = bisection_->reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
-  std::erase_if(watched_, [&](const Watched& each) { return role_[each.slot] != Role::ghost; });
-  for (Slot i = 0; i < core_.flights().size(); ++i)
-    if (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)
-      watched_.push_back({i});
+  watched_.clear();
+  watched_at_.assign(role_.size(), kUnwatched);
   std::vector<Slot> slots;
-  for (const Watched& each : watched_) slots.push_back(each.slot);
+  for (Slot i = 0; i < core_.flights().size(); ++i)
+    if (is_ghost(i) ||
+        (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)) {
+      watch_over(i);
+      slots.push_back(i);
+    }
   core_.set_border(slots, now);
 }
 
@@ -96,7 +99,7 @@ bool Ownership<D>::admit(const Record<D>& r, double now, const Spin<D>& spin) {
   Slot slot = 0;
   if (!core_.admit(r, spin, now, slot)) return false;
   enlist(slot, Role::ghost);
-  watched_.push_back({slot});
+  watch_over(slot);
   return true;
 }
 

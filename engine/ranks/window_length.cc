@@ -58,8 +58,13 @@ double WindowLength<D>::window_end(double now, double end) const {
 template <int D>
 double WindowLength<D>::first_beyond(Subdomain<D>& subdomain, double now, double end) const {
   double first = std::numeric_limits<double>::infinity();
-  if (speed_in(subdomain) > fastest_)
-    subdomain.for_each_touched([&](Slot i) { first = std::min(first, beyond_at(subdomain, i, now, end)); });
+  if (speed_in(subdomain) <= fastest_) return first;
+  subdomain.for_each_touched([&](Slot i) {
+    double fastest = 0;
+    for (std::size_t k = 0; k < subdomain.nodes(i); ++k)
+      fastest = std::max(fastest, subdomain.node(i, k).after.v.norm() + field_);
+    if (fastest > fastest_) first = std::min(first, beyond_at(subdomain, i, now, end));
+  });
   return first;
 }
 

@@ -28,11 +28,14 @@ std::vector<Slot> WindowPaths<D>::end() {
   std::vector<Slot> seen;
   touched_ghosts_.clear();
   ++window_;
-  trace_.link([&](Slot i) {
+  const auto prefetch = [&](Slot i) { ownership_.prefetch(i); };
+  trace_.link(prefetch, [&](Slot i) {
     ownership_.turn(i);
-    if (ownership_.is_seen(i)) seen.push_back(i);
-    if (ownership_.is_ghost(i)) touched_ghosts_.push_back(i);
+    if (!ownership_.is_seen(i) && !ownership_.is_ghost(i)) return;
+    prefetch_line(&flights_[i]);  // its path will be read
+    (ownership_.is_seen(i) ? seen : touched_ghosts_).push_back(i);
   });
+  unchecked_ = touched_ghosts_;
   return seen;
 }
 
@@ -62,9 +65,9 @@ Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, s
           .key = event.slot[1] == kNoEntry
                      ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
                      : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner)),
+          .spin = k + 1 < entries.size() ? trace_.spin_before(entries[k + 1]) : flights_.spin(i),
           .exchange = event.exchange,
-          .overlap = event.overlap,
-          .spin = k + 1 < entries.size() ? trace_.spin_before(entries[k + 1]) : flights_.spin(i)};
+          .overlap = event.overlap};
 }
 
 template <int D>
@@ -104,17 +107,20 @@ template <int D>
 void WindowPaths<D>::cut(const EventKey<D>& last) {
   std::vector<Slot> touched(paths_.slots().begin(), paths_.slots().end());
   for_each_own([&](Slot i) { touched.push_back(i); });
-  for (const Slot i : touched) std::erase_if(rewrite(i), [&](const Node<D>& node) { return last < node.key; });
+  for (const Slot i : touched)
+    if (const std::size_t k = nodes(i); k > 0 && last < node(i, k - 1).key)
+      std::erase_if(rewrite(i), [&](const Node<D>& node) { return last < node.key; });
 }
 
 template <int D>
 void WindowPaths<D>::write(Slot i, Bytes& to) const {
   const View path = view(i);
   put(to, path.size());
+  const std::size_t at = to.size(), bytes = node_bytes();
+  to.resize(at + path.size() * bytes);
   for (std::size_t k = 0; k < path.size(); ++k) {
     const Node<D> node = path.node(k);
-    const auto* bytes = reinterpret_cast<const std::byte*>(&node);
-    to.insert(to.end(), bytes, bytes + node_bytes());
+    std::memcpy(to.data() + at + k * bytes, static_cast<const void*>(&node), bytes);
   }
 }
 
@@ -127,6 +133,7 @@ void WindowPaths<D>::read_script(Slot g, Reader& message) {
   script.count = count;
   script.bytes = bytes;
   script.nodes.clear();
+  unchecked_.push_back(g);
   matched_in_[g] = 0;
 }
 

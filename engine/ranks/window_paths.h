@@ -34,6 +34,8 @@ class WindowPaths {
   const Trace<D>& trace() const { return trace_; }
   bool has_no_events(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
   std::span<const Node<D>> path(Slot i) { return path_of(i).nodes; }
+  std::size_t nodes(Slot i) const { return view(i).size(); }
+  Node<D> node(Slot i, std::size_t k) const { return view(i).node(k); }
   /// The sphere's record before node k of its path; after(): after the last node.
   const Record<D>& before(Slot i, std::size_t k) {
     Path& path = path_of(i);
@@ -56,6 +58,10 @@ class WindowPaths {
   void read_script(Slot g, Reader& message);
   /// The script of a ghost; empty if it had no events on its owner.
   std::span<const Node<D>> script(Slot g);
+  /// The ghosts whose path or script is new since the last call; some may occur twice.
+  std::vector<Slot> unchecked() { return std::exchange(unchecked_, {}); }
+  /// Check a ghost again whose path has been rewritten.
+  void check_again(Slot g) { unchecked_.push_back(g); }
   /// Whether the path of a ghost equals its script.
   bool matches(Slot g);
   /// Whether the paths of all ghosts equal their scripts before a time.
@@ -98,7 +104,7 @@ class WindowPaths {
     return {*this, i, nullptr, trace_.entries(i)};
   }
   /// The bytes of a node in a message: without the spin if no contact is rough.
-  std::size_t node_bytes() const { return flights_.rough() ? sizeof(Node<D>) : offsetof(Node<D>, spin); }
+  std::size_t node_bytes() const { return flights_.rough() ? offsetof(Node<D>, exchange) : offsetof(Node<D>, spin); }
   Node<D> node_of(const Script& script, std::size_t k) const;
   Node<D> logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const;
   Path& path_of(Slot i);
@@ -110,6 +116,7 @@ class WindowPaths {
   std::vector<std::uint8_t> rewritten_;  // by slot: whether the path differs from the log
   BySlot<Script> scripts_;
   std::vector<Slot> touched_ghosts_;  // ghosts with events in the log
+  std::vector<Slot> unchecked_;       // ghosts to be compared with their scripts
   std::vector<std::uint32_t>
       matched_in_;            // by slot: the window in which the ghost's path was found equal to its script
   std::uint32_t window_ = 0;  // number of the present window

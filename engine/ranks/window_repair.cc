@@ -8,7 +8,7 @@ namespace carom {
 template <int D>
 std::vector<Slot> WindowRepair<D>::run() {
   repairs_.clear();
-  paths_.for_each_ghost([&](Slot g) { compare(g); });
+  for (const Slot g : paths_.unchecked()) compare(g);
   while (!tasks_.empty()) {
     const Task task = tasks_.top();
     tasks_.pop();
@@ -32,7 +32,10 @@ std::vector<Slot> WindowRepair<D>::run() {
   std::vector<Slot> changed;
   for (const Repaired& m : repairs_) {
     repair_of_[m.slot] = kNoRepair;
-    if (!ownership_.owns(m.slot)) continue;
+    if (!ownership_.owns(m.slot)) {
+      paths_.check_again(m.slot);
+      continue;
+    }
     const auto now = paths_.path(m.slot).subspan(m.kept);
     if (!std::equal(now.begin(), now.end(), m.old.begin(), m.old.end())) changed.push_back(m.slot);
   }

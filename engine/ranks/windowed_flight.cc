@@ -135,7 +135,7 @@ EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
   std::vector<EventKey<D>> mine;
   if (subdomain_)
     subdomain_->for_each_contact([&](Slot i, std::size_t k) {
-      if (const EventKey<D>& key = subdomain_->path(i)[k].key; key.kind == EventKind::pair) mine.push_back(key);
+      if (const EventKey<D> key = subdomain_->node(i, k).key; key.kind == EventKind::pair) mine.push_back(key);
     });
   auto keys = gather_values<EventKey<D>>(ranks_, mine);
   std::ranges::nth_element(keys, keys.begin() + static_cast<std::ptrdiff_t>(number - 1));
@@ -238,7 +238,9 @@ void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) const {
 template <int D>
 void WindowedFlight<D>::give_back(double time, Particles<D>& particles) {
   measure_work();
+  if (subdomain_) subdomain_->stop();
   collect(time, particles, &work_);
+  if (subdomain_) subdomain_->release();
 }
 
 /// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events per sphere.
