@@ -20,8 +20,12 @@ std::vector<Value> sent_to_near(const Bisection<D>& bisection, Communicator& ran
   for_each([&](const Vec<D>& x, const Value& value) {
     bisection.for_each_near(x, [&](std::uint32_t rank) { put(outgoing[rank], value); });
   });
+  std::vector<Bytes> incoming = ranks.swap(std::move(outgoing));
+  std::size_t size = 0;
+  for (const Bytes& bytes : incoming) size += bytes.size();
   std::vector<Value> near;
-  for (Bytes& bytes : ranks.swap(std::move(outgoing))) {
+  near.reserve(size / sizeof(Value));
+  for (Bytes& bytes : incoming) {
     for (Reader reader(bytes); reader.more();) near.push_back(reader.get<Value>());
     Bytes().swap(bytes);
   }

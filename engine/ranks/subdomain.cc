@@ -58,17 +58,17 @@ void Subdomain<D>::commit() {
 
 template <int D>
 Contact<D> Subdomain<D>::contact_of(Slot lo, std::size_t k) {
-  const EventKey<D> key = path(lo)[k].key;
-  Record<D> a = before(lo, k);
+  const EventKey<D> key = paths_->path(lo)[k].key;
+  Record<D> a = paths_->before(lo, k);
   Spin<D> spin_a = paths_->spin_before(lo, k);
   if (key.kind == EventKind::wall) {
     const Impact<D> impact = flights().bounce(lo, a, &spin_a, box_.wall(key.hi), key.time, key.generation);
     return flights().contact_of(key, a, impact);
   }
-  const Slot hi = slot_of(key.hi);
-  const auto nodes = path(hi);
+  const Slot hi = ownership_->slot_of(key.hi);
+  const auto nodes = paths_->path(hi);
   const auto met = std::ranges::find(nodes, key, &Node<D>::key) - nodes.begin();
-  Record<D> b = before(hi, static_cast<std::size_t>(met));
+  Record<D> b = paths_->before(hi, static_cast<std::size_t>(met));
   Spin<D> spin_b = paths_->spin_before(hi, static_cast<std::size_t>(met));
   const Vec<D> shift = box_.shift(key.image);
   const Impact<D> impact = flights().collide(lo, a, &spin_a, hi, b, &spin_b, shift, key.time, key.generation);

@@ -14,9 +14,9 @@
 //
 //   subdomain.load(records, bisection, number, …);
 //   subdomain.run(now, end);
-//   while (…) { subdomain.follow(id, message); …; subdomain.repair(); … subdomain.changed() … }
+//   while (…) { subdomain.paths().read_script(ghost, message); …; subdomain.repair(); … subdomain.changed() … }
 //   subdomain.commit();
-//   subdomain.sort_out(now, send); …; subdomain.admit(record, now, spin);
+//   subdomain.sort_out(now, send); …; subdomain.ownership().admit(record, now, spin);
 
 #include <optional>
 
@@ -36,7 +36,7 @@ class Subdomain {
   void load(std::vector<Record<D>> records, const Bisection<D>& bisection, std::uint32_t number, const Vec<D>& g,
             double horizon, double now, double max_displacement, const std::vector<Spin<D>>& spins = {});
 
-  /// Frees the memory for plans, and then that for spheres, until the next load().
+  /// Frees the memory for plans, and release() that for spheres, until the next load().
   void stop() { core_.stop(); }
   void release();
 
@@ -44,15 +44,14 @@ class Subdomain {
 
   std::vector<Slot> own() const { return ownership_->own(); }
   const Flights<D>& flights() const { return core_.flights(); }
+  Ownership<D>& ownership() { return *ownership_; }
+  WindowPaths<D>& paths() { return *paths_; }
+  const WindowPaths<D>& paths() const { return *paths_; }
   /// Updates ownership and ghosts here and elsewhere, and removes spheres that are neither own nor ghosts. Calls
   /// send(k, record) for spheres that the k-th neighbour lacks and must admit.
   template <class Send>
   void sort_out(double now, Send&& send) {
     ownership_->sort_out(now, length_, send);
-  }
-  /// Adds a ghost; false if there is no room: load again.
-  bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero()) {
-    return ownership_->admit(r, now, spin);
   }
 
   // In a window.
@@ -61,50 +60,23 @@ class Subdomain {
   /// cut it before that. Returns `end`, or the time of the first event for which the log has no room; the window is
   /// then invalid too.
   double run(double now, double end);
-  void write_path(Slot i, Bytes& to) const { paths_->write(i, to); }
-  /// Reads the script of a ghost; the message must stay until the end of the window.
-  void follow(Id id, Reader& message) { paths_->read_script(slot_of(id), message); }
   void repair() { changed_ = repair_->run(); }
-  /// The events of a sphere in the window.
-  std::span<const Node<D>> path(Slot i) { return paths_->path(i); }
-  /// The same without storing the path, for many spheres: the number of events, and event k.
-  std::size_t nodes(Slot i) const { return paths_->nodes(i); }
-  Node<D> node(Slot i, std::size_t k) const { return paths_->node(i, k); }
-  /// The sphere's record before node k of its path.
-  const Record<D>& before(Slot i, std::size_t k) { return paths_->before(i, k); }
-  /// The sphere's record after the last node.
-  const Record<D>& after(Slot i) const { return paths_->after(i); }
-  Spin<D> spin_after(Slot i) const { return paths_->spin_after(i); }
-  /// Calls visit(slot) for each own sphere that had events in any version of the window.
-  template <class Visit>
-  void for_each_touched(Visit&& visit) const {
-    paths_->for_each_own(visit);
-  }
   /// Calls visit(slot, k) for each node k that is a contact with its lower id owned here.
   template <class Visit>
   void for_each_contact(Visit&& visit) {
-    for_each_touched([&](Slot i) {
-      for (std::size_t k = 0; k < nodes(i); ++k)
-        if (const Node<D> each = node(i, k); each.key.lo == each.after.id) visit(i, k);
+    paths_->for_each_own([&](Slot i) {
+      for (std::size_t k = 0; k < paths_->nodes(i); ++k)
+        if (const Node<D> each = paths_->node(i, k); each.key.lo == each.after.id) visit(i, k);
     });
   }
   /// The contact of node k, visited by for_each_contact().
   Contact<D> contact_of(Slot lo, std::size_t k);
   /// Own spheres that are ghosts elsewhere and got new paths in the last run() or repair().
   std::span<const Slot> changed() const { return changed_; }
-  /// A bit for each neighbour that has an own sphere as a ghost.
-  std::uint64_t holders(Slot i) const { return ownership_->holders(i); }
-  Slot slot_of(Id id) const { return ownership_->slot_of(id); }
-  /// An upper limit of the contacts in tally().
+  /// An upper limit of the contacts in paths().tally().
   std::uint64_t most_events() const { return paths_->trace().events().size() + redone_events() - redone_before_; }
-  /// The contacts of the window; each counts where its lower id is owned.
-  ContactTally tally() const { return paths_->tally(); }
   /// The largest speed of any sphere after an event.
   double fastest() const { return std::sqrt(std::max(paths_->trace().fastest_squared(), repair_->fastest_squared())); }
-  /// Whether all ghosts have the same events here as on their owners before a time.
-  bool consistent(double end) { return paths_->all_match(end); }
-  /// Removes all events after `last`. The core is then invalid; load() again.
-  void cut(const EventKey<D>& last) { paths_->cut(last); }
   /// Ends the window.
   void commit();
 

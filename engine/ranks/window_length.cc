@@ -36,6 +36,7 @@ double first_pace(const Box<D>& box, const Sizes& sizes, Communicator& ranks, co
 template <int D>
 void WindowLength<D>::start(const Box<D>& box, const Sizes& sizes, Communicator& ranks, const Particles<D>& block,
                             const Vec<D>& g, double horizon) {
+  each_ = 0.5 * kCollisionsPerWindow * static_cast<double>(sizes.spheres);
   field_ = g.norm() * horizon;
   fastest_ = 0;
   for (const Vec<D>& v : block.v) fastest_ = std::max(fastest_, v.norm());
@@ -47,9 +48,9 @@ void WindowLength<D>::start(const Box<D>& box, const Sizes& sizes, Communicator&
 }
 
 template <int D>
-double WindowLength<D>::window_end(double now, double end) const {
+double WindowLength<D>::window_end(double now, double end, double collisions) const {
   double length = fastest_ > 0 ? max_displacement_ / fastest_ : end - now;
-  if (pace_ > 0) length = std::min(length, pace_);
+  if (pace_ > 0) length = std::min({length, pace_, (0.1 + std::max(collisions, 0.0) / each_) * pace_});
   if (forced_) length = std::min(length, forced_());
   const double windows = std::ceil((end - now) / length * (1 - 1e-9));
   return windows <= 1 ? end : now + (end - now) / windows;
@@ -59,12 +60,7 @@ template <int D>
 double WindowLength<D>::first_beyond(Subdomain<D>& subdomain, double now, double end) const {
   double first = std::numeric_limits<double>::infinity();
   if (speed_in(subdomain) <= fastest_) return first;
-  subdomain.for_each_touched([&](Slot i) {
-    double fastest = 0;
-    for (std::size_t k = 0; k < subdomain.nodes(i); ++k)
-      fastest = std::max(fastest, subdomain.node(i, k).after.v.norm() + field_);
-    if (fastest > fastest_) first = std::min(first, beyond_at(subdomain, i, now, end));
-  });
+  subdomain.paths().for_each_own([&](Slot i) { first = std::min(first, beyond_at(subdomain.paths(), i, now, end)); });
   return first;
 }
 
@@ -75,12 +71,11 @@ void WindowLength<D>::allow_for(double speed) {
 
 /// first_beyond() for one sphere, from the length of its path.
 template <int D>
-double WindowLength<D>::beyond_at(Subdomain<D>& subdomain, Slot i, double now, double end) const {
-  const auto path = subdomain.path(i);
+double WindowLength<D>::beyond_at(const WindowPaths<D>& paths, Slot i, double now, double end) const {
   double left = max_displacement_;
-  for (std::size_t k = 0; k <= path.size(); ++k) {
-    const double speed = subdomain.before(i, k).v.norm() + field_;
-    const double until = k < path.size() ? path[k].key.time : end;
+  for (std::size_t k = 0; k <= paths.nodes(i); ++k) {  // stores no path: there are many
+    const double speed = (k == 0 ? paths.start(i) : paths.node(i, k - 1).after).v.norm() + field_;
+    const double until = k < paths.nodes(i) ? paths.node(i, k).key.time : end;
     if (speed * (until - now) > left) return now + left / speed;
     left -= speed * (until - now);
     now = until;
@@ -89,10 +84,9 @@ double WindowLength<D>::beyond_at(Subdomain<D>& subdomain, Slot i, double now, d
 }
 
 template <int D>
-void WindowLength<D>::note(double length, std::uint64_t collisions, std::size_t spheres) {
-  const double pace =
-      length * kCollisionsPerWindow * static_cast<double>(spheres) / (2 * static_cast<double>(collisions));
-  pace_ = 1 / (0.9 / pace_ + 0.1 / pace);  // the mean of rates: times of windows with few collisions have no bound
+void WindowLength<D>::note(double length, std::uint64_t collisions) {
+  // The mean of rates: the times of windows with few collisions have no bound.
+  pace_ = 1 / (0.9 / pace_ + 0.1 * static_cast<double>(collisions) / (each_ * length));
 }
 
 template class WindowLength<2>;

@@ -14,7 +14,6 @@ void WindowPaths<D>::load(std::size_t slots) {
   scripts_.clear();
   scripts_.resize(slots);
   rewritten_.assign(slots, 0);
-  matched_in_.assign(slots, 0);
 }
 
 template <int D>
@@ -26,16 +25,14 @@ Trace<D>& WindowPaths<D>::start() {
 template <int D>
 std::vector<Slot> WindowPaths<D>::end() {
   std::vector<Slot> seen;
-  touched_ghosts_.clear();
-  ++window_;
+  unmatched_.clear();
   const auto prefetch = [&](Slot i) { ownership_.prefetch(i); };
   trace_.link(prefetch, [&](Slot i) {
     ownership_.turn(i);
     if (!ownership_.is_seen(i) && !ownership_.is_ghost(i)) return;
     prefetch_line(&flights_[i]);  // its path will be read
-    (ownership_.is_seen(i) ? seen : touched_ghosts_).push_back(i);
+    (ownership_.is_seen(i) ? seen : unmatched_).push_back(i);
   });
-  unchecked_ = touched_ghosts_;
   return seen;
 }
 
@@ -73,13 +70,21 @@ Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, s
 template <int D>
 typename WindowPaths<D>::Path& WindowPaths<D>::path_of(Slot i) {
   if (paths_.has(i)) return paths_.at(i);
+  const Record<D> first = start(i);
   const View logged = view(i);
   Path& path = paths_.add(i);
-  path.start = logged.entries.empty() ? flights_[i] : trace_.before(logged.entries[0]);
+  path.start = first;
   path.spin = logged.entries.empty() ? flights_.spin(i) : trace_.spin_before(logged.entries[0]);
   path.nodes.clear();
   for (std::size_t k = 0; k < logged.size(); ++k) path.nodes.push_back(logged.node(k));
   return path;
+}
+
+template <int D>
+const Record<D>& WindowPaths<D>::start(Slot i) const {
+  const View path = view(i);
+  if (path.nodes) return paths_.at(i).start;
+  return path.size() == 0 ? flights_[i] : trace_.before(path.entries[0]);
 }
 
 template <int D>
@@ -99,7 +104,6 @@ Spin<D> WindowPaths<D>::spin_after(Slot i) const {
 template <int D>
 typename WindowPaths<D>::Nodes& WindowPaths<D>::rewrite(Slot i) {
   rewritten_[i] = 1;
-  matched_in_[i] = 0;
   return path_of(i).nodes;
 }
 
@@ -129,38 +133,20 @@ void WindowPaths<D>::read_script(Slot g, Reader& message) {
   const auto count = message.get<std::uint32_t>();
   const std::byte* const bytes = message.skip(count * node_bytes());
   if (g == IdTable::kNowhere) return;  // there was no room for this ghost, so the window will be revoked
-  Script& script = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
-  script.count = count;
-  script.bytes = bytes;
-  script.nodes.clear();
-  unchecked_.push_back(g);
-  matched_in_[g] = 0;
-}
-
-template <int D>
-Node<D> WindowPaths<D>::node_of(const Script& script, std::size_t k) const {
-  Node<D> node;
-  std::memcpy(static_cast<void*>(&node), script.bytes + k * node_bytes(), node_bytes());
-  return node;
-}
-
-template <int D>
-std::span<const Node<D>> WindowPaths<D>::script(Slot g) {
-  if (!scripts_.has(g)) return {};
-  Script& script = scripts_.at(g);
-  while (script.nodes.size() < script.count) script.nodes.push_back(node_of(script, script.nodes.size()));
-  return script.nodes;
-}
-
-template <int D>
-bool WindowPaths<D>::matches(Slot g) {
-  if (matched_in_[g] == window_) return true;
-  const View path = view(g);
-  const std::size_t count = scripts_.has(g) ? scripts_.at(g).count : 0;
-  if (path.size() != count) return false;
+  Nodes& nodes = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
+  nodes.resize(count);
   for (std::size_t k = 0; k < count; ++k)
-    if (!(path.node(k) == node_of(scripts_.at(g), k))) return false;
-  matched_in_[g] = window_;
+    std::memcpy(static_cast<void*>(&nodes[k]), bytes + k * node_bytes(), node_bytes());
+  unmatched_.push_back(g);
+}
+
+template <int D>
+bool WindowPaths<D>::matches(Slot g) const {
+  const View path = view(g);
+  const auto sent = script(g);
+  if (path.size() != sent.size()) return false;
+  for (std::size_t k = 0; k < sent.size(); ++k)
+    if (!(path.node(k) == sent[k])) return false;
   return true;
 }
 
@@ -170,13 +156,8 @@ bool WindowPaths<D>::all_match(double end) {
     while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
     return nodes;
   };
-  bool all = true;
-  for_each_ghost([&](Slot g) {
-    if (!all || matched_in_[g] == window_) return;
-    const auto seen = until(path(g)), sent = until(script(g));
-    all = std::equal(seen.begin(), seen.end(), sent.begin(), sent.end());
-  });
-  return all;
+  return std::ranges::all_of(
+      unmatched_, [&](Slot g) { return matches(g) || std::ranges::equal(until(path(g)), until(script(g))); });
 }
 
 template <int D>

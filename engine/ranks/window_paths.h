@@ -36,7 +36,8 @@ class WindowPaths {
   std::span<const Node<D>> path(Slot i) { return path_of(i).nodes; }
   std::size_t nodes(Slot i) const { return view(i).size(); }
   Node<D> node(Slot i, std::size_t k) const { return view(i).node(k); }
-  /// The sphere's record before node k of its path; after(): after the last node.
+  const Record<D>& start(Slot i) const;
+  /// The sphere's record before node k of its path; start(): before the first, after(): after the last.
   const Record<D>& before(Slot i, std::size_t k) {
     Path& path = path_of(i);
     return k > 0 ? path.nodes[k - 1].after : path.start;
@@ -54,25 +55,24 @@ class WindowPaths {
 
   /// Appends the path of a sphere to a message.
   void write(Slot i, Bytes& to) const;
-  /// Reads the script of a ghost; the message must stay until the end of the window.
+  /// Reads the script of a ghost.
   void read_script(Slot g, Reader& message);
   /// The script of a ghost; empty if it had no events on its owner.
-  std::span<const Node<D>> script(Slot g);
-  /// The ghosts whose path or script is new since the last call; some may occur twice.
-  std::vector<Slot> unchecked() { return std::exchange(unchecked_, {}); }
-  /// Check a ghost again whose path has been rewritten.
-  void check_again(Slot g) { unchecked_.push_back(g); }
+  std::span<const Node<D>> script(Slot g) const {
+    return scripts_.has(g) ? std::span<const Node<D>>(scripts_.at(g)) : std::span<const Node<D>>();
+  }
   /// Whether the path of a ghost equals its script.
-  bool matches(Slot g);
+  bool matches(Slot g) const;
+  /// The ghosts, some twice, whose path or script is new since they last matched. The former call removes them all; add
+  /// those back that do not match, and those with rewritten paths.
+  std::vector<Slot> take_unmatched() { return std::exchange(unmatched_, {}); }
+  void add_unmatched(Slot g) { unmatched_.push_back(g); }
   /// Whether the paths of all ghosts equal their scripts before a time.
   bool all_match(double end);
 
-  /// Calls visit(slot) for each own sphere, or each ghost, that had events in any version of the window or in its
-  /// script. visit() may call path().
+  /// Calls visit(slot) for each own sphere that had events in any version of the window. visit() may call path().
   template <class Visit>
   void for_each_own(Visit&& visit) const;
-  template <class Visit>
-  void for_each_ghost(Visit&& visit) const;
   /// The contacts of own spheres; each counts where its lower id is owned.
   ContactTally tally() const;
 
@@ -82,12 +82,6 @@ class WindowPaths {
     Record<D> start;  // at the start of the window
     Spin<D> spin;     // there
     Nodes nodes;
-  };
-  /// The script of a ghost. Most are compared with the path and never decoded.
-  struct Script {
-    const std::byte* bytes;
-    std::uint32_t count;
-    Nodes nodes;  // empty until decoded
   };
   /// A path, stored or read from the log; valid until another path is viewed.
   struct View {
@@ -105,7 +99,6 @@ class WindowPaths {
   }
   /// The bytes of a node in a message: without the spin if no contact is rough.
   std::size_t node_bytes() const { return flights_.rough() ? offsetof(Node<D>, exchange) : offsetof(Node<D>, spin); }
-  Node<D> node_of(const Script& script, std::size_t k) const;
   Node<D> logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const;
   Path& path_of(Slot i);
 
@@ -114,12 +107,8 @@ class WindowPaths {
   Trace<D> trace_;
   BySlot<Path> paths_;                   // paths in use
   std::vector<std::uint8_t> rewritten_;  // by slot: whether the path differs from the log
-  BySlot<Script> scripts_;
-  std::vector<Slot> touched_ghosts_;  // ghosts with events in the log
-  std::vector<Slot> unchecked_;       // ghosts to be compared with their scripts
-  std::vector<std::uint32_t>
-      matched_in_;            // by slot: the window in which the ghost's path was found equal to its script
-  std::uint32_t window_ = 0;  // number of the present window
+  BySlot<Nodes> scripts_;
+  std::vector<Slot> unmatched_;
 };
 
 template <int D>
@@ -131,16 +120,6 @@ void WindowPaths<D>::for_each_own(Visit&& visit) const {
         visit(i);
   for (std::size_t k = 0; k < paths_.slots().size(); ++k)  // visit() may add paths
     if (const Slot i = paths_.slots()[k]; ownership_.owns(i) && rewritten_[i] != 0 && !trace_.has(i)) visit(i);
-}
-
-template <int D>
-template <class Visit>
-void WindowPaths<D>::for_each_ghost(Visit&& visit) const {
-  for (const Slot g : scripts_.slots()) visit(g);
-  for (const Slot g : touched_ghosts_)
-    if (!scripts_.has(g)) visit(g);
-  for (std::size_t k = 0; k < paths_.slots().size(); ++k)
-    if (const Slot g = paths_.slots()[k]; ownership_.is_ghost(g) && !scripts_.has(g) && !trace_.has(g)) visit(g);
 }
 
 }  // namespace carom

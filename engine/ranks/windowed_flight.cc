@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ranks/windowed_flight.h"
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 
 #include "engine/base/error.h"
@@ -14,6 +18,13 @@ constexpr std::size_t kMinSpheres = 8;                // spheres in a subdomain
 constexpr std::size_t kMaxNeighbours = 64;            // neighbours of a subdomain: the bits of Subdomain::holders()
 constexpr double kMeanWork = 64, kMaxWork = 64 * 64;  // mean and largest work of a sphere, as integers
 constexpr double kWorkTolerance = 0.1;                // smaller relative differences from the mean are ignored
+
+/// Returns freed memory to the system; call it after large temporary arrays.
+void trim_memory() {
+#if defined(__GLIBC__)
+  malloc_trim(0);
+#endif
+}
 
 }  // namespace
 
@@ -95,6 +106,7 @@ void WindowedFlight<D>::load(double now, Spheres&& spheres) {
   if (subdomain_)
     subdomain_->load(std::move(near), *bisection_, static_cast<std::uint32_t>(ranks_.rank()), g_, horizon_, now,
                      length_.max_displacement(), spins);
+  trim_memory();  // messages and sorted copies
   now_ = now;
   cut_ = false;
   sort_out(true);
@@ -105,7 +117,7 @@ template <int D>
 void WindowedFlight<D>::reload() {
   load(now_, [&](auto&& add) {
     if (subdomain_)
-      for (const Slot i : subdomain_->own()) add(subdomain_->after(i), subdomain_->spin_after(i));
+      for (const Slot i : subdomain_->own()) add(subdomain_->paths().after(i), subdomain_->paths().spin_after(i));
   });
 }
 
@@ -118,14 +130,15 @@ void WindowedFlight<D>::sort_out(bool loaded) {
     subdomain_->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
       if (loaded) return;
       exchange_.add(neighbour, record);
-      if (rough()) exchange_.add(neighbour, subdomain_->flights().spin(subdomain_->slot_of(record.id)));
+      if (rough()) exchange_.add(neighbour, subdomain_->flights().spin(subdomain_->ownership().slot_of(record.id)));
     });
   no_room_ = false;
   if (loaded) return;
   for (const Bytes& bytes : exchange_.swap())
     for (Reader reader(bytes); reader.more();) {
       const auto record = reader.get<Record<D>>();
-      if (!subdomain_->admit(record, now_, rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero()))) no_room_ = true;
+      const Spin<D> spin = rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero());
+      if (!subdomain_->ownership().admit(record, now_, spin)) no_room_ = true;
     }
 }
 
@@ -135,7 +148,7 @@ EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
   std::vector<EventKey<D>> mine;
   if (subdomain_)
     subdomain_->for_each_contact([&](Slot i, std::size_t k) {
-      if (const EventKey<D> key = subdomain_->node(i, k).key; key.kind == EventKind::pair) mine.push_back(key);
+      if (const EventKey<D> key = subdomain_->paths().node(i, k).key; key.kind == EventKind::pair) mine.push_back(key);
     });
   auto keys = gather_values<EventKey<D>>(ranks_, mine);
   std::ranges::nth_element(keys, keys.begin() + static_cast<std::ptrdiff_t>(number - 1));
@@ -152,7 +165,8 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   while (now_ < end && reached == end) {
     if (cut_) reload();
     if (!sorted_) sort_out(false);
-    double stop = std::min(length_.window_end(now_, end), full);
+    const auto left = static_cast<double>(report.collision_limit - collisions);
+    double stop = std::min(length_.window_end(now_, end, left - length_.expected(length)), full);
     const double ran = subdomain_ ? subdomain_->run(now_, stop) : stop;
     // Over all ranks: maxima of whether a path changed, a ghost found no room, of the time reached, the time at which a
     // sphere was too fast (both negated) and of speeds; sums over the window before, and the most collisions of this
@@ -172,7 +186,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       ranks_.combine(most, sums);
       collisions += sums[0];
       events_ += sums[1];
-      if (length > 0) length_.note(std::exchange(length, 0), sums[0], sizes_.spheres);
+      if (length > 0) length_.note(std::exchange(length, 0), sums[0]);
       return most[changed] > 0 && most[no_room] == 0 && -most[earliest] == stop;
     };
     const std::uint64_t rounds = exchange_.make_consistent(subdomain_.get(), agree);
@@ -189,7 +203,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     counts_.rounds += rounds;
     length_.allow_for(most[speed]);
     if (-most[beyond] < stop) stop = cut_at(-most[beyond]);
-    if (subdomain_ && !subdomain_->consistent(stop))
+    if (subdomain_ && !subdomain_->paths().all_match(stop))
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
     got = tally();
     if (collisions + sums[2] >= report.collision_limit) {  // it may have been reached
@@ -197,7 +211,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       ranks_.sum({&count, 1});
       if (collisions + count >= report.collision_limit) {
         const EventKey<D> last = key_of_collision(report.collision_limit - collisions);
-        if (subdomain_) subdomain_->cut(last);
+        if (subdomain_) subdomain_->paths().cut(last);
         cut_ = true;
         got = tally();
         reached = stop = last.time;
@@ -226,7 +240,7 @@ double WindowedFlight<D>::cut_at(double time) {
   cut_ = true;
   EventKey<D> last{.time = time};
   for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
-  if (subdomain_) subdomain_->cut(last);
+  if (subdomain_) subdomain_->paths().cut(last);
   return time;
 }
 
@@ -272,7 +286,7 @@ void WindowedFlight<D>::collect(double time, Particles<D>& copies, std::vector<s
       [&](auto&& send) {
         if (!subdomain_) return;
         for (const Slot i : subdomain_->own()) {
-          const Record<D> r = subdomain_->flights().at(subdomain_->after(i), time);
+          const Record<D> r = subdomain_->flights().at(subdomain_->paths().after(i), time);
           send(r.id, State{subdomain_work_, r.x, r.v});
         }
       },
@@ -287,7 +301,7 @@ void WindowedFlight<D>::collect(double time, Particles<D>& copies, std::vector<s
       blocks(), ranks_,
       [&](auto&& send) {
         if (!subdomain_) return;
-        for (const Slot i : subdomain_->own()) send(subdomain_->after(i).id, subdomain_->spin_after(i));
+        for (const Slot i : subdomain_->own()) send(subdomain_->flights()[i].id, subdomain_->paths().spin_after(i));
       },
       [&](std::size_t place, const Spin<D>& spin) { copies.spin[place] = spin; });
 }

@@ -58,7 +58,7 @@ class WindowedFlight {
   void sort_out(bool loaded);
   double cut_at(double time);
   EventKey<D> key_of_collision(std::uint64_t number) const;
-  ContactTally tally() const { return subdomain_ ? subdomain_->tally() : ContactTally{}; }
+  ContactTally tally() const { return subdomain_ ? subdomain_->paths().tally() : ContactTally{}; }
 
   const Box<D>& box_;
   Sizes sizes_;

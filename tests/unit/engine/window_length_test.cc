@@ -59,10 +59,10 @@ TEST(WindowLength, FollowsTheRateOfCollisionsAndIsForced) {
   for_each_window(forced, 0.01, [](double window) { EXPECT_NEAR(window, 0.001, 1e-9); });
   const auto first = [&] { return length.window_end(0, 100); };
   const double before = first();
-  length.note(1, 1, 1000);  // few collisions in a window, as at the start from a lattice, do not make later ones long
+  length.note(1, 1);  // few collisions in a window, as at the start from a lattice, do not make later ones long
   length.start(f.system->box, f.sizes, f.alone, f.system->particles, Vec<3>::Zero(), 0.8);
   EXPECT_LT(first(), 1.2 * before);
-  for (int k = 0; k < 200; ++k) length.note(0.01, 500, 1000);  // each collides once in 0.01
+  for (int k = 0; k < 200; ++k) length.note(0.01, 250);  // each collides once in 0.01
   EXPECT_NEAR(first(), 0.0015, 1e-5);
 }
 
