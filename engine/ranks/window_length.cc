@@ -7,7 +7,11 @@
 namespace carom {
 namespace {
 
-constexpr double kCollisionsPerWindow = 0.15;                      // mean collisions of a sphere in a window
+// Mean collisions of a sphere in a window. Short windows need fewer ghosts and repairs, and a log that stays in the
+// cache; long ones fewer searches of borders and fewer waits. At packing fraction 0.30 a rank of two with 32,000
+// spheres executes 894.6, 883.3 and 884.4 million instructions in 1.6·10⁵ collisions with 0.3, 0.15 and 0.1;
+// at 0.10, 1194.5 with 0.3 and 1139.2 with 0.15.
+constexpr double kCollisionsPerWindow = 0.15;
 constexpr double kMaxDisplacement = 1.0, kMinDisplacement = 0.02;  // [largest diameter]
 constexpr double kSpeedAllowance = 1.15;                           // speed allowed for, relative to the largest speed
 

@@ -14,6 +14,7 @@ void WindowPaths<D>::load(std::size_t slots) {
   scripts_.clear();
   scripts_.resize(slots);
   rewritten_.assign(slots, 0);
+  listed_.assign(slots, 0);
 }
 
 template <int D>
@@ -25,13 +26,16 @@ Trace<D>& WindowPaths<D>::start() {
 template <int D>
 std::vector<Slot> WindowPaths<D>::end() {
   std::vector<Slot> seen;
-  unmatched_.clear();
+  take_unmatched();
   const auto prefetch = [&](Slot i) { ownership_.prefetch(i); };
   trace_.link(prefetch, [&](Slot i) {
     ownership_.turn(i);
     if (!ownership_.is_seen(i) && !ownership_.is_ghost(i)) return;
     prefetch_line(&flights_[i]);  // its path will be read
-    (ownership_.is_seen(i) ? seen : unmatched_).push_back(i);
+    if (ownership_.is_seen(i))
+      seen.push_back(i);
+    else
+      add_unmatched(i);
   });
   return seen;
 }
@@ -137,7 +141,7 @@ void WindowPaths<D>::read_script(Slot g, Reader& message) {
   nodes.resize(count);
   for (std::size_t k = 0; k < count; ++k)
     std::memcpy(static_cast<void*>(&nodes[k]), bytes + k * node_bytes(), node_bytes());
-  unmatched_.push_back(g);
+  add_unmatched(g);
 }
 
 template <int D>

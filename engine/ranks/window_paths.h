@@ -63,10 +63,15 @@ class WindowPaths {
   }
   /// Whether the path of a ghost equals its script.
   bool matches(Slot g) const;
-  /// The ghosts, some twice, whose path or script is new since they last matched. The former call removes them all; add
-  /// those back that do not match, and those with rewritten paths.
-  std::vector<Slot> take_unmatched() { return std::exchange(unmatched_, {}); }
-  void add_unmatched(Slot g) { unmatched_.push_back(g); }
+  /// Removes and returns the ghosts whose path or script is new since they last matched. Add those back that do not
+  /// match, and those with rewritten paths.
+  std::vector<Slot> take_unmatched() {
+    for (const Slot g : unmatched_) listed_[g] = 0;
+    return std::exchange(unmatched_, {});
+  }
+  void add_unmatched(Slot g) {
+    if (std::exchange(listed_[g], 1) == 0) unmatched_.push_back(g);
+  }
   /// Whether the paths of all ghosts equal their scripts before a time.
   bool all_match(double end);
 
@@ -109,6 +114,7 @@ class WindowPaths {
   std::vector<std::uint8_t> rewritten_;  // by slot: whether the path differs from the log
   BySlot<Nodes> scripts_;
   std::vector<Slot> unmatched_;
+  std::vector<std::uint8_t> listed_;  // by slot: whether it is in unmatched_
 };
 
 template <int D>
