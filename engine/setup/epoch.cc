@@ -102,10 +102,15 @@ double next_epoch(const System<D>& system, const PastEpoch& past) {
   fastest = std::max(fastest, 5 * std::sqrt(hottest / -minus_lightest));
   double longest = std::min(kLonger * past.length, kFarthest * -minus_diameter / fastest);
   longest = std::min(longest, kEventsOfEpoch / past.events * past.length);
-  const Packing<D> packing(1, system.size());
-  for (int k = 0; k < D; ++k)
-    if (const double edge = system.box.edges[k]; system.box.periodic(k))
-      longest = std::min(longest, packing.largest() / kFaster * std::max(edge / fastest, past.length / (boxes + 1)));
+  const double count = Packing<D>(1, system.size()).largest(), came = boxes + 1;
+  for (int k = 0; k < D; ++k) {
+    if (!system.box.periodic(k)) continue;
+    const double edge = system.box.edges[k];
+    // Spheres that turn often come as far as the root of the time.
+    const bool wanders = fastest * past.length > kFaster * came * edge;
+    const double as_measured = wanders ? (count / came) * (count / came) / 4 : count / came / kFaster;
+    longest = std::min(longest, std::max(count / kFaster * edge / fastest, past.length * as_measured));
+  }
   return longest;
 }
 

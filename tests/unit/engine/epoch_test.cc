@@ -27,22 +27,26 @@ TEST(Epoch, FollowsTheEventsOfTheLast) {
   const auto plain = test::hard_spheres<3>(5, 0.3);
   EXPECT_NEAR(next_epoch(*plain, {.length = 1, .events = 20, .boxes = 0}), 2, 1e-12);
   EXPECT_NEAR(next_epoch(*plain, {.length = 1, .events = 80, .boxes = 0}), 0.5, 1e-12);
-  EXPECT_NEAR(next_epoch(*plain, {.length = 1, .events = 1e-3, .boxes = 0}), 64, 1e-12);
-  const auto with = [](auto&& change) {
+  EXPECT_NEAR(next_epoch(*plain, {.length = 0.1, .events = 0, .boxes = 0}), 6.4, 1e-12);
+  const double count = Packing<3>(1, plain->size()).largest(), edge = plain->box.edges[0];
+  const auto with = [](auto&& change, double boxes) {
     auto system = test::hard_spheres<3>(5, 0.3);
     change(*system);
-    return next_epoch(*system, {.length = 1, .events = 1e-3, .boxes = 0.5});
+    return next_epoch(*system, {.length = 1, .events = 0, .boxes = boxes});
   };
-  const double boxes = Packing<3>(1, plain->size()).largest();
-  EXPECT_NEAR(with([](auto& system) { system.particles.v[3] = {0, 1e3, 0}; }), boxes / 4 / 1.5, 1e-12);
-  EXPECT_NEAR(with([](auto& system) { system.particles.v[3] = {0, 1, 0}; }), 64, 1e-12);
-  EXPECT_NEAR(with([](auto& system) { system.particles.v[3] = {0, 1e6, 0}; }), 4096 / 1e6, 1e-12);  // of its digits
-  EXPECT_EQ(with([](auto& system) {
-              system.box.boundary[0] = Boundary::wall;
-              system.box.add({.name = "x-", .velocity = 0.1});
-            }),
+  const auto fast = [](double speed) { return [=](auto& system) { system.particles.v[3] = {0, speed, 0}; }; };
+  EXPECT_NEAR(with(fast(1e3), 0.5), 4.096, 1e-12);                         // digits
+  EXPECT_NEAR(with(fast(1e3), 20), count * count / (21 * 21) / 4, 1e-12);  // wanders
+  EXPECT_NEAR(with(fast(100), 10), count / 4 * edge / 100, 1e-12);         // flies straight
+  EXPECT_NEAR(with(fast(100), 5), count / 4 / 6, 1e-12);                   // has come less far than that
+  EXPECT_EQ(with(
+                [](auto& system) {
+                  system.box.boundary[0] = Boundary::wall;
+                  system.box.add({.name = "x-", .velocity = 0.1});
+                },
+                0),
             0);
-  EXPECT_LT(with([](auto& system) { system.box.bath = {.type = Bath::Type::andersen, .temperature = 1e8}; }), 0.1);
+  EXPECT_LT(with([](auto& system) { system.box.bath = {.type = Bath::Type::andersen, .temperature = 1e8}; }, 0), 0.1);
 }
 
 /// On periodic axes the images of the fastest particle must fit into their bits; the lightest particle in equilibrium
