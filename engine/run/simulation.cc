@@ -94,6 +94,8 @@ void check_fixed(const System<D>& system, const IntegratorInfo& info) {
 
 Plan checked(const Plan& plan) {
   if (!(plan.step > 0)) throw Error(Failure::deck, "the step must be positive");
+  if (plan.longest_step != 0 && !(plan.longest_step >= plan.step))
+    throw Error(Failure::deck, "longest_step is shorter than the step; give a longer one, or none");
   if (!plan.steps && !plan.end_time && !plan.collisions)
     throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
   for (const double interval : {plan.frame_interval, plan.thermo_interval}) check_interval(interval, plan.step);
@@ -121,6 +123,7 @@ typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system,
   if (!info.stepping) choose_epoch(system, given);
   given = completed(info.name, info.parameters, std::move(given));
   plan.step = given.real("step");
+  if (given.has("longest_step")) plan.longest_step = given.real("longest_step");
   return {info.make<D>(given), plan};
 }
 
@@ -263,7 +266,7 @@ void Simulation<D>::run(const Hooks& hooks) {
       // accumulate.
       s.steps += slab.steps;
       s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
-      if (!info_.stepping && !system_->box.bath.rescales()) lengthen_epochs(count_.within + slab.length);
+      if (!system_->box.bath.rescales()) lengthen_slabs(count_.within + slab.length);
       count_.within = 0;
     }
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
@@ -375,16 +378,18 @@ bool Simulation<D>::is_last_on_the_way() const {
          (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
 }
 
-/// Sets the length of the next epoch after one of this length: its number of collisions hardly changes as the gas
-/// cools, and an epoch with too few collisions is followed by one that is longer by a power of four, so that ordinary
-/// gases keep their steps. Collective.
+/// Sets the length of the next slab after one of this length: its number of collisions hardly changes as the gas cools,
+/// and an epoch with too few collisions is followed by one that is longer by a power of four, so that ordinary gases
+/// keep their steps. Collective.
 template <int D>
-void Simulation<D>::lengthen_epochs(double length) {
+void Simulation<D>::lengthen_slabs(double length) {
+  const double most = info_.stepping ? std::floor(plan_.longest_step / plan_.step) : kLongestEpoch;
+  if (!(most > 1)) return;
   double steps = 1;
   if (!system_->box.contacts.elastic()) {
     const double speed = thermal_speed(*system_);
     if (count_.first_speed == 0) count_.first_speed = speed;
-    if (speed > 0) steps = std::max(count_.first_speed / speed, 1.0);
+    if (speed > 0) steps = std::clamp(count_.first_speed / speed, 1.0, most);
   }
   if (integrator_->lengthens()) {
     const double events = static_cast<double>(count_.contacts) / static_cast<double>(system_->size());
@@ -392,7 +397,7 @@ void Simulation<D>::lengthen_epochs(double length) {
     while (4 * steps * plan_.step <= wanted) steps *= 4;
   }
   const auto before = count_.stride;
-  count_.stride = static_cast<std::int64_t>(std::min(steps, kLongestEpoch));
+  count_.stride = static_cast<std::int64_t>(std::min(steps, most));
   if (count_.stride > before) *last_collisions_ *= static_cast<std::uint64_t>(count_.stride / before + 1);
   count_.contacts = 0;
   count_.boxes = 0;
