@@ -188,9 +188,13 @@ void go_to_end(Resumed& from, Communicator& ranks) {
   auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, &given);
   const IntegratorInfo& info = find_integrator(deck.integrator);
   Simulation<D> run(std::move(system), info, info.make<D>(deck.integrator_parameters), plan);
-  run.run({.restore = [&] { restore_state(run.system(), given.read); }});
   std::map<std::string, Bytes> end;
-  save_state(run.system(), into(end));
+  const auto save = [&] {  // before each of the few slabs, and at the end
+    end.clear();
+    save_state(run.system(), into(end));
+    return false;
+  };
+  run.run({.should_stop = save, .restore = [&] { restore_state(run.system(), given.read); }});
   from.end = std::move(end);
   from.head.step = run.statistics().steps;
   from.head.time = run.statistics().end_time;
