@@ -79,7 +79,7 @@ int bench_main(int argc, char** argv) {
   collisions->excludes(forces);
   app.add_flag("--curve", options.curve,
                "Measure whole runs of 10000 (--n) spheres from dilute to dense: equal ones, mixtures, uneven gases; "
-               "200000 collisions")
+               "100000 collisions")
       ->excludes(forces)
       ->excludes(dimension);
 
@@ -101,7 +101,7 @@ int bench_main(int argc, char** argv) {
     if (filled->count() == 0)
       options.packing_fraction = {1e-4, 3e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05,
                                   0.1,  0.2,  0.3,  0.35, 0.4,  0.49, 0.55, 0.6};
-    if (collisions->count() == 0) options.collisions = 200000;
+    if (collisions->count() == 0) options.collisions = 100000;
     bench_curve(options);
   } else {
     options.forces ? bench_forces(options) : bench_events(options);

@@ -47,7 +47,7 @@ temperature = 1.0
 
 /// Collisions per second of processor time.
 double rate_of(const Gas& gas, std::uint64_t n, double filled, std::uint64_t collisions) {
-  constexpr std::uint64_t kBefore = 5;  // collisions of a sphere before the measurement
+  constexpr std::uint64_t kBefore = 2;  // collisions for each sphere before the measurement
   Deck deck = deck_of(deck_text(gas, n, filled));
   auto system = build_system<3>(deck);
   const IntegratorInfo& info = find_integrator(deck.integrator);
@@ -68,10 +68,11 @@ void bench_curve(const Options& options) {
   store(options, {{"points", points}});
   const std::uint64_t n = options.n.empty() ? 10000 : options.n.front();
   std::string heading =
-      title() + fmt::format(
-                    "{} hard spheres in a periodic box, free-flight, one core: thousand collisions per second "
-                    "of processor time,\nin a run with its checks, over {} collisions after {} each.\n\n{:>8}",
-                    n, options.collisions, 10, "phi");
+      title() +
+      fmt::format(
+          "{} hard spheres in a periodic box, free-flight, one core: thousand collisions per second "
+          "of processor time,\nin a run with its checks, over {} collisions after four of each sphere.\n\n{:>8}",
+          n, options.collisions, "phi");
   for (const Gas& gas : kGases) heading += fmt::format(" {:>13}", gas.name);
   say(heading + "\n");
   for (const double filled : options.packing_fraction) {
