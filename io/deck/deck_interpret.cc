@@ -363,7 +363,8 @@ class Interpreter {
     table->read<double>("step", plan.step);
     table->read<double>("longest_step", plan.longest_step);
     if (plan.longest_step != 0 && plan.longest_step < plan.step)
-      problems_.error(table->place("longest_step"), "'longest_step' is shorter than 'step'", "give a longer one, or none");
+      problems_.error(table->place("longest_step"), "'longest_step' is shorter than 'step'",
+                      "give a longer one, or none");
   }
 
   void interaction(ValueTable& table) {
