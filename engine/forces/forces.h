@@ -159,16 +159,16 @@ MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state
   for (Id i = 0; i < at.size(); ++i) {
     if (!system.particles.owns(i)) continue;
     const double squared = at.v[i].squaredNorm();
-    kinetic.add(0.5 * at.mass[i] * squared);
+    kinetic.add(0.5 * moving_mass(at.mass[i]) * squared);
     speed.add(std::sqrt(squared));
-    for (int k = 0; k < D; ++k) momentum[k].add(state.mass[i] * state.v[i][k]);
+    for (int k = 0; k < D; ++k) momentum[k].add(moving_mass(state.mass[i]) * state.v[i][k]);
   }
   MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}};
   if (system.box.contacts.rough()) {
     ExactSeries rotational;
     for (Id i = 0; i < at.size(); ++i)
       if (system.particles.owns(i))
-        rotational.add(0.5 * system.box.contacts.moment(at.species[i], at.mass[i], at.radius[i], D) *
+        rotational.add(0.5 * system.box.contacts.moment(at.species[i], moving_mass(at.mass[i]), at.radius[i], D) *
                        at.spin[i].squaredNorm());
     sums.rotational = rotational.sum();
   }
@@ -187,7 +187,7 @@ double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D>
   for (Id i = 0; i < at.size(); ++i) {
     if (!system.particles.owns(i)) continue;
     sum.add(at.v[i].dot(scratch[i]) / 12);
-    sum.add(-at.mass[i] * a[i].squaredNorm() / 24);
+    sum.add(-moving_mass(at.mass[i]) * a[i].squaredNorm() / 24);
   }
   return system.decomposition.sum(sum.sum()).value();
 }

@@ -12,7 +12,7 @@ struct Measurement {
   Snapshot<D> shot;      ///< its energies, momentum and temperature
   double magnitude = 0;  ///< K + Σ|V| [energy]
   double virial = 0;     ///< Σ m v² + Σ d·F, with its long-range corrections [energy]
-  double speed = 0;      ///< mean |v| [length/time]
+  double speed = 0;      ///< mean |v| of the particles that are not fixed [length/time]
 };
 
 /// The long-range corrections of all terms of V.
@@ -39,7 +39,7 @@ Measurement<D> measure(const System<D>& system, const Particles<D>& state, const
   found.shot.rotational = rotational;
   found.shot.potential = sums.energy.value() + tail.energy;
   for (int k = 0; k < D; ++k) found.shot.momentum[k] = motion.momentum[k].value();
-  if (const auto total = static_cast<double>(system.size()); total > 0) {
+  if (const auto total = static_cast<double>(system.moving()); total > 0) {
     found.shot.temperature = 2 * kinetic / (D * total);
     constexpr int freedoms = Spin<D>::SizeAtCompileTime;
     found.shot.rotational_temperature = 2 * rotational / (freedoms * total);

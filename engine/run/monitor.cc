@@ -76,7 +76,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       },
       [this] {
         const Particles<D>& p = system_.particles;
-        if (info_.hard_cores) touching_.emplace(system_.box, p.radius, p.ghost);
+        if (info_.hard_cores) touching_.emplace(system_.box, p.radius, p.ghost, p.all_fixed());
         if (info_.shadow) scratch_.resize(p.size());
       });
 }
@@ -211,7 +211,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
         2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * time);
   }
   account_.path += elapsed * 0.5 * (speed + account_.speed);
-  if (s.collision_rate > 0) {
+  if (s.collision_rate > 0 && !system_.has_fixed()) {
     s.mean_free_time = 1 / s.collision_rate;
     s.mean_free_path = account_.path / (s.end_time - s.start_time) / s.collision_rate;
   }
@@ -315,7 +315,7 @@ Overlaps Monitor<D>::overlaps() {
   const Decomposition<D>& ranks = system_.decomposition;
   if (ranks.joined() && !ranks.by_place()) {
     const Particles<D> halo = halo_of(system_.box, 2 * ranks.sizes().largest_radius(), ranks.ranks(), p);
-    NeighbourList<D> touching(system_.box, halo.radius, halo.ghost);
+    NeighbourList<D> touching(system_.box, halo.radius, halo.ghost, halo.all_fixed());
     look(touching, halo);
   } else {
     look(*touching_, p);
