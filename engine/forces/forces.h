@@ -118,12 +118,17 @@ void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions
   force_pass<D>(system, out, sums, counters, [&](const auto& term) { term.add_hessian_product(x, w, sums); });
 }
 
-/// V, Σ|V| and the virial at x, as exact sums; not counted as a force pass.
+/// V, Σ|V| and the virial at x of what this rank owns, as exact sums; not counted as a force pass.
 template <int D>
-PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
+PotentialSums own_energy(const System<D>& system, Positions<D> x) {
   PotentialSums sums{.quantum = quanta_of(system).energy};
   for (const auto& term : system.interactions) term->add_energy(x, sums);
-  return system.decomposition.sum(sums);
+  return sums;
+}
+/// The same of all particles. Collective.
+template <int D>
+PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
+  return system.decomposition.sum(own_energy(system, x));
 }
 
 /// The exact sum of term(i) over all particles of all ranks. Collective.
@@ -151,9 +156,9 @@ struct MotionSums {
   }
 };
 
-/// Sums over all particles of a system: the momentum in `state`, the rest in `at`.
+/// Sums over this rank's own particles: the momentum in `state`, the rest in `at`.
 template <int D>
-MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
+MotionSums<D> own_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
   ExactSeries kinetic, speed;
   std::array<ExactSeries, D> momentum;
   for (Id i = 0; i < at.size(); ++i) {
@@ -173,7 +178,7 @@ MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state
     sums.rotational = rotational.sum();
   }
   for (int k = 0; k < D; ++k) sums.momentum[k] = momentum[k].sum();
-  return system.decomposition.sum(sums);
+  return sums;
 }
 
 /// The G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet conserves to second order: G = (1/12) vᵀ
