@@ -26,11 +26,10 @@ Tail tail_of(const System<D>& system) {
   return sum;
 }
 
-/// Measures the momentum of `state` and everything else of `at`, to which `sums` must belong. Collective.
+/// The measurement that follows from the sums over all ranks.
 template <int D>
-Measurement<D> measure(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
-                       const PotentialSums& sums, const Tail& tail) {
-  const MotionSums<D> motion = evaluate_motion(system, state, at);
+Measurement<D> measured(const System<D>& system, const MotionSums<D>& motion, const PotentialSums& sums,
+                        const Tail& tail) {
   const double kinetic = motion.kinetic.value(), rotational = motion.rotational.value();
   Measurement<D> found;
   found.magnitude = kinetic + rotational + sums.magnitude.value();
@@ -46,6 +45,13 @@ Measurement<D> measure(const System<D>& system, const Particles<D>& state, const
     found.speed = motion.speed.value() / total;
   }
   return found;
+}
+
+/// Measures the momentum of `state` and everything else of `at`, to which `sums` must belong. Collective.
+template <int D>
+Measurement<D> measure(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
+                       const PotentialSums& sums, const Tail& tail) {
+  return measured(system, system.decomposition.sum(own_motion(system, state, at)), sums, tail);
 }
 
 /// The pressure for a virial [energy].

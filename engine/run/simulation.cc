@@ -171,6 +171,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   }
   if (again || hooks.restore) {
     decomposition.to_blocks();
+    if (again) monitor_->forget();
     if (hooks.restore) hooks.restore();
     if (decomposition.ranks().rank() > 0) s.counters.seconds = {}, s.counters.events = {}, s.counters.windows = {};
     if (info_.smooth_forces) divide();
