@@ -363,6 +363,13 @@ class Simulation:
         read them, too."""
         return self._session.averages()
 
+    @property
+    def means(self):
+        """Means over time with their standard errors, up to now: ["pressure"]["mean"], ["standard_error"], ["independent_samples"]; also
+        of temperature, potential, collision_rate, mean_free_time and mean_free_path. Each step, or epoch of free flight, is a sample. A
+        standard error is NaN if there are fewer than eight independent blocks of samples."""
+        return self._session.means()
+
     def integrator(self, type, **parameters):
         """Chooses the integrator by its name in decks; see carom.describe(type)."""
         self._session.set_integrator(name_of("integrator", type), refuse_masked(type, parameters))
