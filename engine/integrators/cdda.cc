@@ -151,6 +151,7 @@ IntegratorInfo cdda() {
       .order = "2 or 4",
       .conserves = "energy and linear momentum to rounding, for any step",
       .parameters = {parameter::step(),
+                     parameter::longest_step(),
                      {.name = "order",
                       .type = Parameter::Type::integer,
                       .fallback = "2",

@@ -52,7 +52,7 @@ IntegratorInfo cva() {
           .title = "Collision Verlet Algorithm",
           .order = "2",
           .conserves = "linear momentum to rounding; energy to order 2, with a random walk from collision to collision",
-          .parameters = {parameter::step(), parameter::max_events_per_step()},
+          .parameters = {parameter::step(), parameter::longest_step(), parameter::max_events_per_step()},
           .documentation =
               "Verlet with a step that is cut for all particles at each collision. Between collisions spheres "
               "move on parabolas, so the contact is the first root of a quartic. Each collision costs a "

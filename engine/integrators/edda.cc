@@ -451,6 +451,7 @@ IntegratorInfo edda() {
           "energy and linear momentum to rounding, for any step; angular momentum to the tolerance in slabs "
           "without collisions",
       .parameters = {parameter::step(),
+                     parameter::longest_step(),
                      {.name = "tolerance",
                       .type = Parameter::Type::real,
                       .fallback = "1e-10",

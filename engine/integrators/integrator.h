@@ -104,6 +104,7 @@ std::unique_ptr<Integrator<D>> make_integrator(std::string_view name, Parameters
 /// Parameters that several integrators share.
 namespace parameter {
 Parameter step();
+Parameter longest_step();
 Parameter max_events_per_step();
 }  // namespace parameter
 

@@ -216,6 +216,7 @@ IntegratorInfo mcva() {
       .conserves =
           "linear momentum to rounding; the shadow energy S_h across collisions (order 4 with variant restart)",
       .parameters = {parameter::step(),
+                     parameter::longest_step(),
                      {.name = "variant",
                       .type = Parameter::Type::text,
                       .fallback = "\"grid\"",

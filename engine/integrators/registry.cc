@@ -24,6 +24,18 @@ Parameter step() {
           .range = Parameter::Range::positive};
 }
 
+Parameter longest_step() {
+  return {.name = "longest_step",
+          .type = Parameter::Type::real,
+          .fallback = "0",
+          .unit = "time",
+          .meaning =
+              "as the particles of a gas with inelastic contacts become slower, its steps become longer, so that a "
+              "path of thermal speed keeps its length, up to this; whole multiples of step; 0: all are of "
+              "length step",
+          .range = Parameter::Range::non_negative};
+}
+
 Parameter max_events_per_step() {
   return {.name = "max_events_per_step",
           .type = Parameter::Type::integer,

@@ -81,6 +81,8 @@ void check_rest_speeds(const System<D>& system) {
 
 Plan checked(const Plan& plan) {
   if (!(plan.step > 0)) throw Error(Failure::deck, "the step must be positive");
+  if (plan.longest_step != 0 && !(plan.longest_step >= plan.step))
+    throw Error(Failure::deck, "longest_step is shorter than the step; give a longer one, or none");
   if (!plan.steps && !plan.end_time && !plan.collisions)
     throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
   for (const double interval : {plan.frame_interval, plan.thermo_interval}) check_interval(interval, plan.step);
@@ -108,6 +110,7 @@ typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system,
   if (!given.has("step") && !info.stepping) given.set("step", default_epoch(system));
   given = completed(info.name, info.parameters, std::move(given));
   plan.step = given.real("step");
+  if (given.has("longest_step")) plan.longest_step = given.real("longest_step");
   return {info.make<D>(given), plan};
 }
 
@@ -241,7 +244,7 @@ void Simulation<D>::run(const Hooks& hooks) {
       s.steps += slab.steps;
       s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
       count_.within = 0;
-      if (!info_.stepping && !system_->box.contacts.elastic() && !system_->box.bath.rescales()) lengthen_epochs();
+      if (!system_->box.contacts.elastic() && !system_->box.bath.rescales()) lengthen_slabs();
     }
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
@@ -351,13 +354,15 @@ bool Simulation<D>::is_last_on_the_way() const {
          (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
 }
 
-/// Sets the length of the next epoch, so that its number of collisions hardly changes as the gas cools. Collective.
+/// Sets the length of the next slab, so that its number of collisions hardly changes as the gas cools. Collective.
 template <int D>
-void Simulation<D>::lengthen_epochs() {
+void Simulation<D>::lengthen_slabs() {
+  const double most = info_.stepping ? std::floor(plan_.longest_step / plan_.step) : kLongestEpoch;
+  if (!(most > 1)) return;
   const double speed = thermal_speed(*system_);
   if (count_.first_speed == 0) count_.first_speed = speed;
   const double slower = speed > 0 ? count_.first_speed / speed : 1;
-  count_.stride = static_cast<std::int64_t>(std::clamp(slower, 1.0, kLongestEpoch));
+  count_.stride = static_cast<std::int64_t>(std::clamp(slower, 1.0, most));
 }
 
 template <int D>

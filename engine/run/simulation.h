@@ -25,7 +25,8 @@ namespace carom {
 
 /// When a run ends and what observers get on the way. At least one end is given; the run stops at the first it reaches.
 struct Plan {
-  double step = 0;                      ///< length of a slab [time], > 0
+  double step = 0;          ///< length of a slab [time], > 0
+  double longest_step = 0;  ///< up to which slabs lengthen as a gas with inelastic contacts cools [time]; 0: never
   std::optional<std::int64_t> steps{};  ///< number of slabs
   std::optional<double> end_time{};     ///< the last slab is shortened to end there
   std::optional<std::uint64_t>
@@ -243,7 +244,7 @@ class Simulation {
     return count_.time + static_cast<double>(step - count_.steps) * plan_.step;
   }
   Slab next_slab() const;
-  void lengthen_epochs();
+  void lengthen_slabs();
   bool finished() const;
   void need_collisions() const;
   double fraction_done() const;

@@ -15,13 +15,18 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 // the contacts under pressure; the last is 10⁶ times the rounding of the factors, and small compared with the smallest
 // relevant eigenvalue, so that each repetition reduces the error by several digits.
 constexpr double kFirstProximal = 1e-2, kProximalRatio = 0.03, kLastProximal = 1e-10;
-constexpr int kRepetitions = 400, kPatientRepetitions = 40;
+constexpr int kRepetitions = 400;
 constexpr int kBeforeLowering = 4;  // repetitions with a raised proximal term, before a lower one is tried again
 // A solution is sought to the rounding of the two spheres of each contact. In a cluster with light loads beside heavy
 // ones this may be less than the rounding of the factors; then a solution is accepted that would also be kept.
 constexpr int kStrictRepetitions = 8;
 constexpr int kExchanges = 50;
-constexpr int kFruitlessExchanges = 5;          // of all wrong contacts, before only one is exchanged at a time
+constexpr int kFruitlessExchanges = 5;  // of all wrong contacts, before only one is exchanged at a time
+// Coming near through the interior: the most rounds; the share of the way to the boundary that a step goes; a proximal
+// term of 10⁴ roundings, since the matrix may be singular; the distances, relative to the largest gap, at which it is
+// tried whether the contacts under pressure are known.
+constexpr int kRounds = 50;
+constexpr double kInside = 0.99, kInteriorProximal = 1e-12, kClose[] = {1e-7, 1e-10};
 constexpr double kFewRoundings = 8 * kEpsilon;  // relative error of a sum of a few terms
 constexpr double kMostStretched = 0.1;          // of the kinetic energy: the turn of a sliding pair takes less
 constexpr int kWall = -1;                       // in place of a second body
@@ -205,43 +210,57 @@ class Problem {
     });
   }
 
+  /// Tries the last reactions. Where they are of no use, it comes near the solution through the interior, which tells
+  /// which contacts are under pressure.
   bool solve(const std::vector<int>& cluster) {
     const int m = static_cast<int>(cluster.size());
-    std::vector<double> last(m);
-    for (int k = 0; k < m; ++k) last[k] = contacts_[cluster[k]].lambda;
-    const std::vector<double> none(m, 0.0);
-    return solve(cluster, last, kLastProximal, false) || solve(cluster, none, kFirstProximal, false) ||
-           solve(cluster, none, kFirstProximal, true);
+    std::vector<double> start(m);
+    for (int k = 0; k < m; ++k) start[k] = contacts_[cluster[k]].lambda;
+    arrange(cluster);
+    if (solve(cluster, start, kLastProximal, false)) return true;
+    const Eigen::VectorXd gap = gaps(cluster);
+    Eigen::VectorXd reaction = Eigen::VectorXd::Constant(m, gap.cwiseAbs().maxCoeff()), opening = reaction;
+    for (const double close : kClose) {
+      if (tied_) break;
+      approach(gap, close, reaction, opening);
+      for (int k = 0; k < m; ++k) start[k] = reaction[k] > opening[k] ? reaction[k] / arms_[cluster[k]].scale : 0;
+      if (solve(cluster, start, kLastProximal, close == kClose[1])) return true;
+    }
+    return solve(cluster, std::vector<double>(m, 0.0), kFirstProximal, true);
+  }
+
+  /// How fast the contacts open without reactions, which are set to zero.
+  Eigen::VectorXd gaps(const std::vector<int>& cluster) {
+    Eigen::VectorXd gap(static_cast<Eigen::Index>(cluster.size()));
+    for (const int k : cluster) contacts_[k].lambda = 0;
+    push(cluster);
+    for (Eigen::Index k = 0; k < gap.size(); ++k) gap[k] = excess(cluster[k]) / arms_[cluster[k]].scale;
+    return gap;
   }
 
   /// Starts from these reactions. If all are zero, it starts from the contacts that approach, and with the first
-  /// proximal term from all contacts. Where pivoting makes no progress, the proximal term is raised again, unless
-  /// `patient`: then contacts are exchanged one by one.
-  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal, bool patient) {
+  /// proximal term from all contacts. Where pivoting makes no progress, the proximal term is raised; if the start is of
+  /// no use at all, only where it `insists`.
+  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal, bool insists) {
     const int m = static_cast<int>(cluster.size());
     const bool known = std::ranges::any_of(start, [](double lambda) { return lambda > 0; });
     const bool all = tied_ || proximal == kFirstProximal;
-    Eigen::VectorXd reaction(m), before(m), gap(m);
+    Eigen::VectorXd reaction(m), before(m);
+    const Eigen::VectorXd gap = gaps(cluster);
     active_.assign(m, 0);
-    factored_.clear();
     for (int k = 0; k < m; ++k) {
       reaction[k] = start[k] * arms_[cluster[k]].scale;
-      contacts_[cluster[k]].lambda = 0;
-    }
-    push(cluster);
-    for (int k = 0; k < m; ++k) {
-      gap[k] = excess(cluster[k]) / arms_[cluster[k]].scale;
       active_[k] = all || (known ? start[k] > 0 : gap[k] < 0);
     }
     bool solved = false;
     double lowest = kLastProximal;
     int raised = 0;  // in this repetition
-    for (int repetition = 0; repetition < (patient ? kPatientRepetitions : kRepetitions); ++repetition) {
+    for (int repetition = 0; repetition < kRepetitions; ++repetition) {
       before = reaction;
       proximal_ = proximal;
       const std::vector<char> active = active_;
-      if (!pivot(cluster, gap, before, reaction, patient || proximal == kFirstProximal)) {
-        if (repetition == 0 || proximal == kFirstProximal) return false;
+      if (!pivot(cluster, gap, before, reaction, proximal == kFirstProximal)) {
+        if ((repetition == 0 && !insists) || proximal == kFirstProximal) return false;
         reaction = before;
         active_ = active;
         proximal = lowest = std::min(proximal / kProximalRatio, kFirstProximal);
@@ -269,18 +288,12 @@ class Problem {
     // Exchanging all wrong contacts takes few rounds but may cycle. Where it makes no progress, only the last wrong
     // contact is exchanged, which terminates (Murty, Linear Algebra Appl. 7 (1974) 65).
     int fewest = m + 1, exchanges_left = kFruitlessExchanges;
+    Eigen::VectorXd right(m);
     std::vector<int> wrong;
     for (int round = 0; round < kExchanges + 4 * m; ++round) {
-      if (!factor(cluster)) return false;
-      Eigen::VectorXd right(static_cast<Eigen::Index>(factored_.size()));
-      for (std::size_t at = 0; at < factored_.size(); ++at)
-        right[static_cast<Eigen::Index>(at)] = proximal_ * before[factored_[at]] - gap[factored_[at]];
-      reaction.setZero();
-      if (right.size() > 0) {
-        const Eigen::VectorXd found = solver_.solve(right);
-        for (std::size_t at = 0; at < factored_.size(); ++at)
-          reaction[factored_[at]] = found[static_cast<Eigen::Index>(at)];
-      }
+      if (!factor(active_, Eigen::VectorXd::Constant(m, proximal_))) return false;
+      for (int k = 0; k < m; ++k) right[k] = active_[k] ? proximal_ * before[k] - gap[k] : 0;
+      reaction = solver_.solve(right);
       if (!reaction.allFinite()) return false;
       if (tied_) return true;
       for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
@@ -309,38 +322,81 @@ class Problem {
     return false;
   }
 
-  /// Factors the scaled matrix of the active contacts of a cluster, unless it is factored already.
-  bool factor(const std::vector<int>& cluster) {
-    std::vector<int> wanted, place(size(), kWall);
-    for (int k = 0; k < static_cast<int>(cluster.size()); ++k)
-      if (active_[k]) {
-        place[cluster[k]] = static_cast<int>(wanted.size());
-        wanted.push_back(k);
-      }
-    if (wanted == factored_ && proximal_ == factored_proximal_) return true;
-    factored_ = wanted;
-    factored_proximal_ = proximal_;
-    if (wanted.empty()) return true;
+  /// Computes the scaled matrix of a cluster, and the order in which its contacts are eliminated, whichever are active.
+  void arrange(const std::vector<int>& cluster) {
+    const int m = static_cast<int>(cluster.size());
+    std::vector<int> place(size(), kWall);
+    for (int k = 0; k < m; ++k) place[cluster[k]] = k;
     std::vector<Eigen::Triplet<double>> entries;
-    for (int row = 0; row < static_cast<int>(wanted.size()); ++row) {
-      entries.emplace_back(row, row, proximal_);
-      const int k = cluster[wanted[row]];
+    for (int row = 0; row < m; ++row) {
+      const int k = cluster[row];
       for (const int b : {arms_[k].lo, arms_[k].hi}) {
         if (b == kWall) continue;
         for (const int l : bodies_[b].contacts) {
-          const int column = place[l];
-          if (column == kWall || column > row) continue;
+          if (place[l] > row) continue;
           const double sign = (arms_[k].lo == b) == (arms_[l].lo == b) ? 1 : -1;
           const double value = sign * bodies_[b].inverse_mass * contacts_[k].normal.dot(contacts_[l].normal);
-          entries.emplace_back(row, column, value / (arms_[k].scale * arms_[l].scale));
+          entries.emplace_back(row, place[l], value / (arms_[k].scale * arms_[l].scale));
         }
       }
     }
-    const auto n = static_cast<Eigen::Index>(wanted.size());
-    Eigen::SparseMatrix<double> matrix(n, n);
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    solver_.compute(matrix);
+    all_.resize(m, m);
+    all_.setFromTriplets(entries.begin(), entries.end());
+    solver_.analyzePattern(all_);
+    factored_.clear();
+  }
+
+  /// Factors the matrix of the active contacts with these terms added to its diagonal. The other contacts have rows and
+  /// columns of the identity.
+  bool factor(const std::vector<char>& active, const Eigen::VectorXd& added) {
+    if (active == factored_ && added == added_) return true;
+    factored_ = active;
+    added_ = added;
+    Eigen::SparseMatrix<double> matrix = all_;
+    for (Eigen::Index column = 0; column < matrix.outerSize(); ++column)
+      for (Eigen::SparseMatrix<double>::InnerIterator at(matrix, column); at; ++at) {
+        const bool diagonal = at.row() == column;
+        if (!active[at.row()] || !active[column])
+          at.valueRef() = diagonal;
+        else if (diagonal)
+          at.valueRef() += added[column];
+      }
+    solver_.factorize(matrix);
     return solver_.info() == Eigen::Success;
+  }
+
+  /// Comes near the solution through positive reactions and openings, by the predictor and corrector of Mehrotra (SIAM
+  /// J. Optim. 2 (1992) 575; Nocedal, Wright, Numerical Optimization, ch. 16.6): in about 20 rounds, however large the
+  /// cluster is. Ends where reactions times openings are on average below the square of `close` times the largest gap.
+  void approach(const Eigen::VectorXd& gap, double close, Eigen::VectorXd& reaction, Eigen::VectorXd& opening) {
+    const auto count = static_cast<double>(gap.size());
+    const double wanted = close * gap.cwiseAbs().maxCoeff();
+    const std::vector<char> every(gap.size(), 1);
+    for (int round = 0; round < kRounds; ++round) {
+      const Eigen::VectorXd off = opening - all_.template selfadjointView<Eigen::Lower>() * reaction - gap;
+      const double mean = reaction.dot(opening) / count;
+      if (mean <= wanted * wanted && off.cwiseAbs().maxCoeff() <= wanted) return;
+      const Eigen::VectorXd ratio = opening.cwiseQuotient(reaction);
+      if (!factor(every, (ratio.array() + kInteriorProximal).matrix())) return;
+      Eigen::VectorXd step, opens, target = Eigen::VectorXd::Zero(gap.size());
+      const auto longest = [&] {  // the share of the step that keeps all reactions and openings positive
+        step = solver_.solve(off - opening + target);
+        opens = target - opening - ratio.cwiseProduct(step);
+        double share = 1;
+        for (Eigen::Index k = 0; k < gap.size(); ++k) {
+          if (step[k] < 0) share = std::min(share, -kInside * reaction[k] / step[k]);
+          if (opens[k] < 0) share = std::min(share, -kInside * opening[k] / opens[k]);
+        }
+        return share;
+      };
+      const double predicted = longest();
+      const double after = (reaction + predicted * step).dot(opening + predicted * opens) / count;
+      target = (after * (after / mean) * (after / mean) - step.cwiseProduct(opens).array()) / reaction.array();
+      const double share = longest();
+      if (!step.allFinite() || !opens.allFinite()) return;
+      reaction += share * step;
+      opening += share * opens;
+    }
   }
 
   std::span<RestingContact<D>> contacts_;
@@ -348,9 +404,11 @@ class Problem {
   bool tied_;
   std::vector<Body> bodies_;
   std::vector<Arm> arms_;
-  std::vector<char> active_;   // by contact of the cluster that is being solved
-  std::vector<int> factored_;  // the contacts that solver_ holds the factors for
-  double proximal_ = 0, factored_proximal_ = 0;
+  std::vector<char> active_;         // by contact of the cluster that is being solved
+  std::vector<char> factored_;       // the contacts that solver_ holds the factors for,
+  Eigen::VectorXd added_;            // and what was added to their diagonal
+  Eigen::SparseMatrix<double> all_;  // the lower half of the matrix of the cluster
+  double proximal_ = 0;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
 };
 

@@ -333,7 +333,11 @@ class Interpreter {
     deck_.integrator_parameters = table->of_variant();
     source_.step = table->place("step");
     source_.integrator = &find_integrator(deck_.integrator);
-    table->read<double>("step", deck_.plan.step);
+    Plan& plan = deck_.plan;
+    table->read<double>("step", plan.step);
+    table->read<double>("longest_step", plan.longest_step);
+    if (plan.longest_step != 0 && plan.longest_step < plan.step)
+      problems_.error(table->place("longest_step"), "'longest_step' is shorter than 'step'", "give a longer one, or none");
   }
 
   void interaction(ValueTable& table) {

@@ -301,6 +301,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   if (begun) {
     parameters = completed(integrator_->name, integrator_->parameters, std::move(parameters));
     plan.step = step_;
+    if (parameters.has("longest_step")) plan.longest_step = parameters.real("longest_step");
     made.emplace(std::move(system_), *integrator_, integrator_->make<D>(parameters), plan);
   } else {
     made.emplace(std::move(system_), *integrator_, std::move(parameters), plan);

@@ -47,6 +47,9 @@ DECK_ERRORS = {
     "zero mass": (changed("mass = 1.0", "mass = 0"), 14, ["'mass' must be positive (is 0)"]),
     "zero step": (changed("step = 0.01", "step = 0.0"), 24, ["'step' must be positive (is 0)"]),
     "negative step": (changed("step = 0.01", "step = -1"), 24, ["'step' must be positive (is -1)"]),
+    "longest step below the step": (
+        changed("step = 0.01", "step = 0.01\nlongest_step = 0.005"),
+        25, ["'longest_step' is shorter than 'step'", "give a longer one"]),
     "infinite stiffness": (changed("stiffness = 1.0", "stiffness = inf"), 19, ["'stiffness' must be finite"]),
     "position not a number": (changed("[[2.0, 5.0]", "[[nan, 5.0]"), 11, ["'position' must be finite (is nan)"]),
     "unknown integrator": (changed('"cdda"', '"cddaa"'), 23, ["unknown integrator 'cddaa'", "did you mean 'cdda'?"]),
