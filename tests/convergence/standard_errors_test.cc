@@ -59,7 +59,7 @@ TEST(StandardErrors, OfHardSpheres) {
   Scatter scatter;
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     auto run = test::make_run<3>(test::molten<3>(32, 0.3, seed), "free-flight",
-                                 {.step = 0.25, .end_time = 90, .thermo_interval = 0.25, .from_equilibrium = true});
+                                 {.step = 0.25, .end_time = 60, .thermo_interval = 0.2, .from_equilibrium = true});
     const auto rdf = make_observable("rdf", run->system(), {{"interval", 0.5}, {"bins", 10}});
     const auto sk = make_observable("sk", run->system(), {{"interval", 0.5}, {"range", 6.0}, {"waves", 5}});
     const auto msd = make_observable("msd", run->system(), {{"interval", 0.25}});
@@ -86,10 +86,11 @@ TEST(StandardErrors, OfHardSpheres) {
 TEST(StandardErrors, UnderForces) {
   Scatter scatter;
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
-    auto system = test::molten<2>(30, 0.3, seed);
-    add_interaction(*system, "yukawa", {{"amplitude", 2.0}, {"kappa", 1.0}, {"cutoff", 2.0}});
+    auto system = test::molten<2>(16, 0.3, seed);
+    system->box.bath = {.type = Bath::Type::andersen, .temperature = 1, .last_temperature = 1, .rate = 3, .seed = seed};
+    add_interaction(*system, "yukawa", {{"amplitude", 2.0}, {"kappa", 1.0}, {"cutoff", 1.9}});
     auto run = test::make_run<2>(std::move(system), "psa",
-                                 {.step = 0.02, .steps = 4000, .thermo_interval = 0.2, .from_equilibrium = true});
+                                 {.step = 0.04, .steps = 3000, .thermo_interval = 0.2, .from_equilibrium = true});
     run->run();
     add_means(scatter, run->statistics(), {"pressure", "potential", "temperature"});
   }

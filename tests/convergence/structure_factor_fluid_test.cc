@@ -83,7 +83,7 @@ double verlet_weis(double k, double eta) {
 }
 
 TEST(StructureFactorOfTheFluid, TheoriesAgreeWithWhatIsKnown) {
-  for (const double eta : {0.1, 0.3, 0.45}) {
+  for (const double eta : {0.1, 0.2, 0.3}) {
     EXPECT_NEAR(percus_yevick(0.02, eta), std::pow(1 - eta, 4) / std::pow(1 + 2 * eta, 2), 1e-3);
     EXPECT_NEAR(percus_yevick_g(1, eta), (1 + eta / 2) / std::pow(1 - eta, 2), 1e-9);
     const double compressibility = std::pow(1 - eta, 4) / (std::pow(1 + 2 * eta, 2) + eta * eta * eta * (eta - 4));
@@ -97,7 +97,7 @@ TEST(StructureFactorOfTheFluid, TheoriesAgreeWithWhatIsKnown) {
 TEST(StructureFactorOfTheFluid, IsThatOfVerletAndWeis) {
   const double eta = 0.3;
   auto run = test::make_run<3>(test::molten<3>(500, eta, 1), "free-flight",
-                               {.step = 2, .end_time = 150, .thermo_interval = 0.2, .from_equilibrium = true});
+                               {.step = 2, .end_time = 110, .thermo_interval = 0.2, .from_equilibrium = true});
   const auto sk = make_observable("sk", run->system(), {{"interval", 0.3}, {"range", 16.0}, {"waves", 10}});
   run->add(*sk);
   run->run();
