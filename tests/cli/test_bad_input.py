@@ -221,7 +221,7 @@ DECK_ERRORS = {
         21, ["unknown species 'spere'", "did you mean 'sphere'?"]),
     "equilibrated": (GOOD + '[output]\nstart = "equilibrated"\n', 29, ["looks at the rows of thermo.csv", "give a thermo_interval"]),
     "unknown start": (GOOD + '[output]\nstart = "never"\n', 29, ["first", "equilibrated"]),
-    "waves": (GOOD + '[output]\nsk_interval = 1.0\n', 28, ["axis 0 is not periodic", "set sk_interval = 0"]),
+    "waves": (GOOD + '[output]\nsk_interval = 1.0\n', 29, ["axis 0 is not periodic", "set sk_interval = 0"]),
     "checkpoint time": (GOOD + '[output]\ncheckpoint_wall = "soon"\n', 29, ["'soon' is not a time", "hh:mm:ss"]),
 }
 

@@ -67,7 +67,7 @@ TEST(Transient, EndsWhereTheMarginalStandardErrorIsSmallest) {
 }
 
 TEST(Transient, DoesNotEndWhileTheSeriesDrifts) {
-  for (unsigned seed = 0; seed < 20; ++seed) EXPECT_EQ(find(1e5, 1e4, seed, 2000).end, -1);
+  for (unsigned seed = 0; seed < 20; ++seed) EXPECT_EQ(find(1e5, 1e6, seed, 2000).end, -1);
 }
 
 TEST(Transient, RoundingIsNoDrift) {
