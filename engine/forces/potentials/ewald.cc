@@ -14,6 +14,7 @@
 #include "engine/base/error.h"
 #include "engine/base/normal_deviates.h"
 #include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/simd/wave_kernels.h"
 
 namespace carom {
 namespace {
@@ -23,8 +24,8 @@ constexpr double kPi = std::numbers::pi;
 // that of ending the pair term here.
 constexpr double kSwitchFrom = 0.95;  // of the cutoff
 // α = √π (c N/Ω²)^(1/6) makes pairs and waves cost the same, c the cost of a pair over that of a wave of a particle
-// (Kolafa, Perram); c is taken as 4.8, the sixth power of:
-constexpr double kPairCost = 1.3;
+// (Kolafa, Perram); c is taken as 9.3, the sixth power of:
+constexpr double kPairCost = 1.45;
 constexpr std::size_t kMostWaves = std::size_t{1} << 24;
 
 using Vec3 = Vec<3>;
@@ -32,7 +33,7 @@ using Vec3 = Vec<3>;
 /// The numbers e^(2πi n u), n = −most … most.
 class Phases {
  public:
-  explicit Phases(int most) : most_(most), re_(2 * most + 1), im_(2 * most + 1) {}
+  explicit Phases(int most) : most_(most), re_(2 * most + 1 + WaveRow::kMultiple), im_(re_.size()) {}
 
   void set(double u) {
     const auto [cos, sin] = cosine_and_sine(u);
@@ -46,8 +47,8 @@ class Phases {
       im_[most_ - n] = -im_[most_ + n];
     }
   }
-  const double* re(int n) const { return re_.data() + most_ + n; }
-  const double* im(int n) const { return im_.data() + most_ + n; }
+  const double* re() const { return re_.data() + most_; }  // of n = 0
+  const double* im() const { return im_.data() + most_; }
 
  private:
   int most_;
@@ -56,15 +57,11 @@ class Phases {
 
 /// One half of the vectors k = 2π (a/L_x, b/L_y, c/L_z) with 0 < |k| ≤ k_c, in rows of consecutive c.
 struct Waves {
-  struct Row {
-    int a, b, c;  // c: of the first
-    std::size_t first, count;
-  };
   std::array<int, 3> most;  // largest |a|, |b|, |c|
   Vec3 unit;                // 2π/L
   double longest;           // k_c
-  std::vector<Row> rows;
-  std::vector<double> weight;   // 2 (C/2Ω) (4π/k²) e^(−k²/4α²): for both halves
+  std::vector<WaveRow> rows;
+  std::vector<double> weight;   // 2 (C/2Ω) (4π/k²) e^(−k²/4α²): for both halves; padding has 0
   std::vector<double> squared;  // k²
 
   Waves(const EwaldSplit& split, const Vec3& edges, double constant) : longest(split.wave_cutoff) {
@@ -80,12 +77,16 @@ struct Waves {
         const int end = static_cast<int>(std::sqrt(longest * longest - flat) / unit[2]);
         const int start = a == 0 && b == 0 ? 1 : -end;
         if (end < start) continue;
-        rows.push_back({a, b, start, weight.size(), static_cast<std::size_t>(end - start + 1)});
+        const auto first = static_cast<unsigned>(weight.size()), count = static_cast<unsigned>(end - start + 1);
+        const unsigned padded = (count + WaveRow::kMultiple - 1) / WaveRow::kMultiple * WaveRow::kMultiple;
+        rows.push_back({a, b, start, first, padded});
         for (int c = start; c <= end; ++c) {
           const double k2 = flat + unit[2] * unit[2] * c * c;
           squared.push_back(k2);
           weight.push_back(constant / volume * 4 * kPi / k2 * elementary::exp(-k2 / (4 * split.alpha * split.alpha)));
         }
+        weight.resize(first + padded, 0.0);
+        squared.resize(first + padded, 0.0);
       }
   }
   std::size_t size() const { return weight.size(); }
@@ -96,20 +97,7 @@ struct Amplitudes {
   std::vector<double> re, im;
 };
 
-/// sin(y)/y for |y| ≤ 1; the first omitted term is below 10^-17.
-double sinc_series(double y2) {
-  double sum = -1.0 / 342;
-  constexpr double kFactor[8] = {1.0 / 272, 1.0 / 210, 1.0 / 156, 1.0 / 110, 1.0 / 72, 1.0 / 42, 1.0 / 20, 1.0 / 6};
-  sum = 1 + y2 * sum;
-  for (const double factor : kFactor) sum = 1 - y2 * factor * sum;
-  return sum;
-}
-
-/// sin(2πt)/(2πt)
-double sinc(double t) {
-  const double y = 2 * kPi * t;
-  return std::abs(y) <= 1 ? sinc_series(y * y) : cosine_and_sine(t)[1] / y;
-}
+double sinc(double y) { return y == 0 ? 1 : cosine_and_sine(y / (2 * kPi))[1] / y; }
 
 struct EwaldOptions {
   EwaldSplit split;
@@ -208,41 +196,26 @@ class EwaldTerm final : public Interaction<3> {
     return charged_;
   }
 
-  void set_phases(const Vec3& x) const {
-    for (int k = 0; k < 3; ++k) phases_[k].set(x[k] / box_.edges[k]);
-  }
-  /// Calls visit(row, re, im) with e^(i(k_x x + k_y y)) for each row.
-  template <class Visit>
-  void for_each_row(Visit&& visit) const {
-    for (const Waves::Row& row : waves_->rows) {
-      const double re_a = *phases_[0].re(row.a), im_a = *phases_[0].im(row.a);
-      const double re_b = *phases_[1].re(row.b), im_b = *phases_[1].im(row.b);
-      visit(row, re_a * re_b - im_a * im_b, re_a * im_b + im_a * re_b);
+  /// The waves at x.
+  WaveTask waves_at(const Vec3& x) const {
+    WaveTask task{waves_->rows.data(), waves_->rows.size(), {}, {}};
+    for (int k = 0; k < 3; ++k) {
+      phases_[k].set(x[k] / box_.edges[k]);
+      task.re[k] = phases_[k].re();
+      task.im[k] = phases_[k].im();
     }
+    return task;
   }
 
-  /// Σ_j term_j(k) e^(ik·x_j) in fixed point, term_j(k) = start(j, row) + c·slope(j), |term_j| ≤ 2^exponent.
-  /// Terms are rounded to the quantum by adding a constant; the integers are then the mantissas' differences.
-  template <class Start, class Slope>
-  void sum_terms(Positions<3> x, int exponent, Start&& start, Slope&& slope, Amplitudes& sum) const {
+  /// Σ_j factor_j(k) e^(ik·x_j) in fixed point, |factor_j| ≤ 2^exponent. Terms are rounded to the quantum by adding a
+  /// constant; the integers are then the mantissas' differences.
+  template <class Factor>
+  void sum_terms(Positions<3> x, int exponent, Factor&& factor, Amplitudes& sum) const {
     const double n = static_cast<double>(options_.total);
     const double quantum = std::ldexp(std::max(0x1p-50, std::ldexp(1.0, std::ilogb(n) - 60)), exponent);
     const double shift = 0x1.8p52 * quantum;
     std::vector<std::uint64_t> re(waves_->size()), im(waves_->size());
-    for (const Id j : charged()) {
-      set_phases(x[j]);
-      const double step = slope(j);
-      for_each_row([&](const Waves::Row& row, double re_ab, double im_ab) {
-        const double *re_c = phases_[2].re(row.c), *im_c = phases_[2].im(row.c);
-        std::uint64_t *re_to = re.data() + row.first, *im_to = im.data() + row.first;
-        const double first = start(j, row);
-        for (std::size_t m = 0; m < row.count; ++m) {
-          const double factor = first + static_cast<double>(static_cast<int>(m)) * step;
-          re_to[m] += std::bit_cast<std::uint64_t>(factor * (re_ab * re_c[m] - im_ab * im_c[m]) + shift);
-          im_to[m] += std::bit_cast<std::uint64_t>(factor * (re_ab * im_c[m] + im_ab * re_c[m]) + shift);
-        }
-      });
-    }
+    for (const Id j : charged()) kernels_->add(waves_at(x[j]), factor(j), shift, re.data(), im.data());
     const std::uint64_t shifts = charged().size() * std::bit_cast<std::uint64_t>(shift);
     sum.re.resize(waves_->size());
     sum.im.resize(waves_->size());
@@ -256,8 +229,11 @@ class EwaldTerm final : public Interaction<3> {
   void sum_structure(Positions<3> x, Amplitudes& sum) const {
     charged();
     sum_terms(
-        x, std::ilogb(largest_charge_) + 1, [&](Id j, const Waves::Row&) { return particles_.charge[j]; },
-        [](Id) { return 0.0; }, sum);
+        x, std::ilogb(largest_charge_) + 1,
+        [&](Id j) {
+          return WaveFactor{particles_.charge[j], 0, 0, 0};
+        },
+        sum);
   }
   /// S(k), kept for the last positions.
   const Amplitudes& structure(Positions<3> x) const {
@@ -274,14 +250,13 @@ class EwaldTerm final : public Interaction<3> {
     for (const Id j : charged()) longest = std::max(longest, w[j].norm());
     Amplitudes sum;
     const double most = std::max(largest_charge_ * longest * waves_->longest, 0x1p-900);
-    const auto& unit = waves_->unit;
     sum_terms(
         x, std::ilogb(most) + 2,
-        [&](Id j, const Waves::Row& row) {
-          return particles_.charge[j] *
-                 (row.a * unit[0] * w[j][0] + row.b * unit[1] * w[j][1] + row.c * unit[2] * w[j][2]);
+        [&](Id j) {
+          const Vec3 step = particles_.charge[j] * waves_->unit.cwiseProduct(w[j]);
+          return WaveFactor{0, step[0], step[1], step[2]};
         },
-        [&](Id j) { return particles_.charge[j] * unit[2] * w[j][2]; }, sum);
+        sum);
     for (std::size_t k = 0; k < sum.re.size(); ++k) {
       const double re = sum.re[k];
       sum.re[k] = -sum.im[k];
@@ -299,47 +274,37 @@ class EwaldTerm final : public Interaction<3> {
     return field;
   }
 
-  /// Σ_k k value(m, row, re, im) for one particle at x, where re + i·im = e^(ik·x) and m is the number of k.
-  template <class Value>
-  Vec3 sum_of_waves(const Vec3& x, Value&& value) const {
-    set_phases(x);
-    Vec3 sum = Vec3::Zero();
-    for_each_row([&](const Waves::Row& row, double re_ab, double im_ab) {
-      const double *re_c = phases_[2].re(row.c), *im_c = phases_[2].im(row.c);
-      double all = 0, along = 0;
-      for (std::size_t m = 0; m < row.count; ++m) {
-        const int c = row.c + static_cast<int>(m);
-        const double g =
-            value(row, c, row.first + m, re_ab * re_c[m] - im_ab * im_c[m], re_ab * im_c[m] + im_ab * re_c[m]);
-        all += g;
-        along += c * g;
-      }
-      sum += Vec3(row.a * all, row.b * all, along);
-    });
-    return sum.cwiseProduct(waves_->unit);
-  }
   /// The force on a unit charge that moves by `moved` about x: Σ_k k sinc(k·Δ/2) Im[field* e^(ik·x)].
   Vec3 pull(const Vec3& x, const Amplitudes& field, const Vec3& moved) const {
-    const auto part = [&](std::size_t k, double re, double im) { return field.re[k] * im - field.im[k] * re; };
-    if (moved.isZero(0))
-      return sum_of_waves(x,
-                          [&](const Waves::Row&, int, std::size_t k, double re, double im) { return part(k, re, im); });
-    const Vec3 turn = (0.5 * moved.array() / box_.edges.array()).matrix();
-    if (0.5 * waves_->longest * moved.norm() < 1 - 1e-9)
-      return sum_of_waves(x, [&](const Waves::Row& row, int c, std::size_t k, double re, double im) {
-        const double y = 2 * kPi * (row.a * turn[0] + row.b * turn[1] + c * turn[2]);
-        return part(k, re, im) * sinc_series(y * y);
-      });
-    return sum_of_waves(x, [&](const Waves::Row& row, int c, std::size_t k, double re, double im) {
-      return part(k, re, im) * sinc(row.a * turn[0] + row.b * turn[1] + c * turn[2]);
-    });
+    const WaveTask task = waves_at(x);
+    const Vec3 turn = 0.5 * moved.cwiseProduct(waves_->unit);
+    Vec3 sum = Vec3::Zero();
+    if (moved.isZero(0)) {
+      kernels_->pull(task, field.re.data(), field.im.data(), sum.data());
+    } else if (0.5 * waves_->longest * moved.norm() < 1 - 1e-9) {
+      kernels_->pull_moved(task, {0, turn[0], turn[1], turn[2]}, field.re.data(), field.im.data(), sum.data());
+    } else {
+      for (const WaveRow& row : waves_->rows)
+        for (unsigned m = 0; m < row.count; ++m) {
+          const Vec3 index(row.a, row.b, row.c + static_cast<int>(m));
+          double re = 1, im = 0;
+          for (int k = 0; k < 3; ++k) {
+            const auto n = static_cast<int>(index[k]);
+            const double last = re;
+            re = last * task.re[k][n] - im * task.im[k][n];
+            im = last * task.im[k][n] + im * task.re[k][n];
+          }
+          sum += index * ((field.re[row.first + m] * im - field.im[row.first + m] * re) * sinc(index.dot(turn)));
+        }
+    }
+    return sum.cwiseProduct(waves_->unit);
   }
   /// The change of the force on a unit charge as it moves along w in a constant field.
   Vec3 pull_change(const Vec3& x, const Amplitudes& field, const Vec3& w) const {
     const Vec3 along = w.cwiseProduct(waves_->unit);
-    return sum_of_waves(x, [&](const Waves::Row& row, int c, std::size_t k, double re, double im) {
-      return (row.a * along[0] + row.b * along[1] + c * along[2]) * (field.re[k] * re + field.im[k] * im);
-    });
+    Vec3 sum;
+    kernels_->pull_change(waves_at(x), {0, along[0], along[1], along[2]}, field.re.data(), field.im.data(), sum.data());
+    return sum.cwiseProduct(waves_->unit);
   }
 
   void find_mean_forces(Positions<3> x, Positions<3> x_new) const {
@@ -456,6 +421,7 @@ class EwaldTerm final : public Interaction<3> {
   EwaldOptions options_;
   std::shared_ptr<const Waves> waves_;
   std::unique_ptr<Interaction<3>> pairs_;
+  const WaveKernels* kernels_ = &widest_kernels<WaveKernels>();
   // Caches and scratch, which do not affect the sums.
   mutable std::array<Phases, 3> phases_;
   mutable std::vector<Id> charged_;

@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/forces/simd/pair_kernel.h"
+#include "engine/forces/simd/wave_kernel.h"
 
 namespace carom {
 template <>
 const PairKernels& kernels_of<PairKernels, 4>() {
   static constexpr PairKernels kernels = pair_kernels_of<4>(PairPotentials{});
+  return kernels;
+}
+template <>
+const WaveKernels& kernels_of<WaveKernels, 4>() {
+  static constexpr WaveKernels kernels = wave_kernels_of<4>();
   return kernels;
 }
 }  // namespace carom
