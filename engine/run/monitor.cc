@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -50,11 +52,21 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
   if (info.shadow) statistics.max_shadow_energy_error = 0;
+  std::map<std::string, Id> columns;
+  for (const Wall<D>& wall : system.box.walls()) {
+    column_of_wall_.resize(wall.number + 1);
+    column_of_wall_[wall.number] = columns.try_emplace(system.box.name_of(wall.number), wall.number).first->second;
+  }
+  sampled_walls_.resize(column_of_wall_.size());
+  begin_means();
   Fields& fields = system.fields;
   fields.settle = [this] { settle(); };
   fields.add_value("statistics", statistics);
   fields.add_value("account", account_);
   fields.add_value("impulses of walls", last_row_impulses_);
+  fields.add_value("sampled walls", sampled_walls_);
+  fields.add_value("transient", transient_);
+  fields.add_value("end of the transient", transient_end_);
   fields.add_of_run({"last measurement", [this](Archive& archive) {
                        archive(shot_.time, shot_.step, shot_.collisions, shot_.kinetic, shot_.potential, shot_.shadow,
                                shot_.momentum, shot_.temperature, shot_.dissipated, shot_.work, shot_.heat);
@@ -88,7 +100,8 @@ template <int D>
 void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
   const double time = statistics_.start_time;
   for (Schedule* schedule : {&frames_, &rows_}) schedule->pass(time - plan_.slack());
-  for (Sampler& sampler : samplers_) sampler.due.pass(time - plan_.slack());
+  if (!waits())
+    for (Sampler& sampler : samplers_) sampler.due.pass(time - plan_.slack());
   shot_ = measure(time, system_.particles, &integrator, info_.shadow, fresh);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   if (system_.box.contacts.rough()) statistics_.rotational_energy = shot_.rotational;
@@ -148,7 +161,8 @@ template <int D>
 std::vector<double> Monitor<D>::due_within(const Slab& slab) const {
   std::vector<double> times;
   std::vector<Schedule> all = {frames_, rows_};
-  for (const Sampler& sampler : samplers_) all.push_back(sampler.due);
+  if (!waits())
+    for (const Sampler& sampler : samplers_) all.push_back(sampler.due.later(origin()));
   for (;;) {
     double due = std::numeric_limits<double>::infinity();
     for (const Schedule& schedule : all) due = std::min(due, schedule.due());
@@ -168,11 +182,13 @@ void Monitor<D>::observe(double time, const Particles<D>& copies) {
 /// Passes the particles to observers whose own sampling times are due.
 template <int D>
 void Monitor<D>::sample(double time, const Particles<D>& state) {
+  if (waits()) return;
   for (Sampler& sampler : samplers_) {
-    if (sampler.due.due() > time + plan_.slack()) continue;
+    const double now = time + plan_.slack() - origin();
+    if (sampler.due.due() > now) continue;
     const Stopwatch watch(statistics_.counters.seconds.output);
-    sampler.observer->sample(time, all_particles(state));
-    sampler.due.pass(time + plan_.slack());
+    sampler.observer->sample(time, sampler.observer->divided() ? state : all_particles(state));
+    sampler.due.pass(now);
   }
 }
 
@@ -180,7 +196,8 @@ template <int D>
 void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bool last) {
   const Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + plan_.slack();
-  const bool soon = due || s.steps == s.start_steps + 1 || !info_.stepping || !system_.decomposition.joined();
+  const bool soon = due || s.steps == s.start_steps + 1 || !info_.stepping || !system_.decomposition.joined() ||
+                    (waits() && transient_end_);
   const bool with_shadow =
       info_.shadow && (due || s.steps == s.start_steps + 1 || system_.size() <= kShadowAtEveryStep);
   Waiting& slab = waiting_.emplace_back(observed(s.end_time, system_.particles, &integrator, with_shadow));
@@ -217,6 +234,44 @@ void Monitor<D>::settle() {
   }
 }
 
+/// Begins the means over time at the present time.
+template <int D>
+void Monitor<D>::begin_means() {
+  statistics_.series = Blocking(Statistics::mean_names.size() + column_of_wall_.size());
+}
+
+/// Adds a slab to the means. `path`: the mean length of the spheres' ways in it.
+template <int D>
+void Monitor<D>::add_to_series(const Waiting& slab, double path) {
+  const ContactTally& tally = slab.tally;
+  const double elapsed = slab.elapsed;
+  // Most steps of a small system have no contacts, and the value of an exact sum costs more than all the rest here.
+  const auto since = [](const ExactSum& sum, Sampled& before) {
+    if (std::memcmp(&sum, &before.sum, sizeof sum) == 0) return 0.0;
+    before.sum = sum;
+    const double value = sum.value();
+    return value - std::exchange(before.value, value);
+  };
+  const auto collisions =
+      static_cast<double>(tally.sphere_sphere - std::exchange(account_.sampled_collisions, tally.sphere_sphere));
+  const double virial = elapsed * account_.virial + since(tally.collision_virial, account_.sampled_virial);
+  const double flights = 2 * collisions / static_cast<double>(system_.size());  // of a sphere
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();             // the volume varies
+  values_ = {system_.box.plain() ? pressure_of(virial, system_.box) : none,
+             shot_.temperature * elapsed,
+             shot_.potential * elapsed,
+             flights,
+             elapsed,
+             path};
+  weights_ = {elapsed, elapsed, elapsed, elapsed, flights, flights};
+  values_.resize(statistics_.series.columns());
+  weights_.resize(values_.size(), elapsed);
+  for (std::size_t wall = 0; wall < std::min(column_of_wall_.size(), tally.walls.size()); ++wall)
+    values_[Statistics::mean_names.size() + column_of_wall_[wall]] +=
+        since(tally.walls[wall].impulse, sampled_walls_[wall]);
+  statistics_.series.add(values_, weights_);
+}
+
 /// Adds a slab to the statistics; `sums` are those of all ranks.
 template <int D>
 void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
@@ -242,7 +297,13 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
                                         " of their contact distance, at step " + std::to_string(shot_.step) +
                                         ", time " + short_text(shot_.time) + "; use a smaller integrator.step");
   account_.virial_time += slab.elapsed * account_.virial;
-  account_.path += slab.elapsed * 0.5 * (speed + account_.speed);
+  const double path = slab.elapsed * 0.5 * (speed + account_.speed);
+  account_.path += path;
+  add_to_series(slab, path);
+  if (waits() && transient_end_) {
+    s.equilibrium = {*transient_end_, slab.shot.time};
+    begin_means();
+  }
 }
 
 /// The state of this rank's particles; `integrator` is null if they are not its state.
@@ -262,6 +323,7 @@ typename Monitor<D>::Waiting Monitor<D>::observed(double time, const Particles<D
                        .work = tally.work.value(),
                        .heat = tally.heat.value()},
               .own = {own_motion(system_, state, nodes), potential ? *potential : own_energy<D>(system_, nodes.x), {}},
+              .tally = tally,
               .drained = statistics_.counters.drained(),
               .shadow_term = std::numeric_limits<double>::quiet_NaN()};
   Counters uncounted;
@@ -306,6 +368,9 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
                                 : 0;  // no collisions before the start
   shot.pressure = pressure_of(account_.virial + collisions, system_.box);
   shot.max_energy_error = statistics_.max_energy_error;
+  // Only whole intervals count: the first row has had no collisions, the last one may be early.
+  if (row && waits() && !transient_end_ && rows_.due() <= now && shot.time > statistics_.start_time)
+    transient_end_ = transient_.add(shot.time, {shot.pressure, shot.potential});
   if (row) {
     shot.walls = wall_loads(shot.time);
     for (auto* observer : observers_) observer->thermo(shot);

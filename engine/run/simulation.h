@@ -9,6 +9,7 @@
 // Observing changes nothing: observers get copies, and due times do not shorten slabs.
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -18,6 +19,7 @@
 
 #include "engine/integrators/integrator.h"
 #include "engine/ranks/system.h"
+#include "engine/run/blocking.h"
 
 namespace carom {
 
@@ -32,6 +34,9 @@ struct Plan {
   double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
   double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
   bool events = false;         ///< pass every contact to the observers
+  /// Statistics::series and the samples of observers begin when the initial transient of the rows has ended, at the end
+  /// of a step or epoch (engine/run/transient.h); needs a thermo_interval.
+  bool from_equilibrium = false;
 
   double slack() const { return 1e-9 * step; }  ///< tolerance of due times and ends [time]
 };
@@ -82,8 +87,9 @@ class Observer {
   virtual Sampling sampling() const { return {}; }
   /// Gets copies of all particles at a time of sampling(): exactly then in free flight, otherwise at the first step end
   /// at or after this time. No energies are measured, so frequent samples are cheap. With several ranks only rank 0 has
-  /// the particles.
+  /// the particles, or, if divided(), every rank has its own, and perhaps copies of others (Particles::owns).
   virtual void sample(double /*time*/, const Particles<D>&) {}
+  virtual bool divided() const { return false; }
   /// Registers what the observer accumulates as state of the run; the names begin with `name`.
   virtual void add_state(Fields& /*fields*/, const std::string& /*name*/) {}
   virtual void frame(const Snapshot<D>&) {}
@@ -125,6 +131,16 @@ struct Statistics {
   /// time × the mean speed. The mean of |v| over all particles is computed at slab ends and averaged over time by the
   /// trapezoidal rule. Absent if there was no collision, and if particles are fixed.
   std::optional<double> mean_free_time, mean_free_path;
+  /// With Plan::from_equilibrium, once known: when the transient ended, and the time from which means are taken.
+  struct Equilibrium {
+    double transient_end = 0, start = 0;
+  };
+  std::optional<Equilibrium> equilibrium;
+  /// Means over time with their errors, of samples of one step or epoch each: the columns of `series` are these, then
+  /// the force on each wall by its number (on both sides of a wall by the lower one).
+  static constexpr std::array mean_names = {"pressure",       "temperature",    "potential",
+                                            "collision_rate", "mean_free_time", "mean_free_path"};
+  Blocking series;
   double wall_seconds = 0;     ///< spent in the loop of run()
   bool stopped_early = false;  ///< should_stop has ended it
 
@@ -132,7 +148,7 @@ struct Statistics {
     archive(steps, end_time, fraction_done, start_steps, start_time, counters, force_passes, energy_initial,
             energy_after_first_step, energy_final, first_step_error, energy_reference, energy_scale, tail_energy,
             tail_pressure, max_energy_error, max_shadow_energy_error, max_momentum_error, mean_pressure, collision_rate,
-            mean_free_time, mean_free_path, wall_seconds, stopped_early);
+            mean_free_time, mean_free_path, equilibrium, series, wall_seconds, stopped_early);
   }
 };
 

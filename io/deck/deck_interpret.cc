@@ -479,6 +479,13 @@ class Interpreter {
     table->read<double>("thermo_interval", deck_.plan.thermo_interval);
     table->read<double>("sample_start", deck_.output.sample_start);
     table->read<bool>("events", deck_.plan.events);
+    if (const auto* start = table->find<std::string>("start"); start != nullptr && *start == "equilibrated") {
+      deck_.plan.from_equilibrium = true;
+      if (deck_.plan.thermo_interval == 0)
+        problems_.error(table->place("start"),
+                        "start = \"equilibrated\" looks at the rows of thermo.csv, and there are none",
+                        "give a thermo_interval of a few mean free times");
+    }
     for (const ObservableInfo& info : observables()) {
       Parameters parameters;
       for (const Parameter& each : info.parameters)
@@ -487,9 +494,10 @@ class Interpreter {
       if (parameters.has("interval") && parameters.real("interval") > 0)
         deck_.output.observables.push_back({&info, std::move(parameters)});
     }
-    if (source_.placement.lattice() && !deck_.output.observables.empty() && deck_.output.sample_start == 0)
+    if (source_.placement.lattice() && !deck_.output.observables.empty() && deck_.output.sample_start == 0 &&
+        !deck_.plan.from_equilibrium)
       problems_.warning(table->at, "the averages include the initial lattice, on which g(r) has sharp peaks",
-                        "set sample_start to a time at which the lattice has melted");
+                        "set sample_start to a time at which the lattice has melted, or start = \"equilibrated\"");
     if (const auto* units = table->find<TableValue>("units"))
       deck_.output.units = {std::get<std::string>(units->at("length")), std::get<std::string>(units->at("time"))};
     if (const auto* wall = table->find<std::string>("checkpoint_wall"); wall != nullptr && !wall->empty()) {

@@ -120,6 +120,7 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   plan.frame_interval = of.frame_interval;
   plan.thermo_interval = of.thermo_interval;
   plan.events = of.events;
+  plan.from_equilibrium = of.from_equilibrium;
 }
 
 /// Sets the velocities from a callback, between two steps. The added energy counts as work, like that of moving walls,

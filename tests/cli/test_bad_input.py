@@ -231,6 +231,9 @@ DECK_ERRORS = {
     "unknown species": (
         changed("[integrator]", '[[interaction]]\ntype = "wca"\nepsilon = 1\nsigma = 1\nspecies = ["sphere", "spere"]\n[integrator]', FLUID),
         21, ["unknown species 'spere'", "did you mean 'sphere'?"]),
+    "equilibrated": (GOOD + '[output]\nstart = "equilibrated"\n', 29, ["looks at the rows of thermo.csv", "give a thermo_interval"]),
+    "unknown start": (GOOD + '[output]\nstart = "never"\n', 29, ["first", "equilibrated"]),
+    "waves": (GOOD + '[output]\nsk_interval = 1.0\n', 29, ["axis 0 is not periodic", "set sk_interval = 0"]),
     "checkpoint time": (GOOD + '[output]\ncheckpoint_wall = "soon"\n', 29, ["'soon' is not a time", "hh:mm:ss"]),
 }
 
@@ -333,6 +336,7 @@ def test_averages_of_the_initial_lattice(tmp_path):
     sampled = FLUID + "\n[output]\nrdf_interval = 1.0\n"
     assert "the averages include the initial lattice" in validate(tmp_path, sampled).stderr
     assert "lattice" not in validate(tmp_path, sampled + "sample_start = 2.0\n").stderr
+    assert "lattice" not in validate(tmp_path, sampled + 'start = "equilibrated"\nthermo_interval = 0.1\n').stderr
     (tmp_path / "deck.toml").write_text(FLUID)
     for place, says in (("fcc", True), ("random", False)):
         assert carom("run", "deck.toml", "-o", place, "--set", f"placement.type={place}", cwd=tmp_path).returncode == 0

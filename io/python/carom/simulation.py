@@ -337,8 +337,8 @@ class Simulation:
         """Makes the next runs write the files of `carom run` to a directory: see carom.open().
 
         thermo_interval: time between rows of thermo.csv; callbacks are then called at each row. Other keys are those of
-        [output] in decks: frame_interval, events, rdf_interval, msd_interval, profile_interval, sample_start,
-        checkpoint_wall, units, … (`carom schema`). Each run() ends with a checkpoint, from which from_run() and
+        [output] in decks: frame_interval, events, rdf_interval, sk_interval, msd_interval, profile_interval, start,
+        sample_start, checkpoint_wall, units, … (`carom schema`). Each run() ends with a checkpoint, from which from_run() and
         `carom run --continue` continue. Begins a new run, at time 0; the files of an earlier run in the directory are moved
         to its backup.N.
 
@@ -374,6 +374,13 @@ class Simulation:
         """The averages that output() has requested, up to now, by name and column: ["rdf"]["g"]. The arrays are copies; callbacks may
         read them, too."""
         return self._session.averages()
+
+    @property
+    def means(self):
+        """Means over time with their standard errors, up to now: ["pressure"]["mean"], ["standard_error"], ["independent_samples"]; also
+        of temperature, potential, collision_rate, mean_free_time and mean_free_path. Each step, or epoch of free flight, is a sample. A
+        standard error is NaN if there are fewer than eight independent blocks of samples."""
+        return self._session.means()
 
     def integrator(self, type, **parameters):
         """Chooses the integrator by its name in decks; see carom.describe(type)."""
