@@ -186,9 +186,8 @@ def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, tmp_path):
     found = summary(plain)["equilibration"]
     assert 0 < found["transient_end"] <= found["start"] / 2 + 0.25 and 3 <= found["start"] < 5.5
     assert summary(plain)["means"]["pressure"]["standard_error"] > 0
-    for ranks in (2, 3) if method == "free-flight" else (2,):
-        mpirun(ranks, command(deck, tmp_path / str(ranks), output))
-        assert differences(plain, tmp_path / str(ranks)) == []
+    mpirun(2, command(deck, tmp_path / "two", output))
+    assert differences(plain, tmp_path / "two") == []
     for part in 0.2, 0.7:  # before and after the end of the transient
         at = {"KILL_IN": f"{killed}/", "KILL_AT": str(int(part * int((tmp_path / "changes").read_text())))}
         run(deck, killed, output, env=os.environ | library | at, code=-signal.SIGKILL)

@@ -42,7 +42,7 @@ def test_the_files_are_those_of_the_command_which_goes_on_with_them(tmp_path, de
     assert sim.means["temperature"]["mean"] > 0
     for name, table in sim.open().averages.items():
         assert sim.averages[name].keys() == table.keys()
-        assert all(np.array_equal(values, sim.averages[name][column]) for column, values in table.items())
+        assert all(np.array_equal(values, sim.averages[name][column], equal_nan=True) for column, values in table.items())
     for directory in (by_command, by_python):
         done = subprocess.run([os.environ["CAROM"], "run", "--continue", directory, "--set", "run.end_time=3", "--quiet"])
         assert done.returncode == 0
