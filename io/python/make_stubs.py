@@ -35,7 +35,7 @@ ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]"
              "rotational_temperature": "float",
              "deck": f"{PATHS} | Mapping[str, Any]", "file": PATHS, "set": "Mapping[str, Any]", "directory": PATHS,
              "take_over": "bool", "frame": "int", "time": "float", "steps": "int", "collisions": "int", "every": "float",
-             "callback": "Callable[[Simulation], object]", "progress": "bool", "type": "str", "packing_fraction": "float",
+             "fixed": "bool", "callback": "Callable[[Simulation], object]", "progress": "bool", "type": "str", "packing_fraction": "float",
              "seed": "int", "parameters": "Any", "thermo_interval": "float", "keys": "Any", "port": "int", "browser": "bool",
              "expression": "str | Callable[..., Any]", "start": "float", "cutoff": "float", "tolerance": "float",
              "options": "Mapping[str, Any]", "constants": "Any", "name": "str", "normal": "npt.ArrayLike",
