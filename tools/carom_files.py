@@ -23,7 +23,13 @@ from carom.decks import toml_text
 from carom.files import TRAJECTORY, Trajectory, as_text, complete_flush, open_hdf5, read_summary, read_table, read_thermo, reading
 
 __all__ = ["Error", "TRAJECTORY", "RunFailed", "Trajectory", "as_text", "complete_flush", "find_carom", "one_line", "open_hdf5", "read_summary",
-           "read_table", "read_thermo", "reading", "run_carom", "toml_text"]
+           "read_table", "read_thermo", "reading", "run_carom", "split_errors", "toml_text"]
+
+
+def split_errors(columns):
+    """The means of a table of averages, and their standard errors by the same names; without the numbers of samples."""
+    means = {name: values for name, values in columns.items() if not name.startswith(("error_", "samples_"))}
+    return means, {name: columns["error_" + name] for name in means if "error_" + name in columns}
 
 
 class RunFailed(Exception):

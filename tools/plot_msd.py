@@ -24,7 +24,7 @@ import pathlib
 
 import numpy as np
 
-from carom_files import TRAJECTORY, Trajectory, one_line, read_table, reading
+from carom_files import TRAJECTORY, Trajectory, one_line, read_table, reading, split_errors
 from carom_plot import picture
 
 FROM, TO = 20, 8  # the fit goes from this part of the length of the run to that
@@ -107,7 +107,7 @@ def main(arguments=None):
     if between and len(between) != 2:
         parser.error("--fit takes two lags")
     if options.run.suffix == ".csv":
-        columns = read_table(options.run)
+        columns, _ = split_errors(read_table(options.run))
         with reading(options.run):
             lag, windows = columns.pop("time"), columns.pop("origins")
         dimension, file, title, table = options.dimension, options.output or options.run.with_suffix(".png"), "", None

@@ -8,8 +8,8 @@
 
 Along periodic axes the nearest image counts, so r ends at half the shortest periodic edge. Along walls, g refers to an ideal gas in
 the region that the centres can reach (the average over directions u of the product of 1 - r |u_k| / L_k over the walled axes), so
-that g = 1 without correlations, also near the walls (approximately if radii differ). The band is one standard error, from four parts
-of the run, each averaged separately; an rdf.csv has no parts and is drawn without a band.
+that g = 1 without correlations, also near the walls (approximately if radii differ). The band is one standard error: from four parts
+of the run, each averaged separately, or from an rdf.csv.
 The script writes a CSV with r, g and error beside the picture, by default rdf-frames.csv.
 (Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6.)
 """
@@ -20,7 +20,7 @@ import pathlib
 import numpy as np
 from scipy.spatial import cKDTree
 
-from carom_files import Trajectory, one_line, read_table, reading
+from carom_files import Trajectory, one_line, read_table, reading, split_errors
 from carom_plot import picture
 
 BLOCKS = 4  # parts of the run, for the error
@@ -93,7 +93,7 @@ def error_of_blocks(g):
 
 def curves_of_table(file, species=None):
     """The contents of a run's rdf.csv: r, and g by name, for all particles or for two species."""
-    columns = read_table(file)
+    columns, _ = split_errors(read_table(file))
     with reading(file):
         r = columns.pop("r")
     if species is None:
@@ -126,7 +126,7 @@ def main(arguments=None):
     if options.run.suffix == ".csv":
         r, curves = curves_of_table(options.run, species)
         file = options.output or options.run.with_suffix(".png")
-        draw(file, r, curves)
+        draw(file, r, curves, errors=split_errors(read_table(options.run))[1])
         print(f"Results: {file}")
         return
     with Trajectory(options.run) as trajectory:
@@ -138,14 +138,15 @@ def main(arguments=None):
     file = options.output or folder / "rdf.png"
     table = file.with_name(file.stem + "-frames.csv")
     np.savetxt(table, np.stack([r, g, error], axis=1), delimiter=",", header="r,g,error", comments="")
-    draw(file, r, {"g": g}, title, error)
+    draw(file, r, {"g": g}, title, {"g": error})
     print(f"Results: {table}, {file}")
 
 
-def draw(file, r, curves, title="", error=np.nan):
+def draw(file, r, curves, title="", errors=None):
     with picture(file, xlabel="r [length]", ylabel="g(r)", title=f"{title}\nradial distribution function".strip()) as axes:
         for name, g in curves.items():
             axes.plot(r, g, label=name if len(curves) > 1 else None)
+            error = (errors or {}).get(name, np.nan)
             axes.fill_between(r, g - error, g + error, alpha=0.3)
         axes.axhline(1, color="grey", linewidth=0.8)
 

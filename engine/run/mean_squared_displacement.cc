@@ -46,7 +46,18 @@ void MeanSquaredDisplacement<D>::add(Lag& lag, double time, const Decade& from) 
   lag.squares.resize(number_.size());
   ++lag.origins;
   lag.time.add(time - from.origin_time);
-  for (std::size_t i = 0; i < now_.size(); ++i) lag.squares[species_[i]].add((now_[i] - from.origin[i]).squaredNorm());
+  std::vector<ExactSum> squares(number_.size());
+  for (std::size_t i = 0; i < now_.size(); ++i) squares[species_[i]].add((now_[i] - from.origin[i]).squaredNorm());
+  std::vector<double> means(1 + number_.size());
+  ExactSum all;
+  for (std::size_t s = 0; s < number_.size(); ++s) {
+    lag.squares[s].add(squares[s]);
+    all.add(squares[s]);
+    means[1 + s] = squares[s].value() / number_[s];
+  }
+  means[0] = all.value() / static_cast<double>(now_.size());
+  if (lag.origins == 1) lag.series = Blocking(means.size());
+  lag.series.add(means);
 }
 
 template <int D>
@@ -57,11 +68,12 @@ auto MeanSquaredDisplacement<D>::rows() const -> std::vector<Row> {
     for (const Lag& lag : decade.lag) {
       if (lag.origins == 0) continue;
       const auto origins = static_cast<double>(lag.origins);
-      Row row{lag.time.value() / origins, lag.origins, 0, {}};
+      Row row{lag.time.value() / origins, lag.origins, 0, {}, lag.series.estimate(0), {}};
       ExactSum all;
       for (std::size_t s = 0; s < number_.size(); ++s) {
         all.add(lag.squares[s]);
         row.of.push_back(lag.squares[s].value() / (origins * number_[s]));
+        row.errors.push_back(lag.series.estimate(1 + s));
       }
       row.msd = all.value() / (origins * particles);
       rows.push_back(std::move(row));
@@ -71,15 +83,24 @@ auto MeanSquaredDisplacement<D>::rows() const -> std::vector<Row> {
 
 template <int D>
 std::vector<TableColumn> MeanSquaredDisplacement<D>::table() const {
-  std::vector<TableColumn> table = {{"time", {}}, {"origins", {}}, {"msd", {}}};
-  const bool mixture = number_.size() > 1;
-  for (std::size_t s = 0; mixture && s < number_.size(); ++s) table.push_back({"msd_" + system_.species[s], {}});
-  for (const Row& row : rows()) {
+  std::vector<TableColumn> table = {{"time", {}}, {"origins", {}}};
+  const std::vector<Row> all = rows();
+  const auto add = [&](const std::string& name, auto&& mean, auto&& error) {
+    std::vector<double> means;
+    std::vector<Estimate> errors;
+    for (const Row& row : all) means.push_back(mean(row)), errors.push_back(error(row));
+    add_estimates(table, name, means, errors);
+  };
+  for (const Row& row : all) {
     table[0].values.push_back(row.time);
     table[1].values.push_back(static_cast<double>(row.origins));
-    table[2].values.push_back(row.msd);
-    for (std::size_t s = 0; mixture && s < number_.size(); ++s) table[3 + s].values.push_back(row.of[s]);
   }
+  add(
+      "msd", [](const Row& row) { return row.msd; }, [](const Row& row) { return row.error; });
+  for (std::size_t s = 0; number_.size() > 1 && s < number_.size(); ++s)
+    add(
+        "msd_" + system_.species[s], [s](const Row& row) { return row.of[s]; },
+        [s](const Row& row) { return row.errors[s]; });
   return table;
 }
 
@@ -98,7 +119,8 @@ ObservableInfo msd() {
       .documentation =
           "The mean squared displacement of all particles and, if there are several species, of each of them; it is "
           "continuous across periodic boundaries. Columns: time (the lag), origins (the number of time origins), "
-          "msd, msd_A. A drift of the whole system is not subtracted.",
+          "msd, msd_A, and error_ and samples_ of each, from the means over particles of each origin. A drift of the "
+          "whole system is not subtracted.",
       .source = "Frenkel, Smit, Understanding Molecular Simulation, 2nd ed., section 4.4.2",
       .in_2d = maker<MeanSquaredDisplacement, 2>(),
       .in_3d = maker<MeanSquaredDisplacement, 3>()};

@@ -29,10 +29,12 @@ class MeanSquaredDisplacement : public Observable<D> {
   MeanSquaredDisplacement(const System<D>& system, const Parameters& parameters, double start);
 
   struct Row {
-    double time = 0;            ///< the mean lag: steps may not end at the due times
-    std::uint64_t origins = 0;  ///< number of origins averaged over
-    double msd = 0;             ///< average over all particles [length²]
-    std::vector<double> of;     ///< by species
+    double time = 0;               ///< the mean lag: steps may not end at the due times
+    std::uint64_t origins = 0;     ///< number of origins averaged over
+    double msd = 0;                ///< average over all particles [length²]
+    std::vector<double> of;        ///< by species
+    Estimate error;                ///< of msd
+    std::vector<Estimate> errors;  ///< by species
   };
   /// The rows by ascending lag.
   std::vector<Row> rows() const;
@@ -45,7 +47,8 @@ class MeanSquaredDisplacement : public Observable<D> {
     std::uint64_t origins = 0;
     ExactSum time;
     std::vector<ExactSum> squares;  // by species
-    void archive(Archive& archive) { archive(origins, time, squares); }
+    Blocking series;                // of the means over particles: of all, of each species
+    void archive(Archive& archive) { archive(origins, time, squares, series); }
   };
   struct Decade {
     double origin_time;

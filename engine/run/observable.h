@@ -10,6 +10,7 @@
 // The keys of [output] (rdf_interval, rdf_range …), their checks and manual, the files (rdf.csv) and the entries of the
 // summary are generated from the declarations.
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -28,12 +29,28 @@ struct TableColumn {
   std::vector<double> values;
 };
 
+/// Adds a column of means after the other means, and at the end columns of their errors and independent samples. (A
+/// prefix cannot be taken for a part of a species' name.)
+inline void add_estimates(std::vector<TableColumn>& table, const std::string& name, const std::vector<double>& means,
+                          const std::vector<Estimate>& estimates) {
+  const auto after = std::ranges::find_if(table, [](const auto& each) { return each.name.starts_with("error_"); });
+  table.insert(after, {name, means});
+  TableColumn errors{"error_" + name, {}}, samples{"samples_" + name, {}};
+  for (const Estimate& each : estimates) {
+    errors.values.push_back(each.error);
+    samples.values.push_back(each.samples);
+  }
+  table.push_back(std::move(errors));
+  table.push_back(std::move(samples));
+}
+
 /// A number about one or more species for the summary: `"name": [{"species": ["a", "b"], "symbol": value}, …]`.
 struct SpeciesValue {
   std::string_view name;
   std::vector<std::string> species;
   std::string_view symbol;
   double value;
+  double error = std::numeric_limits<double>::quiet_NaN();  ///< one standard error; NaN: unknown
 };
 
 template <int D>
@@ -63,7 +80,7 @@ class Observable : public Observer<D> {
   /// Passes to the archive, in a fixed order, everything that a sample changes and a later sample or a table reads.
   virtual void sums(Archive& archive) = 0;
   /// Adds a sample; samples() have been added before. `particles` are all particles in the order of their ids. With
-  /// several ranks, called on rank 0 only.
+  /// several ranks, called on rank 0 only; if divided(), on every rank with its own particles (Particles::owns).
   virtual void add_sample(double time, const Particles<D>& particles) = 0;
 
   Sampling sampling_;

@@ -5,11 +5,12 @@
 namespace carom {
 
 namespace observable {  // declared at the ends of their own files
-ObservableInfo rdf(), msd(), profile();
+ObservableInfo rdf(), sk(), msd(), profile();
 }
 
 const std::vector<ObservableInfo>& observables() {
-  static const std::vector<ObservableInfo> all = {observable::rdf(), observable::msd(), observable::profile()};
+  static const std::vector<ObservableInfo> all = {observable::rdf(), observable::sk(), observable::msd(),
+                                                  observable::profile()};
   return all;
 }
 

@@ -126,7 +126,9 @@ RadialDistribution<D>::RadialDistribution(const System<D>& system, const RadialD
   number_.resize(species);
   smallest_.assign(species, std::numeric_limits<double>::infinity());
   largest_.resize(species);
-  counts_.resize(species * (species + 1) / 2 * static_cast<std::size_t>(options.bins));
+  const auto bins = static_cast<std::size_t>(options.bins);
+  counts_.resize(species * (species + 1) / 2 * bins);
+  series_ = Blocking(counts_.size() + (species > 1 ? bins : 0));
 }
 
 template <int D>
@@ -247,7 +249,14 @@ void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& part
     }
     for (int k = D - 1; k >= 0 && ++centre[k] == grid.count(k); --k) centre[k] = 0;
   }
-  for (std::size_t k = 0; k < counts_.size(); ++k) counts_[k] += counted[k / bins * all + k % bins];
+  std::vector<double> of_sample(series_.columns());
+  for (std::size_t k = 0; k < counts_.size(); ++k) {
+    const std::uint64_t count = counted[k / bins * all + k % bins];
+    counts_[k] += count;
+    of_sample[k] += static_cast<double>(count);
+    if (kinds > 1) of_sample[counts_.size() + k % bins] += static_cast<double>(count);
+  }
+  series_.add(of_sample);
 }
 
 template <int D>
@@ -263,10 +272,9 @@ double RadialDistribution<D>::pairs_between(std::size_t a, std::size_t b) const 
   return a == b ? number_[a] * (number_[a] - 1) / 2 : number_[a] * number_[b];
 }
 
-/// Divides counts by those of an ideal gas with `pairs` pairs; `margin` is the radius that centres keep from walls.
+/// The counts in each shell of an ideal gas with `pairs` pairs; `margin` is the radius that centres keep from walls.
 template <int D>
-std::vector<double> RadialDistribution<D>::normalised(const std::vector<std::uint64_t>& counts, double pairs,
-                                                      double margin) const {
+std::vector<double> RadialDistribution<D>::expected(double samples, double pairs, double margin) const {
   Vec<D> edges = system_.box.edges;
   std::array<bool, D> walled;
   for (int k = 0; k < D; ++k) {
@@ -274,14 +282,24 @@ std::vector<double> RadialDistribution<D>::normalised(const std::vector<std::uin
     if (walled[k]) edges[k] -= 2 * margin;
   }
   const double width = options_.range / static_cast<double>(options_.bins);
-  std::vector<double> g(counts.size());
-  for (std::size_t b = 0; b < g.size(); ++b) {
+  std::vector<double> counts(static_cast<std::size_t>(options_.bins));
+  for (std::size_t b = 0; b < counts.size(); ++b) {
     const double inner = static_cast<double>(b) * width, outer = static_cast<double>(b + 1) * width;
-    const double expected =
-        static_cast<double>(this->samples()) * pairs * shell_volume<D>(inner, outer, edges, walled) / edges.prod();
-    g[b] = static_cast<double>(counts[b]) / expected;
+    counts[b] = samples * pairs * shell_volume<D>(inner, outer, edges, walled) / edges.prod();
   }
-  return g;
+  return counts;
+}
+
+template <int D>
+std::vector<double> RadialDistribution<D>::expected(double samples, std::size_t a, std::size_t b) const {
+  return expected(samples, pairs_between(a, b), std::min(smallest_[a], smallest_[b]));
+}
+
+/// The counts of all pairs in all samples.
+template <int D>
+std::vector<double> RadialDistribution<D>::expected_of_all(double samples) const {
+  const double n = std::accumulate(number_.begin(), number_.end(), 0.0);
+  return expected(samples, n * (n - 1) / 2, *std::ranges::min_element(smallest_));
 }
 
 template <int D>
@@ -289,33 +307,73 @@ std::vector<double> RadialDistribution<D>::g() const {
   const std::size_t bins = static_cast<std::size_t>(options_.bins);
   std::vector<std::uint64_t> all(bins);
   for (std::size_t k = 0; k < counts_.size(); ++k) all[k % bins] += counts_[k];
-  const double n = std::accumulate(number_.begin(), number_.end(), 0.0);
-  return normalised(all, n * (n - 1) / 2, *std::ranges::min_element(smallest_));
+  std::vector<double> g = expected_of_all(static_cast<double>(this->samples()));
+  for (std::size_t k = 0; k < bins; ++k) g[k] = static_cast<double>(all[k]) / g[k];
+  return g;
 }
 
 template <int D>
 std::vector<double> RadialDistribution<D>::g(std::size_t a, std::size_t b) const {
-  const auto first = counts_.begin() + static_cast<std::ptrdiff_t>(pair_index(a, b)) * options_.bins;
-  return normalised({first, first + options_.bins}, pairs_between(a, b), std::min(smallest_[a], smallest_[b]));
+  std::vector<double> g = expected(static_cast<double>(this->samples()), a, b);
+  for (std::size_t k = 0; k < g.size(); ++k)
+    g[k] = static_cast<double>(counts_[pair_index(a, b) * g.size() + k]) / g[k];
+  return g;
+}
+
+/// The errors of the columns of a pair of species, or of all at the end.
+template <int D>
+std::vector<Estimate> RadialDistribution<D>::errors_of(std::size_t pair, const std::vector<double>& expected) const {
+  std::vector<Estimate> all;
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    all.push_back(series_.estimate(pair * expected.size() + k));
+    all.back().error /= expected[k];
+  }
+  return all;
+}
+
+template <int D>
+std::vector<Estimate> RadialDistribution<D>::errors() const {
+  return errors_of(number_.size() > 1 ? counts_.size() / static_cast<std::size_t>(options_.bins) : 0,
+                   expected_of_all(1));
+}
+
+template <int D>
+std::vector<Estimate> RadialDistribution<D>::errors(std::size_t a, std::size_t b) const {
+  return errors_of(pair_index(a, b), expected(1, a, b));
 }
 
 template <int D>
 std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::size_t b) const {
   if (this->samples() == 0 || smallest_[a] != largest_[a] || smallest_[b] != largest_[b]) return {};
+  return contact_value_of(a, b, {counts_.begin(), counts_.end()}, static_cast<double>(this->samples()));
+}
+
+template <int D>
+double RadialDistribution<D>::contact_error(std::size_t a, std::size_t b) const {
+  return series_.error_of([&](std::span<const double> sums, double samples) {
+    return contact_value_of(a, b, {sums.begin(), sums.end()}, samples)
+        .value_or(std::numeric_limits<double>::quiet_NaN());
+  });
+}
+
+/// Fits the parabola to counts of all shells of all pairs of species.
+template <int D>
+std::optional<double> RadialDistribution<D>::contact_value_of(std::size_t a, std::size_t b,
+                                                              const std::vector<double>& counts, double samples) const {
   const double contact = smallest_[a] + smallest_[b], width = options_.range / options_.bins;
-  const auto r = radii(), value = g(a, b);
-  const std::uint64_t* counts = &counts_[pair_index(a, b) * static_cast<std::size_t>(options_.bins)];
+  const auto r = radii(), ideal = expected(samples, a, b);
+  const double* const of_pair = &counts[pair_index(a, b) * r.size()];
   // Start at the contact distance; rounding must not lose the first shell.
   const auto first = static_cast<std::size_t>(std::ceil(contact / width * (1 - 1e-9)));
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   int used = 0;
   for (std::size_t k = first; k < r.size() && (k < first + 6 || r[k] + width / 2 <= 1.15 * contact); ++k) {
-    if (counts[k] == 0) continue;
-    const double s = (r[k] - contact) / contact, weight = static_cast<double>(counts[k]);
+    if (!(of_pair[k] > 0)) continue;
+    const double s = (r[k] - contact) / contact, weight = of_pair[k];
     const Eigen::Vector3d powers(1, s, s * s);
     normal += weight * powers * powers.transpose();
-    right += weight * elementary::log(value[k]) * powers;
+    right += weight * elementary::log(of_pair[k] / ideal[k]) * powers;
     ++used;
   }
   if (used < 4) return {};
@@ -326,10 +384,12 @@ std::optional<double> RadialDistribution<D>::contact_value(std::size_t a, std::s
 
 template <int D>
 std::vector<TableColumn> RadialDistribution<D>::table() const {
-  std::vector<TableColumn> table = {{"r", radii()}, {"g", g()}};
+  std::vector<TableColumn> table = {{"r", radii()}};
+  add_estimates(table, "g", g(), errors());
   const auto& names = system_.species;
   for (std::size_t a = 0; names.size() > 1 && a < names.size(); ++a)
-    for (std::size_t b = a; b < names.size(); ++b) table.push_back({"g_" + names[a] + "_" + names[b], g(a, b)});
+    for (std::size_t b = a; b < names.size(); ++b)
+      add_estimates(table, "g_" + names[a] + "_" + names[b], g(a, b), errors(a, b));
   return table;
 }
 
@@ -339,7 +399,8 @@ std::vector<SpeciesValue> RadialDistribution<D>::species_values() const {
   std::vector<SpeciesValue> values;
   for (std::size_t a = 0; a < names.size(); ++a)
     for (std::size_t b = a; b < names.size(); ++b)
-      if (const auto g = contact_value(a, b)) values.push_back({"contact_value", {names[a], names[b]}, "g", *g});
+      if (const auto g = contact_value(a, b))
+        values.push_back({"contact_value", {names[a], names[b]}, "g", *g, contact_error(a, b)});
   return values;
 }
 
@@ -371,7 +432,8 @@ ObservableInfo rdf() {
                       .most = 1e6}},
       .documentation =
           "g(r) of all particles and, if there are several species, of each pair of species. Columns: r (middle of a "
-          "shell), g, g_A_B. `contact_value` in the summary is g extrapolated to contact. Along walls, g refers to "
+          "shell), g, g_A_B, and error_ and samples_ of each. `contact_value` in the summary is g extrapolated to "
+          "contact. Along walls, g refers to "
           "an ideal gas in the region that the centres can reach.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6",
       .in_2d = maker<RadialDistribution, 2>(complete<2>),

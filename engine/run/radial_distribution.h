@@ -48,10 +48,15 @@ class RadialDistribution : public Observable<D> {
   std::vector<double> g() const;
   /// g between two species; NaN if there are no such pairs.
   std::vector<double> g(std::size_t a, std::size_t b) const;
+  /// The errors of g, one for each shell; the means of these estimates are numbers of pairs in a sample.
+  std::vector<Estimate> errors() const;
+  std::vector<Estimate> errors(std::size_t a, std::size_t b) const;
   /// g at contact between two species: ln g is fitted by a parabola in r to the shells between the contact distance and
   /// 1.15 times this distance, or to the first six shells, weighted by the counts. Absent if the species have several
   /// contact distances, or if fewer than four of these shells hold pairs.
   std::optional<double> contact_value(std::size_t a, std::size_t b) const;
+  /// Its standard error; NaN if it is unknown.
+  double contact_error(std::size_t a, std::size_t b) const;
   /// r, g, and g between each two species if there are several.
   std::vector<TableColumn> table() const override;
   /// All contact values.
@@ -59,16 +64,22 @@ class RadialDistribution : public Observable<D> {
 
  private:
   void add_sample(double time, const Particles<D>& particles) override;
-  void sums(Archive& archive) override { archive(number_, smallest_, largest_, counts_); }
+  void sums(Archive& archive) override { archive(number_, smallest_, largest_, counts_, series_); }
   void count(const Particles<D>& particles);
   std::size_t pair_index(std::size_t a, std::size_t b) const;
-  std::vector<double> normalised(const std::vector<std::uint64_t>& counts, double pairs, double margin) const;
+  std::vector<double> expected(double samples, double pairs, double margin) const;
+  std::vector<double> expected(double samples, std::size_t a, std::size_t b) const;
+  std::vector<double> expected_of_all(double samples) const;
+  std::vector<Estimate> errors_of(std::size_t pair, const std::vector<double>& expected) const;
+  std::optional<double> contact_value_of(std::size_t a, std::size_t b, const std::vector<double>& counts,
+                                         double samples) const;
   double pairs_between(std::size_t a, std::size_t b) const;
 
   const System<D>& system_;
   RadialDistributionOptions options_;
   std::vector<double> number_, smallest_, largest_;  // by species: number of particles; radii
   std::vector<std::uint64_t> counts_;                // [pair of species][shell]
+  Blocking series_;                                  // of the counts of a sample, with those of all species at the end
 
   std::array<std::vector<double>, D> x_;  // positions in the order of the cells; kept for reuse of memory
   std::vector<std::uint16_t> species_;

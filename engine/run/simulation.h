@@ -9,6 +9,7 @@
 // Observing changes nothing: observers get copies, and due times do not shorten slabs.
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -18,6 +19,7 @@
 
 #include "engine/integrators/integrator.h"
 #include "engine/ranks/system.h"
+#include "engine/run/blocking.h"
 
 namespace carom {
 
@@ -32,6 +34,9 @@ struct Plan {
   double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
   double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
   bool events = false;         ///< pass every contact to the observers
+  /// Statistics::series and the samples of observers begin when the initial transient of the rows has ended, at the end
+  /// of a step or epoch (engine/run/transient.h); needs a thermo_interval.
+  bool from_equilibrium = false;
 
   double slack() const { return 1e-9 * step; }  ///< tolerance of due times and ends [time]
 };
@@ -57,7 +62,8 @@ struct Snapshot {
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN if the method has none
   double max_energy_error = 0;                               ///< as in Statistics, so far [energy]
   Vec<D> momentum = Vec<D>::Zero();
-  double temperature = 0;  ///< Σ m v²/(D N), in units of energy (k_B = 1); total momentum is not subtracted
+  double temperature = 0;  ///< Σ m v²/(D N) of the N particles that are not fixed, in units of energy (k_B = 1); total
+                           ///< momentum is not subtracted
   double rotational_temperature = 0;  ///< Σ I ω²/(f N), f = 1 in two dimensions, 3 in three [energy]
   double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
@@ -81,8 +87,9 @@ class Observer {
   virtual Sampling sampling() const { return {}; }
   /// Gets copies of all particles at a time of sampling(): exactly then in free flight, otherwise at the first step end
   /// at or after this time. No energies are measured, so frequent samples are cheap. With several ranks only rank 0 has
-  /// the particles.
+  /// the particles, or, if divided(), every rank has its own, and perhaps copies of others (Particles::owns).
   virtual void sample(double /*time*/, const Particles<D>&) {}
+  virtual bool divided() const { return false; }
   /// Registers what the observer accumulates as state of the run; the names begin with `name`.
   virtual void add_state(Fields& /*fields*/, const std::string& /*name*/) {}
   virtual void frame(const Snapshot<D>&) {}
@@ -122,8 +129,18 @@ struct Statistics {
   double collision_rate = 0;  ///< 2 × pair collisions per unit time and particle: the rate for one sphere
   /// The mean time and the mean length of a sphere's flights between two pair collisions: N t/(2 collisions), and this
   /// time × the mean speed. The mean of |v| over all particles is computed at slab ends and averaged over time by the
-  /// trapezoidal rule. Absent if there was no collision.
+  /// trapezoidal rule. Absent if there was no collision, and if particles are fixed.
   std::optional<double> mean_free_time, mean_free_path;
+  /// With Plan::from_equilibrium, once known: when the transient ended, and the time from which means are taken.
+  struct Equilibrium {
+    double transient_end = 0, start = 0;
+  };
+  std::optional<Equilibrium> equilibrium;
+  /// Means over time with their errors, of samples of one step or epoch each: the columns of `series` are these, then
+  /// the force on each wall by its number (on both sides of a wall by the lower one).
+  static constexpr std::array mean_names = {"pressure",       "temperature",    "potential",
+                                            "collision_rate", "mean_free_time", "mean_free_path"};
+  Blocking series;
   double wall_seconds = 0;     ///< spent in the loop of run()
   bool stopped_early = false;  ///< should_stop has ended it
 
@@ -131,7 +148,7 @@ struct Statistics {
     archive(steps, end_time, fraction_done, start_steps, start_time, counters, force_passes, energy_initial,
             energy_after_first_step, energy_final, first_step_error, energy_reference, energy_scale, tail_energy,
             tail_pressure, max_energy_error, max_shadow_energy_error, max_momentum_error, mean_pressure, collision_rate,
-            mean_free_time, mean_free_path, wall_seconds, stopped_early);
+            mean_free_time, mean_free_path, equilibrium, series, wall_seconds, stopped_early);
   }
 };
 
@@ -141,6 +158,9 @@ struct StepCount {
   double time = 0;
   /// How far an epoch of free flight has advanced that needs several slabs [time].
   double within = 0;
+  /// What happened in the epoch so far.
+  double boxes = 0;            ///< PastEpoch::boxes
+  std::uint64_t contacts = 0;  ///< of pairs twice
   /// Free flight with contacts that dissipate: an epoch is as many steps long as the gas is slower than at the start.
   double first_speed = 0;   ///< thermal speed at the start [length/time]
   std::int64_t stride = 1;  ///< steps of the next epoch
@@ -228,7 +248,7 @@ class Simulation {
     return count_.time + static_cast<double>(step - count_.steps) * plan_.step;
   }
   Slab next_slab() const;
-  void lengthen_slabs();
+  void lengthen_slabs(double length);
   bool finished() const;
   void need_collisions() const;
   double fraction_done() const;
@@ -243,6 +263,7 @@ class Simulation {
   double quiet_since_ = 0;  // end of the last slab with pair collisions
   std::uint64_t most_collisions_ = std::max<std::uint64_t>(500'000, 4 * system_->size());  // per slab of an epoch
   std::optional<std::uint64_t> last_collisions_;  // in the last slab, if this run() executed it
+  bool cut_ = false;                              // whether the end of the plan shortened the last slab by whole steps
   std::unique_ptr<Monitor<D>> monitor_;           // from the first run() on
   std::size_t first_of_integrator_ = 0;           // its first entry in Fields::of_run()
 };

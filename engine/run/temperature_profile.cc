@@ -2,8 +2,8 @@
 // Density and temperature in slabs across one axis.
 //
 // If a sample finds n particles (by their centres) with kinetic energy K in a slab of volume V, the density is ⟨n⟩/V
-// and the temperature 2⟨K⟩/(D⟨n⟩); the mean velocity is not subtracted. Sums are exact, so that their order does not
-// matter.
+// and the temperature 2⟨K⟩/(D⟨n⟩), without fixed particles; the mean velocity is not subtracted. Sums are exact, so
+// that their order does not matter.
 
 #include <algorithm>
 #include <limits>
@@ -21,36 +21,59 @@ class TemperatureProfile : public Observable<D> {
         box_(system.box),
         axis_(parameters.integer("axis")),
         number_(static_cast<std::size_t>(parameters.integer("bins"))),
-        twice_kinetic_(number_.size()) {}
+        moving_(number_.size()),
+        twice_kinetic_(number_.size()),
+        series_(2 * number_.size()) {}
 
   std::vector<TableColumn> table() const override {
     const auto bins = static_cast<double>(number_.size()), samples = static_cast<double>(this->samples());
-    std::vector<TableColumn> table = {{"x", {}}, {"density", {}}, {"temperature", {}}};
+    std::vector<TableColumn> table = {{"x", {}}};
+    std::vector<double> density, temperature;
+    std::vector<Estimate> of_density, of_temperature;
     for (std::size_t b = 0; b < number_.size(); ++b) {
       table[0].values.push_back((static_cast<double>(b) + 0.5) * box_.edges[axis_] / bins);
-      table[1].values.push_back(number_[b] / (samples * box_.volume() / bins));
-      table[2].values.push_back(number_[b] > 0 ? twice_kinetic_[b].value() / (D * number_[b])
-                                               : std::numeric_limits<double>::quiet_NaN());
+      density.push_back(number_[b] / (samples * box_.volume() / bins));
+      temperature.push_back(moving_[b] > 0 ? twice_kinetic_[b].value() / (D * moving_[b])
+                                           : std::numeric_limits<double>::quiet_NaN());
+      of_density.push_back(series_.estimate(b));
+      of_density.back().error /= box_.volume() / bins;
+      of_temperature.push_back(series_.estimate(number_.size() + b));
     }
+    add_estimates(table, "density", density, of_density);
+    add_estimates(table, "temperature", temperature, of_temperature);
     return table;
   }
 
  private:
   void add_sample(double /*time*/, const Particles<D>& p) override {
-    const auto bins = static_cast<double>(number_.size());
+    const std::size_t bins = number_.size();
+    std::vector<ExactSum> twice_kinetic(bins);
+    std::vector<double> values(2 * bins), weights(2 * bins, 1.0);
+    std::fill_n(weights.begin() + static_cast<std::ptrdiff_t>(bins), bins, 0.0);
     for (std::size_t i = 0; i < p.size(); ++i) {
-      const double slab = std::clamp(p.x[i][axis_] / box_.edges[axis_] * bins, 0.0, bins - 1);
-      number_[static_cast<std::size_t>(slab)] += 1;
-      twice_kinetic_[static_cast<std::size_t>(slab)].add(p.mass[i] * p.v[i].squaredNorm());
+      const auto all = static_cast<double>(bins);
+      const auto slab = static_cast<std::size_t>(std::clamp(p.x[i][axis_] / box_.edges[axis_] * all, 0.0, all - 1));
+      values[slab] += 1;
+      if (p.fixed(static_cast<Id>(i))) continue;
+      moving_[slab] += 1;
+      weights[bins + slab] += D;
+      twice_kinetic[slab].add(p.mass[i] * p.v[i].squaredNorm());
     }
+    for (std::size_t b = 0; b < bins; ++b) {
+      number_[b] += values[b];
+      values[bins + b] = twice_kinetic[b].value();
+      twice_kinetic_[b].add(twice_kinetic[b]);
+    }
+    series_.add(values, weights);
   }
 
-  void sums(Archive& archive) override { archive(number_, twice_kinetic_); }
+  void sums(Archive& archive) override { archive(number_, moving_, twice_kinetic_, series_); }
 
   const Box<D>& box_;
   Eigen::Index axis_;
-  std::vector<double> number_;  // particles in each slab, summed over all samples
+  std::vector<double> number_, moving_;  // particles in each slab, and those not fixed, summed over all samples
   std::vector<ExactSum> twice_kinetic_;
+  Blocking series_;  // of the densities, then of the temperatures
 };
 
 template <int D>
@@ -86,7 +109,8 @@ ObservableInfo profile() {
                       .meaning = "the axis, counted from 0, that is normal to the slabs",
                       .range = Parameter::Range::non_negative}},
       .documentation =
-          "Columns: x (middle of a slab), density (of centres), temperature 2K/(D n) of the n particles in the slab; "
+          "Columns: x (middle of a slab), density (of centres), temperature 2K/(D n) of the n particles in the slab, "
+          "and error_ and samples_ of both; "
           "their mean velocity is not subtracted.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.12",
       .in_2d = maker<TemperatureProfile, 2>(complete<2>),

@@ -177,9 +177,9 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     outcome.peak_memory_bytes = peak_memory_bytes(accounts);
     if (statistics.stopped_early) outcome.status = "interrupted";
     log.say(report_text(deck, statistics, accounts));
-    if (const auto warning = energy_warning(statistics, find_integrator(deck.integrator))) {
-      outcome.warnings.push_back(*warning);
-      log.warn(*warning);
+    for (const std::string& warning : warnings_about(deck, statistics)) {
+      outcome.warnings.push_back(warning);
+      log.warn(warning);
     }
     if (const auto subdomains = statistics.counters.windows.subdomains;
         subdomains > 0 && subdomains < static_cast<unsigned>(ranks))
@@ -209,10 +209,12 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
 template <int D>
 int run_beside(Deck& deck, Communicator& at_work, Requests& requests, Resumed* from) {
   auto simulation = simulation_of<D>(deck, at_work, from);
-  std::vector<SamplingTimes<D>> others;
-  for (const auto& [info, parameters] : deck.output.observables)
-    others.emplace_back(Sampling{parameters.real("interval"), deck.output.sample_start});
-  for (SamplingTimes<D>& times : others) simulation.add(times);
+  std::vector<std::unique_ptr<Observer<D>>> others;
+  for (const auto& [info, parameters] : deck.output.observables) {
+    others.push_back(info->template in<D>().make(simulation.system(), parameters, deck.output.sample_start));
+    if (!others.back()->divided()) others.back() = std::make_unique<SamplingTimes<D>>(others.back()->sampling());
+    simulation.add(*others.back());
+  }
   BlockSender<D> sender(at_work, simulation.system(), from == nullptr || from->is_branch());
   simulation.add(sender);
   RunControl<D> control(simulation, deck, at_work, requests, {});
@@ -224,6 +226,7 @@ int run_beside(Deck& deck, Communicator& at_work, Requests& requests, Resumed* f
 template <int D>
 int run_on_rank(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
                 Resumed* from) {
+  if (from && from->is_branch()) go_to_end<D>(*from, at_work);
   return at_work.rank() == 0 ? run_deck<D>(deck, options, at_work, ranks, requests, from)
                              : run_beside<D>(deck, at_work, requests, from);
 }

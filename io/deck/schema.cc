@@ -48,7 +48,19 @@ std::vector<Parameter> output_keys() {
       {"frame_interval", real, "0.0", "time", "simulated time between frames of the trajectory; 0: first and last only",
        Range::non_negative},
       {"thermo_interval", real, "0.0", "time", "simulated time between rows of thermo.csv; 0: first and last only",
-       Range::non_negative}};
+       Range::non_negative},
+      {"start",
+       text,
+       "\"first\"",
+       "-",
+       "where means begin: those of summary.json over time, and the samples of " + averages_of_all() +
+           "; first: at the start of the run (samples at sample_start); equilibrated: at the first step or epoch after "
+           "the "
+           "initial transient of pressure and potential energy in the rows of thermo.csv, which ends where the rule "
+           "MSER-5 finds it (White, Simulation 69 (1997) 323; sample_start is counted from there). Needs a "
+           "thermo_interval, best one of a few mean free times, and 100 rows at least",
+       Range::any,
+       {"first", "equilibrated"}}};
   for (const ObservableInfo& info : observables())
     for (const Parameter& parameter : info.parameters) {
       keys.push_back(parameter);
@@ -117,6 +129,10 @@ std::vector<TableSchema> make_schema() {
         {"display_radius", real_or_list, "none", "length", "with verlet: the radius that pictures show; default: 0.5",
          Range::positive},
         {"mass", real_or_list, "1.0", "mass", "mass of a particle", Range::positive},
+        {"fixed", boolean, "false", "-",
+         "true: the particles never move, others bounce off them, and 'mass' has no effect; they may overlap each "
+         "other "
+         "and reach beyond walls"},
         {"charge", real_or_list, "0.0", "charge", "charge of a particle, for interactions between charges"},
         {"spin", vector_list, "none", "1/time",
          "angular velocities that go with explicit positions where contacts have 'tangential': [z] in two dimensions, "

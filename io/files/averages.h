@@ -19,6 +19,7 @@ class AverageWriter : public Observer<D> {
   AverageWriter(std::filesystem::path path, std::unique_ptr<Observable<D>> average);
 
   Sampling sampling() const override { return average_->sampling(); }
+  bool divided() const override { return average_->divided(); }
   void add_state(Fields& fields, const std::string& name) override { average_->add_state(fields, name); }
   /// Throws Error(Failure::file).
   void sample(double time, const Particles<D>& particles) override;

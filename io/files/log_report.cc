@@ -138,6 +138,16 @@ std::optional<std::string> energy_warning(const Statistics& s, const IntegratorI
       std::max(first, later), first > later ? " after the first step" : "");
 }
 
+std::vector<std::string> warnings_about(const Deck& deck, const Statistics& s) {
+  std::vector<std::string> all;
+  if (auto warning = energy_warning(s, find_integrator(deck.integrator))) all.push_back(std::move(*warning));
+  if (deck.plan.from_equilibrium && !s.equilibrium)
+    all.emplace_back(
+        "warning: the initial transient has not ended, so nothing was sampled, and the means of the summary are of the "
+        "whole run; let it run longer, or give a shorter thermo_interval (100 rows at least)");
+  return all;
+}
+
 std::string report_text(const Deck& deck, const Statistics& s, std::span<const RankAccount> ranks) {
   const Counters& c = s.counters;
   const double scale = s.energy_reference > 0 ? s.energy_reference : 1;

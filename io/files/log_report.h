@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "engine/integrators/integrator.h"
 #include "engine/run/simulation.h"
@@ -21,6 +22,9 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 /// A warning if the energy error exceeds the energy itself (the step is far too long), or 1e-12 of it with an exact
 /// method.
 std::optional<std::string> energy_warning(const Statistics& statistics, const IntegratorInfo& method);
+/// All warnings at the end of a run: this one, and if no end of the initial transient was found that means were to
+/// begin at.
+std::vector<std::string> warnings_about(const Deck& deck, const Statistics& statistics);
 
 /// How the run ended, its results, and the time spent by part: least, mean and most of several ranks.
 std::string report_text(const Deck& deck, const Statistics& statistics, std::span<const RankAccount> ranks);

@@ -89,9 +89,9 @@ void RunRecord<D>::close() {
   if (statistics.stopped_early) outcome_.status = "interrupted";
   Communicator alone;
   log_->note(report_text(deck_, statistics, accounts_of_all(alone, statistics)));
-  if (const auto warning = energy_warning(statistics, find_integrator(deck_.integrator))) {
-    outcome_.warnings.push_back(*warning);
-    warn(*warning);
+  for (const std::string& warning : warnings_about(deck_, statistics)) {
+    outcome_.warnings.push_back(warning);
+    warn(warning);
   }
   log_->close();
   write_summary();

@@ -15,6 +15,16 @@ using Json = nlohmann::ordered_json;
 
 Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
+/// NaN is null.
+Json json_of(const Estimate& estimate) {
+  return {{"mean", estimate.mean}, {"standard_error", estimate.error}, {"independent_samples", estimate.samples}};
+}
+
+/// Of a column; nothing but NaN if there is no such column.
+Estimate estimate_of(const Blocking& series, std::size_t column) {
+  return column < series.columns() ? series.estimate(column) : Estimate();
+}
+
 }  // namespace
 
 std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Statistics& s) {
@@ -56,27 +66,42 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"slabs_halved", c.slabs_halved},
       {"frozen", c.frozen},
       {"fallbacks", c.fallbacks},
+      {"means", Json::object()},
       {"wall_seconds", s.wall_seconds},
       {"collisions_per_second", rate},
       {"peak_memory_bytes", std::max(outcome.peak_memory_bytes, peak_memory_bytes())},
   };
+  for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k)
+    json["means"][Statistics::mean_names[k]] = json_of(estimate_of(s.series, k));
+  if (deck.plan.from_equilibrium && s.equilibrium)
+    json["equilibration"] = {{"transient_end", s.equilibrium->transient_end}, {"start", s.equilibrium->start}};
+  else if (deck.plan.from_equilibrium)
+    json["equilibration"] = nullptr;
   if (s.rotational_energy) json["energy"]["rotational"] = *s.rotational_energy;
   for (const WallRecord& wall : outcome.walls) {  // both sides of a wall have one name
     const WallTally none, &tally = wall.number < c.walls.size() ? c.walls[wall.number] : none;
     Json& entry = json["walls"][wall.name];
-    if (entry.is_null()) entry = Json::object();
+    const bool front = entry.is_null();
+    if (front) entry = Json::object();
     const auto add = [&](const char* key, double value) { entry[key] = entry.value(key, 0.0) + value; };
     const double force = s.end_time > s.start_time ? tally.impulse.value() / (s.end_time - s.start_time) : 0;
     entry["collisions"] = entry.value("collisions", std::uint64_t{0}) + tally.contacts;
     add("force", force);
     if (wall.area > 0) add("pressure", force / wall.area);
+    if (front) {  // with the rear
+      const Estimate of_force = estimate_of(s.series, Statistics::mean_names.size() + wall.number);
+      entry["force_standard_error"] = of_force.error;
+      if (wall.area > 0) entry["pressure_standard_error"] = of_force.error / wall.area;
+      entry["independent_samples"] = of_force.samples;
+    }
     add("work", tally.work.value());
     add("heat", tally.heat.value());
   }
   if (!outcome.branched_from.empty())
     json["branched_from"] = {{"checkpoint", outcome.branched_from}, {"step", s.start_steps}, {"time", s.start_time}};
   for (const SpeciesValue& value : outcome.species_values)
-    json[value.name].push_back({{"species", value.species}, {value.symbol, value.value}});
+    json[value.name].push_back(
+        {{"species", value.species}, {value.symbol, value.value}, {"standard_error", value.error}});
   json["warnings"] = outcome.warnings;
   if (!outcome.error.empty()) json["error"] = outcome.error;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

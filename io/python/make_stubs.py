@@ -53,6 +53,7 @@ PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np
               "wall_loads": "dict[str, float]",
               "bath": "dict[str, Any] | None", "bath_temperature": "float | list[float] | None",
               "step": "int", "collisions": "int", "directory": "str | None",
+              "means": "dict[str, dict[str, float]]",
               "averages": "dict[str, dict[str, npt.NDArray[np.float64]]]"}
 VALUES = {"list[float]": "npt.ArrayLike", "list[str]": "Sequence[str]", "list[tuple[int, int]]": "npt.ArrayLike"}
 

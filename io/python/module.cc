@@ -184,6 +184,20 @@ void bind(py::module_& module, const char* name) {
            })
       .def("drawn_spins", [](S& session, const Array& temperature,
                              std::uint64_t seed) { return array_of(session.drawn_spins(span_of(temperature), seed)); })
+      .def("means",
+           [](const S& session) {
+             py::dict all;
+             const Blocking& series = session.statistics().series;
+             for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k) {
+               const Estimate e = k < series.columns() ? series.estimate(k) : Estimate();
+               py::dict entry;
+               entry["mean"] = e.mean;
+               entry["standard_error"] = e.error;
+               entry["independent_samples"] = e.samples;
+               all[Statistics::mean_names[k]] = entry;
+             }
+             return all;
+           })
       .def("averages",
            [](const S& session) {
              py::dict all;

@@ -74,6 +74,18 @@ DECK_ERRORS = {
     "wall with a normal in three dimensions": (
         walled('name = "ramp"\nnormal = [0, 0, 1]'), 9, ["a normal of 3 numbers", "give 2"]),
     "face with a normal": (walled('name = "y+"\nnormal = [0, 1]'), 9, ["'y+' is a face of the box", "leave normal"]),
+    "one-way wall with two sides": (
+        walled('name = "valve"\nnormal = [1, 0]\none_way = true\none_sided = false'), 9, ["'valve' is one-way and has two sides"]),
+    "one-way face": (walled('name = "y+"\none_way = true'), 9, ["'y+' is a face of the box and cannot be one-way", "give a normal"]),
+    "one-way wall that is shaken": (
+        walled('name = "valve"\nnormal = [1, 0]\none_way = true\nvelocity = {amplitude = 0.1, frequency = 1}'),
+        9, ["is one-way and shaken", "give a constant velocity"]),
+    "fixed particles with velocities": (
+        changed("mass = 1.0", "mass = 1.0\nfixed = true"), 12, ["'velocity' of fixed particles", "leave it out"]),
+    "fixed particles with a temperature": (
+        changed("temperature = 1.0", "temperature = 1.0\nfixed = true", FLUID), 11, ["'temperature' of fixed particles"]),
+    "nothing but fixed particles": (
+        changed("temperature = 1.0", "fixed = true", FLUID), 8, ["all particles are fixed, and nothing would move"]),
     "wall that is given twice": (
         walled('name = "y+"\n[[wall]]\nname = "y+"'), 11, ["'y+' is given twice", "its own name"]),
     "walls that cross": (
@@ -219,6 +231,9 @@ DECK_ERRORS = {
     "unknown species": (
         changed("[integrator]", '[[interaction]]\ntype = "wca"\nepsilon = 1\nsigma = 1\nspecies = ["sphere", "spere"]\n[integrator]', FLUID),
         21, ["unknown species 'spere'", "did you mean 'sphere'?"]),
+    "equilibrated": (GOOD + '[output]\nstart = "equilibrated"\n', 29, ["looks at the rows of thermo.csv", "give a thermo_interval"]),
+    "unknown start": (GOOD + '[output]\nstart = "never"\n', 29, ["first", "equilibrated"]),
+    "waves": (GOOD + '[output]\nsk_interval = 1.0\n', 29, ["axis 0 is not periodic", "set sk_interval = 0"]),
     "checkpoint time": (GOOD + '[output]\ncheckpoint_wall = "soon"\n', 29, ["'soon' is not a time", "hh:mm:ss"]),
 }
 
@@ -321,6 +336,7 @@ def test_averages_of_the_initial_lattice(tmp_path):
     sampled = FLUID + "\n[output]\nrdf_interval = 1.0\n"
     assert "the averages include the initial lattice" in validate(tmp_path, sampled).stderr
     assert "lattice" not in validate(tmp_path, sampled + "sample_start = 2.0\n").stderr
+    assert "lattice" not in validate(tmp_path, sampled + 'start = "equilibrated"\nthermo_interval = 0.1\n').stderr
     (tmp_path / "deck.toml").write_text(FLUID)
     for place, says in (("fcc", True), ("random", False)):
         assert carom("run", "deck.toml", "-o", place, "--set", f"placement.type={place}", cwd=tmp_path).returncode == 0

@@ -67,8 +67,9 @@ radius = 0.3
     run(write_deck(tmp_path, two), out,
         ["output.rdf_interval=0.1", "output.rdf_bins=60", "output.msd_interval=0.05", "output.sample_start=0.5"])
     rdf, msd = (np.genfromtxt(out / name, delimiter=",", names=True) for name in ("rdf.csv", "msd.csv"))
-    assert rdf.dtype.names == ("r", "g", "g_sphere_sphere", "g_sphere_small", "g_small_small")
-    assert msd.dtype.names == ("time", "origins", "msd", "msd_sphere", "msd_small")
+    for table, first, means in ((rdf, ("r",), ("g", "g_sphere_sphere", "g_sphere_small", "g_small_small")),
+                                (msd, ("time", "origins"), ("msd", "msd_sphere", "msd_small"))):
+        assert table.dtype.names == (*first, *means, *(prefix + name for name in means for prefix in ("error_", "samples_")))
     # rdf_range is the default: half the edge, which is less than three diameters; the resolved deck names it.
     edge = float(re.search(r"box = \[([0-9.]+),", (out / "deck.toml").read_text())[1])
     largest = float(re.search(r"rdf_range = ([0-9.]+)", (out / "deck.toml").read_text())[1])
@@ -103,13 +104,13 @@ def test_names_with_commas_and_quotes(tmp_path):
     two = two.replace("[[particles]]", '[[particles]]\nname = "a, b"\ncount = 54\ntemperature = 1.0\nradius = 0.5\n[[particles]]')
     run(write_deck(tmp_path, two), tmp_path / "out", ["run.end_time=0.2", "output.rdf_interval=0.1"])
     with open(tmp_path / "out" / "rdf.csv", newline="") as file:
-        assert next(csv.reader(file)) == ["r", "g", *(f"g_{a}_{b}" for a, b in ((names[0], names[0]), (names[0], names[1]), (names[1], names[1])))]
+        assert next(csv.reader(file))[:5] == ["r", "g", *(f"g_{a}_{b}" for a, b in ((names[0], names[0]), (names[0], names[1]), (names[1], names[1])))]
 
 
 def test_profile(tmp_path):
     out = tmp_path / "out"
     run(write_deck(tmp_path, SPHERES), out, ["output.profile_interval=0.1", "output.profile_bins=6", "output.profile_axis=2"])
-    assert (out / "profile.csv").read_text().startswith("x,density,temperature\n")
+    assert (out / "profile.csv").read_text().startswith("x,density,temperature,error_density,")
     profile = np.genfromtxt(out / "profile.csv", delimiter=",", names=True)
     edges = [float(e) for e in re.search(r"box = \[(.*)\]", (out / "deck.toml").read_text())[1].split(",")]
     assert profile["x"] == pytest.approx((np.arange(6) + 0.5) * edges[2] / 6)

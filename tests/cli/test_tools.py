@@ -22,6 +22,7 @@ import movie
 import plot_energy
 import plot_msd
 import plot_rdf
+import plot_sk
 from carom_files import Trajectory, toml_text
 from synthetic_run import write_run
 
@@ -305,6 +306,26 @@ def test_tables_of_a_run_are_drawn(tmp_path, capsys):
         tool.main([str(run)])
         assert (run / f"{name}.csv").read_text() == before
         assert (run / f"{name}-frames.csv").stat().st_size > 100
+
+
+def test_errors_of_tables_are_bars(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("matplotlib.axes.Axes.fill_between", lambda axes, x, low, high, **_: drawn.append((low, high)))
+    monkeypatch.setattr("matplotlib.axes.Axes.errorbar", lambda axes, x, y, error, **named: drawn.append((y, error, named["label"])))
+    (tmp_path / "rdf.csv").write_text("r,g,error_g,samples_g\n" + "".join(f"{r},1,0.25,40\n" for r in (0.5, 1.5, 2.5)))
+    assert list(plot_rdf.curves_of_table(tmp_path / "rdf.csv")[1]) == ["g"]
+    plot_rdf.main([str(tmp_path / "rdf.csv")])
+    assert len(drawn) == 1 and (drawn[0][0] == 0.75).all() and (drawn[0][1] == 1.25).all()
+    (tmp_path / "sk.csv").write_text("k,waves,S,S_charge,error_S,error_S_charge,samples_S,samples_S_charge\n0.5,3,0.1,2,0.01,0.3,40,50\n")
+    plot_sk.main([str(tmp_path)])
+    plot_sk.main([str(tmp_path / "sk.csv"), "--columns", "S_charge", "-o", str(tmp_path / "charge.png")])
+    assert [(*y, *error, label) for y, error, label in drawn[1:]] == [(0.1, 0.01, "S"), (2, 0.3, "S_charge"), (2, 0.3, None)]
+    assert all((tmp_path / name).stat().st_size > 1000 for name in ("rdf.png", "sk.png", "charge.png"))
+    with pytest.raises(SystemExit, match="^There is no g in .*sk.csv, only S, S_charge.$"):
+        plot_sk.main([str(tmp_path), "--columns", "g"])
+    (tmp_path / "sk.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(SystemExit, match="sk.csv"):
+        plot_sk.main([str(tmp_path)])
 
 
 def test_compare(tmp_path):

@@ -53,6 +53,7 @@ def test_a_run_is_seen_while_it_goes_on(browser, tmp_path):
         assert all(now > before for now, before in zip(curve_ends(browser), ends)), "the curves do not grow"
         assert differing(curve, picture(browser, "#curves canvas", False)) > 0.0005
         assert browser.execute_script("return charts.rdf.curves[0].x.length > 5 && Math.max(...charts.rdf.curves[0].y) > 1")
+        assert browser.execute_script("return charts.rdf.curves.length") == 1  # without its error
 
         # The slider goes back to the first frame, which stays.
         browser.execute_script("element('frame').value = 0; element('frame').dispatchEvent(new Event('input'))")

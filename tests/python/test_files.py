@@ -37,9 +37,12 @@ def test_the_files_are_those_of_the_command_which_goes_on_with_them(tmp_path, de
     sim.run(time=2)
     same_files(by_command, by_python)
     assert sim.open().summary["status"] == "done" and len(sim.open().frames) == 5 and sim.directory == str(by_python)
+    for name, entry in sim.open().summary["means"].items():
+        assert all(sim.means[name][key] == value or (value is None and np.isnan(sim.means[name][key])) for key, value in entry.items())
+    assert sim.means["temperature"]["mean"] > 0
     for name, table in sim.open().averages.items():
         assert sim.averages[name].keys() == table.keys()
-        assert all(np.array_equal(values, sim.averages[name][column]) for column, values in table.items())
+        assert all(np.array_equal(values, sim.averages[name][column], equal_nan=True) for column, values in table.items())
     for directory in (by_command, by_python):
         done = subprocess.run([os.environ["CAROM"], "run", "--continue", directory, "--set", "run.end_time=3", "--quiet"])
         assert done.returncode == 0

@@ -63,7 +63,7 @@ class Panel {
     charts.rdf = charts.rdf || new Chart(element("curves"), "g(r)", "r");
     charts.rdf.curves = charts.rdf.curves.filter((curve) => curve.panel !== this);
     charts.rdf.drawn = null;
-    for (const name of names.slice(1)) {
+    for (const name of names.filter((each) => each.startsWith("g"))) {  // not their errors
       const curve = this.curve(charts.rdf, name);
       for (let row = 0; row < rows; row++) curve.add(columns[names[0]][row], columns[name][row]);
     }

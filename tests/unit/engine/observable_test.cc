@@ -47,7 +47,7 @@ std::string error_of(std::string_view name, const System<2>& system, Parameters 
 
 TEST(Observable, ErrorsSayWhatToDo) {
   auto system = test::hard_spheres<2>(3, 0.3);
-  EXPECT_EQ(error_of("profil", *system, {}), "unknown observable 'profil'; give one of: rdf, msd, profile");
+  EXPECT_EQ(error_of("profil", *system, {}), "unknown observable 'profil'; give one of: rdf, sk, msd, profile");
   EXPECT_EQ(
       error_of("rdf", *system, {{"range", 1e3}}).find("rdf: g(r) cannot be taken to 1000 in this box; take at most"),
       0u);
@@ -67,7 +67,7 @@ TEST(Profile, ByHand) {
   system->particles.x[1][0] = 2.1;
   profile->sample(1, system->particles);
   const auto table = profile->table();
-  ASSERT_EQ(table.size(), 3u);
+  ASSERT_EQ(table.size(), 7u);
   EXPECT_EQ(table[0].name, "x");
   EXPECT_EQ(table[0].values, (std::vector<double>{1, 3, 5, 7}));
   EXPECT_EQ(table[1].name, "density");

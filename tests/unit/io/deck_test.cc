@@ -149,11 +149,13 @@ TEST_F(DeckTest, ListsOfALaterSpeciesAreItsOwn) {
 TEST_F(DeckTest, OutputIsWhatItSays) {
   const Deck deck = read(springs, {"output.directory=there", "output.frame_interval=0.25", "output.thermo_interval=0.5",
                                    "output.sample_start=1.5", "output.msd_interval=0.75", "output.events=true",
-                                   R"(output.checkpoint_wall="")", R"(output.units={length = "nm", time = "ps"})"});
+                                   R"(output.start="equilibrated")", R"(output.checkpoint_wall="")",
+                                   R"(output.units={length = "nm", time = "ps"})"});
   EXPECT_EQ(deck.output.directory, "there");
   EXPECT_EQ(deck.plan.frame_interval, 0.25);
   EXPECT_EQ(deck.plan.thermo_interval, 0.5);
   EXPECT_EQ(deck.output.sample_start, 1.5);
+  EXPECT_TRUE(deck.plan.from_equilibrium);
   ASSERT_EQ(deck.output.observables.size(), 1u);
   EXPECT_EQ(deck.output.observables[0].info->name, "msd");
   EXPECT_EQ(deck.output.observables[0].parameters.real("interval"), 0.75);

@@ -283,7 +283,7 @@ TEST(Averages, AreWrittenWheneverTheirSamplesHaveDoubled) {
     EXPECT_EQ(fs::remove(path), std::has_single_bit(sample)) << sample;
   }
   writer.close();
-  EXPECT_TRUE(contents(path).starts_with("x,density,temperature\n1,")) << contents(path);
+  EXPECT_TRUE(contents(path).starts_with("x,density,temperature,error_density,")) << contents(path);
 }
 
 TEST(Averages, NamesThatCouldBeTakenForSeveralAreInQuotes) {
@@ -292,7 +292,7 @@ TEST(Averages, NamesThatCouldBeTakenForSeveralAreInQuotes) {
   system->species = {"small", "la\"rge, heavy"};
   AverageWriter<2> writer(path, make_observable<2>("msd", *system, {{"interval", 1.0}}));
   for (int sample = 0; sample < 2; ++sample) writer.sample(sample, system->particles);
-  EXPECT_TRUE(contents(path).starts_with("time,origins,msd,msd_small,\"msd_la\"\"rge, heavy\"\n1,1,0,0,0\n"))
+  EXPECT_TRUE(contents(path).starts_with("time,origins,msd,msd_small,\"msd_la\"\"rge, heavy\",error_msd,samples_msd,"))
       << contents(path);
 }
 
@@ -302,7 +302,7 @@ TEST(Summary, HasEveryValueByItsName) {
                            .warnings = {"a warning"},
                            .particles = 3,
                            .ranks = 2,
-                           .species_values = {{"contact_value", {"small", "large"}, "g", 1.5}},
+                           .species_values = {{"contact_value", {"small", "large"}, "g", 1.5, 0.25}},
                            .walls = {{1, "x+", 4.0}, {2, "y-", 8.0}}};
   Statistics s;
   s.steps = 10, s.end_time = 11.5, s.force_passes = 12.5, s.energy_initial = 13.5;
@@ -314,24 +314,56 @@ TEST(Summary, HasEveryValueByItsName) {
   c.sphere_sphere = 30, c.sphere_wall = 31, c.max_overlap = 32.5, c.sweeps = 33, c.pieces = 34, c.slabs_halved = 35;
   c.frozen = 36, c.fallbacks = 37, c.folded = 4, c.kicks = 38;
   c.dissipated.add(5.5), c.work.add(6.5), c.heat.add(7.5);
+  // Of the first mean and of the wall 2 only; pressures are (1 … 16) and forces 3.
+  s.series = Blocking(Statistics::mean_names.size() + 3);
+  for (int i = 0; i < 16; ++i) {
+    std::vector<double> values(s.series.columns(), std::nan(""));
+    values[0] = i + 1, values.back() = 3;
+    s.series.add(values);
+  }
   WallTally& floor = c.wall(2);
   floor.contacts = 31, floor.impulse.add(23), floor.work.add(6.5), floor.heat.add(7.5);
   auto json = nlohmann::json::parse(summary_text(test::sample_deck(2), outcome, s));
   EXPECT_GT(json["peak_memory_bytes"], 1000000);
   EXPECT_NE(json["version"], "");
   json.erase("peak_memory_bytes"), json.erase("version");
+  const auto means = json["means"];
+  json.erase("means");
+  EXPECT_EQ(means.size(), Statistics::mean_names.size());
+  for (const char* name : Statistics::mean_names) {
+    EXPECT_EQ(means.at(name).size(), 3u);
+    if (std::string(name) == "pressure")
+      EXPECT_EQ(means.at(name)["mean"], 8.5);
+    else
+      EXPECT_TRUE(means.at(name)["mean"].is_null()) << name;
+  }
+  EXPECT_FALSE(json.contains("equilibration"));
   EXPECT_EQ(json, nlohmann::json::parse(R"({"status": "failed", "error": "disk \ufffd full", "warnings": ["a warning"],
     "deck": "sample.toml", "title": "three spheres", "integrator": "free-flight", "dimension": 2, "particles": 3,
     "ranks": 2, "steps": 10, "end_time": 11.5, "events": {"sphere_sphere": 30, "sphere_wall": 31, "kicks": 38},
     "energy": {"initial": 13.5, "after_first_step": 14.5, "final": 15.5, "reference": 16.0, "max_abs_error": 17.5,
                "dissipated": 5.5, "work": 6.5, "heat": 7.5, "folded": 0.25},
-    "walls": {"x+": {"collisions": 0, "force": 0.0, "pressure": 0.0, "work": 0.0, "heat": 0.0},
-              "y-": {"collisions": 31, "force": 2.0, "pressure": 0.25, "work": 6.5, "heat": 7.5}},
+    "walls": {"x+": {"collisions": 0, "force": 0.0, "pressure": 0.0, "work": 0.0, "heat": 0.0,
+                     "force_standard_error": null, "pressure_standard_error": null, "independent_samples": null},
+              "y-": {"collisions": 31, "force": 2.0, "pressure": 0.25, "work": 6.5, "heat": 7.5,
+                     "force_standard_error": 0.0, "pressure_standard_error": 0.0, "independent_samples": null}},
     "tail": {"energy": 18.5, "pressure": 19.5}, "shadow_energy": {"max_abs_error": 20.5},
     "momentum": {"max_abs_error": 21.5}, "max_overlap": 32.5, "pressure": 22.5, "collision_rate": 23.5,
     "mean_free_time": 24.5, "mean_free_path": 25.5, "force_passes": 12.5, "sweeps": 33, "pieces": 34,
     "slabs_halved": 35, "frozen": 36, "fallbacks": 37, "wall_seconds": 0.5, "collisions_per_second": 60.0,
-    "contact_value": [{"species": ["small", "large"], "g": 1.5}]})"));
+    "contact_value": [{"species": ["small", "large"], "g": 1.5, "standard_error": 0.25}]})"));
+}
+
+TEST(Summary, SaysWhenTheTransientEnded) {
+  Deck deck = test::sample_deck(2);
+  deck.plan.from_equilibrium = true;
+  Statistics s;
+  EXPECT_TRUE(nlohmann::json::parse(summary_text(deck, {}, s)).at("equilibration").is_null());
+  EXPECT_EQ(warnings_about(deck, s).size(), 1u);
+  s.equilibrium = {3.5, 8.0};
+  EXPECT_EQ(nlohmann::json::parse(summary_text(deck, {}, s))["equilibration"],
+            nlohmann::json::parse(R"({"transient_end": 3.5, "start": 8.0})"));
+  EXPECT_EQ(warnings_about(deck, s).size(), 0u);
 }
 
 TEST(Summary, SaysNullWhereThereIsNoNumber) {
