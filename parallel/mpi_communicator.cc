@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMaxMessage = std::size_t{1} << 30;    // bytes of one message, at most
 constexpr std::size_t kFirstMessage = std::size_t{1} << 15;  // bytes sent with the first message between neighbours
-enum Tag : int { data, fold, step, first };
+enum Tag : int { data, fold, step, first, known };
 
 int bytes(std::size_t count) { return static_cast<int>(count); }
 
@@ -29,44 +29,85 @@ void in_pieces(std::size_t size, Start&& start) {
 /// same bits.
 void MpiCommunicator::combine(std::span<double> most, std::span<std::uint64_t> sums) {
   ranks_.watch().begin_call();
+  begin_combine(most, sums);
+  end_combine();
+}
+
+void MpiCommunicator::begin_combine(std::span<double> most, std::span<std::uint64_t> sums) {
+  most_ = most;
+  sums_ = sums;
   mine_.assign(sums.begin(), sums.end());
   for (const double value : most) mine_.push_back(std::bit_cast<std::uint64_t>(value));
   theirs_.resize(mine_.size());
-  const int rank = ranks_.rank(), size = ranks_.size(), length = bytes(mine_.size() * sizeof(std::uint64_t));
-  const auto swap_with = [&](int partner, Tag tag, bool sends, bool receives) {
-    std::array<MPI_Request, 2> requests = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
-    if (receives) MPI_Irecv(theirs_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &requests[0]);
-    if (sends) MPI_Isend(mine_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &requests[1]);
-    ranks_.watch().wait(requests);
-  };
+  // Ranks beyond the largest power of two send their values to a rank below it, which sends the result back.
+  const int rank = ranks_.rank(), size = ranks_.size();
+  int whole = 1;
+  while (2 * whole <= size) whole *= 2;
+  rounds_.clear();
+  if (mine_.empty()) {
+    // Nothing to combine.
+  } else if (rank >= whole) {
+    rounds_ = {{rank - whole, fold, true, false}, {rank - whole, fold, false, true}};
+  } else {
+    if (rank + whole < size) rounds_.push_back({rank + whole, fold, false, true});
+    for (int bit = 1; bit < whole; bit *= 2) rounds_.push_back({rank ^ bit, step, true, true});
+    if (rank + whole < size) rounds_.push_back({rank + whole, fold, true, false});
+  }
+  round_ = 0;
+  begin_round();
+}
+
+void MpiCommunicator::begin_round() {
+  if (round_ == rounds_.size()) return;
+  const auto [partner, tag, sends, receives] = rounds_[round_];
+  const int length = bytes(mine_.size() * sizeof(std::uint64_t));
+  if (receives) MPI_Irecv(theirs_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &combining_[0]);
+  if (sends) MPI_Isend(mine_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &combining_[1]);
+}
+
+void MpiCommunicator::end_combine() {
   const auto larger = [](std::uint64_t a, std::uint64_t b) {
     return std::bit_cast<std::uint64_t>(std::max(std::bit_cast<double>(a), std::bit_cast<double>(b)));
   };
-  const auto combine_received = [&](bool mine_first) {
-    if (!mine_first) mine_.swap(theirs_);
+  for (; round_ < rounds_.size(); ++round_, begin_round()) {
+    ranks_.watch().wait(combining_);
+    const auto [partner, tag, sends, receives] = rounds_[round_];
+    if (!receives) continue;
+    if (partner < ranks_.rank()) mine_.swap(theirs_);
+    if (round_ > 0 && !rounds_[round_ - 1].receives) continue;  // it has sent its values before: this is the result
     for (std::size_t k = 0; k < mine_.size(); ++k)
-      mine_[k] = k < sums.size() ? mine_[k] + theirs_[k] : larger(mine_[k], theirs_[k]);
-  };
-  // Ranks beyond the largest power of two send their values to a rank below it, which sends the result back.
-  int whole = 1;
-  while (2 * whole <= size) whole *= 2;
-  if (rank >= whole) {
-    swap_with(rank - whole, fold, true, false);
-    swap_with(rank - whole, fold, false, true);
-    mine_.swap(theirs_);
-  } else {
-    if (rank + whole < size) {
-      swap_with(rank + whole, fold, false, true);
-      combine_received(true);
-    }
-    for (int bit = 1; bit < whole; bit *= 2) {
-      swap_with(rank ^ bit, step, true, true);
-      combine_received((rank & bit) == 0);
-    }
-    if (rank + whole < size) swap_with(rank + whole, fold, true, false);
+      mine_[k] = k < sums_.size() ? mine_[k] + theirs_[k] : larger(mine_[k], theirs_[k]);
   }
-  for (std::size_t k = 0; k < sums.size(); ++k) sums[k] = mine_[k];
-  for (std::size_t k = 0; k < most.size(); ++k) most[k] = std::bit_cast<double>(mine_[sums.size() + k]);
+  for (std::size_t k = 0; k < sums_.size(); ++k) sums_[k] = mine_[k];
+  for (std::size_t k = 0; k < most_.size(); ++k) most_[k] = std::bit_cast<double>(mine_[sums_.size() + k]);
+}
+
+void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> partners,
+                            std::span<const std::size_t> sizes, std::span<double> most) {
+  ranks_.watch().begin_call();
+  departing_ = std::move(outgoing);
+  arriving_.resize(partners.size());
+  const auto next = [&] { return &exchanging_.emplace_back(MPI_REQUEST_NULL); };
+  for (std::size_t k = 0; k < partners.size(); ++k) {
+    Bytes &in = arriving_[k], &out = departing_[k];
+    in.resize(sizes[k]);
+    in_pieces(in.size(), [&](std::size_t at, int count) {
+      MPI_Irecv(in.data() + at, count, MPI_BYTE, partners[k], known, ranks_.handle(), next());
+    });
+    in_pieces(out.size(), [&](std::size_t at, int count) {
+      MPI_Isend(out.data() + at, count, MPI_BYTE, partners[k], known, ranks_.handle(), next());
+    });
+  }
+  begin_combine(most, {});
+}
+
+std::vector<Bytes> MpiCommunicator::complete() {
+  ranks_.watch().begin_call();
+  if (!exchanging_.empty()) ranks_.watch().wait(exchanging_);
+  exchanging_.clear();
+  end_combine();
+  departing_.clear();
+  return std::move(arriving_);
 }
 
 std::vector<Bytes> MpiCommunicator::trade(const std::function<const Bytes&(std::size_t)>& outgoing) {

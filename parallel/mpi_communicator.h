@@ -6,6 +6,8 @@
 // arrive afterwards, so the object must outlive World::on_all(). Messages can have any length: long ones are split to
 // stay below MPI's limit of 2^31 bytes.
 
+#include <array>
+
 #include "engine/ranks/communicator.h"
 #include "parallel/world.h"
 
@@ -22,16 +24,35 @@ class MpiCommunicator : public Communicator {
   std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override;
   std::vector<Bytes> gather(const Bytes& mine) override;
   void combine(std::span<double> most, std::span<std::uint64_t> sums) override;
+  void start(std::vector<Bytes> outgoing, std::span<const int> partners, std::span<const std::size_t> sizes,
+             std::span<double> most) override;
+  std::vector<Bytes> complete() override;
 
  private:
+  /// An exchange of combine() with another rank.
+  struct Round {
+    int partner, tag;
+    bool sends, receives;
+  };
+  void begin_combine(std::span<double> most, std::span<std::uint64_t> sums);
+  void begin_round();
+  void end_combine();
   std::vector<Bytes> trade(const std::function<const Bytes&(std::size_t)>& outgoing);
 
   const World& ranks_;
   // Buffers of received messages, and of messages sent by swap().
   std::vector<std::uint64_t> leaving_, coming_;
   std::vector<Bytes> incoming_, outgoing_;
-  std::vector<Bytes> first_in_, first_out_;   // the first messages between neighbours
-  std::vector<std::uint64_t> mine_, theirs_;  // values to combine
+  std::vector<Bytes> first_in_, first_out_;  // the first messages between neighbours
+  // Values to combine, where their results go, and the rounds from the present one on.
+  std::vector<std::uint64_t> mine_, theirs_;
+  std::span<double> most_;
+  std::span<std::uint64_t> sums_;
+  std::vector<Round> rounds_;
+  std::size_t round_ = 0;
+  std::array<MPI_Request, 2> combining_ = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
+  std::vector<MPI_Request> exchanging_;  // from start() to complete()
+  std::vector<Bytes> arriving_, departing_;
 };
 
 }  // namespace carom

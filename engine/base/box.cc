@@ -32,6 +32,13 @@ void Box<D>::add(WallOptions<D> wall) {
     refuse("has a number that is not finite", "give finite ones");
   if (std::ranges::find(options, wall.name, &WallOptions<D>::name) != options.end())
     refuse("is given twice", "give each wall its own name");
+  if (wall.one_way && (!wall.one_sided || wall.amplitude != 0 || face != faces.end()))
+    refuse(!wall.one_sided       ? "is one-way and has two sides"
+           : face != faces.end() ? "is a face of the box and cannot be one-way, because nothing is behind it"
+                                 : "is one-way and shaken",
+           !wall.one_sided       ? "leave out one of one_way and one_sided"
+           : face != faces.end() ? "choose another name and give a normal"
+                                 : "give a constant velocity");
   if (face != faces.end()) {
     wall.number = static_cast<Id>(face - faces.begin());
     if (!walled(static_cast<int>(wall.number / 2)))

@@ -26,6 +26,7 @@ struct WallOptions {
   double amplitude = 0;    ///< shaken: the displacement along the normal is amplitude·sin(2π·frequency·time)
   double frequency = 0;    ///< [1/time]
   bool one_sided = true;   ///< false: it acts on the spheres on both sides
+  bool one_way = false;    ///< it reflects spheres that come from the side of the normal, and lets others pass
   double temperature = 0;  ///< a thermal wall has one [energy]; 0: the wall is not thermal
   std::uint64_t seed = 1;  ///< seed of the random numbers of a thermal wall
   double moved = 0;        ///< displacement before time 0 [length]
@@ -99,6 +100,7 @@ struct Box {
       wall.normal = its->normal;
       wall.offset = its->offset;
       wall.one_sided = its->one_sided;
+      if ((wall.one_way = its->one_way)) wall.depth = 1e3 * gap_tolerance()(0);
     }
     if (!its) return wall;
     set_motion(*its, wall);

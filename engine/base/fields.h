@@ -82,6 +82,9 @@ class Fields {
     std::erase_if(working_, [&](const Working& each) { return each.owner == owner; });
   }
 
+  /// Called before the state is saved, on all ranks: completes values of the run that wait for sums over ranks.
+  std::function<void()> settle = [] {};
+
   // For the decomposition and for checkpoints.
 
   /// The fields with an entry for each particle, and the values of the run.

@@ -10,6 +10,7 @@
 // If a system is divided among ranks (engine/ranks/decomposition.h), sums over the system run over what this rank owns:
 // its particles, and the pairs with a lower id that it owns. Forces on ghosts are incomplete.
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -32,6 +33,9 @@ template <int D>
 using Positions = std::span<const Vec<D>>;
 template <int D>
 using Vectors = std::span<Vec<D>>;
+
+/// Waits until the positions of ghosts have arrived; further calls do nothing.
+using Arrival = std::function<void()>;
 
 /// Sums over one evaluation of V, exact and so independent of the order of summation.
 struct PotentialSums {
@@ -64,6 +68,13 @@ class Interaction {
   /// Adds −∂V/∂x_i for each particle; if `sums` is given, adds V and the other sums to it. Throws
   /// Error(Failure::numerical), which names the particles, if a force is not finite or too large to be summed.
   virtual void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums = nullptr) const = 0;
+  /// The same where the positions of ghosts are unknown until arrive() has been called; what does not depend on them
+  /// can be added before.
+  virtual void add_forces_early(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums,
+                                const Arrival& arrive) const {
+    arrive();
+    add_forces(x, forces, sums);
+  }
 
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:

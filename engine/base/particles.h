@@ -5,6 +5,8 @@
 // If a system is divided among ranks (engine/ranks/decomposition.h), each rank has the particles it owns and copies of
 // others, the ghosts. If it does not have all particles, their numbers here still follow the order of ids.
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,13 +16,18 @@
 
 namespace carom {
 
+/// A sphere of infinite mass is fixed: it never moves, and others bounce off it.
+inline bool is_fixed(double mass) { return std::isinf(mass); }
+/// The mass in sums of energies and momenta: 0 for a fixed sphere, which has neither.
+inline double moving_mass(double mass) { return is_fixed(mass) ? 0 : mass; }
+
 /// The argument of Particles::add().
 template <int D>
 struct Particle {
   Vec<D> x;                        ///< position of the centre [length]
   Vec<D> v = Vec<D>::Zero();       ///< velocity [length/time]
   double radius = 0.5;             ///< hard core [length]
-  double mass = 1;                 ///< [mass]
+  double mass = 1;                 ///< [mass]; infinite: the particle is fixed
   double charge = 0;               ///< [charge]
   std::uint16_t species = 0;       ///< index into System::species
   Spin<D> spin = Spin<D>::Zero();  ///< angular velocity [1/time]
@@ -30,7 +37,7 @@ template <int D>
 struct Particles {
   std::vector<Vec<D>> x;               ///< position of the centre [length]
   std::vector<Vec<D>> v;               ///< velocity [length/time]
-  std::vector<double> mass;            ///< [mass], positive
+  std::vector<double> mass;            ///< [mass], positive; infinite: the particle is fixed, and its velocity is 0
   std::vector<double> radius;          ///< hard core [length], positive
   std::vector<double> charge;          ///< [charge]
   std::vector<std::uint16_t> species;  ///< index into System::species
@@ -54,6 +61,15 @@ struct Particles {
       spin.back() = particle.spin;
     }
     return static_cast<Id>(x.size() - 1);
+  }
+  bool fixed(Id i) const { return is_fixed(mass[i]); }
+  bool any_fixed() const { return std::ranges::any_of(mass, is_fixed); }
+  /// 1 for each fixed particle; empty if there is none.
+  std::vector<char> all_fixed() const {
+    std::vector<char> fixed;
+    if (any_fixed())
+      for (const double m : mass) fixed.push_back(is_fixed(m) ? 1 : 0);
+    return fixed;
   }
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
   Id id_of(Id i) const { return id.empty() ? i : id[i]; }

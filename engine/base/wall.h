@@ -3,8 +3,10 @@
 // A hard wall: a plane with everything a contact with it needs. box.h makes the list of all walls.
 //
 // A wall at normal·x = level(t) acts on the spheres on the side that its normal points to. In a slab it moves on a
-// parabola; in free flight, where slabs are long, a shaken wall adds a sine. A collision turns the velocity v of a
-// sphere along the normal into 2u − v, where u is the velocity of the wall.
+// parabola; in free flight, where slabs are long, a shaken wall adds a sine. A one-way wall reflects a sphere at the
+// moment at which it comes from being wholly in front; all other spheres pass, and one that turns back before it is
+// through leaves as it came. A collision turns the velocity v of a sphere along the normal into 2u − v, where u is the
+// velocity of the wall.
 
 #include <algorithm>
 #include <cmath>
@@ -24,15 +26,17 @@ struct Wall {
   int axis = -1;                   ///< a face of the box is normal to this axis; −1: a further wall
   Vec<D> normal = Vec<D>::Zero();  ///< unit vector into the space of the spheres
   bool one_sided = true;           ///< false: does not act on spheres whose centres are behind the plane
-  double offset = 0;               ///< level at time 0, the start of the slab [length]
-  double velocity = 0;             ///< along the normal, at time 0 [length/time]
-  double acceleration = 0;         ///< along the normal [length/time²]
-  double amplitude = 0;            ///< amplitude of the sine; 0: no sine [length]
-  double frequency = 0;            ///< frequency of the sine [1/time]
-  double turns = 0;                ///< phase of the sine at time 0, in turns
-  double temperature = 0;          ///< a thermal wall has one [energy]; 0: the wall is not thermal
-  std::uint64_t seed = 1;          ///< seed of the random numbers of a thermal wall
-  const Bath* bath = nullptr;      ///< not null: no wall at all, its contacts are the kicks of this bath
+  bool one_way = false;            ///< acts only on spheres that are wholly in front; others pass
+  double depth = 0;            ///< one_way: a sphere that is deeper in the plane by rounding still counts as in front
+  double offset = 0;           ///< level at time 0, the start of the slab [length]
+  double velocity = 0;         ///< along the normal, at time 0 [length/time]
+  double acceleration = 0;     ///< along the normal [length/time²]
+  double amplitude = 0;        ///< amplitude of the sine; 0: no sine [length]
+  double frequency = 0;        ///< frequency of the sine [1/time]
+  double turns = 0;            ///< phase of the sine at time 0, in turns
+  double temperature = 0;      ///< a thermal wall has one [energy]; 0: the wall is not thermal
+  std::uint64_t seed = 1;      ///< seed of the random numbers of a thermal wall
+  const Bath* bath = nullptr;  ///< not null: no wall at all, its contacts are the kicks of this bath
 
   double along_normal(const Vec<D>& v) const { return axis >= 0 ? normal[axis] * v[axis] : normal.dot(v); }
   double level(double t) const {
@@ -50,8 +54,11 @@ struct Wall {
     const double at = level(t);
     if (axis >= 0) return normal[axis] > 0 ? x[axis] - at - radius : -at - radius - x[axis];
     const double distance = normal.dot(x) - at;
+    if (one_way) return distance > radius - depth ? distance - radius : std::numeric_limits<double>::infinity();
     return one_sided || distance > 0 ? distance - radius : std::numeric_limits<double>::infinity();
   }
+  /// The distance of the sphere's surface from the plane, negative for a sphere that is not wholly in front [length].
+  double clearance(const Vec<D>& x, double radius, double t = 0) const { return normal.dot(x) - level(t) - radius; }
   /// The rate at which the gap of a sphere with velocity v grows, and the acceleration without the sine for an
   /// acceleration a.
   double opening(const Vec<D>& v, double t = 0) const { return along_normal(v) - velocity_at(t); }

@@ -27,7 +27,10 @@ const std::vector<Parameter>& wall_parameters() {
         {"seed", integer, "none", "-", "seed of the random numbers of a thermal wall; default: that of [placement]",
          Range::non_negative},
         {"one_sided", boolean, "true", "-",
-         "true: all spheres are on the side of the normal; false: a further wall with spheres on both sides"}};
+         "true: all spheres are on the side of the normal; false: a further wall with spheres on both sides"},
+        {"one_way", boolean, "false", "-",
+         "true: a further wall that reflects spheres that come from the side of the normal and lets spheres that come "
+         "from the other side pass; one that turns back before it is through leaves as it came"}};
   }();
   return all;
 }
@@ -35,6 +38,7 @@ const std::vector<Parameter>& wall_parameters() {
 template <int D>
 void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed) {
   WallOptions<D> wall{.name = given.text("name"), .offset = given.real("offset"), .one_sided = given.flag("one_sided")};
+  wall.one_way = given.flag("one_way");
   if (const auto* normal = given.find<std::vector<double>>("normal")) {
     if (normal->size() != D)
       throw Error(Failure::deck, "the wall '" + wall.name + "' has a normal of " + std::to_string(normal->size()) +
@@ -61,7 +65,9 @@ std::string no_room(const Box<D>& box, double diameter, double after) {
       const bool front_and_rear = one.number >= 2 * D && box.find(one.number) == box.find(other.number);
       const bool facing = (one.normal + other.normal).norm() < 1e-6;
       const double gap = -(one.level(after) + other.level(after));
-      if (front_and_rear || !facing || (diameter > 0 && !(one.one_sided && other.one_sided))) continue;
+      if (front_and_rear || !facing || one.one_way || other.one_way ||
+          (diameter > 0 && !(one.one_sided && other.one_sided)))
+        continue;
       if (gap > 0 && gap >= diameter - box.gap_tolerance()(diameter)) continue;
       return box.wall_name(one.number) + " and " + box.wall_name(other.number) + " leave no room " +
              (diameter > 0 ? "for a diameter of " + short_text(diameter) + " " : "") + "between them at time " +

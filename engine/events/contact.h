@@ -114,4 +114,13 @@ inline double wall_contact_time(double gap, double v, double a, double rest, boo
   return first_fall(Polynomial<2>{{gap, v, 0.5 * a}}, rest);
 }
 
+/// A sphere that is not wholly in front of a one-way wall: the time at which it comes back after it has passed.
+/// `clearance` < 0 is the distance of its surface from the plane, v and a as above.
+inline double return_time(double clearance, double v, double a, double rest) {
+  const double discriminant = v * v - 2 * a * clearance;
+  if (v <= 0 || a >= 0 || discriminant <= 0) return kNever;
+  const double s = (v + std::sqrt(discriminant)) / -a;
+  return s < rest ? s : kNever;
+}
+
 }  // namespace carom

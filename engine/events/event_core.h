@@ -76,6 +76,16 @@ class EventCore {
   /// each, if contacts are rough.
   void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double max_displacement,
             const std::vector<Spin<D>>& spins = {});
+  /// Frees the memory for plans; load() again before the next event.
+  void stop() {
+    search_.clear();
+    queue_.release();
+  }
+  /// Removes all spheres and frees their memory.
+  void release() {
+    stop();
+    flights_.release();
+  }
   const Flights<D>& flights() const { return flights_; }
   /// Adds a sphere; false if there is no room: load again.
   bool admit(const Record<D>& r, const Spin<D>& spin, double now, Slot& slot);

@@ -29,6 +29,11 @@ class EventQueue {
   void fill(double now, double horizon, double entries_per_bin);
   /// Removes all entries from the calendar; plans stay.
   void empty() { calendar_ = Calendar(); }
+  /// Frees the memory for entries and plans until clear().
+  void release() {
+    empty();
+    PageVector<NextEvent<D>>().swap(next_events_);
+  }
 
   NextEvent<D>& operator[](Slot i) { return next_events_[i]; }
   const NextEvent<D>& operator[](Slot i) const { return next_events_[i]; }

@@ -145,12 +145,15 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
 
 template <int D>
 double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const {
+  if (is_fixed(mass(i))) return kNever;
   if (wall.bath) return wall.bath->next_kick(r.id, box_.time, r.t, horizon_);
   const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
   const double gap = wall.gap(r.x, at_record, r.t), opening = wall.opening(r.v, r.t) - rate;
   const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity_at(r.t)));
   const bool touching = gap <= gap_tolerance_(at_record);
   const double rest = horizon_ - r.t;
+  if (wall.one_way && !(gap < kNever))
+    return r.t + return_time(wall.clearance(r.x, at_record, r.t), opening, wall.speeding(g_), rest);
   const double s = wall.amplitude == 0 ? wall_contact_time(gap, opening, wall.speeding(g_), rest, touching, slack)
                                        : shaken_contact(r, at_record, rate, wall, touching, slack);
   if (s == 0 && !(opening < -slack) && !wall.thermal())

@@ -44,6 +44,9 @@ class Flights {
   void load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
             std::span<const Spin<D>> spins = {});
 
+  /// Frees the memory for spheres until the next load().
+  void release() { PageVector<Record<D>>().swap(records_); }
+
   std::size_t size() const { return records_.size(); }
   std::size_t capacity() const { return capacity_; }
   const Packing<D>& packing() const { return packing_; }

@@ -12,6 +12,7 @@
 
 #include "engine/base/contact_log.h"
 #include "engine/base/pages.h"
+#include "engine/base/prefetch.h"
 #include "engine/base/record.h"
 
 namespace carom {
@@ -21,9 +22,9 @@ template <int D>
 struct Node {
   Record<D> after;
   EventKey<D> key;
-  PackedExchange exchange{};
-  double overlap = 0;              ///< at contact, relative to the contact distance
   Spin<D> spin = Spin<D>::Zero();  ///< of the sphere after the event; 0 if no contact is rough
+  PackedExchange exchange{};       ///< not in scripts, like the overlap
+  double overlap = 0;              ///< at contact, relative to the contact distance
 
   /// The other sphere's id; kNoPartner at a wall.
   static constexpr Id kNoPartner = std::numeric_limits<Id>::max();
@@ -85,8 +86,6 @@ class Trace {
     event.id[1] = b.id;
     event.slot[0] = i;
     event.slot[1] = j;
-    event.last[0] = new_entry(i, 0);
-    event.last[1] = j == kNoEntry ? kNoEntry : new_entry(j, 1);
     before_.push_back(a);
     before_.push_back(b);
   }
@@ -99,6 +98,27 @@ class Trace {
     event.exchange = exchange;
     event.overlap = overlap;
     fastest_squared_ = std::max({fastest_squared_, a.v.squaredNorm(), b.v.squaredNorm()});
+  }
+
+  /// Links the entries of each sphere, which the functions below require; calls visit(slot) at its first one and, some
+  /// events earlier, prefetch(slot). In one pass over the complete log the memory of many spheres is fetched at once;
+  /// event by event, each would be waited for.
+  template <class Prefetch, class Visit>
+  void link(Prefetch&& prefetch, Visit&& visit) {
+    constexpr std::size_t kAhead = 8;
+    for (std::size_t n = 0; n < events_.size(); ++n) {
+      if (n + kAhead < events_.size())
+        for (const Slot i : events_[n + kAhead].slot)
+          if (i != kNoEntry) prefetch_line(&latest_[i]), prefetch(i);
+      for (const std::uint32_t which : {0u, 1u}) {
+        const Slot i = events_[n].slot[which];
+        if (i == kNoEntry) continue;
+        const bool first = !has(i);
+        events_[n].last[which] = first ? kNoEntry : latest_[i] - base_;
+        latest_[i] = base_ + 2 * static_cast<std::uint32_t>(n) + which;
+        if (first) visit(i);
+      }
+    }
   }
 
   std::span<const Event> events() const { return events_; }
@@ -124,12 +144,6 @@ class Trace {
  private:
   // The capacity of a log: a window has 0.3 events a sphere.
   static constexpr std::size_t kMaxEvents = 20'000, kMaxEventsPerSphere = 16;
-
-  std::uint32_t new_entry(Slot i, std::uint32_t which) {
-    const std::uint32_t last = has(i) ? latest_[i] - base_ : kNoEntry;
-    latest_[i] = base_ + 2 * static_cast<std::uint32_t>(events_.size() - 1) + which;
-    return last;
-  }
 
   std::vector<Event> events_;
   PageVector<Record<D>> before_;       // by entry

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "engine/base/counters.h"
 #include "engine/base/elementary.h"
@@ -46,24 +48,32 @@ Quanta quanta_of(const System<D>& system) {
   return system.quanta.force > 0 ? system.quanta : quanta(system);
 }
 
-/// One force pass: `add` adds the terms of each interaction, `out` gets the sums.
+/// One force pass: `add` adds the terms of each interaction, `out` gets the sums, on ghosts if `ghosts`.
 template <int D, class Add>
-void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, Counters& counters, Add&& add) {
+void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, Counters& counters, Add&& add,
+                bool ghosts = true) {
   const Stopwatch watch(counters.seconds.force);
   for (const auto& term : system.interactions) add(*term);
   for (Id i = 0; i < out.size(); ++i) out[i] = forces.value(i);
-  system.decomposition.update(out);
+  if (ghosts) system.decomposition.update(out);
   counters.force_passes += 1;
 }
 
 /// out[i] = force on particle i at positions x. If `sums` is given, sets it to V and the other sums over what this rank
-/// owns. One force pass.
+/// owns. If `arrive` is given, the positions of ghosts are unknown until arrive() has been called, and the forces on
+/// them remain so. One force pass.
 template <int D>
 void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Counters& counters,
-                     PotentialSums* sums = nullptr) {
+                     PotentialSums* sums = nullptr, const Arrival& arrive = {}) {
   if (sums) *sums = {.quantum = quanta_of(system).energy};
   ForceSums<D> forces(x.size(), quanta_of(system).force);
-  force_pass<D>(system, out, forces, counters, [&](const auto& term) { term.add_forces(x, forces, sums); });
+  bool waits = static_cast<bool>(arrive);
+  const Arrival once = [&] {
+    if (std::exchange(waits, false)) arrive();
+  };
+  const auto add = [&](const auto& term) { term.add_forces_early(x, forces, sums, once); };
+  force_pass<D>(system, out, forces, counters, add, !arrive);
+  once();
 }
 
 /// out[i] = −∇̄_i V(x, x_new), the mean force of a discrete-gradient step. One force pass.
@@ -118,12 +128,17 @@ void evaluate_hessian_product(const System<D>& system, Positions<D> x, Positions
   force_pass<D>(system, out, sums, counters, [&](const auto& term) { term.add_hessian_product(x, w, sums); });
 }
 
-/// V, Σ|V| and the virial at x, as exact sums; not counted as a force pass.
+/// V, Σ|V| and the virial at x of what this rank owns, as exact sums; not counted as a force pass.
 template <int D>
-PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
+PotentialSums own_energy(const System<D>& system, Positions<D> x) {
   PotentialSums sums{.quantum = quanta_of(system).energy};
   for (const auto& term : system.interactions) term->add_energy(x, sums);
-  return system.decomposition.sum(sums);
+  return sums;
+}
+/// The same of all particles. Collective.
+template <int D>
+PotentialSums evaluate_energy(const System<D>& system, Positions<D> x) {
+  return system.decomposition.sum(own_energy(system, x));
 }
 
 /// The exact sum of term(i) over all particles of all ranks. Collective.
@@ -151,29 +166,29 @@ struct MotionSums {
   }
 };
 
-/// Sums over all particles of a system: the momentum in `state`, the rest in `at`.
+/// Sums over this rank's own particles: the momentum in `state`, the rest in `at`.
 template <int D>
-MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
+MotionSums<D> own_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
   ExactSeries kinetic, speed;
   std::array<ExactSeries, D> momentum;
   for (Id i = 0; i < at.size(); ++i) {
     if (!system.particles.owns(i)) continue;
     const double squared = at.v[i].squaredNorm();
-    kinetic.add(0.5 * at.mass[i] * squared);
+    kinetic.add(0.5 * moving_mass(at.mass[i]) * squared);
     speed.add(std::sqrt(squared));
-    for (int k = 0; k < D; ++k) momentum[k].add(state.mass[i] * state.v[i][k]);
+    for (int k = 0; k < D; ++k) momentum[k].add(moving_mass(state.mass[i]) * state.v[i][k]);
   }
   MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}};
   if (system.box.contacts.rough()) {
     ExactSeries rotational;
     for (Id i = 0; i < at.size(); ++i)
       if (system.particles.owns(i))
-        rotational.add(0.5 * system.box.contacts.moment(at.species[i], at.mass[i], at.radius[i], D) *
+        rotational.add(0.5 * system.box.contacts.moment(at.species[i], moving_mass(at.mass[i]), at.radius[i], D) *
                        at.spin[i].squaredNorm());
     sums.rotational = rotational.sum();
   }
   for (int k = 0; k < D; ++k) sums.momentum[k] = momentum[k].sum();
-  return system.decomposition.sum(sums);
+  return sums;
 }
 
 /// The G of the shadow Hamiltonian S_h = H + h² G that kick-drift-kick Verlet conserves to second order: G = (1/12) vᵀ
@@ -182,12 +197,14 @@ MotionSums<D> evaluate_motion(const System<D>& system, const Particles<D>& state
 template <int D>
 double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D> a, Vectors<D> scratch,
                    Counters& counters) {
-  evaluate_hessian_product<D>(system, at.x, at.v, scratch, counters);
+  std::vector<Vec<D>> v = at.v;  // some methods advance own particles only
+  system.decomposition.update(std::span(v));
+  evaluate_hessian_product<D>(system, at.x, v, scratch, counters);
   ExactSeries sum;
   for (Id i = 0; i < at.size(); ++i) {
     if (!system.particles.owns(i)) continue;
     sum.add(at.v[i].dot(scratch[i]) / 12);
-    sum.add(-at.mass[i] * a[i].squaredNorm() / 24);
+    sum.add(-moving_mass(at.mass[i]) * a[i].squaredNorm() / 24);
   }
   return system.decomposition.sum(sum.sum()).value();
 }

@@ -45,8 +45,7 @@ template <int D>
 PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>& particles) {
   const bool still = step.x_new.empty();
   double squared_from_build = 0, squared_step = 0;
-  bool known = made_ && particles_ == step.x.size() && ghost_ == particles.ghost;
-  known = known && follow(step, squared_from_build, squared_step);
+  const bool known = is_for(step, particles) && follow(step, squared_from_build, squared_step);
   if (!known && !still)
     for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
   if (!made_) skin_.begin(2 * *shared_width_);
@@ -62,12 +61,22 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
   return records_;
 }
 
-/// The largest displacements since the last build. Updates the boxes of particles that were wrapped; returns false if
-/// one was wrapped that is not marked as moving, or if a position is not finite.
 template <int D>
-bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, double& squared_step) {
+PairRecords<D>* CutoffList<D>::cover_own(const PairStep<D>& step, const Particles<D>& particles) {
+  double squared = 0, none = 0;
+  if (particles.ghost.empty() || !is_for(step, particles) || !follow(step, squared, none, true)) return nullptr;
+  if (squared > 0.25 * skin_.width() * skin_.width()) return nullptr;
+  records_.load(step);
+  return &records_;
+}
+
+/// The largest displacements since the last build. Updates the boxes of particles that were wrapped; returns false if
+/// one was wrapped that is not marked as moving, or if a position is not finite. `own_only`: ghosts are left out.
+template <int D>
+bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, double& squared_step, bool own_only) {
   const double allowed = 0.25 * skin_.width() * skin_.width();
   for (std::size_t r = 0; r < records_.order.size(); ++r) {
+    if (own_only && (code_[r] & PartnerSearch::kGhost) != 0) continue;
     const Id i = records_.order[r];
     Vec<D> home;
     for (int k = 0; k < D; ++k) home[k] = built_at_[k][r];

@@ -29,11 +29,17 @@ class CutoffList {
   /// ghosts and ids. Throws Error(Failure::numerical) if positions are not finite, or for steps of several periodic
   /// boxes or with far too many pairs.
   PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles);
+  /// The pairs of own particles at x, where the positions of ghosts are unknown; null if a new list is needed for them,
+  /// or if there are no ghosts.
+  PairRecords<D>* cover_own(const PairStep<D>& step, const Particles<D>& particles);
 
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
 
  private:
-  bool follow(const PairStep<D>& step, double& squared_from_build, double& squared_step);
+  bool is_for(const PairStep<D>& step, const Particles<D>& particles) const {
+    return made_ && particles_ == step.x.size() && ghost_ == particles.ghost;
+  }
+  bool follow(const PairStep<D>& step, double& squared_from_build, double& squared_step, bool own_only = false);
   void build(const PairStep<D>& step, const Particles<D>& particles);
   void find_pairs(std::uint32_t row, std::span<const struct PartnerRange> ranges);
 

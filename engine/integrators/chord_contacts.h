@@ -53,7 +53,7 @@ class ChordContacts {
       for (const Wall<D>& wall : scan_.walls()) {
         key.lo = i;
         key.hi = wall.number;
-        if (scan_.rests(key)) continue;
+        if (system_.particles.fixed(i) || scan_.rests(key)) continue;
         const double radius = system_.particles.radius[i];
         judge_wall(key, wall.gap(x[i], radius), wall.opening(chord[i], 0.5 * tau), wall.opening(v[i]),
                    wall.opening(v_end[i], tau), radius, tau, scan_.rounding_speed(i, v[i]), end);

@@ -371,8 +371,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
       const Vec<D> e = mean_[i] - a_[i];
-      lack.add(p.mass[i] * (e.dot(x[i] - p.x[i] - h * v[i]) - 0.5 * h * h * e.squaredNorm()));
-      kinetic.add(0.5 * p.mass[i] * (v_end_[i] - centre()).squaredNorm());
+      lack.add(moving_mass(p.mass[i]) * (e.dot(x[i] - p.x[i] - h * v[i]) - 0.5 * h * h * e.squaredNorm()));
+      kinetic.add(0.5 * moving_mass(p.mass[i]) * (v_end_[i] - centre()).squaredNorm());
     }
     const Sums sums = system.decomposition.sum(Sums{lack.sum(), kinetic.sum()});
     const double missing = sums.missing.value(), most = kMostFolded * sums.kinetic.value();
@@ -387,8 +387,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       balance_.frozen =
           static_cast<std::uint64_t>(sum_over_all<D>(system, [&](Id i) { return frozen(i) ? 1.0 : 0.0; }));
     if (folds) return true;
-    const double forces = sum_over_all<D>(
-        system, [&](Id i) { return p.mass[i] * std::sqrt(mean_[i].squaredNorm() * p.x[i].squaredNorm()); });
+    const double forces = sum_over_all<D>(system, [&](Id i) {
+      return moving_mass(p.mass[i]) * std::sqrt(mean_[i].squaredNorm() * p.x[i].squaredNorm());
+    });
     return std::abs(missing) <= kRoundingOfForces * (forces + pressing);
   }
 

@@ -19,7 +19,11 @@ template <int D>
 class FreeFlight : public Integrator<D> {
  public:
   explicit FreeFlight(const Parameters& parameters)
-      : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
+      : max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {
+    if (const bool* given = parameters.find<bool>("lengthen")) lengthens_ = *given;
+  }
+
+  bool lengthens() const override { return lengthens_; }
 
   void start(System<D>& system, Counters&) override {
     Communicator& ranks = system.decomposition.ranks();
@@ -86,10 +90,16 @@ class FreeFlight : public Integrator<D> {
     }
     end_at(report.reached);
     report.counters.events = flight.counts();
+    report.boxes = 0;
+    for (int k = 0; k < D; ++k)
+      if (const double edge = system.box.edges[k]; system.box.periodic(k))
+        for (const Vec<D>& x : system.particles.x)
+          report.boxes = std::max({report.boxes, x[k] / edge - 1, -x[k] / edge});
     system.wrap();
   }
 
   std::uint64_t max_events_;
+  bool lengthens_ = false;
   Vec<D> g_ = Vec<D>::Zero();
   std::optional<EventCore<D>> core_;  // one of these two is used
   std::optional<WindowedFlight<D>> windowed_;
@@ -107,13 +117,20 @@ IntegratorInfo free_flight() {
       "length of an epoch, after which all particles are moved to the same time; default: about forty mean free times, "
       "but at most a tenth of the relaxation time of a bath of type rescaling, which acts at the ends of "
       "epochs";
+  Parameter lengthen{.name = "lengthen",
+                     .type = Parameter::Type::boolean,
+                     .fallback = "none",
+                     .unit = "-",
+                     .meaning =
+                         "whether an epoch may be 4, 16, 64, … steps long if the spheres had too few collisions in the "
+                         "one before, as where few spheres have most of the energy; default: true if no step is given"};
   Parameter limit = parameter::max_events_per_step();
   limit.meaning = "largest number of collisions per particle in an epoch; more end the run with an error";
   return {.name = "free-flight",
           .title = "Event-driven hard spheres",
           .order = "exact",
           .conserves = "energy and linear momentum, to rounding",
-          .parameters = {epoch, limit},
+          .parameters = {epoch, lengthen, limit},
           .documentation =
               "Exact flight between collisions, for hard spheres without forces or in a uniform field. There is "
               "no time step: the trajectory is exact to rounding. `step` is only the length of an epoch.",

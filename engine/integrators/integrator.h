@@ -22,7 +22,7 @@ struct Slab {
   std::int64_t index = 0;  ///< number of the step or epoch
   double start = 0;        ///< simulated time at its start
   double length = 0;       ///< > 0
-  std::int64_t steps = 1;  ///< in this length; more than one only in free flight of a gas that has cooled
+  std::int64_t steps = 1;  ///< in this length; more than one only in free flight
   /// Free flight stops at this many pair collisions (counted by Counters::sphere_sphere from the start of the run).
   std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();
 };
@@ -35,6 +35,7 @@ struct SlabReport {
   std::span<const double> observe{};  ///< ascending times within the slab at which to observe (free flight only)
   std::function<void(double, const Particles<D>&)> observer{};  ///< gets copies moved to each of these times
   SlabWatch* watch = nullptr;  ///< lets stepping methods abandon a long slab; null: it is always completed
+  double boxes = 0;            ///< set by free flight: PastEpoch::boxes of this slab and rank
   double reached =
       0;  ///< set by the integrator: the time reached within the slab; below the length only at collision_limit
 };
@@ -51,6 +52,9 @@ class Integrator {
   /// Advances the system from the start to the end of the slab; afterwards all particles are at its end, wrapped.
   /// Throws Error(Failure::numerical) with the particles' names if a step fails.
   virtual void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) = 0;
+
+  /// Whether the slab after this one may be longer than a step, by a power of four (free flight).
+  virtual bool lengthens() const { return false; }
 
   /// The state at which energies are measured, if it is not the system itself (mcva, variant restart).
   virtual const Particles<D>* energy_state() const { return nullptr; }

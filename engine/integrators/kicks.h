@@ -17,9 +17,11 @@ struct Accelerations {
     update(system, counters);
   }
   /// Evaluates a at the system's positions: one force pass.
-  void update(const System<D>& system, Counters& counters) {
+  void update(const System<D>& system, Counters& counters) { update(system, system.particles.x, counters, {}); }
+  /// Evaluates a at x, see evaluate_forces(). If arrive() throws, a has not changed.
+  void update(const System<D>& system, Positions<D> x, Counters& counters, const Arrival& arrive) {
     a.resize(system.particles.size());
-    evaluate_forces<D>(system, system.particles.x, a, counters, &sums);
+    evaluate_forces<D>(system, x, a, counters, &sums, arrive);
     for (std::size_t i = 0; i < a.size(); ++i) a[i] /= system.particles.mass[i];
   }
 };

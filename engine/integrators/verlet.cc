@@ -20,17 +20,25 @@ class Verlet : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
-    system.decomposition.need_step(accelerations_.a, slab.length);
-    kick(p.v, accelerations_.a, 0.5 * slab.length);
-    for (std::size_t i = 0; i < p.size(); ++i) p.x[i] += slab.length * p.v[i];
-    accelerations_.update(system, report.counters);
-    kick(p.v, accelerations_.a, 0.5 * slab.length);
+    x_.resize(p.size());
+    v_.resize(p.size());
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      v_[i] = p.v[i] + (0.5 * slab.length) * accelerations_.a[i];
+      x_[i] = p.x[i] + slab.length * v_[i];
+    }
+    // Ghosts get positions only. Nothing has changed yet if finish_step() throws.
+    system.decomposition.start_step(x_, v_, slab.length);
+    accelerations_.update(system, x_, report.counters, [&] { system.decomposition.finish_step(x_); });
+    kick(v_, accelerations_.a, 0.5 * slab.length);
+    p.x.swap(x_);
+    p.v.swap(v_);
     system.wrap();
     report.reached = slab.length;
   }
 
  private:
   Accelerations<D> accelerations_;
+  std::vector<Vec<D>> x_, v_;  // at the end of the drift
 };
 
 }  // namespace

@@ -30,8 +30,20 @@ class Communicator {
   virtual std::vector<Bytes> gather(const Bytes& mine) { return {mine}; }
   /// Replaces each of `most` by its maximum over all ranks and each of `sums` by its sum.
   virtual void combine(std::span<double> /*most*/, std::span<std::uint64_t> /*sums*/) {}
+  /// Begins an exchange between neighbours as swap(), with sizes[k] bytes to come from partners[k], and a combine().
+  /// Both end with complete(), which returns the messages; until then `most` must stay, and no other call but swap() of
+  /// all ranks and gather() is allowed.
+  virtual void start(std::vector<Bytes> outgoing, std::span<const int> partners, std::span<const std::size_t> /*sizes*/,
+                     std::span<double> most) {
+    arrived_ = swap(std::move(outgoing), partners);
+    combine(most, {});
+  }
+  virtual std::vector<Bytes> complete() { return std::move(arrived_); }
   void largest(std::span<double> values) { combine(values, {}); }
   void sum(std::span<std::uint64_t> values) { combine({}, values); }
+
+ private:
+  std::vector<Bytes> arrived_;
 };
 
 /// The messages of all ranks, by rank, on rank 0; empty messages on other ranks. Collective.
@@ -106,6 +118,15 @@ class TimedCommunicator final : public Communicator {
   void combine(std::span<double> most, std::span<std::uint64_t> sums) override {
     const Stopwatch watch(seconds_);
     ranks_.combine(most, sums);
+  }
+  void start(std::vector<Bytes> outgoing, std::span<const int> partners, std::span<const std::size_t> sizes,
+             std::span<double> most) override {
+    const Stopwatch watch(seconds_);
+    ranks_.start(std::move(outgoing), partners, sizes, most);
+  }
+  std::vector<Bytes> complete() override {
+    const Stopwatch watch(seconds_);
+    return ranks_.complete();
   }
   double seconds() const { return seconds_; }
 

@@ -139,11 +139,7 @@ void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
 
 template <int D>
 void Decomposition<D>::migrate(bool all, double slab_length) {
-  if (!all && migrate_to_near(slab_length)) return;
-  if (by_place_ && all_known_)
-    divide_ownership();
-  else
-    migrate_to_all();
+  if (all || !migrate_to_near(slab_length)) migrate_to_all();
 }
 
 /// The messages of pack_own(). Afterwards this rank has no particles.
@@ -202,16 +198,9 @@ void Decomposition<D>::migrate_to_all() {
       ranks_->gather(pack({total() / blocks().ranks}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
   all_known_ = true;
   receive_particles(system_.fields, system_.particles, messages, total());
-  divide_ownership();
-}
-
-/// Divides ownership again; all ranks must have all particles.
-template <int D>
-void Decomposition<D>::divide_ownership() {
   constexpr double kAll = std::numeric_limits<double>::infinity();
   Communicator alone;
   assign(Bisection<D>(system_.box, system_.particles.x, blocks().ranks, kAll, alone), kAll);
-  system_.fields.release_working();
   system_.fields.prepare_working();
 }
 
@@ -236,13 +225,20 @@ void Decomposition<D>::need_paths(double path) {
 }
 
 template <int D>
-void Decomposition<D>::need_step(std::span<const Vec<D>> a, double length) {
-  if (knows_all()) return;
-  const Particles<D>& p = system_.particles;
+void Decomposition<D>::start_step(std::span<Vec<D>> x, std::span<const Vec<D>> v, double length) {
+  if (!by_place_) return;
   double farthest = 0;
-  for (Id i = 0; i < p.size(); ++i)
-    if (p.owns(i)) farthest = std::max(farthest, (p.v[i] + 0.5 * length * a[i]).squaredNorm());
-  need_paths(length * std::sqrt(largest(farthest)));
+  for (Id i = 0; i < v.size(); ++i)
+    if (system_.particles.owns(i)) farthest = std::max(farthest, v[i].squaredNorm());
+  longest_path_ = length * std::sqrt(farthest);
+  halo_.start(*ranks_, {&longest_path_, 1}, x);
+}
+
+template <int D>
+void Decomposition<D>::finish_step(std::span<Vec<D>> x) {
+  if (!by_place_) return;
+  halo_.finish(*ranks_, x);
+  need_paths(longest_path_);
 }
 
 template <int D>

@@ -104,8 +104,11 @@ class Decomposition {
   }
   /// Throws HaloTooSmall unless the halos suffice for a slab in which the longest path on any rank is `path` [length].
   void need_paths(double path);
-  /// need_paths() for a step of a kick-drift-kick method.
-  void need_step(std::span<const Vec<D>> a, double length);
+  /// For a step of this length [time] in which own particles move to x at velocities v: between start_step() and
+  /// finish_step() the positions of their owners travel to ghosts. finish_step() throws HaloTooSmall unless the halos
+  /// suffice. With one rank they do nothing.
+  void start_step(std::span<Vec<D>> x, std::span<const Vec<D>> v, double length);
+  void finish_step(std::span<Vec<D>> x);
   /// Throws HaloTooSmall because ghosts that matter went wrong; the halo must be deeper.
   [[noreturn]] void need_deeper_halo();
   /// Whether the motion of a ghost matters to own particles.
@@ -124,7 +127,6 @@ class Decomposition {
   void migrate(bool all, double slab_length);
   bool migrate_to_near(double slab_length);
   void migrate_to_all();
-  void divide_ownership();
   std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver);
   void assign(const Bisection<D>& bisection, double near);
 
@@ -139,7 +141,8 @@ class Decomposition {
   bool local_ = false, all_known_ = false;
   HaloWidth width_;
   HaloExchange<D> halo_;
-  std::int64_t next_ = 0;  // while all_known_: the slab before which to divide again
+  double longest_path_ = 0;  // of the step between start_step() and finish_step()
+  std::int64_t next_ = 0;    // while all_known_: the slab before which to divide again
   std::int64_t slabs_with_all_ = 1;
 };
 

@@ -20,8 +20,12 @@ std::vector<Value> sent_to_near(const Bisection<D>& bisection, Communicator& ran
   for_each([&](const Vec<D>& x, const Value& value) {
     bisection.for_each_near(x, [&](std::uint32_t rank) { put(outgoing[rank], value); });
   });
+  std::vector<Bytes> incoming = ranks.swap(std::move(outgoing));
+  std::size_t size = 0;
+  for (const Bytes& bytes : incoming) size += bytes.size();
   std::vector<Value> near;
-  for (Bytes& bytes : ranks.swap(std::move(outgoing))) {
+  near.reserve(size / sizeof(Value));
+  for (Bytes& bytes : incoming) {
     for (Reader reader(bytes); reader.more();) near.push_back(reader.get<Value>());
     Bytes().swap(bytes);
   }
@@ -29,24 +33,27 @@ std::vector<Value> sent_to_near(const Bisection<D>& bisection, Communicator& ran
 }
 
 /// From blocks of all particles, `block` on this rank, makes the particles of this rank's subdomain and, as ghosts,
-/// copies of particles within `distance` of it up to rounding. Only x, radius, id and ghost are set. Collective.
+/// copies of particles within `distance` of it up to rounding. Only x, radius, id, ghost and, as 1 or infinite,
+/// mass are set. Collective.
 template <int D>
 Particles<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, const Particles<D>& block) {
   struct Copy {
     Vec<D> x;
-    double radius;
+    double radius, mass;
     Id id;
   };
   const Bisection<D> bisection(box, block.x, static_cast<std::size_t>(ranks.size()), distance * (1 + 1e-6), ranks);
   auto copies = sent_to_near<Copy>(bisection, ranks, [&](auto&& send) {
     for (Id i = 0; i < block.size(); ++i)
-      send(bisection.wrapped(block.x[i]), Copy{block.x[i], block.radius[i], block.id_of(i)});
+      send(bisection.wrapped(block.x[i]),
+           Copy{block.x[i], block.radius[i], block.fixed(i) ? block.mass[i] : 1, block.id_of(i)});
   });
   std::ranges::sort(copies, {}, &Copy::id);
   Particles<D> halo;
   for (const Copy& copy : copies) {
     halo.x.push_back(copy.x);
     halo.radius.push_back(copy.radius);
+    halo.mass.push_back(copy.mass);
     halo.id.push_back(copy.id);
     halo.ghost.push_back(bisection.owner(bisection.wrapped(copy.x)) != static_cast<std::uint32_t>(ranks.rank()));
   }

@@ -2,6 +2,7 @@
 #pragma once
 // Owners of a rank's ghosts, ranks with ghosts of its own particles, and the exchange that updates ghosts.
 
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -29,17 +30,33 @@ class HaloExchange {
   /// Ghosts get the values of their owners; each vector has an entry for each particle of this rank. Collective.
   template <class... T>
   void update(Communicator& ranks, std::span<T>... values) const {
+    start(ranks, {}, values...);
+    finish(ranks, values...);
+  }
+  /// update() in two parts, between which the values are unknown; finish() also replaces each of `most` by its maximum
+  /// over all ranks.
+  template <class... T>
+  void start(Communicator& ranks, std::span<double> most, std::span<T>... values) const {
+    constexpr std::size_t kBytes = (sizeof(T) + ...);
     std::vector<Bytes> outgoing(neighbours_.size());
+    std::vector<std::size_t> sizes;
     for (std::size_t k = 0; k < neighbours_.size(); ++k) {
-      const auto& mine = copied_to_[static_cast<std::size_t>(neighbours_[k])];
-      outgoing[k].reserve(mine.size() * (sizeof(T) + ...));
-      for (const Id i : mine) (put(outgoing[k], values[i]), ...);
+      const auto rank = static_cast<std::size_t>(neighbours_[k]);
+      sizes.push_back(kBytes * copies_of_[rank].size());
+      outgoing[k].resize(kBytes * copied_to_[rank].size());
+      std::byte* to = outgoing[k].data();
+      for (const Id i : copied_to_[rank])
+        ((std::memcpy(to, static_cast<const void*>(&values[i]), sizeof(T)), to += sizeof(T)), ...);
     }
-    const std::vector<Bytes> incoming = ranks.swap(std::move(outgoing), neighbours_);
+    ranks.start(std::move(outgoing), neighbours_, sizes, most);
+  }
+  template <class... T>
+  void finish(Communicator& ranks, std::span<T>... values) const {
+    const std::vector<Bytes> incoming = ranks.complete();
     for (std::size_t k = 0; k < neighbours_.size(); ++k) {
-      Reader from(incoming[k]);
+      const std::byte* from = incoming[k].data();
       for (const Id i : copies_of_[static_cast<std::size_t>(neighbours_[k])])
-        ((values[i] = from.template get<T>()), ...);
+        ((std::memcpy(static_cast<void*>(&values[i]), from, sizeof(T)), from += sizeof(T)), ...);
     }
   }
 

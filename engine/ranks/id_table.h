@@ -16,7 +16,7 @@ class IdTable {
 
   /// Removes all entries and makes room for `most`.
   void clear(std::size_t most) {
-    mask_ = std::bit_ceil(2 * most + 2) - 1;
+    mask_ = std::bit_ceil(most + most / 2 + 2) - 1;
     entries_.assign(mask_ + 1, {});
   }
 

@@ -35,22 +35,22 @@ std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const s
 /// occur twice; `total` is the number of particles on all ranks.
 template <int D>
 void receive_particles(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total) {
-  struct Arrival {
+  struct Received {
     Id id;
     const std::byte* at;
   };
-  std::vector<Arrival> arrivals;
+  std::vector<Received> arrivals;
   for (const Bytes& message : messages)
     for (Reader from(message); from.more();) {
       const Id id = from.template get<Id>();
       arrivals.push_back({id, from.skip(fields.bytes())});
     }
-  std::ranges::sort(arrivals, {}, &Arrival::id);
+  std::ranges::sort(arrivals, {}, &Received::id);
   fields.resize(arrivals.size());
   for (Id i = 0; i < arrivals.size(); ++i) fields.unpack(i, arrivals[i].at);
   p.id.clear();
   if (arrivals.size() < total)
-    for (const Arrival& arrival : arrivals) p.id.push_back(arrival.id);
+    for (const Received& arrival : arrivals) p.id.push_back(arrival.id);
   p.ghost.assign(p.size(), 0);
 }
 

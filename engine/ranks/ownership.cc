@@ -16,6 +16,7 @@ void Ownership<D>::load(const Bisection<D>& bisection, std::uint32_t number, dou
   watched_.clear();
   holders_.assign(slots, 0);
   role_.assign(slots, Role::none);
+  watched_at_.assign(slots, kUnwatched);
   for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, Role::own);
 }
 
@@ -45,12 +46,15 @@ template <int D>
 void Ownership<D>::watch(double now) {
   unwatched_ = 0;
   const double reach = bisection_->reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
-  std::erase_if(watched_, [&](const Watched& each) { return role_[each.slot] != Role::ghost; });
-  for (Slot i = 0; i < core_.flights().size(); ++i)
-    if (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)
-      watched_.push_back({i, 0});
+  watched_.clear();
+  watched_at_.assign(role_.size(), kUnwatched);
   std::vector<Slot> slots;
-  for (const Watched& each : watched_) slots.push_back(each.slot);
+  for (Slot i = 0; i < core_.flights().size(); ++i)
+    if (is_ghost(i) ||
+        (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)) {
+      watch_over(i);
+      slots.push_back(i);
+    }
   core_.set_border(slots, now);
 }
 
@@ -60,12 +64,11 @@ template <int D>
 typename Ownership<D>::Watched Ownership<D>::look_at(Slot i, double now) {
   const Flights<D>& flights = core_.flights();
   const Vec<D> at = bisection_->wrapped(flights.at(i, now).x);
-  const double speed = flights[i].v.norm() + flights.g().norm() * flights.horizon();
   const double depth = bisection_->depth(number_, at), reach = bisection_->reach();
   if (bisection_->deep(depth)) {
     role_[i] = Role::own;
     holders_[i] = 0;
-    return {i, depth - (1 + 1e-6) * reach, (1 + 1e-6) * speed};
+    return {i, depth - (1 + 1e-6) * reach, speed(i)};
   }
   holders_[i] = 0;
   double quiet;
@@ -82,12 +85,12 @@ typename Ownership<D>::Watched Ownership<D>::look_at(Slot i, double now) {
     const double squared = bisection_->squared_distance(number_, at), away = std::sqrt(squared);
     if (squared > reach * reach) {
       forget(i);
-      return {i, 0};
+      return {i};
     }
     role_[i] = Role::ghost;
     quiet = std::min(away, reach - away);
   }
-  return {i, quiet - 1e-6 * reach, (1 + 1e-6) * speed};
+  return {i, quiet - 1e-6 * reach, speed(i)};
 }
 
 template <int D>
@@ -96,7 +99,7 @@ bool Ownership<D>::admit(const Record<D>& r, double now, const Spin<D>& spin) {
   Slot slot = 0;
   if (!core_.admit(r, spin, now, slot)) return false;
   enlist(slot, Role::ghost);
-  watched_.push_back({slot, 0});
+  watch_over(slot);
   return true;
 }
 

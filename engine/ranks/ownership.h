@@ -7,8 +7,10 @@
 
 #include <bit>
 #include <limits>
+#include <utility>
 #include <vector>
 
+#include "engine/base/prefetch.h"
 #include "engine/events/event_core.h"
 #include "engine/ranks/bisection.h"
 #include "engine/ranks/id_table.h"
@@ -38,10 +40,17 @@ class Ownership {
   std::uint64_t holders(Slot i) const { return holders_[i]; }
   Slot slot_of(Id id) const { return slots_.find(id); }
   bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero());
-  /// As in Subdomain, after a window of this `length` [time]. Only spheres with deflected(slot) true may have changed
-  /// their velocities in it.
-  template <class Deflected, class Send>
-  void sort_out(double now, double length, Deflected&& deflected, Send&& send);
+  void prefetch(Slot i) const {
+    prefetch_line(&role_[i]);
+    prefetch_line(&watched_at_[i]);
+  }
+  /// Call for each sphere whose velocity may have changed in a window.
+  void turn(Slot i) {
+    if (watched_at_[i] != kUnwatched) watched_[watched_at_[i]].speed = kTurned;
+  }
+  /// As in Subdomain, after a window of this `length` [time].
+  template <class Send>
+  void sort_out(double now, double length, Send&& send);
 
   /// The region, between two corners, in which a ghost with this record can meet own spheres before `end`: own spheres
   /// stay within `max_displacement` of the subdomain, and are known within another two. False if it is empty.
@@ -51,20 +60,30 @@ class Ownership {
   bool may_meet(const Record<D>& r, Slot j, const Vec<D>& shift, double end) const;
 
  private:
-  static constexpr double kUnknown = -1;
   static constexpr double kWindowsBetweenSearches = 20;       // windows between searches for spheres at the border
   enum class Role : std::uint8_t { none, own, seen, ghost };  // none: empty slot; seen: own, and a ghost elsewhere
 
   struct Watched {
     Slot slot;
-    double quiet;             // how far it may move before it must be examined again
-    double speed = kUnknown;  // until its next event; unknown: unlimited
+    double quiet = 0;  // how far it may move before it must be examined again
+    double speed = 0;  // the largest until its next event, or kTurned
   };
+  static constexpr double kTurned = -1;
+  static constexpr std::uint32_t kUnwatched = std::numeric_limits<std::uint32_t>::max();
 
+  void watch_over(Slot i) {
+    watched_at_[i] = static_cast<std::uint32_t>(watched_.size());
+    watched_.push_back({i});
+  }
   void enlist(Slot i, Role role);
   void forget(Slot i);
   void watch(double now);
   Watched look_at(Slot i, double now);
+  /// The largest speed of a sphere until its next event.
+  double speed(Slot i) const {
+    const Flights<D>& flights = core_.flights();
+    return (1 + 1e-6) * (flights[i].v.norm() + flights.g().norm() * flights.horizon());
+  }
   /// The largest distance of a sphere from its record before `end`.
   double way(const Record<D>& r, double end) const {
     const double time = end - r.t;
@@ -77,30 +96,38 @@ class Ownership {
   double max_displacement_ = 0;  // largest displacement in a window
   double unwatched_ = 0;         // the largest displacement of spheres since watch()
   IdTable slots_;
-  std::vector<Role> role_;              // by slot
-  std::vector<std::uint64_t> holders_;  // by slot
-  std::vector<Watched> watched_;        // ghosts, and own spheres that may leave or become ghosts elsewhere
+  std::vector<Role> role_;                 // by slot
+  std::vector<std::uint32_t> watched_at_;  // by slot: index in watched_, or kUnwatched
+  std::vector<std::uint64_t> holders_;     // by slot
+  std::vector<Watched> watched_;           // ghosts, and own spheres that may leave or become ghosts elsewhere
 };
 
 template <int D>
-template <class Deflected, class Send>
-void Ownership<D>::sort_out(double now, double length, Deflected&& deflected, Send&& send) {
+template <class Send>
+void Ownership<D>::sort_out(double now, double length, Send&& send) {
   if (unwatched_ += max_displacement_; unwatched_ > kWindowsBetweenSearches * max_displacement_) watch(now);
-  std::size_t stay = 0;
-  for (Watched each : watched_) {
+  for (std::size_t k = 0; k < watched_.size();) {
+    Watched& each = watched_[k];
     const Slot i = each.slot;
-    if (each.speed >= 0 && deflected(i)) each.speed = kUnknown;
-    each.quiet -= each.speed >= 0 ? each.speed * length : max_displacement_;
-    if (!(each.quiet > 0)) {
+    const bool turned = each.speed == kTurned;
+    each.quiet -= turned ? max_displacement_ : each.speed * length;
+    if (each.quiet > 0) {
+      if (turned) each.speed = speed(i);
+    } else {
       const std::uint64_t before = holders_[i];
       each = look_at(i, now);
-      if (role_[i] == Role::none) continue;
+      if (role_[i] == Role::none) {  // the last one takes its place
+        watched_at_[i] = kUnwatched;
+        each = watched_.back();
+        watched_.pop_back();
+        if (k < watched_.size()) watched_at_[watched_[k].slot] = static_cast<std::uint32_t>(k);
+        continue;
+      }
       for (std::uint64_t fresh = holders_[i] & ~before; fresh != 0; fresh &= fresh - 1)
         send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
     }
-    watched_[stay++] = each;
+    ++k;
   }
-  watched_.resize(stay);
 }
 
 }  // namespace carom

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ranks/path_exchange.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace carom {
@@ -21,22 +22,18 @@ std::vector<Bytes> PathExchange<D>::swap() {
 }
 
 template <int D>
-std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain) {
-  received_.clear();
+std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain, const std::function<bool(bool)>& agree) {
   std::uint64_t rounds = 0;
-  for (double more = 1; more > 0; ++rounds) {
+  for (bool more = true; more; ++rounds) {
     if (subdomain) add_paths(*subdomain);
-    for (const Bytes& bytes : received_.emplace_back(swap()))
+    for (const Bytes& bytes : swap())
       for (Reader reader(bytes); subdomain && reader.more();) {
-        const auto id = reader.get<Id>();
-        subdomain->follow(id, reader);
+        const Slot ghost = subdomain->ownership().slot_of(reader.get<Id>());
+        subdomain->paths().read_script(ghost, reader);
       }
-    more = 0;
-    if (subdomain) {
-      subdomain->repair();
-      for (const Slot i : subdomain->changed()) more = subdomain->holders(i) != 0 ? 1 : more;
-    }
-    ranks_.largest({&more, 1});
+    if (subdomain) subdomain->repair();
+    more = agree(subdomain &&
+                 std::ranges::any_of(subdomain->changed(), [&](Slot i) { return subdomain->ownership().is_seen(i); }));
   }
   return rounds;
 }
@@ -44,10 +41,10 @@ std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain) {
 template <int D>
 void PathExchange<D>::add_paths(Subdomain<D>& subdomain) {
   for (const Slot i : subdomain.changed())
-    for (std::uint64_t holders = subdomain.holders(i); holders != 0; holders &= holders - 1) {
+    for (std::uint64_t holders = subdomain.ownership().holders(i); holders != 0; holders &= holders - 1) {
       Bytes& bytes = outgoing_[static_cast<std::size_t>(std::countr_zero(holders))];
       put(bytes, subdomain.flights()[i].id);
-      subdomain.write_path(i, bytes);
+      subdomain.paths().write(i, bytes);
     }
 }
 

@@ -2,6 +2,8 @@
 #pragma once
 // Messages between neighbouring subdomains: ghosts that a neighbour lacks, and the paths that make a window consistent.
 
+#include <functional>
+
 #include "engine/ranks/subdomain.h"
 
 namespace carom {
@@ -20,17 +22,17 @@ class PathExchange {
   }
   /// Sends the messages; returns the messages received from the neighbours. Collective.
   std::vector<Bytes> swap();
-  /// Exchanges the paths of a window and repairs it until no path changes on any rank; returns the number of rounds.
-  /// Call once a window: received messages are kept until the next call. Null: this rank has no subdomain. Collective.
-  std::uint64_t make_consistent(Subdomain<D>* subdomain);
+  /// Exchanges the paths of a window and repairs it, in rounds; returns their number. After each round agree(changed)
+  /// is called, which gets whether paths changed here that a neighbour has, and returns whether a path changed on any
+  /// rank: then there is another round. Null: this rank has no subdomain. Collective.
+  std::uint64_t make_consistent(Subdomain<D>* subdomain, const std::function<bool(bool)>& agree);
 
  private:
   void add_paths(Subdomain<D>& subdomain);
 
   Communicator& ranks_;
-  std::vector<int> partners_;                 // ranks of the neighbours
-  std::vector<Bytes> outgoing_;               // for each of them
-  std::vector<std::vector<Bytes>> received_;  // paths received in this window
+  std::vector<int> partners_;    // ranks of the neighbours
+  std::vector<Bytes> outgoing_;  // for each of them
 };
 
 }  // namespace carom

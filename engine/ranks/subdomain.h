@@ -14,9 +14,11 @@
 //
 //   subdomain.load(records, bisection, number, …);
 //   subdomain.run(now, end);
-//   while (…) { subdomain.follow(id, message); …; subdomain.repair(); … subdomain.changed() … }
+//   while (…) { subdomain.paths().read_script(ghost, message); …; subdomain.repair(); … subdomain.changed() … }
 //   subdomain.commit();
-//   subdomain.sort_out(now, send); …; subdomain.admit(record, now, spin);
+//   subdomain.sort_out(now, send); …; subdomain.ownership().admit(record, now, spin);
+
+#include <optional>
 
 #include "engine/ranks/window_repair.h"
 
@@ -27,32 +29,29 @@ class Subdomain {
  public:
   /// `sizes` has the masses and radii of all spheres and must outlive the subdomain.
   Subdomain(const Box<D>& box, const Sizes& sizes, const SearchOptions& options)
-      : box_(box),
-        core_(box, &sizes, options),
-        ownership_(core_),
-        paths_(core_.flights(), ownership_),
-        repair_(box, core_, ownership_, paths_) {}
+      : box_(box), core_(box, &sizes, options) {}
 
   /// Starts at time `now` as subdomain `number` of a bisection, with all spheres near it. In no window may a sphere
   /// move farther than `max_displacement`.
   void load(std::vector<Record<D>> records, const Bisection<D>& bisection, std::uint32_t number, const Vec<D>& g,
             double horizon, double now, double max_displacement, const std::vector<Spin<D>>& spins = {});
 
+  /// Frees the memory for plans, and release() that for spheres, until the next load().
+  void stop() { core_.stop(); }
+  void release();
+
   // Between windows: no event before the time `now` may be pending.
 
-  std::vector<Slot> own() const { return ownership_.own(); }
+  std::vector<Slot> own() const { return ownership_->own(); }
   const Flights<D>& flights() const { return core_.flights(); }
+  Ownership<D>& ownership() { return *ownership_; }
+  WindowPaths<D>& paths() { return *paths_; }
+  const WindowPaths<D>& paths() const { return *paths_; }
   /// Updates ownership and ghosts here and elsewhere, and removes spheres that are neither own nor ghosts. Calls
   /// send(k, record) for spheres that the k-th neighbour lacks and must admit.
   template <class Send>
   void sort_out(double now, Send&& send) {
-    const auto deflected = [&](Slot i) { return paths_.trace().has(i) || disturbed_[i] != 0; };
-    ownership_.sort_out(now, length_, deflected, send);
-    for (const auto& each : other_) disturbed_[each.slot] = 0;
-  }
-  /// Adds a ghost; false if there is no room: load again.
-  bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero()) {
-    return ownership_.admit(r, now, spin);
+    ownership_->sort_out(now, length_, send);
   }
 
   // In a window.
@@ -61,64 +60,42 @@ class Subdomain {
   /// cut it before that. Returns `end`, or the time of the first event for which the log has no room; the window is
   /// then invalid too.
   double run(double now, double end);
-  void write_path(Slot i, Bytes& to) const { paths_.write(i, to); }
-  /// Reads the script of a ghost; the message must stay until the end of the window.
-  void follow(Id id, Reader& message) { paths_.read_script(slot_of(id), message); }
-  void repair() { changed_ = repair_.run(); }
-  /// The events of a sphere in the window.
-  std::span<const Node<D>> path(Slot i) { return paths_.path(i); }
-  /// The sphere's record before node k of its path.
-  const Record<D>& before(Slot i, std::size_t k) { return paths_.before(i, k); }
-  /// The sphere's record after the last node.
-  const Record<D>& after(Slot i) const { return paths_.after(i); }
-  Spin<D> spin_after(Slot i) const { return paths_.spin_after(i); }
-  /// Calls visit(slot) for each own sphere that had events in any version of the window.
-  template <class Visit>
-  void for_each_touched(Visit&& visit) const {
-    paths_.for_each_own(visit);
-  }
+  void repair() { changed_ = repair_->run(); }
   /// Calls visit(slot, k) for each node k that is a contact with its lower id owned here.
   template <class Visit>
   void for_each_contact(Visit&& visit) {
-    for_each_touched([&](Slot i) {
-      const auto nodes = path(i);
-      for (std::size_t k = 0; k < nodes.size(); ++k)
-        if (nodes[k].key.lo == nodes[k].after.id) visit(i, k);
+    paths_->for_each_own([&](Slot i) {
+      for (std::size_t k = 0; k < paths_->nodes(i); ++k)
+        if (const Node<D> each = paths_->node(i, k); each.key.lo == each.after.id) visit(i, k);
     });
   }
   /// The contact of node k, visited by for_each_contact().
   Contact<D> contact_of(Slot lo, std::size_t k);
   /// Own spheres that are ghosts elsewhere and got new paths in the last run() or repair().
   std::span<const Slot> changed() const { return changed_; }
-  /// A bit for each neighbour that has an own sphere as a ghost.
-  std::uint64_t holders(Slot i) const { return ownership_.holders(i); }
-  Slot slot_of(Id id) const { return ownership_.slot_of(id); }
-  /// The contacts of the window; each counts where its lower id is owned.
-  ContactTally tally() const { return paths_.tally(); }
+  /// An upper limit of the contacts in paths().tally().
+  std::uint64_t most_events() const { return paths_->trace().events().size() + redone_events() - redone_before_; }
   /// The largest speed of any sphere after an event.
-  double fastest() const { return std::sqrt(std::max(paths_.trace().fastest_squared(), repair_.fastest_squared())); }
-  /// Whether all ghosts have the same events here as on their owners before a time.
-  bool consistent(double end) { return paths_.all_match(end); }
-  /// Removes all events after `last`. The core is then invalid; load() again.
-  void cut(const EventKey<D>& last) { paths_.cut(last); }
+  double fastest() const { return std::sqrt(std::max(paths_->trace().fastest_squared(), repair_->fastest_squared())); }
   /// Ends the window.
   void commit();
 
   EventCounts counts() const { return core_.counts(); }
-  std::uint64_t run_events() const { return run_events_; }          ///< events of first runs
-  std::uint64_t redone_events() const { return repair_.events(); }  ///< events of repairs
+  std::uint64_t run_events() const { return run_events_; }  ///< events of first runs
+  std::uint64_t redone_events() const {                     ///< events of repairs
+    return redone_events_ + (repair_ ? repair_->events() : 0);
+  }
 
  private:
   const Box<D>& box_;
   EventCore<D> core_;
-  Ownership<D> ownership_;
-  WindowPaths<D> paths_;
-  WindowRepair<D> repair_;
+  std::optional<Ownership<D>> ownership_;
+  std::optional<WindowPaths<D>> paths_;
+  std::optional<WindowRepair<D>> repair_;
   double end_ = 0, length_ = 0;  // the present window
   std::vector<Slot> changed_;
-  std::vector<typename EventCore<D>::Changed> other_;  // after the last window: what differs from the core's
-  std::vector<std::uint8_t> disturbed_;                // by slot: whether it is in other_
   std::uint64_t run_events_ = 0;
+  std::uint64_t redone_events_ = 0, redone_before_ = 0;  // until the last release(); before the present window
 };
 
 }  // namespace carom

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ranks/system.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/base/error.h"
@@ -42,13 +43,26 @@ void System<D>::check() const {
     if (!p.x[i].allFinite()) wrong("position", "give finite coordinates");
     if (!p.v[i].allFinite()) wrong("velocity", "give finite components");
     if (!p.spin.empty() && !p.spin[i].allFinite()) wrong("spin", "give finite components");
-    if (!(p.mass[i] > 0) || !std::isfinite(p.mass[i])) wrong("mass", "give a positive one");
+    if (!(p.mass[i] > 0)) wrong("mass", "give a positive one");
+    if (p.fixed(i) && (p.v[i] != Vec<D>::Zero() || (!p.spin.empty() && p.spin[i] != Spin<D>::Zero())))
+      refuse("particle " + std::to_string(p.id_of(i)) + " is fixed, since its mass is infinite, and has a velocity",
+             "give it a finite mass, or no velocity and no spin");
     if (!(p.radius[i] > 0) || !std::isfinite(p.radius[i])) wrong("radius", "give a positive one");
     if (!std::isfinite(p.charge[i])) wrong("charge", "give a finite one");
     if (p.species[i] >= species.size()) wrong("species", "give System::species a name for each");
   }
 }
 
+template <int D>
+void System<D>::count_moving() {
+  const auto& mass = particles.mass;
+  std::uint64_t fixed = static_cast<std::uint64_t>(std::ranges::count_if(mass, is_fixed));
+  decomposition.ranks().sum({&fixed, 1});
+  fixed_ = static_cast<std::size_t>(fixed);
+}
+
+template void System<2>::count_moving();
+template void System<3>::count_moving();
 template void System<2>::check() const;
 template void System<3>::check() const;
 

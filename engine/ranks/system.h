@@ -47,10 +47,16 @@ struct System {
 
   /// The number of particles on all ranks, also while event cores hold them.
   std::size_t size() const { return decomposition.total(); }
+  /// The number of those that are not fixed; set by count_moving().
+  std::size_t moving() const { return size() - fixed_; }
+  bool has_fixed() const { return fixed_ > 0; }
+  /// Counts the fixed particles. Call when the particles are complete, before they are divided among ranks. Collective.
+  void count_moving();
 
-  /// Whether the total momentum is conserved: no walls, no kicks of a bath, no external field.
+  /// Whether the total momentum is conserved: no walls, no kicks of a bath, no fixed particles, no
+  /// external field.
   bool keeps_momentum() const {
-    return !box.has_walls() && !box.bath.kicks() &&
+    return !box.has_walls() && !box.bath.kicks() && !has_fixed() &&
            std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
   }
 
@@ -68,8 +74,11 @@ struct System {
   }
 
   /// Throws Error(Failure::initial_state) if arrays of the particles differ in length, positions or velocities are not
-  /// finite, masses, radii or edges are not positive, or a species is unknown.
+  /// finite, masses, radii or edges are not positive, a fixed particle moves, or a species is unknown.
   void check() const;
+
+ private:
+  std::size_t fixed_ = 0;
 };
 
 }  // namespace carom

@@ -7,7 +7,11 @@
 namespace carom {
 namespace {
 
-constexpr double kCollisionsPerWindow = 0.3;                       // mean collisions of a sphere in a window
+// Mean collisions of a sphere in a window. Short windows need fewer ghosts and repairs, and a log that stays in the
+// cache; long ones fewer searches of borders and fewer waits. At packing fraction 0.30 a rank of two with 32,000
+// spheres executes 894.6, 883.3 and 884.4 million instructions in 1.6·10⁵ collisions with 0.3, 0.15 and 0.1;
+// at 0.10, 1194.5 with 0.3 and 1139.2 with 0.15.
+constexpr double kCollisionsPerWindow = 0.15;
 constexpr double kMaxDisplacement = 1.0, kMinDisplacement = 0.02;  // [largest diameter]
 constexpr double kSpeedAllowance = 1.15;                           // speed allowed for, relative to the largest speed
 
@@ -36,44 +40,46 @@ double first_pace(const Box<D>& box, const Sizes& sizes, Communicator& ranks, co
 template <int D>
 void WindowLength<D>::start(const Box<D>& box, const Sizes& sizes, Communicator& ranks, const Particles<D>& block,
                             const Vec<D>& g, double horizon) {
+  each_ = 0.5 * kCollisionsPerWindow * static_cast<double>(sizes.spheres);
   field_ = g.norm() * horizon;
   fastest_ = 0;
   for (const Vec<D>& v : block.v) fastest_ = std::max(fastest_, v.norm());
   ranks.largest({&fastest_, 1});
   if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(box, sizes, ranks, block);
   fastest_ = kSpeedAllowance * fastest_ + field_;
-  max_displacement_ = std::clamp(1.05 * pace_ * fastest_, kMinDisplacement * diameter_, kMaxDisplacement * diameter_);
+  max_displacement_ = std::clamp(fastest_ > 0 ? 1.05 * pace_ * fastest_ : 0, kMinDisplacement * diameter_,
+                                 kMaxDisplacement * diameter_);
 }
 
 template <int D>
-double WindowLength<D>::window_end(double now, double end) const {
+double WindowLength<D>::window_end(double now, double end, double collisions) const {
   double length = fastest_ > 0 ? max_displacement_ / fastest_ : end - now;
-  if (pace_ > 0) length = std::min(length, pace_);
+  if (pace_ > 0) length = std::min({length, pace_, (0.1 + std::max(collisions, 0.0) / each_) * pace_});
   if (forced_) length = std::min(length, forced_());
   const double windows = std::ceil((end - now) / length * (1 - 1e-9));
   return windows <= 1 ? end : now + (end - now) / windows;
 }
 
 template <int D>
-double WindowLength<D>::first_beyond(Subdomain<D>* subdomain, double now, double end, Communicator& ranks) {
-  double speed = 0, first = std::numeric_limits<double>::infinity();
-  if (subdomain) speed = subdomain->fastest() + field_;
-  if (subdomain && speed > fastest_)
-    subdomain->for_each_touched([&](Slot i) { first = std::min(first, beyond_at(*subdomain, i, now, end)); });
-  std::array<double, 2> worst{speed, -first};
-  ranks.largest(worst);
-  if (worst[0] > fastest_) fastest_ = kSpeedAllowance * worst[0];
-  return -worst[1];
+double WindowLength<D>::first_beyond(Subdomain<D>& subdomain, double now, double end) const {
+  double first = std::numeric_limits<double>::infinity();
+  if (speed_in(subdomain) <= fastest_) return first;
+  subdomain.paths().for_each_own([&](Slot i) { first = std::min(first, beyond_at(subdomain.paths(), i, now, end)); });
+  return first;
+}
+
+template <int D>
+void WindowLength<D>::allow_for(double speed) {
+  if (speed > fastest_) fastest_ = kSpeedAllowance * speed;
 }
 
 /// first_beyond() for one sphere, from the length of its path.
 template <int D>
-double WindowLength<D>::beyond_at(Subdomain<D>& subdomain, Slot i, double now, double end) const {
-  const auto path = subdomain.path(i);
+double WindowLength<D>::beyond_at(const WindowPaths<D>& paths, Slot i, double now, double end) const {
   double left = max_displacement_;
-  for (std::size_t k = 0; k <= path.size(); ++k) {
-    const double speed = subdomain.before(i, k).v.norm() + field_;
-    const double until = k < path.size() ? path[k].key.time : end;
+  for (std::size_t k = 0; k <= paths.nodes(i); ++k) {  // stores no path: there are many
+    const double speed = (k == 0 ? paths.start(i) : paths.node(i, k - 1).after).v.norm() + field_;
+    const double until = k < paths.nodes(i) ? paths.node(i, k).key.time : end;
     if (speed * (until - now) > left) return now + left / speed;
     left -= speed * (until - now);
     now = until;
@@ -82,11 +88,9 @@ double WindowLength<D>::beyond_at(Subdomain<D>& subdomain, Slot i, double now, d
 }
 
 template <int D>
-void WindowLength<D>::note(double length, std::uint64_t collisions, std::size_t spheres) {
-  if (collisions == 0) return;
-  const double pace =
-      length * kCollisionsPerWindow * static_cast<double>(spheres) / (2 * static_cast<double>(collisions));
-  pace_ = pace_ > 0 ? 0.9 * pace_ + 0.1 * pace : pace;
+void WindowLength<D>::note(double length, std::uint64_t collisions) {
+  // The mean of rates: the times of windows with few collisions have no bound.
+  pace_ = 1 / (0.9 / pace_ + 0.1 * static_cast<double>(collisions) / (each_ * length));
 }
 
 template class WindowLength<2>;

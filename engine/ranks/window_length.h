@@ -21,16 +21,21 @@ class WindowLength {
              double horizon);
   /// The largest displacement of a sphere in a window.
   double max_displacement() const { return max_displacement_; }
-  /// The end of the next window on the way to `end`.
-  double window_end(double now, double end) const;
-  /// The first time at which a sphere may have moved farther than `max_displacement`; infinite if none has. Later
-  /// windows allow for its speed. Null: this rank has no subdomain. Collective.
-  double first_beyond(Subdomain<D>* subdomain, double now, double end, Communicator& ranks);
-  /// Call after a window of this length in which all `spheres` together had this many collisions.
-  void note(double length, std::uint64_t collisions, std::size_t spheres);
+  /// The end of the next window on the way to `end`, or to about this many collisions from now.
+  double window_end(double now, double end, double collisions = std::numeric_limits<double>::infinity()) const;
+  /// The number of collisions expected in a window of this length.
+  double expected(double length) const { return length > 0 ? each_ * length / pace_ : 0; }
+  /// The largest speed that a sphere of a subdomain may have reached in a window.
+  double speed_in(const Subdomain<D>& subdomain) const { return subdomain.fastest() + field_; }
+  /// The first time at which a sphere may have moved farther than `max_displacement`; infinite if none has.
+  double first_beyond(Subdomain<D>& subdomain, double now, double end) const;
+  /// Later windows allow for spheres of this speed; the same on all ranks.
+  void allow_for(double speed);
+  /// Call after a window of this length in which all spheres together had this many collisions.
+  void note(double length, std::uint64_t collisions);
 
  private:
-  double beyond_at(Subdomain<D>& subdomain, Slot i, double now, double end) const;
+  double beyond_at(const WindowPaths<D>& paths, Slot i, double now, double end) const;
 
   double diameter_;
   std::function<double()> forced_;
@@ -38,6 +43,7 @@ class WindowLength {
   double field_ = 0;    // speed that the field may add in the epoch
   double fastest_ = 0;  // largest speed expected
   double pace_ = 0;     // estimated time in which a sphere has kCollisionsPerWindow collisions
+  double each_ = 0;     // collisions of all spheres in that time
 };
 
 }  // namespace carom

@@ -14,7 +14,7 @@ void WindowPaths<D>::load(std::size_t slots) {
   scripts_.clear();
   scripts_.resize(slots);
   rewritten_.assign(slots, 0);
-  matched_in_.assign(slots, 0);
+  listed_.assign(slots, 0);
 }
 
 template <int D>
@@ -26,15 +26,17 @@ Trace<D>& WindowPaths<D>::start() {
 template <int D>
 std::vector<Slot> WindowPaths<D>::end() {
   std::vector<Slot> seen;
-  touched_ghosts_.clear();
-  ++window_;
-  for (const auto& event : trace_.events())
-    for (const int which : {0, 1}) {
-      const Slot i = event.slot[which];
-      if (i == kNoEntry || event.last[which] != kNoEntry) continue;
-      if (ownership_.is_seen(i)) seen.push_back(i);
-      if (ownership_.is_ghost(i)) touched_ghosts_.push_back(i);
-    }
+  take_unmatched();
+  const auto prefetch = [&](Slot i) { ownership_.prefetch(i); };
+  trace_.link(prefetch, [&](Slot i) {
+    ownership_.turn(i);
+    if (!ownership_.is_seen(i) && !ownership_.is_ghost(i)) return;
+    prefetch_line(&flights_[i]);  // its path will be read
+    if (ownership_.is_seen(i))
+      seen.push_back(i);
+    else
+      add_unmatched(i);
+  });
   return seen;
 }
 
@@ -64,21 +66,29 @@ Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, s
           .key = event.slot[1] == kNoEntry
                      ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
                      : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner)),
+          .spin = k + 1 < entries.size() ? trace_.spin_before(entries[k + 1]) : flights_.spin(i),
           .exchange = event.exchange,
-          .overlap = event.overlap,
-          .spin = k + 1 < entries.size() ? trace_.spin_before(entries[k + 1]) : flights_.spin(i)};
+          .overlap = event.overlap};
 }
 
 template <int D>
 typename WindowPaths<D>::Path& WindowPaths<D>::path_of(Slot i) {
   if (paths_.has(i)) return paths_.at(i);
+  const Record<D> first = start(i);
   const View logged = view(i);
   Path& path = paths_.add(i);
-  path.start = logged.entries.empty() ? flights_[i] : trace_.before(logged.entries[0]);
+  path.start = first;
   path.spin = logged.entries.empty() ? flights_.spin(i) : trace_.spin_before(logged.entries[0]);
   path.nodes.clear();
   for (std::size_t k = 0; k < logged.size(); ++k) path.nodes.push_back(logged.node(k));
   return path;
+}
+
+template <int D>
+const Record<D>& WindowPaths<D>::start(Slot i) const {
+  const View path = view(i);
+  if (path.nodes) return paths_.at(i).start;
+  return path.size() == 0 ? flights_[i] : trace_.before(path.entries[0]);
 }
 
 template <int D>
@@ -98,7 +108,6 @@ Spin<D> WindowPaths<D>::spin_after(Slot i) const {
 template <int D>
 typename WindowPaths<D>::Nodes& WindowPaths<D>::rewrite(Slot i) {
   rewritten_[i] = 1;
-  matched_in_[i] = 0;
   return path_of(i).nodes;
 }
 
@@ -106,53 +115,42 @@ template <int D>
 void WindowPaths<D>::cut(const EventKey<D>& last) {
   std::vector<Slot> touched(paths_.slots().begin(), paths_.slots().end());
   for_each_own([&](Slot i) { touched.push_back(i); });
-  for (const Slot i : touched) std::erase_if(rewrite(i), [&](const Node<D>& node) { return last < node.key; });
+  for (const Slot i : touched)
+    if (const std::size_t k = nodes(i); k > 0 && last < node(i, k - 1).key)
+      std::erase_if(rewrite(i), [&](const Node<D>& node) { return last < node.key; });
 }
 
 template <int D>
 void WindowPaths<D>::write(Slot i, Bytes& to) const {
   const View path = view(i);
   put(to, path.size());
+  const std::size_t at = to.size(), bytes = node_bytes();
+  to.resize(at + path.size() * bytes);
   for (std::size_t k = 0; k < path.size(); ++k) {
     const Node<D> node = path.node(k);
-    const auto* bytes = reinterpret_cast<const std::byte*>(&node);
-    to.insert(to.end(), bytes, bytes + node_bytes());
+    std::memcpy(to.data() + at + k * bytes, static_cast<const void*>(&node), bytes);
   }
 }
 
 template <int D>
 void WindowPaths<D>::read_script(Slot g, Reader& message) {
-  Script& script = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
-  script.count = message.get<std::uint32_t>();
-  script.bytes = message.skip(script.count * node_bytes());
-  script.nodes.clear();
-  matched_in_[g] = 0;
-}
-
-template <int D>
-Node<D> WindowPaths<D>::node_of(const Script& script, std::size_t k) const {
-  Node<D> node;
-  std::memcpy(static_cast<void*>(&node), script.bytes + k * node_bytes(), node_bytes());
-  return node;
-}
-
-template <int D>
-std::span<const Node<D>> WindowPaths<D>::script(Slot g) {
-  if (!scripts_.has(g)) return {};
-  Script& script = scripts_.at(g);
-  while (script.nodes.size() < script.count) script.nodes.push_back(node_of(script, script.nodes.size()));
-  return script.nodes;
-}
-
-template <int D>
-bool WindowPaths<D>::matches(Slot g) {
-  if (matched_in_[g] == window_) return true;
-  const View path = view(g);
-  const std::size_t count = scripts_.has(g) ? scripts_.at(g).count : 0;
-  if (path.size() != count) return false;
+  const auto count = message.get<std::uint32_t>();
+  const std::byte* const bytes = message.skip(count * node_bytes());
+  if (g == IdTable::kNowhere) return;  // there was no room for this ghost, so the window will be revoked
+  Nodes& nodes = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
+  nodes.resize(count);
   for (std::size_t k = 0; k < count; ++k)
-    if (!(path.node(k) == node_of(scripts_.at(g), k))) return false;
-  matched_in_[g] = window_;
+    std::memcpy(static_cast<void*>(&nodes[k]), bytes + k * node_bytes(), node_bytes());
+  add_unmatched(g);
+}
+
+template <int D>
+bool WindowPaths<D>::matches(Slot g) const {
+  const View path = view(g);
+  const auto sent = script(g);
+  if (path.size() != sent.size()) return false;
+  for (std::size_t k = 0; k < sent.size(); ++k)
+    if (!(path.node(k) == sent[k])) return false;
   return true;
 }
 
@@ -162,13 +160,8 @@ bool WindowPaths<D>::all_match(double end) {
     while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
     return nodes;
   };
-  bool all = true;
-  for_each_ghost([&](Slot g) {
-    if (!all || matched_in_[g] == window_) return;
-    const auto seen = until(path(g)), sent = until(script(g));
-    all = std::equal(seen.begin(), seen.end(), sent.begin(), sent.end());
-  });
-  return all;
+  return std::ranges::all_of(
+      unmatched_, [&](Slot g) { return matches(g) || std::ranges::equal(until(path(g)), until(script(g))); });
 }
 
 template <int D>

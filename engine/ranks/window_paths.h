@@ -19,13 +19,14 @@ class WindowPaths {
   using Nodes = std::vector<Node<D>>;
 
   /// `flights` must be in the state the core left at the end of the window. Both arguments must outlive this object.
-  WindowPaths(const Flights<D>& flights, const Ownership<D>& ownership) : flights_(flights), ownership_(ownership) {}
+  WindowPaths(const Flights<D>& flights, Ownership<D>& ownership) : flights_(flights), ownership_(ownership) {}
 
   /// Removes everything and makes room for this many slots.
   void load(std::size_t slots);
   /// Starts a window; the core must write to the returned log.
   Trace<D>& start();
-  /// Call when the log is complete. Returns the own spheres with events that are ghosts elsewhere.
+  /// Call when the log is complete; tells the ownership about spheres with events. Returns the own spheres with events
+  /// that are ghosts elsewhere.
   std::vector<Slot> end();
   /// Ends the window; returns the records that differ from the core's.
   std::vector<typename EventCore<D>::Changed> finish();
@@ -33,7 +34,10 @@ class WindowPaths {
   const Trace<D>& trace() const { return trace_; }
   bool has_no_events(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
   std::span<const Node<D>> path(Slot i) { return path_of(i).nodes; }
-  /// The sphere's record before node k of its path; after(): after the last node.
+  std::size_t nodes(Slot i) const { return view(i).size(); }
+  Node<D> node(Slot i, std::size_t k) const { return view(i).node(k); }
+  const Record<D>& start(Slot i) const;
+  /// The sphere's record before node k of its path; start(): before the first, after(): after the last.
   const Record<D>& before(Slot i, std::size_t k) {
     Path& path = path_of(i);
     return k > 0 ? path.nodes[k - 1].after : path.start;
@@ -51,21 +55,29 @@ class WindowPaths {
 
   /// Appends the path of a sphere to a message.
   void write(Slot i, Bytes& to) const;
-  /// Reads the script of a ghost; the message must stay until the end of the window.
+  /// Reads the script of a ghost.
   void read_script(Slot g, Reader& message);
   /// The script of a ghost; empty if it had no events on its owner.
-  std::span<const Node<D>> script(Slot g);
+  std::span<const Node<D>> script(Slot g) const {
+    return scripts_.has(g) ? std::span<const Node<D>>(scripts_.at(g)) : std::span<const Node<D>>();
+  }
   /// Whether the path of a ghost equals its script.
-  bool matches(Slot g);
+  bool matches(Slot g) const;
+  /// Removes and returns the ghosts whose path or script is new since they last matched. Add those back that do not
+  /// match, and those with rewritten paths.
+  std::vector<Slot> take_unmatched() {
+    for (const Slot g : unmatched_) listed_[g] = 0;
+    return std::exchange(unmatched_, {});
+  }
+  void add_unmatched(Slot g) {
+    if (std::exchange(listed_[g], 1) == 0) unmatched_.push_back(g);
+  }
   /// Whether the paths of all ghosts equal their scripts before a time.
   bool all_match(double end);
 
-  /// Calls visit(slot) for each own sphere, or each ghost, that had events in any version of the window or in its
-  /// script. visit() may call path().
+  /// Calls visit(slot) for each own sphere that had events in any version of the window. visit() may call path().
   template <class Visit>
   void for_each_own(Visit&& visit) const;
-  template <class Visit>
-  void for_each_ghost(Visit&& visit) const;
   /// The contacts of own spheres; each counts where its lower id is owned.
   ContactTally tally() const;
 
@@ -75,12 +87,6 @@ class WindowPaths {
     Record<D> start;  // at the start of the window
     Spin<D> spin;     // there
     Nodes nodes;
-  };
-  /// The script of a ghost. Most are compared with the path and never decoded.
-  struct Script {
-    const std::byte* bytes;
-    std::uint32_t count;
-    Nodes nodes;  // empty until decoded
   };
   /// A path, stored or read from the log; valid until another path is viewed.
   struct View {
@@ -97,21 +103,18 @@ class WindowPaths {
     return {*this, i, nullptr, trace_.entries(i)};
   }
   /// The bytes of a node in a message: without the spin if no contact is rough.
-  std::size_t node_bytes() const { return flights_.rough() ? sizeof(Node<D>) : offsetof(Node<D>, spin); }
-  Node<D> node_of(const Script& script, std::size_t k) const;
+  std::size_t node_bytes() const { return flights_.rough() ? offsetof(Node<D>, exchange) : offsetof(Node<D>, spin); }
   Node<D> logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const;
   Path& path_of(Slot i);
 
   const Flights<D>& flights_;
-  const Ownership<D>& ownership_;
+  Ownership<D>& ownership_;
   Trace<D> trace_;
   BySlot<Path> paths_;                   // paths in use
   std::vector<std::uint8_t> rewritten_;  // by slot: whether the path differs from the log
-  BySlot<Script> scripts_;
-  std::vector<Slot> touched_ghosts_;  // ghosts with events in the log
-  std::vector<std::uint32_t>
-      matched_in_;            // by slot: the window in which the ghost's path was found equal to its script
-  std::uint32_t window_ = 0;  // number of the present window
+  BySlot<Nodes> scripts_;
+  std::vector<Slot> unmatched_;
+  std::vector<std::uint8_t> listed_;  // by slot: whether it is in unmatched_
 };
 
 template <int D>
@@ -123,16 +126,6 @@ void WindowPaths<D>::for_each_own(Visit&& visit) const {
         visit(i);
   for (std::size_t k = 0; k < paths_.slots().size(); ++k)  // visit() may add paths
     if (const Slot i = paths_.slots()[k]; ownership_.owns(i) && rewritten_[i] != 0 && !trace_.has(i)) visit(i);
-}
-
-template <int D>
-template <class Visit>
-void WindowPaths<D>::for_each_ghost(Visit&& visit) const {
-  for (const Slot g : scripts_.slots()) visit(g);
-  for (const Slot g : touched_ghosts_)
-    if (!scripts_.has(g)) visit(g);
-  for (std::size_t k = 0; k < paths_.slots().size(); ++k)
-    if (const Slot g = paths_.slots()[k]; ownership_.is_ghost(g) && !scripts_.has(g) && !trace_.has(g)) visit(g);
 }
 
 }  // namespace carom

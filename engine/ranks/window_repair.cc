@@ -8,7 +8,7 @@ namespace carom {
 template <int D>
 std::vector<Slot> WindowRepair<D>::run() {
   repairs_.clear();
-  paths_.for_each_ghost([&](Slot g) { compare(g); });
+  for (const Slot g : paths_.take_unmatched()) compare(g);
   while (!tasks_.empty()) {
     const Task task = tasks_.top();
     tasks_.pop();
@@ -32,7 +32,10 @@ std::vector<Slot> WindowRepair<D>::run() {
   std::vector<Slot> changed;
   for (const Repaired& m : repairs_) {
     repair_of_[m.slot] = kNoRepair;
-    if (!ownership_.owns(m.slot)) continue;
+    if (!ownership_.owns(m.slot)) {
+      paths_.add_unmatched(m.slot);
+      continue;
+    }
     const auto now = paths_.path(m.slot).subspan(m.kept);
     if (!std::equal(now.begin(), now.end(), m.old.begin(), m.old.end())) changed.push_back(m.slot);
   }
@@ -43,6 +46,7 @@ std::vector<Slot> WindowRepair<D>::run() {
 template <int D>
 void WindowRepair<D>::compare(Slot g) {
   if (paths_.matches(g)) return;
+  paths_.add_unmatched(g);
   const auto seen = paths_.path(g), script = paths_.script(g);
   const auto [here, there] = std::mismatch(seen.begin(), seen.end(), script.begin(), script.end());
   const bool sees = here != seen.end() && !ownership_.owns_id(here->partner());

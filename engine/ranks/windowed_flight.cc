@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ranks/windowed_flight.h"
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 
 #include "engine/base/error.h"
@@ -14,6 +18,13 @@ constexpr std::size_t kMinSpheres = 8;                // spheres in a subdomain
 constexpr std::size_t kMaxNeighbours = 64;            // neighbours of a subdomain: the bits of Subdomain::holders()
 constexpr double kMeanWork = 64, kMaxWork = 64 * 64;  // mean and largest work of a sphere, as integers
 constexpr double kWorkTolerance = 0.1;                // smaller relative differences from the mean are ignored
+
+/// Returns freed memory to the system; call it after large temporary arrays.
+void trim_memory() {
+#if defined(__GLIBC__)
+  malloc_trim(0);
+#endif
+}
 
 }  // namespace
 
@@ -95,6 +106,7 @@ void WindowedFlight<D>::load(double now, Spheres&& spheres) {
   if (subdomain_)
     subdomain_->load(std::move(near), *bisection_, static_cast<std::uint32_t>(ranks_.rank()), g_, horizon_, now,
                      length_.max_displacement(), spins);
+  trim_memory();  // messages and sorted copies
   now_ = now;
   cut_ = false;
   sort_out(true);
@@ -105,7 +117,7 @@ template <int D>
 void WindowedFlight<D>::reload() {
   load(now_, [&](auto&& add) {
     if (subdomain_)
-      for (const Slot i : subdomain_->own()) add(subdomain_->after(i), subdomain_->spin_after(i));
+      for (const Slot i : subdomain_->own()) add(subdomain_->paths().after(i), subdomain_->paths().spin_after(i));
   });
 }
 
@@ -118,17 +130,16 @@ void WindowedFlight<D>::sort_out(bool loaded) {
     subdomain_->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
       if (loaded) return;
       exchange_.add(neighbour, record);
-      if (rough()) exchange_.add(neighbour, subdomain_->flights().spin(subdomain_->slot_of(record.id)));
+      if (rough()) exchange_.add(neighbour, subdomain_->flights().spin(subdomain_->ownership().slot_of(record.id)));
     });
+  no_room_ = false;
   if (loaded) return;
-  double full = 0;
   for (const Bytes& bytes : exchange_.swap())
     for (Reader reader(bytes); reader.more();) {
       const auto record = reader.get<Record<D>>();
-      if (!subdomain_->admit(record, now_, rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero()))) full = 1;
+      const Spin<D> spin = rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero());
+      if (!subdomain_->ownership().admit(record, now_, spin)) no_room_ = true;
     }
-  ranks_.largest({&full, 1});
-  if (full > 0) reload();
 }
 
 /// The key of the n-th pair collision of a window over all ranks, n from 1. Collective.
@@ -137,7 +148,7 @@ EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
   std::vector<EventKey<D>> mine;
   if (subdomain_)
     subdomain_->for_each_contact([&](Slot i, std::size_t k) {
-      if (const EventKey<D>& key = subdomain_->path(i)[k].key; key.kind == EventKind::pair) mine.push_back(key);
+      if (const EventKey<D> key = subdomain_->paths().node(i, k).key; key.kind == EventKind::pair) mine.push_back(key);
     });
   auto keys = gather_values<EventKey<D>>(ranks_, mine);
   std::ranges::nth_element(keys, keys.begin() + static_cast<std::ptrdiff_t>(number - 1));
@@ -146,18 +157,42 @@ EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
 
 template <int D>
 double WindowedFlight<D>::run(double end, const Report& report) {
-  ContactTally sum;
+  ContactTally sum, got;
   std::vector<Contact<D>> contacts;
-  std::uint64_t collisions = report.counters.sphere_sphere;
-  double reached = end, full = std::numeric_limits<double>::infinity();
+  const std::uint64_t events_before = events_;
+  std::uint64_t collisions = report.counters.sphere_sphere;  // in windows before the last one
+  double reached = end, length = 0, full = std::numeric_limits<double>::infinity();
   while (now_ < end && reached == end) {
     if (cut_) reload();
     if (!sorted_) sort_out(false);
-    double stop = std::min(length_.window_end(now_, end), full);
-    full = -(subdomain_ ? subdomain_->run(now_, stop) : stop);
-    ranks_.largest({&full, 1});
-    full = -full;
-    if (full < stop) {  // too many events for the log: revoke the window and run it up to there
+    const auto left = static_cast<double>(report.collision_limit - collisions);
+    double stop = std::min(length_.window_end(now_, end, left - length_.expected(length)), full);
+    const double ran = subdomain_ ? subdomain_->run(now_, stop) : stop;
+    // Over all ranks: maxima of whether a path changed, a ghost found no room, of the time reached, the time at which a
+    // sphere was too fast (both negated) and of speeds; sums over the window before, and the most collisions of this
+    // one.
+    enum { changed, no_room, earliest, beyond, speed };
+    std::array<double, 5> most;
+    std::array<std::uint64_t, 3> sums;
+    const auto agree = [&](bool paths_changed) {
+      most = {paths_changed ? 1.0 : 0.0, no_room_ ? 1.0 : 0.0, -ran, -std::numeric_limits<double>::infinity(), 0};
+      sums = {got.sphere_sphere, got.contacts(), 0};
+      if (subdomain_) {
+        most[beyond] = -length_.first_beyond(*subdomain_, now_, stop);
+        most[speed] = length_.speed_in(*subdomain_);
+        sums[2] = subdomain_->most_events();
+      }
+      got = {};
+      ranks_.combine(most, sums);
+      collisions += sums[0];
+      events_ += sums[1];
+      if (length > 0) length_.note(std::exchange(length, 0), sums[0]);
+      return most[changed] > 0 && most[no_room] == 0 && -most[earliest] == stop;
+    };
+    const std::uint64_t rounds = exchange_.make_consistent(subdomain_.get(), agree);
+    if (events_ > report.max_events) throw_too_many_contacts(report.max_events);
+    full = -most[earliest];
+    if (most[no_room] > 0 || full < stop) {  // revoke the window; if the log has no room for more, run it up to there
       if (!(full > now_)) throw_too_many_contacts(report.max_events);
       cut_at(now_);
       sorted_ = false;
@@ -165,38 +200,35 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     }
     full = std::numeric_limits<double>::infinity();
     ++counts_.windows;
-    counts_.rounds += exchange_.make_consistent(subdomain_.get());
-    if (const double beyond = length_.first_beyond(subdomain_.get(), now_, stop, ranks_); beyond < stop)
-      stop = cut_at(beyond);
-    if (subdomain_ && !subdomain_->consistent(stop))
+    counts_.rounds += rounds;
+    length_.allow_for(most[speed]);
+    if (-most[beyond] < stop) stop = cut_at(-most[beyond]);
+    if (subdomain_ && !subdomain_->paths().all_match(stop))
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
-    ContactTally got = tally();
-    std::uint64_t count = got.sphere_sphere;
-    ranks_.sum({&count, 1});
-    if (collisions + count >= report.collision_limit) {  // collision limit reached
-      count = report.collision_limit - collisions;
-      const EventKey<D> last = key_of_collision(count);
-      if (subdomain_) subdomain_->cut(last);
-      cut_ = true;
-      got = tally();
-      reached = stop = last.time;
+    got = tally();
+    if (collisions + sums[2] >= report.collision_limit) {  // it may have been reached
+      std::uint64_t count = got.sphere_sphere;
+      ranks_.sum({&count, 1});
+      if (collisions + count >= report.collision_limit) {
+        const EventKey<D> last = key_of_collision(report.collision_limit - collisions);
+        if (subdomain_) subdomain_->paths().cut(last);
+        cut_ = true;
+        got = tally();
+        reached = stop = last.time;
+      }
     }
     if (report.contacts && subdomain_)
       subdomain_->for_each_contact([&](Slot i, std::size_t k) { contacts.push_back(subdomain_->contact_of(i, k)); });
     sum.add(got);
     counts_.events += got.contacts();
-    std::uint64_t contacts_of_all = got.contacts();
-    ranks_.sum({&contacts_of_all, 1});
-    if (events_ += contacts_of_all; events_ > report.max_events) throw_too_many_contacts(report.max_events);
-    collisions += count;
-    const double length = stop - now_;
+    if (!cut_) length = stop - now_;
     now_ = stop;
     sorted_ = false;
-    if (cut_) continue;
-    if (subdomain_) subdomain_->commit();
-    length_.note(length, count, sizes_.spheres);
+    if (subdomain_ && !cut_) subdomain_->commit();
   }
-  report.counters.add(sum_of_all(ranks_, sum));
+  const ContactTally all = sum_of_all(ranks_, sum);
+  report.counters.add(all);
+  if (events_ = events_before + all.contacts(); events_ > report.max_events) throw_too_many_contacts(report.max_events);
   if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, packed<D>(contacts)), *report.contacts);
   return reached;
 }
@@ -208,7 +240,7 @@ double WindowedFlight<D>::cut_at(double time) {
   cut_ = true;
   EventKey<D> last{.time = time};
   for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
-  if (subdomain_) subdomain_->cut(last);
+  if (subdomain_) subdomain_->paths().cut(last);
   return time;
 }
 
@@ -220,7 +252,9 @@ void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) const {
 template <int D>
 void WindowedFlight<D>::give_back(double time, Particles<D>& particles) {
   measure_work();
+  if (subdomain_) subdomain_->stop();
   collect(time, particles, &work_);
+  if (subdomain_) subdomain_->release();
 }
 
 /// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events per sphere.
@@ -252,7 +286,7 @@ void WindowedFlight<D>::collect(double time, Particles<D>& copies, std::vector<s
       [&](auto&& send) {
         if (!subdomain_) return;
         for (const Slot i : subdomain_->own()) {
-          const Record<D> r = subdomain_->flights().at(subdomain_->after(i), time);
+          const Record<D> r = subdomain_->flights().at(subdomain_->paths().after(i), time);
           send(r.id, State{subdomain_work_, r.x, r.v});
         }
       },
@@ -267,7 +301,7 @@ void WindowedFlight<D>::collect(double time, Particles<D>& copies, std::vector<s
       blocks(), ranks_,
       [&](auto&& send) {
         if (!subdomain_) return;
-        for (const Slot i : subdomain_->own()) send(subdomain_->after(i).id, subdomain_->spin_after(i));
+        for (const Slot i : subdomain_->own()) send(subdomain_->flights()[i].id, subdomain_->paths().spin_after(i));
       },
       [&](std::size_t place, const Spin<D>& spin) { copies.spin[place] = spin; });
 }

@@ -58,7 +58,7 @@ class WindowedFlight {
   void sort_out(bool loaded);
   double cut_at(double time);
   EventKey<D> key_of_collision(std::uint64_t number) const;
-  ContactTally tally() const { return subdomain_ ? subdomain_->tally() : ContactTally{}; }
+  ContactTally tally() const { return subdomain_ ? subdomain_->paths().tally() : ContactTally{}; }
 
   const Box<D>& box_;
   Sizes sizes_;
@@ -72,6 +72,7 @@ class WindowedFlight {
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
   bool sorted_ = false;       // owners and ghosts are up to date at now_
+  bool no_room_ = false;      // for a ghost that this rank's subdomain needs
   bool cut_ = false;          // the last window was cut, so subdomains must be loaded again
   std::uint64_t events_ = 0;  // contacts since take()
   // Events per sphere of the subdomain in the epoch, relative to a mean of kMeanWork over all subdomains; and the same

@@ -31,7 +31,7 @@ double squared_normals(std::size_t n, RandomStream& random) {
 template <int D>
 double kinetic_energy(const System<D>& system, const Vec<D>& centre) {
   const auto& p = system.particles;
-  return sum_over_all<D>(system, [&](Id i) { return 0.5 * p.mass[i] * (p.v[i] - centre).squaredNorm(); });
+  return sum_over_all<D>(system, [&](Id i) { return 0.5 * moving_mass(p.mass[i]) * (p.v[i] - centre).squaredNorm(); });
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ void rescale(System<D>& system, std::int64_t slab, double time, double length, C
   const double before = kinetic_energy<D>(system, Vec<D>::Zero()), kinetic = kinetic_energy(system, centre);
   if (!(kinetic > 0)) return;
   // The kinetic energy of the centre of mass counts as one of D N degrees of freedom, as in the column `temperature`.
-  const std::size_t freedoms = D * system.size();
+  const std::size_t freedoms = D * system.moving();
   RandomStream random(bath.seed, RandomPurpose::rescaling, 0, kBlocksOfSlab * static_cast<std::uint64_t>(slab));
   const double kept = elementary::exp(-length * bath.rate), fresh = -elementary::expm1(-length * bath.rate);
   const double of_one = 0.5 * bath.temperature_at(time) / kinetic;  // the mean energy of a degree of freedom / K
@@ -69,6 +69,7 @@ void kick_all(System<D>& system, double start, double length, Counters& counters
   std::vector<double> gained(p.size(), 0.0);
   std::uint64_t kicks = 0;
   for (Id i = 0; i < p.size(); ++i) {
+    if (p.fixed(i)) continue;
     const Id id = p.id_of(i);
     double last = 0;  // only the last kick of a step matters
     for (double t = 0; (t = bath.next_kick(id, start, t, length)) <= length; last = t)

@@ -12,7 +12,7 @@ struct Measurement {
   Snapshot<D> shot;      ///< its energies, momentum and temperature
   double magnitude = 0;  ///< K + Σ|V| [energy]
   double virial = 0;     ///< Σ m v² + Σ d·F, with its long-range corrections [energy]
-  double speed = 0;      ///< mean |v| [length/time]
+  double speed = 0;      ///< mean |v| of the particles that are not fixed [length/time]
 };
 
 /// The long-range corrections of all terms of V.
@@ -26,11 +26,10 @@ Tail tail_of(const System<D>& system) {
   return sum;
 }
 
-/// Measures the momentum of `state` and everything else of `at`, to which `sums` must belong. Collective.
+/// The measurement that follows from the sums over all ranks.
 template <int D>
-Measurement<D> measure(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
-                       const PotentialSums& sums, const Tail& tail) {
-  const MotionSums<D> motion = evaluate_motion(system, state, at);
+Measurement<D> measured(const System<D>& system, const MotionSums<D>& motion, const PotentialSums& sums,
+                        const Tail& tail) {
   const double kinetic = motion.kinetic.value(), rotational = motion.rotational.value();
   Measurement<D> found;
   found.magnitude = kinetic + rotational + sums.magnitude.value();
@@ -39,13 +38,20 @@ Measurement<D> measure(const System<D>& system, const Particles<D>& state, const
   found.shot.rotational = rotational;
   found.shot.potential = sums.energy.value() + tail.energy;
   for (int k = 0; k < D; ++k) found.shot.momentum[k] = motion.momentum[k].value();
-  if (const auto total = static_cast<double>(system.size()); total > 0) {
+  if (const auto total = static_cast<double>(system.moving()); total > 0) {
     found.shot.temperature = 2 * kinetic / (D * total);
     constexpr int freedoms = Spin<D>::SizeAtCompileTime;
     found.shot.rotational_temperature = 2 * rotational / (freedoms * total);
     found.speed = motion.speed.value() / total;
   }
   return found;
+}
+
+/// Measures the momentum of `state` and everything else of `at`, to which `sums` must belong. Collective.
+template <int D>
+Measurement<D> measure(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
+                       const PotentialSums& sums, const Tail& tail) {
+  return measured(system, system.decomposition.sum(own_motion(system, state, at)), sums, tail);
 }
 
 /// The pressure for a virial [energy].

@@ -17,6 +17,8 @@ namespace carom {
 namespace {
 /// S_h costs two passes over all pairs: for larger systems it is computed at thermo rows and frames only.
 constexpr std::size_t kShadowAtEveryStep = 100;
+/// On several ranks the sums of this many steps are made at once, or sooner if they are needed.
+constexpr std::size_t kMostWaiting = 16;
 
 // Limits at which a run fails, because it is no longer a motion of the deck's system.
 
@@ -58,6 +60,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   sampled_walls_.resize(column_of_wall_.size());
   begin_means();
   Fields& fields = system.fields;
+  fields.settle = [this] { settle(); };
   fields.add_value("statistics", statistics);
   fields.add_value("account", account_);
   fields.add_value("impulses of walls", last_row_impulses_);
@@ -88,7 +91,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       },
       [this] {
         const Particles<D>& p = system_.particles;
-        if (info_.hard_cores) touching_.emplace(system_.box, p.radius, p.ghost);
+        if (info_.hard_cores) touching_.emplace(system_.box, p.radius, p.ghost, p.all_fixed());
         if (info_.shadow) scratch_.resize(p.size());
       });
 }
@@ -125,8 +128,9 @@ template <int D>
 void Monitor<D>::guard(double energy_before, double magnitude_before) {
   const Statistics& s = statistics_;
   const auto fail = [&](const std::string& what) {
-    throw Error(Failure::numerical, what + " at step " + std::to_string(s.steps) + ", time " + short_text(s.end_time) +
-                                        "; " + fastest(system_.particles) + "; use a smaller integrator.step");
+    throw Error(Failure::numerical, what + " at step " + std::to_string(shot_.step) + ", time " +
+                                        short_text(shot_.time) + "; " + fastest(system_.particles) +
+                                        "; use a smaller integrator.step");
   };
   const double energy = std::abs(account_.energy), jump = std::abs(account_.energy - energy_before);
   // If the particles were almost at rest at the start, both energies may be rounding errors.
@@ -190,55 +194,44 @@ void Monitor<D>::sample(double time, const Particles<D>& state) {
 
 template <int D>
 void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bool last) {
-  Statistics& s = statistics_;
+  const Statistics& s = statistics_;
   const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + plan_.slack();
-  const bool first = s.steps == s.start_steps + 1;
-  const bool with_shadow = info_.shadow && (due || first || system_.size() <= kShadowAtEveryStep);
-  const double speed = account_.speed, energy = account_.energy, magnitude = account_.magnitude;
-  shot_ = measure(s.end_time, system_.particles, &integrator, with_shadow);
-  s.energy_final = shot_.total();
-  if (s.rotational_energy) s.rotational_energy = shot_.rotational;
-  if (first && info_.stepping) count_from(shot_);
-  s.max_energy_error = std::max(s.max_energy_error, std::abs(account_.energy - account_.first_energy));
-  if (with_shadow)
-    s.max_shadow_energy_error =
-        std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + s.counters.drained() - account_.first_shadow));
-  guard(energy, magnitude);
-  if (s.max_momentum_error)
-    s.max_momentum_error =
-        std::max(*s.max_momentum_error, (shot_.momentum - Vec<D>(account_.first_momentum.data())).norm());
-  if (info_.hard_cores) {
-    const Overlaps own = overlaps();
-    const double deepest = system_.decomposition.largest(own.depth());
-    s.counters.max_overlap = std::max(s.counters.max_overlap, deepest);
-    if (deepest > kDeepestOverlap) {
-      const Overlaps all = sum_of_all(system_.decomposition.ranks(), own);
-      throw Error(Failure::numerical, "particles " + std::to_string(all.lo) + " and " + std::to_string(all.hi) +
-                                          " overlap, by " + short_text(deepest) +
-                                          " of their contact distance, at step " + std::to_string(s.steps) + ", time " +
-                                          short_text(s.end_time) + "; use a smaller integrator.step");
-    }
+  const bool soon = due || s.steps == s.start_steps + 1 || !info_.stepping || !system_.decomposition.joined() ||
+                    (waits() && transient_end_);
+  const bool with_shadow =
+      info_.shadow && (due || s.steps == s.start_steps + 1 || system_.size() <= kShadowAtEveryStep);
+  Waiting& slab = waiting_.emplace_back(observed(s.end_time, system_.particles, &integrator, with_shadow));
+  slab.elapsed = elapsed;
+  if (info_.hard_cores) slab.own.overlaps = overlaps();
+  if (soon || with_shadow || waiting_.size() == kMostWaiting) settle();
+  sample(s.end_time, system_.particles);
+  if (due) show(shot_, false);
+}
+
+/// Makes the sums that slabs wait for. Collective.
+template <int D>
+void Monitor<D>::settle() {
+  if (waiting_.empty()) return;
+  std::vector<Sums> sums;
+  for (const Waiting& slab : waiting_) sums.push_back(slab.own);
+  if (system_.decomposition.joined()) {
+    const std::vector<Sums> all = gather_values<Sums>(system_.decomposition.ranks(), sums);
+    std::ranges::fill(sums, Sums{});
+    for (std::size_t k = 0; k < all.size(); ++k) sums[k % sums.size()].add(all[k]);
   }
-  account_.virial_time += elapsed * account_.virial;
+  const std::vector<Waiting> slabs = std::exchange(waiting_, {});
+  for (std::size_t k = 0; k < slabs.size(); ++k) take(slabs[k], sums[k]);
+  Statistics& s = statistics_;
   if (const double time = s.end_time - s.start_time; time > 0) {
     if (!system_.box.plain()) account_.virial_time = std::numeric_limits<double>::quiet_NaN();  // the volume varies
     s.mean_pressure = (account_.virial_time + s.counters.collision_virial.value()) / (time * D * system_.box.volume());
     s.collision_rate =
         2.0 * static_cast<double>(s.counters.sphere_sphere) / (static_cast<double>(system_.size()) * time);
   }
-  const double path = elapsed * 0.5 * (speed + account_.speed);
-  account_.path += path;
-  add_to_series(elapsed, path);
-  if (waits() && transient_end_) {
-    s.equilibrium = {*transient_end_, s.end_time};
-    begin_means();
-  }
-  if (s.collision_rate > 0) {
+  if (s.collision_rate > 0 && !system_.has_fixed()) {
     s.mean_free_time = 1 / s.collision_rate;
     s.mean_free_path = account_.path / (s.end_time - s.start_time) / s.collision_rate;
   }
-  sample(s.end_time, system_.particles);
-  show(shot_, false);
 }
 
 /// Begins the means over time at the present time.
@@ -247,10 +240,11 @@ void Monitor<D>::begin_means() {
   statistics_.series = Blocking(Statistics::mean_names.size() + column_of_wall_.size());
 }
 
-/// Adds the slab that has ended to the means. `path`: the mean length of the spheres' ways in it.
+/// Adds a slab to the means. `path`: the mean length of the spheres' ways in it.
 template <int D>
-void Monitor<D>::add_to_series(double elapsed, double path) {
-  const ContactTally& tally = statistics_.counters;
+void Monitor<D>::add_to_series(const Waiting& slab, double path) {
+  const ContactTally& tally = slab.tally;
+  const double elapsed = slab.elapsed;
   // Most steps of a small system have no contacts, and the value of an exact sum costs more than all the rest here.
   const auto since = [](const ExactSum& sum, Sampled& before) {
     if (std::memcmp(&sum, &before.sum, sizeof sum) == 0) return 0.0;
@@ -278,37 +272,86 @@ void Monitor<D>::add_to_series(double elapsed, double path) {
   statistics_.series.add(values_, weights_);
 }
 
-/// `integrator` is null if the particles are not its state.
+/// Adds a slab to the statistics; `sums` are those of all ranks.
 template <int D>
-Snapshot<D> Monitor<D>::measure(double time, const Particles<D>& state, const Integrator<D>* integrator,
-                                bool with_shadow, bool fresh) {
+void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
+  Statistics& s = statistics_;
+  const double speed = account_.speed, energy = account_.energy, magnitude = account_.magnitude;
+  shot_ = measured(slab, sums);
+  s.energy_final = shot_.total();
+  if (s.rotational_energy) s.rotational_energy = shot_.rotational;
+  if (shot_.step == s.start_steps + 1 && info_.stepping) count_from(shot_);
+  s.max_energy_error = std::max(s.max_energy_error, std::abs(account_.energy - account_.first_energy));
+  if (s.max_shadow_energy_error)
+    s.max_shadow_energy_error =
+        std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + slab.drained - account_.first_shadow));
+  guard(energy, magnitude);
+  if (s.max_momentum_error)
+    s.max_momentum_error =
+        std::max(*s.max_momentum_error, (shot_.momentum - Vec<D>(account_.first_momentum.data())).norm());
+  const Overlaps& all = sums.overlaps;
+  s.counters.max_overlap = std::max(s.counters.max_overlap, all.depth());
+  if (all.depth() > kDeepestOverlap)
+    throw Error(Failure::numerical, "particles " + std::to_string(all.lo) + " and " + std::to_string(all.hi) +
+                                        " overlap, by " + short_text(all.depth()) +
+                                        " of their contact distance, at step " + std::to_string(shot_.step) +
+                                        ", time " + short_text(shot_.time) + "; use a smaller integrator.step");
+  account_.virial_time += slab.elapsed * account_.virial;
+  const double path = slab.elapsed * 0.5 * (speed + account_.speed);
+  account_.path += path;
+  add_to_series(slab, path);
+  if (waits() && transient_end_) {
+    s.equilibrium = {*transient_end_, slab.shot.time};
+    begin_means();
+  }
+}
+
+/// The state of this rank's particles; `integrator` is null if they are not its state.
+template <int D>
+typename Monitor<D>::Waiting Monitor<D>::observed(double time, const Particles<D>& state,
+                                                  const Integrator<D>* integrator, bool with_shadow, bool fresh) {
   const Stopwatch watch(statistics_.counters.seconds.output);
   const Particles<D>* elsewhere = integrator ? integrator->energy_state() : nullptr;
   const Particles<D>& nodes = elsewhere ? *elsewhere : state;
   const PotentialSums* potential = integrator && fresh ? integrator->potential() : nullptr;
-  const PotentialSums sums = potential ? system_.decomposition.sum(*potential) : evaluate_energy<D>(system_, nodes.x);
-  const Measurement<D> found = carom::measure(system_, state, nodes, sums, tail_);
-  Snapshot<D> shot = found.shot;
-  shot.time = time;
-  shot.step = statistics_.steps;
-  shot.collisions = statistics_.counters.sphere_sphere;
-  shot.particles = &state;
-  shot.dissipated = statistics_.counters.dissipated.value();
-  shot.work = statistics_.counters.work.value();
-  shot.heat = statistics_.counters.heat.value();
+  const ContactTally& tally = statistics_.counters;
+  Waiting now{.shot = {.time = time,
+                       .step = statistics_.steps,
+                       .collisions = tally.sphere_sphere,
+                       .particles = &state,
+                       .dissipated = tally.dissipated.value(),
+                       .work = tally.work.value(),
+                       .heat = tally.heat.value()},
+              .own = {own_motion(system_, state, nodes), potential ? *potential : own_energy<D>(system_, nodes.x), {}},
+              .tally = tally,
+              .drained = statistics_.counters.drained(),
+              .shadow_term = std::numeric_limits<double>::quiet_NaN()};
+  Counters uncounted;
+  if (with_shadow) now.shadow_term = shadow_term<D>(system_, nodes, integrator->accelerations(), scratch_, uncounted);
+  return now;
+}
+
+/// Measures a state; `sums` are those of all ranks.
+template <int D>
+Snapshot<D> Monitor<D>::measured(const Waiting& at, const Sums& sums) {
+  const Measurement<D> found = carom::measured(system_, sums.motion, sums.potential, tail_);
+  Snapshot<D> shot = at.shot;
+  shot.kinetic = found.shot.kinetic;
+  shot.rotational = found.shot.rotational;
+  shot.potential = found.shot.potential;
+  shot.momentum = found.shot.momentum;
+  shot.temperature = found.shot.temperature;
+  shot.rotational_temperature = found.shot.rotational_temperature;
   // The conserved quantity: the energy of the spheres, what they have lost, and less what walls and baths gave them.
-  account_.energy = shot.kinetic + sums.energy.value() + statistics_.counters.drained();
+  account_.energy = shot.kinetic + sums.potential.energy.value() + at.drained;
   account_.magnitude = found.magnitude;
   account_.virial = found.virial;
   account_.speed = found.speed;
-  if (with_shadow) {
-    Counters uncounted;
-    const double g = shadow_term<D>(system_, nodes, integrator->accelerations(), scratch_, uncounted);
-    shot.shadow = shot.total() + plan_.step * plan_.step * g;
-  }
+  shot.shadow = shot.total() + plan_.step * plan_.step * at.shadow_term;
   if (!std::isfinite(shot.total()))
     throw Error(Failure::numerical, "the energy is not finite at step " + std::to_string(shot.step) + ", time " +
-                                        short_text(time) + "; " + fastest(state) + "; use a smaller integrator.step");
+                                        short_text(shot.time) + "; " + fastest(system_.particles) +
+                                        "; use a smaller integrator.step");
   return shot;
 }
 
@@ -377,7 +420,7 @@ Overlaps Monitor<D>::overlaps() {
   const Decomposition<D>& ranks = system_.decomposition;
   if (ranks.joined() && !ranks.by_place()) {
     const Particles<D> halo = halo_of(system_.box, 2 * ranks.sizes().largest_radius(), ranks.ranks(), p);
-    NeighbourList<D> touching(system_.box, halo.radius, halo.ghost);
+    NeighbourList<D> touching(system_.box, halo.radius, halo.ghost, halo.all_fixed());
     look(touching, halo);
   } else {
     look(*touching_, p);

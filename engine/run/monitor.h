@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/forces/forces.h"
 #include "engine/run/simulation.h"
 #include "engine/run/transient.h"
 #include "engine/search/neighbour_list.h"
@@ -47,7 +48,10 @@ class Monitor {
   /// Keeps references to all arguments.
   Monitor(System<D>& system, const IntegratorInfo& info, const Plan& plan, const std::vector<Observer<D>*>& observers,
           Statistics& statistics);
-  ~Monitor() { system_.fields.remove_working(this); }
+  ~Monitor() {
+    system_.fields.remove_working(this);
+    system_.fields.settle = [] {};
+  }
   Monitor(const Monitor&) = delete;
   Monitor& operator=(const Monitor&) = delete;
 
@@ -65,8 +69,12 @@ class Monitor {
   /// statistics.steps and end_time already include the slab, which advanced the time by `elapsed`.
   void end_of_slab(double elapsed, const Integrator<D>& integrator, bool last);
 
+  /// Forgets slabs that wait for their sums, because another state will be restored.
+  void forget() { waiting_.clear(); }
+
   /// Shows the last state unless this was done before.
   void finish() {
+    settle();
     shot_.particles = &system_.particles;
     show(shot_, true);
   }
@@ -78,17 +86,44 @@ class Monitor {
     Schedule due;
   };
 
+  /// What a measurement needs of each rank.
+  struct Sums {
+    MotionSums<D> motion;
+    PotentialSums potential;
+    Overlaps overlaps;
+    void add(const Sums& other) {
+      motion.add(other.motion);
+      potential.add(other.potential);
+      overlaps.add(other.overlaps);
+    }
+  };
+  /// A state whose sums over all ranks have not been made.
+  struct Waiting {
+    Snapshot<D> shot;  // without what follows from the sums
+    Sums own;
+    ContactTally tally;
+    double drained, shadow_term, elapsed = 0;
+  };
+
   void sample(double time, const Particles<D>& state);
+  Waiting observed(double time, const Particles<D>& state, const Integrator<D>* integrator, bool with_shadow,
+                   bool fresh = true);
+  Snapshot<D> measured(const Waiting& at, const Sums& sums);
   /// Whether samples wait for the end of the transient, and the time from which their times are counted.
   bool waits() const { return plan_.from_equilibrium && !statistics_.equilibrium; }
   double origin() const { return statistics_.equilibrium ? statistics_.equilibrium->start : 0; }
   void begin_means();
   Snapshot<D> measure(double time, const Particles<D>& state, const Integrator<D>* integrator, bool with_shadow,
-                      bool fresh = true);
+                      bool fresh = true) {
+    const Waiting now = observed(time, state, integrator, with_shadow, fresh);
+    return measured(now, system_.decomposition.sum(now.own));
+  }
+  void settle();
+  void take(const Waiting& slab, const Sums& sums);
   void show(Snapshot<D> shot, bool last);
   std::vector<WallLoad> wall_loads(double time);
   void count_from(const Snapshot<D>& shot);
-  void add_to_series(double elapsed, double path);
+  void add_to_series(const Waiting& slab, double path);
   void guard(double energy_before, double magnitude_before);
   std::string fastest(const Particles<D>& state) const;
   Overlaps overlaps();
@@ -127,6 +162,7 @@ class Monitor {
   std::vector<double> last_row_impulses_;     // of the walls, by number, up to the last row
   std::vector<double> values_, weights_;      // of a sample of Statistics::series
   Snapshot<D> shot_;                          // at the last slab's end
+  std::vector<Waiting> waiting_;              // the last slabs
   Tail tail_;                                 // added to output, not to H and its errors
   std::vector<Vec<D>> scratch_;               // for S_h
   std::optional<NeighbourList<D>> touching_;  // pairs that may overlap

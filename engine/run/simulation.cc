@@ -62,8 +62,10 @@ void check_interval(double interval, double step) {
 template <int D>
 double thermal_speed(const System<D>& system) {
   const auto& p = system.particles;
-  const double twice_kinetic = sum_over_all<D>(system, [&](Id i) { return p.mass[i] * p.v[i].squaredNorm(); });
-  return std::sqrt(twice_kinetic / (D * sum_over_all<D>(system, [&](Id i) { return p.mass[i]; })));
+  const double twice_kinetic =
+      sum_over_all<D>(system, [&](Id i) { return moving_mass(p.mass[i]) * p.v[i].squaredNorm(); });
+  const double mass = sum_over_all<D>(system, [&](Id i) { return moving_mass(p.mass[i]); });
+  return std::sqrt(twice_kinetic / (D * mass));
 }
 
 /// A rest speed above the thermal speed would make most contacts elastic. Forces may move spheres that are slow at the
@@ -77,6 +79,17 @@ void check_rest_speeds(const System<D>& system) {
       throw Error(Failure::deck, "the rest_speed " + short_text(law.rest_speed) +
                                      " of a contact is above the thermal " + "speed at the start, " +
                                      short_text(thermal) + "; give a smaller one, or none");
+}
+
+template <int D>
+void check_fixed(const System<D>& system, const IntegratorInfo& info) {
+  if (!system.has_fixed()) return;
+  if (system.moving() == 0)
+    throw Error(Failure::deck, "all particles are fixed and nothing would move; give some a finite mass");
+  if (!info.smooth_forces && !system.interactions.empty())
+    throw Error(Failure::deck, std::string(info.name) +
+                                   " knows no fixed particles in a uniform-field, where all particles have the same "
+                                   "acceleration; take psa, edda or their relatives");
 }
 
 Plan checked(const Plan& plan) {
@@ -107,7 +120,7 @@ typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system,
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
   if (plan.step != 0) given.set("step", plan.step);
-  if (!given.has("step") && !info.stepping) given.set("step", default_epoch(system));
+  if (!info.stepping) choose_epoch(system, given);
   given = completed(info.name, info.parameters, std::move(given));
   plan.step = given.real("step");
   if (given.has("longest_step")) plan.longest_step = given.real("longest_step");
@@ -144,6 +157,8 @@ void Simulation<D>::begin(const Hooks& hooks) {
   const bool again = monitor_ != nullptr;
   if (!again) {
     system_->need_spins();
+    system_->count_moving();
+    check_fixed(*system_, info_);
     if (!hooks.restore) check_rest_speeds(*system_);
     if (info_.smooth_forces) {
       system_->quanta = quanta(*system_);
@@ -156,6 +171,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   }
   if (again || hooks.restore) {
     decomposition.to_blocks();
+    if (again) monitor_->forget();
     if (hooks.restore) hooks.restore();
     if (decomposition.ranks().rank() > 0) s.counters.seconds = {}, s.counters.events = {}, s.counters.windows = {};
     if (info_.smooth_forces) divide();
@@ -163,7 +179,12 @@ void Simulation<D>::begin(const Hooks& hooks) {
   }
   if (again) {
     // The last slab was shortened to meet the previous end of the run.
-    if (s.end_time != next_slab().start) count_.steps = s.steps, count_.time = s.end_time, count_.within = 0;
+    if (s.end_time != next_slab().start) {
+      count_.steps = s.steps;
+      count_.time = s.end_time;
+      count_.within = count_.boxes = 0;
+      count_.contacts = 0;
+    }
     return;
   }
   if (hooks.branch) {
@@ -219,7 +240,7 @@ void Simulation<D>::run(const Hooks& hooks) {
                                monitor_->observe(slab.start + offset, copies);
                              },
                          .watch = &watch};
-    const std::uint64_t collisions = s.counters.sphere_sphere;
+    const std::uint64_t collisions = s.counters.sphere_sphere, at_walls = s.counters.sphere_wall;
     if (!fly(slab, report, watch)) {
       if (hooks.left) hooks.left();
       continue;
@@ -228,6 +249,9 @@ void Simulation<D>::run(const Hooks& hooks) {
     show_contacts(slab);
     s.counters.seconds.communicate = system_->decomposition.seconds_waited();
     last_collisions_ = s.counters.sphere_sphere - collisions;
+    cut_ = slab.steps < count_.stride;
+    count_.contacts += 2 * *last_collisions_ + s.counters.sphere_wall - at_walls;
+    count_.boxes = std::max(count_.boxes, report.boxes);
     if (*last_collisions_ > 0) quiet_since_ = slab.start + report.reached;
 
     const double step = length_from(time_of(slab.index), plan_);
@@ -243,8 +267,8 @@ void Simulation<D>::run(const Hooks& hooks) {
       // accumulate.
       s.steps += slab.steps;
       s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
+      if (!system_->box.bath.rescales()) lengthen_slabs(count_.within + slab.length);
       count_.within = 0;
-      if (!system_->box.contacts.elastic() && !system_->box.bath.rescales()) lengthen_slabs();
     }
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
@@ -345,24 +369,39 @@ bool Simulation<D>::is_last_on_the_way() const {
   const Statistics& s = statistics_;
   const Slab next = next_slab();
   // A slab that meets an end may differ from a step by rounding alone.
-  const bool whole = s.end_time == next.start && (s.steps == s.start_steps || count_.within > 0 ||
-                                                  length_from(time_of(s.steps - 1), plan_) == plan_.step);
+  const bool whole =
+      !cut_ && s.end_time == next.start &&
+      (s.steps == s.start_steps || count_.within > 0 || length_from(time_of(s.steps - 1), plan_) == plan_.step);
   if (!whole) return false;
-  if (finished() || length_from(time_of(s.steps), plan_) != plan_.step) return true;
+  if (finished() || next.steps < count_.stride || length_from(time_of(s.steps), plan_) != plan_.step) return true;
   // Free flight ends within a slab at its last collision; the slab before predicts the number of collisions.
   return plan_.collisions && next.collision_limit == *plan_.collisions &&
          (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
 }
 
-/// Sets the length of the next slab, so that its number of collisions hardly changes as the gas cools. Collective.
+/// Sets the length of the next slab after one of this length: its number of collisions hardly changes as the gas cools,
+/// and an epoch with too few collisions is followed by one that is longer by a power of four, so that ordinary gases
+/// keep their steps. Collective.
 template <int D>
-void Simulation<D>::lengthen_slabs() {
+void Simulation<D>::lengthen_slabs(double length) {
   const double most = info_.stepping ? std::floor(plan_.longest_step / plan_.step) : kLongestEpoch;
   if (!(most > 1)) return;
-  const double speed = thermal_speed(*system_);
-  if (count_.first_speed == 0) count_.first_speed = speed;
-  const double slower = speed > 0 ? count_.first_speed / speed : 1;
-  count_.stride = static_cast<std::int64_t>(std::clamp(slower, 1.0, most));
+  double steps = 1;
+  if (!system_->box.contacts.elastic()) {
+    const double speed = thermal_speed(*system_);
+    if (count_.first_speed == 0) count_.first_speed = speed;
+    if (speed > 0) steps = std::clamp(count_.first_speed / speed, 1.0, most);
+  }
+  if (integrator_->lengthens()) {
+    const double events = static_cast<double>(count_.contacts) / static_cast<double>(system_->size());
+    const double wanted = next_epoch(*system_, {length, events, count_.boxes});
+    while (4 * steps * plan_.step <= wanted) steps *= 4;
+  }
+  const auto before = count_.stride;
+  count_.stride = static_cast<std::int64_t>(std::min(steps, most));
+  if (count_.stride > before) *last_collisions_ *= static_cast<std::uint64_t>(count_.stride / before + 1);
+  count_.contacts = 0;
+  count_.boxes = 0;
 }
 
 template <int D>

@@ -62,7 +62,8 @@ struct Snapshot {
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN if the method has none
   double max_energy_error = 0;                               ///< as in Statistics, so far [energy]
   Vec<D> momentum = Vec<D>::Zero();
-  double temperature = 0;  ///< Σ m v²/(D N), in units of energy (k_B = 1); total momentum is not subtracted
+  double temperature = 0;  ///< Σ m v²/(D N) of the N particles that are not fixed, in units of energy (k_B = 1); total
+                           ///< momentum is not subtracted
   double rotational_temperature = 0;  ///< Σ I ω²/(f N), f = 1 in two dimensions, 3 in three [energy]
   double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
@@ -128,7 +129,7 @@ struct Statistics {
   double collision_rate = 0;  ///< 2 × pair collisions per unit time and particle: the rate for one sphere
   /// The mean time and the mean length of a sphere's flights between two pair collisions: N t/(2 collisions), and this
   /// time × the mean speed. The mean of |v| over all particles is computed at slab ends and averaged over time by the
-  /// trapezoidal rule. Absent if there was no collision.
+  /// trapezoidal rule. Absent if there was no collision, and if particles are fixed.
   std::optional<double> mean_free_time, mean_free_path;
   /// With Plan::from_equilibrium, once known: when the transient ended, and the time from which means are taken.
   struct Equilibrium {
@@ -157,6 +158,9 @@ struct StepCount {
   double time = 0;
   /// How far an epoch of free flight has advanced that needs several slabs [time].
   double within = 0;
+  /// What happened in the epoch so far.
+  double boxes = 0;            ///< PastEpoch::boxes
+  std::uint64_t contacts = 0;  ///< of pairs twice
   /// Free flight with contacts that dissipate: an epoch is as many steps long as the gas is slower than at the start.
   double first_speed = 0;   ///< thermal speed at the start [length/time]
   std::int64_t stride = 1;  ///< steps of the next epoch
@@ -244,7 +248,7 @@ class Simulation {
     return count_.time + static_cast<double>(step - count_.steps) * plan_.step;
   }
   Slab next_slab() const;
-  void lengthen_slabs();
+  void lengthen_slabs(double length);
   bool finished() const;
   void need_collisions() const;
   double fraction_done() const;
@@ -259,6 +263,7 @@ class Simulation {
   double quiet_since_ = 0;  // end of the last slab with pair collisions
   std::uint64_t most_collisions_ = std::max<std::uint64_t>(500'000, 4 * system_->size());  // per slab of an epoch
   std::optional<std::uint64_t> last_collisions_;  // in the last slab, if this run() executed it
+  bool cut_ = false;                              // whether the end of the plan shortened the last slab by whole steps
   std::unique_ptr<Monitor<D>> monitor_;           // from the first run() on
   std::size_t first_of_integrator_ = 0;           // its first entry in Fields::of_run()
 };

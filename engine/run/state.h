@@ -31,6 +31,7 @@ inline StateWriter into(std::map<std::string, Bytes>& state) {
 /// continue. Collective.
 template <int D>
 void save_state(System<D>& system, const StateWriter& writer) {
+  system.fields.settle();
   Communicator& ranks = system.decomposition.ranks();
   for (const auto& field : system.fields.of_particles()) {
     if (field->kind == Fields::Kind::constant) continue;

@@ -2,8 +2,8 @@
 // Density and temperature in slabs across one axis.
 //
 // If a sample finds n particles (by their centres) with kinetic energy K in a slab of volume V, the density is ⟨n⟩/V
-// and the temperature 2⟨K⟩/(D⟨n⟩); the mean velocity is not subtracted. Sums are exact, so that their order does not
-// matter.
+// and the temperature 2⟨K⟩/(D⟨n⟩), without fixed particles; the mean velocity is not subtracted. Sums are exact, so
+// that their order does not matter.
 
 #include <algorithm>
 #include <limits>
@@ -21,6 +21,7 @@ class TemperatureProfile : public Observable<D> {
         box_(system.box),
         axis_(parameters.integer("axis")),
         number_(static_cast<std::size_t>(parameters.integer("bins"))),
+        moving_(number_.size()),
         twice_kinetic_(number_.size()),
         series_(2 * number_.size()) {}
 
@@ -32,7 +33,7 @@ class TemperatureProfile : public Observable<D> {
     for (std::size_t b = 0; b < number_.size(); ++b) {
       table[0].values.push_back((static_cast<double>(b) + 0.5) * box_.edges[axis_] / bins);
       density.push_back(number_[b] / (samples * box_.volume() / bins));
-      temperature.push_back(number_[b] > 0 ? twice_kinetic_[b].value() / (D * number_[b])
+      temperature.push_back(moving_[b] > 0 ? twice_kinetic_[b].value() / (D * moving_[b])
                                            : std::numeric_limits<double>::quiet_NaN());
       of_density.push_back(series_.estimate(b));
       of_density.back().error /= box_.volume() / bins;
@@ -53,6 +54,8 @@ class TemperatureProfile : public Observable<D> {
       const auto all = static_cast<double>(bins);
       const auto slab = static_cast<std::size_t>(std::clamp(p.x[i][axis_] / box_.edges[axis_] * all, 0.0, all - 1));
       values[slab] += 1;
+      if (p.fixed(static_cast<Id>(i))) continue;
+      moving_[slab] += 1;
       weights[bins + slab] += D;
       twice_kinetic[slab].add(p.mass[i] * p.v[i].squaredNorm());
     }
@@ -64,11 +67,11 @@ class TemperatureProfile : public Observable<D> {
     series_.add(values, weights);
   }
 
-  void sums(Archive& archive) override { archive(number_, twice_kinetic_, series_); }
+  void sums(Archive& archive) override { archive(number_, moving_, twice_kinetic_, series_); }
 
   const Box<D>& box_;
   Eigen::Index axis_;
-  std::vector<double> number_;  // particles in each slab, summed over all samples
+  std::vector<double> number_, moving_;  // particles in each slab, and those not fixed, summed over all samples
   std::vector<ExactSum> twice_kinetic_;
   Blocking series_;  // of the densities, then of the temperatures
 };

@@ -20,10 +20,12 @@ double mean(const std::vector<double>& of) {
 }  // namespace
 
 template <int D>
-NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without)
+NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without,
+                                std::vector<char> fixed)
     : box_(box),
       reach_(std::move(reach)),
       without_(without),
+      fixed_(std::move(fixed)),
       skin_(0.3 * mean(reach_), 6, 1.6 * mean(reach_)) {}  // at least 15 % of a mean pair reach
 
 template <int D>
@@ -96,7 +98,7 @@ bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
     if (!without_.empty() && without_[i] != 0) continue;
     const std::size_t first = pairs_.size();
     cells.for_each_near(x[i], reach_[i], [&](Id j, const Image<D>& image) {
-      if (j <= i) return;
+      if (j <= i || (!fixed_.empty() && fixed_[i] != 0 && fixed_[j] != 0)) return;
       const Vec<D> d = x[i] - x[j] + box_.shift(image);
       const double reach = reach_[i] + reach_[j] + skin_.width();
       if (d.squaredNorm() <= reach * reach) pairs_.push_back({i, j, image});

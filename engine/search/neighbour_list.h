@@ -29,8 +29,9 @@ template <int D>
 class NeighbourList {
  public:
   /// Lists pairs (i, j) that can come as near as reach(i) + reach(j), except those pairs whose lower particle is marked
-  /// in `without`, which must outlive the list; if it is empty, all pairs are listed.
-  NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without = {});
+  /// in `without`, which must outlive the list, and pairs of two particles marked in `fixed`. Empty marks exclude none.
+  NeighbourList(const Box<D>& box, std::vector<double> reach, std::span<const char> without = {},
+                std::vector<char> fixed = {});
 
   /// The pairs that are within reach at x, at x_new, or anywhere on straight lines or shallow arcs between them (arcs
   /// that deviate from x by at most `margin` more than the straight displacement). Rebuilds the list if needed. Throws
@@ -50,6 +51,7 @@ class NeighbourList {
   const Box<D>& box_;
   std::vector<double> reach_;
   std::span<const char> without_;
+  std::vector<char> fixed_;
   Skin skin_;
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
   std::vector<NeighbourPair<D>> pairs_;

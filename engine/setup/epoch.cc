@@ -16,6 +16,17 @@ namespace {
 /// The longest epoch, relative to the relaxation time of a bath that rescales at the ends of epochs: the kinetic energy
 /// moves by at most a tenth of its distance from the mean at once.
 constexpr double kEpochOfRelaxation = 0.1;
+/// The events of a sphere in an epoch: starting an epoch costs a fifth of an event for each sphere.
+constexpr double kEventsOfEpoch = 40;
+/// How far the fastest sphere may fly in an epoch that is longer than the default [smallest diameter]. The time of an
+/// event and the position of its spheres are rounded to 2^-53 of the time and the path since the start of the epoch:
+/// together less than 1e-12 of the smallest contact distance.
+constexpr double kFarthest = 4096;
+/// In an epoch a sphere may become this many times faster than all were before: it gets up to twice the speed of a
+/// heavy sphere.
+constexpr double kFaster = 4;
+/// The longest epoch, relative to the last one.
+constexpr double kLonger = 64;
 }  // namespace
 
 template <int D>
@@ -29,8 +40,8 @@ double default_epoch(const System<D>& system) {
   const auto [at_start, mass, diameter, fastest, lightest] = accumulated_in_order(
       system.decomposition.others() ? *system.decomposition.others() : alone, Sums{}, [&](Sums& sums) {
         for (std::size_t i = 0; i < p.size(); ++i) {
-          sums.twice_kinetic += p.mass[i] * p.v[i].squaredNorm();
-          sums.mass += p.mass[i] / n;
+          sums.twice_kinetic += moving_mass(p.mass[i]) * p.v[i].squaredNorm();
+          sums.mass += moving_mass(p.mass[i]) / n;
           sums.diameter += 2 * p.radius[i] / n;
           sums.fastest = std::max(sums.fastest, p.v[i].norm());
           sums.lightest = std::min(sums.lightest, p.mass[i]);
@@ -41,14 +52,16 @@ double default_epoch(const System<D>& system) {
   const bool heated = bath.type != Bath::Type::none;
   const double hottest = heated ? std::max(bath.temperature, bath.last_temperature) : 0;
   const double twice_kinetic = std::max(at_start, D * n * hottest);
-  if (twice_kinetic == 0) return 1;
+  if (twice_kinetic == 0 || mass == 0) return 1;
   const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));
   const double rate = thermal_speed * contacts_a_length({D, n / system.box.volume(), filled, diameter, diameter});
   const double farthest = std::min(300 * diameter, 4 * system.box.edges.minCoeff());
-  double epoch = std::min(40 / rate, farthest / thermal_speed);
+  // In equilibrium, where the lightest are the fastest.
+  const double light_speed = std::sqrt(twice_kinetic / (D * n * lightest));
+  double epoch = std::min(kEventsOfEpoch / rate, farthest / std::max(thermal_speed, light_speed));
   if (bath.rescales()) epoch = std::min(epoch, kEpochOfRelaxation / bath.rate);
   // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.
-  const double speed = std::max(fastest, 5 * std::sqrt(twice_kinetic / (D * n * lightest)));
+  const double speed = std::max(fastest, 5 * light_speed);
   const Packing<D> packing(1, system.size());
   for (int k = 0; k < D; ++k)
     if (system.box.periodic(k)) epoch = std::min(epoch, packing.largest() * system.box.edges[k] / speed);
@@ -59,7 +72,53 @@ double default_epoch(const System<D>& system) {
   return rounded;
 }
 
+template <int D>
+void choose_epoch(const System<D>& system, Parameters& given, double step) {
+  if (given.has("step")) return;
+  given.set("step", step > 0 ? step : default_epoch(system));
+  if (!given.has("lengthen")) given.set("lengthen", true);
+}
+
+template <int D>
+double next_epoch(const System<D>& system, const PastEpoch& past) {
+  const auto& p = system.particles;
+  std::array<double, 4> largest{-std::numeric_limits<double>::infinity(), 0, past.boxes, -1};
+  auto& [minus_diameter, fastest, boxes, minus_lightest] = largest;
+  minus_lightest = minus_diameter;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    minus_diameter = std::max(minus_diameter, -2 * p.radius[i]);
+    minus_lightest = std::max(minus_lightest, -p.mass[i]);
+    fastest = std::max(fastest, p.v[i].norm());
+  }
+  system.decomposition.ranks().largest(largest);
+  double hottest = 0;
+  const Bath& bath = system.box.bath;
+  if (bath.type != Bath::Type::none) hottest = std::max(bath.temperature, bath.last_temperature);
+  for (const auto& wall : system.box.options) {
+    hottest = std::max(hottest, wall.temperature);
+    if (wall.moves()) return 0;
+  }
+  if (!system.interactions.empty()) return 0;
+  fastest = std::max(fastest, 5 * std::sqrt(hottest / -minus_lightest));
+  double longest = std::min(kLonger * past.length, kFarthest * -minus_diameter / fastest);
+  longest = std::min(longest, kEventsOfEpoch / past.events * past.length);
+  const double count = Packing<D>(1, system.size()).largest(), came = boxes + 1;
+  for (int k = 0; k < D; ++k) {
+    if (!system.box.periodic(k)) continue;
+    const double edge = system.box.edges[k];
+    // Spheres that turn often come as far as the root of the time.
+    const bool wanders = fastest * past.length > kFaster * came * edge;
+    const double as_measured = wanders ? (count / came) * (count / came) / 4 : count / came / kFaster;
+    longest = std::min(longest, std::max(count / kFaster * edge / fastest, past.length * as_measured));
+  }
+  return longest;
+}
+
 template double default_epoch(const System<2>&);
 template double default_epoch(const System<3>&);
+template void choose_epoch(const System<2>&, Parameters&, double);
+template void choose_epoch(const System<3>&, Parameters&, double);
+template double next_epoch(const System<2>&, const PastEpoch&);
+template double next_epoch(const System<3>&, const PastEpoch&);
 
 }  // namespace carom

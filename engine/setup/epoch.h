@@ -1,15 +1,37 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The default length of an epoch of free flight.
+// The length of an epoch of free flight, unless it is given.
 
+#include "engine/base/parameters.h"
 #include "engine/ranks/system.h"
 
 namespace carom {
 
-/// Forty mean free times of the fluid at this density (Enskog's theory), but at most the time to move 300 diameters or
-/// to cross the box four times, and less if light or fast particles could cross more boxes than can be counted; rounded
-/// to two digits; 1 if nothing moves. Longer epochs lose digits, because times and unwrapped positions grow.
+/// Forty mean free times of the fluid at this density (Enskog's theory), but at most the time in which the lightest
+/// spheres move 300 diameters or cross the box four times in equilibrium, and less if light or fast ones could cross
+/// more boxes than can be counted; rounded to two digits; 1 if nothing moves. Longer epochs lose digits, because times
+/// and unwrapped positions grow.
 template <int D>
 double default_epoch(const System<D>& system);
+
+/// Completes the parameters of free flight if no step is given: the default epoch (or `step`, which was the default
+/// when the run began), and that epochs may become longer.
+template <int D>
+void choose_epoch(const System<D>& system, Parameters& given, double step = 0);
+
+/// What happened in an epoch of free flight.
+struct PastEpoch {
+  double length = 0;  ///< [time]
+  double events = 0;  ///< contacts of a sphere, on average
+  /// How far a sphere came beyond a periodic face before positions were wrapped: the largest number of boxes.
+  double boxes = 0;
+};
+
+/// How long the epoch after this one should be: forty events of a sphere, if the spheres then neither fly through more
+/// boxes than can be counted nor so far that times and positions lose digits; 0 if walls or a field give spheres
+/// energy, so that their speeds are unknown. The default epoch is shorter if few
+/// spheres have most of the energy, since it allows for the equilibrium to come. Collective.
+template <int D>
+double next_epoch(const System<D>& system, const PastEpoch& past);
 
 }  // namespace carom

@@ -193,12 +193,13 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
 
 template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
-                       std::span<const char> beyond) {
+                       std::span<const char> beyond, std::span<const char> fixed) {
   Overlaps found;
   SizedCells<D> cells(box, radius, Extent<D>(x));
   const GapTolerance tolerance = box.gap_tolerance();
   for (Id i = 0; i < x.size(); ++i) {
     const auto look = [&](Id j, const Image<D>& image) {
+      if (!fixed.empty() && fixed[i] != 0 && fixed[j] != 0) return;
       const double distance = (x[i] - x[j] + box.shift(image)).norm(), contact = radius[i] + radius[j];
       if (distance < contact - tolerance(contact)) found.add({1, j, i, distance, contact});
     };
@@ -209,11 +210,13 @@ Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<c
 }
 
 template <int D>
-Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius) {
+Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
+                         std::span<const char> fixed) {
   Outsiders found;
   const GapTolerance tolerance = box.gap_tolerance();
   const auto walls = box.walls();
   for (Id i = 0; i < x.size(); ++i) {
+    if (!fixed.empty() && fixed[i] != 0) continue;
     bool outside = false;
     for (const Wall<D>& wall : walls) {
       const double depth = -wall.gap(x[i], radius[i]);
@@ -300,8 +303,10 @@ template std::vector<Vec<2>> lattice_sites(Lattice, const Box<2>&, std::size_t, 
 template Vec<2> commensurate_edges<2>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::span<const double>, std::span<const Id>,
                                       std::uint64_t, std::uint64_t);
-template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>, std::span<const char>);
-template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>);
+template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>, std::span<const char>,
+                                std::span<const char>);
+template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>,
+                                  std::span<const char>);
 template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
                               Communicator*);
 template void draw_spins(Particles<2>&, const ContactLaws&, std::span<const Id>, std::span<const double>, std::uint64_t,
@@ -315,8 +320,10 @@ template std::vector<Vec<3>> lattice_sites(Lattice, const Box<3>&, std::size_t, 
 template Vec<3> commensurate_edges<3>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::span<const double>, std::span<const Id>,
                                       std::uint64_t, std::uint64_t);
-template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>, std::span<const char>);
-template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>);
+template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>, std::span<const char>,
+                                std::span<const char>);
+template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>,
+                                  std::span<const char>);
 template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
                               Communicator*);
 template void draw_spins(Particles<3>&, const ContactLaws&, std::span<const Id>, std::span<const double>, std::uint64_t,

@@ -60,7 +60,7 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
                              std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries = 20000);
 
 /// Pairs closer than their contact distance by more than the gap tolerance (engine/base/wall.h), also through periodic
-/// images; pairs are ignored if `beyond` marks the sphere with the larger index.
+/// images; pairs are ignored if `beyond` marks the sphere with the larger index, or `fixed` both.
 struct Overlaps {
   std::size_t pairs = 0;
   Id lo = 0, hi = 0;    ///< the pair that overlaps most, relative to its contact distance; the first one in a tie
@@ -78,9 +78,9 @@ struct Overlaps {
 };
 template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
-                       std::span<const char> beyond = {});
+                       std::span<const char> beyond = {}, std::span<const char> fixed = {});
 
-/// Spheres that extend beyond a wall by more than the gap tolerance.
+/// Spheres not marked in `fixed` that extend beyond a wall by more than the gap tolerance.
 struct Outsiders {
   std::size_t spheres = 0;
   Id worst = 0;
@@ -88,7 +88,8 @@ struct Outsiders {
   double depth = 0;  ///< how far the worst one extends beyond the wall [length]
 };
 template <int D>
-Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius);
+Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
+                         std::span<const char> fixed = {});
 
 /// Maxwell–Boltzmann velocities for the particles `chosen`, with a temperature for each: drawn at random, shifted to
 /// zero total momentum (unless there is only one particle) and scaled so that 2K = D Σ temperature up to rounding. With

@@ -25,7 +25,7 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events, s
       walls_(system.box.walls()),
       walls_at_(system.box.time),
       tolerance_(system.box.gap_tolerance()),
-      list_(system.box, system.particles.radius),
+      list_(system.box, system.particles.radius, {}, system.particles.all_fixed()),
       keeps_momentum_(system.keeps_momentum()),
       max_events_(max_events),
       reactions_(reactions),
@@ -65,7 +65,8 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   }
   key.kind = EventKind::wall;
   key.image = {};
-  for (Id i = 0; i < x.size(); ++i)
+  for (Id i = 0; i < x.size(); ++i) {
+    if (particles_.fixed(i)) continue;
     for (const Wall<D>& wall : walls()) {
       const double gap = wall.gap(x[i], particles_.radius[i]);
       if (gap > std::max(tolerance(particles_.radius[i]), widest_)) continue;
@@ -73,6 +74,7 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
       key.hi = wall.number;
       note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
     }
+  }
   std::ranges::sort(touching_, {}, &Touch<D>::key);
   auto known = reactions_.begin();  // in the order of keys too, so each touch finds its reaction from there on
   for (Touch<D>& touch : touching_) {
@@ -193,11 +195,12 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
                                           "space between walls, or a periodic box");
     count_event(touch.key);
     if (watch_) watch_->cut();
-    const Id lo = touch.key.lo;
-    const Vec<D> before = v[lo];
-    const double dissipated = impulse(touch);
-    const double gained = 0.5 * particles_.mass[lo] * (v[lo].squaredNorm() - before.squaredNorm());
-    record(touch, x, particles_.mass[lo] * (v[lo] - before), dissipated, gained);
+    const bool fixed = particles_.fixed(touch.key.lo);
+    const Id moves = fixed ? touch.key.hi : touch.key.lo;
+    const Vec<D> before = v[moves];
+    const double dissipated = impulse(touch), mass = particles_.mass[moves];
+    const double gained = 0.5 * mass * (v[moves].squaredNorm() - before.squaredNorm());
+    record(touch, x, (fixed ? -mass : mass) * (v[moves] - before), dissipated, gained);
   }
 }
 
@@ -230,7 +233,7 @@ double ContactScan<D>::stop_rounding(Vectors<D> v) const {
     for (const Id i : {contact.key.lo, contact.key.hi}) {
       if (i != contact.key.lo && contact.key.kind != EventKind::pair) continue;
       if (v[i].norm() > rounding_speed(i, Vec<D>::Zero())) continue;
-      lost += 0.5 * particles_.mass[i] * v[i].squaredNorm();
+      lost += 0.5 * moving_mass(particles_.mass[i]) * v[i].squaredNorm();
       v[i].setZero();
     }
   return lost;
@@ -408,16 +411,21 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   }
   key.kind = EventKind::wall;
   key.image = {};
-  for (Id i = 0; i < x.size(); ++i)
+  for (Id i = 0; i < x.size(); ++i) {
+    if (particles_.fixed(i)) continue;
     for (const Wall<D>& wall : walls()) {
       const double gap = wall.gap(x[i], particles_.radius[i]);
       key.lo = i;
       key.hi = wall.number;
       const bool touching = gap <= tolerance(particles_.radius[i]);
-      key.time = wall_contact_time(gap, wall.opening(v[i]), wall.speeding(a[i]), rest, touching,
-                                   touching ? rounding_speed(key, v) : 0.0);
+      const double opening = wall.opening(v[i]), speeding = wall.speeding(a[i]);
+      if (wall.one_way && !(gap < kNever))
+        key.time = return_time(wall.clearance(x[i], particles_.radius[i]), opening, speeding, rest);
+      else
+        key.time = wall_contact_time(gap, opening, speeding, rest, touching, touching ? rounding_speed(key, v) : 0.0);
       if (key.time < kNever) offer(wall.normal);
     }
+  }
   // Pieces that end in a contact without an impulse count too, so that their number is limited.
   if (first.key.time < kNever && events_ == events_at_last_cut_) count_event(first.key);
   events_at_last_cut_ = events_;

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "engine/base/particles.h"
+
 namespace carom {
 namespace {
 
@@ -45,7 +47,7 @@ class Problem {
     for (Id id = 0; id < place.size(); ++id) {
       if (place[id] == kWall) continue;
       place[id] = static_cast<int>(bodies_.size());
-      bodies_.push_back({id, 1 / mass[id]});
+      bodies_.push_back({id, 1 / mass[id], moving_mass(mass[id])});
     }
     for (const auto& contact : contacts) {
       Arm arm{place[contact.key.lo], pair(contact) ? place[contact.key.hi] : kWall};
@@ -65,7 +67,7 @@ class Problem {
     for (const Body& body : bodies_) {
       const Vec<D> before = w_[body.id];
       w_[body.id] += body.shift;
-      if (lost) *lost -= 0.5 / body.inverse_mass * body.shift.dot(before + w_[body.id]);
+      if (lost) *lost -= 0.5 * body.mass * body.shift.dot(before + w_[body.id]);
     }
     return solved;
   }
@@ -95,8 +97,9 @@ class Problem {
       for (const int b : bodies) {
         Vec<D>& v = w_[bodies_[b].id];
         const Vec<D> after = v + bodies_[b].shift;
-        const double m = 1 / bodies_[b].inverse_mass;
+        const double m = bodies_[b].mass;
         lost -= 0.5 * m * bodies_[b].shift.dot(v + after);
+        if (m == 0) free.setZero();  // a fixed sphere
         mass += m;
         momentum += m * after;
         v = after;
@@ -109,7 +112,7 @@ class Problem {
         carried = true;
         centre += (speed - normal.dot(centre)) * normal;
       }
-      for (const int b : bodies) kinetic += 0.5 / bodies_[b].inverse_mass * (w_[bodies_[b].id] - centre).squaredNorm();
+      for (const int b : bodies) kinetic += 0.5 * bodies_[b].mass * (w_[bodies_[b].id] - centre).squaredNorm();
       if (!(std::abs(lost) <= kMostStretched * kinetic)) {
         lacks += lost;
         continue;
@@ -117,9 +120,10 @@ class Problem {
       if (lost == 0) continue;
       const double share = lost / kinetic, stretch = share / (1 + std::sqrt(1 + share));
       for (const int b : bodies) {
+        if (bodies_[b].mass == 0) continue;
         const Vec<D> more = stretch * (w_[bodies_[b].id] - centre);
         w_[bodies_[b].id] += more;
-        if (carried) lacks -= more.dot(centre) / bodies_[b].inverse_mass;
+        if (carried) lacks -= bodies_[b].mass * more.dot(centre);
       }
     }
     return lacks;
@@ -128,7 +132,7 @@ class Problem {
  private:
   struct Body {
     Id id;
-    double inverse_mass;
+    double inverse_mass, mass;      // 0, both, of a fixed sphere
     Vec<D> shift = Vec<D>::Zero();  // of w, by the reactions
     double size = 0;                // Σ |term| of w + shift
     std::vector<int> contacts{};
@@ -150,7 +154,7 @@ class Problem {
   std::vector<std::vector<int>> clusters() {
     for (int k = 0; k < size(); ++k)
       for (const int body : {arms_[k].lo, arms_[k].hi})
-        if (body != kWall) bodies_[body].contacts.push_back(k);
+        if (body != kWall && bodies_[body].mass > 0) bodies_[body].contacts.push_back(k);
     std::vector<std::vector<int>> found;
     std::vector<char> seen(size(), 0);
     for (int first = 0; first < size(); ++first) {

@@ -276,14 +276,17 @@ void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
 
 template <int D>
 void SlabCore<D>::predict_walls(Id i) {
-  if (walls_.empty()) return;
+  if (walls_.empty() || particles_.fixed(i)) return;
   const double t = start(i), radius = particles_.radius[i];
   const Vec<D> x = position(i, t), v = velocity(i, t), a = acceleration(i);
   for (const Wall<D>& wall : walls_) {
     const double gap = wall.gap(x, radius, t);
     const bool touching = gap <= scan_->tolerance(radius);
-    const double s = wall_contact_time(gap, wall.opening(v, t), wall.speeding(a), length_ - t, touching,
-                                       touching ? scan_->rounding_speed(i, v) : 0.0);
+    const double opening = wall.opening(v, t), speeding = wall.speeding(a), rest = length_ - t;
+    const double s =
+        wall.one_way && !(gap < kNever)
+            ? return_time(wall.clearance(x, radius, t), opening, speeding, rest)
+            : wall_contact_time(gap, opening, speeding, rest, touching, touching ? scan_->rounding_speed(i, v) : 0.0);
     if (!(t + s < length_)) continue;
     EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = wall.number};
     if (!held_.empty() && scan_->rests(key)) continue;
@@ -346,9 +349,10 @@ bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
   if (rest * (0.5 * rest * std::max(0.0, -opening) - meeting.speed) > most) return false;
   EventKey<D> at_end = key;
   at_end.time = length_;
-  const double gap = pair ? Meeting(*this, at_end).normal.norm() - meeting.sigma
-                          : box_.wall(key.hi).gap(position(key.lo, length_), meeting.sigma, length_);
-  return gap >= -most;
+  if (pair) return Meeting(*this, at_end).normal.norm() - meeting.sigma >= -most;
+  const Wall<D> wall = box_.wall(key.hi);
+  const Vec<D> x = position(key.lo, length_);
+  return (wall.one_way ? wall.clearance(x, meeting.sigma, length_) : wall.gap(x, meeting.sigma, length_)) >= -most;
 }
 
 /// Whether the spheres touch at the start and come together again before the contact has opened by what a contact at

@@ -96,8 +96,9 @@ void check_end(const Deck& deck, const CheckpointHead& head) {
 
 StateReader Resumed::reader() const {
   return [this](const std::string& name) {
-    if (name == "spin" && is_branch() && !checkpoint->has(name)) return Bytes();  // contacts were smooth so far
-    return checkpoint->read(name);
+    const bool known = end.empty() ? checkpoint->has(name) : end.contains(name);
+    if (name == "spin" && is_branch() && !known) return Bytes();  // contacts were smooth so far
+    return end.empty() ? checkpoint->read(name) : end.at(name);
   };
 }
 
@@ -118,10 +119,12 @@ Resumed find_state(const std::filesystem::path& checkpoint, const std::filesyste
   Resumed found;
   std::string file;
   if (ranks.rank() == 0) {
-    if (fs::is_directory(checkpoint))
+    if (fs::is_directory(checkpoint)) {
       found.checkpoint.emplace(last_checkpoint(checkpoint, found.warning));
-    else
+      if (found.warning.empty()) found.reached = last_thermo_point(checkpoint / run_file::thermo);
+    } else {
       found.checkpoint.emplace(checkpoint);
+    }
     const fs::path place = fs::absolute(found.checkpoint->file()).lexically_normal();
     std::error_code ignored;
     if (fs::equivalent(place.parent_path(), output, ignored))
@@ -173,6 +176,32 @@ Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks) {
 }
 
 template <int D>
+void go_to_end(Resumed& from, Communicator& ranks) {
+  Deck& deck = *from.of;
+  const Plan& plan = deck.plan;
+  const ThermoPoint& reached = from.reached;
+  const bool ended = (plan.steps && reached.step >= *plan.steps) ||
+                     (plan.end_time && reached.time >= *plan.end_time - plan.slack()) ||
+                     (plan.collisions && reached.collisions >= *plan.collisions);
+  if (!ended || reached.time <= from.head.time + plan.slack()) return;
+  const GivenState given{from.reader(), from.head.bonds, from.head.time};
+  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, &given);
+  const IntegratorInfo& info = find_integrator(deck.integrator);
+  Simulation<D> run(std::move(system), info, info.make<D>(deck.integrator_parameters), plan);
+  std::map<std::string, Bytes> end;
+  const auto save = [&] {  // before each of the few slabs, and at the end
+    end.clear();
+    save_state(run.system(), into(end));
+    return false;
+  };
+  run.run({.should_stop = save, .restore = [&] { restore_state(run.system(), given.read); }});
+  from.end = std::move(end);
+  from.head.step = run.statistics().steps;
+  from.head.time = run.statistics().end_time;
+  from.count = {from.head.step, from.head.time};
+}
+
+template <int D>
 GivenState state_of(Resumed& from, const Deck& deck) {
   if (from.is_branch()) check_end(deck, from.head);
   return {from.reader(), from.head.bonds, from.head.time, from.is_branch()};
@@ -190,6 +219,8 @@ void set_hooks(const Resumed& from, const Deck& deck, Simulation<D>& simulation,
   hooks.branch = {start, counted ? count : start};
 }
 
+template void go_to_end<2>(Resumed&, Communicator&);
+template void go_to_end<3>(Resumed&, Communicator&);
 template GivenState state_of<2>(Resumed&, const Deck&);
 template GivenState state_of<3>(Resumed&, const Deck&);
 template void set_hooks(const Resumed&, const Deck&, Simulation<2>&, Simulation<2>::Hooks&);

@@ -8,6 +8,7 @@
 //   set_hooks(from, deck, simulation, hooks);
 //   simulation.run(hooks);
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,10 +28,11 @@ struct Resumed {
   std::unique_ptr<DirectoryLock> lock;
   std::optional<Checkpoint> checkpoint;
   CheckpointHead head;
-  std::string warning;     ///< about a later checkpoint that is damaged
-  StepCount count;         ///< how its steps are counted
-  ThermoPoint reached;     ///< the point that a continued run has reached
-  std::optional<Deck> of;  ///< for a branch: the deck of the run that it branches off
+  std::string warning;               ///< about a later checkpoint that is damaged
+  StepCount count;                   ///< how its steps are counted
+  ThermoPoint reached;               ///< the point that the run has reached
+  std::optional<Deck> of;            ///< for a branch: the deck of the run that it branches off
+  std::map<std::string, Bytes> end;  ///< for a branch: the state at the end of that run, if that is not the checkpoint
   bool same_motion = false;
 
   bool is_branch() const { return of.has_value(); }
@@ -41,13 +43,18 @@ struct Resumed {
 /// The last checkpoint of the run to be continued. Throws Error(Failure::file). Collective.
 Resumed find_run(const std::filesystem::path& directory, bool take_over, Communicator& ranks);
 
-/// The state a branch starts from: a checkpoint, or the last good one in a directory. `output`: directory of the
-/// branch. Throws Error(Failure::file), or Error(Failure::deck) if `output` is the directory of the run itself.
-/// Collective.
+/// The state a branch starts from: a checkpoint, or the last good one in a directory; go_to_end() may follow. `output`:
+/// directory of the branch. Throws Error(Failure::file), or Error(Failure::deck) if `output` is the directory of the
+/// run itself. Collective.
 Resumed find_state(const std::filesystem::path& checkpoint, const std::filesystem::path& output, Communicator& ranks);
 
 /// The deck of a continued run, of which only the end may change, or of a branch. Throws Error(Failure::deck).
 Deck deck_of(Resumed& from, const RunOptions& options, Communicator& ranks);
+
+/// For a branch off the directory of a run that has ended: computes the state at its end, where `from` then is. The
+/// checkpoint is from before the last step or epoch, which the end of the run has shortened. Collective.
+template <int D>
+void go_to_end(Resumed& from, Communicator& ranks);
 
 /// The state that the run of this deck starts from; `from` must outlive it. Throws Error(Failure::deck) if a branch
 /// would have nothing to do. Collective.

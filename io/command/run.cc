@@ -226,6 +226,7 @@ int run_beside(Deck& deck, Communicator& at_work, Requests& requests, Resumed* f
 template <int D>
 int run_on_rank(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
                 Resumed* from) {
+  if (from && from->is_branch()) go_to_end<D>(*from, at_work);
   return at_work.rank() == 0 ? run_deck<D>(deck, options, at_work, ranks, requests, from)
                              : run_beside<D>(deck, at_work, requests, from);
 }

@@ -91,9 +91,10 @@ void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
   if (ValueTable* placement = source.values.find("placement"); placement != nullptr && !source.placement.file.empty())
     placement->values.set("file", source.placement.file.string());
   if (deck.plan.step == 0) {
-    deck.plan.step = default_epoch(system);
-    deck.integrator_parameters.set("step", deck.plan.step);
-    source.values.find("integrator")->values.set("step", deck.plan.step);
+    choose_epoch(system, deck.integrator_parameters);
+    deck.plan.step = deck.integrator_parameters.real("step");
+    for (const char* const name : {"step", "lengthen"})
+      source.values.find("integrator")->values.set(name, deck.integrator_parameters.all().find(name)->second);
   }
   ValueTable& output = *source.values.find("output");
   for (auto& [info, parameters] : deck.output.observables) {
@@ -156,6 +157,12 @@ void make_interactions(const Deck::Source& source, System<D>& system, bool place
     if (config.wrong) return;
     try {
       auto term = config.info->make<D>(config.parameters, context);
+      if (source.integrator != nullptr && !source.integrator->smooth_forces &&
+          std::ranges::any_of(source.species, &SpeciesConfig::fixed))
+        problems.error(config.at,
+                       std::string(source.integrator->name) +
+                           " knows no fixed particles in a uniform-field, where all have the same acceleration",
+                       "leave the field out, let all particles move, or take psa, edda or their relatives");
       if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
         problems.error(config.at,
                        std::string(source.integrator->name) + " cannot carry the interaction '" +

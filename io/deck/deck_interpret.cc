@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "engine/base/bath_options.h"
 #include "engine/base/contact_options.h"
@@ -127,21 +128,27 @@ class Interpreter {
     const bool named = table.find<std::string>("name") != nullptr;
     if (named && std::ranges::count(source_.species, species.name, &SpeciesConfig::name) > 0)
       problems_.error(table.place("name"), "two species are called '" + species.name + "'", "give each its own name");
+    table.read<bool>("fixed", species.fixed);
     positions(table, species);
     velocities(table, species);
     spins(table, species);
+    fixed(table, species);
     if (species.count > 0) {
       for (const char* key : {"display_radius", "radius"})
         if (table.given(key)) species.radius = numbers(table, key, species.count);
       if (species.radius.empty()) species.radius = {0.5};
       species.mass = numbers(table, "mass", species.count);
       species.charge = numbers(table, "charge", species.count);
+      if (species.fixed) species.mass = {std::numeric_limits<double>::infinity()};
     }
     source_.species.push_back(std::move(species));
   }
 
   /// Spheres have a radius, and points have none.
   void cores() {
+    if (!source_.species.empty() && std::ranges::all_of(source_.species, &SpeciesConfig::fixed))
+      problems_.error(source_.species.front().at, "all particles are fixed, and nothing would move",
+                      "let some move: fixed = false");
     if (source_.integrator == nullptr) return;
     for (const ValueTable& table : values_.list("contact"))
       if (!source_.integrator->hard_cores && table.given("tangential"))
@@ -200,9 +207,28 @@ class Interpreter {
     else if (table.given("count") && table.given("velocity"))
       problems_.error(table.place("velocity"), "'velocity' goes with explicit positions only",
                       "give a temperature with a count");
-    else if (table.given("count") && !table.given("temperature"))
+    else if (table.given("count") && !table.given("temperature") && !species.fixed)
       problems_.error(table.at, "missing key 'temperature' in [[particles]]",
                       "a species given by count needs it; 0 leaves the particles at rest");
+  }
+
+  /// Fixed particles have no velocities and no spins.
+  void fixed(const ValueTable& table, SpeciesConfig& species) {
+    const auto still = [](const std::vector<double>& each) {
+      return std::ranges::all_of(each, [](double c) { return c == 0; });
+    };
+    if (!species.fixed) return;
+    for (const auto& [key, moves] : {std::pair{"velocity", !std::ranges::all_of(species.velocity, still)},
+                                     {"temperature", species.temperature.value_or(0) > 0},
+                                     {"spin", !std::ranges::all_of(species.spin, still)},
+                                     {"rotational_temperature", species.rotational_temperature.value_or(0) > 0}})
+      if (moves)
+        problems_.error(table.place(key), std::string("'") + key + "' of fixed particles",
+                        "leave it out, or let them move: fixed = false");
+    species.temperature.reset();
+    species.rotational_temperature.reset();
+    species.velocity.clear();
+    species.spin.clear();
   }
 
   void spins(const ValueTable& table, SpeciesConfig& species) {
@@ -337,7 +363,8 @@ class Interpreter {
     table->read<double>("step", plan.step);
     table->read<double>("longest_step", plan.longest_step);
     if (plan.longest_step != 0 && plan.longest_step < plan.step)
-      problems_.error(table->place("longest_step"), "'longest_step' is shorter than 'step'", "give a longer one, or none");
+      problems_.error(table->place("longest_step"), "'longest_step' is shorter than 'step'",
+                      "give a longer one, or none");
   }
 
   void interaction(ValueTable& table) {

@@ -19,6 +19,7 @@ struct SpeciesConfig {
   std::optional<double> temperature, rotational_temperature;
   std::vector<double> radius, mass, charge;  ///< one for each particle, or one for all
   double inertia = 0;                        ///< reduced; 0: homogeneous
+  bool fixed = false;                        ///< then the mass is infinite
 
   static double of(const std::vector<double>& values, std::size_t n) { return values[values.size() == 1 ? 0 : n]; }
 };

@@ -129,6 +129,10 @@ std::vector<TableSchema> make_schema() {
         {"display_radius", real_or_list, "none", "length", "with verlet: the radius that pictures show; default: 0.5",
          Range::positive},
         {"mass", real_or_list, "1.0", "mass", "mass of a particle", Range::positive},
+        {"fixed", boolean, "false", "-",
+         "true: the particles never move, others bounce off them, and 'mass' has no effect; they may overlap each "
+         "other "
+         "and reach beyond walls"},
         {"charge", real_or_list, "0.0", "charge", "charge of a particle, for interactions between charges"},
         {"spin", vector_list, "none", "1/time",
          "angular velocities that go with explicit positions where contacts have 'tangential': [z] in two dimensions, "

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace carom {
 
@@ -140,8 +141,9 @@ std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<cons
   };
   fmt::format_to(out, "\nAtoms # {}\n\n", styles);
   for (std::size_t i = 0; i < n; ++i) {
-    const double r = trajectory.radius[i],
-                 density = trajectory.mass[i] / (4.0 / 3.0 * 3.14159265358979323846 * r * r * r);
+    // LAMMPS has no infinite mass: there `fix freeze` or no integration fixes a particle.
+    const double r = trajectory.radius[i], mass = std::isinf(trajectory.mass[i]) ? 1 : trajectory.mass[i],
+                 density = mass / (4.0 / 3.0 * 3.14159265358979323846 * r * r * r);
     const auto* x = &f.position[3 * i];
     const auto* image = &f.image[3 * i];
     if (charged || bonded) {

@@ -293,8 +293,8 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   terms_.complete(*system_);
   if (output_) describe(plan, begun, hooks);
   Parameters parameters = parameters_;
-  if (!begun) step_ = parameters.has("step") ? parameters.real("step") : default_epoch(*system_);
-  parameters.set("step", step_);
+  if (!integrator_->stepping) choose_epoch(*system_, parameters, begun ? step_ : 0);
+  step_ = parameters.real("step");
   const double interval = plan.thermo_interval;
 
   std::optional<Simulation<D>> made;  // if this throws, the session keeps its system

@@ -129,9 +129,12 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
 template <int D>
 void Session<D>::push(const Simulation<D>& run) {
   Particles<D>& p = at_work_->particles;
+  for (Id i = 0; i < p.size(); ++i)
+    if (p.fixed(i) && pushed_[i] != Vec<D>::Zero())
+      refuse("velocities: particle " + std::to_string(i) + " is fixed; give it the velocity 0");
   change_value<Statistics>(at_work_->fields, "statistics", [&](Statistics& s) {
     for (Id i = 0; i < p.size(); ++i)
-      s.counters.work.add(0.5 * p.mass[i] * (pushed_[i].squaredNorm() - p.v[i].squaredNorm()));
+      s.counters.work.add(0.5 * moving_mass(p.mass[i]) * (pushed_[i].squaredNorm() - p.v[i].squaredNorm()));
     s.max_momentum_error.reset();
   });
   p.v = std::exchange(pushed_, {});

@@ -74,8 +74,14 @@ int bench_main(int argc, char** argv) {
   auto* dimension = app.add_option("--dimension", options.dimension, "2 or 3");
   dimension->capture_default_str()->check(CLI::IsMember({2, 3}))->excludes(forces);
   number("--equilibrate", options.equilibrate, "Epochs of forty mean free times before measuring", 0)->excludes(forces);
-  number("--collisions", options.collisions, "Collisions of a measurement, at least; whole epochs are measured", 1)
-      ->excludes(forces);
+  auto* collisions =
+      number("--collisions", options.collisions, "Collisions of a measurement, at least; whole epochs are measured", 1);
+  collisions->excludes(forces);
+  app.add_flag("--curve", options.curve,
+               "Measure whole runs of 10000 (--n) spheres from dilute to dense: equal ones, mixtures, uneven gases; "
+               "100000 collisions")
+      ->excludes(forces)
+      ->excludes(dimension);
 
   app.add_option("--potential", options.potential, "Of --forces: these potentials; all")
       ->needs(forces)
@@ -91,7 +97,15 @@ int bench_main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : static_cast<int>(Failure::deck);
   }
-  options.forces ? bench_forces(options) : bench_events(options);
+  if (options.curve) {
+    if (filled->count() == 0)
+      options.packing_fraction = {1e-4, 3e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05,
+                                  0.1,  0.2,  0.3,  0.35, 0.4,  0.49, 0.55, 0.6};
+    if (collisions->count() == 0) options.collisions = 100000;
+    bench_curve(options);
+  } else {
+    options.forces ? bench_forces(options) : bench_events(options);
+  }
   return 0;
 }
 

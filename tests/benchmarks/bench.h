@@ -3,6 +3,7 @@
 // The program carom_bench measures the speed of the event core and of the loops over pairs on this machine.
 //
 //   carom_bench --n 10000 --packing-fraction 0.49       bench_events(): collisions a second
+//   carom_bench --curve                                 bench_curve(): the same of dilute to dense, and uneven gases
 //   carom_bench --forces --potential yukawa             bench_forces(): pairs a second, steps a second
 //
 // Each state is built from a deck. Both functions print a table that grows row by row, and throw Error.
@@ -25,6 +26,7 @@ constexpr std::uint64_t kSeed = 20240117;
 
 struct Options {
   bool forces = false;           ///< measure forces instead of the event core
+  bool curve = false;            ///< measure whole runs of gases from dilute to dense
   std::vector<std::uint64_t> n;  ///< empty: see sizes()
   std::uint64_t repeat = 3;      ///< measurements of each state
   std::filesystem::path json;    ///< file for all results; empty: none
@@ -52,6 +54,10 @@ struct Options {
 /// first to equilibrate and then, several times, to measure. The observables of a run (energies, overlaps, files) are
 /// not measured.
 void bench_events(const Options& options);
+
+/// Whole runs of free flight without files: gases of equal spheres, of different sizes and masses, and with few spheres
+/// that have most of the energy, at each packing fraction.
+void bench_curve(const Options& options);
 
 /// The potentials that bench_forces() measures.
 std::vector<std::string> bench_potentials();

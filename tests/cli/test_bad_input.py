@@ -74,6 +74,18 @@ DECK_ERRORS = {
     "wall with a normal in three dimensions": (
         walled('name = "ramp"\nnormal = [0, 0, 1]'), 9, ["a normal of 3 numbers", "give 2"]),
     "face with a normal": (walled('name = "y+"\nnormal = [0, 1]'), 9, ["'y+' is a face of the box", "leave normal"]),
+    "one-way wall with two sides": (
+        walled('name = "valve"\nnormal = [1, 0]\none_way = true\none_sided = false'), 9, ["'valve' is one-way and has two sides"]),
+    "one-way face": (walled('name = "y+"\none_way = true'), 9, ["'y+' is a face of the box and cannot be one-way", "give a normal"]),
+    "one-way wall that is shaken": (
+        walled('name = "valve"\nnormal = [1, 0]\none_way = true\nvelocity = {amplitude = 0.1, frequency = 1}'),
+        9, ["is one-way and shaken", "give a constant velocity"]),
+    "fixed particles with velocities": (
+        changed("mass = 1.0", "mass = 1.0\nfixed = true"), 12, ["'velocity' of fixed particles", "leave it out"]),
+    "fixed particles with a temperature": (
+        changed("temperature = 1.0", "temperature = 1.0\nfixed = true", FLUID), 11, ["'temperature' of fixed particles"]),
+    "nothing but fixed particles": (
+        changed("temperature = 1.0", "fixed = true", FLUID), 8, ["all particles are fixed, and nothing would move"]),
     "wall that is given twice": (
         walled('name = "y+"\n[[wall]]\nname = "y+"'), 11, ["'y+' is given twice", "its own name"]),
     "walls that cross": (

@@ -72,6 +72,18 @@ def test_discs(tmp_path):
     assert point["dimension"] == 2
 
 
+def test_curve(tmp_path):
+    """Each gas at each packing fraction, of lattices, at random and compressed."""
+    quick = ["--n", 108, "--packing-fraction", 0.01, 0.35, "--collisions", 500, "--json", tmp_path / "bench.json"]
+    table = bench("--curve", *quick).stdout
+    points = json.loads((tmp_path / "bench.json").read_text())["points"]
+    assert [(p.pop("n"), p.pop("packing_fraction")) for p in points] == [(108, 0.01), (108, 0.35)]
+    for point in points:
+        assert len(point) == 5 and all(rate > 0 for rate in point.values())
+        assert all(name in table for name in point)
+    assert "excludes" in bench("--curve", "--dimension", 2, code=2).stderr
+
+
 def force_results(tmp_path, *arguments, **environment):
     done = subprocess.run([BENCH, "--forces", "--json", tmp_path / "bench.json", *map(str, arguments)],
                           capture_output=True, text=True, timeout=120, env=os.environ | environment)

@@ -95,6 +95,31 @@ def test_within_an_epoch(after, tmp_path):
     expect_later_part(whole, later, step, start)
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("method, end", [("free-flight", "run.end_time=0.7301"), ("free-flight", "run.collisions=150"),
+                                         ("edda", "run.end_time=0.7301")])
+def test_a_run_that_has_ended_is_left_at_its_end(method, end, ranks, tmp_path):
+    """The checkpoint is from before the last epoch or step; a branch off this file starts there."""
+    ended, out, earlier = (tmp_path / name for name in ("ended", "out", "earlier"))
+    text = box(method, 3, 1).replace("[run]\nsteps = 1\n", "[run]\n")
+    run(write_deck(tmp_path, text), ended, [end])
+    kept = contents(ended)
+    later = ["run.end_time=2"] + ["run.collisions=100000"] * ("collisions" in end)
+    branch(ended, out, later, ranks=ranks)
+    branch(ended / "checkpoint.h5", earlier, later, ranks=ranks)
+    assert contents(ended) == kept
+    last, first = (data_sets(each / "trajectory.h5md") for each in (ended, out))
+    assert thermo(out)["time"][0] == summary(out)["branched_from"]["time"] == summary(ended)["end_time"] > thermo(earlier)["time"][0]
+    for name in ("position", "velocity", "image"):
+        name = f"particles/trajectory/{name}/value"
+        assert first[name][0].tobytes() == last[name][-1].tobytes(), name
+    account = summary(out)
+    assert account["energy"]["initial"] == summary(ended)["energy"]["final"] and account["end_time"] == 2
+    go_on(out, ["--set", "run.end_time=2.5"])
+    branch(ended, tmp_path / "longer", ["run.end_time=2.5", *later[1:]])
+    expect_same(tmp_path / "longer", out)
+
+
 @pytest.fixture(scope="module")
 def half(tmp_path_factory):
     """A complete run of cdda with 30 steps of 0.02 and two checkpoints."""

@@ -87,6 +87,21 @@ void check_calls(MpiCommunicator& ranks) {
     for (std::size_t k = 0; k < partners.size(); ++k)
       require(received[k] == filled(sends(partners[k], rank) ? length : length / 7, partners[k], rank),
               "swap of neighbours");
+    // Between start() and complete() other messages travel.
+    std::vector<std::size_t> sizes;
+    messages.clear();
+    for (const int r : partners) {
+      messages.push_back(filled(sends(rank, r) ? length : length / 7, rank, r));
+      sizes.push_back(sends(r, rank) ? length : length / 7);
+    }
+    std::vector<double> most = {static_cast<double>(rank), -1.0 - rank};
+    if (length == 1000) most.clear();
+    ranks.start(std::move(messages), partners, sizes, most);
+    require(ranks.gather(filled(3, rank, 0)).size() == static_cast<std::size_t>(size), "gather before complete");
+    const auto arrived = ranks.complete();
+    for (std::size_t k = 0; k < partners.size(); ++k)
+      require(arrived[k] == filled(sizes[k], partners[k], rank), "start and complete");
+    require(most.empty() || (most[0] == size - 1 && most[1] == -1), "maxima of start");
     const auto all = ranks.gather(filled(length * static_cast<std::size_t>(rank), rank, 0));
     for (int r = 0; r < size; ++r)
       require(all[static_cast<std::size_t>(r)] == filled(length * static_cast<std::size_t>(r), r, 0), "gather");

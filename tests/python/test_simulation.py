@@ -186,6 +186,35 @@ def test_a_number_of_collisions_ends_within_an_epoch_and_the_run_goes_on():
     assert same_state(sim, undisturbed)
 
 
+def test_fixed_particles(tmp_path):
+    def scene():
+        sim = carom.Simulation(box=[12, 8], boundary="wall")
+        sim.add_particles(position=[[4, 4], [4.5, 4.2], [0.1, 2]], fixed=True, species="peg")
+        sim.add_particles(position=[[8, 4.3], [9, 6]], velocity=[[-1, 0], [0.5, 0.2]])
+        sim.integrator("edda", step=0.05)
+        return sim
+
+    sim, again = scene(), scene()
+    pegs = sim.position[:3].copy()
+    assert np.isinf(sim.mass[:3]).all() and (sim.mass[3:] == 1).all()
+    sim.thermalize(2.0, seed=3)
+    assert not sim.velocity[:3].any() and sim.temperature == pytest.approx(2.0, rel=1e-14)
+    again.thermalize(2.0, seed=3)
+    sim.run(time=20)
+    assert sim.collisions > 5 and np.array_equal(sim.position[:3], pegs) and sim.energy_error < 1e-12
+    again.write_deck(tmp_path / "deck.toml", time=20, every=5)
+    assert "fixed = true" in (tmp_path / "deck.toml").read_text()
+    run = run_command(tmp_path / "deck.toml", tmp_path / "run")
+    assert np.array_equal(run.position(-1), sim.position)
+    placed = carom.Simulation(box=[10, 10], boundary="periodic")
+    placed.add_particles(count=10, radius=0.4, fixed=True, species="peg")
+    placed.add_particles(count=10, radius=0.4, temperature=1.0)
+    placed.place("random", seed=2)
+    assert np.isinf(placed.mass[:10]).all() and not placed.velocity[:10].any() and placed.velocity[10:].any()
+    with pytest.raises(carom.UsageError, match="'velocity' of fixed particles"):
+        sim.add_particles(position=[[1, 1]], velocity=[[1, 0]], fixed=True)
+
+
 def test_progress_is_a_line_that_goes_away(capsys, monkeypatch):
     monkeypatch.setattr(carom.progress, "QUIET", 0)
     sim = gas(512)

@@ -185,14 +185,21 @@ class EwaldTerm final : public Interaction<3> {
     return std::ranges::all_of(x, [&](const Vec3& each) { return (each.array().abs() < most).all(); });
   }
 
+  /// The mass of a charge, or its limit relative to those of fixed ones.
+  double weight(Id i) const {
+    if (!fixed_) return particles_.mass[i];
+    return particles_.fixed(i) ? 1 : 0;
+  }
   const std::vector<Id>& charged() const {
     if (charged_.empty())
       for (Id i = 0; i < particles_.size(); ++i)
         if (particles_.charge[i] != 0) {
           charged_.push_back(i);
-          mass_ += particles_.mass[i];
+          fixed_ |= particles_.fixed(i);
           largest_charge_ = std::max(largest_charge_, std::abs(particles_.charge[i]));
         }
+    if (mass_ == 0)
+      for (const Id i : charged_) mass_ += weight(i);
     return charged_;
   }
 
@@ -313,7 +320,7 @@ class EwaldTerm final : public Interaction<3> {
     if (!moderate(x) || !moderate(x_new)) return;
     std::ranges::fill(f, Vec3::Zero());
     Vec3 centre = Vec3::Zero();  // motion of the centre of mass
-    for (const Id j : charged()) centre += particles_.mass[j] * (x_new[j] - x[j]);
+    for (const Id j : charged()) centre += weight(j) * (x_new[j] - x[j]);
     centre /= mass_;
     std::vector<Vec3> relative(x.begin(), x.end());
     for (const Id j : charged()) relative[j] = x_new[j] - centre;
@@ -392,7 +399,7 @@ class EwaldTerm final : public Interaction<3> {
       }
       const double per_mass = static_cast<double>(net) / mass_;
       for (std::size_t n = 0; n < charges.size(); ++n) {
-        const std::int64_t share = std::llrint(per_mass * particles_.mass[charges[n]]);
+        const std::int64_t share = std::llrint(per_mass * weight(charges[n]));
         rounded[n][k] -= share;
         net -= share;
       }
@@ -426,6 +433,7 @@ class EwaldTerm final : public Interaction<3> {
   mutable std::array<Phases, 3> phases_;
   mutable std::vector<Id> charged_;
   mutable double mass_ = 0, largest_charge_ = 0;  // of the charged particles
+  mutable bool fixed_ = false;                    // whether one of them is fixed
   mutable std::vector<Vec3> at_;
   mutable Amplitudes structure_;                                // S(k) at at_
   mutable struct { std::vector<Vec3> x, x_new, force; } mean_;  // the last mean forces

@@ -8,6 +8,11 @@ namespace {
 
 template <int D>
 std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionContext<D>& context) {
+  double fixed = context.particles.any_fixed() ? 1 : 0;
+  if (context.ranks) context.ranks->largest({&fixed, 1});
+  if (fixed > 0)
+    options::refuse("gravity",
+                    "the infinite mass of a fixed particle would attract without limit; give it a large finite mass");
   return options::all_pairs<D>("gravity", InverseDistance(-p.real("constant")), PairWeight::masses, p, context,
                                "make the boundaries 'wall' or 'open'");
 }

@@ -46,6 +46,10 @@ class PairTerm final : public Interaction<D> {
   void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
     evaluate({.x = x}, &forces, sums);
   }
+  void add_forces_early(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums,
+                        const Arrival& arrive) const override {
+    evaluate({.x = x}, &forces, sums, 1, &arrive);
+  }
   std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
                                 int sign) const override {
     return evaluate({.x = x, .x_new = x_new, .changed = changed}, &forces, nullptr, sign);
@@ -129,8 +133,10 @@ class PairTerm final : public Interaction<D> {
     return own;
   }
 
-  /// The loop over pairs. For mean forces, returns the number of this rank's pairs.
-  std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1) const {
+  /// The loop over pairs. For mean forces, returns the number of this rank's pairs. `arrive`: not null if the positions
+  /// of ghosts are unknown before this is called.
+  std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1,
+                         const Arrival* arrive = nullptr) const {
     const PairFormula& formula = this->formula();
     const auto& function = sums                     ? formula.forces_and_sums
                            : !given.vectors.empty() ? formula.hessian_product
@@ -142,7 +148,7 @@ class PairTerm final : public Interaction<D> {
     PairTotals totals[2];  // for pairs of own particles, and pairs shared with another rank
     std::uint64_t own = 0;
     ForceWords* low = nullptr;
-    pairs_.batches(step(given), particles_, cutoff_squared(), *batch_, [&](bool shared) {
+    const auto add_batch = [&](bool shared) {
       if (forces && !low) {
         units.limits = forces->make_room(pairs_.most_partners());
         units.per_force = sign / forces->quantum();
@@ -157,7 +163,17 @@ class PairTerm final : public Interaction<D> {
         if (wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
       }
       if (!given.x_new.empty()) own += owned(shared);
-    });
+    };
+    const PairStep<D> all = step(given);
+    bool rest = false;  // pairs of own particles have been added
+    if constexpr (requires { pairs_.own_batches(all, particles_, cutoff_squared(), *batch_, add_batch); })
+      if (arrive && pairs_.own_batches(all, particles_, cutoff_squared(), *batch_, add_batch)) {
+        if (low) pairs_.flush_to(*forces);
+        low = nullptr;
+        rest = true;
+      }
+    if (arrive) (*arrive)();
+    pairs_.batches(all, particles_, cutoff_squared(), *batch_, add_batch, rest);
     if (low) pairs_.flush_to(*forces);
     if (!sums) return own;
     // A shared pair counts half on each rank.

@@ -3,12 +3,15 @@
 // Sources of pairs for the sum of a term of V: a list of bonds, all pairs, or the pairs within a cutoff.
 //
 // Each source has
-//   batches(step, particles, cutoff², batch, visit)   fills the batch repeatedly and calls visit(shared); shared:
-//                               another rank owns one particle of each pair; pairs of two ghosts are omitted
+//   batches(step, particles, cutoff², batch, visit, shared_only)   fills the batch repeatedly and calls visit(shared);
+//                               shared: another rank owns one particle of each pair; pairs of two ghosts are omitted
 //   id(place)                   the particle with this number in a batch
 //   low(sums), high(sums)       words to which the forces of a batch are added; flush_to(sums) comes last
 //   most_partners()             upper bound for any particle in these batches
 //   use(kernels)                replaces the widest kernels of this machine
+//   own_batches(…)              if it exists: as batches() for pairs of own particles, where the positions of ghosts
+//   are
+//                               unknown; returns false if that is not possible
 // and
 //   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
 //   among(some)                             the source for a subset of the particles, or nothing if partners are
@@ -30,11 +33,12 @@
 
 namespace carom {
 
-/// Fills the batch from each part of a list in turn.
+/// Fills the batch from each part of a list in turn, from the kinds of pairs of own particles, shared ones, or both.
 template <int D, class Visit>
 void collect_batches(PairRecords<D>& records, const Box<D>& box, const PairStep<D>& step, double cutoff_squared,
-                     const PairKernels& kernels, PairBatch& batch, Visit&& visit) {
+                     const PairKernels& kernels, PairBatch& batch, Visit&& visit, bool own = true, bool shared = true) {
   for (const auto kind : {PairRecords<D>::kPlain, PairRecords<D>::kMoving, PairRecords<D>::kShared}) {
+    if (!(kind == PairRecords<D>::kShared ? shared : own)) continue;
     PairRows rows = records.rows(kind, box, step);
     rows.cutoff_squared = cutoff_squared;
     for (PairCursor cursor; kernels.collect(rows, cursor, batch);) visit(kind == PairRecords<D>::kShared);
@@ -95,7 +99,7 @@ class Bonds {
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double /*cutoff_squared*/, PairBatch& batch,
-               Visit&& visit) const {
+               Visit&& visit, bool /*shared_only*/ = false) const {
     shared_.clear();
     for (const bool shared : {false, true}) {
       batch.clear();
@@ -172,7 +176,7 @@ class AllPairs {
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
-               Visit&& visit) const {
+               Visit&& visit, bool /*shared_only*/ = false) const {
     if (records_.order.empty() || ghost_ != particles.ghost) arrange(particles);
     need_finite(particles, step.x);
     records_.load(step);
@@ -244,9 +248,16 @@ class PairsWithinCutoff {
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
-               Visit&& visit) const {
+               Visit&& visit, bool shared_only = false) const {
     records_ = &list_.cover(step, particles);
-    collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit);
+    collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit, !shared_only);
+  }
+  template <class Visit>
+  bool own_batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
+                   Visit&& visit) const {
+    records_ = list_.cover_own(step, particles);
+    if (records_) collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit, true, false);
+    return records_ != nullptr;
   }
   Id id(std::uint32_t place) const { return records_->order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_->low(); }

@@ -17,11 +17,11 @@ class UniformField {
     double least = std::numeric_limits<double>::infinity();
     for (const double m : *mass_)
       for (int k = 0; k < D; ++k)
-        if (m * g_[k] != 0) least = std::min(least, std::abs(m * g_[k]));
+        if (moving_mass(m) * g_[k] != 0) least = std::min(least, std::abs(m * g_[k]));
     return least < std::numeric_limits<double>::infinity() ? least : 0;
   }
-  double value(Id i, const Vec<D>& x) const { return -(*mass_)[i] * g_.dot(x); }
-  Vec<D> gradient(Id i, const Vec<D>&) const { return -(*mass_)[i] * g_; }
+  double value(Id i, const Vec<D>& x) const { return -moving_mass((*mass_)[i]) * g_.dot(x); }
+  Vec<D> gradient(Id i, const Vec<D>&) const { return -moving_mass((*mass_)[i]) * g_; }
   Vec<D> mean_gradient(Id i, const Vec<D>& x, const Vec<D>&) const { return gradient(i, x); }
   Vec<D> hessian_product(Id, const Vec<D>&, const Vec<D>&) const { return Vec<D>::Zero(); }
   const Vec<D>& acceleration() const { return g_; }
@@ -50,7 +50,8 @@ InteractionInfo uniform_field() {
           .parameters = {{"acceleration", Type::real_list, "", "length/time^2", "g, one number an axis"}},
           .formula = "sum over particles of -m g.x",
           .documentation =
-              "The same acceleration for all particles, such as that of gravity on the ground. Flights stay exact "
+              "The same acceleration for all particles that are not fixed, such as that of gravity on the ground. "
+              "Flights stay exact "
               "parabolas, so free-flight handles this field, too.",
           .source = "textbook",
           .in_2d = make<2>,

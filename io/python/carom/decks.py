@@ -74,6 +74,13 @@ def species_of(sim, of):
     columns = {name: getattr(sim, name) for name in ("position", "velocity", "radius", "mass", "charge")}
     species = [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
                for kind, name in enumerate(sim.species_names)]
+    for one in species:
+        if np.isinf(one["mass"]).any():
+            if not np.isinf(one["mass"]).all():
+                raise UsageError(f"{of}: some particles of the species '{one['name']}' are fixed, and others move, which a deck "
+                                 "cannot say; give the fixed ones a species of their own")
+            del one["mass"], one["velocity"]
+            one["fixed"] = True
     if not any("tangential" in contact for contact in sim.contacts):
         return species
     spins = sim.spin.reshape(len(sim), -1)

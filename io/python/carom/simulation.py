@@ -116,13 +116,14 @@ class Simulation:
         return formats.read(cls, file, frame, radius, boundary)
 
     def add_particles(self, position=None, velocity=None, radius=None, mass=1.0, charge=0.0, species="particle", count=None,
-                      temperature=None, spin=None, inertia=None, rotational_temperature=None):
+                      temperature=None, spin=None, inertia=None, rotational_temperature=None, fixed=False):
         """Adds N particles; returns the range of their ids.
 
         position, velocity: arrays of shape (N, D) [length, length/time]; the default velocity is 0.
         radius, mass, charge: one number for all, or N numbers. The default radius is 0.5; leave it out for verlet, which has no hard
         cores. species: the name of their species, for forces between species.
         spin: angular velocities [1/time], (N,) in two dimensions, about z, and (N, 3) in three. Contacts with "tangential" change them.
+        fixed: they never move, and others bounce off them; their mass is infinite.
         inertia: reduced moment of inertia 4I/(m sigma²) of the species; the default is that of a homogeneous body.
         count, temperature, rotational_temperature: replace positions, velocities and spins, which place() then chooses. Without
         rotational_temperature the particles do not spin.
@@ -130,12 +131,17 @@ class Simulation:
             sim.add_particles(position=[[1, 1], [3, 1]], velocity=[[0, 0], [0.5, 0]], radius=0.5)
             sim.add_particles(count=500, temperature=1.0, radius=0.5, species="solvent")
         """
+        if fixed:
+            for name, value in (("velocity", velocity), ("temperature", temperature), ("spin", spin),
+                                ("rotational_temperature", rotational_temperature)):
+                if value is not None and np.any(value):
+                    raise UsageError(f"add_particles: '{name}' of fixed particles; leave it out")
         self._cores |= radius is not None
         radius = 0.5 if radius is None else radius
         if count is not None:
             return self._count(count, position, velocity, temperature,
-                               {"name": species, "radius": radius, "mass": mass, "charge": charge}, spin, inertia,
-                               rotational_temperature)
+                               {"name": species, "radius": radius, "mass": mass, "charge": charge, "fixed": bool(fixed)},
+                               spin, inertia, rotational_temperature)
         if position is None:
             raise UsageError("add_particles: there is no 'position'; give one of shape (N, D), or a count for place()")
         for name, value in (("temperature", temperature), ("rotational_temperature", rotational_temperature)):
@@ -156,6 +162,8 @@ class Simulation:
                              f"{x.shape}")
         others = [one_or_each("add_particles", name, values, len(x))
                   for name, values in (("radius", radius), ("mass", mass), ("charge", charge))]
+        if fixed:
+            others[1] = np.array([np.inf])
         if not isinstance(species, str):
             raise UsageError(f"add_particles: 'species' is {species!r}; give one name, and call again for other species")
         turning = np.empty(0) if spin is None else self._spins("add_particles", spin, len(x))
@@ -183,6 +191,8 @@ class Simulation:
         self._inertias[table["name"]] = self._inertia(inertia)
         if position is not None or velocity is not None:
             raise UsageError("add_particles: 'count' excludes 'position' and 'velocity'; leave it out, or them")
+        if table["fixed"]:
+            temperature = 0.0
         if temperature is None:
             raise UsageError("add_particles: 'count' needs a 'temperature'; 0 leaves the particles at rest")
         if rotational_temperature is not None and not 0 <= rotational_temperature < np.inf:
@@ -252,9 +262,11 @@ class Simulation:
             raise UsageError(f"thermalize: there is no species '{species}'; give one of: {', '.join(self.species_names)}")
         chosen = slice(None) if species is None else self.species == self.species_names.index(species)
         each[chosen] = temperature
+        each[np.isinf(self.mass)] = np.nan
         self._session.set_velocity(self._session.drawn_velocities(each, seed))
         if rotational_temperature is not None:
             each[chosen] = rotational_temperature
+            each[np.isinf(self.mass)] = np.nan
             self._session.set_spin(self._session.drawn_spins(each, seed))
 
     def add_wall(self, name, normal=None, **parameters):

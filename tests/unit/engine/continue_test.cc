@@ -62,6 +62,7 @@ struct Scene {
   Plan plan;
   Given given{};
   std::optional<std::uint64_t> slab_collisions{};
+  bool averages = true;  ///< with all observables, which need the volume of the box
 
   std::unique_ptr<Simulation<D>> run_of(std::unique_ptr<System<D>> system, const Plan& its) const {
     auto simulation = test::make_run<D>(std::move(system), method, its, given);
@@ -102,6 +103,7 @@ Outcome<D> run(const Scene<D>& scene, int ranks, const Plan& plan, const Leave& 
     simulation->add(account);
     std::vector<std::unique_ptr<Observable<D>>> averages;
     for (const ObservableInfo& info : observables()) {
+      if (!scene.averages) break;
       averages.push_back(make_observable<D>(info.name, simulation->system(), {{"interval", 1.5 * plan.step}}));
       simulation->add(*averages.back());
     }
@@ -216,6 +218,60 @@ Scene<3> fluid(std::optional<std::uint64_t> slab_collisions = {}) {
 }
 TEST(Continue, FreeFlightBetweenEpochs) { compare<3>(fluid(), kRanks, {1, 3}); }
 TEST(Continue, FreeFlightWithinEpochs) { compare<3>(fluid(40), kRanks, {1, 3, 5}); }
+
+/// Two heavy spheres have nearly all energy: epochs become 4, 16 and 64 steps long.
+Scene<3> uneven(std::optional<std::uint64_t> slab_collisions = {}) {
+  return {[] {
+            auto system = test::hard_spheres<3>(6, 0.35);
+            for (const Id i : {100, 700}) system->particles.mass[i] = 1e10;
+            return system;
+          },
+          "free-flight",
+          {.step = 0.005, .end_time = 3, .frame_interval = 0.3, .thermo_interval = 0.11, .events = true},
+          {{"lengthen", true}},
+          slab_collisions};
+}
+TEST(Continue, EpochsThatBecomeLonger) {
+  const Scene<3> scene = uneven();
+  const auto run = scene.run_of(scene.make(), scene.plan);
+  struct Slabs : Observer<3> {
+    void contacts(double start, std::span<const Contact<3>>) override { starts.push_back(start); }
+    std::vector<double> starts;
+  } slabs;
+  run->add(slabs);
+  run->run();
+  slabs.starts.erase(std::unique(slabs.starts.begin(), slabs.starts.end()), slabs.starts.end());
+  EXPECT_LT(slabs.starts.size(), 12u);  // of 600 steps
+  compare<3>(scene, {{2, 3}}, {3});
+  compare<3>(uneven(900), {{0, 2}}, {5});
+}
+
+/// A third of the spheres is fixed, and a one-way wall may stand in the way.
+template <int D>
+Scene<D> obstructed(Scene<D> scene, bool valve) {
+  return {[make = scene.make, valve] {
+            auto system = make();
+            auto& p = system->particles;
+            for (Id i = 0; i < p.size(); i += 3) p.mass[i] = std::numeric_limits<double>::infinity(), p.v[i].setZero();
+            if (!valve) return system;
+            Vec<D> normal = Vec<D>::Unit(1);
+            normal[0] = 0.1;
+            system->box.boundary[1] = Boundary::open;
+            system->box.add({.name = "valve", .normal = normal, .offset = 0.4 * system->box.edges[1], .one_way = true});
+            return system;
+          },
+          scene.method,
+          scene.plan,
+          scene.given,
+          scene.slab_collisions,
+          !valve};
+}
+TEST(Continue, FixedSpheresAndAOneWayWall) {
+  compare<3>(obstructed(fluid(), true), {{2, 3}}, {3});
+  compare<2>(obstructed(springs("psa"), true), {{2, 3}}, {7});
+  compare<3>(obstructed(yukawa("edda"), false), {{2, 3}}, {5});
+  for (const char* method : {"edda", "mcva", "cdda"}) compare<2>(obstructed(springs(method), true), {{1, 2}}, {9});
+}
 
 /// A scene with spins, whose contacts are rough and inelastic.
 template <int D>
@@ -368,8 +424,10 @@ TEST(Continue, ALaterEnd) {
     cases.push_back(
         {scene, ends(scene.plan, [](Plan& p, bool short_) { p.end_time = (short_ ? 3.0 : 5.1) * p.step; })});
   }
-  for (const Scene<3>& scene : {fluid(), fluid(40)})
+  for (const Scene<3>& scene : {fluid(), fluid(40), uneven()})
     cases.push_back({scene, ends(scene.plan, [](Plan& p, bool short_) { p.collisions = short_ ? 500 : 1500; })});
+  for (const double early : {0.5, 0.52, 0.523})  // ends within long epochs, at whole steps and between them
+    cases.push_back({uneven(), ends(uneven().plan, [=](Plan& p, bool short_) { p.end_time = short_ ? early : 1.0; })});
   for (const auto& [scene, plans] : cases)
     for (const int ranks : {0, 2}) {
       SCOPED_TRACE(scene.method + " on " + std::to_string(ranks) + " ranks");

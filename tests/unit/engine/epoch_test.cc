@@ -22,21 +22,48 @@ TEST(Epoch, IsFortyMeanFreeTimesInAnyDimension) {
   EXPECT_NEAR(spheres * 4 * sphere * at_sphere * speed, 40, 0.05 * 40);
 }
 
-/// On periodic axes the images of the fastest particle, and of the lightest in equilibrium, must fit into their bits.
+/// The next epoch has forty events of a sphere, but is not too long for the images and the digits.
+TEST(Epoch, FollowsTheEventsOfTheLast) {
+  const auto plain = test::hard_spheres<3>(5, 0.3);
+  EXPECT_NEAR(next_epoch(*plain, {.length = 1, .events = 20, .boxes = 0}), 2, 1e-12);
+  EXPECT_NEAR(next_epoch(*plain, {.length = 1, .events = 80, .boxes = 0}), 0.5, 1e-12);
+  EXPECT_NEAR(next_epoch(*plain, {.length = 0.1, .events = 0, .boxes = 0}), 6.4, 1e-12);
+  const double count = Packing<3>(1, plain->size()).largest(), edge = plain->box.edges[0];
+  const auto with = [](auto&& change, double boxes) {
+    auto system = test::hard_spheres<3>(5, 0.3);
+    change(*system);
+    return next_epoch(*system, {.length = 1, .events = 0, .boxes = boxes});
+  };
+  const auto fast = [](double speed) { return [=](auto& system) { system.particles.v[3] = {0, speed, 0}; }; };
+  EXPECT_NEAR(with(fast(1e3), 0.5), 4.096, 1e-12);                         // digits
+  EXPECT_NEAR(with(fast(1e3), 20), count * count / (21 * 21) / 4, 1e-12);  // wanders
+  EXPECT_NEAR(with(fast(100), 10), count / 4 * edge / 100, 1e-12);         // flies straight
+  EXPECT_NEAR(with(fast(100), 5), count / 4 / 6, 1e-12);                   // has come less far than that
+  EXPECT_EQ(with(
+                [](auto& system) {
+                  system.box.boundary[0] = Boundary::wall;
+                  system.box.add({.name = "x-", .velocity = 0.1});
+                },
+                0),
+            0);
+  EXPECT_LT(with([](auto& system) { system.box.bath = {.type = Bath::Type::andersen, .temperature = 1e8}; }, 0), 0.1);
+}
+
+/// On periodic axes the images of the fastest particle must fit into their bits; the lightest particle in equilibrium
+/// moves at most four boxes.
 TEST(Epoch, EndsBeforeAParticleHasComeThroughTooManyBoxes) {
   const auto usual = test::hard_spheres<3>(4, 0.3);
-  const double boxes = Packing<3>(1, usual->size()).largest();
-  const auto epoch = [](double speed, Boundary boundary) {
-    auto system = test::hard_spheres<3>(4, 0.3);
-    system->particles.mass[7] = 1e-12;
-    system->particles.v[7] = {speed, 0, 0};
-    system->box.boundary.fill(boundary);
-    return default_epoch(*system);
+  const double boxes = Packing<3>(1, usual->size()).largest(), edge = usual->box.edges[0];
+  const auto system = [](double speed, Boundary boundary) {
+    auto made = test::hard_spheres<3>(4, 0.3);
+    made->particles.mass[7] = 1e-16;
+    made->particles.v[7] = {speed, 0, 0};
+    made->box.boundary.fill(boundary);
+    return made;
   };
-  for (const auto& [speed, fastest] : {std::pair{6e6, 6e6}, {0.0, 5e6}}) {
-    EXPECT_NEAR(epoch(speed, Boundary::periodic) * fastest / (boxes * usual->box.edges[0]), 1, 0.05) << speed;
-    EXPECT_NEAR(epoch(speed, Boundary::wall) / default_epoch(*usual), 1, 0.1) << speed;
-  }
+  EXPECT_NEAR(default_epoch(*system(1e10, Boundary::periodic)) * 1e10 / (boxes * edge), 1, 0.05);
+  for (const Boundary boundary : {Boundary::periodic, Boundary::wall})
+    EXPECT_NEAR(default_epoch(*system(0, boundary)) * 1e8 / (4 * edge), 1, 0.05);
 }
 
 }  // namespace

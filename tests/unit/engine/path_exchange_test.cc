@@ -32,10 +32,10 @@ TEST(PathExchange, MakesSubdomainsAgreeAboutAWindow) {
   in_a_window(*system, sizes, kEnd, [&](Communicator&, Subdomain<3>* subdomain, std::uint64_t rounds) {
     EXPECT_GE(rounds, 2u);
     if (!subdomain) return;
-    EXPECT_TRUE(subdomain->consistent(kEnd));
+    EXPECT_TRUE(subdomain->paths().all_match(kEnd));
     const std::lock_guard lock(mutex);
     for (const Slot i : subdomain->own()) {
-      const Record<3>& r = subdomain->after(i);
+      const Record<3>& r = subdomain->paths().after(i);
       EXPECT_EQ(r.x, right[r.id].x) << r.id;
       EXPECT_EQ(r.v, right[r.id].v) << r.id;
       ++own;

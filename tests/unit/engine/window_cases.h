@@ -41,7 +41,11 @@ void in_a_window(const System<D>& system, const Sizes& sizes, double end, auto&&
     if (subdomain) subdomain->run(0, end);
     PathExchange<D> exchange(ranks);
     exchange.start(bisection);
-    const std::uint64_t rounds = exchange.make_consistent(subdomain.get());
+    const std::uint64_t rounds = exchange.make_consistent(subdomain.get(), [&](bool changed) {
+      double more = changed ? 1 : 0;
+      ranks.largest({&more, 1});
+      return more > 0;
+    });
     check(ranks, subdomain.get(), rounds);
   });
 }

@@ -190,10 +190,20 @@ TEST(WindowedFlight, UnevenWork) {
       1500);
 }
 
+/// All spheres fall into one of two subdomains, which has no room for so many and must be loaded again.
+TEST(WindowedFlight, GhostsThatFindNoRoom) {
+  const Case<2> c{.system = random_system<2>(1500, {30, 60}, {P, W}, 0.04, 0.04, 19), .g = {0, -20}, .slab = 3};
+  const auto reference = whole(c);
+  ASSERT_GT(reference.contacts.size(), 1000u);
+  WindowCounts counts;
+  expect_same(reference, divided(c, {.subdomains = 2}, nullptr, &counts), "falling");
+  EXPECT_GT(counts.cut, 0u);
+}
+
 /// One sphere is so fast that each subdomain would have more neighbours than there are bits.
 TEST(WindowedFlight, MoreRegionsThanTheBoxHasRoomFor) {
   const Case<3> c{.system = test::hard_spheres<3>(6, 0.49), .slab = 0.01, .slabs = 2};
-  c.system->particles.v[5] *= 100;
+  c.system->particles.v[5] *= 200;
   WindowCounts counts;
   expect_same(whole(c), divided(c, {.subdomains = 72}, nullptr, &counts), "72 subdomains");
   EXPECT_GT(counts.subdomains, 20u);
