@@ -101,6 +101,7 @@ Estimate Blocking::estimate(std::size_t column) const {
     sum += value(block);
     weights += weight(block);
   }
+  if (weights == 0) return found;
   const double above = sum / weights;  // the mean less first_
   found.mean = first_[column] + above;
 
