@@ -226,7 +226,7 @@ class Problem {
     Eigen::VectorXd reaction = Eigen::VectorXd::Constant(m, gap.cwiseAbs().maxCoeff()), opening = reaction;
     for (const double close : kClose) {
       if (tied_) break;
-      approach(gap, close, reaction, opening);
+      if (!approach(gap, close, reaction, opening)) break;
       for (int k = 0; k < m; ++k) start[k] = reaction[k] > opening[k] ? reaction[k] / arms_[cluster[k]].scale : 0;
       if (solve(cluster, start, kLastProximal, close == kClose[1])) return true;
     }
@@ -372,16 +372,19 @@ class Problem {
   /// Comes near the solution through positive reactions and openings, by the predictor and corrector of Mehrotra (SIAM
   /// J. Optim. 2 (1992) 575; Nocedal, Wright, Numerical Optimization, ch. 16.6): in about 20 rounds, however large the
   /// cluster is. Ends where reactions times openings are on average below the square of `close` times the largest gap.
-  void approach(const Eigen::VectorXd& gap, double close, Eigen::VectorXd& reaction, Eigen::VectorXd& opening) {
+  /// Returns false if no reactions seem to hold the contacts, as where walls squeeze a sphere.
+  bool approach(const Eigen::VectorXd& gap, double close, Eigen::VectorXd& reaction, Eigen::VectorXd& opening) {
     const auto count = static_cast<double>(gap.size());
     const double wanted = close * gap.cwiseAbs().maxCoeff();
     const std::vector<char> every(gap.size(), 1);
+    bool possible = false;
     for (int round = 0; round < kRounds; ++round) {
       const Eigen::VectorXd off = opening - all_.template selfadjointView<Eigen::Lower>() * reaction - gap;
       const double mean = reaction.dot(opening) / count;
-      if (mean <= wanted * wanted && off.cwiseAbs().maxCoeff() <= wanted) return;
+      possible = off.cwiseAbs().maxCoeff() <= wanted;
+      if (possible && mean <= wanted * wanted) break;
       const Eigen::VectorXd ratio = opening.cwiseQuotient(reaction);
-      if (!factor(every, (ratio.array() + kInteriorProximal).matrix())) return;
+      if (!factor(every, (ratio.array() + kInteriorProximal).matrix())) break;
       Eigen::VectorXd step, opens, target = Eigen::VectorXd::Zero(gap.size());
       const auto longest = [&] {  // the share of the step that keeps all reactions and openings positive
         step = solver_.solve(off - opening + target);
@@ -397,10 +400,11 @@ class Problem {
       const double after = (reaction + predicted * step).dot(opening + predicted * opens) / count;
       target = (after * (after / mean) * (after / mean) - step.cwiseProduct(opens).array()) / reaction.array();
       const double share = longest();
-      if (!step.allFinite() || !opens.allFinite()) return;
+      if (!step.allFinite() || !opens.allFinite()) break;
       reaction += share * step;
       opening += share * opens;
     }
+    return possible;
   }
 
   std::span<RestingContact<D>> contacts_;

@@ -106,7 +106,8 @@ TEST(StructureFactor, OfALatticeHasBraggPeaks) {
   const double edge = system->box.edges[0], smallest = 2 * kPi / edge;
   const auto sk = make_observable("sk", *system, {{"interval", 1.0}, {"range", smallest * 4}});
   sk->sample(0, system->particles);
-  for (const double s : columns_of(sk->table())["S"]) EXPECT_NEAR(s, 0, 1e-12);
+  const auto columns = columns_of(sk->table());
+  for (const double s : columns.at("S")) EXPECT_NEAR(s, 0, 1e-12);
   const auto further = make_observable("sk", *system, {{"interval", 1.0}, {"range", smallest * 6}, {"waves", 1000}});
   further->sample(0, system->particles);
   const auto table = columns_of(further->table());
