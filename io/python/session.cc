@@ -401,6 +401,7 @@ const Snapshot<D>& Session<D>::shot() {
   if (running_) refuse("a run is just beginning; look at it in its callback, or after it");
   terms_.complete(*system_);
   System<D>& system = *system_;
+  system.count_moving();
   system.quanta = quanta(system);
   const Measurement<D> now = measure(system, system.particles, system.particles,
                                      evaluate_energy<D>(system, system.particles.x), tail_of(system));
