@@ -201,11 +201,11 @@ def test_fixed_particles(tmp_path):
     assert not sim.velocity[:3].any() and sim.temperature == pytest.approx(2.0, rel=1e-14)
     again.thermalize(2.0, seed=3)
     sim.run(time=20)
-    assert sim.collisions > 5 and np.array_equal(sim.position[:3], pegs) and sim.energy_error < 1e-12
+    assert sim.collisions > 2 and np.array_equal(sim.position[:3], pegs) and sim.energy_error < 1e-12
     again.write_deck(tmp_path / "deck.toml", time=20, every=5)
     assert "fixed = true" in (tmp_path / "deck.toml").read_text()
     run = run_command(tmp_path / "deck.toml", tmp_path / "run")
-    assert np.array_equal(run.position(-1), sim.position)
+    assert np.array_equal(run.frames[-1].position, sim.position)
     placed = carom.Simulation(box=[10, 10], boundary="periodic")
     placed.add_particles(count=10, radius=0.4, fixed=True, species="peg")
     placed.add_particles(count=10, radius=0.4, temperature=1.0)
