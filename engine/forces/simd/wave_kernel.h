@@ -65,7 +65,7 @@ struct WaveLoops {
     const V* const parts[3] = {x, y, along};
     for (int k = 0; k < 3; ++k) {
       double lanes[WaveRow::kMultiple];
-      for (unsigned v = 0; v < kVectors; ++v) store(lanes + v * W, parts[k][v]);
+      for (std::size_t v = 0; v < kVectors; ++v) store(lanes + v * W, parts[k][v]);
       for (unsigned width = WaveRow::kMultiple / 2; width > 0; width /= 2)
         for (unsigned l = 0; l < width; ++l) lanes[l] += lanes[l + width];
       sum[k] = lanes[0];
