@@ -110,7 +110,7 @@ std::optional<ParameterError> error_of(const System<D>& system, double range) {
 
 /// Sets the range if it is not given.
 template <int D>
-std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
+std::optional<ParameterError> complete_gr(Parameters& parameters, const System<D>& system) {
   if (!parameters.has("range")) parameters.set("range", RadialDistribution<D>::usual_range(system));
   return error_of(system, parameters.real("range"));
 }
@@ -436,8 +436,8 @@ ObservableInfo rdf() {
           "contact. Along walls, g refers to "
           "an ideal gas in the region that the centres can reach.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6",
-      .in_2d = maker<RadialDistribution, 2>(complete<2>),
-      .in_3d = maker<RadialDistribution, 3>(complete<3>)};
+      .in_2d = maker<RadialDistribution, 2>(complete_gr<2>),
+      .in_3d = maker<RadialDistribution, 3>(complete_gr<3>)};
 }
 
 }  // namespace observable

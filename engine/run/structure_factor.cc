@@ -263,7 +263,7 @@ class StructureFactor : public Observable<D> {
 
 /// Sets the range if it is not given: four times the k of a wave as long as the largest diameter.
 template <int D>
-std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
+std::optional<ParameterError> complete_sk(Parameters& parameters, const System<D>& system) {
   for (int k = 0; k < D; ++k)
     if (!system.box.periodic(k))
       return ParameterError{
@@ -315,8 +315,8 @@ ObservableInfo sk() {
           "sums "
           "over its own particles.",
       .source = "Hansen, McDonald, Theory of Simple Liquids, 4th ed., sections 4.1 and 10.2",
-      .in_2d = maker<StructureFactor, 2>(complete<2>),
-      .in_3d = maker<StructureFactor, 3>(complete<3>)};
+      .in_2d = maker<StructureFactor, 2>(complete_sk<2>),
+      .in_3d = maker<StructureFactor, 3>(complete_sk<3>)};
 }
 
 }  // namespace carom::observable

@@ -77,7 +77,7 @@ class TemperatureProfile : public Observable<D> {
 };
 
 template <int D>
-std::optional<ParameterError> complete(Parameters& parameters, const System<D>& system) {
+std::optional<ParameterError> complete_profile(Parameters& parameters, const System<D>& system) {
   if (parameters.integer("axis") >= D)
     return ParameterError{"axis", "there is no such axis", "the axes are numbered from 0"};
   if (system.box.closed() && system.box.plain()) return {};
@@ -113,8 +113,8 @@ ObservableInfo profile() {
           "and error_ and samples_ of both; "
           "their mean velocity is not subtracted.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.12",
-      .in_2d = maker<TemperatureProfile, 2>(complete<2>),
-      .in_3d = maker<TemperatureProfile, 3>(complete<3>)};
+      .in_2d = maker<TemperatureProfile, 2>(complete_profile<2>),
+      .in_3d = maker<TemperatureProfile, 3>(complete_profile<3>)};
 }
 
 }  // namespace carom::observable
