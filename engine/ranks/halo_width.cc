@@ -18,8 +18,8 @@ constexpr double kDecay = 0.75;                   // factor on enlarged widths a
 void HaloWidth::fit(double reach, double path, double diameter) {
   path_ = std::max(kPathAllowance * path, wanted_path_);
   slack_ = std::clamp(kSlabsBetweenDivisions * path, kMinSlack * diameter, kMaxSlack * diameter);
-  near_ = std::max(reach, diameter) + 2 * path_ + 2 * slack_;
-  far_ = near_ + depth_ * diameter;
+  near_ = diameter + 2 * path_ + 2 * slack_;
+  far_ = near_ + std::max(reach - diameter, depth_ * diameter);
   safe_slabs_ = 0;
 }
 

@@ -4,8 +4,10 @@
 // the same values.
 //
 // A division is valid until a particle is displaced by more than the slack; in each slab no path may exceed an allowed
-// length. Ghosts matter if they are within the reach of forces and contacts plus twice the slack and twice the path.
-// Ghosts beyond, to the depth over which collisions propagate errors from the rim, keep these ghosts correct.
+// length. A rank has all particles within the reach of forces plus twice the slack and twice the path of its part of
+// the box. Ghosts matter if their contacts may be contacts of its own particles: they are within the largest diameter
+// plus twice the slack and the path. Ghosts beyond, to the depth over which collisions propagate errors from the rim,
+// keep these ghosts correct. The end points of all other ghosts come from their owners.
 
 #include <utility>
 
@@ -46,7 +48,7 @@ class HaloWidth {
   }
 
  private:
-  static constexpr double kMinDepth = 3;       // width of the layer of ghosts that do not matter [largest diameter]
+  static constexpr double kMinDepth = 3;       // depth of ghosts around those that matter [largest diameter]
   static constexpr double kUsableSlack = 0.8;  // fraction of the slack that may be used
 
   double near_ = 0, far_ = 0;
@@ -54,7 +56,7 @@ class HaloWidth {
   double safe_slabs_ = 0;               // until a particle may be displaced too far
   double wanted_path_ = 0;              // lower bound, after a path was too long recently
   bool asked_ = false;                  // the slab needs a larger halo, of finite width
-  double least_depth_ = 0, depth_ = 0;  // width of the layer of ghosts that do not matter [largest diameter]
+  double least_depth_ = 0, depth_ = 0;  // depth of ghosts around those that matter [largest diameter]
 };
 
 }  // namespace carom

@@ -458,18 +458,22 @@ void SlabCore<D>::compare_sequences() {
     if (swapped_.empty() || swapped_.back() != each.id) swapped_.push_back(each.id);
 }
 
-/// Throws on all ranks: SlabLeft if one of them was asked to stop; HaloTooSmall if a flight failed on one of them, if a
-/// relevant copy had other events than its original, or if a path was longer than the halo allows. Collective.
+/// Copies get the ends of their originals' flights. Throws on all ranks: SlabLeft if one of them was asked to stop;
+/// HaloTooSmall if a flight failed on one of them, if a relevant copy had other events than its original, or if a path
+/// was longer than the halo allows. Collective.
 template <int D>
 void SlabCore<D>::compare_ranks(bool failed) {
   Decomposition<D>& decomposition = system_.decomposition;
   PathHashes<D> events(particles_);
   for (const Contact<D>& contact : contacts_) events.add(contact.key);
   std::vector<std::uint64_t> at_owners = events.words();
-  decomposition.update(std::span(at_owners));
+  decomposition.update(std::span(at_owners), std::span(x_));
   bool equal = true;
-  for (Id i = 0; i < at_owners.size(); ++i)
+  for (Id i = 0; i < at_owners.size(); ++i) {
+    if (particles_.owns(i)) continue;
+    moved_[i] = x_[i] != last_x_[i];
     if (at_owners[i] != events.words()[i] && decomposition.matters(i)) equal = false;
+  }
   std::array<double, 4> most = {failed ? 1.0 : 0.0, equal ? 0.0 : 1.0, own_reach_, left_ ? 1.0 : 0.0};
   auto& [any_failed, any_wrong, farthest, any_left] = most;
   for (const Id i : beyond_)

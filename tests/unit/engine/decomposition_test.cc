@@ -69,6 +69,7 @@ void expect_same(const Account<D>& one, const Account<D>& other) {
     EXPECT_EQ(one.frames[k].x, other.frames[k].x) << "frame " << k;
     EXPECT_EQ(one.frames[k].v, other.frames[k].v) << "frame " << k;
     EXPECT_EQ(one.frames[k].image, other.frames[k].image) << "frame " << k;
+    EXPECT_EQ(one.frames[k].spin, other.frames[k].spin) << "frame " << k;
   }
   EXPECT_EQ(one.events, other.events);
   EXPECT_EQ(one.values, other.values);
@@ -200,23 +201,48 @@ TEST(Decomposition, Rod) {
     EXPECT_LT(s.counters.slabs_again, 5u) << method;
   }
 }
-/// Chains of collisions that reach from the rim of a rank's ghosts to its own particles: discs in a long strip, so
-/// dense that each collides more than once in two steps.
+/// Discs in a long strip, so dense that each collides more than once in two steps of 0.12.
+std::unique_ptr<System<2>> strip() {
+  std::vector<Vec<2>> x, v;
+  for (int k = 0; k < 2400; ++k) {
+    x.push_back({0.5 + 1.08 * (k / 12), 0.5 + 1.08 * (k % 12)});
+    v.push_back({0.3 * (k * 7 % 11 - 5), 0.3 * (k * 5 % 13 - 6)});
+  }
+  return test::make_system<2>({216, 12.96}, Boundary::periodic, x, v);
+}
+/// Chains of collisions that reach from the rim of a rank's ghosts to its own particles.
 TEST(Decomposition, GhostsThatGoWrong) {
-  const auto strip = [] {
-    std::vector<Vec<2>> x, v;
-    for (int k = 0; k < 2400; ++k) {
-      x.push_back({0.5 + 1.08 * (k / 12), 0.5 + 1.08 * (k % 12)});
-      v.push_back({0.3 * (k * 7 % 11 - 5), 0.3 * (k * 5 % 13 - 6)});
-    }
-    auto system = test::make_system<2>({216, 12.96}, Boundary::periodic, x, v);
+  const auto bonded = [] {
+    auto system = strip();
     test::add_interaction(*system, "harmonic-bond", {{"within", 1.2}, {"stiffness", 0.1}, {"rest_length", 1.1}});
     return system;
   };
   for (const char* method : {"psa", "edda"}) {
-    const Counters c = compare<2>(strip, method, 0.12, 5, 10000).counters;
+    const Counters c = compare<2>(bonded, method, 0.12, 5, 10000).counters;
     EXPECT_GT(c.slabs_again, c.slabs_by_all) << method;  // more ghosts were sufficient
   }
+}
+/// Ghosts go wrong that are too far to collide with own particles, but within the reach of forces: their owners tell
+/// where they are.
+TEST(Decomposition, GhostsThatGoWrongFarAway) {
+  const auto attracted = [] {
+    auto system = strip();
+    test::add_interaction(*system, "yukawa", {{"amplitude", -1.0}, {"kappa", 0.3}, {"cutoff", 8.0}});
+    return system;
+  };
+  EXPECT_EQ(compare<2>(attracted, "edda", 0.12, 5, 5000).counters.slabs_by_all, 0u);
+}
+/// Spins of ghosts go wrong, too, and are those of their owners before each step.
+TEST(Decomposition, GhostsWithSpin) {
+  const auto rough = [] {
+    auto system = strip();
+    test::set_law(*system, {{"tangential", 0.7}});
+    for (Id i = 0; i < system->size(); ++i) system->particles.spin.push_back(Spin<2>::Constant(0.1 * (i % 7)));
+    test::add_interaction(*system, "harmonic-bond", {{"within", 1.2}, {"stiffness", 0.1}, {"rest_length", 1.1}});
+    return system;
+  };
+  for (const char* method : {"psa", "edda"})
+    EXPECT_EQ(compare<2>(rough, method, 0.02, 40, 10000).counters.slabs_again, 0u) << method;
 }
 /// No rank has all particles: neither to find the bonds in its block nor to sum up forces over its own and its ghosts.
 TEST(Decomposition, NoRankHasAllParticles) {
