@@ -8,7 +8,9 @@
 // (force_sums.h), so no sum depends on how the pairs were found.
 //
 // If a system is divided among ranks (engine/ranks/decomposition.h), sums over the system run over what this rank owns:
-// its particles, and the pairs with a lower id that it owns. Forces on ghosts are incomplete.
+// its particles, and the pairs with a lower id that it owns. Forces on ghosts are incomplete. A term in which each particle
+// feels all others, as the waves of an Ewald sum, then adds up sums of all ranks in add_…(): all ranks call these functions
+// in the same order.
 
 #include <functional>
 #include <memory>
@@ -79,7 +81,8 @@ class Interaction {
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:
   /// only pairs with at least one changed particle, and fields on changed particles (a term in which each particle
-  /// feels all others, as the waves of an Ewald sum, adds all its forces); sign −1 subtracts exactly what +1 added.
+  /// feels all others adds all its forces); sign −1 subtracts exactly what +1 added in the last call, and calls no other
+  /// rank.
   /// Returns the number of this rank's pairs (or particles, for a field) within reach. A trial step may be far too
   /// long: forces that are not finite or too large invalidate the sums.
   virtual std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces,
@@ -91,6 +94,8 @@ class Interaction {
   /// This term for the subset `some` of the particles, which must outlive it. Null if the subset lacks particles that
   /// act on owned ones.
   virtual std::unique_ptr<Interaction> among(const Particles<D>& some) const = 0;
+  /// The particles are divided among these ranks, which a term with sums over all particles needs.
+  virtual void join(Communicator& /*ranks*/) {}
   /// The distance from x within which other particles matter, as far as this rank knows [length]; infinite: all
   /// particles do.
   virtual double reach(Positions<D> x) const = 0;

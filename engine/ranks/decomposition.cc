@@ -214,6 +214,7 @@ void Decomposition<D>::assign(const Bisection<D>& bisection, double near) {
   for (const auto& term : block_interactions_) {
     system_.interactions.push_back(term->among(p));
     if (!system_.interactions.back()) throw std::logic_error("a particle is missing that an own particle feels");
+    system_.interactions.back()->join(*ranks_);
   }
 }
 

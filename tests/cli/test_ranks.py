@@ -202,7 +202,7 @@ def test_ewald_sums_are_those_of_one_rank(method, tmp_path):
                f"integrator.type={method}", "integrator.step=0.05", "interaction.0.surface=\"vacuum\""]
     run(deck, tmp_path / "plain", shorter)
     assert summary(tmp_path / "plain")["events"]["sphere_sphere"] > 0
-    for ranks in 2, 3:
+    for ranks in 2, 3, 4:
         assert mpirun(ranks, command(deck, tmp_path / str(ranks), shorter)).stderr == ""
         assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
 

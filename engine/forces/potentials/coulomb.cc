@@ -77,7 +77,7 @@ InteractionInfo coulomb() {
           "form "
           "ewald sums all periodic images in a box that is periodic along three axes; 'accuracy' sets alpha and both "
           "cutoffs. If the charges do not add up to zero, a uniform background neutralises them, and its energy is "
-          "part of V. Every rank computes the whole sum over waves.",
+          "part of V.",
       .source =
           "Wolf et al., J. Chem. Phys. 110 (1999) 8254; Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104; "
           "Ewald, Ann. Phys. 369 (1921) 253; Kolafa, Perram, Mol. Simul. 9 (1992) 351",

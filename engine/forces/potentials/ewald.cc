@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "engine/base/elementary.h"
@@ -15,6 +16,7 @@
 #include "engine/base/normal_deviates.h"
 #include "engine/forces/potentials/damped_coulomb.h"
 #include "engine/forces/simd/wave_kernels.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom {
 namespace {
@@ -106,6 +108,26 @@ struct EwaldOptions {
   double constant_energy;  // of each charge with itself and with the background [energy]
   double background;       // the latter
   std::size_t total;       // number of particles on all ranks
+  ChargeSums charges;      // of all ranks
+};
+
+/// Integer sums over all particles of the components of a force, each in two words, and a count of impossible ones.
+struct WholeForce {
+  using Whole = ForceSums<3>::Whole;
+  std::array<std::uint64_t, 7> word{};
+
+  /// Returns `quanta`, rounded down and added to component k; a number too large is counted instead.
+  std::int64_t add(int k, double quanta) {
+    if (!(std::abs(quanta) < 0x1p61)) return ++word[6], 0;
+    const auto whole = static_cast<std::int64_t>(std::floor(quanta));
+    word[2 * k] += static_cast<std::uint64_t>(whole & 0xffffffff);
+    word[2 * k + 1] += static_cast<std::uint64_t>(whole >> 32);
+    return whole;
+  }
+  Whole operator[](int k) const {
+    return (static_cast<Whole>(static_cast<std::int64_t>(word[2 * k + 1])) << 32) + static_cast<Whole>(word[2 * k]);
+  }
+  bool possible() const { return word[6] == 0; }
 };
 
 class EwaldTerm final : public Interaction<3> {
@@ -126,13 +148,17 @@ class EwaldTerm final : public Interaction<3> {
   }
 
   void add_forces(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums) const override {
-    pairs_->add_forces(x, forces, sums);
+    add_forces_early(x, forces, sums, [] {});
+  }
+  void add_forces_early(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums,
+                        const Arrival& arrive) const override {
+    pairs_->add_forces_early(x, forces, sums, arrive);
     need_finite(particles_, x);
     const Amplitudes field = weighted(structure(x));
     std::vector<Vec3> f(x.size(), Vec3::Zero());
     for (const Id j : charged()) f[j] = particles_.charge[j] * pull(x[j], field, Vec3::Zero());
     add_surface(dipole(x, x), f);
-    if (!add_rounded(f, forces, 1))
+    if (!add(rounded(f, forces.quantum()), forces, 1))
       throw Error(Failure::numerical,
                   "a force of the Ewald sum is too large or no number; use a smaller "
                   "integrator.step, or place the charges farther apart");
@@ -142,64 +168,93 @@ class EwaldTerm final : public Interaction<3> {
   std::uint64_t add_mean_forces(Positions<3> x, Positions<3> x_new, ForceSums<3>& forces, const char* changed,
                                 int sign) const override {
     const std::uint64_t own = pairs_->add_mean_forces(x, x_new, forces, changed, sign);
-    // All charges feel a change of one of them, so `changed` does not matter here.
-    if (!same(x, mean_.x) || !same(x_new, mean_.x_new)) {
+    // All charges feel a change of one of them, so `changed` does not matter here. What is subtracted has been added
+    // before; other ranks take no part in that.
+    if (sign > 0 || !same(x, mean_.x) || !same(x_new, mean_.x_new) || mean_.quantum != forces.quantum()) {
       mean_.x.assign(x.begin(), x.end());
       mean_.x_new.assign(x_new.begin(), x_new.end());
-      find_mean_forces(x, x_new);
+      mean_.quantum = forces.quantum();
+      mean_.force = rounded(mean_forces(x, x_new), mean_.quantum);
     }
-    if (!add_rounded(mean_.force, forces, sign)) forces.invalidate();
+    if (!add(mean_.force, forces, sign)) forces.invalidate();
     return own;
   }
 
   void add_hessian_product(Positions<3> x, Positions<3> w, ForceSums<3>& out) const override {
     pairs_->add_hessian_product(x, w, out);
     std::vector<Vec3> f(x.size(), Vec3::Zero());
-    if (!moderate(x) || !moderate(w)) return out.invalidate();
+    if (!all_moderate(x, w)) return out.invalidate();
     const Amplitudes field = weighted(structure(x)), change = weighted(structure_change(x, w));
     for (const Id j : charged())
       f[j] = -particles_.charge[j] * (pull(x[j], change, Vec3::Zero()) + pull_change(x[j], field, w[j]));
-    add_surface(-weighted_sum(w), f);
-    if (!add_rounded(f, out, 1)) out.invalidate();
+    if (options_.vacuum) add_surface(-total([&](Id j) { return Vec3(particles_.charge[j] * w[j]); }), f);
+    if (!add(rounded(f, out.quantum()), out, 1)) out.invalidate();
   }
 
   std::unique_ptr<Interaction<3>> among(const Particles<3>& some) const override {
-    if (some.size() < options_.total) return nullptr;
     auto pairs = pairs_->among(some);
     if (!pairs) return nullptr;
     return std::make_unique<EwaldTerm>(box_, some, options_, waves_, std::move(pairs));
   }
-  double reach(Positions<3>) const override { return std::numeric_limits<double>::infinity(); }
-  double reach(const Particles<3>&, Communicator&) const override { return std::numeric_limits<double>::infinity(); }
+  void join(Communicator& ranks) override { ranks_ = &ranks; }
+  double reach(Positions<3> x) const override { return pairs_->reach(x); }
+  double reach(const Particles<3>& block, Communicator& ranks) const override { return pairs_->reach(block, ranks); }
   std::uint64_t interacting_pairs(Positions<3> x) const override { return pairs_->interacting_pairs(x); }
   ForceScale scale(double distance) const override { return pairs_->scale(distance); }
   void use(const PairKernels& kernels) override { pairs_->use(kernels); }
 
  private:
-  static bool same(Positions<3> x, const std::vector<Vec3>& y) {
-    return x.size() == y.size() && !y.empty() && std::memcmp(x.data(), y.data(), sizeof(Vec3) * y.size()) == 0;
+  /// Whether own charges are at the same places.
+  bool same(Positions<3> x, const std::vector<Vec3>& y) const {
+    const auto same_place = [&](Id j) { return std::memcmp(&x[j], &y[j], sizeof(Vec3)) == 0; };
+    return x.size() == y.size() && std::ranges::all_of(charged(), same_place);
   }
-  /// Whether all vectors are finite and so small that their number of edges fits an integer.
-  bool moderate(Positions<3> x) const {
+  /// Whether the vectors of all charges on all ranks are finite and so small that their number of edges fits an
+  /// integer.
+  bool all_moderate(Positions<3> x, Positions<3> y) const {
     const double most = 0x1p40 * box_.edges.minCoeff();
-    return std::ranges::all_of(x, [&](const Vec3& each) { return (each.array().abs() < most).all(); });
+    const auto moderate = [&](Id j) { return (x[j].array().abs() < most).all() && (y[j].array().abs() < most).all(); };
+    return !any(!std::ranges::all_of(charged(), moderate));
+  }
+
+  // Functions of all ranks.
+
+  bool any(bool here) const { return largest(here ? 1 : 0) > 0; }
+  double largest(double value) const {
+    ranks_->largest({&value, 1});
+    return value;
+  }
+  /// The exact sum of vector(j) over all charges.
+  Vec3 total(auto&& vector) const {
+    struct Sums {
+      std::array<ExactSum, 3> of;
+      void add(const Sums& other) {
+        for (int k = 0; k < 3; ++k) of[k].add(other.of[k]);
+      }
+    } sums;
+    std::array<ExactSeries, 3> own;
+    for (const Id j : charged()) {
+      const Vec3 term = vector(j);
+      for (int k = 0; k < 3; ++k) own[k].add(term[k]);
+    }
+    for (int k = 0; k < 3; ++k) sums.of[k] = own[k].sum();
+    sums = sum_of_all(*ranks_, sums);
+    return {sums.of[0].value(), sums.of[1].value(), sums.of[2].value()};
   }
 
   /// The mass of a charge, or its limit relative to those of fixed ones.
   double weight(Id i) const {
-    if (!fixed_) return particles_.mass[i];
+    if (options_.charges.fixed == 0) return particles_.mass[i];
     return particles_.fixed(i) ? 1 : 0;
   }
+  double whole_weight() const {
+    return options_.charges.fixed == 0 ? options_.charges.mass.value() : options_.charges.fixed;
+  }
+  /// The charges of this rank.
   const std::vector<Id>& charged() const {
     if (charged_.empty())
       for (Id i = 0; i < particles_.size(); ++i)
-        if (particles_.charge[i] != 0) {
-          charged_.push_back(i);
-          fixed_ |= particles_.fixed(i);
-          largest_charge_ = std::max(largest_charge_, std::abs(particles_.charge[i]));
-        }
-    if (mass_ == 0)
-      for (const Id i : charged_) mass_ += weight(i);
+        if (particles_.charge[i] != 0 && particles_.owns(i)) charged_.push_back(i);
     return charged_;
   }
 
@@ -221,22 +276,25 @@ class EwaldTerm final : public Interaction<3> {
     const double n = static_cast<double>(options_.total);
     const double quantum = std::ldexp(std::max(0x1p-50, std::ldexp(1.0, std::ilogb(n) - 60)), exponent);
     const double shift = 0x1.8p52 * quantum;
-    std::vector<std::uint64_t> re(waves_->size()), im(waves_->size());
-    for (const Id j : charged()) kernels_->add(waves_at(x[j]), factor(j), shift, re.data(), im.data());
+    const std::size_t n_waves = waves_->size();
+    std::vector<std::uint64_t> whole(2 * n_waves);
+    std::uint64_t *const re = whole.data(), *const im = re + n_waves;
+    for (const Id j : charged()) kernels_->add(waves_at(x[j]), factor(j), shift, re, im);
     const std::uint64_t shifts = charged().size() * std::bit_cast<std::uint64_t>(shift);
-    sum.re.resize(waves_->size());
-    sum.im.resize(waves_->size());
-    for (std::size_t k = 0; k < waves_->size(); ++k) {
-      sum.re[k] = quantum * static_cast<double>(static_cast<std::int64_t>(re[k] - shifts));
-      sum.im[k] = quantum * static_cast<double>(static_cast<std::int64_t>(im[k] - shifts));
+    for (std::uint64_t& each : whole) each -= shifts;
+    ranks_->sum(whole);
+    sum.re.resize(n_waves);
+    sum.im.resize(n_waves);
+    for (std::size_t k = 0; k < n_waves; ++k) {
+      sum.re[k] = quantum * static_cast<double>(static_cast<std::int64_t>(re[k]));
+      sum.im[k] = quantum * static_cast<double>(static_cast<std::int64_t>(im[k]));
     }
   }
 
   /// S(k)
   void sum_structure(Positions<3> x, Amplitudes& sum) const {
-    charged();
     sum_terms(
-        x, std::ilogb(largest_charge_) + 1,
+        x, std::ilogb(options_.charges.largest) + 1,
         [&](Id j) {
           return WaveFactor{particles_.charge[j], 0, 0, 0};
         },
@@ -244,7 +302,7 @@ class EwaldTerm final : public Interaction<3> {
   }
   /// S(k), kept for the last positions.
   const Amplitudes& structure(Positions<3> x) const {
-    if (!same(x, at_)) {
+    if (any(!same(x, at_))) {
       sum_structure(x, structure_);
       at_.assign(x.begin(), x.end());
     }
@@ -252,11 +310,11 @@ class EwaldTerm final : public Interaction<3> {
   }
   /// The derivative of S(k) along w, over i: Σ q_j (k·w_j) e^(ik·x_j), times i.
   Amplitudes structure_change(Positions<3> x, Positions<3> w) const {
-    charged();
     double longest = 0;
     for (const Id j : charged()) longest = std::max(longest, w[j].norm());
+    longest = largest(longest);
     Amplitudes sum;
-    const double most = std::max(largest_charge_ * longest * waves_->longest, 0x1p-900);
+    const double most = std::max(options_.charges.largest * longest * waves_->longest, 0x1p-900);
     sum_terms(
         x, std::ilogb(most) + 2,
         [&](Id j) {
@@ -314,14 +372,12 @@ class EwaldTerm final : public Interaction<3> {
     return sum.cwiseProduct(waves_->unit);
   }
 
-  void find_mean_forces(Positions<3> x, Positions<3> x_new) const {
-    auto& f = mean_.force;
-    f.assign(x.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-    if (!moderate(x) || !moderate(x_new)) return;
-    std::ranges::fill(f, Vec3::Zero());
-    Vec3 centre = Vec3::Zero();  // motion of the centre of mass
-    for (const Id j : charged()) centre += weight(j) * (x_new[j] - x[j]);
-    centre /= mass_;
+  /// The mean forces on own charges; NaN if positions are not moderate.
+  std::vector<Vec3> mean_forces(Positions<3> x, Positions<3> x_new) const {
+    if (!all_moderate(x, x_new)) return {x.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
+    std::vector<Vec3> f(x.size(), Vec3::Zero());
+    // The motion of the centre of mass.
+    const Vec3 centre = total([&](Id j) { return Vec3(weight(j) * (x_new[j] - x[j])); }) / whole_weight();
     std::vector<Vec3> relative(x.begin(), x.end());
     for (const Id j : charged()) relative[j] = x_new[j] - centre;
     Amplitudes field, after;
@@ -335,24 +391,21 @@ class EwaldTerm final : public Interaction<3> {
     for (const Id j : charged())
       f[j] = particles_.charge[j] * pull(0.5 * (x[j] + relative[j]), field, relative[j] - x[j]);
     if (options_.vacuum) add_surface(0.5 * (dipole(x, x) + dipole(x, x_new)), f);
+    return f;
   }
 
-  Vec3 weighted_sum(Positions<3> w) const {
-    Vec3 sum = Vec3::Zero();
-    for (const Id j : charged()) sum += particles_.charge[j] * w[j];
-    return sum;
-  }
   /// Σ q x_new, where x_new is unwrapped: x is in the image that is the nearest to the particles' own positions.
   Vec3 dipole(Positions<3> x, Positions<3> x_new) const {
-    Vec3 sum = Vec3::Zero();
-    if (!options_.vacuum) return sum;
-    for (const Id j : charged())
+    if (!options_.vacuum) return Vec3::Zero();
+    return total([&](Id j) {
+      Vec3 moment;
       for (int k = 0; k < 3; ++k) {
         const double edge = box_.edges[k];
         const double edges = particles_.image[j][k] + std::nearbyint((particles_.x[j][k] - x[j][k]) / edge);
-        sum[k] += particles_.charge[j] * (x_new[j][k] + edges * edge);
+        moment[k] = particles_.charge[j] * (x_new[j][k] + edges * edge);
       }
-    return sum;
+      return moment;
+    });
   }
   /// Adds the forces of the surface of charge around a sphere in vacuum.
   void add_surface(const Vec3& dipole, std::vector<Vec3>& f) const {
@@ -362,63 +415,68 @@ class EwaldTerm final : public Interaction<3> {
   }
 
   void add_sums(Positions<3> x, PotentialSums& sums) const {
-    if (x.empty() || !particles_.owns(0)) return;  // every rank has all particles; one of them adds
     const auto add = [&](double energy, double virial) {
       sums.energy.add(energy);
       sums.magnitude.add(std::abs(energy));
       sums.virial.add(virial);
     };
     const Amplitudes& s = structure(x);
+    const Vec3 moment = dipole(x, x);
     const double scale = 0.5 / (options_.split.alpha * options_.split.alpha);
-    for (std::size_t k = 0; k < waves_->size(); ++k) {
+    const auto me = static_cast<std::size_t>(ranks_->rank()), ranks = static_cast<std::size_t>(ranks_->size());
+    for (std::size_t k = me; k < waves_->size(); k += ranks) {
       const double energy = waves_->weight[k] * (s.re[k] * s.re[k] + s.im[k] * s.im[k]);
       add(energy, energy * (1 - scale * waves_->squared[k]));
     }
+    if (me != 0) return;
     add(options_.constant_energy - options_.background, 0);
     add(options_.background, 3 * options_.background);
     if (options_.vacuum) {
-      const double energy = options_.constant * 2 * kPi / 3 / box_.edges.prod() * dipole(x, x).squaredNorm();
+      const double energy = options_.constant * 2 * kPi / 3 / box_.edges.prod() * moment.squaredNorm();
       add(energy, energy);
     }
   }
 
-  /// Adds forces on own particles, rounded to quanta so that their sum over all particles is exactly zero. Returns
-  /// false if one is too large or no number.
-  bool add_rounded(const std::vector<Vec3>& f, ForceSums<3>& forces, int sign) const {
-    using Whole = ForceSums<3>::Whole;
-    constexpr std::int64_t kHalf = std::int64_t{1} << 31;  // both parts of a sum of quanta are exact as doubles
-    const ForceLimits limits = forces.make_room(2);
+  /// Forces on the charges of this rank [quanta].
+  using RoundedForces = std::optional<std::vector<std::array<std::int64_t, 3>>>;
+
+  /// The forces on own charges, rounded to quanta so that their sum over all ranks is exactly zero: each charge gives
+  /// up a share m/M of it, rounded up or down by its id, and the one with the lowest id what remains. No forces if one
+  /// is too large or no number. Collective.
+  RoundedForces rounded(const std::vector<Vec3>& f, double quantum) const {
     const auto& charges = charged();
     std::vector<std::array<std::int64_t, 3>> rounded(charges.size());
-    for (int k = 0; k < 3; ++k) {
-      Whole net = 0;
-      for (std::size_t n = 0; n < charges.size(); ++n) {
-        const double quanta = f[charges[n]][k] / forces.quantum();
-        if (!(std::abs(quanta) < 0x1p61)) return false;
-        net += rounded[n][k] = std::llrint(quanta);
-      }
-      const double per_mass = static_cast<double>(net) / mass_;
-      for (std::size_t n = 0; n < charges.size(); ++n) {
-        const std::int64_t share = std::llrint(per_mass * weight(charges[n]));
-        rounded[n][k] -= share;
-        net -= share;
-      }
-      for (std::size_t n = 0; net != 0; n = (n + 1) % charges.size()) {  // the rounding of the shares
-        const int one = net > 0 ? 1 : -1;
-        rounded[n][k] -= one;
-        net -= one;
-      }
-    }
+    WholeForce net, shares;
+    for (std::size_t n = 0; n < charges.size(); ++n)
+      for (int k = 0; k < 3; ++k) rounded[n][k] = net.add(k, std::nearbyint(f[charges[n]][k] / quantum));
+    ranks_->sum(net.word);
     for (std::size_t n = 0; n < charges.size(); ++n) {
-      if (!particles_.owns(charges[n])) continue;
+      const double share = weight(charges[n]) / whole_weight();
+      // Multiples of the golden ratio: in any number of consecutive ids nearly the right number is rounded up.
+      const double up = static_cast<double>((particles_.id_of(charges[n]) * 0x9e3779b97f4a7c15U) >> 11U) * 0x1p-53;
+      for (int k = 0; k < 3; ++k) rounded[n][k] -= shares.add(k, static_cast<double>(net[k]) * share + up);
+    }
+    ranks_->sum(shares.word);
+    if (!net.possible() || !shares.possible()) return std::nullopt;
+    for (std::size_t n = 0; n < charges.size(); ++n)
+      if (particles_.id_of(charges[n]) == options_.charges.first)
+        for (int k = 0; k < 3; ++k) rounded[n][k] -= static_cast<std::int64_t>(net[k] - shares[k]);
+    return rounded;
+  }
+  /// Returns false if there are no forces, or one is too large.
+  bool add(const RoundedForces& rounded, ForceSums<3>& forces, int sign) const {
+    constexpr std::int64_t kHalf = std::int64_t{1} << 31;  // both parts of a sum of quanta are exact as doubles
+    const ForceLimits limits = forces.make_room(2);
+    if (!rounded) return false;
+    for (std::size_t n = 0; n < charged().size(); ++n) {
       Vec3 upper, lower;
       for (int k = 0; k < 3; ++k) {
-        const std::int64_t low = rounded[n][k] % kHalf;
-        upper[k] = static_cast<double>(rounded[n][k] - low);
+        const std::int64_t whole = (*rounded)[n][k], low = whole % kHalf;
+        upper[k] = static_cast<double>(whole - low);
         lower[k] = static_cast<double>(low);
       }
       for (const Vec3& part : {upper, lower})
-        if (!forces.add(charges[n], sign * forces.quantum() * part, limits)) return false;
+        if (!forces.add(charged()[n], sign * forces.quantum() * part, limits)) return false;
     }
     return true;
   }
@@ -428,15 +486,19 @@ class EwaldTerm final : public Interaction<3> {
   EwaldOptions options_;
   std::shared_ptr<const Waves> waves_;
   std::unique_ptr<Interaction<3>> pairs_;
+  Communicator alone_;
+  Communicator* ranks_ = &alone_;
   const WaveKernels* kernels_ = &widest_kernels<WaveKernels>();
   // Caches and scratch, which do not affect the sums.
   mutable std::array<Phases, 3> phases_;
   mutable std::vector<Id> charged_;
-  mutable double mass_ = 0, largest_charge_ = 0;  // of the charged particles
-  mutable bool fixed_ = false;                    // whether one of them is fixed
   mutable std::vector<Vec3> at_;
-  mutable Amplitudes structure_;                                // S(k) at at_
-  mutable struct { std::vector<Vec3> x, x_new, force; } mean_;  // the last mean forces
+  mutable Amplitudes structure_;  // S(k) at at_
+  mutable struct {
+    std::vector<Vec3> x, x_new;
+    double quantum;
+    RoundedForces force;
+  } mean_{};  // the last mean forces
 };
 
 }  // namespace
@@ -475,13 +537,7 @@ std::unique_ptr<Interaction<3>> ewald(const Parameters& p, const InteractionCont
   if (!(accuracy >= 1e-14 && accuracy <= 0.1))
     options::refuse(type, "'accuracy' is out of range; give a number from 1e-14 to 0.1");
   ChargeSums charges;
-  for (const double q : context.particles.charge) {
-    if (q == 0) continue;
-    charges.total.add(q);
-    charges.absolute.add(std::abs(q));
-    charges.squares.add(q * q);
-    charges.count.add(1.0);
-  }
+  for (Id i = 0; i < context.particles.size(); ++i) charges.add(context.particles, i);
   if (context.ranks) charges = sum_of_all(*context.ranks, charges);
   if (charges.count.value() == 0) {
     if (context.placed)
@@ -507,7 +563,8 @@ std::unique_ptr<Interaction<3>> ewald(const Parameters& p, const InteractionCont
       options::within_reach<3>(type, Cut<DampedCoulomb>(whole, split.cutoff, CutKind::switched, split.switch_from),
                                PairWeight::charges, p, context, whole);
   return std::make_unique<EwaldTerm>(
-      box, context.particles, EwaldOptions{split, constant, vacuum, self + background, background, context.total},
+      box, context.particles,
+      EwaldOptions{split, constant, vacuum, self + background, background, context.total, charges},
       std::make_shared<const Waves>(split, box.edges, constant), std::move(pairs));
 }
 

@@ -16,7 +16,13 @@
 // |S|² is invariant under translation, so x′ is taken relative to the motion of the charges' centre of mass, and the
 // share (m_j/M) Σ F̄ is taken off each F̄_j; the work remains exact, because Σ m_j Δ_j = 0, and the net force is zero.
 //
-// S(k) is summed in fixed point, so its bits do not depend on the order of the particles.
+// Each rank sums over its own charges, and then adds up S(k), the motion of the centre of mass and the net force of all
+// ranks. S(k) and forces are summed in fixed point, other sums are exact, so no bit depends on the order of the
+// particles or on how they are divided among ranks.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "engine/base/interaction.h"
 #include "engine/forces/potentials/options.h"
@@ -33,16 +39,38 @@ struct EwaldSplit {
 
 /// The charges of a system.
 struct ChargeSums {
-  ExactSum total;     ///< Σ q
-  ExactSum absolute;  ///< Σ |q|
-  ExactSum squares;   ///< Σ q²
-  ExactSum count;     ///< number of charged particles
+  ExactSum total;                             ///< Σ q
+  ExactSum absolute;                          ///< Σ |q|
+  ExactSum squares;                           ///< Σ q²
+  ExactSum count;                             ///< number of charged particles
+  ExactSum mass;                              ///< of those that are not fixed
+  double fixed = 0;                           ///< number of fixed ones
+  double largest = 0;                         ///< |q|
+  Id first = std::numeric_limits<Id>::max();  ///< the lowest id of a charged particle
 
+  void add(const Particles<3>& particles, Id i) {
+    const double q = particles.charge[i];
+    if (q == 0) return;
+    total.add(q);
+    absolute.add(std::abs(q));
+    squares.add(q * q);
+    count.add(1.0);
+    if (particles.fixed(i))
+      ++fixed;
+    else
+      mass.add(particles.mass[i]);
+    largest = std::max(largest, std::abs(q));
+    first = std::min(first, particles.id_of(i));
+  }
   void add(const ChargeSums& other) {
     total.add(other.total);
     absolute.add(other.absolute);
     squares.add(other.squares);
     count.add(other.count);
+    mass.add(other.mass);
+    fixed += other.fixed;
+    largest = std::max(largest, other.largest);
+    first = std::min(first, other.first);
   }
 };
 

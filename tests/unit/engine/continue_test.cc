@@ -191,11 +191,25 @@ Scene<3> yukawa(const std::string& method, const Given& given = {}) {
           },
           method, plan_of(0.02, 18), given};
 }
+Scene<3> ions(const std::string& method) {
+  return {[] {
+            auto system = test::hard_spheres<3>(4, 0.3);
+            for (Id i = 0; i < system->size(); ++i) system->particles.charge[i] = i % 2 == 0 ? 1 : -1;
+            test::add_interaction(
+                *system, "coulomb",
+                {{"form", std::string("ewald")}, {"accuracy", 1e-2}, {"surface", std::string("vacuum")}});
+            return system;
+          },
+          method,
+          plan_of(0.02, 12),
+          {}};
+}
 
 TEST(Continue, SlabMethods) {
   for (const char* method : {"verlet", "psa", "edda"}) {
     compare<2>(springs(method), kRanks, {1, 7, 16});
     compare<3>(yukawa(method), kRanks, {5});
+    compare<3>(ions(method), {{1, 2}, {3, 0}}, {7});
   }
 }
 /// Sweeps are accelerated once the largest frequency is known, which is part of the state.

@@ -282,6 +282,75 @@ TEST(Decomposition, NoRankHasAllParticles) {
     for (Id i = 0; i < p.size(); ++i) EXPECT_EQ(p.x[i], all.x[p.id[i]] + all.v[p.id[i]]);
   });
 }
+/// Ions in a long box, some spheres without charge, one ion fixed if `fixed`.
+std::unique_ptr<System<3>> ions(const std::string& surface, bool fixed = false) {
+  std::vector<Vec<3>> x, v;
+  std::vector<double> radius, mass;
+  for (int k = 0; k < 512; ++k) {
+    x.push_back(1.7 * Vec<3>(k / 16 + 0.5, k / 4 % 4 + 0.5, k % 4 + 0.5));
+    v.push_back({0.4 * (k % 7 - 3), 0.5 * (k % 5 - 2), 0.6 * (k % 3 - 1)});
+    radius.push_back(0.8);
+    mass.push_back(1.0 + 0.5 * (k % 4));
+  }
+  auto system = test::make_system<3>({54.4, 6.8, 6.8}, Boundary::periodic, x, v, radius, mass);
+  Particles<3>& p = system->particles;
+  for (Id i = 0; i < p.size(); ++i) p.charge[i] = i % 5 == 4 ? 0 : i % 5 < 2 ? 1.5 : -1.5;
+  for (const Id i : {510, 511}) p.charge[i] = 0;
+  if (fixed) p.mass[7] = std::numeric_limits<double>::infinity(), p.v[7] = Vec<3>::Zero();
+  test::add_interaction(*system, "coulomb",
+                        {{"constant", 1.0}, {"form", std::string("ewald")}, {"accuracy", 0.01}, {"surface", surface}});
+  return system;
+}
+TEST(Decomposition, Ions) {
+  for (const char* method : {"psa", "edda"}) compare<3>([] { return ions("vacuum"); }, method, 0.02, 12, 100);
+  compare<3>([] { return ions("conducting", true); }, "edda", 0.02, 6, 60);
+  for (const char* method : {"mcva", "cdda"}) compare<3>([] { return ions("vacuum"); }, method, 0.014, 3, 1);
+  const auto points = [] {
+    auto system = ions("conducting");
+    std::ranges::fill(system->particles.radius, 1e-3);
+    return system;
+  };
+  compare<3>(points, "verlet", 0.02, 20, 0);
+}
+/// S(k), the net force and the motion of the centre of mass are sums over the ranks.
+TEST(Decomposition, NoRankHasAllIons) {
+  for (const bool fixed : {false, true}) {
+    const auto start = [&] { return ions(fixed ? "conducting" : "vacuum", fixed); };
+    struct Sums {
+      double energy;
+      std::vector<Vec<3>> force, mean, product;
+    };
+    const auto sums = [](const System<3>& system) {
+      const Particles<3>& p = system.particles;
+      std::vector<Vec<3>> x_new = p.x;
+      for (Id i = 0; i < p.size(); ++i) x_new[i] += 0.3 * p.v[i] + (p.fixed(i) ? Vec<3>::Zero() : Vec<3>(0.2, 0.1, 0));
+      Sums all{evaluate_energy<3>(system, p.x).energy.value(), p.x, p.x, p.x};
+      Counters uncounted;
+      evaluate_forces<3>(system, p.x, all.force, uncounted);
+      evaluate_mean_forces<3>(system, p.x, x_new, all.mean, uncounted);
+      evaluate_hessian_product<3>(system, p.x, p.v, all.product, uncounted);
+      return all;
+    };
+    auto whole = start();
+    whole->quanta = quanta(*whole);
+    const Sums expected = sums(*whole);
+    test::ThreadRanks(8).run([&](Communicator& exchange) {
+      auto system = start();
+      system->quanta = whole->quanta;
+      system->decomposition.join(exchange);
+      system->decomposition.divide(true, 0.02);
+      const Particles<3>& p = system->particles;
+      EXPECT_LE(p.size(), whole->size() / 2);
+      const Sums found = sums(*system);
+      EXPECT_EQ(found.energy, expected.energy);
+      for (Id i = 0; i < p.size(); ++i) {
+        EXPECT_EQ(found.force[i], expected.force[p.id[i]]);
+        EXPECT_EQ(found.mean[i], expected.mean[p.id[i]]);
+        EXPECT_EQ(found.product[i], expected.product[p.id[i]]);
+      }
+    });
+  }
+}
 /// A division allows for steps twice as long as its longest.
 TEST(Decomposition, StepsGiveGhostsTheirPositionsAndAreNotTooLong) {
   constexpr double kStep = 0.02;
