@@ -13,8 +13,7 @@
 
 #include "engine/base/elementary.h"
 #include "engine/base/error.h"
-#include "engine/base/normal_deviates.h"
-#include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/ewald_pair.h"
 #include "engine/forces/simd/wave_kernels.h"
 #include "engine/ranks/communicator.h"
 
@@ -28,17 +27,40 @@ constexpr double kSwitchFrom = 0.95;  // of the cutoff
 // α = √π (c N/Ω²)^(1/6) makes pairs and waves cost the same, c the cost of a pair over that of a wave of a particle
 // (Kolafa, Perram); c is taken as 9.3, the sixth power of:
 constexpr double kPairCost = 1.45;
+constexpr double kPolynomial = 0.05;  // of the error of the pair sum: the part of the polynomial in it
 constexpr std::size_t kMostWaves = std::size_t{1} << 24;
 
 using Vec3 = Vec<3>;
+
+/// Cosine and sine of 2πu, |u| < 2^50, with errors of an ulp or two: their Taylor series within an eighth of a turn.
+std::array<double, 2> turn(double u) {
+  const double quarters = std::nearbyint(4 * u), y = 2 * kPi * (u - 0.25 * quarters), y2 = y * y;
+  double sin = 1, cos = 1;
+  for (int n = 16; n > 0; n -= 2) {
+    sin = 1 - y2 * (1.0 / (n * (n + 1))) * sin;
+    cos = 1 - y2 * (1.0 / (n * (n - 1))) * cos;
+  }
+  sin *= y;
+  switch (static_cast<std::int64_t>(quarters) & 3) {
+    case 0:
+      return {cos, sin};
+    case 1:
+      return {-sin, cos};
+    case 2:
+      return {-cos, -sin};
+    default:
+      return {sin, -cos};
+  }
+}
 
 /// The numbers e^(2πi n u), n = −most … most.
 class Phases {
  public:
   explicit Phases(int most) : most_(most), re_(2 * most + 1 + WaveRow::kMultiple), im_(re_.size()) {}
 
-  void set(double u) {
-    const auto [cos, sin] = cosine_and_sine(u);
+  /// From cosine and sine of 2πu.
+  void set(const std::array<double, 2>& of_u) {
+    const auto [cos, sin] = of_u;
     re_[most_] = 1;
     im_[most_] = 0;
     for (int n = 1; n <= most_; ++n) {
@@ -99,7 +121,7 @@ struct Amplitudes {
   std::vector<double> re, im;
 };
 
-double sinc(double y) { return y == 0 ? 1 : cosine_and_sine(y / (2 * kPi))[1] / y; }
+double sinc(double y) { return y == 0 ? 1 : turn(y / (2 * kPi))[1] / y; }
 
 struct EwaldOptions {
   EwaldSplit split;
@@ -156,7 +178,7 @@ class EwaldTerm final : public Interaction<3> {
     need_finite(particles_, x);
     const Amplitudes field = weighted(structure(x));
     std::vector<Vec3> f(x.size(), Vec3::Zero());
-    for (const Id j : charged()) f[j] = particles_.charge[j] * pull(x[j], field, Vec3::Zero());
+    for (const Id j : charged()) f[j] = particles_.charge[j] * pull(j, x[j], field, Vec3::Zero());
     add_surface(dipole(x, x), f);
     if (!add(rounded(f, forces.quantum()), forces, 1))
       throw Error(Failure::numerical,
@@ -186,7 +208,7 @@ class EwaldTerm final : public Interaction<3> {
     if (!all_moderate(x, w)) return out.invalidate();
     const Amplitudes field = weighted(structure(x)), change = weighted(structure_change(x, w));
     for (const Id j : charged())
-      f[j] = -particles_.charge[j] * (pull(x[j], change, Vec3::Zero()) + pull_change(x[j], field, w[j]));
+      f[j] = -particles_.charge[j] * (pull(j, x[j], change, Vec3::Zero()) + pull_change(j, x[j], field, w[j]));
     if (options_.vacuum) add_surface(-total([&](Id j) { return Vec3(particles_.charge[j] * w[j]); }), f);
     if (!add(rounded(f, out.quantum()), out, 1)) out.invalidate();
   }
@@ -201,6 +223,12 @@ class EwaldTerm final : public Interaction<3> {
   double reach(const Particles<3>& block, Communicator& ranks) const override { return pairs_->reach(block, ranks); }
   std::uint64_t interacting_pairs(Positions<3> x) const override { return pairs_->interacting_pairs(x); }
   ForceScale scale(double distance) const override { return pairs_->scale(distance); }
+  Caution caution() const override {
+    if (options_.background == 0) return {};
+    return {"the charges add up to " + short_text(options_.charges.total.value()) +
+                ", which a uniform background neutralises",
+            "change the charges if that is not what you mean"};
+  }
   void use(const PairKernels& kernels) override { pairs_->use(kernels); }
 
  private:
@@ -258,11 +286,14 @@ class EwaldTerm final : public Interaction<3> {
     return charged_;
   }
 
-  /// The waves at x.
-  WaveTask waves_at(const Vec3& x) const {
+  /// The waves at x, a position of particle j.
+  WaveTask waves_at(Id j, const Vec3& x) const {
     WaveTask task{waves_->rows.data(), waves_->rows.size(), {}, {}};
+    turns_.resize(particles_.size(), {Vec3::Constant(std::numeric_limits<double>::quiet_NaN()), {}});
+    Turns& last = turns_[j];
     for (int k = 0; k < 3; ++k) {
-      phases_[k].set(x[k] / box_.edges[k]);
+      if (x[k] != last.x[k]) last.of[k] = turn((last.x[k] = x[k]) / box_.edges[k]);
+      phases_[k].set(last.of[k]);
       task.re[k] = phases_[k].re();
       task.im[k] = phases_[k].im();
     }
@@ -279,7 +310,7 @@ class EwaldTerm final : public Interaction<3> {
     const std::size_t n_waves = waves_->size();
     std::vector<std::uint64_t> whole(2 * n_waves);
     std::uint64_t *const re = whole.data(), *const im = re + n_waves;
-    for (const Id j : charged()) kernels_->add(waves_at(x[j]), factor(j), shift, re, im);
+    for (const Id j : charged()) kernels_->add(waves_at(j, x[j]), factor(j), shift, re, im);
     const std::uint64_t shifts = charged().size() * std::bit_cast<std::uint64_t>(shift);
     for (std::uint64_t& each : whole) each -= shifts;
     ranks_->sum(whole);
@@ -340,8 +371,8 @@ class EwaldTerm final : public Interaction<3> {
   }
 
   /// The force on a unit charge that moves by `moved` about x: Σ_k k sinc(k·Δ/2) Im[field* e^(ik·x)].
-  Vec3 pull(const Vec3& x, const Amplitudes& field, const Vec3& moved) const {
-    const WaveTask task = waves_at(x);
+  Vec3 pull(Id j, const Vec3& x, const Amplitudes& field, const Vec3& moved) const {
+    const WaveTask task = waves_at(j, x);
     const Vec3 turn = 0.5 * moved.cwiseProduct(waves_->unit);
     Vec3 sum = Vec3::Zero();
     if (moved.isZero(0)) {
@@ -365,10 +396,11 @@ class EwaldTerm final : public Interaction<3> {
     return sum.cwiseProduct(waves_->unit);
   }
   /// The change of the force on a unit charge as it moves along w in a constant field.
-  Vec3 pull_change(const Vec3& x, const Amplitudes& field, const Vec3& w) const {
+  Vec3 pull_change(Id j, const Vec3& x, const Amplitudes& field, const Vec3& w) const {
     const Vec3 along = w.cwiseProduct(waves_->unit);
     Vec3 sum;
-    kernels_->pull_change(waves_at(x), {0, along[0], along[1], along[2]}, field.re.data(), field.im.data(), sum.data());
+    kernels_->pull_change(waves_at(j, x), {0, along[0], along[1], along[2]}, field.re.data(), field.im.data(),
+                          sum.data());
     return sum.cwiseProduct(waves_->unit);
   }
 
@@ -389,7 +421,7 @@ class EwaldTerm final : public Interaction<3> {
     }
     field = weighted(field);
     for (const Id j : charged())
-      f[j] = particles_.charge[j] * pull(0.5 * (x[j] + relative[j]), field, relative[j] - x[j]);
+      f[j] = particles_.charge[j] * pull(j, 0.5 * (x[j] + relative[j]), field, relative[j] - x[j]);
     if (options_.vacuum) add_surface(0.5 * (dipole(x, x) + dipole(x, x_new)), f);
     return f;
   }
@@ -491,6 +523,11 @@ class EwaldTerm final : public Interaction<3> {
   const WaveKernels* kernels_ = &widest_kernels<WaveKernels>();
   // Caches and scratch, which do not affect the sums.
   mutable std::array<Phases, 3> phases_;
+  struct Turns {
+    Vec3 x;
+    std::array<std::array<double, 2>, 3> of;
+  };
+  mutable std::vector<Turns> turns_;  // cosine and sine of 2πx/L where each particle was looked at last
   mutable std::vector<Id> charged_;
   mutable std::vector<Vec3> at_;
   mutable Amplitudes structure_;  // S(k) at at_
@@ -558,10 +595,15 @@ std::unique_ptr<Interaction<3>> ewald(const Parameters& p, const InteractionCont
                               " waves; make the box less elongated, or 'accuracy' less strict");
   const double background = neutral ? 0.0 : -constant * kPi * total * total / (2 * split.alpha * split.alpha * volume);
   const double self = -constant * split.alpha / std::sqrt(kPi) * charges.squares.value();
-  const DampedCoulomb whole(constant, split.alpha);
-  auto pairs =
-      options::within_reach<3>(type, Cut<DampedCoulomb>(whole, split.cutoff, CutKind::switched, split.switch_from),
-                               PairWeight::charges, p, context, whole);
+  // The largest error of dE/du, u = α²ρ, with which the errors of all pairs are at most kPolynomial of the error that
+  // the pair sum may have: the force between two charges is 2 C q² r α³ dE/du.
+  const double n = charges.count.value(), r = split.cutoff, spacing = elementary::cbrt(volume / n);
+  const double near = std::max(1.0, 4 * kPi / 3 * elementary::pow(r / spacing, 3));
+  const double error =
+      kPolynomial * 0.5 * accuracy / (spacing * spacing * std::sqrt(near) * 2 * r * elementary::pow(split.alpha, 3));
+  const EwaldPair pair(constant, split.alpha, split.cutoff, error);
+  auto pairs = options::within_reach<3>(type, Cut<EwaldPair>(pair, split.cutoff, CutKind::switched, split.switch_from),
+                                        PairWeight::charges, p, context, pair);
   return std::make_unique<EwaldTerm>(
       box, context.particles,
       EwaldOptions{split, constant, vacuum, self + background, background, context.total, charges},
