@@ -8,9 +8,9 @@
 // (force_sums.h), so no sum depends on how the pairs were found.
 //
 // If a system is divided among ranks (engine/ranks/decomposition.h), sums over the system run over what this rank owns:
-// its particles, and the pairs with a lower id that it owns. Forces on ghosts are incomplete. A term in which each particle
-// feels all others, as the waves of an Ewald sum, then adds up sums of all ranks in add_…(): all ranks call these functions
-// in the same order.
+// its particles, and the pairs with a lower id that it owns. Forces on ghosts are incomplete. A term in which each
+// particle feels all others, as the waves of an Ewald sum, then adds up sums of all ranks in add_…(): all ranks call
+// these functions in the same order.
 
 #include <functional>
 #include <memory>
@@ -81,10 +81,9 @@ class Interaction {
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:
   /// only pairs with at least one changed particle, and fields on changed particles (a term in which each particle
-  /// feels all others adds all its forces); sign −1 subtracts exactly what +1 added in the last call, and calls no other
-  /// rank.
-  /// Returns the number of this rank's pairs (or particles, for a field) within reach. A trial step may be far too
-  /// long: forces that are not finite or too large invalidate the sums.
+  /// feels all others adds all its forces); sign −1 subtracts exactly what +1 added in the last call, and calls no
+  /// other rank. Returns the number of this rank's pairs (or particles, for a field) within reach. A trial step may be
+  /// far too long: forces that are not finite or too large invalidate the sums.
   virtual std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces,
                                         const char* changed = nullptr, int sign = 1) const = 0;
 
@@ -112,6 +111,12 @@ class Interaction {
 
   /// The estimated contribution beyond the cutoff, of all particles, on each rank.
   virtual Tail tail() const { return {}; }
+
+  /// What a user should know about this term, and what to do about it; empty if there is nothing.
+  struct Caution {
+    std::string what, remedy;
+  };
+  virtual Caution caution() const { return {}; }
 
   /// The bonds of this term, by ids, if it was made for all particles or a block; null if it has none.
   virtual const PairList* bonds() const { return nullptr; }

@@ -105,6 +105,10 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
                        say("cutoff ", config.parameters.real("cutoff"), " is more than half the box, ", shortest / 2),
                        "particles meet several images of each other; enlarge the box");
 
+  for (std::size_t k = 0; k < system.interactions.size(); ++k)
+    if (const auto caution = system.interactions[k]->caution(); !caution.what.empty())
+      problems.warning(source.interactions[k].at, caution.what, caution.remedy);
+
   constexpr std::uint64_t affordable = 500'000;  // particles or pairs: below a second of work
   if (!source.integrator->stepping || system.interactions.empty() || system.size() > affordable) return;
   system.quanta = quanta(system);

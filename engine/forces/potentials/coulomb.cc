@@ -16,7 +16,7 @@ std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionConte
     if (p.has("cutoff") || p.has("damping"))
       options::refuse(type, "form = \"ewald\" takes 'cutoff' and 'damping' from 'accuracy'; leave them out");
     if constexpr (D == 3)
-      return ewald(p, context);
+      return ewald(type, p.real("constant"), charges, p, context);
     else
       options::refuse(type, "form = \"ewald\" is for three dimensions; use form = \"damped-shifted\"");
   }
@@ -75,8 +75,10 @@ InteractionInfo coulomb() {
           "that replaces the long-ranged potential in neutral periodic systems: the real-space part of an Ewald sum, "
           "cut so that V, V' and V'' go to zero at the cutoff. Usual values: alpha times cutoff between 2 and 3. The "
           "form "
-          "ewald sums all periodic images in a box that is periodic along three axes; 'accuracy' sets alpha and both "
-          "cutoffs. If the charges do not add up to zero, a uniform background neutralises them, and its energy is "
+          "ewald sums all periodic images in a box that is periodic along three axes, or along two and has walls along "
+          "the third; 'accuracy' sets alpha and both "
+          "cutoffs. Between walls the charges must add up to zero. If the charges do not add up to zero, a uniform "
+          "background neutralises them, and its energy is "
           "part of V.",
       .source =
           "Wolf et al., J. Chem. Phys. 110 (1999) 8254; Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104; "

@@ -13,8 +13,7 @@
 
 #include "engine/base/elementary.h"
 #include "engine/base/error.h"
-#include "engine/base/normal_deviates.h"
-#include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/ewald_pair.h"
 #include "engine/forces/simd/wave_kernels.h"
 #include "engine/ranks/communicator.h"
 
@@ -28,17 +27,40 @@ constexpr double kSwitchFrom = 0.95;  // of the cutoff
 // α = √π (c N/Ω²)^(1/6) makes pairs and waves cost the same, c the cost of a pair over that of a wave of a particle
 // (Kolafa, Perram); c is taken as 9.3, the sixth power of:
 constexpr double kPairCost = 1.45;
+constexpr double kPolynomial = 0.05;  // of the error of the pair sum: the part of the polynomial in it
 constexpr std::size_t kMostWaves = std::size_t{1} << 24;
 
 using Vec3 = Vec<3>;
+
+/// Cosine and sine of 2πu, |u| < 2^50, with errors of an ulp or two: their Taylor series within an eighth of a turn.
+std::array<double, 2> turn(double u) {
+  const double quarters = std::nearbyint(4 * u), y = 2 * kPi * (u - 0.25 * quarters), y2 = y * y;
+  double sin = 1, cos = 1;
+  for (int n = 16; n > 0; n -= 2) {
+    sin = 1 - y2 * (1.0 / (n * (n + 1))) * sin;
+    cos = 1 - y2 * (1.0 / (n * (n - 1))) * cos;
+  }
+  sin *= y;
+  switch (static_cast<std::int64_t>(quarters) & 3) {
+    case 0:
+      return {cos, sin};
+    case 1:
+      return {-sin, cos};
+    case 2:
+      return {-cos, -sin};
+    default:
+      return {sin, -cos};
+  }
+}
 
 /// The numbers e^(2πi n u), n = −most … most.
 class Phases {
  public:
   explicit Phases(int most) : most_(most), re_(2 * most + 1 + WaveRow::kMultiple), im_(re_.size()) {}
 
-  void set(double u) {
-    const auto [cos, sin] = cosine_and_sine(u);
+  /// From cosine and sine of 2πu.
+  void set(const std::array<double, 2>& of_u) {
+    const auto [cos, sin] = of_u;
     re_[most_] = 1;
     im_[most_] = 0;
     for (int n = 1; n <= most_; ++n) {
@@ -99,12 +121,14 @@ struct Amplitudes {
   std::vector<double> re, im;
 };
 
-double sinc(double y) { return y == 0 ? 1 : cosine_and_sine(y / (2 * kPi))[1] / y; }
+double sinc(double y) { return y == 0 ? 1 : turn(y / (2 * kPi))[1] / y; }
 
 struct EwaldOptions {
   EwaldSplit split;
   double constant;
-  bool vacuum;
+  PairWeight weight;       // charges or masses
+  Vec3 edges;              // of the box that is repeated: that of the system, or one with room between its two walls
+  Vec3 surface;            // V has the terms (C/2) surface_k M_k², M = Σ q_j x_j [1/volume]
   double constant_energy;  // of each charge with itself and with the background [energy]
   double background;       // the latter
   std::size_t total;       // number of particles on all ranks
@@ -139,11 +163,12 @@ class EwaldTerm final : public Interaction<3> {
         options_(options),
         waves_(std::move(waves)),
         pairs_(std::move(pairs)),
+        charge_(*pair_factors(options_.weight, particles_)),
         phases_{Phases(waves_->most[0]), Phases(waves_->most[1]), Phases(waves_->most[2])} {}
 
   void add_energy(Positions<3> x, PotentialSums& sums) const override {
     pairs_->add_energy(x, sums);
-    need_finite(particles_, x);
+    need_inside(x);
     add_sums(x, sums);
   }
 
@@ -153,10 +178,10 @@ class EwaldTerm final : public Interaction<3> {
   void add_forces_early(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums,
                         const Arrival& arrive) const override {
     pairs_->add_forces_early(x, forces, sums, arrive);
-    need_finite(particles_, x);
+    need_inside(x);
     const Amplitudes field = weighted(structure(x));
     std::vector<Vec3> f(x.size(), Vec3::Zero());
-    for (const Id j : charged()) f[j] = particles_.charge[j] * pull(x[j], field, Vec3::Zero());
+    for (const Id j : charged()) f[j] = charge_[j] * pull(j, x[j], field, Vec3::Zero());
     add_surface(dipole(x, x), f);
     if (!add(rounded(f, forces.quantum()), forces, 1))
       throw Error(Failure::numerical,
@@ -186,8 +211,8 @@ class EwaldTerm final : public Interaction<3> {
     if (!all_moderate(x, w)) return out.invalidate();
     const Amplitudes field = weighted(structure(x)), change = weighted(structure_change(x, w));
     for (const Id j : charged())
-      f[j] = -particles_.charge[j] * (pull(x[j], change, Vec3::Zero()) + pull_change(x[j], field, w[j]));
-    if (options_.vacuum) add_surface(-total([&](Id j) { return Vec3(particles_.charge[j] * w[j]); }), f);
+      f[j] = -charge_[j] * (pull(j, x[j], change, Vec3::Zero()) + pull_change(j, x[j], field, w[j]));
+    if (has_surface()) add_surface(-total([&](Id j) { return Vec3(charge_[j] * w[j]); }), f);
     if (!add(rounded(f, out.quantum()), out, 1)) out.invalidate();
   }
 
@@ -201,6 +226,18 @@ class EwaldTerm final : public Interaction<3> {
   double reach(const Particles<3>& block, Communicator& ranks) const override { return pairs_->reach(block, ranks); }
   std::uint64_t interacting_pairs(Positions<3> x) const override { return pairs_->interacting_pairs(x); }
   ForceScale scale(double distance) const override { return pairs_->scale(distance); }
+  Caution caution() const override {
+    if (options_.background == 0) return {};
+    if (options_.weight == PairWeight::masses)
+      return {
+          "a uniform background of negative mass fills the periodic box, without which the sum over all images does "
+          "not exist "
+          "(the Jeans swindle)",
+          "use form = \"plain\" and open boundaries or walls for a system that is alone in space"};
+    return {"the charges add up to " + short_text(options_.charges.total.value()) +
+                ", which a uniform background neutralises",
+            "change the charges if that is not what you mean"};
+  }
   void use(const PairKernels& kernels) override { pairs_->use(kernels); }
 
  private:
@@ -212,9 +249,20 @@ class EwaldTerm final : public Interaction<3> {
   /// Whether the vectors of all charges on all ranks are finite and so small that their number of edges fits an
   /// integer.
   bool all_moderate(Positions<3> x, Positions<3> y) const {
-    const double most = 0x1p40 * box_.edges.minCoeff();
+    const double most = 0x1p40 * options_.edges.minCoeff();
     const auto moderate = [&](Id j) { return (x[j].array().abs() < most).all() && (y[j].array().abs() < most).all(); };
     return !any(!std::ranges::all_of(charged(), moderate));
+  }
+
+  /// Positions must be finite, and between the walls if there are any.
+  void need_inside(Positions<3> x) const {
+    need_finite(particles_, x);
+    for (int k = 0; k < 3; ++k)
+      for (const Id j : charged())
+        if (!box_.periodic(k) && !(x[j][k] >= 0 && x[j][k] <= box_.edges[k]))
+          throw Error(Failure::numerical, "particle " + std::to_string(particles_.id_of(j)) +
+                                              " is not between the walls, as its Ewald sum requires; use a smaller "
+                                              "integrator.step, or an integrator with hard cores");
   }
 
   // Functions of all ranks.
@@ -254,15 +302,18 @@ class EwaldTerm final : public Interaction<3> {
   const std::vector<Id>& charged() const {
     if (charged_.empty())
       for (Id i = 0; i < particles_.size(); ++i)
-        if (particles_.charge[i] != 0 && particles_.owns(i)) charged_.push_back(i);
+        if (charge_[i] != 0 && particles_.owns(i)) charged_.push_back(i);
     return charged_;
   }
 
-  /// The waves at x.
-  WaveTask waves_at(const Vec3& x) const {
+  /// The waves at x, a position of particle j.
+  WaveTask waves_at(Id j, const Vec3& x) const {
     WaveTask task{waves_->rows.data(), waves_->rows.size(), {}, {}};
+    turns_.resize(particles_.size(), {Vec3::Constant(std::numeric_limits<double>::quiet_NaN()), {}});
+    Turns& last = turns_[j];
     for (int k = 0; k < 3; ++k) {
-      phases_[k].set(x[k] / box_.edges[k]);
+      if (x[k] != last.x[k]) last.of[k] = turn((last.x[k] = x[k]) / options_.edges[k]);
+      phases_[k].set(last.of[k]);
       task.re[k] = phases_[k].re();
       task.im[k] = phases_[k].im();
     }
@@ -279,7 +330,7 @@ class EwaldTerm final : public Interaction<3> {
     const std::size_t n_waves = waves_->size();
     std::vector<std::uint64_t> whole(2 * n_waves);
     std::uint64_t *const re = whole.data(), *const im = re + n_waves;
-    for (const Id j : charged()) kernels_->add(waves_at(x[j]), factor(j), shift, re, im);
+    for (const Id j : charged()) kernels_->add(waves_at(j, x[j]), factor(j), shift, re, im);
     const std::uint64_t shifts = charged().size() * std::bit_cast<std::uint64_t>(shift);
     for (std::uint64_t& each : whole) each -= shifts;
     ranks_->sum(whole);
@@ -296,7 +347,7 @@ class EwaldTerm final : public Interaction<3> {
     sum_terms(
         x, std::ilogb(options_.charges.largest) + 1,
         [&](Id j) {
-          return WaveFactor{particles_.charge[j], 0, 0, 0};
+          return WaveFactor{charge_[j], 0, 0, 0};
         },
         sum);
   }
@@ -318,7 +369,7 @@ class EwaldTerm final : public Interaction<3> {
     sum_terms(
         x, std::ilogb(most) + 2,
         [&](Id j) {
-          const Vec3 step = particles_.charge[j] * waves_->unit.cwiseProduct(w[j]);
+          const Vec3 step = charge_[j] * waves_->unit.cwiseProduct(w[j]);
           return WaveFactor{0, step[0], step[1], step[2]};
         },
         sum);
@@ -340,8 +391,8 @@ class EwaldTerm final : public Interaction<3> {
   }
 
   /// The force on a unit charge that moves by `moved` about x: Σ_k k sinc(k·Δ/2) Im[field* e^(ik·x)].
-  Vec3 pull(const Vec3& x, const Amplitudes& field, const Vec3& moved) const {
-    const WaveTask task = waves_at(x);
+  Vec3 pull(Id j, const Vec3& x, const Amplitudes& field, const Vec3& moved) const {
+    const WaveTask task = waves_at(j, x);
     const Vec3 turn = 0.5 * moved.cwiseProduct(waves_->unit);
     Vec3 sum = Vec3::Zero();
     if (moved.isZero(0)) {
@@ -365,10 +416,11 @@ class EwaldTerm final : public Interaction<3> {
     return sum.cwiseProduct(waves_->unit);
   }
   /// The change of the force on a unit charge as it moves along w in a constant field.
-  Vec3 pull_change(const Vec3& x, const Amplitudes& field, const Vec3& w) const {
+  Vec3 pull_change(Id j, const Vec3& x, const Amplitudes& field, const Vec3& w) const {
     const Vec3 along = w.cwiseProduct(waves_->unit);
     Vec3 sum;
-    kernels_->pull_change(waves_at(x), {0, along[0], along[1], along[2]}, field.re.data(), field.im.data(), sum.data());
+    kernels_->pull_change(waves_at(j, x), {0, along[0], along[1], along[2]}, field.re.data(), field.im.data(),
+                          sum.data());
     return sum.cwiseProduct(waves_->unit);
   }
 
@@ -388,30 +440,30 @@ class EwaldTerm final : public Interaction<3> {
       field.im[k] = 0.5 * (field.im[k] + after.im[k]);
     }
     field = weighted(field);
-    for (const Id j : charged())
-      f[j] = particles_.charge[j] * pull(0.5 * (x[j] + relative[j]), field, relative[j] - x[j]);
-    if (options_.vacuum) add_surface(0.5 * (dipole(x, x) + dipole(x, x_new)), f);
+    for (const Id j : charged()) f[j] = charge_[j] * pull(j, 0.5 * (x[j] + relative[j]), field, relative[j] - x[j]);
+    if (has_surface()) add_surface(0.5 * (dipole(x, x) + dipole(x, x_new)), f);
     return f;
   }
 
   /// Σ q x_new, where x_new is unwrapped: x is in the image that is the nearest to the particles' own positions.
   Vec3 dipole(Positions<3> x, Positions<3> x_new) const {
-    if (!options_.vacuum) return Vec3::Zero();
+    if (!has_surface()) return Vec3::Zero();
     return total([&](Id j) {
       Vec3 moment;
       for (int k = 0; k < 3; ++k) {
-        const double edge = box_.edges[k];
-        const double edges = particles_.image[j][k] + std::nearbyint((particles_.x[j][k] - x[j][k]) / edge);
-        moment[k] = particles_.charge[j] * (x_new[j][k] + edges * edge);
+        const double edge = box_.edges[k], moved = box_.periodic(k) ? particles_.x[j][k] - x[j][k] : 0;
+        const double edges = particles_.image[j][k] + std::nearbyint(moved / edge);
+        moment[k] = charge_[j] * (x_new[j][k] + edges * edge);
       }
       return moment;
     });
   }
-  /// Adds the forces of the surface of charge around a sphere in vacuum.
+  bool has_surface() const { return !options_.surface.isZero(0); }
+  /// Adds the forces of the terms (C/2) surface_k M_k².
   void add_surface(const Vec3& dipole, std::vector<Vec3>& f) const {
-    if (!options_.vacuum) return;
-    const Vec3 field = -options_.constant * 4 * kPi / 3 / box_.edges.prod() * dipole;
-    for (const Id j : charged()) f[j] += particles_.charge[j] * field;
+    if (!has_surface()) return;
+    const Vec3 field = -options_.constant * options_.surface.cwiseProduct(dipole);
+    for (const Id j : charged()) f[j] += charge_[j] * field;
   }
 
   void add_sums(Positions<3> x, PotentialSums& sums) const {
@@ -431,8 +483,8 @@ class EwaldTerm final : public Interaction<3> {
     if (me != 0) return;
     add(options_.constant_energy - options_.background, 0);
     add(options_.background, 3 * options_.background);
-    if (options_.vacuum) {
-      const double energy = options_.constant * 2 * kPi / 3 / box_.edges.prod() * moment.squaredNorm();
+    if (has_surface()) {
+      const double energy = 0.5 * options_.constant * options_.surface.dot(moment.cwiseProduct(moment));
       add(energy, energy);
     }
   }
@@ -486,11 +538,17 @@ class EwaldTerm final : public Interaction<3> {
   EwaldOptions options_;
   std::shared_ptr<const Waves> waves_;
   std::unique_ptr<Interaction<3>> pairs_;
+  const std::vector<double>& charge_;
   Communicator alone_;
   Communicator* ranks_ = &alone_;
   const WaveKernels* kernels_ = &widest_kernels<WaveKernels>();
   // Caches and scratch, which do not affect the sums.
   mutable std::array<Phases, 3> phases_;
+  struct Turns {
+    Vec3 x;
+    std::array<std::array<double, 2>, 3> of;
+  };
+  mutable std::vector<Turns> turns_;  // cosine and sine of 2πx/L where each particle was looked at last
   mutable std::vector<Id> charged_;
   mutable std::vector<Vec3> at_;
   mutable Amplitudes structure_;  // S(k) at at_
@@ -503,12 +561,12 @@ class EwaldTerm final : public Interaction<3> {
 
 }  // namespace
 
-EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double longest) {
+EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double repeated, double longest) {
   const double n = charges.count.value(), q2 = charges.squares.value();
   const double spacing = elementary::cbrt(volume / n);
   const double error = 0.5 * accuracy * q2 / n / (spacing * spacing);  // of either sum
   const auto root_log = [](double x) { return std::sqrt(std::max(1.0, elementary::log(x))); };
-  double alpha = kPairCost * std::sqrt(kPi) * elementary::pow(n / (volume * volume), 1.0 / 6);
+  double alpha = kPairCost * std::sqrt(kPi) * elementary::pow(n / (volume * repeated), 1.0 / 6);
   const auto pairs = [&](double r) { return root_log(2 * q2 / (std::sqrt(n * r * volume) * error)); };
   double end = 3 / alpha;  // where the pair sum is cut off
   for (int turn = 0; turn < 20; ++turn) end = pairs(end) / alpha;
@@ -518,26 +576,52 @@ EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume
   }
   double t = 3;  // k_c/2α
   for (int turn = 0; turn < 20; ++turn) {
-    t = root_log(q2 * alpha * std::sqrt(8 / (n * volume * 2 * alpha * t)) / error);
+    t = root_log(q2 * alpha * std::sqrt(8 / (n * repeated * 2 * alpha * t)) / error);
   }
   return {alpha, end, end / kSwitchFrom, 2 * alpha * t};
 }
 
-std::unique_ptr<Interaction<3>> ewald(const Parameters& p, const InteractionContext<3>& context) {
-  constexpr std::string_view type = "coulomb";
+namespace {
+
+/// The room between two images of a slab in which their forces on a charge, after the dipole term, are at most half the
+/// accuracy: the field of N random charges beyond it is that of the longest waves along the walls, four of them from
+/// two sides,
+///
+///   8 q² √N (2π/A) e^(−2π gap/L) ≤ ½ accuracy q²/(Ω/N)^(2/3),   A the area of a wall, L its longer edge.
+double slab_gap(double accuracy, double n, double volume, double area, double longer) {
+  const double spacing = elementary::cbrt(volume / n);
+  const double ratio = 32 * kPi * std::sqrt(n) * spacing * spacing / (area * accuracy);
+  return longer / (2 * kPi) * std::max(1.0, elementary::log(ratio));
+}
+
+}  // namespace
+
+std::unique_ptr<Interaction<3>> ewald(std::string_view type, double constant, PairWeight weight, const Parameters& p,
+                                      const InteractionContext<3>& context) {
   const Box<3>& box = context.box;
-  for (int k = 0; k < 3; ++k)
-    if (!box.periodic(k))
-      options::refuse(type,
-                      "form = \"ewald\" needs a box that is periodic along all three axes; make the boundaries "
-                      "'periodic', or use form = \"plain\"");
+  int walled = -1;  // the axis with two walls
+  for (int k = 0; k < 3; ++k) {
+    if (box.periodic(k)) continue;
+    if (!box.walled(k) || walled >= 0 || weight == PairWeight::masses)
+      options::refuse(type, weight == PairWeight::masses
+                                ? "form = \"ewald\" needs a box that is periodic along all three axes; make the "
+                                  "boundaries 'periodic', or use form = \"plain\""
+                                : "form = \"ewald\" needs a box that is periodic along all three axes, or has walls "
+                                  "along one of them; make the boundaries 'periodic', or use form = \"plain\"");
+    walled = k;
+  }
+  for (const WallOptions<3>& wall : box.options)
+    if (walled >= 0 && (wall.number == 2 * static_cast<Id>(walled) || wall.number == 2 * static_cast<Id>(walled) + 1) &&
+        (wall.moves() || wall.one_way))
+      options::refuse(type, "form = \"ewald\" takes no walls of the box that move or let spheres pass; leave that out");
   if (p.has("species") || (p.has("exclude") && p.text("exclude") == "bonded"))
-    options::refuse(type, "form = \"ewald\" acts between all charges so far; leave out 'species' and 'exclude'");
+    options::refuse(type, "form = \"ewald\" acts between all particles so far; leave out 'species' and 'exclude'");
   const double accuracy = p.has("accuracy") ? p.real("accuracy") : 1e-5;
   if (!(accuracy >= 1e-14 && accuracy <= 0.1))
     options::refuse(type, "'accuracy' is out of range; give a number from 1e-14 to 0.1");
   ChargeSums charges;
-  for (Id i = 0; i < context.particles.size(); ++i) charges.add(context.particles, i);
+  const std::vector<double>& charge = *pair_factors(weight, context.particles);
+  for (Id i = 0; i < charge.size(); ++i) charges.add(context.particles, i, charge[i]);
   if (context.ranks) charges = sum_of_all(*context.ranks, charges);
   if (charges.count.value() == 0) {
     if (context.placed)
@@ -545,27 +629,51 @@ std::unique_ptr<Interaction<3>> ewald(const Parameters& p, const InteractionCont
                       "form = \"ewald\" finds no charges; give the species a 'charge', or leave the interaction out");
     charges.squares.add(1.0), charges.count.add(1.0);
   }
-  const double constant = p.real("constant"), total = charges.total.value(), volume = box.edges.prod();
+  const double n = charges.count.value(), total = charges.total.value(), volume = box.edges.prod();
   const bool vacuum = p.has("surface") && p.text("surface") == "vacuum";
   const bool neutral = std::abs(total) <= 1e-12 * charges.absolute.value();
-  if (vacuum && !neutral)
-    options::refuse(type, "surface = \"vacuum\" needs a neutral system, but the charges add up to " +
-                              short_text(total) + "; change the charges, or use surface = \"conducting\"");
-  const EwaldSplit split = ewald_split(accuracy, charges, volume, 0.5 * box.edges.minCoeff());
+  if ((vacuum || walled >= 0) && !neutral)
+    options::refuse(type, std::string(vacuum ? "surface = \"vacuum\"" : "form = \"ewald\" between walls") +
+                              " needs a neutral system, but the charges add up to " + short_text(total) +
+                              "; change the charges, or " +
+                              (vacuum ? "use surface = \"conducting\"" : "use form = \"damped-shifted\""));
+  if (p.has("surface") && walled >= 0)
+    options::refuse(type, "'surface' is for boxes that are periodic along three axes; leave it out between walls");
+  Vec3 edges = box.edges, surface = Vec3::Zero();
+  double longest = 0.5 * edges.minCoeff();
+  if (walled >= 0) {
+    Vec3 wall = edges;
+    wall[walled] = 0;
+    const double gap = slab_gap(accuracy, n, volume, volume / edges[walled], wall.maxCoeff());
+    wall[walled] = 2 * gap;
+    longest = 0.5 * wall.minCoeff();
+    edges[walled] += gap;
+    surface[walled] = 4 * kPi / edges.prod();
+  } else if (vacuum) {
+    surface.setConstant(4 * kPi / 3 / volume);
+  }
+  const double repeated = edges.prod();
+  const EwaldSplit split = ewald_split(accuracy, charges, volume, repeated, longest);
   const double sphere = split.wave_cutoff / (2 * kPi);
-  if (4 * kPi / 3 * sphere * sphere * sphere * volume > 2 * static_cast<double>(kMostWaves))
+  if (4 * kPi / 3 * sphere * sphere * sphere * repeated > 2 * static_cast<double>(kMostWaves))
     options::refuse(type, "form = \"ewald\" would need more than " + std::to_string(kMostWaves) +
                               " waves; make the box less elongated, or 'accuracy' less strict");
-  const double background = neutral ? 0.0 : -constant * kPi * total * total / (2 * split.alpha * split.alpha * volume);
+  const double background =
+      neutral ? 0.0 : -constant * kPi * total * total / (2 * split.alpha * split.alpha * repeated);
   const double self = -constant * split.alpha / std::sqrt(kPi) * charges.squares.value();
-  const DampedCoulomb whole(constant, split.alpha);
-  auto pairs =
-      options::within_reach<3>(type, Cut<DampedCoulomb>(whole, split.cutoff, CutKind::switched, split.switch_from),
-                               PairWeight::charges, p, context, whole);
+  // The largest error of dE/du, u = α²ρ, with which the errors of all pairs are at most kPolynomial of the error that
+  // the pair sum may have: the force between two charges is 2 C q² r α³ dE/du.
+  const double r = split.cutoff, spacing = elementary::cbrt(volume / n);
+  const double near = std::max(1.0, 4 * kPi / 3 * elementary::pow(r / spacing, 3));
+  const double error =
+      kPolynomial * 0.5 * accuracy / (spacing * spacing * std::sqrt(near) * 2 * r * elementary::pow(split.alpha, 3));
+  const EwaldPair pair(constant, split.alpha, split.cutoff, error);
+  auto pairs = options::within_reach<3>(type, Cut<EwaldPair>(pair, split.cutoff, CutKind::switched, split.switch_from),
+                                        weight, p, context, pair);
   return std::make_unique<EwaldTerm>(
       box, context.particles,
-      EwaldOptions{split, constant, vacuum, self + background, background, context.total, charges},
-      std::make_shared<const Waves>(split, box.edges, constant), std::move(pairs));
+      EwaldOptions{split, constant, weight, edges, surface, self + background, background, context.total, charges},
+      std::make_shared<const Waves>(split, edges, constant), std::move(pairs));
 }
 
 }  // namespace carom

@@ -8,6 +8,13 @@
 // The fourth term is the uniform background of a charged cell; the last one, with unwrapped positions, is there only if
 // the surface is "vacuum" (de Leeuw, Perram, Smith, Proc. R. Soc. A 373 (1980) 27). The first one is a PairTerm.
 //
+// Between two walls the sum is that over all images along the other two axes: the box that is repeated has empty room
+// between the walls of neighbouring images, and the dipole term (2π/Ω) M_z², z along the normal of the walls, takes off
+// the field of the images (Yeh, Berkowitz, J. Chem. Phys. 111 (1999) 3155). What remains of that field decreases by
+// e^(−2π/L) per length of empty room, L the longer edge of the walls (slab_gap() in ewald.cc).
+//
+// Masses, with C = −G and a background of negative mass, are summed like charges.
+//
 // The discrete gradient of the sum over k follows from |S′|² − |S|² = Re (S′ − S)(S′ + S)* and
 //
 //   e^(ik·x′) − e^(ik·x) = i k·Δ sinc(k·Δ/2) e^(ik·(x + x′)/2),   Δ = x′ − x:
@@ -48,8 +55,7 @@ struct ChargeSums {
   double largest = 0;                         ///< |q|
   Id first = std::numeric_limits<Id>::max();  ///< the lowest id of a charged particle
 
-  void add(const Particles<3>& particles, Id i) {
-    const double q = particles.charge[i];
+  void add(const Particles<3>& particles, Id i, double q) {
     if (q == 0) return;
     total.add(q);
     absolute.add(std::abs(q));
@@ -80,10 +86,13 @@ struct ChargeSums {
 ///
 ///   pairs: 2 q² √(N/Ωr) e^(−α²r²),   waves: q² α √(8N/Ωk) e^(−k²/4α²),   r and k where the sums end.
 ///
+/// Ω in the second estimate is `repeated`, the volume of the box that is repeated, in which the system's has its place.
 /// The pair term reaches at most `longest`.
-EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double longest);
+EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double repeated, double longest);
 
-/// The term of `form = "ewald"`. Refuses boxes that are not periodic along all axes.
-std::unique_ptr<Interaction<3>> ewald(const Parameters& parameters, const InteractionContext<3>& context);
+/// The term of `form = "ewald"` of the interaction `type`, with the constant C. Refuses boxes that are neither periodic
+/// along all axes nor, for charges, between two walls.
+std::unique_ptr<Interaction<3>> ewald(std::string_view type, double constant, PairWeight weight,
+                                      const Parameters& parameters, const InteractionContext<3>& context);
 
 }  // namespace carom

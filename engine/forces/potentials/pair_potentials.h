@@ -7,6 +7,7 @@
 
 #include "engine/forces/potentials/cut.h"
 #include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/ewald_pair.h"
 #include "engine/forces/potentials/harmonic_bond.h"
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/inverse_power.h"
@@ -26,6 +27,7 @@ struct PotentialList {
 using PairPotentials = PotentialList<HarmonicBond,                     // bonds
                                      InverseDistance,                  // gravity, Coulomb
                                      Cut<DampedCoulomb>,               //
+                                     Cut<EwaldPair>,                   //
                                      Yukawa, Cut<Yukawa>,              //
                                      LennardJones, Cut<LennardJones>,  //
                                      Wca,                              //

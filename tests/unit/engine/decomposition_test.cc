@@ -282,7 +282,7 @@ TEST(Decomposition, NoRankHasAllParticles) {
     for (Id i = 0; i < p.size(); ++i) EXPECT_EQ(p.x[i], all.x[p.id[i]] + all.v[p.id[i]]);
   });
 }
-/// Ions in a long box, some spheres without charge, one ion fixed if `fixed`.
+/// Ions in a long box, some spheres without charge, one ion fixed if `fixed`; between walls if there is no surface.
 std::unique_ptr<System<3>> ions(const std::string& surface, bool fixed = false) {
   std::vector<Vec<3>> x, v;
   std::vector<double> radius, mass;
@@ -297,12 +297,19 @@ std::unique_ptr<System<3>> ions(const std::string& surface, bool fixed = false) 
   for (Id i = 0; i < p.size(); ++i) p.charge[i] = i % 5 == 4 ? 0 : i % 5 < 2 ? 1.5 : -1.5;
   for (const Id i : {510, 511}) p.charge[i] = 0;
   if (fixed) p.mass[7] = std::numeric_limits<double>::infinity(), p.v[7] = Vec<3>::Zero();
-  test::add_interaction(*system, "coulomb",
-                        {{"constant", 1.0}, {"form", std::string("ewald")}, {"accuracy", 0.01}, {"surface", surface}});
+  Given given = {{"constant", 1.0}, {"form", std::string("ewald")}, {"accuracy", 0.01}};
+  if (surface.empty())
+    system->box.boundary[2] = Boundary::wall;
+  else
+    given.set("surface", surface);
+  test::add_interaction(*system, "coulomb", given);
   return system;
 }
 TEST(Decomposition, Ions) {
-  for (const char* method : {"psa", "edda"}) compare<3>([] { return ions("vacuum"); }, method, 0.02, 12, 100);
+  for (const char* method : {"psa", "edda"}) {
+    compare<3>([] { return ions("vacuum"); }, method, 0.02, 12, 100);
+    compare<3>([] { return ions(""); }, method, 0.02, 4, 20);
+  }
   compare<3>([] { return ions("conducting", true); }, "edda", 0.02, 6, 60);
   for (const char* method : {"mcva", "cdda"}) compare<3>([] { return ions("vacuum"); }, method, 0.014, 3, 1);
   const auto points = [] {

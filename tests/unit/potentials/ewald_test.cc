@@ -28,6 +28,10 @@ std::unique_ptr<Interaction<3>> ewald(const Scene<3>& scene, double accuracy, co
                     {{"constant", constant}, {"form", "ewald"s}, {"accuracy", accuracy}, {"surface", surface}});
 }
 
+std::unique_ptr<Interaction<3>> ewald_between_walls(const Scene<3>& scene, double accuracy) {
+  return scene.make("coulomb", {{"constant", 1.0}, {"form", "ewald"s}, {"accuracy", accuracy}});
+}
+
 /// A crystal of `cells`³ cubic cells of edge 1, each with these ions.
 Scene<3> crystal(int cells, const std::vector<std::pair<Vec<3>, double>>& ions) {
   Scene<3> scene(0, cells, Boundary::periodic, 0);
@@ -184,6 +188,26 @@ TEST(Ewald, ErrorsAreBelowTheAccuracyAskedForAndNotFarBelow) {
   }
 }
 
+/// The work of the mean forces is exact, and their sum is zero.
+void expect_exact_work(const Scene<3>& scene, const Interaction<3>& term, const std::vector<Vec<3>>& x,
+                       const std::vector<Vec<3>>& x_new) {
+  ForceSums<3> sums(x.size(), test::kQuantum);
+  term.add_mean_forces(x, x_new, sums);
+  std::array<ForceSums<3>::Whole, 3> net{};
+  ExactSum work;
+  double scale = 0;
+  for (Id i = 0; i < x.size(); ++i)
+    for (int k = 0; k < 3; ++k) {
+      net[k] += sums.quanta(i)[k];
+      work.add(sums.value(i)[k] * (x_new[i][k] - x[i][k]));
+      scale += std::abs(sums.value(i)[k]) * scene.box.edges[k];
+    }
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(static_cast<long>(net[k]), 0);
+  const auto before = test::sums(term, x), after = test::sums(term, x_new);
+  EXPECT_NEAR(work.value(), before.energy.value() - after.energy.value(),
+              5e-16 * (scale + before.magnitude.value() + after.magnitude.value()));
+}
+
 TEST(Ewald, MeanForcesDoExactlyTheWorkAndTheirSumIsZeroBitByBit) {
   Scene<3> scene(60, 6, Boundary::periodic, 0.7);
   for (Id i = 0; i < 60; ++i) scene.particles.charge[i] = i % 3 == 0 ? 2 : -1;
@@ -200,24 +224,133 @@ TEST(Ewald, MeanForcesDoExactlyTheWorkAndTheirSumIsZeroBitByBit) {
       auto w = scene.random_vectors(size);
       for (auto& each : w) each += Vec<3>(0.3, -0.2, 0.1);
       const auto x_new = displaced(x, w, 1);
-      ForceSums<3> sums(x.size(), test::kQuantum);
-      term->add_mean_forces(x, x_new, sums);
-      std::array<ForceSums<3>::Whole, 3> net{};
-      ExactSum work;
-      double scale = 0;
-      for (Id i = 0; i < x.size(); ++i)
-        for (int k = 0; k < 3; ++k) {
-          net[k] += sums.quanta(i)[k];
-          work.add(sums.value(i)[k] * (x_new[i][k] - x[i][k]));
-          scale += std::abs(sums.value(i)[k]) * scene.box.edges[k];
-        }
-      for (int k = 0; k < 3; ++k) EXPECT_EQ(static_cast<long>(net[k]), 0);
-      const auto before = test::sums(*term, x), after = test::sums(*term, x_new);
-      EXPECT_NEAR(work.value(), before.energy.value() - after.energy.value(),
-                  5e-16 * (scale + before.magnitude.value() + after.magnitude.value()))
-          << size << ' ' << surface;
+      expect_exact_work(scene, *term, x, x_new);
     }
   }
+}
+
+/// The energy of two unit charges at a distance d and all their images along x and y alone, with a split of its own:
+/// pairs, waves along the walls, and the fields of sheets of charge (de Leeuw, Perram, Mol. Phys. 37 (1979) 1313);
+/// without the charge itself if d is zero.
+long double slab_pair(const Vec<3>& edges, const std::array<long double, 3>& d, long double alpha) {
+  const long double pi = std::acos(-1.0L), area = edges[0] * edges[1], z = d[2];
+  long double sum =
+      -2 * pi / area * (z * std::erf(alpha * z) + std::exp(-alpha * alpha * z * z) / (alpha * std::sqrt(pi)));
+  for (int a = -2; a <= 2; ++a)
+    for (int b = -2; b <= 2; ++b) {
+      const long double x = d[0] + a * edges[0], y = d[1] + b * edges[1], r = std::sqrt(x * x + y * y + z * z);
+      sum += r > 0 ? std::erfc(alpha * r) / r : -2 * alpha / std::sqrt(pi);
+    }
+  for (int a = -8; a <= 8; ++a)
+    for (int b = a > 0 ? 0 : 1; b <= 8; ++b) {  // one half of them: a > 0 and b = 0, or b > 0
+      const long double u = 2 * pi * a / edges[0], v = 2 * pi * b / edges[1], k = std::sqrt(u * u + v * v);
+      const auto side = [&](long double s) { return std::exp(k * s) * std::erfc(k / (2 * alpha) + alpha * s); };
+      sum += 2 * pi / (area * k) * std::cos(u * d[0] + v * d[1]) * (side(z) + side(-z));
+    }
+  return sum;
+}
+
+/// Ions in a box between walls along z.
+Scene<3> slab(const Vec<3>& edges) {
+  Scene<3> scene(0, 1, Boundary::periodic, 0);
+  scene.box.edges = edges;
+  scene.box.boundary[2] = Boundary::wall;
+  std::uniform_real_distribution<double> uniform(0.05, 0.95);
+  for (int n = 0; n < 12; ++n) {
+    auto& p = scene.particles;
+    p.x.push_back(edges.cwiseProduct(Vec<3>(uniform(scene.random), uniform(scene.random), uniform(scene.random))));
+    p.v.push_back(Vec<3>::Zero());
+    p.mass.push_back(1 + n % 3);
+    p.radius.push_back(0.1);
+    p.charge.push_back(n < 6 ? n < 3 ? 2 : 1 : -1.5);
+    p.species.push_back(0);
+    p.image.push_back({});
+  }
+  return scene;
+}
+
+TEST(Ewald, BetweenWallsItIsTheSumOverImagesAlongThem) {
+  for (const Vec<3>& edges : {Vec<3>(4, 4, 4), Vec<3>(4, 5, 2), Vec<3>(4, 3.5, 9)}) {
+    const Scene<3> scene = slab(edges);
+    const auto& p = scene.particles;
+    // The energy of particle i at a place moved along an axis, with all others and their images.
+    const auto energy_of = [&](Id i, std::size_t axis, long double moved, long double alpha) {
+      long double sum = 0;
+      for (Id j = 0; j < p.size(); ++j) {
+        std::array<long double, 3> d{};
+        for (int k = 0; k < 3; ++k) d[static_cast<std::size_t>(k)] = static_cast<long double>(p.x[i][k]) - p.x[j][k];
+        if (i != j) d[axis] += moved;
+        sum += p.charge[i] * p.charge[j] * slab_pair(edges, d, alpha);
+      }
+      return sum;
+    };
+    long double exact = 0, other = 0;
+    std::vector<Vec<3>> force(p.size());
+    for (Id i = 0; i < p.size(); ++i) {
+      exact += 0.5L * energy_of(i, 0, 0, 0.9L);
+      other += 0.5L * energy_of(i, 0, 0, 0.8L);
+      for (int k = 0; k < 3; ++k) {
+        const auto change = [&](long double h) {
+          return energy_of(i, static_cast<std::size_t>(k), h, 0.9L) -
+                 energy_of(i, static_cast<std::size_t>(k), -h, 0.9L);
+        };
+        constexpr long double h = 1e-3L;
+        force[i][k] = static_cast<double>(-(8 * change(h) - change(2 * h)) / (12 * h));
+      }
+    }
+    EXPECT_NEAR(static_cast<double>(exact - other), 0, 1e-12);
+    const double unit = 2.375 / std::pow(edges.prod() / 12, 2.0 / 3);  // the mean of q²
+    for (const double accuracy : {1e-2, 1e-4, 1e-6, 1e-8}) {
+      const auto term = ewald_between_walls(scene, accuracy);
+      EXPECT_NEAR(energy(*term, p.x), static_cast<double>(exact), 10 * accuracy * unit);
+      const auto f = forces(*term, p.x);
+      double sum = 0;
+      for (Id i = 0; i < p.size(); ++i) sum += (f[i] - force[i]).squaredNorm();
+      EXPECT_LE(std::sqrt(sum / 12), accuracy * unit);
+      std::cout << edges.transpose() << ", " << accuracy << ": force " << std::sqrt(sum / 12) / unit << ", energy "
+                << energy(*term, p.x) - static_cast<double>(exact) << '\n';
+    }
+  }
+}
+
+TEST(Ewald, MeanForcesBetweenWallsDoExactlyTheWork) {
+  Scene<3> scene = slab({4, 5, 6});
+  const auto term = ewald_between_walls(scene, 1e-6);
+  const auto& x = scene.particles.x;
+  for (const double size : {1e-6, 0.01, 0.2}) {
+    auto w = scene.random_vectors(size);
+    for (auto& each : w) each += Vec<3>(0.3, -0.2, 0.1);
+    expect_exact_work(scene, *term, x, displaced(x, w, 1));
+  }
+}
+
+TEST(Ewald, MassesInAPeriodicBoxAttractLikeChargesOfTheOtherSign) {
+  Scene<3> scene(60, 6, Boundary::periodic, 0.7);
+  const auto term = scene.make("gravity", {{"constant", 1.3}, {"form", "ewald"s}, {"accuracy", 1e-6}});
+  Scene<3> charges = scene;
+  charges.particles.charge = scene.particles.mass;
+  const auto same = ewald(charges, 1e-6, "conducting", -1.3);
+  const auto& x = scene.particles.x;
+  EXPECT_EQ(energy(*term, x), energy(*same, x));
+  const auto f = forces(*term, x), g = forces(*same, x);
+  for (Id i = 0; i < x.size(); ++i) EXPECT_EQ(f[i], g[i]);
+  EXPECT_NE(term->caution().what.find("uniform background of negative mass"), std::string::npos);
+  EXPECT_NE(same->caution().what.find("a uniform background neutralises"), std::string::npos);
+  // Two masses near each other feel hardly more than each other.
+  Scene<3> two(0, 50, Boundary::periodic, 0);
+  for (const double place : {24.5, 25.5}) {
+    two.particles.x.push_back({place, 25, 25});
+    two.particles.v.push_back(Vec<3>::Zero());
+    two.particles.mass.push_back(2);
+    two.particles.radius.push_back(0.1);
+    two.particles.charge.push_back(0);
+    two.particles.species.push_back(0);
+    two.particles.image.push_back({});
+  }
+  const auto pull =
+      forces(*two.make("gravity", {{"constant", 1.3}, {"form", "ewald"s}, {"accuracy", 1e-8}}), two.particles.x);
+  EXPECT_NEAR(pull[0][0], 1.3 * 4, 1e-3);
+  EXPECT_EQ(pull[0][0], -pull[1][0]);
 }
 
 TEST(Ewald, ASubtractedEvaluationLeavesNothing) {
@@ -286,6 +419,17 @@ TEST(Ewald, RefusesWhatItCannotDo) {
   expect(refusal(scene, {{"cutoff", 2.0}}), "from 'accuracy'");
   expect(refusal(scene, {{"exclude", "bonded"s}}), "leave out 'species' and 'exclude'");
   expect(refusal(Scene<3>(10, 6, Boundary::wall, 0.7), {}), "periodic along all three axes");
+  Scene<3> between = slab({4, 4, 4});
+  expect(refusal(between, {{"surface", "conducting"s}}), "leave it out between walls");
+  const auto term = ewald_between_walls(between, 1e-4);
+  auto beyond = between.particles.x;
+  beyond[2][2] = 4.01;
+  EXPECT_THROW(forces(*term, beyond), Error);
+  EXPECT_THROW(energy(*term, beyond), Error);
+  between.particles.charge[0] = 1;
+  expect(refusal(between, {}), "between walls needs a neutral system, but the charges add up to -1");
+  between.box.boundary[2] = Boundary::open;
+  expect(refusal(between, {}), "has walls along one of them");
   scene.box.edges[0] = 1e9;
   expect(refusal(scene, {}), "waves");
   std::ranges::fill(scene.particles.charge, 0.0);

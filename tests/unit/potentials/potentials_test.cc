@@ -4,6 +4,7 @@
 #include <boost/math/special_functions/erf.hpp>
 
 #include "engine/forces/potentials/damped_coulomb.h"
+#include "engine/forces/potentials/ewald_pair.h"
 #include "engine/forces/potentials/harmonic_bond.h"
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/inverse_power.h"
@@ -68,6 +69,37 @@ TEST(Accuracy, DampedCoulomb) {
     const auto rounding = [&](double rho, double) { return 1 + alpha * alpha * rho; };
     expect_within(measure(DampedCoulomb(c, alpha), exact, exact, 1e-6, 30, rounding, 600), 4);
   }
+}
+
+TEST(Accuracy, EwaldPair) {
+  const double c = 1.9;
+  for (const double alpha : {0.3, 1.1, 2.5})
+    for (const double range : {1.0, 2.3, 4.0, 6.0}) {  // α times the end
+      const double end = range / alpha;
+      const auto exact = [&](const Precise& rho) {
+        const Precise r = sqrt(rho);
+        return Precise(Precise(c) * boost::math::erfc(Precise(alpha) * r) / r);
+      };
+      const auto scale = [&](const Precise& rho) { return Precise(Precise(c) / sqrt(rho)); };
+      const auto rounding = [](double, double) { return 1.0; };
+      // The steps of measure() lead to 11 ρ.
+      expect_within(measure(EwaldPair(c, alpha, end, 0), exact, scale, 1e-6, end * end / 11.1, rounding, 200), 4);
+    }
+}
+
+TEST(Accuracy, EwaldPairWithoutItsLastTerms) {
+  for (const double range : {1.5, 3.0, 5.0})
+    for (double error = 1e-2; error > 1e-13; error /= 10) {
+      const EwaldPair pair(1, 1, range, error);
+      double most = 0;
+      for (int n = 1; n <= 1000; ++n) {
+        const double rho = range * range * n / 1000, r = std::sqrt(rho);
+        const double exact = -0.5 * (std::erfc(r) / r + 2 / std::sqrt(std::acos(-1)) * std::exp(-rho)) / rho;
+        most = std::max(most, std::abs(pair.derivative(rho) - exact) - 1e-15 / (r * rho));
+      }
+      EXPECT_LE(most, error);
+      EXPECT_GE(most, 0.01 * error);
+    }
 }
 
 TEST(Accuracy, Yukawa) {

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "engine/forces/potentials/potential.h"
+
+namespace carom {
+
+/// The pair term of an Ewald sum for unit charges, up to r = `end`:
+///
+///   V(r) = C [1/r − α E(α²ρ)],   E(u) = erf(√u)/√u = (2/√π) ∫₀¹ e^(−uτ²) dτ,
+///
+/// where a polynomial in t = 2ρ/end² − 1 stands for the entire function E: the Chebyshev series of E over the range,
+/// without its last terms. Its derivative and quotient are those of the polynomial, so energies are exact whatever its
+/// degree;
+///
+///   (p(b) − p(a))/(b − a) = q₀,   q_k = q_{k+1} b + p_{k+1},   p_k = p_{k+1} a + c_k   (Horner's scheme and its
+///   quotient).
+///
+/// With h = ½ (α end)² and J_n = (2/√π) ∫₀¹ τ^(2n) e^(−hτ²) dτ the coefficients of t^n and of the Chebyshev polynomial
+/// T_n in E are
+///
+///   (−h)^n/n! J_n   and   2 (−1)^n Σ_m (h/2)^(2m+n)/(m! (m + n)!) J_{2m+n}   (n > 0).
+///
+/// Errors: a few ε of C/r, besides those of the terms left out.
+class EwaldPair {
+ public:
+  /// `error`: the largest error of dE/du.
+  EwaldPair(double constant, double alpha, double end, double error)
+      : c_(constant), alpha_(alpha), end2_(end * end), slope_(2 / end2_) {
+    const double h = 0.5 * alpha * alpha * end2_;
+    const auto terms = static_cast<std::size_t>(64 + 4 * h);  // beyond, all are below 2^-60
+    std::vector<double> j(4 * terms, 0.0);
+    for (std::size_t n = j.size() - 1; n-- > 0;)
+      j[n] = (2 * h * j[n + 1] + kTwoOverRootPi * elementary::exp(-h)) / (2.0 * static_cast<double>(n) + 1);
+    std::vector<double> chebyshev(terms);
+    double first = 2, taylor = 1;
+    for (std::size_t n = 0; n < terms; ++n) {
+      double term = first;
+      for (std::size_t m = 0; m < terms; ++m) {
+        chebyshev[n] += term * j[2 * m + n];
+        const auto next = static_cast<double>(m + 1);
+        term *= 0.25 * h * h / (next * (next + static_cast<double>(n)));
+      }
+      if (n < kMost) term_[n] = taylor * j[n];
+      const auto next = static_cast<double>(n + 1);
+      first *= -0.5 * h / next;
+      taylor *= -h / next;
+    }
+    // |dT_n/dt| ≤ n², dt/du = 1/h
+    double left_out = 0;
+    for (degree_ = terms - 1; degree_ > 1; --degree_) {
+      const auto n = static_cast<double>(degree_);
+      left_out += std::abs(chebyshev[degree_]) * n * n / h;
+      if (left_out > error && degree_ < kMost) break;
+    }
+    std::vector<double> before(terms + 1), last(terms + 1), next(terms + 1);  // coefficients of T_{n−1}, T_n, T_{n+1}
+    before[0] = last[1] = 1;
+    for (std::size_t n = 1; n < terms; ++n) {
+      for (std::size_t k = 0; n > degree_ && k <= degree_; ++k) term_[k] -= chebyshev[n] * last[k];
+      for (std::size_t k = 0; k <= terms; ++k) next[k] = (k > 0 ? 2 * last[k - 1] : 0) - before[k];
+      before.swap(last);
+      last.swap(next);
+    }
+    for (double& each : term_) each *= constant * alpha;
+  }
+
+  ForceScale scale(double distance) const {
+    const double near = std::min(distance, 1 / alpha_), energy = 0.125 * std::abs(c_) / near;
+    return {2 * energy / near, energy};  // V(1/α) = 0.157 Cα; the force there is 0.57 Cα²
+  }
+
+  template <class T>
+  T value(T rho) const {
+    const T t = slope_ * elementary::min(rho, all<T>(end2_)) - 1;
+    T p = all<T>(term_[degree_]);
+    for (std::size_t k = degree_; k-- > 0;) p = p * t + term_[k];
+    return c_ / elementary::sqrt(rho) - p;
+  }
+  template <class T>
+  T derivative(T rho) const {
+    return quotient(rho, rho);
+  }
+  template <class T>
+  T second_derivative(T rho) const {
+    const T t = slope_ * elementary::min(rho, all<T>(end2_)) - 1;
+    T p = all<T>(term_[degree_]), first = all<T>(0), second = all<T>(0);
+    for (std::size_t k = degree_; k-- > 0;) {
+      second = second * t + first;
+      first = first * t + p;
+      p = p * t + term_[k];
+    }
+    return 0.75 * c_ / (rho * rho * elementary::sqrt(rho)) - 2 * slope_ * slope_ * second;
+  }
+  template <class T>
+  T quotient(T rho_old, T rho_new) const {
+    const T lower = elementary::min(elementary::min(rho_old, rho_new), all<T>(end2_));
+    const T upper = elementary::min(elementary::max(rho_old, rho_new), all<T>(end2_));
+    const T r = elementary::sqrt(lower), s = elementary::sqrt(upper);
+    const T a = slope_ * lower - 1, b = slope_ * upper - 1;
+    T p = all<T>(term_[degree_]), q = all<T>(0);
+    for (std::size_t k = degree_; k-- > 0;) {
+      q = q * b + p;
+      p = p * a + term_[k];
+    }
+    return -c_ / (r * s * (r + s)) - slope_ * q;
+  }
+
+ private:
+  static constexpr std::size_t kMost = 64;
+  static constexpr double kTwoOverRootPi = 0x1.20dd750429b6dp+0;
+
+  double c_;             ///< [energy·length] for unit charges
+  double alpha_;         ///< [1/length]
+  double end2_, slope_;  ///< [length²], [1/length²]
+  std::size_t degree_ = 0;
+  std::array<double, kMost> term_{};  ///< [energy]
+};
+
+static_assert(Potential<EwaldPair>);
+
+}  // namespace carom
