@@ -25,8 +25,8 @@ constexpr double kPi = std::numbers::pi;
 // that of ending the pair term here.
 constexpr double kSwitchFrom = 0.95;  // of the cutoff
 // α = √π (c N/Ω²)^(1/6) makes pairs and waves cost the same, c the cost of a pair over that of a wave of a particle
-// (Kolafa, Perram); c is taken as 9.3, the sixth power of:
-constexpr double kPairCost = 1.45;
+// (Kolafa, Perram); c is taken as 6, the sixth power of:
+constexpr double kPairCost = 1.35;
 constexpr double kPolynomial = 0.05;  // of the error of the pair sum: the part of the polynomial in it
 constexpr std::size_t kMostWaves = std::size_t{1} << 24;
 

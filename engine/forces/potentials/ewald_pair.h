@@ -66,7 +66,13 @@ class EwaldPair {
       before.swap(last);
       last.swap(next);
     }
-    for (double& each : term_) each *= constant * alpha;
+    for (std::size_t n = 0; n <= degree_; ++n) {
+      term_[n] *= constant * alpha;
+      const auto k = static_cast<double>(n);
+      if (n > 0) first_[n - 1] = slope_ * k * term_[n];
+      if (n > 1) second_[n - 2] = slope_ * (k - 1) * first_[n - 1];
+    }
+    for (std::size_t n = degree_ + 1; n < kMost; ++n) term_[n] = 0;
   }
 
   ForceScale scale(double distance) const {
@@ -76,25 +82,15 @@ class EwaldPair {
 
   template <class T>
   T value(T rho) const {
-    const T t = slope_ * elementary::min(rho, all<T>(end2_)) - 1;
-    T p = all<T>(term_[degree_]);
-    for (std::size_t k = degree_; k-- > 0;) p = p * t + term_[k];
-    return c_ / elementary::sqrt(rho) - p;
+    return c_ / elementary::sqrt(rho) - polynomial(term_, rho);
   }
   template <class T>
   T derivative(T rho) const {
-    return quotient(rho, rho);
+    return -0.5 * c_ / (rho * elementary::sqrt(rho)) - polynomial(first_, rho);
   }
   template <class T>
   T second_derivative(T rho) const {
-    const T t = slope_ * elementary::min(rho, all<T>(end2_)) - 1;
-    T p = all<T>(term_[degree_]), first = all<T>(0), second = all<T>(0);
-    for (std::size_t k = degree_; k-- > 0;) {
-      second = second * t + first;
-      first = first * t + p;
-      p = p * t + term_[k];
-    }
-    return 0.75 * c_ / (rho * rho * elementary::sqrt(rho)) - 2 * slope_ * slope_ * second;
+    return 0.75 * c_ / (rho * rho * elementary::sqrt(rho)) - polynomial(second_, rho);
   }
   template <class T>
   T quotient(T rho_old, T rho_new) const {
@@ -113,12 +109,26 @@ class EwaldPair {
  private:
   static constexpr std::size_t kMost = 64;
   static constexpr double kTwoOverRootPi = 0x1.20dd750429b6dp+0;
+  using Terms = std::array<double, kMost + 1>;  // by the power of t
+
+  /// Even and odd powers apart, because a sum has to wait for the one before.
+  template <class T>
+  T polynomial(const Terms& terms, T rho) const {
+    const T t = slope_ * elementary::min(rho, all<T>(end2_)) - 1, t2 = t * t;
+    std::size_t k = degree_ / 2 * 2;
+    T even = all<T>(terms[k]), odd = all<T>(terms[k + 1]);
+    for (; k > 0; k -= 2) {
+      even = even * t2 + terms[k - 2];
+      odd = odd * t2 + terms[k - 1];
+    }
+    return even + odd * t;
+  }
 
   double c_;             ///< [energy·length] for unit charges
   double alpha_;         ///< [1/length]
   double end2_, slope_;  ///< [length²], [1/length²]
   std::size_t degree_ = 0;
-  std::array<double, kMost> term_{};  ///< [energy]
+  Terms term_{}, first_{}, second_{};  ///< of the polynomial in V [energy], dV/dρ and d²V/dρ²
 };
 
 static_assert(Potential<EwaldPair>);
