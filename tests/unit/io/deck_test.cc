@@ -246,6 +246,29 @@ TEST_F(DeckTest, WarnsOfACutoffBeyondHalfThePeriodicBox) {
   EXPECT_NE(warnings("4.5")[0].find("cutoff 4.5 is more than half the box, 4.25"), std::string::npos);
 }
 
+TEST_F(DeckTest, WarnsOfTheBackgroundOfAnEwaldSum) {
+  const auto warnings = [&](const std::string& charge, const std::string& interaction) {
+    const auto species = [](const std::string& name, const std::string& q) {
+      return "[[particles]]\nname = \"" + name + "\"\ncount = 32\ntemperature = 1.0\nradius = 0.1\ncharge = " + q +
+             "\n";
+    };
+    Deck deck = read(
+        "format = 1\ntitle = \"t\"\n[system]\ndimension = 3\nbox = [8, 8, 8]\n"
+        "boundary = [\"periodic\", \"periodic\", \"periodic\"]\n" +
+        species("a", "1.0") + species("b", charge) + "[placement]\ntype = \"fcc\"\n[[interaction]]\ntype = \"" +
+        interaction + "\"\nform = \"ewald\"\naccuracy = 0.01\n[integrator]\ntype = \"psa\"\nstep = 0.001\n" +
+        "[run]\nsteps = 1\n[output]\ndirectory = \"out\"\n");
+    build_system<3>(deck);
+    return deck.warnings;
+  };
+  EXPECT_TRUE(warnings("-1.0", "coulomb").empty());
+  ASSERT_EQ(warnings("-0.5", "coulomb").size(), 1u);
+  EXPECT_NE(warnings("-0.5", "coulomb")[0].find("the charges add up to 16, which a uniform background neutralises"),
+            std::string::npos);
+  ASSERT_EQ(warnings("-1.0", "gravity").size(), 1u);
+  EXPECT_NE(warnings("-1.0", "gravity")[0].find("Jeans swindle"), std::string::npos);
+}
+
 /// A checkpoint has the bonds that were found at the start of the run, so a branch cannot set another length.
 TEST_F(DeckTest, ABranchHasTheBondsOfItsRun) {
   std::string lattice = fluid + R"([[interaction]]
