@@ -481,8 +481,8 @@ std::optional<ParameterError> complete_transport(Parameters& parameters, const S
   if (!system.box.contacts.elastic() || system.box.contacts.rough())
     return refuse("elastic and smooth contacts", "remove the contact laws");
   if (!parameters.has("longest")) parameters.set("longest", kIntervals * parameters.real("interval"));
-  if (parameters.real("longest") >= 2 * parameters.real("interval")) return {};
-  return ParameterError{"longest", "the longest lag is shorter than two intervals", "give a longer one"};
+  if (parameters.real("longest") >= parameters.real("interval")) return {};
+  return ParameterError{"longest", "the longest lag is shorter than the interval", "give a longer one"};
 }
 
 }  // namespace

@@ -105,9 +105,9 @@ TEST(PressureTensor, TraceIsThePressureUnderForces) {
   double pressure = 0;
   const double of_pairs =
       trace("lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}, {"cutoff", 2.0}, {"tail", true}}, false, &pressure);
-  EXPECT_NEAR(of_pairs, pressure, 1e-6 * pressure);  // positions move by 1e-7
-  const double of_waves = trace("ewald", {{"constant", 3.0}}, true, &pressure);
-  EXPECT_NEAR(of_waves, pressure, 1e-6 * pressure);
+  EXPECT_NEAR(of_pairs, pressure, 1e-6);  // positions move by 1e-7
+  const double of_waves = trace("coulomb", {{"form", std::string("ewald")}}, true, &pressure);
+  EXPECT_NEAR(of_waves, pressure, 1e-6);
 }
 
 /// Without collisions and forces all coefficients are known: |x(t) − x(0)|² and the squared integrals are those of
@@ -241,7 +241,9 @@ TEST(Transport, VelocitiesAtLagZeroHaveTheTemperature) {
                                                {{"interval", 0.05}, {"longest", 2.0}});
   const double n = static_cast<double>(run->system().size());
   for (const auto& value : observable->species_values())
-    if (value.symbol == "temperature") EXPECT_NEAR(t.at("vacf")[0], 3 * value.value * (n - 1) / n, 1e-12);
+    if (value.symbol == "temperature") {
+      EXPECT_NEAR(t.at("vacf")[0], 3 * value.value * (n - 1) / n, 1e-12);
+    }
   EXPECT_LT(t.at("vacf").back(), 0.1 * t.at("vacf")[0]);
 }
 
@@ -257,7 +259,7 @@ TEST(Transport, RefusesWhatHasNoCoefficients) {
   };
   auto system = test::hard_spheres<2>(3, 0.3);
   EXPECT_EQ(error_of(*system), "");
-  EXPECT_NE(error_of(*system, {{"interval", 0.1}, {"longest", 0.15}}).find("shorter than two intervals"),
+  EXPECT_NE(error_of(*system, {{"interval", 0.1}, {"longest", 0.05}}).find("shorter than the interval"),
             std::string::npos);
   test::set_law<2>(*system, {{"restitution", 0.9}});
   EXPECT_NE(error_of(*system).find("elastic and smooth"), std::string::npos);
