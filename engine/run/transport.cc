@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The pressure tensor and the transport coefficients, from the fluxes of momentum and energy through the whole box:
 //
-//   S = Σ m v v + Σ d F + Σ d J δ(t − t_c),   Q = Σ e v + ½ Σ d F·(v_i + v_j) + Σ d ΔE δ(t − t_c),   e = ½ m v² + ½ Σ
-//   V,
+//   S = Σ m v v + Σ d F + Σ d J δ(t − t_c),   Q = Σ e v + ½ Σ d F·(v_i + v_j) + Σ d ΔE δ(t − t_c),
 //
-// with sums over particles, over pairs (d = x_i − x_j of the nearest image, F the force on i) and over collisions (J
-// the impulse on i, ΔE the energy that i gets, d of the image that is touched). The pressure tensor is ⟨S⟩/Ω. The shear
-// viscosity and the thermal conductivity are the rates of Einstein and Helfand (Alder, Gass, Wainwright, J. Chem. Phys.
-// 53 (1970) 3813), where T is in units of energy:
+// with e = ½ m v² + ½ Σ V, sums over particles, over pairs (d = x_i − x_j of the nearest image, F the force on i) and
+// over collisions (J the impulse on i, ΔE the energy that i gets, d of the image that is touched). The pressure tensor
+// is ⟨S⟩/Ω. The shear viscosity and the thermal conductivity are the rates of Einstein and Helfand (Alder, Gass,
+// Wainwright, J. Chem. Phys. 53 (1970) 3813), where T is in units of energy:
 //
 //   ⟨(∫S_xy dt)²⟩ → 2 t Ω T η,   ⟨(∫Q_x dt)²⟩ → 2 t Ω T² λ,   ⟨|x(t) − x(0)|²⟩ → 2 D t times the diffusion coefficient.
 //
@@ -15,7 +14,8 @@
 // are no functions of the state in a periodic box (Erpenbeck, Phys. Rev. E 51 (1995) 4296). Σ m v v and Σ e v are
 // integrated by the trapezoidal rule between samples, and what they jump by at a collision is weighted with the time
 // that is left of the interval. In flights without forces they change at collisions only, so that the integrals are
-// exact; with forces they are of second order in the interval.
+// exact; with forces they are of second order in the interval, apart from the jumps of Σ d F·v at collisions, which are
+// not weighted.
 //
 // Lags are those of a multiple-tau correlator with 16 values a level and intervals that double from level to level
 // (Ramírez, Sukumaran, Vorselaars, Likhtman, J. Chem. Phys. 133 (2010) 154103): 0 … 16, 18 … 32, 36 … 64 … intervals.
