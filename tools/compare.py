@@ -20,7 +20,7 @@ import numpy as np
 
 from carom_files import TRAJECTORY, one_line, open_hdf5, read_summary, read_table, read_thermo, reading
 
-TABLES = ["rdf.csv", "sk.csv", "msd.csv", "profile.csv"]
+TABLES = ["rdf.csv", "sk.csv", "msd.csv", "profile.csv", "transport.csv", "pressure_tensor.csv"]
 # The fields of the summary that describe the machine and the directory, not the run.
 OF_THE_MACHINE = {"deck", "version", "ranks", "wall_seconds", "collisions_per_second", "peak_memory_bytes"}
 

@@ -53,6 +53,20 @@ struct PotentialSums {
   }
 };
 
+/// What the pairs of a state contribute to the fluxes of momentum and energy, as exact sums.
+template <int D>
+struct PairFluxes {
+  std::array<ExactSum, D * D> stress{};  ///< Σ d_a F_b over pairs, d and F as in PotentialSums [energy]; index D a + b
+  std::array<ExactSum, D> heat{};        ///< ½ Σ [V + d F·] (v_i + v_j) over pairs [energy·length/time]
+  bool heat_known = true;                ///< false if a term cannot give it
+
+  void add(const PairFluxes& other) {
+    for (std::size_t k = 0; k < stress.size(); ++k) stress[k].add(other.stress[k]);
+    for (std::size_t k = 0; k < heat.size(); ++k) heat[k].add(other.heat[k]);
+    heat_known &= other.heat_known;
+  }
+};
+
 /// A constant correction to the reported V (engine/forces/potentials/tail.h).
 struct Tail {
   double energy = 0;  ///< [energy]
@@ -66,6 +80,10 @@ class Interaction {
 
   /// Adds V and the other sums at positions x.
   virtual void add_energy(Positions<D> x, PotentialSums& sums) const = 0;
+
+  /// Adds the fluxes at positions x and velocities v, of which those of ghosts are not read; external fields have none.
+  /// Throws Error(Failure::deck) if the term has no formula for its stress.
+  virtual void add_fluxes(Positions<D> x, Positions<D> v, PairFluxes<D>& fluxes) const = 0;
 
   /// Adds −∂V/∂x_i for each particle; if `sums` is given, adds V and the other sums to it. Throws
   /// Error(Failure::numerical), which names the particles, if a force is not finite or too large to be summed.

@@ -238,13 +238,13 @@ Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, Spin<D>* spin, const Wall<D>&
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
                                   const Impact<D>& impact) const {
-  if (a.id < b.id) return {key, a.x, b.x - shift, impact.impulse, impact.exchange, impact.overlap};
-  return {key, b.x, a.x + shift, -impact.impulse, impact.exchange, impact.overlap};
+  if (a.id < b.id) return {key, a.x, b.x - shift, impact.impulse, impact.exchange, impact.overlap, a.v, b.v};
+  return {key, b.x, a.x + shift, -impact.impulse, impact.exchange, impact.overlap, b.v, a.v};
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const {
-  return {key, r.x, box_.wall(key.hi).foot(r.x, key.time), impact.impulse, impact.exchange, impact.overlap};
+  return {key, r.x, box_.wall(key.hi).foot(r.x, key.time), impact.impulse, impact.exchange, impact.overlap, r.v};
 }
 
 template class Flights<2>;

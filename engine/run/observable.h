@@ -44,7 +44,8 @@ inline void add_estimates(std::vector<TableColumn>& table, const std::string& na
   table.push_back(std::move(samples));
 }
 
-/// A number about one or more species for the summary: `"name": [{"species": ["a", "b"], "symbol": value}, …]`.
+/// A number about one or more species for the summary: `"name": [{"species": ["a", "b"], "symbol": value}, …]`; without
+/// species one about the whole system: `"name": {"symbol": {"mean": value, "standard_error": error}, …}`.
 struct SpeciesValue {
   std::string_view name;
   std::vector<std::string> species;

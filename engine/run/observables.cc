@@ -5,12 +5,13 @@
 namespace carom {
 
 namespace observable {  // declared at the ends of their own files
-ObservableInfo rdf(), sk(), msd(), profile();
+ObservableInfo rdf(), sk(), msd(), profile(), transport(), pressure_tensor();
 }
 
 const std::vector<ObservableInfo>& observables() {
-  static const std::vector<ObservableInfo> all = {observable::rdf(), observable::sk(), observable::msd(),
-                                                  observable::profile()};
+  static const std::vector<ObservableInfo> all = {observable::rdf(),       observable::sk(),
+                                                  observable::msd(),       observable::profile(),
+                                                  observable::transport(), observable::pressure_tensor()};
   return all;
 }
 

@@ -134,6 +134,7 @@ template <int D>
 void Simulation<D>::add(Observer<D>& observer) {
   check_interval(observer.sampling().interval, plan_.step);
   observers_.push_back(&observer);
+  contacts_needed_ |= observer.needs_contacts();
 }
 
 template <int D>
@@ -211,7 +212,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   };
   std::vector<Contact<D>> contacts;
   const auto show_contacts = [&](const Slab& slab) {
-    if (!plan_.events) return;
+    if (!contacts_needed_) return;
     const Stopwatch stopwatch(s.counters.seconds.output);
     if (system_->box.bath.kicks())
       std::erase_if(contacts, [](const auto& each) { return each.key.hi == Bath::kNumber; });
@@ -232,7 +233,7 @@ void Simulation<D>::run(const Hooks& hooks) {
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor_->due_within(slab);
     contacts.clear();
     SlabReport<D> report{.counters = s.counters,
-                         .contacts = plan_.events ? &contacts : nullptr,
+                         .contacts = contacts_needed_ ? &contacts : nullptr,
                          .observe = due,
                          .observer =
                              [&](double offset, const Particles<D>& copies) {

@@ -97,6 +97,9 @@ class Observer {
   /// Gets the executed contacts of one slab in key order (an epoch may have several slabs); key.time is relative to
   /// `slab_start`. With several ranks, called on rank 0 only.
   virtual void contacts(double /*slab_start*/, std::span<const Contact<D>>) {}
+  /// Whether it needs contacts() even without Plan::events; the same on all ranks. Those of a slab up to the time of a
+  /// sample come before the sample.
+  virtual bool needs_contacts() const { return false; }
   /// Called after every slab with the progress of the run; must be cheap.
   virtual void progress(const struct Statistics&) {}
 };
@@ -258,6 +261,7 @@ class Simulation {
   const IntegratorInfo& info_;
   std::unique_ptr<Integrator<D>> integrator_;
   std::vector<Observer<D>*> observers_;
+  bool contacts_needed_ = plan_.events;
   Statistics statistics_;
   StepCount count_;
   double quiet_since_ = 0;  // end of the last slab with pair collisions

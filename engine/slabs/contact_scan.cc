@@ -200,16 +200,18 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
     const Vec<D> before = v[moves];
     const double dissipated = impulse(touch), mass = particles_.mass[moves];
     const double gained = 0.5 * mass * (v[moves].squaredNorm() - before.squaredNorm());
-    record(touch, x, (fixed ? -mass : mass) * (v[moves] - before), dissipated, gained);
+    record(touch, x, v, (fixed ? -mass : mass) * (v[moves] - before), dissipated, gained);
   }
 }
 
 template <int D>
-void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated,
-                            double gained) {
+void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, Positions<D> v, const Vec<D>& impulse,
+                            double dissipated, double gained) {
   const Id lo = touch.key.lo, hi = touch.key.hi;
   Contact<D> contact{touch.key, x[lo], x[lo], impulse};
+  contact.v_lo = v[lo];
   if (touch.pair()) {
+    contact.v_hi = v[hi];
     contact.exchange.virial = touch.normal.dot(impulse);
     contact.x_hi = x[hi] - box_.shift(touch.key.image);
   } else {

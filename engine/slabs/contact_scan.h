@@ -152,7 +152,8 @@ class ContactScan {
   }
   void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
   /// `gained`: the change of the kinetic energy of lo.
-  void record(const Touch<D>& touch, Positions<D> x, const Vec<D>& impulse, double dissipated, double gained);
+  void record(const Touch<D>& touch, Positions<D> x, Positions<D> v, const Vec<D>& impulse, double dissipated,
+              double gained);
   double wall_speed(const EventKey<D>& key, double later = 0) const {
     return key.kind == EventKind::wall ? box_.wall(key.hi).velocity_at(later) : 0.0;
   }

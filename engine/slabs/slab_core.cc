@@ -439,8 +439,10 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
       contact.impulse += rubbed.impulse;
       contact.exchange.dissipated += rubbed.dissipated;
     }
+    contact.v_hi = hi.v;
     checks_path(hi);
   }
+  contact.v_lo = lo.v;
   checks_path(lo);
   contacts_.push_back(contact);
 }

@@ -20,6 +20,10 @@ class AverageWriter : public Observer<D> {
 
   Sampling sampling() const override { return average_->sampling(); }
   bool divided() const override { return average_->divided(); }
+  bool needs_contacts() const override { return average_->needs_contacts(); }
+  void contacts(double slab_start, std::span<const Contact<D>> contacts) override {
+    average_->contacts(slab_start, contacts);
+  }
   void add_state(Fields& fields, const std::string& name) override { average_->add_state(fields, name); }
   /// Throws Error(Failure::file).
   void sample(double time, const Particles<D>& particles) override;

@@ -100,8 +100,11 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
   if (!outcome.branched_from.empty())
     json["branched_from"] = {{"checkpoint", outcome.branched_from}, {"step", s.start_steps}, {"time", s.start_time}};
   for (const SpeciesValue& value : outcome.species_values)
-    json[value.name].push_back(
-        {{"species", value.species}, {value.symbol, value.value}, {"standard_error", value.error}});
+    if (value.species.empty())
+      json[value.name][value.symbol] = {{"mean", value.value}, {"standard_error", value.error}};
+    else
+      json[value.name].push_back(
+          {{"species", value.species}, {value.symbol, value.value}, {"standard_error", value.error}});
   json["warnings"] = outcome.warnings;
   if (!outcome.error.empty()) json["error"] = outcome.error;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

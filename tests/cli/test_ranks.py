@@ -117,7 +117,7 @@ def test_inelastic_contacts_are_those_of_one_rank_and_continue(method, tmp_path)
 def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
     output = ["output.events=true", "output.rdf_interval=0.17", "output.msd_interval=0.11", "output.profile_interval=0.13", "output.sample_start=0.05"]
     if text is ROUGH:
-        output += ["particles.0.count=500", "run.end_time=1.0", "output.sk_interval=0.12"]
+        output += ["particles.0.count=500", "run.end_time=1.0", "output.sk_interval=0.12", "output.pressure_tensor_interval=0.09"]
     run(write_deck(tmp_path, text), tmp_path / "plain", output)
     assert summary(tmp_path / "plain")["events"]["sphere_sphere"] >= 1500
     for ranks in 1, 2, 3, 4, 8:
@@ -126,7 +126,7 @@ def test_any_number_of_ranks_gives_the_same_files(text, tmp_path):
         assert done.stderr == ""
         assert differences(tmp_path / "plain", out) == []
         assert (out / "events.h5").exists()
-        for name in ["thermo.csv", "rdf.csv", "msd.csv", "profile.csv"] + (["sk.csv"] if text is ROUGH else []):
+        for name in ["thermo.csv", "rdf.csv", "msd.csv", "profile.csv"] + (["sk.csv", "pressure_tensor.csv"] if text is ROUGH else []):
             assert filecmp.cmp(tmp_path / "plain" / name, out / name, shallow=False)
         assert sorted(path.name for path in out.iterdir()) == sorted(path.name for path in (tmp_path / "plain").iterdir())
         assert summary(out)["ranks"] == ranks
@@ -162,14 +162,15 @@ def test_positions_from_a_file_that_rank_0_sees(tmp_path):
 def test_forces_are_shared(method, tmp_path):
     deck = ROOT / "inputs" / "yukawa-fluid.toml"
     shorter = ["particles.count=256", "interaction.0.cutoff=2.5", "run.steps=20", "output.events=true", f"integrator.type={method}", "integrator.step=0.01",
-               "output.frame_interval=0.1", "output.rdf_interval=0.07", "output.sk_interval=0.09", "output.profile_interval=0.05", "output.sample_start=0.05"]
+               "output.frame_interval=0.1", "output.rdf_interval=0.07", "output.sk_interval=0.09", "output.profile_interval=0.05",
+               "output.transport_interval=0.02", "output.transport_longest=0.1", "output.pressure_tensor_interval=0.03", "output.sample_start=0.05"]
     run(deck, tmp_path / "plain", shorter)
     assert summary(tmp_path / "plain")["events"]["sphere_sphere"] > 0
     for ranks in 2, 3:
         done = mpirun(ranks, command(deck, tmp_path / str(ranks), shorter))
         assert done.stderr == ""
         assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
-        for name in "rdf.csv", "sk.csv", "profile.csv":
+        for name in "rdf.csv", "sk.csv", "profile.csv", "transport.csv", "pressure_tensor.csv":
             assert filecmp.cmp(tmp_path / "plain" / name, tmp_path / str(ranks) / name, shallow=False)
 
 
@@ -179,6 +180,7 @@ def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, tmp_path):
     plain, killed = tmp_path / "plain", tmp_path / "killed"
     output = ["particles.0.count=108", "output.start=\"equilibrated\"", "output.frame_interval=0",
               "output.rdf_interval=0.1", "output.sk_interval=0.2", "output.sk_bins=5", "output.checkpoint_wall=\"0\"",
+              "output.transport_interval=0.08", "output.pressure_tensor_interval=0.05",
               *(["integrator.step=0.04", "run.end_time=5.6", "output.thermo_interval=0.04", "interaction.0.cutoff=2.0"] if method == "edda"
                 else ["integrator.step=0.2", "output.thermo_interval=0.03", "run.end_time=6"])]
     library = {"LD_PRELOAD": str(killer_library(tmp_path)), "KILL_IN": f"{plain}/", "KILL_COUNT": str(tmp_path / "changes")}
@@ -186,6 +188,7 @@ def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, tmp_path):
     found = summary(plain)["equilibration"]
     assert 0 < found["transient_end"] <= found["start"] / 2 + 0.25 and 3 <= found["start"] < 5.5
     assert summary(plain)["means"]["pressure"]["standard_error"] > 0
+    assert summary(plain)["transport"]["shear_viscosity"]["mean"] > 0
     mpirun(2, command(deck, tmp_path / "two", output))
     assert differences(plain, tmp_path / "two") == []
     for part in 0.2, 0.7:  # before and after the end of the transient

@@ -33,6 +33,7 @@ class FieldTerm final : public Interaction<D> {
       sums.magnitude.add(std::abs(v));
     }
   }
+  void add_fluxes(Positions<D>, Positions<D>, PairFluxes<D>&) const override {}
   void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
     const ForceLimits limits = forces.make_room(1);
     for (Id i = 0; i < x.size(); ++i)

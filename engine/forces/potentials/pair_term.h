@@ -43,6 +43,26 @@ class PairTerm final : public Interaction<D> {
         batch_(std::make_unique<PairBatch>()) {}
 
   void add_energy(Positions<D> x, PotentialSums& sums) const override { evaluate({.x = x}, nullptr, &sums); }
+  void add_fluxes(Positions<D> x, Positions<D> v, PairFluxes<D>& fluxes) const override {
+    const PairBatch& batch = *batch_;
+    pairs_.batches(step({.x = x}), particles_, cutoff_squared(), *batch_, [&](bool shared) {
+      for (unsigned r = 0; r < batch.rows; ++r)
+        for (unsigned k = batch.row[r].begin; k < batch.row[r + 1].begin; ++k) {
+          Vec<D> d;
+          for (int axis = 0; axis < D; ++axis) d[axis] = batch.d[axis][k];
+          const double rho = d.squaredNorm(), w = batch.weight[k];
+          const Vec<D> force = (-2 * w * potential_.derivative(rho)) * d;
+          // A shared pair counts half on each rank, and gives each rank the current of its own particle.
+          for (int a = 0; a < D; ++a)
+            for (int b = 0; b < D; ++b) fluxes.stress[D * a + b].add((shared ? 0.5 : 1.0) * d[a] * force[b]);
+          for (const Id i : {pairs_.id(batch.row[r].row), pairs_.id(batch.second[k])})
+            if (particles_.owns(i)) {
+              const Vec<D> current = 0.5 * (w * potential_.value(rho) * v[i] + force.dot(v[i]) * d);
+              for (int axis = 0; axis < D; ++axis) fluxes.heat[axis].add(current[axis]);
+            }
+        }
+    });
+  }
   void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
     evaluate({.x = x}, &forces, sums);
   }

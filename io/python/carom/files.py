@@ -24,7 +24,7 @@ from carom import notebook, page
 from carom.errors import FileError
 
 TRAJECTORY = "trajectory.h5md"
-AVERAGES = ("rdf", "sk", "msd", "profile")
+AVERAGES = ("rdf", "sk", "msd", "profile", "transport", "pressure_tensor")
 
 
 @contextlib.contextmanager

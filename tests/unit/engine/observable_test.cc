@@ -47,7 +47,8 @@ std::string error_of(std::string_view name, const System<2>& system, Parameters 
 
 TEST(Observable, ErrorsSayWhatToDo) {
   auto system = test::hard_spheres<2>(3, 0.3);
-  EXPECT_EQ(error_of("profil", *system, {}), "unknown observable 'profil'; give one of: rdf, sk, msd, profile");
+  EXPECT_EQ(error_of("profil", *system, {}),
+            "unknown observable 'profil'; give one of: rdf, sk, msd, profile, transport, pressure_tensor");
   EXPECT_EQ(
       error_of("rdf", *system, {{"range", 1e3}}).find("rdf: g(r) cannot be taken to 1000 in this box; take at most"),
       0u);
