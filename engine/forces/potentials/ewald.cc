@@ -175,21 +175,21 @@ class EwaldTerm final : public Interaction<3> {
   /// The stress of a wave is that of its energy, δ_ab − 2 k_a k_b (1/k² + 1/4α²) times it (Nosé, Klein, Mol. Phys. 50
   /// (1983) 1055).
   void add_fluxes(Positions<3> x, Positions<3> v, PairFluxes<3>& fluxes) const override {
-    if (options_.vacuum)
+    if (has_surface())
       throw Error(Failure::deck,
-                  "ewald with surface = \"vacuum\" has no formula for the pressure tensor; use the default surface, or "
-                  "no pressure_tensor and no transport");
+                  "ewald with surface = \"vacuum\" or between walls has no formula for the pressure tensor; use the "
+                  "default surface, or no pressure_tensor and no transport");
     pairs_->add_fluxes(x, v, fluxes);
     fluxes.heat_known = false;
-    need_finite(particles_, x);
-    if (x.empty() || !particles_.owns(0)) return;  // as in add_sums()
+    need_inside(x);
     const Amplitudes& s = structure(x);
+    if (ranks_->rank() != 0) return;
     const double scale = 0.25 / (options_.split.alpha * options_.split.alpha);
     for (const WaveRow& row : waves_->rows)
       for (unsigned m = 0; m < row.count; ++m) {
         const std::size_t k = row.first + m;
-        const double energy = waves_->weight[k] * (s.re[k] * s.re[k] + s.im[k] * s.im[k]);
         if (waves_->weight[k] == 0) continue;
+        const double energy = waves_->weight[k] * (s.re[k] * s.re[k] + s.im[k] * s.im[k]);
         const Vec3 wave = waves_->unit.cwiseProduct(Vec3(row.a, row.b, row.c + static_cast<int>(m)));
         for (int a = 0; a < 3; ++a)
           for (int b = 0; b < 3; ++b)
