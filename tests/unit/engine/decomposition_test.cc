@@ -326,16 +326,19 @@ TEST(Decomposition, NoRankHasAllIons) {
     struct Sums {
       double energy;
       std::vector<Vec<3>> force, mean, product;
+      double energy_of_few;  // after a motion of which most ranks know nothing
     };
     const auto sums = [](const System<3>& system) {
       const Particles<3>& p = system.particles;
       std::vector<Vec<3>> x_new = p.x;
       for (Id i = 0; i < p.size(); ++i) x_new[i] += 0.3 * p.v[i] + (p.fixed(i) ? Vec<3>::Zero() : Vec<3>(0.2, 0.1, 0));
-      Sums all{evaluate_energy<3>(system, p.x).energy.value(), p.x, p.x, p.x};
+      Sums all{evaluate_energy<3>(system, p.x).energy.value(), p.x, p.x, p.x, 0};
       Counters uncounted;
       evaluate_forces<3>(system, p.x, all.force, uncounted);
       evaluate_mean_forces<3>(system, p.x, x_new, all.mean, uncounted);
       evaluate_hessian_product<3>(system, p.x, p.v, all.product, uncounted);
+      for (Id i = 0; i < p.size(); ++i) x_new[i] = p.x[i] + (p.id_of(i) < 6 ? Vec<3>(0.1, 0, 0) : Vec<3>::Zero());
+      all.energy_of_few = evaluate_energy<3>(system, x_new).energy.value();
       return all;
     };
     auto whole = start();
@@ -350,6 +353,7 @@ TEST(Decomposition, NoRankHasAllIons) {
       EXPECT_LE(p.size(), whole->size() / 2);
       const Sums found = sums(*system);
       EXPECT_EQ(found.energy, expected.energy);
+      EXPECT_EQ(found.energy_of_few, expected.energy_of_few);
       for (Id i = 0; i < p.size(); ++i) {
         EXPECT_EQ(found.force[i], expected.force[p.id[i]]);
         EXPECT_EQ(found.mean[i], expected.mean[p.id[i]]);
