@@ -66,7 +66,7 @@ Measured measure(double density, std::size_t n, double lag, double lag_of_diffus
   const double root = std::sqrt(std::ranges::find(values, "temperature", &SpeciesValue::symbol)->value);
   const auto at = [&](const std::string& name, double time) {
     const auto row = std::ranges::lower_bound(table["time"], time * free_time * (1 - 1e-9)) - table["time"].begin();
-    const auto k = static_cast<std::size_t>(row);
+    const auto k = std::min(static_cast<std::size_t>(row), table["time"].size() - 1);
     return Value{table[name].at(k) / root, table["error_" + name].at(k) / root};  // all three scale with √T
   };
   const Measured all{at("diffusion", lag_of_diffusion), at("shear_viscosity", lag), at("thermal_conductivity", lag)};
