@@ -109,13 +109,13 @@ TEST(TransportCoefficientsSlow, OfADiluteGas) {
 TEST(TransportCoefficientsSlow, FromADiluteToADenseFluid) {
   struct {
     double density, lag, lag_of_diffusion, viscosity;
-  } const states[] = {{0.2, 16, 60, 1.0}, {0.5, 16, 80, 1.0}, {0.8, 60, 100, 1.2}};
+  } const states[] = {{0.2, 16, 60, 1.0}, {0.5, 16, 80, 1.0}, {0.8, 20, 80, 1.18}};
   for (const auto& [density, lag, lag_of_diffusion, viscosity] : states) {
     const Measured all = measure(density, 500, lag, lag_of_diffusion, test::slow_collisions(2e7));
     const Coefficients e = enskog(density);
     expect("diffusion", all.diffusion, speedy(density), 0.01, 0.01);
     expect("viscosity", all.viscosity, viscosity * e.viscosity, 0.03, 0.03);
-    expect("conductivity", all.conductivity, e.conductivity, 0.02, 0.03);
+    expect("conductivity", all.conductivity, e.conductivity, 0.03, 0.03);
   }
 }
 
