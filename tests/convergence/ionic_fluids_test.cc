@@ -81,7 +81,7 @@ void expect_primitive_model(const PrimitiveModelState& state, std::int64_t steps
 }
 
 TEST(PrimitiveModel, HasTheEnergyAndPressureOfTheLiterature) {
-  expect_primitive_model({1.0001, .5516, .0016, 1.094, .005}, 4000);
+  expect_primitive_model({1.0001, .5516, .0016, 1.094, .005}, 8000);
 }
 TEST(PrimitiveModelSlow, HasTheEnergyAndPressureOfTheLiterature) {
   for (const PrimitiveModelState& state : {PrimitiveModelState{0.00911, .1029, .0013, .9701, .0008},
@@ -94,8 +94,7 @@ TEST(PrimitiveModelSlow, HasTheEnergyAndPressureOfTheLiterature) {
 
 /// The one-component plasma in units of the ion-sphere radius a = (3/4πρ)^(1/3), at Γ = q²/(4πε₀ a kT). The energy of
 /// the fluid for Γ ≥ 1: U/NkT = aΓ + bΓ^(1/4) + cΓ^(−1/4) + d, a fit to Monte Carlo runs of 128 to 1024 ions (Slattery,
-/// Doolen, DeWitt, Phys. Rev. A 26 (1982) 2255). From Γ = 10 to 100 such fits agree within 0.01;
-/// 108 ions deviate by some 0.04 at Γ = 100.
+/// Doolen, DeWitt, Phys. Rev. A 26 (1982) 2255). From Γ = 10 to 100 such fits agree within 0.01.
 void expect_plasma(double coupling, std::size_t n, std::int64_t steps) {
   const double density = 3 / (4 * std::numbers::pi), frequency = std::sqrt(3 * coupling),
                root = std::pow(coupling, 0.25);
@@ -105,14 +104,14 @@ void expect_plasma(double coupling, std::size_t n, std::int64_t steps) {
   const double fit = -0.897744 * coupling + 0.95043 * root + 0.18956 / root - 0.81487;
   std::cout << "Gamma " << coupling << ": U/NkT " << energy << " +- " << error << " (" << fit << "), pU "
             << means.pressure.mean << " +- " << means.pressure.error << std::endl;
-  EXPECT_NEAR(energy, fit, 3 * error + 0.01 * std::max(1.0, coupling / 25));
+  EXPECT_NEAR(energy, fit, 3 * error + 0.01);
   EXPECT_LE(error, 0.02);
   // All potential energy is that of charges, so the virial is a third of it, but for the errors of the sums.
   EXPECT_NEAR(means.pressure.mean / density, means.temperature.mean + energy / 3, 1e-4 * (1 + std::abs(energy)));
 }
 
 TEST(OneComponentPlasma, HasTheEnergiesOfTheLiterature) {
-  for (const double coupling : {1.0, 10.0, 100.0}) expect_plasma(coupling, 108, 4000);
+  for (const double coupling : {1.0, 10.0}) expect_plasma(coupling, 108, 6000);
 }
 TEST(OneComponentPlasmaSlow, HasTheEnergiesOfTheLiterature) {
   for (const double coupling : {1.0, 10.0, 100.0}) expect_plasma(coupling, 500, 20000);

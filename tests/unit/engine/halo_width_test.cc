@@ -21,7 +21,7 @@ HaloWidth fitted(bool cores) {
 }
 
 TEST(HaloWidth, IsDeeperWhereParticlesCollide) {
-  EXPECT_EQ(fitted(false).far(), fitted(false).near());
+  EXPECT_EQ(fitted(false).far(), fitted(false).near() + kReach - kDiameter);
   EXPECT_GE(fitted(true).far(), fitted(true).near() + 2 * kDiameter);
   EXPECT_EQ(fitted(true).near(), fitted(false).near());
 }
@@ -67,7 +67,8 @@ TEST(HaloWidth, IsOutdatedBeforeAParticleHasComeTooFar) {
     while (!width.outdated([&] { return ++looks, come; })) {
       ASSERT_TRUE(width.allows(2 * path));
       come += 2 * path;
-      EXPECT_LE(kReach + 2 * come, width.near()) << path;
+      EXPECT_LE(kDiameter + 2 * come, width.near()) << path;
+      EXPECT_LE(kReach + 2 * come, width.far()) << path;
       ++slabs;
     }
     EXPECT_GE(slabs, 1) << path;
@@ -76,7 +77,7 @@ TEST(HaloWidth, IsOutdatedBeforeAParticleHasComeTooFar) {
     EXPECT_FALSE(width.outdated([] { return 0.0; }));
     // Even if it was slower before, it may have the largest allowed speed in the next slab.
     for (come = 0; width.fit(kReach, path, kDiameter), !width.outdated([&] { return come; }); come += 0.01)
-      ASSERT_LE(kReach + 2 * (come + 2 * path), width.near()) << path;
+      ASSERT_LE(kDiameter + 2 * (come + 2 * path), width.near()) << path;
   }
 }
 

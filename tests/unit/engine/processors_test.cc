@@ -69,7 +69,7 @@ void expect(const std::string& name, const Hash& hash) {
       {"forces inverse-power 15, 3-D", 0x1a8549af861c1dc7},
       {"forces uniform-field 16, 3-D", 0xbc8a7f3b04a71023},
       {"forces harmonic-trap 17, 3-D", 0x40fc7847816452a2},
-      {"forces coulomb 18, 3-D", 0x67d61396a84c0d9},
+      {"forces coulomb 18, 3-D", 0xaae03174b76a7e27},
       {"free-flight, 2-D", 0xb16187a39856c8f0},
       {"g(r), 2-D", 0x856ff1085199a98c},
       {"compression, 2-D", 0xcbb049e9a124503},
