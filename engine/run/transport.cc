@@ -204,8 +204,9 @@ class PressureTensor : public Observable<D> {
     for (std::size_t part = 0; part < kParts.size(); ++part) {
       std::vector<double> means;
       std::vector<Estimate> estimates;
-      for (std::size_t k = 0; k < D * D; ++k) {
-        estimates.push_back(estimate(D * D * part + k));
+      constexpr std::size_t kComponents = std::size_t{D} * D;
+      for (std::size_t k = 0; k < kComponents; ++k) {
+        estimates.push_back(estimate(kComponents * part + k));
         means.push_back(estimates.back().mean);
       }
       add_estimates(table, kParts[part], means, estimates);
@@ -233,7 +234,7 @@ class PressureTensor : public Observable<D> {
     const Fluxes<D> sum = fluxes_.to(time, particles, all);
     if (this->samples() > 0 && !all.empty()) {
       const Tensor<D> parts[] = {sum.kinetic + sum.contacts + sum.forces, sum.kinetic, sum.contacts, sum.forces};
-      if (series_.columns() == 0) series_ = Blocking(D * D * kParts.size());
+      if (series_.columns() == 0) series_ = Blocking(std::size_t{D} * D * kParts.size());
       std::vector<double> values;
       for (const Tensor<D>& part : parts)
         for (int a = 0; a < D; ++a)

@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -141,14 +140,14 @@ struct WholeForce {
   std::array<std::uint64_t, 7> word{};
 
   /// Returns `quanta`, rounded down and added to component k; a number too large is counted instead.
-  std::int64_t add(int k, double quanta) {
+  std::int64_t add(std::size_t k, double quanta) {
     if (!(std::abs(quanta) < 0x1p61)) return ++word[6], 0;
     const auto whole = static_cast<std::int64_t>(std::floor(quanta));
     word[2 * k] += static_cast<std::uint64_t>(whole & 0xffffffff);
     word[2 * k + 1] += static_cast<std::uint64_t>(whole >> 32);
     return whole;
   }
-  Whole operator[](int k) const {
+  Whole operator[](std::size_t k) const {
     return (static_cast<Whole>(static_cast<std::int64_t>(word[2 * k + 1])) << 32) + static_cast<Whole>(word[2 * k]);
   }
   bool possible() const { return word[6] == 0; }
@@ -156,8 +155,8 @@ struct WholeForce {
 
 class EwaldTerm final : public Interaction<3> {
  public:
-  EwaldTerm(const Box<3>& box, const Particles<3>& particles, EwaldOptions options, std::shared_ptr<const Waves> waves,
-            std::unique_ptr<Interaction<3>> pairs)
+  EwaldTerm(const Box<3>& box, const Particles<3>& particles, const EwaldOptions& options,
+            std::shared_ptr<const Waves> waves, std::unique_ptr<Interaction<3>> pairs)
       : box_(box),
         particles_(particles),
         options_(options),
@@ -270,7 +269,7 @@ class EwaldTerm final : public Interaction<3> {
  private:
   /// Whether own charges are at the same places.
   bool same(Positions<3> x, const std::vector<Vec3>& y) const {
-    const auto same_place = [&](Id j) { return std::memcmp(&x[j], &y[j], sizeof(Vec3)) == 0; };
+    const auto same_place = [&](Id j) { return x[j] == y[j]; };
     return x.size() == y.size() && std::ranges::all_of(charged(), same_place);
   }
   /// Whether the vectors of all charges on all ranks are finite and so small that their number of edges fits an
