@@ -1,264 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The pressure tensor and the transport coefficients, from the fluxes of momentum and energy through the whole box:
+// Diffusion, shear viscosity and thermal conductivity by Einstein and Helfand (Alder, Gass, Wainwright, J. Chem. Phys.
+// 53 (1970) 3813), from particles and from the fluxes S and Q of momentum and energy (fluxes.h); T is in units of
+// energy:
 //
-//   S = Σ m v v + Σ d F + Σ d J δ(t − t_c),   Q = Σ e v + ½ Σ d F·(v_i + v_j) + Σ d ΔE δ(t − t_c),
+//   ⟨|x(t) − x(0)|²⟩ → 2 D t times the diffusion coefficient in D dimensions,
+//   ⟨(∫S_xy dt)²⟩ → 2 t Ω T η,   ⟨(∫Q_x dt)²⟩ → 2 t Ω T² λ.
 //
-// with e = ½ m v² + ½ Σ V, sums over particles, over pairs (d = x_i − x_j of the nearest image, F the force on i) and
-// over collisions (J the impulse on i, ΔE the energy that i gets, d of the image that is touched). The pressure tensor
-// is ⟨S⟩/Ω. The shear viscosity and the thermal conductivity are the rates of Einstein and Helfand (Alder, Gass,
-// Wainwright, J. Chem. Phys. 53 (1970) 3813), where T is in units of energy:
-//
-//   ⟨(∫S_xy dt)²⟩ → 2 t Ω T η,   ⟨(∫Q_x dt)²⟩ → 2 t Ω T² λ,   ⟨|x(t) − x(0)|²⟩ → 2 D t times the diffusion coefficient.
-//
-// The integrals are sums of what passes during each interval. They are not differences of Σ m x v_y and Σ e x, which
-// are no functions of the state in a periodic box (Erpenbeck, Phys. Rev. E 51 (1995) 4296). Σ m v v and Σ e v are
-// integrated by the trapezoidal rule between samples, and what they jump by at a collision is weighted with the time
-// that is left of the interval. In flights without forces they change at collisions only, so that the integrals are
-// exact; with forces they are of second order in the interval, apart from the jumps of Σ d F·v at collisions, which are
-// not weighted.
-//
-// Lags are those of a multiple-tau correlator with 16 values a level and intervals that double from level to level
+// The lags are those of a multiple-tau correlator with 16 values a level and intervals that double from level to level
 // (Ramírez, Sukumaran, Vorselaars, Likhtman, J. Chem. Phys. 133 (2010) 154103): 0 … 16, 18 … 32, 36 … 64 … intervals.
-// Velocities are averaged over the interval of their level, as there. Integrals and positions are not, so that their
-// differences are exact at all lags. The running coefficients are rates between a lag and half of it: their deviation
-// decays as the correlations do, that of ⟨(∫S dt)²⟩/2t only as 1/t.
-//
-// Rank 0 has the collisions in the order of their keys and collects the particles, so that the bits do not depend on
-// the ranks.
+// Velocities are averaged over the interval of their level, as in that paper. Integrals and positions are not averaged,
+// so their differences are exact at all lags. A running coefficient is the rate between half a lag and the lag: its
+// deviation decays as the correlations do, whereas the deviation of ⟨(∫S dt)²⟩/2t decays as 1/t.
 
-#include <algorithm>
-#include <cmath>
-
-#include "engine/forces/forces.h"
-#include "engine/run/measurement.h"
-#include "engine/run/observable.h"
+#include "engine/run/fluxes.h"
 
 namespace carom::observable {
 namespace {
-
-template <int D>
-using Tensor = Eigen::Matrix<double, D, D>;
-
-/// A particle as rank 0 needs it.
-template <int D>
-struct Traveller {
-  Id id;
-  std::uint16_t species;
-  double mass;  // 0: fixed
-  Vec<D> x, v;  // x unwrapped
-};
-
-/// All particles on rank 0 in the order of their ids; nothing on other ranks. Collective.
-template <int D>
-std::vector<Traveller<D>> travellers(const System<D>& system, const Particles<D>& p) {
-  std::vector<Traveller<D>> all;
-  Bytes mine;
-  Communicator* const others = system.decomposition.others();
-  for (Id i = 0; i < p.size(); ++i) {
-    if (!p.owns(i)) continue;
-    Traveller<D> one{p.id_of(i), p.species[i], moving_mass(p.mass[i]), p.x[i], p.v[i]};
-    for (int k = 0; k < D; ++k) one.x[k] += static_cast<double>(p.image[i][k]) * system.box.edges[k];
-    if (others)
-      put(mine, one);
-    else
-      all.push_back(one);
-  }
-  if (!others) return all;
-  for (const Bytes& bytes : gather_on_first(*others, std::move(mine)))
-    for (Reader reader(bytes); reader.more();) all.push_back(reader.get<Traveller<D>>());
-  std::ranges::sort(all, {}, &Traveller<D>::id);
-  return all;
-}
-
-/// The fluxes of a state, or their integrals.
-template <int D>
-struct Fluxes {
-  Tensor<D> kinetic = Tensor<D>::Zero(), forces = Tensor<D>::Zero(), contacts = Tensor<D>::Zero();
-  Vec<D> heat = Vec<D>::Zero();
-
-  void add(double factor, const Fluxes& other) {
-    kinetic += factor * other.kinetic;
-    forces += factor * other.forces;
-    contacts += factor * other.contacts;
-    heat += factor * other.heat;
-  }
-  void add_kinetic(double mass, const Vec<D>& v, double sign = 1) {
-    kinetic += sign * mass * v * v.transpose();
-    heat += (0.5 * sign * mass * v.squaredNorm()) * v;
-  }
-};
-
-/// Integrates the fluxes from sample to sample, on rank 0. Velocities are relative to the centre of mass at the first
-/// sample if `relative`.
-template <int D>
-class FluxIntegral {
- public:
-  FluxIntegral(const System<D>& system, bool relative) : system_(system), relative_(relative) {}
-
-  void add(double slab_start, std::span<const Contact<D>> contacts) {
-    if (mass_.empty()) return;  // before the first sample, or not on rank 0
-    for (const Contact<D>& each : contacts) {
-      const bool pair = each.key.kind == EventKind::pair;
-      Fluxes<D> jump;
-      const auto bounced = [&](Id i, const Vec<D>& v, const Vec<D>& impulse) {  // returns the energy that i gets
-        if (!(mass_[i] > 0)) return 0.0;
-        const Vec<D> after = v - drift_, before = after - impulse / mass_[i];
-        jump.add_kinetic(mass_[i], after);
-        jump.add_kinetic(mass_[i], before, -1);
-        return 0.5 * impulse.dot(before + after);
-      };
-      const double gained = bounced(each.key.lo, each.v_lo, each.impulse);
-      jumps_.add(1, jump);
-      moments_.add(slab_start + each.key.time - time_, jump);
-      if (!pair) continue;
-      jump = {};
-      const double other = bounced(each.key.hi, each.v_hi, -each.impulse);
-      jumps_.add(1, jump);
-      moments_.add(slab_start + each.key.time - time_, jump);
-      const Vec<D> d = each.x_lo - each.x_hi;
-      jumps_.contacts += d * each.impulse.transpose();
-      transferred_ += (0.5 * (gained - other)) * d;
-    }
-  }
-
-  /// The integrals over the time since the last sample; zero at the first one, and on other ranks than the first.
-  /// Collective.
-  Fluxes<D> to(double time, const Particles<D>& particles, std::span<const Traveller<D>> all) {
-    const bool first = mass_.empty();
-    if (first && !all.empty()) {
-      double mass = 0;
-      drift_.setZero();
-      for (const Traveller<D>& each : all) {
-        mass_.push_back(each.mass);
-        drift_ += each.mass * each.v;
-        mass += each.mass;
-      }
-      drift_ = relative_ ? Vec<D>(drift_ / mass) : Vec<D>(Vec<D>::Zero());
-    }
-    Fluxes<D> now;
-    for (const Traveller<D>& each : all) now.add_kinetic(each.mass, each.v - drift_);
-    add_forces(particles, now);
-    const double h = time - time_;
-    Fluxes<D> sum;
-    if (!first) {
-      sum.add(0.5 * h, last_);
-      sum.add(0.5 * h, now);
-      sum.add(0.5 * h, jumps_);
-      sum.add(-1, moments_);
-      sum.contacts = jumps_.contacts;
-      sum.heat += transferred_;
-    }
-    last_ = now;
-    time_ = time;
-    jumps_ = moments_ = {};
-    transferred_.setZero();
-    return sum;
-  }
-  const Vec<D>& drift() const { return drift_; }
-  bool heat_known() const { return heat_known_; }
-
-  void archive(Archive& archive) { archive(mass_, time_, last_, jumps_, moments_, drift_, transferred_, heat_known_); }
-
- private:
-  void add_forces(const Particles<D>& particles, Fluxes<D>& now) {
-    if (system_.interactions.empty()) return;
-    std::vector<Vec<D>> v(particles.v);
-    Communicator* const others = system_.decomposition.others();
-    const Vec<D> drift = others ? gather_values<Vec<D>>(*others, {&drift_, 1})[0] : drift_;  // only rank 0 knows it
-    for (Vec<D>& each : v) each -= drift;
-    PairFluxes<D> own;
-    for (const auto& term : system_.interactions) term->add_fluxes(particles.x, v, own);
-    if (others) own = sum_of_all(*others, own);
-    for (int a = 0; a < D; ++a) {
-      for (int b = 0; b < D; ++b) now.forces(a, b) = own.stress[D * a + b].value();
-      now.forces(a, a) += tail_of(system_).virial / D;
-      now.heat[a] += own.heat[a].value();
-    }
-    heat_known_ = own.heat_known;
-  }
-
-  const System<D>& system_;
-  bool relative_, heat_known_ = true;
-  std::vector<double> mass_;   // by id; 0: fixed
-  double time_ = 0;            // of the last sample
-  Fluxes<D> last_;             // then
-  Fluxes<D> jumps_, moments_;  // Σ of the jumps since then, Σ of the jumps times the times since then
-  Vec<D> drift_ = Vec<D>::Zero(), transferred_ = Vec<D>::Zero();
-};
-
-/// The means of S/Ω.
-template <int D>
-class PressureTensor : public Observable<D> {
- public:
-  PressureTensor(const System<D>& system, const Parameters& parameters, double start)
-      : Observable<D>({parameters.real("interval"), start}), system_(system), fluxes_(system, false) {}
-
-  bool divided() const override { return true; }
-  bool needs_contacts() const override { return true; }
-  void contacts(double slab_start, std::span<const Contact<D>> contacts) override { fluxes_.add(slab_start, contacts); }
-
-  std::vector<TableColumn> table() const override {
-    std::vector<TableColumn> table = {{"a", {}}, {"b", {}}};
-    for (int a = 0; a < D; ++a)
-      for (int b = 0; b < D; ++b) table[0].values.push_back(a), table[1].values.push_back(b);
-    for (std::size_t part = 0; part < kParts.size(); ++part) {
-      std::vector<double> means;
-      std::vector<Estimate> estimates;
-      constexpr std::size_t kComponents = std::size_t{D} * D;
-      for (std::size_t k = 0; k < kComponents; ++k) {
-        estimates.push_back(estimate(kComponents * part + k));
-        means.push_back(estimates.back().mean);
-      }
-      add_estimates(table, kParts[part], means, estimates);
-    }
-    return table;
-  }
-  std::vector<SpeciesValue> species_values() const override {
-    static constexpr std::array<std::array<std::string_view, 3>, 3> names = {
-        {{"xx", "xy", "xz"}, {"yx", "yy", "yz"}, {"zx", "zy", "zz"}}};
-    std::vector<SpeciesValue> values;
-    for (int a = 0; a < D; ++a)
-      for (int b = 0; b < D; ++b) {
-        const Estimate e = estimate(D * a + b);
-        values.push_back({"pressure_tensor", {}, names[a][b], e.mean, e.error});
-      }
-    return values;
-  }
-
- private:
-  static constexpr std::array kParts = {"pressure", "kinetic", "collisions", "forces"};
-
-  Estimate estimate(std::size_t column) const { return series_.columns() > 0 ? series_.estimate(column) : Estimate{}; }
-  void add_sample(double time, const Particles<D>& particles) override {
-    const std::vector<Traveller<D>> all = travellers(system_, particles);
-    const Fluxes<D> sum = fluxes_.to(time, particles, all);
-    if (this->samples() > 0 && !all.empty()) {
-      const Tensor<D> parts[] = {sum.kinetic + sum.contacts + sum.forces, sum.kinetic, sum.contacts, sum.forces};
-      if (series_.columns() == 0) series_ = Blocking(std::size_t{D} * D * kParts.size());
-      std::vector<double> values;
-      for (const Tensor<D>& part : parts)
-        for (int a = 0; a < D; ++a)
-          for (int b = 0; b < D; ++b) values.push_back(part(a, b) / system_.box.volume());
-      const double elapsed = time - before_;
-      series_.add(values, {&elapsed, 1});
-    }
-    before_ = time;
-  }
-  void sums(Archive& archive) override { archive(fluxes_, before_, series_); }
-
-  const System<D>& system_;
-  FluxIntegral<D> fluxes_;
-  double before_ = 0;  // the last sample
-  Blocking series_;    // of the parts; the weights are the times
-};
-
-template <int D>
-std::optional<ParameterError> complete_pressure_tensor(Parameters&, const System<D>& system) {
-  if (system.box.plain()) return {};
-  return ParameterError{"interval",
-                        "the pressure tensor needs a constant volume, and walls of this box move or divide it",
-                        "set pressure_tensor_interval = 0"};
-}
 
 constexpr std::size_t kLags = 16;   // values of a level; the next level has intervals twice as long
 constexpr double kIntervals = 100;  // the longest lag, unless it is given
@@ -488,55 +245,32 @@ std::optional<ParameterError> complete_transport(Parameters& parameters, const S
 
 }  // namespace
 
-ObservableInfo pressure_tensor() {
-  return {
-      .name = "pressure_tensor",
-      .title = "pressure tensor",
-      .parameters = {parameter::interval("simulated time between samples of the pressure tensor, averaged into "
-                                         "pressure_tensor.csv; 0: none. Collisions "
-                                         "between samples are all counted; with forces give a few steps")},
-      .documentation =
-          "The mean of (sum m v v + sum d F + sum d J/t)/V over particles, pairs and collisions, d the separation, F "
-          "the "
-          "force and J the impulse; a force of more than two particles is refused unless its tensor is known (the "
-          "waves "
-          "of ewald). Columns: a and b (the axes), pressure, its parts kinetic, collisions and forces, and error_ and "
-          "samples_ of each. Between collisions in free flight the integral over time is exact; with forces it is a "
-          "trapezoidal sum over samples. Contacts at rest are not counted, as in the pressure of thermo.csv.",
-      .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.7",
-      .in_2d = maker<PressureTensor, 2>(complete_pressure_tensor<2>),
-      .in_3d = maker<PressureTensor, 3>(complete_pressure_tensor<3>)};
-}
-
 ObservableInfo transport() {
   using enum Parameter::Type;
-  return {
-      .name = "transport",
-      .title = "transport coefficients",
-      .parameters =
-          {parameter::interval(
-               "the shortest lag of time correlations and transport coefficients, averaged into "
-               "transport.csv; 0: none. With forces give one or few steps. A sample costs about 25 passes "
-               "over the particles, on rank 0"),
-           {"longest", real, "none", "time",
-            "the longest lag, at which summary.json takes the coefficients: longer than correlations live, and "
-            "shorter than sound needs for half the box; default: 100 intervals",
-            Parameter::Range::positive}},
-      .documentation =
-          "Columns: time (the lag), vacf (the mean of v(0)v(t) over particles), diffusion, shear_viscosity and "
-          "thermal_conductivity (half the rate at which mean squared displacements and integrals of the fluxes of "
-          "momentum "
-          "and energy grow between half the lag and the lag, divided by D, V T and V T^2), error_ and samples_ of "
-          "each. "
-          "With several species vacf and diffusion of each; thermal_conductivity for one species of equal masses "
-          "without "
-          "ewald. T is that of N - 1 particles, and the drift of the whole system is taken off. Memory: 34 positions "
-          "or velocities of each particle for each doubling of the lag from 16 intervals on, on rank 0.",
-      .source =
-          "Alder, Gass, Wainwright, J. Chem. Phys. 53 (1970) 3813; Ramirez, Sukumaran, Vorselaars, Likhtman, J. "
-          "Chem. Phys. 133 (2010) 154103",
-      .in_2d = maker<Transport, 2>(complete_transport<2>),
-      .in_3d = maker<Transport, 3>(complete_transport<3>)};
+  return {.name = "transport",
+          .title = "transport coefficients",
+          .parameters =
+              {parameter::interval(
+                   "the shortest lag of time correlations and transport coefficients, averaged into "
+                   "transport.csv; 0: none. With forces give one or few steps. A sample costs about 25 passes "
+                   "over the particles, on rank 0"),
+               {"longest", real, "none", "time",
+                "the longest lag, at which summary.json takes the coefficients: longer than correlations live, and "
+                "shorter than sound needs for half the box; default: 100 intervals",
+                Parameter::Range::positive}},
+          .documentation =
+              "Columns: time (the lag), vacf (the mean of v(0)v(t) over particles), diffusion, shear_viscosity and "
+              "thermal_conductivity (half the rate at which mean squared displacements and integrals of the fluxes of "
+              "momentum and energy grow between half the lag and the lag, divided by D, V T and V T^2), error_ and "
+              "samples_ of each. With several species vacf and diffusion of each; thermal_conductivity for one species "
+              "of equal masses "
+              "without ewald. T is that of N - 1 particles, and the drift of the whole system is taken off. Memory: 34 "
+              "positions or velocities of each particle for each doubling of the lag from 16 intervals on, on rank 0.",
+          .source =
+              "Alder, Gass, Wainwright, J. Chem. Phys. 53 (1970) 3813; Ramirez, Sukumaran, Vorselaars, Likhtman, J. "
+              "Chem. Phys. 133 (2010) 154103",
+          .in_2d = maker<Transport, 2>(complete_transport<2>),
+          .in_3d = maker<Transport, 3>(complete_transport<3>)};
 }
 
 }  // namespace carom::observable

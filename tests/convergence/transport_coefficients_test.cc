@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Diffusion, viscosity and thermal conductivity of hard spheres against Enskog's theory and the literature.
 //
-// Enskog's values in the order of Sonine polynomials in which they have converged, with the contact value of the
-// literature's pressure. Simulated ratios to them are those of Alder, Gass, Wainwright, J. Chem. Phys. 53 (1970) 3813:
-// to their errors of a few percent the conductivity has Enskog's value at all densities, and the viscosity has it below
-// ρσ³ = 0.6 and rises above it beyond. The diffusion coefficient is Speedy's (Mol. Phys. 62 (1987) 509), whose equation
-// describes systems of about 500 spheres.
+// Enskog's values include the Sonine polynomials up to the order at which they have converged, and the contact value
+// of the literature's pressure. Alder, Gass, Wainwright, J. Chem. Phys. 53 (1970) 3813, simulated the ratios to these
+// values: within their errors of a few percent the ratio of the conductivity is 1 at all densities, and the ratio of
+// the viscosity is 1 below ρσ³ = 0.6 and larger at higher densities. The ratio of the viscosity at 0.8 that is expected
+// here was set after a run, so it only guards against changes. The diffusion coefficient is compared with the equation
+// of Speedy (Mol. Phys. 62 (1987) 509), which describes systems of about 500 spheres.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +23,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Of spheres of diameter 1, mass 1 and temperature 1.
+/// The coefficients of spheres of diameter 1, mass 1 and temperature 1.
 struct Coefficients {
   double diffusion, viscosity, conductivity;
 };

@@ -74,12 +74,10 @@ InteractionInfo coulomb() {
           "Charges in vacuum (plain: all pairs are summed directly; not in periodic boxes), or the damped-shifted sum "
           "that replaces the long-ranged potential in neutral periodic systems: the real-space part of an Ewald sum, "
           "cut so that V, V' and V'' go to zero at the cutoff. Usual values: alpha times cutoff between 2 and 3. The "
-          "form "
-          "ewald sums all periodic images in a box that is periodic along three axes, or along two and has walls along "
-          "the third; 'accuracy' sets alpha and both "
-          "cutoffs. Between walls the charges must add up to zero. If the charges do not add up to zero, a uniform "
-          "background neutralises them, and its energy is "
-          "part of V.",
+          "form ewald sums all periodic images in a box that is periodic along three axes, or along two axes and has "
+          "walls along the third; 'accuracy' sets alpha and both cutoffs. If charges in a box that is periodic along "
+          "three axes do not add up to zero, a uniform background neutralises them, and its energy is part of V. "
+          "Between walls they must add up to zero.",
       .source =
           "Wolf et al., J. Chem. Phys. 110 (1999) 8254; Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104; "
           "Ewald, Ann. Phys. 369 (1921) 253; Kolafa, Perram, Mol. Simul. 9 (1992) 351",

@@ -13,6 +13,7 @@
 #include "engine/base/elementary.h"
 #include "engine/base/error.h"
 #include "engine/forces/potentials/ewald_pair.h"
+#include "engine/forces/potentials/ewald_waves.h"
 #include "engine/forces/simd/wave_kernels.h"
 #include "engine/ranks/communicator.h"
 
@@ -20,107 +21,9 @@ namespace carom {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// From here to the cutoff the switching function takes the pair term to zero; the force error that it causes is about
-// that of ending the pair term here.
-constexpr double kSwitchFrom = 0.95;  // of the cutoff
-// α = √π (c N/Ω²)^(1/6) makes pairs and waves cost the same, c the cost of a pair over that of a wave of a particle
-// (Kolafa, Perram); c is taken as 6, the sixth power of:
-constexpr double kPairCost = 1.35;
-constexpr double kPolynomial = 0.05;  // of the error of the pair sum: the part of the polynomial in it
 constexpr std::size_t kMostWaves = std::size_t{1} << 24;
 
 using Vec3 = Vec<3>;
-
-/// Cosine and sine of 2πu, |u| < 2^50, with errors of an ulp or two: their Taylor series within an eighth of a turn.
-std::array<double, 2> turn(double u) {
-  const double quarters = std::nearbyint(4 * u), y = 2 * kPi * (u - 0.25 * quarters), y2 = y * y;
-  double sin = 1, cos = 1;
-  for (int n = 16; n > 0; n -= 2) {
-    sin = 1 - y2 * (1.0 / (n * (n + 1))) * sin;
-    cos = 1 - y2 * (1.0 / (n * (n - 1))) * cos;
-  }
-  sin *= y;
-  switch (static_cast<std::int64_t>(quarters) & 3) {
-    case 0:
-      return {cos, sin};
-    case 1:
-      return {-sin, cos};
-    case 2:
-      return {-cos, -sin};
-    default:
-      return {sin, -cos};
-  }
-}
-
-/// The numbers e^(2πi n u), n = −most … most.
-class Phases {
- public:
-  explicit Phases(int most) : most_(most), re_(2 * most + 1 + WaveRow::kMultiple), im_(re_.size()) {}
-
-  /// From cosine and sine of 2πu.
-  void set(const std::array<double, 2>& of_u) {
-    const auto [cos, sin] = of_u;
-    re_[most_] = 1;
-    im_[most_] = 0;
-    for (int n = 1; n <= most_; ++n) {
-      const double re = re_[most_ + n - 1], im = im_[most_ + n - 1];
-      re_[most_ + n] = re * cos - im * sin;
-      im_[most_ + n] = re * sin + im * cos;
-      re_[most_ - n] = re_[most_ + n];
-      im_[most_ - n] = -im_[most_ + n];
-    }
-  }
-  const double* re() const { return re_.data() + most_; }  // of n = 0
-  const double* im() const { return im_.data() + most_; }
-
- private:
-  int most_;
-  std::vector<double> re_, im_;
-};
-
-/// One half of the vectors k = 2π (a/L_x, b/L_y, c/L_z) with 0 < |k| ≤ k_c, in rows of consecutive c.
-struct Waves {
-  std::array<int, 3> most;  // largest |a|, |b|, |c|
-  Vec3 unit;                // 2π/L
-  double longest;           // k_c
-  std::vector<WaveRow> rows;
-  std::vector<double> weight;   // 2 (C/2Ω) (4π/k²) e^(−k²/4α²): for both halves; padding has 0
-  std::vector<double> squared;  // k²
-
-  Waves(const EwaldSplit& split, const Vec3& edges, double constant) : longest(split.wave_cutoff) {
-    const double volume = edges.prod();
-    for (int k = 0; k < 3; ++k) {
-      unit[k] = 2 * kPi / edges[k];
-      most[k] = static_cast<int>(std::min(longest / unit[k], 1e6));
-    }
-    for (int a = 0; a <= most[0]; ++a)
-      for (int b = a == 0 ? 0 : -most[1]; b <= most[1]; ++b) {
-        const double flat = unit[0] * unit[0] * a * a + unit[1] * unit[1] * b * b;
-        if (flat > longest * longest) continue;
-        const int end = static_cast<int>(std::sqrt(longest * longest - flat) / unit[2]);
-        const int start = a == 0 && b == 0 ? 1 : -end;
-        if (end < start) continue;
-        const auto first = static_cast<unsigned>(weight.size()), count = static_cast<unsigned>(end - start + 1);
-        const unsigned padded = (count + WaveRow::kMultiple - 1) / WaveRow::kMultiple * WaveRow::kMultiple;
-        rows.push_back({a, b, start, first, padded});
-        for (int c = start; c <= end; ++c) {
-          const double k2 = flat + unit[2] * unit[2] * c * c;
-          squared.push_back(k2);
-          weight.push_back(constant / volume * 4 * kPi / k2 * elementary::exp(-k2 / (4 * split.alpha * split.alpha)));
-        }
-        weight.resize(first + padded, 0.0);
-        squared.resize(first + padded, 0.0);
-      }
-  }
-  std::size_t size() const { return weight.size(); }
-};
-
-/// One complex number for each k.
-struct Amplitudes {
-  std::vector<double> re, im;
-};
-
-double sinc(double y) { return y == 0 ? 1 : turn(y / (2 * kPi))[1] / y; }
 
 struct EwaldOptions {
   EwaldSplit split;
@@ -257,8 +160,7 @@ class EwaldTerm final : public Interaction<3> {
     if (options_.weight == PairWeight::masses)
       return {
           "a uniform background of negative mass fills the periodic box, without which the sum over all images does "
-          "not exist "
-          "(the Jeans swindle)",
+          "not exist (the Jeans swindle)",
           "use form = \"plain\" and open boundaries or walls for a system that is alone in space"};
     return {"the charges add up to " + short_text(options_.charges.total.value()) +
                 ", which a uniform background neutralises",
@@ -587,41 +489,6 @@ class EwaldTerm final : public Interaction<3> {
 
 }  // namespace
 
-EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double repeated, double longest) {
-  const double n = charges.count.value(), q2 = charges.squares.value();
-  const double spacing = elementary::cbrt(volume / n);
-  const double error = 0.5 * accuracy * q2 / n / (spacing * spacing);  // of either sum
-  const auto root_log = [](double x) { return std::sqrt(std::max(1.0, elementary::log(x))); };
-  double alpha = kPairCost * std::sqrt(kPi) * elementary::pow(n / (volume * repeated), 1.0 / 6);
-  const auto pairs = [&](double r) { return root_log(2 * q2 / (std::sqrt(n * r * volume) * error)); };
-  double end = 3 / alpha;  // where the pair sum is cut off
-  for (int turn = 0; turn < 20; ++turn) end = pairs(end) / alpha;
-  if (end > kSwitchFrom * longest) {
-    end = kSwitchFrom * longest;
-    alpha = pairs(end) / end;
-  }
-  double t = 3;  // k_c/2α
-  for (int turn = 0; turn < 20; ++turn) {
-    t = root_log(q2 * alpha * std::sqrt(8 / (n * repeated * 2 * alpha * t)) / error);
-  }
-  return {alpha, end, end / kSwitchFrom, 2 * alpha * t};
-}
-
-namespace {
-
-/// The room between two images of a slab in which their forces on a charge, after the dipole term, are at most half the
-/// accuracy: the field of N random charges beyond it is that of the longest waves along the walls, four of them from
-/// two sides,
-///
-///   8 q² √N (2π/A) e^(−2π gap/L) ≤ ½ accuracy q²/(Ω/N)^(2/3),   A the area of a wall, L its longer edge.
-double slab_gap(double accuracy, double n, double volume, double area, double longer) {
-  const double spacing = elementary::cbrt(volume / n);
-  const double ratio = 32 * kPi * std::sqrt(n) * spacing * spacing / (area * accuracy);
-  return longer / (2 * kPi) * std::max(1.0, elementary::log(ratio));
-}
-
-}  // namespace
-
 std::unique_ptr<Interaction<3>> ewald(std::string_view type, double constant, PairWeight weight, const Parameters& p,
                                       const InteractionContext<3>& context) {
   const Box<3>& box = context.box;
@@ -687,13 +554,7 @@ std::unique_ptr<Interaction<3>> ewald(std::string_view type, double constant, Pa
   const double background =
       neutral ? 0.0 : -constant * kPi * total * total / (2 * split.alpha * split.alpha * repeated);
   const double self = -constant * split.alpha / std::sqrt(kPi) * charges.squares.value();
-  // The largest error of dE/du, u = α²ρ, with which the errors of all pairs are at most kPolynomial of the error that
-  // the pair sum may have: the force between two charges is 2 C q² r α³ dE/du.
-  const double r = split.cutoff, spacing = elementary::cbrt(volume / n);
-  const double near = std::max(1.0, 4 * kPi / 3 * elementary::pow(r / spacing, 3));
-  const double error =
-      kPolynomial * 0.5 * accuracy / (spacing * spacing * std::sqrt(near) * 2 * r * elementary::pow(split.alpha, 3));
-  const EwaldPair pair(constant, split.alpha, split.cutoff, error);
+  const EwaldPair pair(constant, split.alpha, split.cutoff, split.pair_error);
   auto pairs = options::within_reach<3>(type, Cut<EwaldPair>(pair, split.cutoff, CutKind::switched, split.switch_from),
                                         weight, p, context, pair);
   return std::make_unique<EwaldTerm>(

@@ -11,7 +11,7 @@
 // Between two walls the sum is that over all images along the other two axes: the box that is repeated has empty room
 // between the walls of neighbouring images, and the dipole term (2π/Ω) M_z², z along the normal of the walls, takes off
 // the field of the images (Yeh, Berkowitz, J. Chem. Phys. 111 (1999) 3155). What remains of that field decreases by
-// e^(−2π/L) per length of empty room, L the longer edge of the walls (slab_gap() in ewald.cc).
+// e^(−2π/L) per length of empty room, L the longer edge of the walls (slab_gap()).
 //
 // Masses, with C = −G and a background of negative mass, are summed like charges.
 //
@@ -42,6 +42,7 @@ struct EwaldSplit {
   double switch_from;  ///< up to here the pair term is erfc(αr)/r [length]
   double cutoff;       ///< where the switched pair term ends [length]
   double wave_cutoff;  ///< the largest |k| [1/length]
+  double pair_error;   ///< the largest error of dE/du of the pair term, see EwaldPair
 };
 
 /// The charges of a system.
@@ -89,6 +90,13 @@ struct ChargeSums {
 /// Ω in the second estimate is `repeated`, the volume of the box that is repeated, in which the system's has its place.
 /// The pair term reaches at most `longest`.
 EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume, double repeated, double longest);
+
+/// The room between two images of a slab in which their forces on a charge, after the dipole term, are at most half the
+/// accuracy: the field of N random charges beyond it is that of the longest waves along the walls, four of them from
+/// two sides,
+///
+///   8 q² √N (2π/A) e^(−2π gap/L) ≤ ½ accuracy q²/(Ω/N)^(2/3),   A the area of a wall, L its longer edge.
+double slab_gap(double accuracy, double n, double volume, double area, double longer);
 
 /// The term of `form = "ewald"` of the interaction `type`, with the constant C. Refuses boxes that are neither periodic
 /// along all axes nor, for charges, between two walls.

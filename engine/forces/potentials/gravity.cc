@@ -32,25 +32,24 @@ InteractionInfo gravity() {
   return {
       .name = "gravity",
       .kind = InteractionInfo::Kind::pair,
-      .parameters =
-          options::with_filter({{"constant", Type::real, "1.0", "energy*length/mass^2", "G"},
-                                {"form",
-                                 Type::text,
-                                 "\"plain\"",
-                                 "-",
-                                 "plain: -G m m'/r between all pairs; ewald: the sum over all periodic images",
-                                 Range::any,
-                                 {"plain", "ewald"}},
-                                {"accuracy", Type::real, "none", "-",
-                                 "of the form ewald: root mean square error of the forces, relative to G m^2/a^2, m^2 "
-                                 "the mean squared mass and a^3 "
-                                 "the volume per particle; from 1e-14 to 0.1; absent: 1e-5",
-                                 Range::positive}}),
+      .parameters = options::with_filter(
+          {{"constant", Type::real, "1.0", "energy*length/mass^2", "G"},
+           {"form",
+            Type::text,
+            "\"plain\"",
+            "-",
+            "plain: -G m m'/r between all pairs; ewald: the sum over all periodic images",
+            Range::any,
+            {"plain", "ewald"}},
+           {"accuracy", Type::real, "none", "-",
+            "of the form ewald: root mean square error of the forces, relative to G m^2/a^2, m^2 "
+            "the mean squared mass and a^3 the volume per particle; from 1e-14 to 0.1; absent: 1e-5",
+            Range::positive}}),
       .formula = "sum over pairs of -G m m'/r, or the Ewald sum over all pairs and images",
       .documentation =
           "Newton's gravitation. plain: all pairs are summed directly; not in periodic boxes. ewald: in a box that is "
-          "periodic "
-          "along three axes, all images are summed. That sum exists only with a uniform background of negative mass, "
+          "periodic along three axes, all images are summed. That sum exists only with a uniform background of "
+          "negative mass, "
           "as if the mean density caused no forces (the Jeans swindle); its energy is part of V.",
       .source = "Enomoto, thesis, 2011, experiment 2; Hernquist, Bouchet, Suto, Astrophys. J. Suppl. 75 (1991) 231",
       .in_2d = make<2>,

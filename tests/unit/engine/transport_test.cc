@@ -184,9 +184,9 @@ struct Moments : Observer<D> {
   double interval_, stiffness_;
 };
 
-/// A cluster of which nothing passes the boundary: there Σ m x v and Σ e x are functions of the state, whose changes
-/// are the integrals of the fluxes. Returns the relative errors of viscosity and conductivity at the longest lag, which
-/// has one origin.
+/// Runs a cluster that no particle leaves and that no pair joins across the boundary: there Σ m x v and Σ e x are
+/// functions of the state, and their changes are the integrals of the fluxes. Returns the relative errors of viscosity
+/// and conductivity at the longest lag, which has one origin.
 template <int D>
 std::array<double, 2> errors_in_cluster(const std::string& integrator, std::size_t samples, double stiffness,
                                         double radius = 0.5) {
