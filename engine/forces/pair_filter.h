@@ -23,11 +23,19 @@ class BondTable {
     for (auto& [i, j] : bonds)
       if (i > j) std::swap(i, j);
     std::ranges::sort(bonds);
+    bonds.erase(std::unique(bonds.begin(), bonds.end()), bonds.end());
     for (const auto& [i, j] : bonds) {
       first_.resize(i + 2, partners_.size());
       partners_.push_back(j);
       first_.back() = partners_.size();
     }
+  }
+  /// Each bond once, i < j, ascending.
+  PairList list() const {
+    PairList bonds;
+    for (Id i = 0; i + 1 < first_.size(); ++i)
+      for (std::size_t n = first_[i]; n < first_[i + 1]; ++n) bonds.push_back({i, partners_[n]});
+    return bonds;
   }
   bool joins(Id i, Id j) const {
     if (i > j) std::swap(i, j);

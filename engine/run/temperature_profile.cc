@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Density and temperature in slabs across one axis.
+// Densities and temperature in slabs across one axis.
 //
 // If a sample finds n particles (by their centres) with kinetic energy K in a slab of volume V, the density is ⟨n⟩/V
 // and the temperature 2⟨K⟩/(D⟨n⟩), without fixed particles; the mean velocity is not subtracted. Sums are exact, so
@@ -23,37 +23,54 @@ class TemperatureProfile : public Observable<D> {
         number_(static_cast<std::size_t>(parameters.integer("bins"))),
         moving_(number_.size()),
         twice_kinetic_(number_.size()),
-        series_(2 * number_.size()) {}
+        species_(system.species),
+        series_((2 + parts()) * number_.size()) {}
 
   std::vector<TableColumn> table() const override {
     const auto bins = static_cast<double>(number_.size()), samples = static_cast<double>(this->samples());
     std::vector<TableColumn> table = {{"x", {}}};
-    std::vector<double> density, temperature;
-    std::vector<Estimate> of_density, of_temperature;
+    const auto density = [&](std::size_t first) {
+      std::vector<Estimate> estimates;
+      for (std::size_t b = 0; b < number_.size(); ++b) {
+        estimates.push_back(series_.estimate(first + b));
+        estimates.back().error /= box_.volume() / bins;
+      }
+      return estimates;
+    };
+    std::vector<double> all, temperature;
+    std::vector<Estimate> of_temperature;
     for (std::size_t b = 0; b < number_.size(); ++b) {
       table[0].values.push_back((static_cast<double>(b) + 0.5) * box_.edges[axis_] / bins);
-      density.push_back(number_[b] / (samples * box_.volume() / bins));
+      all.push_back(number_[b] / (samples * box_.volume() / bins));
       temperature.push_back(moving_[b] > 0 ? twice_kinetic_[b].value() / (D * moving_[b])
                                            : std::numeric_limits<double>::quiet_NaN());
-      of_density.push_back(series_.estimate(b));
-      of_density.back().error /= box_.volume() / bins;
       of_temperature.push_back(series_.estimate(number_.size() + b));
     }
-    add_estimates(table, "density", density, of_density);
+    add_estimates(table, "density", all, density(0));
     add_estimates(table, "temperature", temperature, of_temperature);
+    for (std::size_t s = 0; s < parts(); ++s) {
+      const std::vector<Estimate> estimates = density((2 + s) * number_.size());
+      std::vector<double> of_species;
+      for (const Estimate& each : estimates) of_species.push_back(each.mean / (box_.volume() / bins));
+      add_estimates(table, "density_" + species_[s], of_species, estimates);
+    }
     return table;
   }
 
  private:
+  /// The number of species, each of which has a density of its own; 0 if there is only one.
+  std::size_t parts() const { return species_.size() > 1 ? species_.size() : 0; }
+
   void add_sample(double /*time*/, const Particles<D>& p) override {
     const std::size_t bins = number_.size();
     std::vector<ExactSum> twice_kinetic(bins);
-    std::vector<double> values(2 * bins), weights(2 * bins, 1.0);
+    std::vector<double> values(series_.columns()), weights(series_.columns(), 1.0);
     std::fill_n(weights.begin() + static_cast<std::ptrdiff_t>(bins), bins, 0.0);
     for (std::size_t i = 0; i < p.size(); ++i) {
       const auto all = static_cast<double>(bins);
       const auto slab = static_cast<std::size_t>(std::clamp(p.x[i][axis_] / box_.edges[axis_] * all, 0.0, all - 1));
       values[slab] += 1;
+      if (parts() > 0) values[(2 + p.species[i]) * bins + slab] += 1;
       if (p.fixed(static_cast<Id>(i))) continue;
       moving_[slab] += 1;
       weights[bins + slab] += D;
@@ -73,7 +90,8 @@ class TemperatureProfile : public Observable<D> {
   Eigen::Index axis_;
   std::vector<double> number_, moving_;  // particles in each slab, and those not fixed, summed over all samples
   std::vector<ExactSum> twice_kinetic_;
-  Blocking series_;  // of the densities, then of the temperatures
+  std::vector<std::string> species_;
+  Blocking series_;  // of the numbers in all slabs, then of the temperatures, then of the numbers of each species
 };
 
 template <int D>
@@ -92,7 +110,7 @@ ObservableInfo profile() {
   using enum Parameter::Type;
   return {
       .name = "profile",
-      .title = "density and temperature across the box",
+      .title = "densities and temperature across the box",
       .parameters = {parameter::interval("simulated time between samples of the profile of density and temperature, "
                                          "averaged into profile.csv; 0: none"),
                      {.name = "bins",
@@ -110,8 +128,7 @@ ObservableInfo profile() {
                       .range = Parameter::Range::non_negative}},
       .documentation =
           "Columns: x (middle of a slab), density (of centres), temperature 2K/(D n) of the n particles in the slab, "
-          "and error_ and samples_ of both; "
-          "their mean velocity is not subtracted.",
+          "their mean velocity is not subtracted; with several species density_A of each; error_ and samples_ of all.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.12",
       .in_2d = maker<TemperatureProfile, 2>(complete_profile<2>),
       .in_3d = maker<TemperatureProfile, 3>(complete_profile<3>)};

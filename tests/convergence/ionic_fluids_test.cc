@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Fluids of charges with Ewald sums against the literature: the restricted primitive model and the one-component
-// plasma.
+// Fluids of charges with Ewald sums against the literature: the restricted primitive model, the one-component plasma,
+// and counter-ions between charged walls.
 //
-// A rescaling bath keeps the temperature 1, so that means are canonical. Means start after the initial transient.
+// A bath keeps the temperature 1, so that means are canonical. Means start after the initial transient.
 
 #include <gtest/gtest.h>
 
@@ -115,6 +115,59 @@ TEST(OneComponentPlasma, HasTheEnergiesOfTheLiterature) {
 }
 TEST(OneComponentPlasmaSlow, HasTheEnergiesOfTheLiterature) {
   for (const double coupling : {1.0, 10.0, 100.0}) expect_plasma(coupling, 500, 20000);
+}
+
+/// Where the ions are between the walls, and what they do to them.
+struct BetweenWalls : Observer<3> {
+  double edge;
+  std::vector<double> spread, load;
+  explicit BetweenWalls(double between) : edge(between) {}
+  void thermo(const Snapshot<3>& shot) override {
+    if (shot.time < 500) return;
+    double sum = 0;
+    for (const Vec<3>& x : shot.particles->x) sum += std::pow(2 * x[2] / edge - 1, 2);
+    spread.push_back(sum / static_cast<double>(shot.particles->size()));
+    load.push_back(0.5 * (std::abs(shot.walls[0].load()) + std::abs(shot.walls[1].load())));
+  }
+};
+
+/// Weakly coupled ions between two walls of the opposite charge σ per area follow the Poisson–Boltzmann equation: their
+/// density is K²/(2π l_B cos² Kz), z from the middle, K tan(KL/2) = 2π l_B σ. The density at a wall, times kT, is the
+/// pressure on it. The coupling 2π l_B² σ is 0.02 here, and L is twice the Gouy–Chapman length 1/(2π l_B σ), where
+/// KL/2 = 0.860334 (Moreira, Netz, Europhys. Lett. 52 (2000) 705).
+TEST(CounterIons, BetweenChargedWallsFollowPoissonAndBoltzmann) {
+  constexpr std::size_t kIons = 64;
+  constexpr double kTwoPi = 2 * std::numbers::pi, kWall = 0.02 / kTwoPi, kEdge = 100, kHalf = 0.860333589;
+  auto system = ions(kIons, 1e-4, 1, 0, 1, 1e-3);
+  system->interactions.clear();
+  const double side = std::sqrt(kIons / (2 * kWall));
+  const Vec<3> edges(side, side, kEdge);
+  for (Vec<3>& x : system->particles.x) x = x.cwiseQuotient(system->box.edges).cwiseProduct(edges);
+  system->box.edges = edges;
+  system->box.boundary[2] = Boundary::wall;
+  test::add_interaction(*system, "coulomb",
+                        {{"constant", 1.0},
+                         {"form", std::string("ewald")},
+                         {"accuracy", 1e-3},
+                         {"wall_charges", std::vector<double>(2, -kWall)}});
+  system->box.bath = {.type = Bath::Type::andersen, .temperature = 1, .last_temperature = 1, .rate = 0.02};
+  BetweenWalls seen(kEdge);
+  const auto run = test::make_run<3>(std::move(system), "edda", {.step = 1, .steps = 8000, .thermo_interval = 20});
+  run->add(seen);
+  run->run();
+  double weight = 0, squares = 0;
+  for (int k = 0; k < 1000; ++k) {
+    const double s = (k + 0.5) / 1000, density = 1 / std::pow(std::cos(kHalf * s), 2);
+    weight += density, squares += density * s * s;
+  }
+  const double at_wall = std::pow(2 * kHalf / kEdge, 2) / kTwoPi + kTwoPi * kWall * kWall;
+  const test::Mean spread = test::blocked_mean(seen.spread, 0), load = test::blocked_mean(seen.load, 0);
+  std::cout << "spread " << spread.value << " +- " << spread.error << " (" << squares / weight
+            << "), pressure on the walls " << load.value << " +- " << load.error << " (" << at_wall << ")\n";
+  EXPECT_NEAR(spread.value, squares / weight, 3 * spread.error + 0.01 * spread.value);
+  EXPECT_NEAR(load.value, at_wall, 3 * load.error + 0.01 * load.value);
+  EXPECT_LE(spread.error, 0.02 * spread.value);
+  EXPECT_LE(load.error, 0.03 * load.value);
 }
 
 }  // namespace

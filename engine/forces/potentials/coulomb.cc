@@ -20,8 +20,9 @@ std::unique_ptr<Interaction<D>> make(const Parameters& p, const InteractionConte
     else
       options::refuse(type, "form = \"ewald\" is for three dimensions; use form = \"damped-shifted\"");
   }
-  if (p.has("accuracy") || p.has("surface"))
-    options::refuse(type, "'accuracy' and 'surface' belong to form = \"ewald\"; leave them out or change 'form'");
+  if (p.has("accuracy") || p.has("surface") || p.has("wall_charges"))
+    options::refuse(
+        type, "'accuracy', 'surface' and 'wall_charges' belong to form = \"ewald\"; leave them out or change 'form'");
   if (p.text("form") == "plain") {
     if (p.has("cutoff") || p.has("damping"))
       options::refuse(type,
@@ -66,7 +67,9 @@ InteractionInfo coulomb() {
             "-",
             "of the form ewald: what surrounds the periodic images, an ideal conductor or vacuum; absent: conducting",
             Range::any,
-            {"conducting", "vacuum"}}}),
+            {"conducting", "vacuum"}},
+           {"wall_charges", Type::real_list, "none", "charge/length^2",
+            "of the form ewald between two walls: the charge per area of the lower and of the upper wall"}}),
       .formula =
           "sum over pairs of C q q'/r, or of C q q' [erfc(alpha r)/r - polynomial in r^2] up to the cutoff, or the "
           "Ewald sum over all pairs and images",
@@ -77,10 +80,14 @@ InteractionInfo coulomb() {
           "form ewald sums all periodic images in a box that is periodic along three axes, or along two axes and has "
           "walls along the third; 'accuracy' sets alpha and both cutoffs. If charges in a box that is periodic along "
           "three axes do not add up to zero, a uniform background neutralises them, and its energy is part of V. "
-          "Between walls they must add up to zero.",
+          "Between walls they must add up to zero together with 'wall_charges', which are spread evenly over the "
+          "planes at "
+          "both ends of the box; V contains "
+          "the energy of particles and walls in each other's field.",
       .source =
           "Wolf et al., J. Chem. Phys. 110 (1999) 8254; Fennell, Gezelter, J. Chem. Phys. 124 (2006) 234104; "
-          "Ewald, Ann. Phys. 369 (1921) 253; Kolafa, Perram, Mol. Simul. 9 (1992) 351",
+          "Ewald, Ann. Phys. 369 (1921) 253; Kolafa, Perram, Mol. Simul. 9 (1992) 351; "
+          "Yeh, Berkowitz, J. Chem. Phys. 111 (1999) 3155",
       .in_2d = make<2>,
       .in_3d = make<3>};
 }

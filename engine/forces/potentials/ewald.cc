@@ -12,8 +12,12 @@
 
 #include "engine/base/elementary.h"
 #include "engine/base/error.h"
+#include "engine/forces/potentials/damped_coulomb.h"
 #include "engine/forces/potentials/ewald_pair.h"
 #include "engine/forces/potentials/ewald_waves.h"
+#include "engine/forces/potentials/field_term.h"
+#include "engine/forces/potentials/inverse_distance.h"
+#include "engine/forces/potentials/uniform_field.h"
 #include "engine/forces/simd/wave_kernels.h"
 #include "engine/ranks/communicator.h"
 
@@ -30,8 +34,9 @@ struct EwaldOptions {
   double constant;
   PairWeight weight;       // charges or masses
   Vec3 edges;              // of the box that is repeated: that of the system, or one with room between its two walls
-  Vec3 surface;            // V has the terms (C/2) surface_k M_k², M = Σ q_j x_j [1/volume]
-  double constant_energy;  // of each charge with itself and with the background [energy]
+  Vec3 surface;            // V has the terms (C/2) surface_k (M_k² − Q Σ q_j x_jk² − Q² L_k²/12) [1/volume]
+  double excess;           // Q; 0 if the charges are neutral
+  double constant_energy;  // of each charge with itself and with the background, and of charged walls [energy]
   double background;       // the latter
   std::size_t total;       // number of particles on all ranks
   ChargeSums charges;      // of all ranks
@@ -59,17 +64,17 @@ struct WholeForce {
 class EwaldTerm final : public Interaction<3> {
  public:
   EwaldTerm(const Box<3>& box, const Particles<3>& particles, const EwaldOptions& options,
-            std::shared_ptr<const Waves> waves, std::unique_ptr<Interaction<3>> pairs)
+            std::shared_ptr<const Waves> waves, std::vector<std::unique_ptr<Interaction<3>>> parts)
       : box_(box),
         particles_(particles),
         options_(options),
         waves_(std::move(waves)),
-        pairs_(std::move(pairs)),
+        parts_(std::move(parts)),
         charge_(*pair_factors(options_.weight, particles_)),
         phases_{Phases(waves_->most[0]), Phases(waves_->most[1]), Phases(waves_->most[2])} {}
 
   void add_energy(Positions<3> x, PotentialSums& sums) const override {
-    pairs_->add_energy(x, sums);
+    for (const auto& part : parts_) part->add_energy(x, sums);
     need_inside(x);
     add_sums(x, sums);
   }
@@ -81,7 +86,7 @@ class EwaldTerm final : public Interaction<3> {
       throw Error(Failure::deck,
                   "ewald with surface = \"vacuum\" or between walls has no formula for the pressure tensor; use the "
                   "default surface, or no pressure_tensor and no transport");
-    pairs_->add_fluxes(x, v, fluxes);
+    for (const auto& part : parts_) part->add_fluxes(x, v, fluxes);
     fluxes.heat_known = false;
     need_inside(x);
     const Amplitudes& s = structure(x);
@@ -106,12 +111,12 @@ class EwaldTerm final : public Interaction<3> {
   }
   void add_forces_early(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums,
                         const Arrival& arrive) const override {
-    pairs_->add_forces_early(x, forces, sums, arrive);
+    for (const auto& part : parts_) part->add_forces_early(x, forces, sums, arrive);
     need_inside(x);
     const Amplitudes field = weighted(structure(x));
     std::vector<Vec3> f(x.size(), Vec3::Zero());
     for (const Id j : charged()) f[j] = charge_[j] * pull(j, x[j], field, Vec3::Zero());
-    add_surface(dipole(x, x), f);
+    add_surface(dipole(x, x), x, f);
     if (!add(rounded(f, forces.quantum()), forces, 1))
       throw Error(Failure::numerical,
                   "a force of the Ewald sum is too large or no number; use a smaller "
@@ -121,7 +126,8 @@ class EwaldTerm final : public Interaction<3> {
 
   std::uint64_t add_mean_forces(Positions<3> x, Positions<3> x_new, ForceSums<3>& forces, const char* changed,
                                 int sign) const override {
-    const std::uint64_t own = pairs_->add_mean_forces(x, x_new, forces, changed, sign);
+    std::uint64_t own = 0;
+    for (const auto& part : parts_) own += part->add_mean_forces(x, x_new, forces, changed, sign);
     // All charges feel a change of one of them, so `changed` does not matter here. What is subtracted has been added
     // before; other ranks take no part in that.
     if (sign > 0 || !same(x, mean_.x) || !same(x_new, mean_.x_new) || mean_.quantum != forces.quantum()) {
@@ -135,28 +141,44 @@ class EwaldTerm final : public Interaction<3> {
   }
 
   void add_hessian_product(Positions<3> x, Positions<3> w, ForceSums<3>& out) const override {
-    pairs_->add_hessian_product(x, w, out);
+    for (const auto& part : parts_) part->add_hessian_product(x, w, out);
     std::vector<Vec3> f(x.size(), Vec3::Zero());
     if (!all_moderate(x, w)) return out.invalidate();
     const Amplitudes field = weighted(structure(x)), change = weighted(structure_change(x, w));
     for (const Id j : charged())
       f[j] = -charge_[j] * (pull(j, x[j], change, Vec3::Zero()) + pull_change(j, x[j], field, w[j]));
-    if (has_surface()) add_surface(-total([&](Id j) { return Vec3(charge_[j] * w[j]); }), f);
+    if (has_surface()) add_surface(total([&](Id j) { return Vec3(charge_[j] * w[j]); }), w, f, -1);
     if (!add(rounded(f, out.quantum()), out, 1)) out.invalidate();
   }
 
   std::unique_ptr<Interaction<3>> among(const Particles<3>& some) const override {
-    auto pairs = pairs_->among(some);
-    if (!pairs) return nullptr;
-    return std::make_unique<EwaldTerm>(box_, some, options_, waves_, std::move(pairs));
+    std::vector<std::unique_ptr<Interaction<3>>> parts;
+    for (const auto& part : parts_)
+      if (parts.push_back(part->among(some)); !parts.back()) return nullptr;
+    return std::make_unique<EwaldTerm>(box_, some, options_, waves_, std::move(parts));
   }
   void join(Communicator& ranks) override { ranks_ = &ranks; }
-  double reach(Positions<3> x) const override { return pairs_->reach(x); }
-  double reach(const Particles<3>& block, Communicator& ranks) const override { return pairs_->reach(block, ranks); }
-  std::uint64_t interacting_pairs(Positions<3> x) const override { return pairs_->interacting_pairs(x); }
-  ForceScale scale(double distance) const override { return pairs_->scale(distance); }
+  double reach(Positions<3> x) const override {
+    double reach = 0;
+    for (const auto& part : parts_) reach = std::max(reach, part->reach(x));
+    return reach;
+  }
+  double reach(const Particles<3>& block, Communicator& ranks) const override {
+    double reach = 0;
+    for (const auto& part : parts_) reach = std::max(reach, part->reach(block, ranks));
+    return reach;
+  }
+  std::uint64_t interacting_pairs(Positions<3> x) const override {
+    std::uint64_t own = 0;
+    for (const auto& part : parts_) own += part->interacting_pairs(x);
+    return own;
+  }
+  ForceScale scale(double distance) const override { return parts_.front()->scale(distance); }
+  bool keeps_momentum() const override {
+    return std::ranges::all_of(parts_, [](const auto& part) { return part->keeps_momentum(); });
+  }
   Caution caution() const override {
-    if (options_.background == 0) return {};
+    if (options_.background == 0 || has_surface()) return {};
     if (options_.weight == PairWeight::masses)
       return {
           "a uniform background of negative mass fills the periodic box, without which the sum over all images does "
@@ -166,7 +188,9 @@ class EwaldTerm final : public Interaction<3> {
                 ", which a uniform background neutralises",
             "change the charges if that is not what you mean"};
   }
-  void use(const PairKernels& kernels) override { pairs_->use(kernels); }
+  void use(const PairKernels& kernels) override {
+    for (const auto& part : parts_) part->use(kernels);
+  }
 
  private:
   /// Whether own charges are at the same places.
@@ -369,7 +393,11 @@ class EwaldTerm final : public Interaction<3> {
     }
     field = weighted(field);
     for (const Id j : charged()) f[j] = charge_[j] * pull(j, 0.5 * (x[j] + relative[j]), field, relative[j] - x[j]);
-    if (has_surface()) add_surface(0.5 * (dipole(x, x) + dipole(x, x_new)), f);
+    if (has_surface()) {
+      std::vector<Vec3> middle(x.begin(), x.end());
+      for (const Id j : charged()) middle[j] = 0.5 * (x[j] + x_new[j]);
+      add_surface(0.5 * (dipole(x, x) + dipole(x, x_new)), middle, f);
+    }
     return f;
   }
 
@@ -387,11 +415,11 @@ class EwaldTerm final : public Interaction<3> {
     });
   }
   bool has_surface() const { return !options_.surface.isZero(0); }
-  /// Adds the forces of the terms (C/2) surface_k M_k².
-  void add_surface(const Vec3& dipole, std::vector<Vec3>& f) const {
+  /// Adds the forces of the terms with `surface`, −C surface_k q_j (M_k − Q x_jk), times `sign`.
+  void add_surface(const Vec3& dipole, Positions<3> x, std::vector<Vec3>& f, double sign = 1) const {
     if (!has_surface()) return;
-    const Vec3 field = -options_.constant * options_.surface.cwiseProduct(dipole);
-    for (const Id j : charged()) f[j] += charge_[j] * field;
+    const Vec3 slope = -sign * options_.constant * options_.surface;
+    for (const Id j : charged()) f[j] += charge_[j] * slope.cwiseProduct(dipole - options_.excess * x[j]);
   }
 
   void add_sums(Positions<3> x, PotentialSums& sums) const {
@@ -401,7 +429,10 @@ class EwaldTerm final : public Interaction<3> {
       sums.virial.add(virial);
     };
     const Amplitudes& s = structure(x);
-    const Vec3 moment = dipole(x, x);
+    Vec3 squares = dipole(x, x).cwiseAbs2();
+    if (const double q = options_.excess; q != 0)
+      squares -=
+          q * (total([&](Id j) { return Vec3(charge_[j] * x[j].cwiseAbs2()); }) + q / 12 * options_.edges.cwiseAbs2());
     const double scale = 0.5 / (options_.split.alpha * options_.split.alpha);
     const auto me = static_cast<std::size_t>(ranks_->rank()), ranks = static_cast<std::size_t>(ranks_->size());
     for (std::size_t k = me; k < waves_->size(); k += ranks) {
@@ -412,7 +443,7 @@ class EwaldTerm final : public Interaction<3> {
     add(options_.constant_energy - options_.background, 0);
     add(options_.background, 3 * options_.background);
     if (has_surface()) {
-      const double energy = 0.5 * options_.constant * options_.surface.dot(moment.cwiseProduct(moment));
+      const double energy = 0.5 * options_.constant * options_.surface.dot(squares);
       add(energy, energy);
     }
   }
@@ -465,7 +496,7 @@ class EwaldTerm final : public Interaction<3> {
   const Particles<3>& particles_;
   EwaldOptions options_;
   std::shared_ptr<const Waves> waves_;
-  std::unique_ptr<Interaction<3>> pairs_;
+  std::vector<std::unique_ptr<Interaction<3>>> parts_;  // the pairs; bonded pairs that are excluded; charged walls
   const std::vector<double>& charge_;
   Communicator alone_;
   Communicator* ranks_ = &alone_;
@@ -507,8 +538,10 @@ std::unique_ptr<Interaction<3>> ewald(std::string_view type, double constant, Pa
     if (walled >= 0 && (wall.number == 2 * static_cast<Id>(walled) || wall.number == 2 * static_cast<Id>(walled) + 1) &&
         (wall.moves() || wall.one_way))
       options::refuse(type, "form = \"ewald\" takes no walls of the box that move or let spheres pass; leave that out");
-  if (p.has("species") || (p.has("exclude") && p.text("exclude") == "bonded"))
-    options::refuse(type, "form = \"ewald\" acts between all particles so far; leave out 'species' and 'exclude'");
+  if (p.has("species"))
+    options::refuse(type,
+                    "form = \"ewald\" acts between all charges; leave out 'species', and give particles that take "
+                    "no part the charge 0");
   const double accuracy = p.has("accuracy") ? p.real("accuracy") : 1e-5;
   if (!(accuracy >= 1e-14 && accuracy <= 0.1))
     options::refuse(type, "'accuracy' is out of range; give a number from 1e-14 to 0.1");
@@ -525,11 +558,23 @@ std::unique_ptr<Interaction<3>> ewald(std::string_view type, double constant, Pa
   const double n = charges.count.value(), total = charges.total.value(), volume = box.edges.prod();
   const bool vacuum = p.has("surface") && p.text("surface") == "vacuum";
   const bool neutral = std::abs(total) <= 1e-12 * charges.absolute.value();
-  if ((vacuum || walled >= 0) && !neutral)
+  std::vector<double> plates = {0, 0};
+  if (p.has("wall_charges")) {
+    plates = p.get<std::vector<double>>("wall_charges");
+    if (walled < 0 || plates.size() != 2)
+      options::refuse(type,
+                      "'wall_charges' takes two numbers, the charge per area of the lower and of the upper wall, in "
+                      "a box with walls along one axis and periodic boundaries along the others; correct it");
+  }
+  const double area = walled >= 0 ? volume / box.edges[walled] : 0, on_walls = area * (plates[0] + plates[1]);
+  const double absolute = charges.absolute.value() + area * (std::abs(plates[0]) + std::abs(plates[1]));
+  const bool balanced = walled < 0 ? neutral : std::abs(total + on_walls) <= 1e-12 * absolute;
+  if (context.placed && !balanced && (vacuum || walled >= 0))
     options::refuse(type, std::string(vacuum ? "surface = \"vacuum\"" : "form = \"ewald\" between walls") +
                               " needs a neutral system, but the charges add up to " + short_text(total) +
-                              "; change the charges, or " +
-                              (vacuum ? "use surface = \"conducting\"" : "use form = \"damped-shifted\""));
+                              (vacuum ? "; change the charges, or use surface = \"conducting\""
+                                      : " and those on the walls to " + short_text(on_walls) +
+                                            "; change 'wall_charges' or the charges of particles"));
   if (p.has("surface") && walled >= 0)
     options::refuse(type, "'surface' is for boxes that are periodic along three axes; leave it out between walls");
   Vec3 edges = box.edges, surface = Vec3::Zero();
@@ -537,7 +582,7 @@ std::unique_ptr<Interaction<3>> ewald(std::string_view type, double constant, Pa
   if (walled >= 0) {
     Vec3 wall = edges;
     wall[walled] = 0;
-    const double gap = slab_gap(accuracy, n, volume, volume / edges[walled], wall.maxCoeff());
+    const double gap = slab_gap(accuracy, n, volume, area, wall.maxCoeff());
     wall[walled] = 2 * gap;
     longest = 0.5 * wall.minCoeff();
     edges[walled] += gap;
@@ -555,12 +600,29 @@ std::unique_ptr<Interaction<3>> ewald(std::string_view type, double constant, Pa
       neutral ? 0.0 : -constant * kPi * total * total / (2 * split.alpha * split.alpha * repeated);
   const double self = -constant * split.alpha / std::sqrt(kPi) * charges.squares.value();
   const EwaldPair pair(constant, split.alpha, split.cutoff, split.pair_error);
-  auto pairs = options::within_reach<3>(type, Cut<EwaldPair>(pair, split.cutoff, CutKind::switched, split.switch_from),
-                                        weight, p, context, pair);
-  return std::make_unique<EwaldTerm>(
-      box, context.particles,
-      EwaldOptions{split, constant, weight, edges, surface, self + background, background, context.total, charges},
-      std::make_shared<const Waves>(split, edges, constant), std::move(pairs));
+  std::vector<std::unique_ptr<Interaction<3>>> parts;
+  parts.push_back(options::within_reach<3>(
+      type, Cut<EwaldPair>(pair, split.cutoff, CutKind::switched, split.switch_from), weight, p, context, pair));
+  if (p.has("exclude") && p.text("exclude") == "bonded") {
+    // The waves contain the pairs that are excluded: −C erf(αr)/r.
+    const Bonds<3> bonds(box, context.bonds->list());
+    const InverseDistance whole(-constant);
+    parts.push_back(options::term<3>(DampedCoulomb(constant, split.alpha), weight, context, bonds, whole));
+    parts.push_back(options::term<3>(whole, weight, context, bonds, whole));
+  }
+  double walls = 0;
+  if (plates != std::vector<double>{0, 0}) {
+    // Two planes of charge: V = −2πC Σ q_i [σ z_i + σ' (L − z_i)] − 2πC A σ σ' L.
+    Vec3 field = Vec3::Zero();
+    field[walled] = 2 * kPi * constant * (plates[0] - plates[1]);
+    walls = -2 * kPi * constant * box.edges[walled] * plates[1] * (total + area * plates[0]);
+    parts.push_back(std::make_unique<FieldTerm<3, UniformField<3>>>(context.particles,
+                                                                    UniformField<3>(weight, context.particles, field)));
+  }
+  return std::make_unique<EwaldTerm>(box, context.particles,
+                                     EwaldOptions{split, constant, weight, edges, surface, neutral ? 0.0 : total,
+                                                  self + background + walls, background, context.total, charges},
+                                     std::make_shared<const Waves>(split, edges, constant), std::move(parts));
 }
 
 }  // namespace carom

@@ -11,7 +11,12 @@
 // Between two walls the sum is that over all images along the other two axes: the box that is repeated has empty room
 // between the walls of neighbouring images, and the dipole term (2π/Ω) M_z², z along the normal of the walls, takes off
 // the field of the images (Yeh, Berkowitz, J. Chem. Phys. 111 (1999) 3155). What remains of that field decreases by
-// e^(−2π/L) per length of empty room, L the longer edge of the walls (slab_gap()).
+// e^(−2π/L) per length of empty room, L the longer edge of the walls (slab_gap()). If the walls carry charges, those of
+// the particles need not add up to zero; the dipole term is then (2π/Ω) (M_z² − Q Σ q_i z_i² − Q² L_z²/12), L_z the
+// edge of the box that is repeated (Ballenegger, Arnold, Cerdà, J. Chem. Phys. 131 (2009) 094107). The field of two
+// walls of charge σ and σ' per area is uniform, 2πC (σ − σ').
+//
+// Pairs that are excluded have the term −C q_i q_j erf(αr)/r, which takes them out of the waves.
 //
 // Masses, with C = −G and a background of negative mass, are summed like charges.
 //

@@ -9,7 +9,7 @@
 //   hessian_product(i, x, w)       V_i″ w
 //   least_force(distance)          the force at this distance from where it is zero [force]; 0: unknown
 //   among(particles)               the field for other particles
-// and, if it gives all particles the same acceleration, acceleration().
+// and acceleration(), that of all particles, or null if they have no common one.
 
 #include <algorithm>
 #include <utility>
@@ -65,7 +65,7 @@ class FieldTerm final : public Interaction<D> {
   }
   const Vec<D>* common_acceleration() const override {
     if constexpr (requires { field_.acceleration(); })
-      return &field_.acceleration();
+      return field_.acceleration();
     else
       return nullptr;
   }

@@ -122,6 +122,7 @@ class Bonds {
                                                     : Vec<D>(step.vectors[i] - step.vectors[j]);
           for (int k = 0; k < 3; ++k) batch.d_new[k][batch.n] = k < D ? d_new[k] : 0;
         }
+        batch.weight[batch.n] = step.weight ? (*step.weight)[i] * (*step.weight)[j] : 1;
         batch.second[batch.n++] = j;
         if (batch.n == PairBatch::kCapacity) flush();
       }

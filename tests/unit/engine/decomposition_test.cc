@@ -282,7 +282,8 @@ TEST(Decomposition, NoRankHasAllParticles) {
     for (Id i = 0; i < p.size(); ++i) EXPECT_EQ(p.x[i], all.x[p.id[i]] + all.v[p.id[i]]);
   });
 }
-/// Ions in a long box, some spheres without charge, one ion fixed if `fixed`; between walls if there is no surface.
+/// Ions in a long box, some spheres without charge, one ion fixed if `fixed`; between charged walls if there is no
+/// surface. Bonded ions do not act on each other.
 std::unique_ptr<System<3>> ions(const std::string& surface, bool fixed = false) {
   std::vector<Vec<3>> x, v;
   std::vector<double> radius, mass;
@@ -298,10 +299,16 @@ std::unique_ptr<System<3>> ions(const std::string& surface, bool fixed = false) 
   for (const Id i : {510, 511}) p.charge[i] = 0;
   if (fixed) p.mass[7] = std::numeric_limits<double>::infinity(), p.v[7] = Vec<3>::Zero();
   Given given = {{"constant", 1.0}, {"form", std::string("ewald")}, {"accuracy", 0.01}};
-  if (surface.empty())
+  if (surface.empty()) {
     system->box.boundary[2] = Boundary::wall;
-  else
+    p.charge[5] += 1.25;
+    given.set("wall_charges", std::vector<double>{-0.01, 0.01 - 1.25 / (54.4 * 6.8)});
+  } else {
     given.set("surface", surface);
+    given.set("exclude", std::string("bonded"));
+    test::add_interaction(*system, "harmonic-bond",
+                          {{"pairs", PairList{{0, 1}, {17, 33}, {511, 3}}}, {"stiffness", 1.0}, {"rest_length", 1.7}});
+  }
   test::add_interaction(*system, "coulomb", given);
   return system;
 }

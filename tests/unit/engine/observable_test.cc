@@ -83,6 +83,19 @@ TEST(Profile, ByHand) {
   across->sample(0, system->particles);
   EXPECT_EQ(across->table()[0].values, (std::vector<double>{0.5, 1.5, 2.5, 3.5, 4.5}));
   EXPECT_EQ(across->table()[1].values, (std::vector<double>{1 / 8.0, 0, 1 / 8.0, 1 / 8.0, 1 / 8.0}));
+
+  system->species = {"A", "B"};
+  system->particles.species = {0, 1, 1, 0};
+  const auto each = make_observable("profile", *system, {{"interval", 1.0}, {"bins", 2}});
+  for (const double time : {0.0, 1.0}) each->sample(time, system->particles);
+  const auto of_species = each->table();
+  ASSERT_EQ(of_species.size(), 13u);
+  EXPECT_EQ(of_species[3].name, "density_A");
+  EXPECT_EQ(of_species[3].values, (std::vector<double>{1 / 20.0, 1 / 20.0}));
+  EXPECT_EQ(of_species[4].name, "density_B");
+  EXPECT_EQ(of_species[4].values, (std::vector<double>{1 / 20.0, 1 / 20.0}));
+  EXPECT_EQ(of_species[9].name, "error_density_A");
+  EXPECT_EQ(of_species[12].name, "samples_density_B");
 }
 
 TEST(Profile, OfAUniformFluidIsFlat) {

@@ -53,9 +53,13 @@ inline const std::vector<Case>& cases() {
       {"inverse-power",
        Boundary::periodic,
        {{"epsilon", 1.0}, {"sigma", 0.8}, {"exponent", 9.5}, {"cutoff", 2.0}, {"cut", "switch"s}}},
-      {"uniform-field", Boundary::wall, {}},
+      {"uniform-field", Boundary::wall, {{"acceleration", 0.0}}},
+      {"uniform-field", Boundary::wall, {{"electric_field", 0.0}}},
       {"harmonic-trap", Boundary::wall, {{"stiffness", 0.7}}},
       {"coulomb", Boundary::periodic, {{"constant", 1.3}, {"form", "ewald"s}, {"accuracy", 1e-11}}},
+      {"coulomb",
+       Boundary::periodic,
+       {{"constant", 1.3}, {"form", "ewald"s}, {"accuracy", 1e-11}, {"exclude", "bonded"s}}},
   };
   return all;
 }
@@ -71,14 +75,17 @@ void for_each_case(Check&& check) {
     SCOPED_TRACE(each.type + " in " + std::to_string(D) + " dimensions");
     Scene<D> scene(D == 2 ? 24 : 40, 5, each.boundary, 0.75);
     auto parameters = each.parameters;
-    if (each.type == "harmonic-bond" && each.boundary == Boundary::periodic)  // shorter than half the box, across edges
-      for (const auto& [i, j] : kPeriodicBonds) {
-        scene.particles.x[j] = scene.particles.x[i] + Vec<D>::Constant(0.9);
+    const bool excludes = !parameters.empty() && parameters.back().first == "exclude";
+    if (excludes || (each.type == "harmonic-bond" && each.boundary == Boundary::periodic))
+      for (const auto& [i, j] : kPeriodicBonds) {  // shorter than half the box, across edges
+        scene.particles.x[j] = scene.particles.x[i] + Vec<D>::Constant(j < 5 ? 0.9 : -0.9);
         scene.box.wrap(scene.particles.x[j], scene.particles.image[j]);
       }
-    if (each.type == "uniform-field") parameters.emplace_back("acceleration", std::vector<double>(D, -0.6));
-    const auto term = scene.make(each.type, parameters);
-    const auto remake = [&](const Scene<D>& other) { return other.make(each.type, parameters); };
+    if (each.type == "uniform-field") parameters.back().second = std::vector<double>(D, -0.6);
+    const auto remake = [&](const Scene<D>& other) {
+      return other.make(each.type, parameters, excludes ? std::make_shared<BondTable>(kPeriodicBonds) : nullptr);
+    };
+    const auto term = remake(scene);
     if constexpr (std::is_invocable_v<Check, Scene<D>&, const Interaction<D>&, decltype(remake)>)
       check(scene, *term, remake);
     else

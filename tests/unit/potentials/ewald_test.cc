@@ -6,6 +6,7 @@
 
 #include <boost/math/constants/constants.hpp>
 #include <boost/math/special_functions/erf.hpp>
+#include <numbers>
 
 #include "engine/base/error.h"
 #include "tests/unit/potentials/precise.h"
@@ -22,14 +23,18 @@ using test::mean_forces;
 using test::Precise;
 using test::Scene;
 
+constexpr double kPi = std::numbers::pi;
+
 std::unique_ptr<Interaction<3>> ewald(const Scene<3>& scene, double accuracy, const std::string& surface = "conducting",
                                       double constant = 1) {
   return scene.make("coulomb",
                     {{"constant", constant}, {"form", "ewald"s}, {"accuracy", accuracy}, {"surface", surface}});
 }
 
-std::unique_ptr<Interaction<3>> ewald_between_walls(const Scene<3>& scene, double accuracy) {
-  return scene.make("coulomb", {{"constant", 1.0}, {"form", "ewald"s}, {"accuracy", accuracy}});
+std::unique_ptr<Interaction<3>> ewald_between_walls(const Scene<3>& scene, double accuracy,
+                                                    const std::vector<double>& wall_charges = {0, 0}) {
+  return scene.make("coulomb",
+                    {{"constant", 1.0}, {"form", "ewald"s}, {"accuracy", accuracy}, {"wall_charges", wall_charges}});
 }
 
 /// A crystal of `cells`³ cubic cells of edge 1, each with these ions.
@@ -270,9 +275,13 @@ Scene<3> slab(const Vec<3>& edges) {
 }
 
 TEST(Ewald, BetweenWallsItIsTheSumOverImagesAlongThem) {
-  for (const Vec<3>& edges : {Vec<3>(4, 4, 4), Vec<3>(4, 5, 2), Vec<3>(4, 3.5, 9)}) {
-    const Scene<3> scene = slab(edges);
-    const auto& p = scene.particles;
+  for (const auto& [edges, wall_charges] : {std::pair{Vec<3>(4, 4, 4), std::vector{0.0, 0.0}},
+                                            {Vec<3>(4, 5, 2), {0.3, -0.3}},
+                                            {Vec<3>(4, 3.5, 9), {0.2, -0.6}}}) {
+    Scene<3> scene = slab(edges);
+    auto& p = scene.particles;
+    const double area = edges[0] * edges[1], on_walls = area * (wall_charges[0] + wall_charges[1]);
+    p.charge[4] -= on_walls;
     // The energy of particle i at a place moved along an axis, with all others and their images.
     const auto energy_of = [&](Id i, std::size_t axis, long double moved, long double alpha) {
       long double sum = 0;
@@ -282,9 +291,15 @@ TEST(Ewald, BetweenWallsItIsTheSumOverImagesAlongThem) {
         if (i != j) d[axis] += moved;
         sum += p.charge[i] * p.charge[j] * slab_pair(edges, d, alpha);
       }
-      return sum;
+      const long double z = p.x[i][2] + (axis == 2 ? moved : 0);
+      const long double in_walls = wall_charges[0] * z + wall_charges[1] * (edges[2] - z);
+      return sum - 2 * kPi * p.charge[i] * in_walls;
     };
-    long double exact = 0, other = 0;
+    // Half of the energy of a charge in the field of the walls belongs to the walls.
+    long double exact = -2 * kPi * wall_charges[1] * edges[2] * wall_charges[0] * area, other = 0;
+    for (Id i = 0; i < p.size(); ++i)
+      exact -= kPi * p.charge[i] * (wall_charges[0] * p.x[i][2] + wall_charges[1] * (edges[2] - p.x[i][2]));
+    other = exact;
     std::vector<Vec<3>> force(p.size());
     for (Id i = 0; i < p.size(); ++i) {
       exact += 0.5L * energy_of(i, 0, 0, 0.9L);
@@ -299,9 +314,10 @@ TEST(Ewald, BetweenWallsItIsTheSumOverImagesAlongThem) {
       }
     }
     EXPECT_NEAR(static_cast<double>(exact - other), 0, 1e-12);
-    const double unit = 2.375 / std::pow(edges.prod() / 12, 2.0 / 3);  // the mean of q²
+    double unit = 0;  // from the mean of q²
+    for (const double q : p.charge) unit += q * q / 12 / std::pow(edges.prod() / 12, 2.0 / 3);
     for (const double accuracy : {1e-2, 1e-4, 1e-6, 1e-8}) {
-      const auto term = ewald_between_walls(scene, accuracy);
+      const auto term = ewald_between_walls(scene, accuracy, wall_charges);
       EXPECT_NEAR(energy(*term, p.x), static_cast<double>(exact), 10 * accuracy * unit);
       const auto f = forces(*term, p.x);
       double sum = 0;
@@ -315,13 +331,44 @@ TEST(Ewald, BetweenWallsItIsTheSumOverImagesAlongThem) {
 
 TEST(Ewald, MeanForcesBetweenWallsDoExactlyTheWork) {
   Scene<3> scene = slab({4, 5, 6});
-  const auto term = ewald_between_walls(scene, 1e-6);
   const auto& x = scene.particles.x;
-  for (const double size : {1e-6, 0.01, 0.2}) {
-    auto w = scene.random_vectors(size);
-    for (auto& each : w) each += Vec<3>(0.3, -0.2, 0.1);
-    expect_exact_work(scene, *term, x, displaced(x, w, 1));
+  for (const auto& wall_charges : {std::vector{0.0, 0.0}, {0.2, 0.2}}) {
+    scene.particles.charge[4] -= 20 * (wall_charges[0] + wall_charges[1]);  // walls of equal charges pull nobody
+    const auto term = ewald_between_walls(scene, 1e-6, wall_charges);
+    for (const double size : {1e-6, 0.01, 0.2}) {
+      auto w = scene.random_vectors(size);
+      for (auto& each : w) each += Vec<3>(0.3, -0.2, 0.1);
+      expect_exact_work(scene, *term, x, displaced(x, w, 1));
+    }
   }
+}
+
+TEST(Ewald, LeavesOutBondedPairs) {
+  Scene<3> scene(40, 6, Boundary::periodic, 0.7);
+  for (Id i = 0; i < 40; ++i) scene.particles.charge[i] = i % 2 == 0 ? 1.5 : -1;
+  auto& x = scene.particles.x;
+  // A triangle, two bonds of one pair, and a bond across the edges, longer than the pair term reaches.
+  const PairList bonds = {{0, 1}, {2, 1}, {0, 2}, {1, 0}, {3, 4}};
+  x[1] = x[0] + Vec<3>(0.6, 0, 0), x[2] = x[0] + Vec<3>(0.2, 0.8, 0.1), x[3] = {0.3, 0.2, 5.9}, x[4] = {4.3, 4.2, 3.4};
+  const std::vector<std::pair<std::string, ParameterValue>> parameters = {
+      {"constant", 1.2}, {"form", "ewald"s}, {"accuracy", 1e-9}, {"exclude", "bonded"s}};
+  const auto some = scene.make("coulomb", parameters, std::make_shared<BondTable>(bonds));
+  const auto all = ewald(scene, 1e-9, "conducting", 1.2);
+  auto f = forces(*all, x);
+  double v = energy(*all, x);
+  for (const auto& [i, j] : {std::pair{0, 1}, {1, 2}, {0, 2}, {3, 4}}) {
+    const auto first = static_cast<Id>(i), second = static_cast<Id>(j);
+    const Vec<3> d = scene.nearest(x[first] - x[second]);
+    const double pair = 1.2 * scene.particles.charge[first] * scene.particles.charge[second] / d.norm();
+    v -= pair;
+    f[first] -= pair / d.squaredNorm() * d;
+    f[second] += pair / d.squaredNorm() * d;
+  }
+  EXPECT_NEAR(energy(*some, x), v, 1e-12 * std::abs(v));
+  const auto found = forces(*some, x);
+  for (Id i = 0; i < 40; ++i) EXPECT_LE((found[i] - f[i]).norm(), 1e-7) << i;
+  const auto w = scene.random_vectors(0.2);
+  expect_exact_work(scene, *some, x, displaced(x, w, 1));
 }
 
 TEST(Ewald, MassesInAPeriodicBoxAttractLikeChargesOfTheOtherSign) {
@@ -417,7 +464,9 @@ TEST(Ewald, RefusesWhatItCannotDo) {
   expect(refusal(scene, {{"surface", "vacuum"s}}), "the charges add up to 2.5");
   expect(refusal(scene, {{"accuracy", 1e-15}}), "give a number from 1e-14 to 0.1");
   expect(refusal(scene, {{"cutoff", 2.0}}), "from 'accuracy'");
-  expect(refusal(scene, {{"exclude", "bonded"s}}), "leave out 'species' and 'exclude'");
+  expect(refusal(scene, {{"exclude", "bonded"s}}), "there are no bonds");
+  expect(refusal(scene, {{"species", std::vector{"A"s, "B"s}}}), "give particles that take no part the charge 0");
+  expect(refusal(scene, {{"wall_charges", std::vector{0.1, -0.1}}}), "in a box with walls along one axis");
   expect(refusal(Scene<3>(10, 6, Boundary::wall, 0.7), {}), "periodic along all three axes");
   Scene<3> between = slab({4, 4, 4});
   expect(refusal(between, {{"surface", "conducting"s}}), "leave it out between walls");
@@ -427,7 +476,9 @@ TEST(Ewald, RefusesWhatItCannotDo) {
   EXPECT_THROW(forces(*term, beyond), Error);
   EXPECT_THROW(energy(*term, beyond), Error);
   between.particles.charge[0] = 1;
-  expect(refusal(between, {}), "between walls needs a neutral system, but the charges add up to -1");
+  expect(refusal(between, {}),
+         "between walls needs a neutral system, but the charges add up to -1 and those on the walls to 0");
+  expect(refusal(between, {{"wall_charges", std::vector{0.1, 0.1}}}), "to -1 and those on the walls to 3.2");
   between.box.boundary[2] = Boundary::open;
   expect(refusal(between, {}), "has walls along one of them");
   scene.box.edges[0] = 1e9;

@@ -311,6 +311,11 @@ TEST(Refused, VectorsOfTheWrongLength) {
   const Scene<3> scene(5, 10, Boundary::wall, 0.5);
   expect_contains(refusal(scene, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}}),
                   "'acceleration' has 2 components; give 3");
+  expect_contains(refusal(scene, "uniform-field", {}), "give 'acceleration' or 'electric_field'");
+  expect_contains(
+      refusal(scene, "uniform-field",
+              {{"acceleration", std::vector<double>{0, 0, -1}}, {"electric_field", std::vector<double>{0, 0, -1}}}),
+      "give one of them");
   expect_contains(refusal(scene, "harmonic-trap", {{"stiffness", 1.0}, {"centre", std::vector<double>{1}}}),
                   "'centre' has 1 components; give 3");
 }
