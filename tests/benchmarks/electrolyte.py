@@ -25,7 +25,6 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools"))
 from carom_files import Trajectory, find_carom, run_carom
 
 DENSITY, CONSTANT, STEP = 0.0925, 1.68, 0.005
-CUTOFFS = 3.0, 4.0, 5.0, 6.0, 8.0, 10.0
 
 DECK = """format = 1
 [system]
@@ -102,14 +101,22 @@ class Carom:
         return (self.run(ions, accuracy, 3 * steps, ranks=ranks)[1] - self.run(ions, accuracy, steps, ranks=ranks)[1]) / (2 * steps)
 
 
+def write_data(path, edge, position, charge, velocity=None):
+    """Writes a data file of LAMMPS for ions of mass 1 in a cube."""
+    def rows(values):
+        return [" ".join(map(repr, map(float, each))) for each in values]
+    atoms = [f"{i + 1} 1 {float(q) * CONSTANT ** 0.5!r} {x}" for i, (q, x) in enumerate(zip(charge, rows(position % edge)))]
+    parts = ["", f"{len(charge)} atoms", "1 atom types", *(f"0 {edge!r} {axis}lo {axis}hi" for axis in "xyz"), "", "Masses", "", "1 1.0", "",
+             "Atoms # charge", "", *atoms]
+    if velocity is not None:
+        parts += ["", "Velocities", "", *(f"{i + 1} {v}" for i, v in enumerate(rows(velocity)))]
+    path.write_text("\n".join(parts) + "\n")
+
+
 class Lammps:
     def __init__(self, command, directory, position, charge):
         self.command, self.directory = command, directory
-        edge = (len(charge) / DENSITY) ** (1 / 3)
-        lines = [f"{len(charge)} atoms", "1 atom types"] + [f"0 {edge!r} {axis}lo {axis}hi" for axis in "xyz"] + ["Masses", "1 1.0", "Atoms # charge"]
-        lines += [f"{i + 1} 1 {q * CONSTANT ** 0.5!r} " + " ".join(map(repr, map(float, x))) for i, (x, q) in enumerate(zip(position % edge, charge))]
-        lines = [line if i in (0, 1) or not line[0].isupper() else f"\n{line}\n" for i, line in enumerate(lines)]
-        (directory / "data").write_text("\n" + "\n".join(lines) + "\n")
+        write_data(directory / "data", (len(charge) / DENSITY) ** (1 / 3), position, charge)
 
     def run(self, style, cutoff, accuracy, commands, steps=1, epsilon=1.0, ranks=1):
         script = LAMMPS.format(data=self.directory / "data", cutoff=cutoff, epsilon=epsilon, style=style, accuracy=accuracy, step=STEP, steps=steps)
@@ -126,7 +133,7 @@ class Lammps:
         return np.loadtxt(self.directory / "forces", skiprows=9)[:, 1:]
 
     def seconds_per_step(self, style, cutoff, accuracy, steps, ranks):
-        commands = f"velocity all create 1.0 1 loop geom\nrun 10\nrun {steps}\n"
+        commands = f"velocity all create 1.0 1 loop geom\nrun 2\nrun {steps}\n"
         lines = [line for line in self.run(style, cutoff, accuracy, commands, steps, ranks=ranks).splitlines() if line.startswith("Loop time")]
         return float(lines[-1].split()[3]) / steps
 
@@ -139,6 +146,7 @@ def main():
     parser.add_argument("--ranks", type=int, default=1)
     parser.add_argument("--accuracy", type=float, default=1e-4)
     parser.add_argument("--steps", type=int, default=20)
+    parser.add_argument("--cutoffs", type=float, nargs="+", default=[3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
     given = parser.parse_args()
     print("| ions | force error | Carom, ms per step | LAMMPS ewald (cutoff) | ratio | LAMMPS pppm (cutoff) | ratio |\n|---|---|---|---|---|---|---|")
     for ions in given.ions:
@@ -150,7 +158,7 @@ def main():
             entries = []
             for style in ("ewald", "pppm"):
                 best = None
-                for cutoff in CUTOFFS:
+                for cutoff in given.cutoffs:
                     if 2 * cutoff > (ions / DENSITY) ** (1 / 3):
                         continue
                     accuracy = error

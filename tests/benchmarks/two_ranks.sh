@@ -35,7 +35,7 @@ decks["psa, 108000 ions"]=$(ions 108000 105.32 psa 4)
 run() {
   mpirun -n "$1" "$carom" run "${@:3}" --quiet -o "$runs/$2" --set output.frame_interval=1e9 --set output.thermo_interval=1e9
   awk '/^total / { print $2 }' "$runs/$2/run.log"
-  rm -r "$runs/$2"
+  rm -r "${runs:?}/$2"
 }
 
 # pair NAME: prints the two times

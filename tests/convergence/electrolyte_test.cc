@@ -13,12 +13,11 @@
 namespace carom {
 namespace {
 
-/// The restricted primitive model with 32 ions at the number density 0.2, l_B/d = 1.68, at random on
-/// fcc sites.
-std::unique_ptr<System<3>> electrolyte(unsigned seed, const std::string& surface = "conducting") {
-  const std::size_t n = 32;
+/// The restricted primitive model with n ions at this number density, l_B/d = 1.68, at random on fcc sites.
+std::unique_ptr<System<3>> electrolyte(unsigned seed, const std::string& surface = "conducting", std::size_t n = 32,
+                                       double density = 0.2) {
   Box<3> box;
-  box.edges = Vec<3>::Constant(std::cbrt(n / 0.2));
+  box.edges = Vec<3>::Constant(std::cbrt(static_cast<double>(n) / density));
   box.boundary.fill(Boundary::periodic);
   auto system = test::make_system<3>(box.edges, Boundary::periodic, lattice_sites<3>(Lattice::centred, box, n, 0.0),
                                      std::vector<Vec<3>>(n, Vec<3>::Zero()), std::vector<double>(n, 0.5),
@@ -47,6 +46,16 @@ TEST(Electrolyte, EddaKeepsEnergyAndMomentumThroughCollisions) {
     EXPECT_LE(*s.max_momentum_error, 1e-12);
     EXPECT_GT(s.counters.sphere_sphere, 300u);
   }
+}
+
+TEST(ElectrolyteSlow, EddaKeepsEnergyAndMomentumThroughAMillionCollisions) {
+  const auto run = test::run_steps<3>(electrolyte(1, "conducting", 108, 0.5), "edda", 0.05, 100'000);
+  const auto& s = run->statistics();
+  std::cout << s.max_energy_error / s.energy_reference << ", momentum " << *s.max_momentum_error << ", collisions "
+            << s.counters.sphere_sphere << '\n';
+  EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);
+  EXPECT_LE(*s.max_momentum_error, 1e-11);
+  EXPECT_GT(s.counters.sphere_sphere, 1'000'000u);
 }
 
 TEST(Electrolyte, EveryOtherMethodRuns) {

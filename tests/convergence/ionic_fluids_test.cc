@@ -83,14 +83,15 @@ void expect_primitive_model(const PrimitiveModelState& state, std::int64_t steps
 TEST(PrimitiveModel, HasTheEnergyAndPressureOfTheLiterature) {
   expect_primitive_model({1.0001, .5516, .0016, 1.094, .005}, 8000);
 }
-TEST(PrimitiveModelSlow, HasTheEnergyAndPressureOfTheLiterature) {
-  for (const PrimitiveModelState& state : {PrimitiveModelState{0.00911, .1029, .0013, .9701, .0008},
-                                           {0.10376, .2739, .0014, .9445, .0012},
-                                           {0.42502, .4341, .0017, .9774, .0046},
-                                           {1.0001, .5516, .0016, 1.094, .005},
-                                           {1.9676, .6511, .0020, 1.346, .009}})
-    expect_primitive_model(state, 60000);
-}
+class PrimitiveModelSlow : public testing::TestWithParam<PrimitiveModelState> {};
+TEST_P(PrimitiveModelSlow, HasTheEnergyAndPressureOfTheLiterature) { expect_primitive_model(GetParam(), 60000); }
+INSTANTIATE_TEST_SUITE_P(All, PrimitiveModelSlow,
+                         testing::Values(PrimitiveModelState{0.00911, .1029, .0013, .9701, .0008},
+                                         PrimitiveModelState{0.10376, .2739, .0014, .9445, .0012},
+                                         PrimitiveModelState{0.42502, .4341, .0017, .9774, .0046},
+                                         PrimitiveModelState{1.0001, .5516, .0016, 1.094, .005},
+                                         PrimitiveModelState{1.9676, .6511, .0020, 1.346, .009}),
+                         [](const auto& test) { return "State" + std::to_string(test.index); });
 
 /// The one-component plasma in units of the ion-sphere radius a = (3/4πρ)^(1/3), at Γ = q²/(4πε₀ a kT). The energy of
 /// the fluid for Γ ≥ 1: U/NkT = aΓ + bΓ^(1/4) + cΓ^(−1/4) + d, a fit to Monte Carlo runs of 128 to 1024 ions (Slattery,
