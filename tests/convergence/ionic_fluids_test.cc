@@ -62,6 +62,10 @@ Means means_of(std::unique_ptr<System<3>> system, const char* method, double ste
 /// Rasaiah, Card, Valleau, J. Chem. Phys. 56 (1972) 248, with their standard errors, as functions of the concentration.
 struct PrimitiveModelState {
   double molar, energy, energy_error, pressure, pressure_error;
+
+  friend std::ostream& operator<<(std::ostream& out, const PrimitiveModelState& state) {
+    return out << state.molar << " M";
+  }
 };
 
 void expect_primitive_model(const PrimitiveModelState& state, std::int64_t steps) {

@@ -54,8 +54,8 @@ inline const std::vector<Case>& cases() {
        Boundary::periodic,
        {{"epsilon", 1.0}, {"sigma", 0.8}, {"exponent", 9.5}, {"cutoff", 2.0}, {"cut", "switch"s}}},
       {"uniform-field", Boundary::wall, {{"acceleration", 0.0}}},
-      {"uniform-field", Boundary::wall, {{"electric_field", 0.0}}},
       {"harmonic-trap", Boundary::wall, {{"stiffness", 0.7}}},
+      {"uniform-field", Boundary::wall, {{"electric_field", 0.0}}},
       {"coulomb", Boundary::periodic, {{"constant", 1.3}, {"form", "ewald"s}, {"accuracy", 1e-11}}},
       {"coulomb",
        Boundary::periodic,
@@ -78,7 +78,7 @@ void for_each_case(Check&& check) {
     const bool excludes = !parameters.empty() && parameters.back().first == "exclude";
     if (excludes || (each.type == "harmonic-bond" && each.boundary == Boundary::periodic))
       for (const auto& [i, j] : kPeriodicBonds) {  // shorter than half the box, across edges
-        scene.particles.x[j] = scene.particles.x[i] + Vec<D>::Constant(j < 5 ? 0.9 : -0.9);
+        scene.particles.x[j] = scene.particles.x[i] + Vec<D>::Constant(excludes && j > 5 ? -0.9 : 0.9);
         scene.box.wrap(scene.particles.x[j], scene.particles.image[j]);
       }
     if (each.type == "uniform-field") parameters.back().second = std::vector<double>(D, -0.6);
