@@ -24,11 +24,13 @@ std::vector<Bytes> PathExchange<D>::swap() {
 template <int D>
 std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain, const std::function<bool(bool)>& agree) {
   std::uint64_t rounds = 0;
-  for (bool more = true; more; ++rounds) {
-    if (subdomain) add_paths(*subdomain);
-    for (const Bytes& bytes : swap())
-      for (Reader reader(bytes); subdomain && reader.more();) subdomain->paths().read_script(reader);
-    if (subdomain) subdomain->repair();
+  for (bool more = true; more; rounds += 2) {
+    for (int round = 0; round < 2; ++round) {  // most windows need two, few need more
+      if (subdomain) add_paths(*subdomain);
+      for (const Bytes& bytes : swap())
+        for (Reader reader(bytes); subdomain && reader.more();) subdomain->paths().read_script(reader);
+      if (subdomain) subdomain->repair();
+    }
     more = agree(subdomain &&
                  std::ranges::any_of(subdomain->changed(), [&](Slot i) { return subdomain->ownership().is_seen(i); }));
   }

@@ -22,9 +22,9 @@ class PathExchange {
   }
   /// Sends the messages; returns the messages received from the neighbours. Collective.
   std::vector<Bytes> swap();
-  /// Exchanges the paths of a window and repairs it, in rounds; returns their number. After each round agree(changed)
-  /// is called, which gets whether paths changed here that a neighbour has, and returns whether a path changed on any
-  /// rank: then there is another round. Null: this rank has no subdomain. Collective.
+  /// Exchanges the paths of a window and repairs it, in rounds; returns their number. After every second round
+  /// agree(changed) is called, which gets whether paths changed here in this round that a neighbour has, and returns
+  /// whether a path changed on any rank: then there are two more. Null: this rank has no subdomain. Collective.
   std::uint64_t make_consistent(Subdomain<D>* subdomain, const std::function<bool(bool)>& agree);
 
  private:
