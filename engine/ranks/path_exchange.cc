@@ -15,10 +15,11 @@ void PathExchange<D>::start(const Bisection<D>& bisection) {
 }
 
 template <int D>
-std::vector<Bytes> PathExchange<D>::swap() {
-  std::vector<Bytes> received = ranks_.swap(std::move(outgoing_), partners_);
-  outgoing_.assign(partners_.size(), {});
-  return received;
+const std::vector<Bytes>& PathExchange<D>::swap() {
+  for (Bytes& read : received_) read.clear();
+  received_.resize(partners_.size());
+  received_ = ranks_.swap(std::exchange(outgoing_, std::move(received_)), partners_);
+  return received_;
 }
 
 template <int D>
