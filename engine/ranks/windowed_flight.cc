@@ -19,8 +19,8 @@ constexpr std::size_t kMaxNeighbours = 64;            // neighbours of a subdoma
 constexpr double kMeanWork = 64, kMaxWork = 64 * 64;  // mean and largest work of a sphere, as integers
 constexpr double kWorkTolerance = 0.1;                // smaller relative differences from the mean are ignored
 
-/// Returns freed memory to the system; call it after large temporary arrays. Address sanitizer has an allocator of its own and
-/// leaves that of glibc uninitialised, where malloc_trim() called by several threads at once crashes.
+/// Returns freed memory to the system; call it after large temporary arrays. Address sanitizer has an allocator of its
+/// own and leaves that of glibc uninitialised, where malloc_trim() called by several threads at once crashes.
 void trim_memory() {
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
   malloc_trim(0);
