@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <utility>
 
 namespace carom {
 
@@ -151,7 +152,7 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing) {
 std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<const int> partners) {
   ranks_.watch().begin_call();
   outgoing_ = std::move(outgoing);
-  incoming_.assign(partners.size(), {});
+  incoming_.resize(partners.size());
   first_in_.resize(partners.size());
   first_out_.resize(partners.size());
   std::vector<MPI_Request> requests;
@@ -184,8 +185,7 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<
       });
   }
   if (!requests.empty()) ranks_.watch().wait(requests);
-  outgoing_.clear();
-  return std::move(incoming_);
+  return std::exchange(incoming_, std::move(outgoing_));  // the next messages reuse the memory
 }
 
 std::vector<Bytes> MpiCommunicator::gather(const Bytes& mine) {

@@ -221,10 +221,11 @@ void EventSearch<D>::move(Slot i, double now) {
 
 template <int D>
 void EventSearch<D>::set_border(std::span<const Slot> slots, double now) {
-  at_border_.assign(flights_.capacity(), 0);
+  const auto before = std::exchange(at_border_, std::vector<std::uint8_t>(flights_.capacity()));
   if (!border_fits()) return;
   for (const Slot i : slots) {
     at_border_[i] = 1;
+    if (!before.empty() && before[i] != 0) continue;  // it has stayed near the centre of its region
     if (lists_->move(i, flights_.at(i, now).x, distance_left(i))) {
       plan(i, now);
       queue_.read_versions();

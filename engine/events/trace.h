@@ -63,14 +63,13 @@ class Trace {
 
   /// Removes all events and makes room for this many slots.
   void clear(std::size_t slots) {
-    base_ += 2 * static_cast<std::uint32_t>(events_.size());
+    base_ += 2 * static_cast<std::uint32_t>(size_);
     if (base_ > kNoEntry / 4) {
       std::fill(latest_.begin(), latest_.end(), 0);
       base_ = 1;
     }
     latest_.resize(slots, 0);
-    events_.clear();
-    before_.clear();
+    size_ = 0;
     spins_before_.clear();
     fastest_squared_ = 0;
     most_ = kMaxEvents + kMaxEventsPerSphere * slots;
@@ -78,36 +77,37 @@ class Trace {
 
   /// Call before an event of sphere `i`, and of sphere `j` unless `j` is kNoEntry.
   void begin(Slot i, const Record<D>& a, Slot j, const Record<D>& b, std::uint32_t partner, std::uint32_t generation) {
-    if (events_.size() == most_) throw LogFull{};
-    Event& event = events_.emplace_back();
+    if (size_ == events_.size()) grow();
+    Event& event = events_[size_];
     event.generation = generation;
     event.partner = partner;
     event.id[0] = a.id;
     event.id[1] = b.id;
     event.slot[0] = i;
     event.slot[1] = j;
-    before_.push_back(a);
-    before_.push_back(b);
+    before_[2 * size_] = a;
+    before_[2 * size_ + 1] = b;
+    ++size_;
   }
   /// Call after begin() if contacts are rough.
   void note_spins(const Spin<D>& a, const Spin<D>& b) { spins_before_.insert(spins_before_.end(), {a, b}); }
   /// Call after the event.
   void end(const Record<D>& a, const Record<D>& b, const PackedExchange& exchange, double overlap) {
-    Event& event = events_.back();
+    Event& event = events_[size_ - 1];
     event.time = a.t;
     event.exchange = exchange;
     event.overlap = overlap;
     fastest_squared_ = std::max({fastest_squared_, a.v.squaredNorm(), b.v.squaredNorm()});
   }
 
-  /// Links the entries of each sphere, which the functions below require; calls visit(slot) at its first one and, some
+  /// Links the entries of each sphere, which the functions below require; calls visit(slot, first) at each and, some
   /// events earlier, prefetch(slot). In one pass over the complete log the memory of many spheres is fetched at once;
   /// event by event, each would be waited for.
   template <class Prefetch, class Visit>
   void link(Prefetch&& prefetch, Visit&& visit) {
     constexpr std::size_t kAhead = 8;
-    for (std::size_t n = 0; n < events_.size(); ++n) {
-      if (n + kAhead < events_.size())
+    for (std::size_t n = 0; n < size_; ++n) {
+      if (n + kAhead < size_)
         for (const Slot i : events_[n + kAhead].slot)
           if (i != kNoEntry) prefetch_line(&latest_[i]), prefetch(i);
       for (const std::uint32_t which : {0u, 1u}) {
@@ -116,12 +116,12 @@ class Trace {
         const bool first = !has(i);
         events_[n].last[which] = first ? kNoEntry : latest_[i] - base_;
         latest_[i] = base_ + 2 * static_cast<std::uint32_t>(n) + which;
-        if (first) visit(i);
+        visit(i, first);
       }
     }
   }
 
-  std::span<const Event> events() const { return events_; }
+  std::span<const Event> events() const { return {events_.data(), size_}; }
   const Event& event_of(std::uint32_t entry) const { return events_[entry / 2]; }
   /// The sphere's record before its entry in an event.
   const Record<D>& before(std::uint32_t entry) const { return before_[entry]; }
@@ -145,12 +145,18 @@ class Trace {
   // The capacity of a log: a window has 0.3 events a sphere.
   static constexpr std::size_t kMaxEvents = 20'000, kMaxEventsPerSphere = 16;
 
-  std::vector<Event> events_;
+  [[gnu::noinline]] void grow() {
+    if (size_ >= most_) throw LogFull{};
+    events_.resize(std::min(most_, 2 * size_ + 1000));
+    before_.resize(2 * events_.size());
+  }
+
+  std::vector<Event> events_;          // the first size_ are used
   PageVector<Record<D>> before_;       // by entry
   std::vector<Spin<D>> spins_before_;  // by entry; empty if no contact is rough
   std::vector<std::uint32_t> latest_;  // by slot: base_ + entry; smaller values are from earlier windows
   std::uint32_t base_ = 1;
-  std::size_t most_ = 0;
+  std::size_t size_ = 0, most_ = 0;
   double fastest_squared_ = 0;
   mutable std::vector<std::uint32_t> entries_;
 };

@@ -11,13 +11,22 @@ void Ownership<D>::load(const Bisection<D>& bisection, std::uint32_t number, dou
   number_ = number;
   max_displacement_ = max_displacement;
   unwatched_ = std::numeric_limits<double>::infinity();
+  from_field_ = (1 + 1e-6) * core_.flights().g().norm() * core_.flights().horizon();
   const std::size_t slots = core_.flights().capacity();
   slots_.clear(slots);
-  watched_.clear();
   holders_.assign(slots, 0);
   role_.assign(slots, Role::none);
-  watched_at_.assign(slots, kUnwatched);
+  unwatch();
   for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, Role::own);
+}
+
+template <int D>
+void Ownership<D>::unwatch() {
+  watched_.clear();
+  quiet_.clear();
+  speed_.clear();
+  turned_.clear();
+  watched_at_.assign(role_.size(), kUnwatched);
 }
 
 template <int D>
@@ -46,29 +55,25 @@ template <int D>
 void Ownership<D>::watch(double now) {
   unwatched_ = 0;
   const double reach = bisection_->reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
-  watched_.clear();
-  watched_at_.assign(role_.size(), kUnwatched);
-  std::vector<Slot> slots;
+  unwatch();
   for (Slot i = 0; i < core_.flights().size(); ++i)
     if (is_ghost(i) ||
-        (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach)) {
+        (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach))
       watch_over(i);
-      slots.push_back(i);
-    }
-  core_.set_border(slots, now);
+  core_.set_border(watched_, now);
 }
 
 /// Finds the owner of a sphere and the subdomains that have it as a ghost, from its present position, and how far it
-/// can move before either changes. All subdomains that have the sphere find the same.
+/// can move before either changes, which is returned. All subdomains that have the sphere find the same.
 template <int D>
-typename Ownership<D>::Watched Ownership<D>::look_at(Slot i, double now) {
+double Ownership<D>::look_at(Slot i, double now) {
   const Flights<D>& flights = core_.flights();
   const Vec<D> at = bisection_->wrapped(flights.at(i, now).x);
   const double depth = bisection_->depth(number_, at), reach = bisection_->reach();
   if (bisection_->deep(depth)) {
     role_[i] = Role::own;
     holders_[i] = 0;
-    return {i, depth - (1 + 1e-6) * reach, speed(i)};
+    return depth - (1 + 1e-6) * reach;
   }
   holders_[i] = 0;
   double quiet;
@@ -85,12 +90,12 @@ typename Ownership<D>::Watched Ownership<D>::look_at(Slot i, double now) {
     const double squared = bisection_->squared_distance(number_, at), away = std::sqrt(squared);
     if (squared > reach * reach) {
       forget(i);
-      return {i};
+      return 0;
     }
     role_[i] = Role::ghost;
     quiet = std::min(away, reach - away);
   }
-  return {i, quiet - 1e-6 * reach, speed(i)};
+  return quiet - 1e-6 * reach;
 }
 
 template <int D>
@@ -109,10 +114,17 @@ bool Ownership<D>::meeting_place(const Record<D>& r, double end, Vec<D>& low, Ve
   const Vec<D> at = bisection_->wrapped(r.x);
   const double close = bisection_->reach() - max_displacement_ + far;
   if (bisection_->squared_distance(number_, at) > close * close) return false;
-  const Vec<D> room = Vec<D>::Constant(bisection_->reach() + far);
-  low = at - room;
-  high = at + room;
+  const double room = bisection_->reach() + far;
+  low = at - Vec<D>::Constant(room);
+  high = at + Vec<D>::Constant(room);
   if (!bisection_->clip(number_, 3 * max_displacement_, low, high)) return false;
+  // The part of the ball around the sphere: the farther the region along one axis, the narrower along the others.
+  const Vec<D> gap = (low - at).cwiseMax(at - high).cwiseMax(0);
+  const double left = room * room - gap.squaredNorm();
+  if (left < 0) return false;
+  const Vec<D> reach = (gap.cwiseAbs2().array() + left).sqrt();
+  low = low.cwiseMax(at - reach).eval();
+  high = high.cwiseMin(at + reach).eval();
   low += r.x - at;
   high += r.x - at;
   return true;

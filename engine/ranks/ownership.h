@@ -5,6 +5,7 @@
 // Each subdomain computes the ownership of all its spheres from their positions, and all subdomains get the same
 // result. A sphere is examined again once it may have moved so far that the result changes.
 
+#include <algorithm>
 #include <bit>
 #include <limits>
 #include <utility>
@@ -40,13 +41,15 @@ class Ownership {
   std::uint64_t holders(Slot i) const { return holders_[i]; }
   Slot slot_of(Id id) const { return slots_.find(id); }
   bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero());
-  void prefetch(Slot i) const {
-    prefetch_line(&role_[i]);
-    prefetch_line(&watched_at_[i]);
-  }
-  /// Call for each sphere whose velocity may have changed in a window.
-  void turn(Slot i) {
-    if (watched_at_[i] != kUnwatched) watched_[watched_at_[i]].speed = kTurned;
+  void prefetch(Slot i) const { prefetch_line(&watched_at_[i]); }
+  /// Call in a window for each event of a sphere, or `often`: for a sphere that may have had several. False for spheres
+  /// far from the border, which are neither ghosts nor seen.
+  bool turn(Slot i, bool often = false) {
+    const std::uint32_t k = watched_at_[i];
+    if (k == kUnwatched) return false;
+    if (speed_[k] >= 0) turned_.push_back(i);
+    speed_[k] = speed_[k] >= 0 && !often ? -speed_[k] : kOften;
+    return true;
   }
   /// As in Subdomain, after a window of this `length` [time].
   template <class Send>
@@ -60,29 +63,26 @@ class Ownership {
   bool may_meet(const Record<D>& r, Slot j, const Vec<D>& shift, double end) const;
 
  private:
-  static constexpr double kWindowsBetweenSearches = 20;       // windows between searches for spheres at the border
+  static constexpr double kWindowsBetweenSearches = 40;       // windows between searches for spheres at the border
   enum class Role : std::uint8_t { none, own, seen, ghost };  // none: empty slot; seen: own, and a ghost elsewhere
 
-  struct Watched {
-    Slot slot;
-    double quiet = 0;  // how far it may move before it must be examined again
-    double speed = 0;  // the largest until its next event, or kTurned
-  };
-  static constexpr double kTurned = -1;
+  static constexpr double kOften = -std::numeric_limits<double>::infinity();
   static constexpr std::uint32_t kUnwatched = std::numeric_limits<std::uint32_t>::max();
 
   void watch_over(Slot i) {
     watched_at_[i] = static_cast<std::uint32_t>(watched_.size());
-    watched_.push_back({i});
+    watched_.push_back(i);
+    quiet_.push_back(0);
+    speed_.push_back(0);
   }
   void enlist(Slot i, Role role);
   void forget(Slot i);
+  void unwatch();
   void watch(double now);
-  Watched look_at(Slot i, double now);
-  /// The largest speed of a sphere until its next event.
+  double look_at(Slot i, double now);
+  /// The largest speed of a sphere until its next event, not 0.
   double speed(Slot i) const {
-    const Flights<D>& flights = core_.flights();
-    return (1 + 1e-6) * (flights[i].v.norm() + flights.g().norm() * flights.horizon());
+    return (1 + 1e-6) * core_.flights()[i].v.norm() + from_field_ + std::numeric_limits<double>::min();
   }
   /// The largest distance of a sphere from its record before `end`.
   double way(const Record<D>& r, double end) const {
@@ -95,37 +95,53 @@ class Ownership {
   std::uint32_t number_ = 0;
   double max_displacement_ = 0;  // largest displacement in a window
   double unwatched_ = 0;         // the largest displacement of spheres since watch()
+  double from_field_ = 0;        // the largest speed that the field adds
   IdTable slots_;
   std::vector<Role> role_;                 // by slot
   std::vector<std::uint32_t> watched_at_;  // by slot: index in watched_, or kUnwatched
   std::vector<std::uint64_t> holders_;     // by slot
-  std::vector<Watched> watched_;           // ghosts, and own spheres that may leave or become ghosts elsewhere
+  std::vector<Slot> watched_;              // ghosts, and own spheres that may leave or become ghosts elsewhere
+  std::vector<double> quiet_;              // of each: how far it may move before it must be examined again
+  std::vector<double> speed_;              // of each: the largest until its next event; negated after it, then kOften
+  std::vector<Slot> turned_;               // spheres with events since sort_out()
 };
 
 template <int D>
 template <class Send>
 void Ownership<D>::sort_out(double now, double length, Send&& send) {
   if (unwatched_ += max_displacement_; unwatched_ > kWindowsBetweenSearches * max_displacement_) watch(now);
-  for (std::size_t k = 0; k < watched_.size();) {
-    Watched& each = watched_[k];
-    const Slot i = each.slot;
-    const bool turned = each.speed == kTurned;
-    each.quiet -= turned ? max_displacement_ : each.speed * length;
-    if (each.quiet > 0) {
-      if (turned) each.speed = speed(i);
-    } else {
-      const std::uint64_t before = holders_[i];
-      each = look_at(i, now);
-      if (role_[i] == Role::none) {  // the last one takes its place
-        watched_at_[i] = kUnwatched;
-        each = watched_.back();
-        watched_.pop_back();
-        if (k < watched_.size()) watched_at_[watched_[k].slot] = static_cast<std::uint32_t>(k);
-        continue;
-      }
-      for (std::uint64_t fresh = holders_[i] & ~before; fresh != 0; fresh &= fresh - 1)
-        send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
+  for (const Slot i : turned_) {
+    const std::uint32_t k = watched_at_[i];
+    const double before = -speed_[k];
+    speed_[k] = speed(i);
+    const double rest =
+        max_displacement_ - speed_[k] * length;  // of the displacement; the loop below subtracts the other
+    quiet_[k] -= std::max(std::min((before - speed_[k]) * length, rest), 0.0);
+  }
+  turned_.clear();
+  for (std::size_t k = 0; k < watched_.size(); ++k) quiet_[k] -= speed_[k] * length;
+  const auto next = [&](std::size_t from) {
+    const auto due = [](double quiet) { return !(quiet > 0); };
+    return static_cast<std::size_t>(std::find_if(quiet_.begin() + from, quiet_.end(), due) - quiet_.begin());
+  };
+  for (std::size_t k = next(0); k < watched_.size(); k = next(k)) {
+    const Slot i = watched_[k];
+    const std::uint64_t before = holders_[i];
+    quiet_[k] = look_at(i, now);
+    if (role_[i] == Role::none) {  // the last one takes its place
+      watched_at_[i] = kUnwatched;
+      watched_[k] = watched_.back();
+      quiet_[k] = quiet_.back();
+      speed_[k] = speed_.back();
+      watched_.pop_back();
+      quiet_.pop_back();
+      speed_.pop_back();
+      if (k < watched_.size()) watched_at_[watched_[k]] = static_cast<std::uint32_t>(k);
+      continue;
     }
+    speed_[k] = speed(i);
+    for (std::uint64_t fresh = holders_[i] & ~before; fresh != 0; fresh &= fresh - 1)
+      send(static_cast<std::size_t>(std::countr_zero(fresh)), core_.flights()[i]);
     ++k;
   }
 }

@@ -15,23 +15,23 @@ void PathExchange<D>::start(const Bisection<D>& bisection) {
 }
 
 template <int D>
-std::vector<Bytes> PathExchange<D>::swap() {
-  std::vector<Bytes> received = ranks_.swap(std::move(outgoing_), partners_);
-  outgoing_.assign(partners_.size(), {});
-  return received;
+const std::vector<Bytes>& PathExchange<D>::swap() {
+  for (Bytes& read : received_) read.clear();
+  received_.resize(partners_.size());
+  received_ = ranks_.swap(std::exchange(outgoing_, std::move(received_)), partners_);
+  return received_;
 }
 
 template <int D>
 std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain, const std::function<bool(bool)>& agree) {
   std::uint64_t rounds = 0;
-  for (bool more = true; more; ++rounds) {
-    if (subdomain) add_paths(*subdomain);
-    for (const Bytes& bytes : swap())
-      for (Reader reader(bytes); subdomain && reader.more();) {
-        const Slot ghost = subdomain->ownership().slot_of(reader.get<Id>());
-        subdomain->paths().read_script(ghost, reader);
-      }
-    if (subdomain) subdomain->repair();
+  for (bool more = true; more; rounds += 2) {
+    for (int round = 0; round < 2; ++round) {  // most windows need two, few need more
+      if (subdomain) add_paths(*subdomain);
+      for (const Bytes& bytes : swap())
+        for (Reader reader(bytes); subdomain && reader.more();) subdomain->paths().read_script(reader);
+      if (subdomain) subdomain->repair();
+    }
     more = agree(subdomain &&
                  std::ranges::any_of(subdomain->changed(), [&](Slot i) { return subdomain->ownership().is_seen(i); }));
   }
@@ -41,11 +41,8 @@ std::uint64_t PathExchange<D>::make_consistent(Subdomain<D>* subdomain, const st
 template <int D>
 void PathExchange<D>::add_paths(Subdomain<D>& subdomain) {
   for (const Slot i : subdomain.changed())
-    for (std::uint64_t holders = subdomain.ownership().holders(i); holders != 0; holders &= holders - 1) {
-      Bytes& bytes = outgoing_[static_cast<std::size_t>(std::countr_zero(holders))];
-      put(bytes, subdomain.flights()[i].id);
-      subdomain.paths().write(i, bytes);
-    }
+    for (std::uint64_t holders = subdomain.ownership().holders(i); holders != 0; holders &= holders - 1)
+      subdomain.paths().write(i, outgoing_[static_cast<std::size_t>(std::countr_zero(holders))]);
 }
 
 template class PathExchange<2>;

@@ -20,11 +20,11 @@ class PathExchange {
   void add(std::size_t neighbour, const T& value) {
     put(outgoing_[neighbour], value);
   }
-  /// Sends the messages; returns the messages received from the neighbours. Collective.
-  std::vector<Bytes> swap();
-  /// Exchanges the paths of a window and repairs it, in rounds; returns their number. After each round agree(changed)
-  /// is called, which gets whether paths changed here that a neighbour has, and returns whether a path changed on any
-  /// rank: then there is another round. Null: this rank has no subdomain. Collective.
+  /// Sends the messages; returns the messages received from the neighbours, valid until the next call. Collective.
+  const std::vector<Bytes>& swap();
+  /// Exchanges the paths of a window and repairs it, in rounds; returns their number. After every second round
+  /// agree(changed) is called, which gets whether paths changed here in this round that a neighbour has, and returns
+  /// whether a path changed on any rank: then there are two more. Null: this rank has no subdomain. Collective.
   std::uint64_t make_consistent(Subdomain<D>* subdomain, const std::function<bool(bool)>& agree);
 
  private:
@@ -33,6 +33,7 @@ class PathExchange {
   Communicator& ranks_;
   std::vector<int> partners_;    // ranks of the neighbours
   std::vector<Bytes> outgoing_;  // for each of them
+  std::vector<Bytes> received_;  // from each of them; their memory is used for the next outgoing messages
 };
 
 }  // namespace carom

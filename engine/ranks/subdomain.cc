@@ -51,7 +51,7 @@ double Subdomain<D>::run(double now, double end) {
 template <int D>
 void Subdomain<D>::commit() {
   const auto other = paths_->finish();
-  for (const auto& each : other) ownership_->turn(each.slot);
+  for (const auto& each : other) ownership_->turn(each.slot, true);
   core_.put(other, end_);
   changed_.clear();
 }

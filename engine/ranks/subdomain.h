@@ -14,7 +14,7 @@
 //
 //   subdomain.load(records, bisection, number, …);
 //   subdomain.run(now, end);
-//   while (…) { subdomain.paths().read_script(ghost, message); …; subdomain.repair(); … subdomain.changed() … }
+//   while (…) { subdomain.paths().read_script(message); …; subdomain.repair(); … subdomain.changed() … }
 //   subdomain.commit();
 //   subdomain.sort_out(now, send); …; subdomain.ownership().admit(record, now, spin);
 

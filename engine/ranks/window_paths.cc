@@ -28,9 +28,8 @@ std::vector<Slot> WindowPaths<D>::end() {
   std::vector<Slot> seen;
   take_unmatched();
   const auto prefetch = [&](Slot i) { ownership_.prefetch(i); };
-  trace_.link(prefetch, [&](Slot i) {
-    ownership_.turn(i);
-    if (!ownership_.is_seen(i) && !ownership_.is_ghost(i)) return;
+  trace_.link(prefetch, [&](Slot i, bool first) {
+    if (!ownership_.turn(i) || !first || (!ownership_.is_seen(i) && !ownership_.is_ghost(i))) return;
     prefetch_line(&flights_[i]);  // its path will be read
     if (ownership_.is_seen(i))
       seen.push_back(i);
@@ -123,19 +122,22 @@ void WindowPaths<D>::cut(const EventKey<D>& last) {
 template <int D>
 void WindowPaths<D>::write(Slot i, Bytes& to) const {
   const View path = view(i);
-  put(to, path.size());
-  const std::size_t at = to.size(), bytes = node_bytes();
-  to.resize(at + path.size() * bytes);
-  for (std::size_t k = 0; k < path.size(); ++k) {
+  const ScriptHead head{flights_[i].id, path.size()};
+  std::size_t at = to.size(), bytes = node_bytes();
+  to.resize(at + sizeof head + head.nodes * bytes);
+  std::memcpy(to.data() + at, &head, sizeof head);
+  at += sizeof head;
+  for (std::size_t k = 0; k < head.nodes; ++k, at += bytes) {
     const Node<D> node = path.node(k);
-    std::memcpy(to.data() + at + k * bytes, static_cast<const void*>(&node), bytes);
+    std::memcpy(to.data() + at, static_cast<const void*>(&node), bytes);
   }
 }
 
 template <int D>
-void WindowPaths<D>::read_script(Slot g, Reader& message) {
-  const auto count = message.get<std::uint32_t>();
+void WindowPaths<D>::read_script(Reader& message) {
+  const auto [id, count] = message.get<ScriptHead>();
   const std::byte* const bytes = message.skip(count * node_bytes());
+  const Slot g = ownership_.slot_of(id);
   if (g == IdTable::kNowhere) return;  // there was no room for this ghost, so the window will be revoked
   Nodes& nodes = scripts_.has(g) ? scripts_.at(g) : scripts_.add(g);
   nodes.resize(count);

@@ -56,7 +56,7 @@ class WindowPaths {
   /// Appends the path of a sphere to a message.
   void write(Slot i, Bytes& to) const;
   /// Reads the script of a ghost.
-  void read_script(Slot g, Reader& message);
+  void read_script(Reader& message);
   /// The script of a ghost; empty if it had no events on its owner.
   std::span<const Node<D>> script(Slot g) const {
     return scripts_.has(g) ? std::span<const Node<D>>(scripts_.at(g)) : std::span<const Node<D>>();
@@ -83,6 +83,10 @@ class WindowPaths {
 
  private:
   static constexpr std::uint32_t kNoEntry = Trace<D>::kNoEntry;
+  struct ScriptHead {
+    Id id;
+    std::uint32_t nodes;
+  };
   struct Path {
     Record<D> start;  // at the start of the window
     Spin<D> spin;     // there

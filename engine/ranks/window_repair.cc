@@ -45,7 +45,7 @@ std::vector<Slot> WindowRepair<D>::run() {
 /// Starts a repair where the path of a ghost differs from its script, except by a contact with an own sphere.
 template <int D>
 void WindowRepair<D>::compare(Slot g) {
-  if (paths_.matches(g)) return;
+  if (paths_.matches(g) || adopt(g)) return;
   paths_.add_unmatched(g);
   const auto seen = paths_.path(g), script = paths_.script(g);
   const auto [here, there] = std::mismatch(seen.begin(), seen.end(), script.begin(), script.end());
@@ -99,18 +99,61 @@ void WindowRepair<D>::plan_script(Repaired& m) {
         {.kind = Task::Kind::script, .key = next->key, .a = m.slot, .version_a = static_cast<std::uint32_t>(m.script)});
 }
 
+/// Replaces the path of a ghost by its script if it had no events here and, on its script, meets no own sphere with
+/// events; returns whether it did. So most ghosts are repaired: their partners are farther from the border. Contacts
+/// with spheres without events are in the script, because the ghost's owner has these spheres.
+template <int D>
+bool WindowRepair<D>::adopt(Slot g) {
+  if (!paths_.has_no_events(g)) return false;
+  const auto script = paths_.script(g);
+  for (const Node<D>& node : script)
+    if (ownership_.owns_id(node.partner())) return false;
+  bool met = false;
+  const auto moved = [&](Slot j) { return !paths_.has_no_events(j) && ownership_.owns(j); };
+  for (std::size_t k = 0; k < script.size() && !met; ++k)
+    visit_near(g, script[k].after, moved, [&](Slot j, const Image<D>& image) {
+      EventKey<D> key;
+      met = met || (meets(g, script[k].after, j, image, script[k].key, key) &&
+                    (k + 1 == script.size() || key <= script[k + 1].key));
+    });
+  if (!met) paths_.rewrite(g).assign(script.begin(), script.end());
+  return !met;
+}
+
+/// Calls visit(j, image) for the spheres with wanted(j) that sphere `i` may touch before the end of the window if it
+/// has this record. False for a ghost that can meet no own sphere.
+template <int D>
+template <class Wanted, class Visit>
+bool WindowRepair<D>::visit_near(Slot i, const Record<D>& r, Wanted&& wanted, Visit&& visit) {
+  const bool ghost = ownership_.is_ghost(i);
+  Vec<D> low, high;
+  if (ghost && !ownership_.meeting_place(r, end_, low, high)) return false;
+  for (const std::uint32_t candidate : ghost ? core_.find_near_at_border(i, low, high) : core_.find_near(i)) {
+    const Slot j = flights_.packing().slot(candidate);
+    if (!wanted(j)) continue;
+    const Image<D> image = flights_.packing().image(candidate);
+    if (ownership_.may_meet(r, j, box_.shift(image), end_)) visit(j, image);
+  }
+  return true;
+}
+
 /// Plans all contacts that a repaired sphere may have after `now`.
 template <int D>
 void WindowRepair<D>::predict(Repaired& m, const EventKey<D>& now) {
   const bool ghost = ownership_.is_ghost(m.slot);
-  Vec<D> low, high;
-  if (ghost && !ownership_.meeting_place(m.now, end_, low, high)) return;
-  for (const std::uint32_t candidate : ghost ? core_.find_near_at_border(m.slot, low, high) : core_.find_near(m.slot)) {
-    const Slot j = flights_.packing().slot(candidate);
-    const Image<D> image = flights_.packing().image(candidate);
-    if (j != m.slot && (!ghost || ownership_.owns(j)) && ownership_.may_meet(m.now, j, box_.shift(image), end_))
-      meet(m, j, image, now);
-  }
+  const auto wanted = [&](Slot j) { return j != m.slot && (!ghost || ownership_.owns(j)); };
+  if (!visit_near(m.slot, m.now, wanted, [&](Slot j, const Image<D>& image) {
+        EventKey<D> key;
+        if (meets(m.slot, m.now, j, image, now, key))
+          tasks_.push({.kind = Task::Kind::contact,
+                       .key = key,
+                       .a = m.slot,
+                       .b = j,
+                       .version_a = m.version,
+                       .version_b = version(j),
+                       .image = image});
+      }))
+    return;
   for (const Wall<D>& wall : flights_.walls()) {
     const double t = flights_.wall_contact(m.slot, m.now, wall);
     if (!(t < end_)) continue;
@@ -122,39 +165,27 @@ void WindowRepair<D>::predict(Repaired& m, const EventKey<D>& now) {
   }
 }
 
-/// Plans the contact of a repaired sphere with another one.
+/// Whether sphere `i`, if it has record r from `now` on, meets another one in the window, and the contact.
 template <int D>
-void WindowRepair<D>::meet(Repaired& m, Slot j, const Image<D>& image, const EventKey<D>& now) {
+bool WindowRepair<D>::meets(Slot i, const Record<D>& r, Slot j, const Image<D>& image, const EventKey<D>& now,
+                            EventKey<D>& key) {
   const Vec<D> shift = box_.shift(image);
-  // Computes the contact with a record of the other sphere; false if there is none in the window.
-  EventKey<D> key;
-  const auto meets = [&](const Record<D>& other) {
-    const double t = flights_.pair_contact(m.slot, m.now, j, other, shift);
+  const auto touches = [&](const Record<D>& other) {
+    const double t = flights_.pair_contact(i, r, j, other, shift);
     if (!(t < end_)) return false;
-    const auto generation = std::max(Flights<D>::generation_at(m.now, t), Flights<D>::generation_at(other, t));
-    key = pair_key<D>(t, generation, m.now.id, other.id, image);
+    const auto generation = std::max(Flights<D>::generation_at(r, t), Flights<D>::generation_at(other, t));
+    key = pair_key<D>(t, generation, r.id, other.id, image);
     return true;
   };
-  bool found = false;
-  if (repaired(j)) {
-    found = meets(repairs_[repair_of_[j]].now);
-  } else if (paths_.has_no_events(j)) {
-    found = meets(paths_.after(j));
-  } else {  // along its path: a contact counts only before the next node
-    const auto path = paths_.path(j);
-    std::size_t k = 0;
-    while (k < path.size() && path[k].key < now) ++k;
-    for (; !found && k <= path.size(); ++k)
-      found = meets(paths_.before(j, k)) && (k == path.size() || key <= path[k].key);
-  }
-  if (found)
-    tasks_.push({.kind = Task::Kind::contact,
-                 .key = key,
-                 .a = m.slot,
-                 .b = j,
-                 .version_a = m.version,
-                 .version_b = version(j),
-                 .image = image});
+  if (repaired(j)) return touches(repairs_[repair_of_[j]].now);
+  if (paths_.has_no_events(j)) return touches(paths_.after(j));
+  // Along its path a contact counts only before the next node.
+  const auto path = paths_.path(j);
+  std::size_t k = 0;
+  while (k < path.size() && path[k].key < now) ++k;
+  for (; k <= path.size(); ++k)
+    if (touches(paths_.before(j, k)) && (k == path.size() || key <= path[k].key)) return true;
+  return false;
 }
 
 template <int D>

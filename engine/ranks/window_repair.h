@@ -69,9 +69,12 @@ class WindowRepair {
   std::uint32_t version(Slot i) const { return repaired(i) ? repairs_[repair_of_[i]].version : 0; }
   const Node<D>* next_of_script(const Repaired& m);
   void compare(Slot g);
+  bool adopt(Slot g);
   Repaired& begin(Slot i, const EventKey<D>& key);
   void predict(Repaired& m, const EventKey<D>& now);
-  void meet(Repaired& m, Slot j, const Image<D>& image, const EventKey<D>& now);
+  template <class Wanted, class Visit>
+  bool visit_near(Slot i, const Record<D>& r, Wanted&& wanted, Visit&& visit);
+  bool meets(Slot i, const Record<D>& r, Slot j, const Image<D>& image, const EventKey<D>& now, EventKey<D>& key);
   void contact(const Task& task);
   void script(const Task& task);
   void check(const Task& task);

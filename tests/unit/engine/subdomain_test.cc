@@ -64,7 +64,7 @@ struct Divided {
         Bytes& bytes = messages.emplace_back();
         parts[from]->paths.write(i, bytes);
         Reader reader(bytes);
-        to.paths.read_script(to.ownership.slot_of(parts[from]->core.flights()[i].id), reader);
+        to.paths.read_script(reader);
         EXPECT_FALSE(reader.more());
         ++sent;
       }
@@ -193,7 +193,7 @@ TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
     Bytes& own = d.messages.emplace_back();
     paths.write(g, own);
     Reader reader(own);
-    paths.read_script(g, reader);
+    paths.read_script(reader);
     EXPECT_TRUE(paths.matches(g));
     EXPECT_TRUE(ownership.is_ghost(g));
     ++compared;
