@@ -26,9 +26,10 @@ class CutoffList {
   }
 
   /// The pairs within the cutoff at x or x_new, and some beyond. A pair keeps the image it has at x. `particles` has
-  /// ghosts and ids. Throws Error(Failure::numerical) if positions are not finite, or for steps of several periodic
-  /// boxes or with far too many pairs.
-  PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles);
+  /// ghosts and ids. `own_covered`: cover_own() has just returned a list for the own particles at x. Throws
+  /// Error(Failure::numerical) if positions are not finite, or for steps of several periodic boxes or with far too many
+  /// pairs.
+  PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles, bool own_covered = false);
   /// The pairs of own particles at x, where the positions of ghosts are unknown; null if a new list is needed for them,
   /// or if there are no ghosts.
   PairRecords<D>* cover_own(const PairStep<D>& step, const Particles<D>& particles);
@@ -39,7 +40,8 @@ class CutoffList {
   bool is_for(const PairStep<D>& step, const Particles<D>& particles) const {
     return made_ && particles_ == step.x.size() && ghost_ == particles.ghost;
   }
-  bool follow(const PairStep<D>& step, double& squared_from_build, double& squared_step, bool own_only = false);
+  bool follow(const PairStep<D>& step, std::size_t first, std::size_t end, double& squared_from_build,
+              double& squared_step);
   void build(const PairStep<D>& step, const Particles<D>& particles);
   void find_pairs(std::uint32_t row, std::span<const struct PartnerRange> ranges);
 
@@ -52,7 +54,8 @@ class CutoffList {
   std::vector<char> ghost_;
   std::size_t particles_ = 0;  // at the last build
   bool made_ = false;
-  PairRecords<D> records_;
+  PairRecords<D> records_;                       // own particles before ghosts
+  double own_squared_ = 0;                       // the largest squared displacement found by cover_own()
   std::array<std::vector<double>, 3> built_at_;  // coordinates in the box at the last build
   std::vector<std::uint64_t> code_;
   std::vector<std::uint32_t> plain_, other_;

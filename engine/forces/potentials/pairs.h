@@ -10,8 +10,8 @@
 //   most_partners()             upper bound for any particle in these batches
 //   use(kernels)                replaces the widest kernels of this machine
 //   own_batches(…)              if it exists: as batches() for pairs of own particles, where the positions of ghosts
-//   are
-//                               unknown; returns false if that is not possible
+//                               are unknown; returns false if that is not possible. batches() with shared_only adds
+//                               the rest
 // and
 //   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
 //   among(some)                             the source for a subset of the particles, or nothing if partners are
@@ -203,6 +203,7 @@ class AllPairs {
             records_.order.push_back(i);
         end.push_back(static_cast<std::uint32_t>(records_.order.size()));
       }
+    records_.own = records_.order.size();
     const auto add = [&](auto kind, std::uint32_t row, std::uint32_t first, std::uint32_t last) {
       const auto run = [&](std::uint32_t stop) {
         if (first < stop) records_.runs[kind].push_back({row, first, stop - first, {0, 0, 0}});
@@ -249,7 +250,7 @@ class PairsWithinCutoff {
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
                Visit&& visit, bool shared_only = false) const {
-    records_ = &list_.cover(step, particles);
+    records_ = &list_.cover(step, particles, shared_only);
     collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit, !shared_only);
   }
   template <class Visit>
