@@ -51,8 +51,11 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
   if (!known && !still)
     for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
   if (!made_) skin_.begin(2 * *shared_width_);
-  const double length = std::sqrt(squared_step);
-  if (!skin_.lasts(known, std::sqrt(squared_from_build), length)) {
+  const double length = std::sqrt(squared_step), from_build = std::sqrt(squared_from_build);
+  grown_ = from_build - std::exchange(farthest_, from_build);
+  const bool renew = std::exchange(renew_, false);
+  if (!skin_.lasts(known, from_build, length) || renew) {
+    farthest_ = grown_ = 0;
     need_finite(particles, step.x);
     skin_.renew(box_, length, [&] { return "particle " + std::to_string(particles.id_of(farthest(step))); });
     *shared_width_ = skin_.width();
@@ -204,7 +207,9 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   made_ = true;
   particles_ = step.x.size();
   records_.clear();
-  plain_size_ = 0;
+  records_.partners[PairRecords<D>::kMoving].clear();
+  records_.partners[PairRecords<D>::kShared].clear();
+  plain_size_ = 0;  // the search writes into a longer array
   std::vector<Id> members, ghosts;
   Extent<D> extent;
   for (Id i = 0; i < step.x.size(); ++i)
@@ -282,9 +287,9 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
       }
     }
   }
-  records_.partners[0].swap(plain_);
-  records_.partners[0].resize(plain_size_);  // beyond it the search leaves invalid places
   for (auto& partners : records_.partners) partners.resize(partners.size() + 8);
+  // The search leaves invalid places beyond the last partner.
+  std::fill_n(records_.partners[PairRecords<D>::kPlain].data() + plain_size_, 8, 0u);
 }
 
 /// Lists the pairs of one particle with the particles in these ranges.
@@ -293,6 +298,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
   const std::uint64_t code = code_[row];
   const double reach = (cutoff_ + skin_.width()) * (1 + 1e-12);
   const bool ghost = row >= records_.own;
+  auto& plain = records_.partners[PairRecords<D>::kPlain];
   PartnerSearch search{.x = {built_at_[0].data(), built_at_[1].data(), built_at_[2].data()},
                        .code = code_.data(),
                        .row = row,
@@ -305,15 +311,15 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     std::size_t last = first, candidates = 16;
     for (; last < ranges.size() && ranges[last].as(ranges[first]); ++last)
       candidates += ranges[last].end - ranges[last].begin;
-    if (plain_.size() < plain_size_ + candidates) plain_.resize(2 * (plain_size_ + candidates));
+    if (plain.size() < plain_size_ + candidates) plain.resize(2 * (plain_size_ + candidates));
     if (other_.size() < candidates) other_.resize(candidates);
     search.here = ranges[first].here();
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
-    PartnersFound found{plain_.data() + plain_size_, other_.data()};
+    PartnersFound found{plain.data() + plain_size_, other_.data()};
     for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
     if (filter_.excluded) {
       const auto excluded = [&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); };
-      found.plain = std::remove_if(plain_.data() + plain_size_, found.plain, excluded);
+      found.plain = std::remove_if(plain.data() + plain_size_, found.plain, excluded);
       found.other = std::remove_if(other_.data(), found.other, excluded);
     }
     const auto add = [&](int kind, std::size_t begin, std::size_t end) {
@@ -323,7 +329,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
                                      static_cast<std::uint32_t>(end - begin),
                                      {image[0], image[1], image[2]}});
     };
-    const auto plain_end = static_cast<std::size_t>(found.plain - plain_.data());
+    const auto plain_end = static_cast<std::size_t>(found.plain - plain.data());
     add(PairRecords<D>::kPlain, plain_size_, plain_end);
     plain_size_ = plain_end;
     const auto kind = ghost ? PairRecords<D>::kShared : PairRecords<D>::kMoving;

@@ -34,6 +34,13 @@ class CutoffList {
   /// or if there are no ghosts.
   PairRecords<D>* cover_own(const PairStep<D>& step, const Particles<D>& particles);
 
+  /// The particles are others than those of the last cover().
+  void forget() { made_ = false; }
+  /// Whether a new list will be needed in the next step if particles move on as in the last one.
+  bool ages() const { return made_ && farthest_ + grown_ > 0.5 * skin_.width(); }
+  /// The next cover() makes a new list.
+  void renew() { renew_ = true; }
+
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
 
  private:
@@ -53,13 +60,14 @@ class CutoffList {
   const PairKernels* kernels_ = &widest_kernels<PairKernels>();
   std::vector<char> ghost_;
   std::size_t particles_ = 0;  // at the last build
-  bool made_ = false;
-  PairRecords<D> records_;                       // own particles before ghosts
-  double own_squared_ = 0;                       // the largest squared displacement found by cover_own()
+  bool made_ = false, renew_ = false;
+  double farthest_ = 0, grown_ = 0;  // the largest displacement at the last cover(), and how much it had grown
+  PairRecords<D> records_;           // own particles before ghosts
+  double own_squared_ = 0;           // the largest squared displacement found by cover_own()
   std::array<std::vector<double>, 3> built_at_;  // coordinates in the box at the last build
   std::vector<std::uint64_t> code_;
-  std::vector<std::uint32_t> plain_, other_;
-  std::size_t plain_size_ = 0;
+  std::vector<std::uint32_t> other_;
+  std::size_t plain_size_ = 0;  // the number of partners in plain pairs
 };
 
 }  // namespace carom

@@ -5,7 +5,7 @@ namespace carom {
 
 template <int D>
 void PairRecords<D>::clear() {
-  for (int kind = 0; kind < kKinds; ++kind) runs[kind].clear(), partners[kind].clear();
+  for (auto& each : runs) each.clear();
   order.clear();
   box.clear();
 }

@@ -38,10 +38,11 @@ class PairRecords {
   std::vector<Id> order;  ///< particles by place
   std::size_t own = 0;    ///< the number of places whose sums flush_to() adds: those of own particles come first
   std::vector<PairRun> runs[kKinds];
-  std::vector<std::uint32_t> partners[kKinds];  ///< followed by eight more, for padding
+  std::vector<std::uint32_t> partners[kKinds];  ///< followed by at least eight more, for padding
   std::vector<PairRecord> box;                  ///< numbers of the boxes that the particles are in; empty: all 0
   std::size_t most_partners = 0;                ///< upper bound for any particle
 
+  /// Removes all but partners.
   void clear();
   /// Loads the positions and weights of a step, of the particles in the places from `first` to before `end`.
   void load(const PairStep<D>& step, std::size_t first, std::size_t end);

@@ -12,6 +12,8 @@
 //   own_batches(…)              if it exists: as batches() for pairs of own particles, where the positions of ghosts
 //                               are unknown; returns false if that is not possible. batches() with shared_only adds
 //                               the rest
+//   ages(), renew()             if they exist: as in Interaction
+//   regroup()                   if it exists: the particles have been replaced by others
 // and
 //   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
 //   among(some)                             the source for a subset of the particles, or nothing if partners are
@@ -260,6 +262,9 @@ class PairsWithinCutoff {
     if (records_) collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit, true, false);
     return records_ != nullptr;
   }
+  void regroup() { list_.forget(); }
+  bool ages() const { return list_.ages(); }
+  void renew() const { list_.renew(); }
   Id id(std::uint32_t place) const { return records_->order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_->low(); }
   ForceWords* high(ForceSums<D>&) const { return records_->high(); }
