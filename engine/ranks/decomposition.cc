@@ -118,7 +118,8 @@ Bytes Decomposition<D>::block_of(Fields::Field& field) const {
 template <int D>
 bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
   if (!by_place_) return false;
-  const auto farthest = [&] { return std::sqrt(largest(halo_.squared_farthest(system_.box, system_.particles))); };
+  const auto known = std::exchange(farthest_, {});
+  const auto farthest = [&] { return std::sqrt(known ? *known : largest(squared_farthest(system_.particles.x))); };
   if (all_known_ ? slab < next_ : !width_.outdated(farthest)) return false;
   if (!all_known_) {  // the last division was good enough
     slabs_with_all_ = std::max<std::int64_t>(slabs_with_all_ / 2, 1);
@@ -239,7 +240,9 @@ void Decomposition<D>::start_step(std::span<Vec<D>> x, std::span<const Vec<D>> v
   double farthest = 0;
   for (Id i = 0; i < v.size(); ++i)
     if (system_.particles.owns(i)) farthest = std::max(farthest, v[i].squaredNorm());
-  most_ = {length * std::sqrt(farthest)};
+  farthest_.reset();
+  const bool look = !all_known_ && width_.looks_next();
+  most_ = {length * std::sqrt(farthest), look ? squared_farthest(x) : 0};
   for (const auto& term : system_.interactions) most_.push_back(term->ages() ? 1 : 0);
   halo_.start(*ranks_, most_, x);
 }
@@ -249,8 +252,9 @@ void Decomposition<D>::finish_step(std::span<Vec<D>> x) {
   if (!by_place_) return;
   halo_.finish(*ranks_, x);
   need_paths(most_[0]);
-  for (std::size_t k = 1; k < most_.size(); ++k)
-    if (most_[k] > 0) system_.interactions[k - 1]->renew();
+  if (!all_known_ && width_.looks_next()) farthest_ = most_[1];
+  for (std::size_t k = 2; k < most_.size(); ++k)
+    if (most_[k] > 0) system_.interactions[k - 2]->renew();
 }
 
 template <int D>

@@ -126,6 +126,9 @@ class Decomposition {
  private:
   void migrate(bool all, double slab_length);
   bool migrate_to_near(double slab_length);
+  double squared_farthest(std::span<const Vec<D>> x) const {
+    return halo_.squared_farthest(system_.box, system_.particles, x);
+  }
   void migrate_to_all();
   std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver,
                           std::vector<Fields::Arrival>* stay = nullptr);
@@ -142,8 +145,9 @@ class Decomposition {
   bool local_ = false, all_known_ = false;
   HaloWidth width_;
   HaloExchange<D> halo_;
-  std::vector<double> most_;  // between start_step() and finish_step(): the longest path, and which terms age
-  std::int64_t next_ = 0;     // while all_known_: the slab before which to divide again
+  std::optional<double> farthest_;  // the largest squared displacement at the end of the last step, if it was needed
+  std::vector<double> most_;        // between start_step() and finish_step(): the longest path, and which terms age
+  std::int64_t next_ = 0;           // while all_known_: the slab before which to divide again
   std::int64_t slabs_with_all_ = 1;
 };
 
