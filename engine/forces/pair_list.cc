@@ -42,7 +42,8 @@ struct PartnerRange {
 };
 
 template <int D>
-PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>& particles, bool own_covered) {
+PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>& particles, bool own_covered,
+                                     const std::function<void()>& before_build) {
   const bool still = step.x_new.empty();
   const std::size_t first = own_covered ? records_.own : 0;
   double squared_from_build = own_covered ? own_squared_ : 0, squared_step = 0;
@@ -59,6 +60,7 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
     need_finite(particles, step.x);
     skin_.renew(box_, length, [&] { return "particle " + std::to_string(particles.id_of(farthest(step))); });
     *shared_width_ = skin_.width();
+    if (before_build) before_build();
     ghost_ = particles.ghost;
     build(step, particles);
     records_.load(step);
@@ -208,8 +210,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   particles_ = step.x.size();
   records_.clear();
   records_.partners[PairRecords<D>::kMoving].clear();
-  records_.partners[PairRecords<D>::kShared].clear();
-  plain_size_ = 0;  // the search writes into a longer array
+  records_.partners[PairRecords<D>::kSharedMoving].clear();
+  sizes_ = {};
   std::vector<Id> members, ghosts;
   Extent<D> extent;
   for (Id i = 0; i < step.x.size(); ++i)
@@ -277,7 +279,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
       if (own) ranges[0].begin = r + 1;
       find_pairs(r, ranges);
-      if (plain_size_ + records_.partners[own ? PairRecords<D>::kMoving : PairRecords<D>::kShared].size() >
+      if (sizes_[own ? 0 : 1] +
+              records_.partners[own ? PairRecords<D>::kMoving : PairRecords<D>::kSharedMoving].size() >
           kMaxPairs + kMaxPartners * particles_) {
         made_ = false;
         throw Error(Failure::numerical,
@@ -287,9 +290,13 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
       }
     }
   }
-  for (auto& partners : records_.partners) partners.resize(partners.size() + 8);
-  // The search leaves invalid places beyond the last partner.
-  std::fill_n(records_.partners[PairRecords<D>::kPlain].data() + plain_size_, 8, 0u);
+  for (const auto kind : {PairRecords<D>::kMoving, PairRecords<D>::kSharedMoving})
+    records_.partners[kind].resize(records_.partners[kind].size() + 8);
+  for (const std::size_t k : {0, 1}) {  // the search leaves invalid places beyond the last partner
+    auto& partners = records_.partners[k == 0 ? PairRecords<D>::kPlain : PairRecords<D>::kShared];
+    if (partners.size() < sizes_[k] + 8) partners.resize(sizes_[k] + 8);
+    std::fill_n(partners.data() + sizes_[k], 8, 0u);
+  }
 }
 
 /// Lists the pairs of one particle with the particles in these ranges.
@@ -298,45 +305,47 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
   const std::uint64_t code = code_[row];
   const double reach = (cutoff_ + skin_.width()) * (1 + 1e-12);
   const bool ghost = row >= records_.own;
-  auto& plain = records_.partners[PairRecords<D>::kPlain];
+  const auto kind = ghost ? PairRecords<D>::kShared : PairRecords<D>::kPlain;
+  const auto moving_kind = ghost ? PairRecords<D>::kSharedMoving : PairRecords<D>::kMoving;
+  auto& plain = records_.partners[kind];
+  std::size_t& size = sizes_[ghost ? 1 : 0];
   PartnerSearch search{.x = {built_at_[0].data(), built_at_[1].data(), built_at_[2].data()},
                        .code = code_.data(),
                        .row = row,
                        .own = {},
                        .reach_squared = reach * reach};
   search.wanted = filter_.species.partner_code(code);
-  search.plain = !ghost && (code & PartnerSearch::kMoving) == 0;
+  search.plain = (code & PartnerSearch::kMoving) == 0;
   for (std::size_t first = 0; first < ranges.size();) {
     const auto& image = ranges[first].image;
     std::size_t last = first, candidates = 16;
     for (; last < ranges.size() && ranges[last].as(ranges[first]); ++last)
       candidates += ranges[last].end - ranges[last].begin;
-    if (plain.size() < plain_size_ + candidates) plain.resize(2 * (plain_size_ + candidates));
+    if (plain.size() < size + candidates) plain.resize(2 * (size + candidates));
     if (other_.size() < candidates) other_.resize(candidates);
     search.here = ranges[first].here();
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
-    PartnersFound found{plain.data() + plain_size_, other_.data()};
+    PartnersFound found{plain.data() + size, other_.data()};
     for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
     if (filter_.excluded) {
       const auto excluded = [&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); };
-      found.plain = std::remove_if(plain.data() + plain_size_, found.plain, excluded);
+      found.plain = std::remove_if(plain.data() + size, found.plain, excluded);
       found.other = std::remove_if(other_.data(), found.other, excluded);
     }
-    const auto add = [&](int kind, std::size_t begin, std::size_t end) {
+    const auto add = [&](int to, std::size_t begin, std::size_t end) {
       if (begin == end) return;
-      records_.runs[kind].push_back({row,
-                                     static_cast<std::uint32_t>(begin),
-                                     static_cast<std::uint32_t>(end - begin),
-                                     {image[0], image[1], image[2]}});
+      records_.runs[to].push_back({row,
+                                   static_cast<std::uint32_t>(begin),
+                                   static_cast<std::uint32_t>(end - begin),
+                                   {image[0], image[1], image[2]}});
     };
     const auto plain_end = static_cast<std::size_t>(found.plain - plain.data());
-    add(PairRecords<D>::kPlain, plain_size_, plain_end);
-    plain_size_ = plain_end;
-    const auto kind = ghost ? PairRecords<D>::kShared : PairRecords<D>::kMoving;
-    auto& partners = records_.partners[kind];
+    add(kind, size, plain_end);
+    size = plain_end;
+    auto& partners = records_.partners[moving_kind];
     const std::size_t begin = partners.size();
     partners.insert(partners.end(), other_.data(), found.other);
-    add(kind, begin, partners.size());
+    add(moving_kind, begin, partners.size());
   }
 }
 

@@ -35,7 +35,7 @@ PairRows PairRecords<D>::rows(Kind kind, const Box<D>& in, const PairStep<D>& st
   PairRows rows{.x = x_.data()};
   rows.vectors = !step.vectors.empty();
   if (rows.vectors || !step.x_new.empty()) rows.x_new = x_new_.data();
-  if (kind != kPlain && !box.empty()) rows.box = box.data();
+  if ((kind == kMoving || kind == kSharedMoving) && !box.empty()) rows.box = box.data();
   for (int k = 0; k < D; ++k) rows.edges[k] = in.edges[k];
   rows.weighted = step.weight != nullptr;
   rows.partner = partners[kind].data();

@@ -29,11 +29,13 @@ template <int D>
 class PairRecords {
  public:
   enum Kind {
-    kPlain,   ///< both particles are owned
-    kMoving,  ///< both are owned, but one may be wrapped into another box
-    kShared,  ///< another rank owns one of the particles
+    kPlain,         ///< both particles are owned
+    kMoving,        ///< both are owned, but one may be wrapped into another box
+    kShared,        ///< another rank owns one of the particles
+    kSharedMoving,  ///< another rank owns one of the particles, and one may be wrapped
     kKinds
   };
+  static bool shared(Kind kind) { return kind == kShared || kind == kSharedMoving; }
 
   std::vector<Id> order;  ///< particles by place
   std::size_t own = 0;    ///< the number of places whose sums flush_to() adds: those of own particles come first

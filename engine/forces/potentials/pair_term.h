@@ -199,15 +199,20 @@ class PairTerm final : public Interaction<D> {
       if (!given.x_new.empty()) own += owned(shared);
     };
     const PairStep<D> all = step(given);
-    bool rest = false;  // pairs of own particles have been added
+    bool done = false;
     if constexpr (requires { pairs_.own_batches(all, particles_, cutoff_squared(), *batch_, add_batch); })
       if (arrive && pairs_.own_batches(all, particles_, cutoff_squared(), *batch_, add_batch)) {
-        if (low) pairs_.flush_to(*forces);
-        low = nullptr;
-        rest = true;
+        (*arrive)();
+        pairs_.rest_batches(all, particles_, cutoff_squared(), *batch_, add_batch, [&] {
+          if (low) pairs_.flush_to(*forces);
+          low = nullptr;
+        });
+        done = true;
       }
-    if (arrive) (*arrive)();
-    pairs_.batches(all, particles_, cutoff_squared(), *batch_, add_batch, rest);
+    if (!done) {
+      if (arrive) (*arrive)();
+      pairs_.batches(all, particles_, cutoff_squared(), *batch_, add_batch);
+    }
     if (low) pairs_.flush_to(*forces);
     if (!sums) return own;
     // A shared pair counts half on each rank.
