@@ -86,17 +86,23 @@ void MpiCommunicator::end_combine() {
 void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> partners,
                             std::span<const std::size_t> sizes, std::span<double> most) {
   ranks_.watch().begin_call();
-  departing_ = std::move(outgoing);
+  departures_[0].messages.swap(departures_[1].messages);
+  departures_[0].requests.swap(departures_[1].requests);
+  auto& [messages, requests] = departures_[0];
+  if (!requests.empty()) ranks_.watch().wait(requests);
+  requests.clear();
+  messages = std::move(outgoing);
   arriving_.resize(partners.size());
-  const auto next = [&] { return &exchanging_.emplace_back(MPI_REQUEST_NULL); };
   for (std::size_t k = 0; k < partners.size(); ++k) {
-    Bytes &in = arriving_[k], &out = departing_[k];
+    Bytes &in = arriving_[k], &out = messages[k];
     in.resize(sizes[k]);
     in_pieces(in.size(), [&](std::size_t at, int count) {
-      MPI_Irecv(in.data() + at, count, MPI_BYTE, partners[k], known, ranks_.handle(), next());
+      MPI_Irecv(in.data() + at, count, MPI_BYTE, partners[k], known, ranks_.handle(),
+                &receiving_.emplace_back(MPI_REQUEST_NULL));
     });
     in_pieces(out.size(), [&](std::size_t at, int count) {
-      MPI_Isend(out.data() + at, count, MPI_BYTE, partners[k], known, ranks_.handle(), next());
+      MPI_Isend(out.data() + at, count, MPI_BYTE, partners[k], known, ranks_.handle(),
+                &requests.emplace_back(MPI_REQUEST_NULL));
     });
   }
   begin_combine(most, {});
@@ -104,10 +110,9 @@ void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> pa
 
 std::vector<Bytes> MpiCommunicator::complete() {
   ranks_.watch().begin_call();
-  if (!exchanging_.empty()) ranks_.watch().wait(exchanging_);
-  exchanging_.clear();
+  if (!receiving_.empty()) ranks_.watch().wait(receiving_);
+  receiving_.clear();
   end_combine();
-  departing_.clear();
   return std::move(arriving_);
 }
 

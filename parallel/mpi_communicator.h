@@ -51,8 +51,15 @@ class MpiCommunicator : public Communicator {
   std::vector<Round> rounds_;
   std::size_t round_ = 0;
   std::array<MPI_Request, 2> combining_ = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
-  std::vector<MPI_Request> exchanging_;  // from start() to complete()
-  std::vector<Bytes> arriving_, departing_;
+  std::vector<MPI_Request> receiving_;  // from start() to complete()
+  std::vector<Bytes> arriving_;
+  /// Messages that start() sends. Long ones leave only while the receiver waits in complete(), so this rank waits for
+  /// them two exchanges later: it may be up to a step ahead of its neighbours.
+  struct Departure {
+    std::vector<Bytes> messages;
+    std::vector<MPI_Request> requests;
+  };
+  std::array<Departure, 2> departures_;
 };
 
 }  // namespace carom

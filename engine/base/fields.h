@@ -16,6 +16,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -36,6 +37,13 @@ class Fields {
   /// The scalars of an entry, as other programs can read them.
   enum class Scalar { float64, int32, uint32, uint16, bytes };
 
+  /// A particle that stays on this rank, or arrives.
+  struct Arrival {
+    Id id;
+    Id place;             ///< of one that stays, before take()
+    const std::byte* at;  ///< the bytes of one that arrives, as pack() writes them; null: it stays
+  };
+
   /// An array with one entry a particle.
   struct Field {
     Field(std::string name_, Kind kind_, Scalar scalar_, std::size_t size_, std::size_t columns_)
@@ -44,6 +52,8 @@ class Fields {
     virtual std::byte* data() = 0;  ///< the first entry
     virtual std::size_t entries() const = 0;
     virtual void resize(std::size_t entries) = 0;  ///< 0: frees the memory
+    /// Replaces all entries; `offset`: of this field in the bytes of a particle.
+    virtual void take(std::span<const Arrival> arrivals, std::size_t offset) = 0;
     const std::string name;
     const Kind kind;
     const Scalar scalar;
@@ -97,17 +107,19 @@ class Fields {
     for (const auto& field : fields_) sum += field->size;
     return sum;
   }
-  /// Copies all fields of particle i to, or from, bytes() bytes.
+  /// Copies all fields of particle i to bytes() bytes.
   void pack(Id i, std::byte* to) const {
     for (const auto& field : fields_) {
       std::memcpy(to, field->data() + i * field->size, field->size);
       to += field->size;
     }
   }
-  void unpack(Id i, const std::byte* from) {
+  /// Replaces all particles.
+  void take(std::span<const Arrival> arrivals) {
+    std::size_t offset = 0;
     for (const auto& field : fields_) {
-      std::memcpy(field->data() + i * field->size, from, field->size);
-      from += field->size;
+      field->take(arrivals, offset);
+      offset += field->size;
     }
   }
   /// Resizes all fields to this many particles; 0 frees the memory.
@@ -151,6 +163,15 @@ class Fields {
         std::vector<T>().swap(values);
       else
         values.resize(entries);
+    }
+    void take(std::span<const Arrival> arrivals, std::size_t offset) override {
+      std::vector<T> all(arrivals.size());
+      for (std::size_t k = 0; k < all.size(); ++k)
+        if (const Arrival& each = arrivals[k]; each.at)
+          std::memcpy(static_cast<void*>(&all[k]), each.at + offset, sizeof(T));
+        else
+          all[k] = values[each.place];
+      values.swap(all);
     }
     std::vector<T>& values;
   };

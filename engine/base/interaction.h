@@ -97,6 +97,11 @@ class Interaction {
     add_forces(x, forces, sums);
   }
 
+  /// Whether this rank's list of pairs will be too old in the next step, and the order to make a new one in this step:
+  /// ranks that make their lists in the same steps wait less for each other.
+  virtual bool ages() const { return false; }
+  virtual void renew() const {}
+
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:
   /// only pairs with at least one changed particle, and fields on changed particles (a term in which each particle
@@ -112,6 +117,9 @@ class Interaction {
   /// This term for the subset `some` of the particles, which must outlive it. Null if the subset lacks particles that
   /// act on owned ones.
   virtual std::unique_ptr<Interaction> among(const Particles<D>& some) const = 0;
+  /// The particles for which this term was made have been replaced by others, in the same arrays. False if it must be
+  /// made again by among(). A term that can go on keeps the memory of its lists.
+  virtual bool regroup() { return false; }
   /// The particles are divided among these ranks, which a term with sums over all particles needs.
   virtual void join(Communicator& /*ranks*/) {}
   /// The distance from x within which other particles matter, as far as this rank knows [length]; infinite: all

@@ -42,41 +42,52 @@ struct PartnerRange {
 };
 
 template <int D>
-PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>& particles) {
+PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>& particles, bool own_covered,
+                                     const std::function<void()>& before_build) {
   const bool still = step.x_new.empty();
-  double squared_from_build = 0, squared_step = 0;
-  const bool known = is_for(step, particles) && follow(step, squared_from_build, squared_step);
+  const std::size_t first = own_covered ? records_.own : 0;
+  double squared_from_build = own_covered ? own_squared_ : 0, squared_step = 0;
+  const bool known =
+      is_for(step, particles) && follow(step, first, records_.order.size(), squared_from_build, squared_step);
   if (!known && !still)
     for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
   if (!made_) skin_.begin(2 * *shared_width_);
-  const double length = std::sqrt(squared_step);
-  if (!skin_.lasts(known, std::sqrt(squared_from_build), length)) {
+  const double length = std::sqrt(squared_step), from_build = std::sqrt(squared_from_build);
+  grown_ = from_build - std::exchange(farthest_, from_build);
+  const bool renew = std::exchange(renew_, false);
+  if (!skin_.lasts(known, from_build, length) || renew) {
+    farthest_ = grown_ = 0;
     need_finite(particles, step.x);
     skin_.renew(box_, length, [&] { return "particle " + std::to_string(particles.id_of(farthest(step))); });
     *shared_width_ = skin_.width();
+    if (before_build) before_build();
     ghost_ = particles.ghost;
     build(step, particles);
+    records_.load(step);
+  } else {
+    records_.load(step, first);
   }
-  records_.load(step);
   return records_;
 }
 
 template <int D>
 PairRecords<D>* CutoffList<D>::cover_own(const PairStep<D>& step, const Particles<D>& particles) {
-  double squared = 0, none = 0;
-  if (particles.ghost.empty() || !is_for(step, particles) || !follow(step, squared, none, true)) return nullptr;
-  if (squared > 0.25 * skin_.width() * skin_.width()) return nullptr;
-  records_.load(step);
+  double none = 0;
+  own_squared_ = 0;
+  if (particles.ghost.empty() || !is_for(step, particles) || !follow(step, 0, records_.own, own_squared_, none))
+    return nullptr;
+  if (own_squared_ > 0.25 * skin_.width() * skin_.width()) return nullptr;
+  records_.load(step, 0, records_.own);
   return &records_;
 }
 
-/// The largest displacements since the last build. Updates the boxes of particles that were wrapped; returns false if
-/// one was wrapped that is not marked as moving, or if a position is not finite. `own_only`: ghosts are left out.
+/// The largest displacements since the last build, of the particles in these places. Updates the boxes of particles
+/// that were wrapped; returns false if one was wrapped that is not marked as moving, or if a position is not finite.
 template <int D>
-bool CutoffList<D>::follow(const PairStep<D>& step, double& squared_from_build, double& squared_step, bool own_only) {
+bool CutoffList<D>::follow(const PairStep<D>& step, std::size_t first, std::size_t end, double& squared_from_build,
+                           double& squared_step) {
   const double allowed = 0.25 * skin_.width() * skin_.width();
-  for (std::size_t r = 0; r < records_.order.size(); ++r) {
-    if (own_only && (code_[r] & PartnerSearch::kGhost) != 0) continue;
+  for (std::size_t r = first; r < end; ++r) {
     const Id i = records_.order[r];
     Vec<D> home;
     for (int k = 0; k < D; ++k) home[k] = built_at_[k][r];
@@ -127,20 +138,22 @@ template <int D>
 struct Cells {
   static constexpr std::int32_t kSlices = 8;
   CellGrid<D> grid;
+  std::size_t count;  // of cells
   std::array<std::int32_t, D> range;
-  std::vector<std::uint32_t> start;
+  std::vector<std::uint32_t> start;  // the first place of each cell: of own particles and then, if any, of ghosts
   std::vector<std::vector<Piece>> around, ahead;  // for each cell of a row: the whole range, and its upper half
 
-  Cells(const CellGrid<D>& cells, double reach) : grid(cells), start(kSlices * cells.cells() + 1) {
+  Cells(const CellGrid<D>& cells, double reach, bool ghosts)
+      : grid(cells), count(kSlices * cells.cells()), start((ghosts ? 2 : 1) * count + 1) {
     for (int k = 0; k < D; ++k) {
       const double edges = reach / grid.edge(k);
       range[k] = static_cast<std::int32_t>(std::clamp(std::ceil(k < D - 1 ? edges : kSlices * edges), 1.0, 1e8));
     }
-    const std::int32_t count = kSlices * grid.count(D - 1), far = range[D - 1];
+    const std::int32_t slices = kSlices * grid.count(D - 1), far = range[D - 1];
     const bool periodic = grid.box().periodic(D - 1);
-    for (std::int32_t c = 0; c < count; ++c) {
-      around.push_back(pieces(c - far, c + far, count, periodic));
-      ahead.push_back(pieces(c, c + far, count, periodic));
+    for (std::int32_t c = 0; c < slices; ++c) {
+      around.push_back(pieces(c - far, c + far, slices, periodic));
+      ahead.push_back(pieces(c, c + far, slices, periodic));
     }
   }
 
@@ -150,9 +163,9 @@ struct Cells {
     return kSlices * grid.index(cell) + static_cast<std::size_t>(std::clamp(kSlices * part, 0.0, kSlices - 1.0));
   }
 
-  /// The ranges of places with partners for the particles of a cell, sorted by image, each pair of cells once. The
-  /// first range begins with the cell itself.
-  void partners(const Cell<D>& centre, std::vector<PartnerRange>& found) const {
+  /// The ranges of places with partners for the particles of a cell, sorted by image. `half`: each pair of cells once,
+  /// and the first range begins with the cell itself; else all cells within reach.
+  void partners(const Cell<D>& centre, bool half, std::vector<PartnerRange>& found) const {
     found.clear();
     bool elsewhere = false;
     const auto add = [&](std::size_t row, const Image<D>& boxes, const std::vector<Piece>& some) {
@@ -168,12 +181,12 @@ struct Cells {
     const auto last = static_cast<std::size_t>(centre[D - 1]);
     Cell<D> row = centre;
     row[D - 1] = 0;
-    add(kSlices * grid.index(row), {}, ahead[last]);
+    if (half) add(kSlices * grid.index(row), {}, ahead[last]);
     const std::int32_t side = D == 3 ? range[1] : 0;
-    for (std::int32_t a = 0; a <= range[0]; ++a) {
+    for (std::int32_t a = half ? 0 : -range[0]; a <= range[0]; ++a) {
       typename CellGrid<D>::Step first, second{};
       if (!grid.step(0, centre[0] + a, first)) continue;
-      for (std::int32_t b = a == 0 ? 1 : -side; b <= side; ++b) {
+      for (std::int32_t b = half && a == 0 ? 1 : -side; b <= side; ++b) {
         Image<D> boxes{};
         boxes[0] = first.boxes;
         if constexpr (D == 3) {
@@ -184,7 +197,7 @@ struct Cells {
       }
     }
     if (elsewhere)
-      std::ranges::stable_sort(found.begin() + 1, found.end(), {},
+      std::ranges::stable_sort(found.begin() + (half ? 1 : 0), found.end(), {},
                                [](const PartnerRange& part) { return std::pair(!part.here(), part.image); });
   }
 };
@@ -196,18 +209,23 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   made_ = true;
   particles_ = step.x.size();
   records_.clear();
-  plain_size_ = 0;
-  std::vector<Id> members;
+  records_.partners[PairRecords<D>::kMoving].clear();
+  records_.partners[PairRecords<D>::kSharedMoving].clear();
+  sizes_ = {};
+  std::vector<Id> members, ghosts;
   Extent<D> extent;
   for (Id i = 0; i < step.x.size(); ++i)
-    if (filter_.species.code(i) != 0) members.push_back(i), extent.add(step.x[i]);
+    if (filter_.species.code(i) != 0)
+      (ghost_.empty() || ghost_[i] == 0 ? members : ghosts).push_back(i), extent.add(step.x[i]);
+  records_.own = members.size();
+  members.insert(members.end(), ghosts.begin(), ghosts.end());
   const double reach = cutoff_ + skin_.width();
-  Cells<D> cells(CellGrid<D>(box_, reach, extent), reach);
+  Cells<D> cells(CellGrid<D>(box_, reach, extent), reach, !ghosts.empty());
 
-  // Counting sort by cell.
+  // Counting sort by cell, own particles before ghosts.
   std::vector<std::uint32_t> at(members.size());
   for (std::size_t m = 0; m < members.size(); ++m) {
-    at[m] = static_cast<std::uint32_t>(cells.index(step.x[members[m]]));
+    at[m] = static_cast<std::uint32_t>(cells.index(step.x[members[m]]) + (m < records_.own ? 0 : cells.count));
     ++cells.start[at[m] + 1];
   }
   const std::size_t fullest = *std::ranges::max_element(cells.start);
@@ -217,7 +235,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   for (std::size_t m = 0; m < members.size(); ++m) records_.order[next[at[m]]++] = members[m];
   double around = 1;
   for (int k = 0; k < D; ++k) around *= 2 * cells.range[k] + 1;
-  records_.most_partners = static_cast<std::size_t>(around * static_cast<double>(fullest));
+  records_.most_partners = static_cast<std::size_t>((ghosts.empty() ? 1 : 2) * around * static_cast<double>(fullest));
 
   for (auto& coordinate : built_at_) coordinate.assign(members.size() + 8, 0);
   code_.assign(members.size() + 8, 0);
@@ -228,12 +246,11 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     boxes[r] = cells.grid.boxes(cells.grid.cell(step.x[i]));
     const Vec<D> home = step.x[i] - box_.shift(boxes[r]);
     std::uint64_t code = filter_.species.code(i);
-    if (!ghost_.empty() && ghost_[i] != 0) code |= PartnerSearch::kGhost | PartnerSearch::kOdd;
     bool moving = boxes[r] != Image<D>{};
     for (int k = 0; k < D; ++k)
       moving = moving || (box_.periodic(k) &&
                           std::min(home[k], box_.edges[k] - home[k]) <= 0.5 * skin_.width() + 1e-9 * box_.edges[k]);
-    if (moving) code |= PartnerSearch::kMoving | PartnerSearch::kOdd;
+    if (moving) code |= PartnerSearch::kMoving;
     any_moving = any_moving || moving;
     for (int k = 0; k < D; ++k) built_at_[k][r] = home[k];
     code_[r] = code;
@@ -244,42 +261,42 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
       for (int k = 0; k < D; ++k) (&records_.box.back().x)[k] = box[k];
     }
 
-  std::vector<std::uint32_t> owned(members.size() + 1);  // number of own particles before each place
-  for (std::size_t r = 0; r < members.size(); ++r)
-    owned[r + 1] = owned[r] + ((code_[r] & PartnerSearch::kGhost) == 0 ? 1 : 0);
-  const auto all_ghosts = [&](const PartnerRange& range) { return owned[range.begin] == owned[range.end]; };
+  // The partners of an own particle are own particles in half of the cells around it, those of a ghost all own
+  // particles around it.
   std::vector<PartnerRange> ranges;
   Cell<D> centre{};
   for (std::size_t c = 0; c + 1 < cells.start.size(); ++c) {
-    if (cells.start[c] < cells.start[c + 1]) {
-      std::size_t rest = c;
-      for (int k = D - 1; k >= 0; --k) {
-        const std::size_t slices = k < D - 1 ? 1 : Cells<D>::kSlices;
-        const std::size_t count = slices * static_cast<std::size_t>(cells.grid.count(k));
-        centre[k] = static_cast<std::int32_t>(rest % count);
-        rest /= count;
-      }
-      cells.partners(centre, ranges);
-      const bool ghosts = owned[cells.start[c]] == owned[cells.start[c + 1]];
-      const bool among = !ghosts || !all_ghosts(ranges[0]);  // the first range begins with the cell itself
-      if (ghosts) std::erase_if(ranges, all_ghosts);
-      for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
-        if (among) ranges[0].begin = r + 1;
-        find_pairs(r, ranges);
-        if (plain_size_ + records_.partners[PairRecords<D>::kMoving].size() > kMaxPairs + kMaxPartners * particles_) {
-          made_ = false;
-          throw Error(Failure::numerical, "far too many pairs are within " + short_text(reach) +
-                                              " of each other: the cutoff and " + short_text(skin_.width()) +
-                                              " for steps as long as that of particle " +
-                                              std::to_string(particles.id_of(farthest(step))) +
-                                              "; use a smaller integrator.step or cutoff");
-        }
+    if (cells.start[c] == cells.start[c + 1]) continue;
+    const bool own = c < cells.count;
+    std::size_t rest = c % cells.count;
+    for (int k = D - 1; k >= 0; --k) {
+      const std::size_t slices = k < D - 1 ? 1 : Cells<D>::kSlices;
+      const std::size_t count = slices * static_cast<std::size_t>(cells.grid.count(k));
+      centre[k] = static_cast<std::int32_t>(rest % count);
+      rest /= count;
+    }
+    cells.partners(centre, own, ranges);
+    for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
+      if (own) ranges[0].begin = r + 1;
+      find_pairs(r, ranges);
+      if (sizes_[own ? 0 : 1] +
+              records_.partners[own ? PairRecords<D>::kMoving : PairRecords<D>::kSharedMoving].size() >
+          kMaxPairs + kMaxPartners * particles_) {
+        made_ = false;
+        throw Error(Failure::numerical,
+                    "far too many pairs are within " + short_text(reach) + " of each other: the cutoff and " +
+                        short_text(skin_.width()) + " for steps as long as that of particle " +
+                        std::to_string(particles.id_of(farthest(step))) + "; use a smaller integrator.step or cutoff");
       }
     }
   }
-  records_.partners[0].swap(plain_);
-  records_.partners[0].resize(plain_size_);  // beyond it the search leaves invalid places
-  for (auto& partners : records_.partners) partners.resize(partners.size() + 8);
+  for (const auto kind : {PairRecords<D>::kMoving, PairRecords<D>::kSharedMoving})
+    records_.partners[kind].resize(records_.partners[kind].size() + 8);
+  for (const std::size_t k : {0, 1}) {  // the search leaves invalid places beyond the last partner
+    auto& partners = records_.partners[k == 0 ? PairRecords<D>::kPlain : PairRecords<D>::kShared];
+    if (partners.size() < sizes_[k] + 8) partners.resize(sizes_[k] + 8);
+    std::fill_n(partners.data() + sizes_[k], 8, 0u);
+  }
 }
 
 /// Lists the pairs of one particle with the particles in these ranges.
@@ -287,50 +304,48 @@ template <int D>
 void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> ranges) {
   const std::uint64_t code = code_[row];
   const double reach = (cutoff_ + skin_.width()) * (1 + 1e-12);
-  const bool is_ghost = (code & PartnerSearch::kGhost) != 0;
+  const bool ghost = row >= records_.own;
+  const auto kind = ghost ? PairRecords<D>::kShared : PairRecords<D>::kPlain;
+  const auto moving_kind = ghost ? PairRecords<D>::kSharedMoving : PairRecords<D>::kMoving;
+  auto& plain = records_.partners[kind];
+  std::size_t& size = sizes_[ghost ? 1 : 0];
   PartnerSearch search{.x = {built_at_[0].data(), built_at_[1].data(), built_at_[2].data()},
                        .code = code_.data(),
                        .row = row,
                        .own = {},
                        .reach_squared = reach * reach};
   search.wanted = filter_.species.partner_code(code);
-  search.plain = (code & PartnerSearch::kOdd) == 0;
+  search.plain = (code & PartnerSearch::kMoving) == 0;
   for (std::size_t first = 0; first < ranges.size();) {
     const auto& image = ranges[first].image;
     std::size_t last = first, candidates = 16;
     for (; last < ranges.size() && ranges[last].as(ranges[first]); ++last)
       candidates += ranges[last].end - ranges[last].begin;
-    if (plain_.size() < plain_size_ + candidates) plain_.resize(2 * (plain_size_ + candidates));
+    if (plain.size() < size + candidates) plain.resize(2 * (size + candidates));
     if (other_.size() < candidates) other_.resize(candidates);
     search.here = ranges[first].here();
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
-    PartnersFound found{plain_.data() + plain_size_, other_.data()};
+    PartnersFound found{plain.data() + size, other_.data()};
     for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
     if (filter_.excluded) {
       const auto excluded = [&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); };
-      found.plain = std::remove_if(plain_.data() + plain_size_, found.plain, excluded);
+      found.plain = std::remove_if(plain.data() + size, found.plain, excluded);
       found.other = std::remove_if(other_.data(), found.other, excluded);
     }
-    const auto add = [&](int kind, std::size_t begin, std::size_t end) {
+    const auto add = [&](int to, std::size_t begin, std::size_t end) {
       if (begin == end) return;
-      records_.runs[kind].push_back({row,
-                                     static_cast<std::uint32_t>(begin),
-                                     static_cast<std::uint32_t>(end - begin),
-                                     {image[0], image[1], image[2]}});
+      records_.runs[to].push_back({row,
+                                   static_cast<std::uint32_t>(begin),
+                                   static_cast<std::uint32_t>(end - begin),
+                                   {image[0], image[1], image[2]}});
     };
-    const auto plain_end = static_cast<std::size_t>(found.plain - plain_.data());
-    add(PairRecords<D>::kPlain, plain_size_, plain_end);
-    plain_size_ = plain_end;
-    for (const int kind : {PairRecords<D>::kMoving, PairRecords<D>::kShared}) {
-      auto& partners = records_.partners[kind];
-      const std::size_t begin = partners.size();
-      for (const std::uint32_t* other = other_.data(); other < found.other; ++other) {
-        const bool other_is_ghost = (code_[*other] & PartnerSearch::kGhost) != 0;
-        if (is_ghost && other_is_ghost) continue;
-        if ((kind == PairRecords<D>::kShared) == (is_ghost || other_is_ghost)) partners.push_back(*other);
-      }
-      add(kind, begin, partners.size());
-    }
+    const auto plain_end = static_cast<std::size_t>(found.plain - plain.data());
+    add(kind, size, plain_end);
+    size = plain_end;
+    auto& partners = records_.partners[moving_kind];
+    const std::size_t begin = partners.size();
+    partners.insert(partners.end(), other_.data(), found.other);
+    add(moving_kind, begin, partners.size());
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -26,12 +27,22 @@ class CutoffList {
   }
 
   /// The pairs within the cutoff at x or x_new, and some beyond. A pair keeps the image it has at x. `particles` has
-  /// ghosts and ids. Throws Error(Failure::numerical) if positions are not finite, or for steps of several periodic
-  /// boxes or with far too many pairs.
-  PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles);
+  /// ghosts and ids. `own_covered`: cover_own() has just returned a list for the own particles at x, and before_build()
+  /// is called if a new list must replace it. Throws
+  /// Error(Failure::numerical) if positions are not finite, or for steps of several periodic boxes or with far too many
+  /// pairs.
+  PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles, bool own_covered = false,
+                        const std::function<void()>& before_build = {});
   /// The pairs of own particles at x, where the positions of ghosts are unknown; null if a new list is needed for them,
   /// or if there are no ghosts.
   PairRecords<D>* cover_own(const PairStep<D>& step, const Particles<D>& particles);
+
+  /// The particles are others than those of the last cover().
+  void forget() { made_ = false; }
+  /// Whether a new list will be needed in the next step if particles move on as in the last one.
+  bool ages() const { return made_ && farthest_ + grown_ > 0.5 * skin_.width(); }
+  /// The next cover() makes a new list.
+  void renew() { renew_ = true; }
 
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
 
@@ -39,7 +50,8 @@ class CutoffList {
   bool is_for(const PairStep<D>& step, const Particles<D>& particles) const {
     return made_ && particles_ == step.x.size() && ghost_ == particles.ghost;
   }
-  bool follow(const PairStep<D>& step, double& squared_from_build, double& squared_step, bool own_only = false);
+  bool follow(const PairStep<D>& step, std::size_t first, std::size_t end, double& squared_from_build,
+              double& squared_step);
   void build(const PairStep<D>& step, const Particles<D>& particles);
   void find_pairs(std::uint32_t row, std::span<const struct PartnerRange> ranges);
 
@@ -51,12 +63,14 @@ class CutoffList {
   const PairKernels* kernels_ = &widest_kernels<PairKernels>();
   std::vector<char> ghost_;
   std::size_t particles_ = 0;  // at the last build
-  bool made_ = false;
-  PairRecords<D> records_;
+  bool made_ = false, renew_ = false;
+  double farthest_ = 0, grown_ = 0;  // the largest displacement at the last cover(), and how much it had grown
+  PairRecords<D> records_;           // own particles before ghosts
+  double own_squared_ = 0;           // the largest squared displacement found by cover_own()
   std::array<std::vector<double>, 3> built_at_;  // coordinates in the box at the last build
   std::vector<std::uint64_t> code_;
-  std::vector<std::uint32_t> plain_, other_;
-  std::size_t plain_size_ = 0;
+  std::vector<std::uint32_t> other_;
+  std::array<std::size_t, 2> sizes_{};  // the numbers of partners in kPlain and in kShared, whose arrays are longer
 };
 
 }  // namespace carom

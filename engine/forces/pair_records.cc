@@ -5,7 +5,7 @@ namespace carom {
 
 template <int D>
 void PairRecords<D>::clear() {
-  for (int kind = 0; kind < kKinds; ++kind) runs[kind].clear(), partners[kind].clear();
+  for (auto& each : runs) each.clear();
   order.clear();
   box.clear();
 }
@@ -20,14 +20,14 @@ PairRecord record(const Vec<D>& x, double w) {
 }  // namespace
 
 template <int D>
-void PairRecords<D>::load(const PairStep<D>& step) {
+void PairRecords<D>::load(const PairStep<D>& step, std::size_t first, std::size_t end) {
   x_.resize(order.size());
-  for (std::size_t r = 0; r < order.size(); ++r)
+  for (std::size_t r = first; r < end; ++r)
     x_[r] = record<D>(step.x[order[r]], step.weight ? (*step.weight)[order[r]] : 1);
   const auto& other = step.vectors.empty() ? step.x_new : step.vectors;
   if (other.empty()) return;
   x_new_.resize(order.size());
-  for (std::size_t r = 0; r < order.size(); ++r) x_new_[r] = record<D>(other[order[r]], 1);
+  for (std::size_t r = first; r < end; ++r) x_new_[r] = record<D>(other[order[r]], 1);
 }
 
 template <int D>
@@ -35,7 +35,7 @@ PairRows PairRecords<D>::rows(Kind kind, const Box<D>& in, const PairStep<D>& st
   PairRows rows{.x = x_.data()};
   rows.vectors = !step.vectors.empty();
   if (rows.vectors || !step.x_new.empty()) rows.x_new = x_new_.data();
-  if (kind != kPlain && !box.empty()) rows.box = box.data();
+  if ((kind == kMoving || kind == kSharedMoving) && !box.empty()) rows.box = box.data();
   for (int k = 0; k < D; ++k) rows.edges[k] = in.edges[k];
   rows.weighted = step.weight != nullptr;
   rows.partner = partners[kind].data();
@@ -80,10 +80,10 @@ ForceWords* PairRecords<D>::high() {
 template <int D>
 void PairRecords<D>::flush_to(ForceSums<D>& sums) {
   ForceWords* const low = sums.low();
-  for (std::size_t r = 0; r < low_.size(); ++r) low[order[r]].add(low_[r]);
+  for (std::size_t r = 0; r < own; ++r) low[order[r]].add(low_[r]);
   if (high_.empty()) return;
   ForceWords* const high = sums.high();
-  for (std::size_t r = 0; r < high_.size(); ++r) high[order[r]].add(high_[r]);
+  for (std::size_t r = 0; r < own; ++r) high[order[r]].add(high_[r]);
 }
 
 template class PairRecords<2>;

@@ -29,21 +29,26 @@ template <int D>
 class PairRecords {
  public:
   enum Kind {
-    kPlain,   ///< both particles are owned
-    kMoving,  ///< both are owned, but one may be wrapped into another box
-    kShared,  ///< another rank owns one of the particles
+    kPlain,         ///< both particles are owned
+    kMoving,        ///< both are owned, but one may be wrapped into another box
+    kShared,        ///< another rank owns one of the particles
+    kSharedMoving,  ///< another rank owns one of the particles, and one may be wrapped
     kKinds
   };
+  static bool shared(Kind kind) { return kind == kShared || kind == kSharedMoving; }
 
   std::vector<Id> order;  ///< particles by place
+  std::size_t own = 0;    ///< the number of places whose sums flush_to() adds: those of own particles come first
   std::vector<PairRun> runs[kKinds];
-  std::vector<std::uint32_t> partners[kKinds];  ///< followed by eight more, for padding
+  std::vector<std::uint32_t> partners[kKinds];  ///< followed by at least eight more, for padding
   std::vector<PairRecord> box;                  ///< numbers of the boxes that the particles are in; empty: all 0
   std::size_t most_partners = 0;                ///< upper bound for any particle
 
+  /// Removes all but partners.
   void clear();
-  /// Loads the positions and weights of a step.
-  void load(const PairStep<D>& step);
+  /// Loads the positions and weights of a step, of the particles in the places from `first` to before `end`.
+  void load(const PairStep<D>& step, std::size_t first, std::size_t end);
+  void load(const PairStep<D>& step, std::size_t first = 0) { load(step, first, order.size()); }
   /// The input of the kernels; call load() first.
   PairRows rows(Kind kind, const Box<D>& box, const PairStep<D>& step);
 

@@ -118,7 +118,8 @@ Bytes Decomposition<D>::block_of(Fields::Field& field) const {
 template <int D>
 bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
   if (!by_place_) return false;
-  const auto farthest = [&] { return std::sqrt(largest(halo_.squared_farthest(system_.box, system_.particles))); };
+  const auto known = std::exchange(farthest_, {});
+  const auto farthest = [&] { return std::sqrt(known ? *known : largest(squared_farthest(system_.particles.x))); };
   if (all_known_ ? slab < next_ : !width_.outdated(farthest)) return false;
   if (!all_known_) {  // the last division was good enough
     slabs_with_all_ = std::max<std::int64_t>(slabs_with_all_ / 2, 1);
@@ -142,18 +143,22 @@ void Decomposition<D>::migrate(bool all, double slab_length) {
   if (all || !migrate_to_near(slab_length)) migrate_to_all();
 }
 
-/// The messages of pack_own(). Afterwards this rank has no particles.
+/// The messages of pack_own(). Afterwards this rank has no particles, unless `stay` is given.
 template <int D>
-std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver) {
+std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver,
+                                          std::vector<Fields::Arrival>* stay) {
   Particles<D>& p = system_.particles;
-  std::vector<Bytes> messages = pack_own(system_.fields, p, particles, for_each_receiver);
   system_.fields.release_working();
+  std::optional<std::size_t> here;
+  if (stay) here = static_cast<std::size_t>(ranks_->rank());
+  std::vector<Bytes> messages = pack_own(system_.fields, p, particles, for_each_receiver, here, stay);
   if (!by_place_) {
     block_ = std::exchange(p, {});
     block_interactions_ = std::move(system_.interactions);
+    system_.interactions.clear();
     by_place_ = true;
   }
-  system_.interactions.clear();
+  if (stay) return messages;
   system_.fields.resize(0);
   p.id = {};
   return messages;
@@ -183,10 +188,13 @@ bool Decomposition<D>::migrate_to_near(double slab_length) {
   ranks_->sum(known);
   if (static_cast<double>(std::ranges::max(known)) > kMaxKnownFraction * static_cast<double>(total())) return false;
 
-  const auto messages = ranks_->swap(
-      pack(mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); }));
+  std::vector<Fields::Arrival> stay;
+  const bool again = by_place_;  // before, the particles are in blocks, whose memory is freed first
+  const auto messages = ranks_->swap(pack(
+      mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); },
+      again ? &stay : nullptr));
   all_known_ = false;
-  receive_particles(system_.fields, system_.particles, messages, total());
+  receive_particles(system_.fields, system_.particles, messages, total(), std::move(stay));
   assign(bisection, width_.near());
   system_.fields.prepare_working();
   return true;
@@ -204,17 +212,18 @@ void Decomposition<D>::migrate_to_all() {
   system_.fields.prepare_working();
 }
 
-/// Sets the owners of this rank's particles; ghosts nearer than `near` matter. Builds the interactions for them if they
-/// are missing.
+/// Sets the owners of this rank's particles; ghosts nearer than `near` matter. Makes the interactions for them.
 template <int D>
 void Decomposition<D>::assign(const Bisection<D>& bisection, double near) {
   Particles<D>& p = system_.particles;
   halo_.assign(bisection, system_.box, p, ranks_->rank(), near);
-  if (!system_.interactions.empty()) return;
-  for (const auto& term : block_interactions_) {
-    system_.interactions.push_back(term->among(p));
-    if (!system_.interactions.back()) throw std::logic_error("a particle is missing that an own particle feels");
-    system_.interactions.back()->join(*ranks_);
+  system_.interactions.resize(block_interactions_.size());
+  for (std::size_t k = 0; k < block_interactions_.size(); ++k) {
+    auto& term = system_.interactions[k];
+    if (term && term->regroup()) continue;
+    term = block_interactions_[k]->among(p);
+    if (!term) throw std::logic_error("a particle is missing that an own particle feels");
+    term->join(*ranks_);
   }
 }
 
@@ -231,15 +240,21 @@ void Decomposition<D>::start_step(std::span<Vec<D>> x, std::span<const Vec<D>> v
   double farthest = 0;
   for (Id i = 0; i < v.size(); ++i)
     if (system_.particles.owns(i)) farthest = std::max(farthest, v[i].squaredNorm());
-  longest_path_ = length * std::sqrt(farthest);
-  halo_.start(*ranks_, {&longest_path_, 1}, x);
+  farthest_.reset();
+  const bool look = !all_known_ && width_.looks_next();
+  most_ = {length * std::sqrt(farthest), look ? squared_farthest(x) : 0};
+  for (const auto& term : system_.interactions) most_.push_back(term->ages() ? 1 : 0);
+  halo_.start(*ranks_, most_, x);
 }
 
 template <int D>
 void Decomposition<D>::finish_step(std::span<Vec<D>> x) {
   if (!by_place_) return;
   halo_.finish(*ranks_, x);
-  need_paths(longest_path_);
+  need_paths(most_[0]);
+  if (!all_known_ && width_.looks_next()) farthest_ = most_[1];
+  for (std::size_t k = 2; k < most_.size(); ++k)
+    if (most_[k] > 0) system_.interactions[k - 2]->renew();
 }
 
 template <int D>

@@ -106,7 +106,7 @@ class Decomposition {
   void need_paths(double path);
   /// For a step of this length [time] in which own particles move to x at velocities v: between start_step() and
   /// finish_step() the positions of their owners travel to ghosts. finish_step() throws HaloTooSmall unless the halos
-  /// suffice. With one rank they do nothing.
+  /// suffice. If a list of pairs ages on any rank, all make new ones. With one rank they do nothing.
   void start_step(std::span<Vec<D>> x, std::span<const Vec<D>> v, double length);
   void finish_step(std::span<Vec<D>> x);
   /// Throws HaloTooSmall because ghosts that matter went wrong; the halo must be deeper.
@@ -126,8 +126,12 @@ class Decomposition {
  private:
   void migrate(bool all, double slab_length);
   bool migrate_to_near(double slab_length);
+  double squared_farthest(std::span<const Vec<D>> x) const {
+    return halo_.squared_farthest(system_.box, system_.particles, x);
+  }
   void migrate_to_all();
-  std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver);
+  std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver,
+                          std::vector<Fields::Arrival>* stay = nullptr);
   void assign(const Bisection<D>& bisection, double near);
 
   System<D>& system_;
@@ -141,8 +145,9 @@ class Decomposition {
   bool local_ = false, all_known_ = false;
   HaloWidth width_;
   HaloExchange<D> halo_;
-  double longest_path_ = 0;  // of the step between start_step() and finish_step()
-  std::int64_t next_ = 0;    // while all_known_: the slab before which to divide again
+  std::optional<double> farthest_;  // the largest squared displacement at the end of the last step, if it was needed
+  std::vector<double> most_;        // between start_step() and finish_step(): the longest path, and which terms age
+  std::int64_t next_ = 0;           // while all_known_: the slab before which to divide again
   std::int64_t slabs_with_all_ = 1;
 };
 

@@ -7,8 +7,8 @@ namespace carom {
 namespace {
 
 template <int D>
-Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, Id i) {
-  return p.x[i] + box.shift(p.image[i]);
+Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, std::span<const Vec<D>> x, Id i) {
+  return x[i] + box.shift(p.image[i]);
 }
 
 }  // namespace
@@ -25,7 +25,7 @@ void HaloExchange<D>::assign(const Bisection<D>& bisection, const Box<D>& box, P
     const std::uint32_t owner = bisection.owner(x);
     p.ghost[i] = owner != own;
     matters_.push_back(owner != own && bisection.squared_distance(own, x) <= near * near);
-    at_.push_back(unwrapped(box, p, i));
+    at_.push_back(unwrapped<D>(box, p, p.x, i));
     if (owner != own)
       copies_of_[owner].push_back(i);
     else
@@ -39,10 +39,10 @@ void HaloExchange<D>::assign(const Bisection<D>& bisection, const Box<D>& box, P
 }
 
 template <int D>
-double HaloExchange<D>::squared_farthest(const Box<D>& box, const Particles<D>& p) const {
+double HaloExchange<D>::squared_farthest(const Box<D>& box, const Particles<D>& p, std::span<const Vec<D>> x) const {
   double farthest = 0;
   for (Id i = 0; i < p.size(); ++i)
-    if (p.owns(i)) farthest = std::max(farthest, (unwrapped(box, p, i) - at_[i]).squaredNorm());
+    if (p.owns(i)) farthest = std::max(farthest, (unwrapped<D>(box, p, x, i) - at_[i]).squaredNorm());
   return farthest;
 }
 

@@ -24,8 +24,8 @@ class HaloExchange {
   void assign(const Bisection<D>& bisection, const Box<D>& box, Particles<D>& p, int me, double near);
   /// Whether the motion of a ghost matters to own particles.
   bool matters(Id i) const { return matters_[i] != 0; }
-  /// The largest squared displacement of an own particle since assign().
-  double squared_farthest(const Box<D>& box, const Particles<D>& p) const;
+  /// The largest squared displacement of an own particle since assign(), if it is at x with the image of `p`.
+  double squared_farthest(const Box<D>& box, const Particles<D>& p, std::span<const Vec<D>> x) const;
 
   /// Ghosts get the values of their owners; each vector has an entry for each particle of this rank. Collective.
   template <class... T>

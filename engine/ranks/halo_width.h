@@ -34,6 +34,8 @@ class HaloWidth {
   /// Call if the last division was good enough: the next halos may be narrower.
   void relax();
 
+  /// Whether the next outdated() will call farthest().
+  bool looks_next() const { return safe_slabs_ < 1; }
   /// Call before a slab: whether a particle may be displaced too far since fit(). Calls farthest(), the largest
   /// displacement, only if necessary.
   template <class Farthest>

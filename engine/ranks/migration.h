@@ -3,6 +3,8 @@
 // Migration of particles with all their fields (fields.h) from their owners to the ranks that need them.
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/base/bytes.h"
@@ -12,18 +14,26 @@
 namespace carom {
 
 /// Packs this rank's own particles into the messages that for_each_receiver(place, visit) visits; `particles` is the
-/// number of particles in each message.
+/// number of particles in each message. Those for message number `here` stay: they are added to `stay` instead.
 template <int D>
 std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const std::vector<std::uint64_t>& particles,
-                            auto&& for_each_receiver) {
+                            auto&& for_each_receiver, std::optional<std::size_t> here = {},
+                            std::vector<Fields::Arrival>* stay = nullptr) {
   std::vector<Bytes> messages(particles.size());
   Bytes packed(sizeof(Id) + fields.bytes());
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
     const Id id = p.id_of(i);
-    std::memcpy(packed.data(), &id, sizeof id);
-    fields.pack(i, packed.data() + sizeof id);
+    bool is_packed = false;
     for_each_receiver(p.x[i], [&](std::size_t message) {
+      if (message == here) {
+        stay->push_back({id, i, nullptr});
+        return;
+      }
+      if (!std::exchange(is_packed, true)) {
+        std::memcpy(packed.data(), &id, sizeof id);
+        fields.pack(i, packed.data() + sizeof id);
+      }
       if (messages[message].empty()) messages[message].reserve(particles[message] * packed.size());
       messages[message].insert(messages[message].end(), packed.begin(), packed.end());
     });
@@ -31,26 +41,21 @@ std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const s
   return messages;
 }
 
-/// Replaces this rank's particles by the particles in the messages, ordered by id and not marked as ghosts. No id may
-/// occur twice; `total` is the number of particles on all ranks.
+/// Replaces this rank's particles by those that stay and those in the messages, ordered by id and not marked as ghosts.
+/// No id may occur twice; `total` is the number of particles on all ranks.
 template <int D>
-void receive_particles(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total) {
-  struct Received {
-    Id id;
-    const std::byte* at;
-  };
-  std::vector<Received> arrivals;
+void receive_particles(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total,
+                       std::vector<Fields::Arrival> stay = {}) {
   for (const Bytes& message : messages)
     for (Reader from(message); from.more();) {
       const Id id = from.template get<Id>();
-      arrivals.push_back({id, from.skip(fields.bytes())});
+      stay.push_back({id, 0, from.skip(fields.bytes())});
     }
-  std::ranges::sort(arrivals, {}, &Received::id);
-  fields.resize(arrivals.size());
-  for (Id i = 0; i < arrivals.size(); ++i) fields.unpack(i, arrivals[i].at);
+  std::ranges::sort(stay, {}, &Fields::Arrival::id);
+  fields.take(stay);
   p.id.clear();
-  if (arrivals.size() < total)
-    for (const Received& arrival : arrivals) p.id.push_back(arrival.id);
+  if (stay.size() < total)
+    for (const Fields::Arrival& each : stay) p.id.push_back(each.id);
   p.ghost.assign(p.size(), 0);
 }
 

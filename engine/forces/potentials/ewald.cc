@@ -109,6 +109,8 @@ class EwaldTerm final : public Interaction<3> {
   void add_forces(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums) const override {
     add_forces_early(x, forces, sums, [] {});
   }
+  bool ages() const override { return pairs_->ages(); }
+  void renew() const override { pairs_->renew(); }
   void add_forces_early(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums,
                         const Arrival& arrive) const override {
     for (const auto& part : parts_) part->add_forces_early(x, forces, sums, arrive);

@@ -70,6 +70,13 @@ class PairTerm final : public Interaction<D> {
                         const Arrival& arrive) const override {
     evaluate({.x = x}, &forces, sums, 1, &arrive);
   }
+  bool ages() const override {
+    if constexpr (requires { pairs_.ages(); }) return pairs_.ages();
+    return false;
+  }
+  void renew() const override {
+    if constexpr (requires { pairs_.renew(); }) pairs_.renew();
+  }
   std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
                                 int sign) const override {
     return evaluate({.x = x, .x_new = x_new, .changed = changed}, &forces, nullptr, sign);
@@ -85,6 +92,13 @@ class PairTerm final : public Interaction<D> {
     auto term = std::make_unique<PairTerm>(some, potential_, weight_, std::move(*pairs), scale_, tail_);
     term->use(*kernels_);
     return term;
+  }
+  bool regroup() override {
+    if constexpr (requires { pairs_.regroup(); }) {
+      pairs_.regroup();
+      return true;
+    }
+    return false;
   }
   void use(const PairKernels& kernels) override {
     kernels_ = &kernels;
@@ -185,15 +199,20 @@ class PairTerm final : public Interaction<D> {
       if (!given.x_new.empty()) own += owned(shared);
     };
     const PairStep<D> all = step(given);
-    bool rest = false;  // pairs of own particles have been added
+    bool done = false;
     if constexpr (requires { pairs_.own_batches(all, particles_, cutoff_squared(), *batch_, add_batch); })
       if (arrive && pairs_.own_batches(all, particles_, cutoff_squared(), *batch_, add_batch)) {
-        if (low) pairs_.flush_to(*forces);
-        low = nullptr;
-        rest = true;
+        (*arrive)();
+        pairs_.rest_batches(all, particles_, cutoff_squared(), *batch_, add_batch, [&] {
+          if (low) pairs_.flush_to(*forces);
+          low = nullptr;
+        });
+        done = true;
       }
-    if (arrive) (*arrive)();
-    pairs_.batches(all, particles_, cutoff_squared(), *batch_, add_batch, rest);
+    if (!done) {
+      if (arrive) (*arrive)();
+      pairs_.batches(all, particles_, cutoff_squared(), *batch_, add_batch);
+    }
     if (low) pairs_.flush_to(*forces);
     if (!sums) return own;
     // A shared pair counts half on each rank.

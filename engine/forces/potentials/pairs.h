@@ -3,15 +3,17 @@
 // Sources of pairs for the sum of a term of V: a list of bonds, all pairs, or the pairs within a cutoff.
 //
 // Each source has
-//   batches(step, particles, cutoff², batch, visit, shared_only)   fills the batch repeatedly and calls visit(shared);
-//                               shared: another rank owns one particle of each pair; pairs of two ghosts are omitted
+//   batches(step, particles, cutoff², batch, visit)   fills the batch repeatedly and calls visit(shared); shared:
+//                               another rank owns one particle of each pair; pairs of two ghosts are omitted
 //   id(place)                   the particle with this number in a batch
 //   low(sums), high(sums)       words to which the forces of a batch are added; flush_to(sums) comes last
 //   most_partners()             upper bound for any particle in these batches
 //   use(kernels)                replaces the widest kernels of this machine
 //   own_batches(…)              if it exists: as batches() for pairs of own particles, where the positions of ghosts
-//   are
-//                               unknown; returns false if that is not possible
+//                               are unknown; returns false if that is not possible. Then rest_batches(…, before_new)
+//                               for the rest; before_new() is called if sums must be flushed before new batches
+//   ages(), renew()             if they exist: as in Interaction
+//   regroup()                   if it exists: the particles have been replaced by others
 // and
 //   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
 //   among(some)                             the source for a subset of the particles, or nothing if partners are
@@ -19,6 +21,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -37,11 +40,12 @@ namespace carom {
 template <int D, class Visit>
 void collect_batches(PairRecords<D>& records, const Box<D>& box, const PairStep<D>& step, double cutoff_squared,
                      const PairKernels& kernels, PairBatch& batch, Visit&& visit, bool own = true, bool shared = true) {
-  for (const auto kind : {PairRecords<D>::kPlain, PairRecords<D>::kMoving, PairRecords<D>::kShared}) {
-    if (!(kind == PairRecords<D>::kShared ? shared : own)) continue;
+  using Records = PairRecords<D>;
+  for (const auto kind : {Records::kPlain, Records::kMoving, Records::kShared, Records::kSharedMoving}) {
+    if (!(Records::shared(kind) ? shared : own)) continue;
     PairRows rows = records.rows(kind, box, step);
     rows.cutoff_squared = cutoff_squared;
-    for (PairCursor cursor; kernels.collect(rows, cursor, batch);) visit(kind == PairRecords<D>::kShared);
+    for (PairCursor cursor; kernels.collect(rows, cursor, batch);) visit(Records::shared(kind));
   }
 }
 
@@ -99,7 +103,7 @@ class Bonds {
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double /*cutoff_squared*/, PairBatch& batch,
-               Visit&& visit, bool /*shared_only*/ = false) const {
+               Visit&& visit) const {
     shared_.clear();
     for (const bool shared : {false, true}) {
       batch.clear();
@@ -177,7 +181,7 @@ class AllPairs {
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
-               Visit&& visit, bool /*shared_only*/ = false) const {
+               Visit&& visit) const {
     if (records_.order.empty() || ghost_ != particles.ghost) arrange(particles);
     need_finite(particles, step.x);
     records_.load(step);
@@ -204,6 +208,7 @@ class AllPairs {
             records_.order.push_back(i);
         end.push_back(static_cast<std::uint32_t>(records_.order.size()));
       }
+    records_.own = records_.order.size();
     const auto add = [&](auto kind, std::uint32_t row, std::uint32_t first, std::uint32_t last) {
       const auto run = [&](std::uint32_t stop) {
         if (first < stop) records_.runs[kind].push_back({row, first, stop - first, {0, 0, 0}});
@@ -249,9 +254,9 @@ class PairsWithinCutoff {
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
-               Visit&& visit, bool shared_only = false) const {
+               Visit&& visit) const {
     records_ = &list_.cover(step, particles);
-    collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit, !shared_only);
+    collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit);
   }
   template <class Visit>
   bool own_batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
@@ -260,6 +265,15 @@ class PairsWithinCutoff {
     if (records_) collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit, true, false);
     return records_ != nullptr;
   }
+  template <class Visit>
+  void rest_batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,
+                    Visit&& visit, const std::function<void()>& before_new) const {
+    records_ = &list_.cover(step, particles, true, before_new);
+    collect_batches(*records_, box_, step, cutoff_squared, *kernels_, batch, visit, false);
+  }
+  void regroup() { list_.forget(); }
+  bool ages() const { return list_.ages(); }
+  void renew() const { list_.renew(); }
   Id id(std::uint32_t place) const { return records_->order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_->low(); }
   ForceWords* high(ForceSums<D>&) const { return records_->high(); }

@@ -110,15 +110,15 @@ struct PairFormula {
 
 /// A search for the partners of one particle in a range of places, when a list is built.
 struct PartnerSearch {
-  // Bits of a particle's code: may be wrapped, ghost, first species, second species; kOdd: may be wrapped or ghost.
-  static constexpr std::uint64_t kMoving = 1, kGhost = 2, kFirst = 4, kSecond = 8, kOdd = 1ULL << 63;
+  // Bits of a particle's code: may be wrapped, first species, second species.
+  static constexpr std::uint64_t kFirst = 1, kSecond = 2, kMoving = 1ULL << 63;
   const double* x[3] = {};  ///< coordinates in the box
   const std::uint64_t* code = nullptr;
   std::uint32_t row = 0;
   double own[3];  ///< its position, shifted by the image
   double reach_squared = 0;
   std::uint64_t wanted = 0;  ///< the partner's code must have the highest of these bits
-  bool plain = false;        ///< the particle is not odd
+  bool plain = false;        ///< pairs with partners that are not moving are plain
   bool here = false;         ///< the image is zero
 };
 /// The results: plain pairs and others; each array has room for `count` more entries plus eight.

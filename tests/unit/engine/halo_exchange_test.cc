@@ -90,7 +90,7 @@ TEST(HaloExchange, KnowsHowFarOwnParticlesHaveCome) {
     known.p.x[i][0] -= kBox.edges[0];
     known.p.image[i][0] += 1;
   }
-  EXPECT_NEAR(known.halo.squared_farthest(kBox, known.p), 0.0625, 1e-12);
+  EXPECT_NEAR(known.halo.squared_farthest(kBox, known.p, known.p.x), 0.0625, 1e-12);
 }
 
 }  // namespace

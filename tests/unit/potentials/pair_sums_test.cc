@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Sums over pairs have equal bits for any kernel and any order.
 
+#include <algorithm>
 #include <cstdlib>
+#include <map>
+#include <random>
 
 #include "engine/forces/pair_list.h"
 #include "engine/forces/potentials/cut.h"
@@ -81,6 +84,44 @@ TEST(CutoffList, HasPlacesBehindTheLastPartnerToo) {
       EXPECT_GE(pairs, n - 1);
     }
   }
+}
+
+/// Own particles come first; pairs of ghosts are not listed.
+TEST(CutoffList, HasEachPairOfAnOwnParticleOnce) {
+  constexpr double kCutoff = 1.5;
+  Box<3> box;
+  box.edges = {6, 5, 7};
+  box.boundary.fill(Boundary::periodic);
+  Particles<3> p;
+  std::mt19937_64 random(1);
+  const auto place = [&](int axis) { return box.edges[axis] * static_cast<double>(random() >> 11) * 0x1p-53; };
+  for (int i = 0; i < 300; ++i) {
+    p.x.emplace_back(place(0), place(1), place(2));
+    p.ghost.push_back(i % 3 == 0);
+  }
+  CutoffList<3> list(box, kCutoff, {});
+  const PairRecords<3>& records = list.cover({.x = p.x}, p);
+  EXPECT_EQ(records.own, 200u);
+  std::map<std::pair<Id, Id>, int> listed;
+  for (const auto kind :
+       {PairRecords<3>::kPlain, PairRecords<3>::kMoving, PairRecords<3>::kShared, PairRecords<3>::kSharedMoving}) {
+    EXPECT_FALSE(records.runs[kind].empty()) << kind;
+    for (const PairRun& run : records.runs[kind])
+      for (std::size_t k = run.begin; k < run.begin + run.count; ++k) {
+        const Id i = records.order[run.row], j = records.order[records.partners[kind][k]];
+        EXPECT_TRUE(p.owns(j));
+        EXPECT_EQ(p.owns(i), !PairRecords<3>::shared(kind));
+        ++listed[std::minmax(i, j)];
+      }
+  }
+  for (Id i = 0; i < p.size(); ++i)
+    for (Id j = i + 1; j < p.size(); ++j) {
+      const Vec<3> d = p.x[i] - p.x[j];
+      const bool near = (d + box.shift(box.nearest_image(d))).norm() <= kCutoff && (p.owns(i) || p.owns(j));
+      const auto found = listed.find({i, j});
+      EXPECT_LE(found == listed.end() ? 0 : found->second, 1);
+      EXPECT_TRUE(!near || found != listed.end()) << i << " and " << j;
+    }
 }
 
 TEST(PairSums, AreOfTheKernelsThatAreToBeUsed) {
