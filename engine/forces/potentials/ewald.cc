@@ -109,8 +109,12 @@ class EwaldTerm final : public Interaction<3> {
   void add_forces(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums) const override {
     add_forces_early(x, forces, sums, [] {});
   }
-  bool ages() const override { return pairs_->ages(); }
-  void renew() const override { pairs_->renew(); }
+  bool ages() const override {
+    return std::ranges::any_of(parts_, [](const auto& part) { return part->ages(); });
+  }
+  void renew() const override {
+    for (const auto& part : parts_) part->renew();
+  }
   void add_forces_early(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums,
                         const Arrival& arrive) const override {
     for (const auto& part : parts_) part->add_forces_early(x, forces, sums, arrive);
