@@ -88,7 +88,8 @@ void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> pa
   ranks_.watch().begin_call();
   departures_[0].messages.swap(departures_[1].messages);
   departures_[0].requests.swap(departures_[1].requests);
-  auto& [messages, requests] = departures_[0];
+  std::vector<Bytes>& messages = departures_[0].messages;
+  std::vector<MPI_Request>& requests = departures_[0].requests;
   if (!requests.empty()) ranks_.watch().wait(requests);
   requests.clear();
   messages = std::move(outgoing);

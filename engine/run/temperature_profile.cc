@@ -31,6 +31,7 @@ class TemperatureProfile : public Observable<D> {
     std::vector<TableColumn> table = {{"x", {}}};
     const auto density = [&](std::size_t first) {
       std::vector<Estimate> estimates;
+      estimates.reserve(number_.size());
       for (std::size_t b = 0; b < number_.size(); ++b) {
         estimates.push_back(series_.estimate(first + b));
         estimates.back().error /= box_.volume() / bins;
@@ -51,6 +52,7 @@ class TemperatureProfile : public Observable<D> {
     for (std::size_t s = 0; s < parts(); ++s) {
       const std::vector<Estimate> estimates = density((2 + s) * number_.size());
       std::vector<double> of_species;
+      of_species.reserve(estimates.size());
       for (const Estimate& each : estimates) of_species.push_back(each.mean / (box_.volume() / bins));
       add_estimates(table, "density_" + species_[s], of_species, estimates);
     }

@@ -283,7 +283,8 @@ TEST(Averages, AreWrittenWheneverTheirSamplesHaveDoubled) {
     EXPECT_EQ(fs::remove(path), std::has_single_bit(sample)) << sample;
   }
   writer.close();
-  EXPECT_TRUE(contents(path).starts_with("x,density,temperature,density_small,density_large,error_density,")) << contents(path);
+  EXPECT_TRUE(contents(path).starts_with("x,density,temperature,density_small,density_large,error_density,"))
+      << contents(path);
 }
 
 TEST(Averages, NamesThatCouldBeTakenForSeveralAreInQuotes) {
