@@ -71,6 +71,7 @@ pair_coeff * * {epsilon} 1.0
 pair_modify shift yes
 kspace_style {style} {accuracy}
 neighbor 0.3 bin
+neigh_modify one 10000 page 200000
 fix 1 all nve
 timestep {step}
 thermo {steps}
@@ -146,7 +147,7 @@ def main():
     parser.add_argument("--ranks", type=int, default=1)
     parser.add_argument("--accuracy", type=float, default=1e-4)
     parser.add_argument("--steps", type=int, default=20)
-    parser.add_argument("--cutoffs", type=float, nargs="+", default=[3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
+    parser.add_argument("--cutoffs", type=float, nargs="+", default=[4.0, 6.0, 8.0, 10.0, 12.0, 15.0])
     given = parser.parse_args()
     print("| ions | force error | Carom, ms per step | LAMMPS ewald (cutoff) | ratio | LAMMPS pppm (cutoff) | ratio |\n|---|---|---|---|---|---|---|")
     for ions in given.ions:
