@@ -170,6 +170,7 @@ TEST(SearchTuning, TakesListsForDenseFluidsAndForMixtures) {
                                                              {3, 0.2, 1.5, false},
                                                              {3, 0.2, 5.0, true},
                                                              {3, 0.02, 5.0, false},
+                                                             {3, 0.05, 8.0, true},
                                                              {2, 0.4, 1.0, false},
                                                              {2, 0.6, 1.0, true},
                                                              {2, 0.4, 1.5, false},
