@@ -28,9 +28,8 @@ class CutoffList {
 
   /// The pairs within the cutoff at x or x_new, and some beyond. A pair keeps the image it has at x. `particles` has
   /// ghosts and ids. `own_covered`: cover_own() has just returned a list for the own particles at x, and before_build()
-  /// is called if a new list must replace it. Throws
-  /// Error(Failure::numerical) if positions are not finite, or for steps of several periodic boxes or with far too many
-  /// pairs.
+  /// is called if a new list must replace it. Throws Error(Failure::numerical) if positions are not finite, or for
+  /// steps of several periodic boxes or with far too many pairs.
   PairRecords<D>& cover(const PairStep<D>& step, const Particles<D>& particles, bool own_covered = false,
                         const std::function<void()>& before_build = {});
   /// The pairs of own particles at x, where the positions of ghosts are unknown; null if a new list is needed for them,
@@ -70,7 +69,7 @@ class CutoffList {
   std::array<std::vector<double>, 3> built_at_;  // coordinates in the box at the last build
   std::vector<std::uint64_t> code_;
   std::vector<std::uint32_t> other_;
-  std::array<std::size_t, 2> sizes_{};  // the numbers of partners in kPlain and in kShared, whose arrays are longer
+  std::array<std::size_t, 2> sizes_{};  // numbers of partners in kPlain and in kShared; the arrays are longer
 };
 
 }  // namespace carom

@@ -38,7 +38,7 @@ class PairRecords {
   static bool shared(Kind kind) { return kind == kShared || kind == kSharedMoving; }
 
   std::vector<Id> order;  ///< particles by place
-  std::size_t own = 0;    ///< the number of places whose sums flush_to() adds: those of own particles come first
+  std::size_t own = 0;    ///< the number of places of own particles, which come first; flush_to() adds their sums
   std::vector<PairRun> runs[kKinds];
   std::vector<std::uint32_t> partners[kKinds];  ///< followed by at least eight more, for padding
   std::vector<PairRecord> box;                  ///< numbers of the boxes that the particles are in; empty: all 0

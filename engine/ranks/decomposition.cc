@@ -189,7 +189,7 @@ bool Decomposition<D>::migrate_to_near(double slab_length) {
   if (static_cast<double>(std::ranges::max(known)) > kMaxKnownFraction * static_cast<double>(total())) return false;
 
   std::vector<Fields::Arrival> stay;
-  const bool again = by_place_;  // before, the particles are in blocks, whose memory is freed first
+  const bool again = by_place_;  // at first the particles are in blocks, and the memory of these is freed
   const auto messages = ranks_->swap(pack(
       mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); },
       again ? &stay : nullptr));

@@ -146,7 +146,7 @@ class Decomposition {
   HaloWidth width_;
   HaloExchange<D> halo_;
   std::optional<double> farthest_;  // the largest squared displacement at the end of the last step, if it was needed
-  std::vector<double> most_;        // between start_step() and finish_step(): the longest path, and which terms age
+  std::vector<double> most_;        // of a step: longest path, largest squared displacement, which terms age
   std::int64_t next_ = 0;           // while all_known_: the slab before which to divide again
   std::int64_t slabs_with_all_ = 1;
 };

@@ -41,21 +41,21 @@ std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const s
   return messages;
 }
 
-/// Replaces this rank's particles by those that stay and those in the messages, ordered by id and not marked as ghosts.
-/// No id may occur twice; `total` is the number of particles on all ranks.
+/// Replaces this rank's particles by those that stay, `arrivals`, and those in the messages, ordered by id and not
+/// marked as ghosts. No id may occur twice; `total` is the number of particles on all ranks.
 template <int D>
 void receive_particles(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total,
-                       std::vector<Fields::Arrival> stay = {}) {
+                       std::vector<Fields::Arrival> arrivals = {}) {
   for (const Bytes& message : messages)
     for (Reader from(message); from.more();) {
       const Id id = from.template get<Id>();
-      stay.push_back({id, 0, from.skip(fields.bytes())});
+      arrivals.push_back({id, 0, from.skip(fields.bytes())});
     }
-  std::ranges::sort(stay, {}, &Fields::Arrival::id);
-  fields.take(stay);
+  std::ranges::sort(arrivals, {}, &Fields::Arrival::id);
+  fields.take(arrivals);
   p.id.clear();
-  if (stay.size() < total)
-    for (const Fields::Arrival& each : stay) p.id.push_back(each.id);
+  if (arrivals.size() < total)
+    for (const Fields::Arrival& each : arrivals) p.id.push_back(each.id);
   p.ghost.assign(p.size(), 0);
 }
 

@@ -12,6 +12,7 @@
 
 #include "engine/base/elementary.h"
 #include "engine/base/error.h"
+#include "engine/forces/potentials/balanced_forces.h"
 #include "engine/forces/potentials/damped_coulomb.h"
 #include "engine/forces/potentials/ewald_pair.h"
 #include "engine/forces/potentials/ewald_waves.h"
@@ -40,25 +41,6 @@ struct EwaldOptions {
   double background;       // the latter
   std::size_t total;       // number of particles on all ranks
   ChargeSums charges;      // of all ranks
-};
-
-/// Integer sums over all particles of the components of a force, each in two words, and a count of impossible ones.
-struct WholeForce {
-  using Whole = ForceSums<3>::Whole;
-  std::array<std::uint64_t, 7> word{};
-
-  /// Returns `quanta`, rounded down and added to component k; a number too large is counted instead.
-  std::int64_t add(std::size_t k, double quanta) {
-    if (!(std::abs(quanta) < 0x1p61)) return ++word[6], 0;
-    const auto whole = static_cast<std::int64_t>(std::floor(quanta));
-    word[2 * k] += static_cast<std::uint64_t>(whole & 0xffffffff);
-    word[2 * k + 1] += static_cast<std::uint64_t>(whole >> 32);
-    return whole;
-  }
-  Whole operator[](std::size_t k) const {
-    return (static_cast<Whole>(static_cast<std::int64_t>(word[2 * k + 1])) << 32) + static_cast<Whole>(word[2 * k]);
-  }
-  bool possible() const { return word[6] == 0; }
 };
 
 class EwaldTerm final : public Interaction<3> {
@@ -123,7 +105,7 @@ class EwaldTerm final : public Interaction<3> {
     std::vector<Vec3> f(x.size(), Vec3::Zero());
     for (const Id j : charged()) f[j] = charge_[j] * pull(j, x[j], field, Vec3::Zero());
     add_surface(dipole(x, x), x, f);
-    if (!add(rounded(f, forces.quantum()), forces, 1))
+    if (!add(rounded(f, forces.quantum()), charged(), forces, 1))
       throw Error(Failure::numerical,
                   "a force of the Ewald sum is too large or no number; use a smaller "
                   "integrator.step, or place the charges farther apart");
@@ -142,7 +124,7 @@ class EwaldTerm final : public Interaction<3> {
       mean_.quantum = forces.quantum();
       mean_.force = rounded(mean_forces(x, x_new), mean_.quantum);
     }
-    if (!add(mean_.force, forces, sign)) forces.invalidate();
+    if (!add(mean_.force, charged(), forces, sign)) forces.invalidate();
     return own;
   }
 
@@ -154,7 +136,7 @@ class EwaldTerm final : public Interaction<3> {
     for (const Id j : charged())
       f[j] = -charge_[j] * (pull(j, x[j], change, Vec3::Zero()) + pull_change(j, x[j], field, w[j]));
     if (has_surface()) add_surface(total([&](Id j) { return Vec3(charge_[j] * w[j]); }), w, f, -1);
-    if (!add(rounded(f, out.quantum()), out, 1)) out.invalidate();
+    if (!add(rounded(f, out.quantum()), charged(), out, 1)) out.invalidate();
   }
 
   std::unique_ptr<Interaction<3>> among(const Particles<3>& some) const override {
@@ -454,48 +436,11 @@ class EwaldTerm final : public Interaction<3> {
     }
   }
 
-  /// Forces on the charges of this rank [quanta].
-  using RoundedForces = std::optional<std::vector<std::array<std::int64_t, 3>>>;
-
-  /// The forces on own charges, rounded to quanta so that their sum over all ranks is exactly zero: each charge gives
-  /// up a share m/M of it, rounded up or down by its id, and the one with the lowest id what remains. No forces if one
-  /// is too large or no number. Collective.
-  RoundedForces rounded(const std::vector<Vec3>& f, double quantum) const {
-    const auto& charges = charged();
-    std::vector<std::array<std::int64_t, 3>> rounded(charges.size());
-    WholeForce net, shares;
-    for (std::size_t n = 0; n < charges.size(); ++n)
-      for (int k = 0; k < 3; ++k) rounded[n][k] = net.add(k, std::nearbyint(f[charges[n]][k] / quantum));
-    ranks_->sum(net.word);
-    for (std::size_t n = 0; n < charges.size(); ++n) {
-      const double share = weight(charges[n]) / whole_weight();
-      // Multiples of the golden ratio: in any number of consecutive ids nearly the right number is rounded up.
-      const double up = static_cast<double>((particles_.id_of(charges[n]) * 0x9e3779b97f4a7c15U) >> 11U) * 0x1p-53;
-      for (int k = 0; k < 3; ++k) rounded[n][k] -= shares.add(k, static_cast<double>(net[k]) * share + up);
-    }
-    ranks_->sum(shares.word);
-    if (!net.possible() || !shares.possible()) return std::nullopt;
-    for (std::size_t n = 0; n < charges.size(); ++n)
-      if (particles_.id_of(charges[n]) == options_.charges.first)
-        for (int k = 0; k < 3; ++k) rounded[n][k] -= static_cast<std::int64_t>(net[k] - shares[k]);
-    return rounded;
-  }
-  /// Returns false if there are no forces, or one is too large.
-  bool add(const RoundedForces& rounded, ForceSums<3>& forces, int sign) const {
-    constexpr std::int64_t kHalf = std::int64_t{1} << 31;  // both parts of a sum of quanta are exact as doubles
-    const ForceLimits limits = forces.make_room(2);
-    if (!rounded) return false;
-    for (std::size_t n = 0; n < charged().size(); ++n) {
-      Vec3 upper, lower;
-      for (int k = 0; k < 3; ++k) {
-        const std::int64_t whole = (*rounded)[n][k], low = whole % kHalf;
-        upper[k] = static_cast<double>(whole - low);
-        lower[k] = static_cast<double>(low);
-      }
-      for (const Vec3& part : {upper, lower})
-        if (!forces.add(charged()[n], sign * forces.quantum() * part, limits)) return false;
-    }
-    return true;
+  /// The forces on own charges, which add up to zero over all ranks. Collective.
+  BalancedForces rounded(const std::vector<Vec3>& f, double quantum) const {
+    return balanced(
+        f, charged(), particles_, options_.charges.first, quantum, [&](Id j) { return weight(j) / whole_weight(); },
+        *ranks_);
   }
 
   const Box<3>& box_;
@@ -520,7 +465,7 @@ class EwaldTerm final : public Interaction<3> {
   mutable struct {
     std::vector<Vec3> x, x_new;
     double quantum;
-    RoundedForces force;
+    BalancedForces force;
   } mean_{};  // the last mean forces
 };
 

@@ -37,39 +37,28 @@ struct Known {
   Fields fields;
 };
 
-TEST(Migration, BringsOwnParticlesWithTheirFields) {
-  Known one, two;
-  for (const Id id : {0u, 3u, 4u, 7u}) one.add(id, id == 3);
-  for (const Id id : {1u, 3u, 4u, 6u}) two.add(id, id == 4);
-  const auto by_place = [](const Vec<2>& x, auto&& visit) {
-    if (x[0] < 5) visit(0);
-    if (x[0] > 2) visit(1);
-  };
-  const auto from_one = pack_own(one.fields, one.p, {2, 2}, by_place),
-             from_two = pack_own(two.fields, two.p, {2, 2}, by_place);
-  receive_particles(one.fields, one.p, {from_one[0], from_two[0]}, 6);
-  receive_particles(two.fields, two.p, {from_one[1], from_two[1]}, 6);
-  one.expect_ids({0, 1, 3, 4});
-  two.expect_ids({3, 4, 6, 7});
-}
-
-TEST(Migration, DoesNotSendParticlesThatStay) {
-  Known one, two;
-  for (const Id id : {0u, 3u, 4u, 7u}) one.add(id, id == 3);
-  for (const Id id : {1u, 3u, 4u, 6u}) two.add(id, id == 4);
-  const auto by_place = [](const Vec<2>& x, auto&& visit) {
-    if (x[0] < 5) visit(0);
-    if (x[0] > 2) visit(1);
-  };
-  std::vector<Fields::Arrival> stay[2];
-  const auto from_one = pack_own(one.fields, one.p, {2, 2}, by_place, 0, &stay[0]),
-             from_two = pack_own(two.fields, two.p, {2, 2}, by_place, 1, &stay[1]);
-  EXPECT_TRUE(from_one[0].empty());
-  EXPECT_TRUE(from_two[1].empty());
-  receive_particles(one.fields, one.p, {from_one[0], from_two[0]}, 6, stay[0]);
-  receive_particles(two.fields, two.p, {from_one[1], from_two[1]}, 6, stay[1]);
-  one.expect_ids({0, 1, 3, 4});
-  two.expect_ids({3, 4, 6, 7});
+TEST(Migration, BringsOwnParticlesWithTheirFieldsAndDoesNotSendThoseThatStay) {
+  for (const bool stays : {false, true}) {
+    Known one, two;
+    for (const Id id : {0u, 3u, 4u, 7u}) one.add(id, id == 3);
+    for (const Id id : {1u, 3u, 4u, 6u}) two.add(id, id == 4);
+    const auto by_place = [](const Vec<2>& x, auto&& visit) {
+      if (x[0] < 5) visit(0);
+      if (x[0] > 2) visit(1);
+    };
+    std::vector<Fields::Arrival> stay[2];
+    const auto pack = [&](const Known& from, std::size_t here) {
+      return stays ? pack_own(from.fields, from.p, {2, 2}, by_place, here, &stay[here])
+                   : pack_own(from.fields, from.p, {2, 2}, by_place);
+    };
+    const auto from_one = pack(one, 0), from_two = pack(two, 1);
+    EXPECT_EQ(from_one[0].empty(), stays);
+    EXPECT_EQ(from_two[1].empty(), stays);
+    receive_particles(one.fields, one.p, {from_one[0], from_two[0]}, 6, stay[0]);
+    receive_particles(two.fields, two.p, {from_one[1], from_two[1]}, 6, stay[1]);
+    one.expect_ids({0, 1, 3, 4});
+    two.expect_ids({3, 4, 6, 7});
+  }
 }
 
 TEST(Migration, NeedsNoIdsWhereAllAreKnown) {

@@ -333,7 +333,8 @@ TEST(Ewald, MeanForcesBetweenWallsDoExactlyTheWork) {
   Scene<3> scene = slab({4, 5, 6});
   const auto& x = scene.particles.x;
   for (const auto& wall_charges : {std::vector{0.0, 0.0}, {0.2, 0.2}}) {
-    scene.particles.charge[4] -= 20 * (wall_charges[0] + wall_charges[1]);  // walls of equal charges pull nobody
+    scene.particles.charge[4] -=
+        20 * (wall_charges[0] + wall_charges[1]);  // the field between walls of equal charges is zero
     const auto term = ewald_between_walls(scene, 1e-6, wall_charges);
     for (const double size : {1e-6, 0.01, 0.2}) {
       auto w = scene.random_vectors(size);
