@@ -110,13 +110,13 @@ template <int D>
 template <class Send>
 void Ownership<D>::sort_out(double now, double length, Send&& send) {
   if (unwatched_ += max_displacement_; unwatched_ > kWindowsBetweenSearches * max_displacement_) watch(now);
+  // A sphere with one event moved at most as fast as before or after it, one with several at most max_displacement_.
+  // The loop below subtracts its way at the speed after them.
   for (const Slot i : turned_) {
     const std::uint32_t k = watched_at_[i];
-    const double before = -speed_[k];
+    const double before = std::min(-speed_[k] * length, max_displacement_);
     speed_[k] = speed(i);
-    const double rest =
-        max_displacement_ - speed_[k] * length;  // of the displacement; the loop below subtracts the other
-    quiet_[k] -= std::max(std::min((before - speed_[k]) * length, rest), 0.0);
+    quiet_[k] -= std::max(before - speed_[k] * length, 0.0);
   }
   turned_.clear();
   for (std::size_t k = 0; k < watched_.size(); ++k) quiet_[k] -= speed_[k] * length;
