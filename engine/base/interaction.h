@@ -59,12 +59,10 @@ struct PairFluxes {
   std::array<ExactSum, std::size_t{D} * D>
       stress{};                    ///< Σ d_a F_b over pairs, d and F as in PotentialSums [energy]; index D a + b
   std::array<ExactSum, D> heat{};  ///< ½ Σ [V + d F·] (v_i + v_j) over pairs [energy·length/time]
-  bool heat_known = true;          ///< false if a term cannot give it
 
   void add(const PairFluxes& other) {
     for (std::size_t k = 0; k < stress.size(); ++k) stress[k].add(other.stress[k]);
     for (std::size_t k = 0; k < heat.size(); ++k) heat[k].add(other.heat[k]);
-    heat_known &= other.heat_known;
   }
 };
 

@@ -35,6 +35,7 @@ struct Traveller {
   Id id;
   std::uint16_t species;
   double mass;  // 0: fixed
+  double charge;
   Vec<D> x, v;  // x unwrapped
 };
 
@@ -46,7 +47,7 @@ std::vector<Traveller<D>> travellers(const System<D>& system, const Particles<D>
   Communicator* const others = system.decomposition.others();
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
-    Traveller<D> one{p.id_of(i), p.species[i], moving_mass(p.mass[i]), p.x[i], p.v[i]};
+    Traveller<D> one{p.id_of(i), p.species[i], moving_mass(p.mass[i]), p.charge[i], p.x[i], p.v[i]};
     for (int k = 0; k < D; ++k) one.x[k] += static_cast<double>(p.image[i][k]) * system.box.edges[k];
     if (others)
       put(mine, one);
@@ -145,9 +146,8 @@ class FluxIntegral {
     return sum;
   }
   const Vec<D>& drift() const { return drift_; }
-  bool heat_known() const { return heat_known_; }
 
-  void archive(Archive& archive) { archive(mass_, time_, last_, jumps_, moments_, drift_, transferred_, heat_known_); }
+  void archive(Archive& archive) { archive(mass_, time_, last_, jumps_, moments_, drift_, transferred_); }
 
  private:
   void add_forces(const Particles<D>& particles, Fluxes<D>& now) {
@@ -164,11 +164,10 @@ class FluxIntegral {
       now.forces(a, a) += tail_of(system_).virial / D;
       now.heat[a] += own.heat[a].value();
     }
-    heat_known_ = own.heat_known;
   }
 
   const System<D>& system_;
-  bool relative_, heat_known_ = true;
+  bool relative_;
   std::vector<double> mass_;   // by id; 0: fixed
   double time_ = 0;            // of the last sample
   Fluxes<D> last_;             // then

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Diffusion, shear viscosity and thermal conductivity by Einstein and Helfand (Alder, Gass, Wainwright, J. Chem. Phys.
-// 53 (1970) 3813), from particles and from the fluxes S and Q of momentum and energy (fluxes.h); T is in units of
-// energy:
+// Diffusion, shear viscosity, thermal and electrical conductivity by Einstein and Helfand (Alder, Gass, Wainwright, J.
+// Chem. Phys. 53 (1970) 3813), from particles and from the fluxes S and Q of momentum and energy (fluxes.h); T is in
+// units of energy:
 //
 //   ⟨|x(t) − x(0)|²⟩ → 2 D t times the diffusion coefficient in D dimensions,
-//   ⟨(∫S_xy dt)²⟩ → 2 t Ω T η,   ⟨(∫Q_x dt)²⟩ → 2 t Ω T² λ.
+//   ⟨(∫S_xy dt)²⟩ → 2 t Ω T η,   ⟨(∫Q_x dt)²⟩ → 2 t Ω T² λ,   ⟨(Σ q x(t) − Σ q x(0))²⟩ → 2 t Ω T σ.
 //
 // The lags are those of a multiple-tau correlator with 16 values a level and intervals that double from level to level
 // (Ramírez, Sukumaran, Vorselaars, Likhtman, J. Chem. Phys. 133 (2010) 154103): 0 … 16, 18 … 32, 36 … 64 … intervals.
@@ -55,6 +55,7 @@ class Transport : public Observable<D> {
     }
     add("shear_viscosity", kShear, viscosity_scale());
     if (conducts()) add("thermal_conductivity", kHeat, viscosity_scale() / temperature());
+    if (charged_) add("electrical_conductivity", kCurrent, viscosity_scale());
     return table;
   }
 
@@ -74,26 +75,33 @@ class Transport : public Observable<D> {
     add("diffusion", kSingle + 1, 1);
     add("shear_viscosity", kShear, viscosity_scale());
     if (conducts()) add("thermal_conductivity", kHeat, viscosity_scale() / temperature());
+    if (charged_) add("electrical_conductivity", kCurrent, viscosity_scale());
     return values;
   }
 
  private:
-  enum : std::size_t { kTime, kShear, kHeat, kSingle };  // quantities; then the vacf and D of all, of each species
+  enum : std::size_t {
+    kTime,
+    kShear,
+    kHeat,
+    kCurrent,
+    kSingle
+  };  // quantities; then the vacf and D of all, of each species
 
   /// The last values of a level, in rings, and the series of what they give.
   struct Level {
     std::uint64_t count = 0;        // values so far
     std::vector<double> time;       // of the rings
-    std::vector<double> integrals;  // of the stress, then of the heat flux
+    std::vector<double> integrals;  // of the stress, of the heat flux, of the electric current
     std::vector<Vec<D>> x, v;
     Blocking series;  // [lag][quantity]
     void archive(Archive& archive) { archive(count, time, integrals, x, v, series); }
   };
   static constexpr std::size_t kRing = kLags + 1;
-  static constexpr std::size_t kStresses = D * (D + 1) / 2 - 1, kIntegrals = kStresses + D;
+  static constexpr std::size_t kStresses = D * (D + 1) / 2 - 1, kIntegrals = kStresses + 2 * D;
 
   std::size_t quantities() const { return kSingle + 2 * (number_.size() > 1 ? number_.size() + 1 : 1); }
-  bool conducts() const { return number_.size() == 1 && equal_masses_ && fluxes_.heat_known(); }
+  bool conducts() const { return number_.size() == 1 && alike_; }
   double temperature() const { return temperatures_ / static_cast<double>(this->samples()); }
   double viscosity_scale() const { return 1 / (system_.box.volume() * temperature()); }
   static std::size_t first_lag(std::size_t level) { return level == 0 ? 0 : kLags / 2 + 1; }
@@ -127,7 +135,8 @@ class Transport : public Observable<D> {
       for (const Traveller<D>& each : all) {
         number_[each.species] += 1;
         species_.push_back(each.species);
-        equal_masses_ &= each.mass == all[0].mass;
+        alike_ &= each.mass == all[0].mass && std::abs(each.charge) == std::abs(all[0].charge);
+        charged_ |= each.charge != 0;
       }
       integrals_.resize(kIntegrals);
     }
@@ -139,12 +148,15 @@ class Transport : public Observable<D> {
     if constexpr (D == 3) integrals_[k++] += (s(0, 0) + s(1, 1) - 2 * s(2, 2)) / std::sqrt(12.0);
     for (int a = 0; a < D; ++a) integrals_[k++] += sum.heat[a];
 
+    double* const dipole = &integrals_[k];
+    std::fill_n(dipole, D, 0.0);
     double twice_kinetic = 0;
     std::vector<Vec<D>> x, v;
     for (const Traveller<D>& each : all) {
       x.push_back(each.x - time * fluxes_.drift());
       v.push_back(each.v - fluxes_.drift());
       twice_kinetic += each.mass * v.back().squaredNorm();
+      for (int a = 0; a < D; ++a) dipole[a] += each.charge * x.back()[a];
     }
     temperatures_ += twice_kinetic / (D * std::max(1.0, static_cast<double>(all.size()) - 1));
     add(0, time, integrals_, x, v);
@@ -185,7 +197,9 @@ class Transport : public Observable<D> {
       at[kTime] = l.time[here] - l.time[there];
       for (std::size_t k = 0; k < kIntegrals; ++k) {
         const double change = l.integrals[here * kIntegrals + k] - l.integrals[there * kIntegrals + k];
-        at[k < kStresses ? kShear : kHeat] += change * change / (k < kStresses ? kStresses : D);
+        at[k < kStresses       ? kShear
+           : k < kStresses + D ? kHeat
+                               : kCurrent] += change * change / (k < kStresses ? kStresses : D);
       }
       for (std::size_t i = 0; i < n; ++i) {
         const std::size_t kind = kSingle + (number_.size() > 1 ? 2 * (species_[i] + std::size_t{1}) : 0);
@@ -211,7 +225,7 @@ class Transport : public Observable<D> {
   }
 
   void sums(Archive& archive) override {
-    archive(fluxes_, number_, species_, equal_masses_, integrals_, temperatures_, levels_);
+    archive(fluxes_, number_, species_, alike_, charged_, integrals_, temperatures_, levels_);
   }
 
   const System<D>& system_;
@@ -219,9 +233,9 @@ class Transport : public Observable<D> {
   FluxIntegral<D> fluxes_;
   std::vector<double> number_;  // of particles, by species
   std::vector<std::uint16_t> species_;
-  bool equal_masses_ = true;
-  std::vector<double> integrals_;  // since the first sample
-  double temperatures_ = 0;        // Σ over samples
+  bool alike_ = true, charged_ = false;  // whether all have one mass and one |charge|; whether there are charges
+  std::vector<double> integrals_;        // since the first sample
+  double temperatures_ = 0;              // Σ over samples
   std::vector<Level> levels_;
 };
 
@@ -247,30 +261,32 @@ std::optional<ParameterError> complete_transport(Parameters& parameters, const S
 
 ObservableInfo transport() {
   using enum Parameter::Type;
-  return {.name = "transport",
-          .title = "transport coefficients",
-          .parameters =
-              {parameter::interval(
-                   "the shortest lag of time correlations and transport coefficients, averaged into "
-                   "transport.csv; 0: none. With forces give one or few steps. A sample costs about 25 passes "
-                   "over the particles, on rank 0"),
-               {"longest", real, "none", "time",
-                "the longest lag, at which summary.json takes the coefficients: longer than correlations live, and "
-                "shorter than sound needs for half the box; default: 100 intervals",
-                Parameter::Range::positive}},
-          .documentation =
-              "Columns: time (the lag), vacf (the mean of v(0)v(t) over particles), diffusion, shear_viscosity and "
-              "thermal_conductivity (half the rate at which mean squared displacements and integrals of the fluxes of "
-              "momentum and energy grow between half the lag and the lag, divided by D, V T and V T^2), error_ and "
-              "samples_ of each. With several species vacf and diffusion of each; thermal_conductivity for one species "
-              "of equal masses "
-              "without ewald. T is that of N - 1 particles, and the drift of the whole system is taken off. Memory: 34 "
-              "positions or velocities of each particle for each doubling of the lag from 16 intervals on, on rank 0.",
-          .source =
-              "Alder, Gass, Wainwright, J. Chem. Phys. 53 (1970) 3813; Ramirez, Sukumaran, Vorselaars, Likhtman, J. "
-              "Chem. Phys. 133 (2010) 154103",
-          .in_2d = maker<Transport, 2>(complete_transport<2>),
-          .in_3d = maker<Transport, 3>(complete_transport<3>)};
+  return {
+      .name = "transport",
+      .title = "transport coefficients",
+      .parameters =
+          {parameter::interval(
+               "the shortest lag of time correlations and transport coefficients, averaged into "
+               "transport.csv; 0: none. With forces give one or few steps. A sample costs about 25 passes "
+               "over the particles, on rank 0"),
+           {"longest", real, "none", "time",
+            "the longest lag, at which summary.json takes the coefficients: longer than correlations live, and "
+            "shorter than sound needs for half the box; default: 100 intervals",
+            Parameter::Range::positive}},
+      .documentation =
+          "Columns: time (the lag), vacf (the mean of v(0)v(t) over particles), diffusion, shear_viscosity, "
+          "thermal_conductivity and electrical_conductivity (half the rate at which mean squared displacements and "
+          "integrals of the fluxes of momentum, energy and charge grow between half the lag and the lag, divided by "
+          "D, V T, V T^2 and V T), error_ and samples_ of each. With several species vacf and diffusion of each; "
+          "thermal_conductivity for one species of equal masses and equal or opposite charges; "
+          "electrical_conductivity if there are charges. T is that of N - 1 particles, and the drift of the whole "
+          "system is taken off. Memory: 34 "
+          "positions or velocities of each particle for each doubling of the lag from 16 intervals on, on rank 0.",
+      .source =
+          "Alder, Gass, Wainwright, J. Chem. Phys. 53 (1970) 3813; Ramirez, Sukumaran, Vorselaars, Likhtman, J. "
+          "Chem. Phys. 133 (2010) 154103",
+      .in_2d = maker<Transport, 2>(complete_transport<2>),
+      .in_3d = maker<Transport, 3>(complete_transport<3>)};
 }
 
 }  // namespace carom::observable

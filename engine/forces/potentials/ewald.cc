@@ -27,6 +27,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr std::size_t kMostWaves = std::size_t{1} << 24;
+// Charges that share a part of the waves in the first level of cache: the phases of each take one or two KB.
+constexpr std::size_t kTogether = 16;
 
 using Vec3 = Vec<3>;
 
@@ -52,8 +54,9 @@ class EwaldTerm final : public Interaction<3> {
         options_(options),
         waves_(std::move(waves)),
         parts_(std::move(parts)),
-        charge_(*pair_factors(options_.weight, particles_)),
-        phases_{Phases(waves_->most[0]), Phases(waves_->most[1]), Phases(waves_->most[2])} {}
+        charge_(*pair_factors(options_.weight, particles_)) {
+    for (std::size_t i = 0; i < 3 * kTogether; ++i) phases_.emplace_back(waves_->most[i % 3]);
+  }
 
   void add_energy(Positions<3> x, PotentialSums& sums) const override {
     for (const auto& part : parts_) part->add_energy(x, sums);
@@ -62,30 +65,55 @@ class EwaldTerm final : public Interaction<3> {
   }
 
   /// The stress of a wave is that of its energy, δ_ab − 2 k_a k_b (1/k² + 1/4α²) times it (Nosé, Klein, Mol. Phys. 50
-  /// (1983) 1055).
+  /// (1983) 1055). A charge's share of energy and stress, with Re S*(k) q_j e^(ik·x_j) in the place of |S(k)|², times
+  /// its velocity is its share of the heat flux (Bernu, Vieillefosse, Phys. Rev. A 18 (1978) 2345).
   void add_fluxes(Positions<3> x, Positions<3> v, PairFluxes<3>& fluxes) const override {
     if (has_surface())
       throw Error(Failure::deck,
                   "ewald with surface = \"vacuum\" or between walls has no formula for the pressure tensor; use the "
                   "default surface, or no pressure_tensor and no transport");
     for (const auto& part : parts_) part->add_fluxes(x, v, fluxes);
-    fluxes.heat_known = false;
     need_inside(x);
     const Amplitudes& s = structure(x);
+    std::array<Amplitudes, 3> current;
+    double fastest = 0;
+    for (const Id j : charged()) fastest = std::max(fastest, v[j].norm());
+    const int exponent = exponent_of(options_.charges.largest * largest(fastest)) + 1;
+    for (int a = 0; a < 3; ++a)
+      sum_terms(x, exponent, current[a], [&](Id j, const WaveTask& task, double shift, std::uint64_t* sum) {
+        kernels_->add(task, charge_[j] * v[j][a], shift, sum);
+      });
+    const double own = options_.constant * options_.split.alpha / std::sqrt(kPi);
+    const double background = options_.excess == 0 ? 0.0 : 2 * options_.background / options_.excess;
+    const Vec3 constant = total([&](Id j) { return Vec3(charge_[j] * (background - own * charge_[j]) * v[j]); });
     if (ranks_->rank() != 0) return;
+    for (int a = 0; a < 3; ++a) {
+      fluxes.stress[4 * a].add(options_.background);
+      fluxes.heat[a].add(constant[a]);
+    }
     const double scale = 0.25 / (options_.split.alpha * options_.split.alpha);
     for (const WaveRow& row : waves_->rows)
-      for (unsigned m = 0; m < row.count; ++m) {
-        const std::size_t k = row.first + m;
+      for (unsigned m = 0; m < 2 * row.count; ++m) {
+        const int sign = m < row.count ? 1 : -1;
+        const std::size_t k = row.first + m % row.count;
         if (waves_->weight[k] == 0) continue;
-        const double energy = waves_->weight[k] * (s.re[k] * s.re[k] + s.im[k] * s.im[k]);
-        const Vec3 wave = waves_->unit.cwiseProduct(Vec3(row.a, row.b, row.c + static_cast<int>(m)));
-        for (int a = 0; a < 3; ++a)
-          for (int b = 0; b < 3; ++b)
-            fluxes.stress[3 * a + b].add(energy *
-                                         ((a == b ? 1 : 0) - 2 * wave[a] * wave[b] * (1 / waves_->squared[k] + scale)));
+        const Vec3 wave = waves_->unit.cwiseProduct(Vec3(row.a, row.b, sign * static_cast<int>(m % row.count)));
+        const std::array<double, 2> here = wave_of(s, k, sign);
+        Vec3 work;  // Re S*(k) Σ q v e^(ik·x)
+        for (int a = 0; a < 3; ++a) {
+          const std::array<double, 2> flow = wave_of(current[a], k, sign);
+          work[a] = 0.5 * waves_->weight[k] * (here[0] * flow[0] + here[1] * flow[1]);
+        }
+        const double energy = 0.5 * waves_->weight[k] * (here[0] * here[0] + here[1] * here[1]);
+        for (int a = 0; a < 3; ++a) {
+          fluxes.heat[a].add(work[a]);
+          for (int b = 0; b < 3; ++b) {
+            const double tensor = (a == b ? 1 : 0) - 2 * wave[a] * wave[b] * (1 / waves_->squared[k] + scale);
+            fluxes.stress[3 * a + b].add(energy * tensor);
+            fluxes.heat[a].add(tensor * work[b]);
+          }
+        }
       }
-    for (const std::size_t k : {0, 4, 8}) fluxes.stress[k].add(options_.background);
   }
 
   void add_forces(Positions<3> x, ForceSums<3>& forces, PotentialSums* sums) const override {
@@ -101,9 +129,7 @@ class EwaldTerm final : public Interaction<3> {
                         const Arrival& arrive) const override {
     for (const auto& part : parts_) part->add_forces_early(x, forces, sums, arrive);
     need_inside(x);
-    const Amplitudes field = weighted(structure(x));
-    std::vector<Vec3> f(x.size(), Vec3::Zero());
-    for (const Id j : charged()) f[j] = charge_[j] * pull(j, x[j], field, Vec3::Zero());
+    std::vector<Vec3> f = pull(x, weighted(structure(x)));
     add_surface(dipole(x, x), x, f);
     if (!add(rounded(f, forces.quantum()), charged(), forces, 1))
       throw Error(Failure::numerical,
@@ -130,11 +156,10 @@ class EwaldTerm final : public Interaction<3> {
 
   void add_hessian_product(Positions<3> x, Positions<3> w, ForceSums<3>& out) const override {
     for (const auto& part : parts_) part->add_hessian_product(x, w, out);
-    std::vector<Vec3> f(x.size(), Vec3::Zero());
     if (!all_moderate(x, w)) return out.invalidate();
-    const Amplitudes field = weighted(structure(x)), change = weighted(structure_change(x, w));
-    for (const Id j : charged())
-      f[j] = -charge_[j] * (pull(j, x[j], change, Vec3::Zero()) + pull_change(j, x[j], field, w[j]));
+    std::vector<Vec3> f = pull(x, weighted(structure_change(x, w)));
+    const std::vector<Vec3> own = pull_change(x, weighted(structure(x)), w);
+    for (const Id j : charged()) f[j] = -(f[j] + own[j]);
     if (has_surface()) add_surface(total([&](Id j) { return Vec3(charge_[j] * w[j]); }), w, f, -1);
     if (!add(rounded(f, out.quantum()), charged(), out, 1)) out.invalidate();
   }
@@ -246,50 +271,58 @@ class EwaldTerm final : public Interaction<3> {
     return charged_;
   }
 
-  /// The waves at x, a position of particle j.
-  WaveTask waves_at(Id j, const Vec3& x) const {
-    WaveTask task{waves_->rows.data(), waves_->rows.size(), {}, {}};
+  /// Calls visit(j, waves at x_j) for each own charge and each part of the waves: a part serves several charges while
+  /// it is in the cache.
+  void for_each_part(Positions<3> x, auto&& visit) const {
+    const std::span<const Id> all = charged();
     turns_.resize(particles_.size(), {Vec3::Constant(std::numeric_limits<double>::quiet_NaN()), {}});
-    Turns& last = turns_[j];
-    for (int k = 0; k < 3; ++k) {
-      if (x[k] != last.x[k]) last.of[k] = turn((last.x[k] = x[k]) / options_.edges[k]);
-      phases_[k].set(last.of[k]);
-      task.re[k] = phases_[k].re();
-      task.im[k] = phases_[k].im();
+    for (std::size_t first = 0; first < all.size(); first += kTogether) {
+      const std::span<const Id> some = all.subspan(first, std::min(kTogether, all.size() - first));
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        Turns& last = turns_[some[i]];
+        for (int k = 0; k < 3; ++k) {
+          const double at = x[some[i]][k];
+          if (at != last.x[k]) last.of[k] = turn((last.x[k] = at) / options_.edges[k]);
+          phases_[3 * i + k].set(last.of[k]);
+        }
+      }
+      for (const Waves::Part& part : waves_->parts)
+        for (std::size_t i = 0; i < some.size(); ++i) {
+          const Phases* const p = &phases_[3 * i];
+          visit(some[i], WaveTask{&waves_->rows[part.first],
+                                  part.n,
+                                  {p[0].re(), p[1].re(), p[2].re()},
+                                  {p[0].im(), p[1].im(), p[2].im()}});
+        }
     }
-    return task;
   }
 
-  /// Σ_j factor_j(k) e^(ik·x_j) in fixed point, |factor_j| ≤ 2^exponent. Terms are rounded to the quantum by adding a
-  /// constant; the integers are then the mantissas' differences.
-  template <class Factor>
-  void sum_terms(Positions<3> x, int exponent, Factor&& factor, Amplitudes& sum) const {
+  /// A power of two above |value| has this exponent.
+  static int exponent_of(double value) { return std::ilogb(std::max(value, 0x1p-900)) + 1; }
+
+  /// Sums over all charges in fixed point: add(j, waves, shift, sum) adds a term and the shift to each sum,
+  /// |term| ≤ 2^exponent. Terms are rounded to the quantum by adding a constant; the integers are then the mantissas'
+  /// differences.
+  void sum_terms(Positions<3> x, int exponent, Amplitudes& sum, auto&& add) const {
     const double n = static_cast<double>(options_.total);
     const double quantum = std::ldexp(std::max(0x1p-50, std::ldexp(1.0, std::ilogb(n) - 60)), exponent);
     const double shift = 0x1.8p52 * quantum;
-    const std::size_t n_waves = waves_->size();
-    std::vector<std::uint64_t> whole(2 * n_waves);
-    std::uint64_t *const re = whole.data(), *const im = re + n_waves;
-    for (const Id j : charged()) kernels_->add(waves_at(j, x[j]), factor(j), shift, re, im);
+    std::vector<std::uint64_t> whole(WaveRow::kProducts * waves_->size());
+    for_each_part(x, [&](Id j, const WaveTask& task) { add(j, task, shift, whole.data()); });
     const std::uint64_t shifts = charged().size() * std::bit_cast<std::uint64_t>(shift);
     for (std::uint64_t& each : whole) each -= shifts;
     ranks_->sum(whole);
-    sum.re.resize(n_waves);
-    sum.im.resize(n_waves);
-    for (std::size_t k = 0; k < n_waves; ++k) {
-      sum.re[k] = quantum * static_cast<double>(static_cast<std::int64_t>(re[k]));
-      sum.im[k] = quantum * static_cast<double>(static_cast<std::int64_t>(im[k]));
-    }
+    sum.resize(whole.size());
+    for (std::size_t k = 0; k < sum.size(); ++k)
+      sum[k] = quantum * static_cast<double>(static_cast<std::int64_t>(whole[k]));
   }
 
   /// S(k)
   void sum_structure(Positions<3> x, Amplitudes& sum) const {
-    sum_terms(
-        x, std::ilogb(options_.charges.largest) + 1,
-        [&](Id j) {
-          return WaveFactor{charge_[j], 0, 0, 0};
-        },
-        sum);
+    sum_terms(x, exponent_of(options_.charges.largest), sum,
+              [&](Id j, const WaveTask& task, double shift, std::uint64_t* sums) {
+                kernels_->add(task, charge_[j], shift, sums);
+              });
   }
   /// S(k), kept for the last positions.
   const Amplitudes& structure(Positions<3> x) const {
@@ -299,90 +332,102 @@ class EwaldTerm final : public Interaction<3> {
     }
     return structure_;
   }
-  /// The derivative of S(k) along w, over i: Σ q_j (k·w_j) e^(ik·x_j), times i.
+  /// Real and imaginary part of the wave of ±c of an entry.
+  static std::array<double, 2> wave_of(const Amplitudes& s, std::size_t k, int sign) {
+    const auto part = [&](unsigned product) { return s[place_of(k, product)]; };
+    return {part(0) - sign * part(1), part(3) + sign * part(2)};
+  }
+  /// The derivative of S(k) along w.
   Amplitudes structure_change(Positions<3> x, Positions<3> w) const {
     double longest = 0;
     for (const Id j : charged()) longest = std::max(longest, w[j].norm());
     longest = largest(longest);
     Amplitudes sum;
-    const double most = std::max(options_.charges.largest * longest * waves_->longest, 0x1p-900);
-    sum_terms(
-        x, std::ilogb(most) + 2,
-        [&](Id j) {
-          const Vec3 step = charge_[j] * waves_->unit.cwiseProduct(w[j]);
-          return WaveFactor{0, step[0], step[1], step[2]};
-        },
-        sum);
-    for (std::size_t k = 0; k < sum.re.size(); ++k) {
-      const double re = sum.re[k];
-      sum.re[k] = -sum.im[k];
-      sum.im[k] = re;
-    }
+    sum_terms(x, exponent_of(options_.charges.largest * longest * waves_->longest) + 1, sum,
+              [&](Id j, const WaveTask& task, double shift, std::uint64_t* sums) {
+                const Vec3 along = w[j].cwiseProduct(waves_->unit);
+                kernels_->add_change(task, charge_[j], along.data(), shift, sums);
+              });
     return sum;
   }
-  /// 2 A S for each k of the half.
+  /// The potential of S.
   Amplitudes weighted(const Amplitudes& s) const {
-    Amplitudes field{s.re, s.im};
-    for (std::size_t k = 0; k < waves_->size(); ++k) {
-      field.re[k] *= 2 * waves_->weight[k];
-      field.im[k] *= 2 * waves_->weight[k];
-    }
+    Amplitudes field(s.size());
+    for (std::size_t k = 0; k < waves_->size(); ++k)
+      for (unsigned product = 0; product < WaveRow::kProducts; ++product)
+        field[place_of(k, product)] = 2 * waves_->weight[k] * s[place_of(k, product)];
     return field;
   }
 
-  /// The force on a unit charge that moves by `moved` about x: Σ_k k sinc(k·Δ/2) Im[field* e^(ik·x)].
-  Vec3 pull(Id j, const Vec3& x, const Amplitudes& field, const Vec3& moved) const {
-    const WaveTask task = waves_at(j, x);
-    const Vec3 turn = 0.5 * moved.cwiseProduct(waves_->unit);
-    Vec3 sum = Vec3::Zero();
-    if (moved.isZero(0)) {
-      kernels_->pull(task, field.re.data(), field.im.data(), sum.data());
-    } else if (0.5 * waves_->longest * moved.norm() < 1 - 1e-9) {
-      kernels_->pull_moved(task, {0, turn[0], turn[1], turn[2]}, field.re.data(), field.im.data(), sum.data());
-    } else {
-      for (const WaveRow& row : waves_->rows)
-        for (unsigned m = 0; m < row.count; ++m) {
-          const Vec3 index(row.a, row.b, row.c + static_cast<int>(m));
-          double re = 1, im = 0;
-          for (int k = 0; k < 3; ++k) {
-            const auto n = static_cast<int>(index[k]);
-            const double last = re;
-            re = last * task.re[k][n] - im * task.im[k][n];
-            im = last * task.im[k][n] + im * task.re[k][n];
-          }
-          sum += index * ((field.re[row.first + m] * im - field.im[row.first + m] * re) * sinc(index.dot(turn)));
-        }
-    }
-    return sum.cwiseProduct(waves_->unit);
+  /// Adds up vectors in units of 2π/L, which add(j, waves, vector) adds to, times the charges; zero for other
+  /// particles.
+  std::vector<Vec3> per_charge(Positions<3> x, auto&& add) const {
+    std::vector<Vec3> f(x.size(), Vec3::Zero());
+    for_each_part(x, [&](Id j, const WaveTask& task) { add(j, task, f[j].data()); });
+    for (const Id j : charged()) f[j] = charge_[j] * f[j].cwiseProduct(waves_->unit);
+    return f;
   }
-  /// The change of the force on a unit charge as it moves along w in a constant field.
-  Vec3 pull_change(Id j, const Vec3& x, const Amplitudes& field, const Vec3& w) const {
-    const Vec3 along = w.cwiseProduct(waves_->unit);
-    Vec3 sum;
-    kernels_->pull_change(waves_at(j, x), {0, along[0], along[1], along[2]}, field.re.data(), field.im.data(),
-                          sum.data());
-    return sum.cwiseProduct(waves_->unit);
+  /// The forces on own charges in a field.
+  std::vector<Vec3> pull(Positions<3> x, const Amplitudes& field) const {
+    return per_charge(x, [&](Id, const WaveTask& task, double* sum) { kernels_->pull(task, field.data(), sum); });
+  }
+  /// The changes of the forces as charges move along w in a constant field.
+  std::vector<Vec3> pull_change(Positions<3> x, const Amplitudes& field, Positions<3> w) const {
+    return per_charge(x, [&](Id j, const WaveTask& task, double* sum) {
+      const Vec3 along = w[j].cwiseProduct(waves_->unit);
+      kernels_->pull_change(task, along.data(), field.data(), sum);
+    });
+  }
+  /// The mean forces on charges that move by 2 `half` about x: a unit charge feels Σ_k k sinc(k·half) Im[field*
+  /// e^(ik·x)].
+  std::vector<Vec3> pull_moved(Positions<3> x, const Amplitudes& field, Positions<3> half) const {
+    return per_charge(x, [&](Id j, const WaveTask& task, double* sum) {
+      const Vec3 y = half[j].cwiseProduct(waves_->unit);
+      const double most = waves_->longest * half[j].norm();
+      if (most < 1 - 1e-9)
+        kernels_->pull_moved(task, y.data(), most, field.data(), sum);
+      else
+        pull_far(task, y, field, sum);
+    });
+  }
+  /// The same for a long way.
+  static void pull_far(const WaveTask& task, const Vec3& y, const Amplitudes& field, double* sum) {
+    for (std::size_t r = 0; r < task.n; ++r)
+      for (unsigned m = 0; m < 2 * task.rows[r].count; ++m) {
+        const WaveRow& row = task.rows[r];
+        const int c = static_cast<int>(m % row.count), sign = m < row.count ? 1 : -1;
+        const Vec3 index(row.a, row.b, sign * c);
+        double re = 1, im = 0;
+        for (int k = 0; k < 3; ++k) {
+          const int n = k == 0 ? row.a : k == 1 ? row.b : c;
+          const double last = re, turned = k == 2 ? sign * task.im[k][n] : task.im[k][n];
+          re = last * task.re[k][n] - im * turned;
+          im = last * turned + im * task.re[k][n];
+        }
+        const std::array<double, 2> wave = wave_of(field, row.first + m % row.count, sign);
+        const Vec3 pull = (0.5 * (wave[0] * im - wave[1] * re) * sinc(index.dot(y))) * index;
+        for (int k = 0; k < 3; ++k) sum[k] += pull[k];
+      }
   }
 
   /// The mean forces on own charges; NaN if positions are not moderate.
   std::vector<Vec3> mean_forces(Positions<3> x, Positions<3> x_new) const {
     if (!all_moderate(x, x_new)) return {x.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
-    std::vector<Vec3> f(x.size(), Vec3::Zero());
     // The motion of the centre of mass.
     const Vec3 centre = total([&](Id j) { return Vec3(weight(j) * (x_new[j] - x[j])); }) / whole_weight();
     std::vector<Vec3> relative(x.begin(), x.end());
     for (const Id j : charged()) relative[j] = x_new[j] - centre;
-    Amplitudes field, after;
-    sum_structure(relative, after);
-    field = structure(x);
-    for (std::size_t k = 0; k < waves_->size(); ++k) {
-      field.re[k] = 0.5 * (field.re[k] + after.re[k]);
-      field.im[k] = 0.5 * (field.im[k] + after.im[k]);
+    Amplitudes mean;
+    sum_structure(relative, mean);
+    const Amplitudes& before = structure(x);
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] = 0.5 * (before[k] + mean[k]);
+    std::vector<Vec3> middle(x.begin(), x.end()), half(x.size());
+    for (const Id j : charged()) {
+      middle[j] = 0.5 * (x[j] + relative[j]);
+      half[j] = 0.5 * (relative[j] - x[j]);
     }
-    field = weighted(field);
-    for (const Id j : charged()) f[j] = charge_[j] * pull(j, 0.5 * (x[j] + relative[j]), field, relative[j] - x[j]);
+    std::vector<Vec3> f = pull_moved(middle, weighted(mean), half);
     if (has_surface()) {
-      std::vector<Vec3> middle(x.begin(), x.end());
       for (const Id j : charged()) middle[j] = 0.5 * (x[j] + x_new[j]);
       add_surface(0.5 * (dipole(x, x) + dipole(x, x_new)), middle, f);
     }
@@ -424,7 +469,12 @@ class EwaldTerm final : public Interaction<3> {
     const double scale = 0.5 / (options_.split.alpha * options_.split.alpha);
     const auto me = static_cast<std::size_t>(ranks_->rank()), ranks = static_cast<std::size_t>(ranks_->size());
     for (std::size_t k = me; k < waves_->size(); k += ranks) {
-      const double energy = waves_->weight[k] * (s.re[k] * s.re[k] + s.im[k] * s.im[k]);
+      double squares_here = 0;
+      for (unsigned product = 0; product < WaveRow::kProducts; ++product) {
+        const double amplitude = s[place_of(k, product)];
+        squares_here += amplitude * amplitude;
+      }
+      const double energy = waves_->weight[k] * squares_here;
       add(energy, energy * (1 - scale * waves_->squared[k]));
     }
     if (me != 0) return;
@@ -453,7 +503,7 @@ class EwaldTerm final : public Interaction<3> {
   Communicator* ranks_ = &alone_;
   const WaveKernels* kernels_ = &widest_kernels<WaveKernels>();
   // Caches and scratch, which do not affect the sums.
-  mutable std::array<Phases, 3> phases_;
+  mutable std::vector<Phases> phases_;  // of some charges, along three axes each
   struct Turns {
     Vec3 x;
     std::array<std::array<double, 2>, 3> of;

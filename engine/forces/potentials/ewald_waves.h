@@ -60,16 +60,24 @@ class Phases {
   std::vector<double> re_, im_;
 };
 
-/// One half of the vectors k = 2π (a/L_x, b/L_y, c/L_z) with 0 < |k| ≤ k_c, in rows of consecutive c.
+/// The vectors k = 2π (a/L_x, b/L_y, ±c/L_z) with 0 < |k| ≤ k_c, one of k and −k, in rows of consecutive c (see
+/// wave_kernels.h). With the amplitudes S of Σ_j q_j e^(ik·x_j), the energy of an entry is `weight` Σ S² over its four
+/// products: 2 (C/2Ω) (4π/k²) e^(−k²/4α²) |S(k)|² for each of its waves.
 struct Waves {
+  /// Rows that fit into the first level of cache with the amplitudes of one kind.
+  struct Part {
+    std::size_t first, n;
+  };
   std::array<int, 3> most;  // largest |a|, |b|, |c|
   Vec<3> unit;              // 2π/L
   double longest;           // k_c
   std::vector<WaveRow> rows;
-  std::vector<double> weight;   // 2 (C/2Ω) (4π/k²) e^(−k²/4α²): for both halves; padding has 0
+  std::vector<Part> parts;
+  std::vector<double> weight;   // of each entry; padding and k = 0 have 0
   std::vector<double> squared;  // k²
 
   Waves(const EwaldSplit& split, const Vec<3>& edges, double constant) : longest(split.wave_cutoff) {
+    constexpr unsigned kEntries = 512;  // of a part: 16 KB, half of the first level of most processors
     const double volume = edges.prod();
     for (int k = 0; k < 3; ++k) {
       unit[k] = 2 * std::numbers::pi / edges[k];
@@ -80,16 +88,18 @@ struct Waves {
         const double flat = unit[0] * unit[0] * a * a + unit[1] * unit[1] * b * b;
         if (flat > longest * longest) continue;
         const int end = static_cast<int>(std::sqrt(longest * longest - flat) / unit[2]);
-        const int start = a == 0 && b == 0 ? 1 : -end;
-        if (end < start) continue;
-        const auto first = static_cast<unsigned>(weight.size()), count = static_cast<unsigned>(end - start + 1);
+        const auto first = static_cast<unsigned>(weight.size()), count = static_cast<unsigned>(end + 1);
         const unsigned padded = (count + WaveRow::kMultiple - 1) / WaveRow::kMultiple * WaveRow::kMultiple;
-        rows.push_back({a, b, start, first, padded});
-        for (int c = start; c <= end; ++c) {
-          const double k2 = flat + unit[2] * unit[2] * c * c;
+        if (parts.empty() || first + padded - rows[parts.back().first].first > kEntries)
+          parts.push_back({rows.size(), 0});
+        ++parts.back().n;
+        rows.push_back({a, b, first, padded});
+        for (int c = 0; c <= end; ++c) {
+          const double k2 = flat + unit[2] * unit[2] * c * c, waves = flat > 0 && c > 0 ? 2 : 1;
           squared.push_back(k2);
-          weight.push_back(constant / volume * 4 * std::numbers::pi / k2 *
-                           elementary::exp(-k2 / (4 * split.alpha * split.alpha)));
+          weight.push_back(k2 > 0 ? waves * constant / volume * 4 * std::numbers::pi / k2 *
+                                        elementary::exp(-k2 / (4 * split.alpha * split.alpha))
+                                  : 0.0);
         }
         weight.resize(first + padded, 0.0);
         squared.resize(first + padded, 0.0);
@@ -98,10 +108,8 @@ struct Waves {
   std::size_t size() const { return weight.size(); }
 };
 
-/// One complex number for each k.
-struct Amplitudes {
-  std::vector<double> re, im;
-};
+/// One number for each product of each entry; see place_of().
+using Amplitudes = std::vector<double>;
 
 /// sin(y)/y
 inline double sinc(double y) { return y == 0 ? 1 : turn(y / (2 * std::numbers::pi))[1] / y; }

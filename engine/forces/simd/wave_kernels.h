@@ -2,8 +2,11 @@
 #pragma once
 // The interface between the Ewald sum and its loops over waves, which are compiled once for each vector width.
 //
-// Waves stand in rows of consecutive c, k = 2π (a/L_x, b/L_y, c/L_z); the last entries of a row may be padding, of
-// which the fields are zero. Sums have eight partial sums whatever the width, so that all widths give the same bits.
+// The waves k = 2π (a/L_x, b/L_y, ±c/L_z) stand in rows of consecutive c ≥ 0. With X = 2π (a x/L_x + b y/L_y) and
+// Z = 2π c z/L_z, the waves of +c and −c are linear in four products: cos X cos Z, sin X sin Z, cos X sin Z,
+// sin X cos Z. Amplitudes are sums of these products, in blocks: eight numbers of the first product, for eight values
+// of c, then eight of the second one, and so on. Sums have eight partial sums whatever the width, so that all widths
+// give the same bits.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,31 +17,37 @@ namespace carom {
 
 struct WaveRow {
   static constexpr unsigned kMultiple = 8;
-  int a, b, c;            ///< c: of the first wave
-  unsigned first, count;  ///< the waves first … first + count − 1; both are multiples of kMultiple
+  static constexpr unsigned kProducts = 4;
+  int a, b;
+  unsigned first, count;  ///< its entries; multiples of kMultiple, where the last ones may be padding of weight zero
 };
 
-/// The waves, and one particle: e^(2πi n x/L) along each axis, where the pointers are those of n = 0.
+/// The place of a product of an entry in the amplitudes.
+constexpr std::size_t place_of(std::size_t entry, unsigned product) {
+  constexpr std::size_t kIn = WaveRow::kMultiple;
+  return entry / kIn * kIn * WaveRow::kProducts + product * kIn + entry % kIn;
+}
+
+/// Rows, and one particle: e^(2πi n x/L) along each axis, where the pointers are those of n = 0.
 struct WaveTask {
   const WaveRow* rows;
   std::size_t n;
   const double *re[3], *im[3];  ///< the third ones have kMultiple readable entries after the last n
 };
 
-/// A linear function of a, b and c.
-struct WaveFactor {
-  double constant, a, b, c;
-};
-
+/// The vectors `w` and `y` are in units of L/2π: k·w = a w[0] + b w[1] ± c w[2]. `field` has the amplitudes φ of a
+/// potential Σ φ · product. All but the first two add to the sum of three components, in units of 2π/L.
 struct WaveKernels {
-  /// Adds factor·e^(ik·x) + shift to re and im, as bits.
-  void (*add)(const WaveTask&, const WaveFactor& factor, double shift, std::uint64_t* re, std::uint64_t* im);
-  /// Σ (a, b, c) Im[field* e^(ik·x)]
-  void (*pull)(const WaveTask&, const double* re, const double* im, double* sum);
-  /// Σ (a, b, c) sin(y)/y Im[field* e^(ik·x)], |y| ≤ 1
-  void (*pull_moved)(const WaveTask&, const WaveFactor& y, const double* re, const double* im, double* sum);
-  /// Σ (a, b, c) factor Re[field* e^(ik·x)]
-  void (*pull_change)(const WaveTask&, const WaveFactor& factor, const double* re, const double* im, double* sum);
+  /// Adds factor × product + shift to the amplitudes, as bits.
+  void (*add)(const WaveTask&, double factor, double shift, std::uint64_t* amplitudes);
+  /// The derivatives of the products along w in the place of the products.
+  void (*add_change)(const WaveTask&, double factor, const double* w, double shift, std::uint64_t* amplitudes);
+  /// Minus the gradient of the potential.
+  void (*pull)(const WaveTask&, const double* field, double* sum);
+  /// The derivative of the latter along w.
+  void (*pull_change)(const WaveTask&, const double* w, const double* field, double* sum);
+  /// As `pull`, with each wave times sin(k·y)/(k·y); |k·y| ≤ most ≤ 1.
+  void (*pull_moved)(const WaveTask&, const double* y, double most, const double* field, double* sum);
 };
 
 }  // namespace carom

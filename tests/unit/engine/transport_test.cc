@@ -114,6 +114,7 @@ TEST(PressureTensor, TraceIsThePressureUnderForces) {
 TEST(Transport, OfStraightFlights) {
   auto system = test::make_system<2>({50, 50}, Boundary::periodic, {{5, 5}, {5, 20}, {5, 40}},
                                      {{0.3, 0}, {0.1, 0.01}, {0.2, 0.02}});
+  system->particles.charge = {2, -2, 2};
   const auto [run, observable, t] =
       sampled<2>(std::move(system), "free-flight", 10, 250, "transport", {{"interval", 1.0}, {"longest", 100.0}});
   std::vector<double> lags;
@@ -124,6 +125,7 @@ TEST(Transport, OfStraightFlights) {
   const std::vector<Vec<2>> v = {{0.1, -0.01}, {-0.1, 0}, {0, 0.01}};  // without the drift
   double square = 0, xy = 0, difference = 0;
   Vec<2> heat = Vec<2>::Zero();
+  const Vec<2> current = 2 * (v[0] - v[1] + v[2]);
   for (const Vec<2>& each : v) {
     square += each.squaredNorm() / 3;
     xy += each[0] * each[1];
@@ -143,6 +145,8 @@ TEST(Transport, OfStraightFlights) {
                 1e-9);
     EXPECT_NEAR(t.at("thermal_conductivity")[row],
                 0.5 * heat.squaredNorm() * rate / (volume * temperature * temperature), 1e-9);
+    EXPECT_NEAR(t.at("electrical_conductivity")[row], 0.5 * current.squaredNorm() * rate / (volume * temperature),
+                1e-9);
   }
 }
 

@@ -436,6 +436,43 @@ TEST(Ewald, TheVirialOfCoulombForcesIsTheirEnergy) {
   }
 }
 
+std::array<double, 12> fluxes(const Interaction<3>& term, const Scene<3>& scene, Positions<3> v) {
+  PairFluxes<3> sums;
+  term.add_fluxes(scene.particles.x, v, sums);
+  std::array<double, 12> all;
+  for (std::size_t k = 0; k < 9; ++k) all[k] = sums.stress[k].value();
+  for (std::size_t k = 0; k < 3; ++k) all[9 + k] = sums.heat[k].value();
+  return all;
+}
+
+TEST(Ewald, StressAndHeatFluxDoNotDependOnTheSplit) {
+  for (const bool neutral : {true, false}) {
+    Scene<3> scene(60, 6, Boundary::periodic, 0.7);
+    for (Id i = 0; neutral && i < 60; ++i) scene.particles.charge[i] = i % 2 == 0 ? 1 : -1;
+    const auto v = scene.random_vectors(1);
+    const auto exact = fluxes(*ewald(scene, 1e-13), scene, v);
+    for (const double accuracy : {1e-7, 1e-9, 1e-11}) {
+      const auto found = fluxes(*ewald(scene, accuracy), scene, v);
+      for (std::size_t k = 0; k < 12; ++k) {
+        EXPECT_NEAR(found[k], exact[k], 300 * accuracy) << k << " " << accuracy << " " << neutral;
+        EXPECT_GT(std::abs(exact[k]), 1e-3);
+      }
+    }
+  }
+}
+
+/// The images of a small neutral cluster in a large box hardly matter.
+TEST(Ewald, StressAndHeatFluxOfAClusterAreThoseOfItsPairs) {
+  Scene<3> scene(20, 4, Boundary::periodic, 0.5);
+  for (Id i = 0; i < 20; ++i) scene.particles.charge[i] = i % 2 == 0 ? 1 : -1;
+  scene.box.edges *= 40;
+  const auto v = scene.random_vectors(1);
+  const auto found = fluxes(*ewald(scene, 1e-9), scene, v);
+  scene.box.boundary.fill(Boundary::open);
+  const auto pairs = fluxes(*scene.make("coulomb", {{"constant", 1.0}, {"form", "plain"s}}), scene, v);
+  for (std::size_t k = 0; k < 12; ++k) EXPECT_NEAR(found[k], pairs[k], 1e-3) << k;
+}
+
 TEST(Ewald, TheSurfaceInVacuumSeesUnwrappedPositions) {
   Scene<3> scene(20, 6, Boundary::periodic, 0.7);
   for (Id i = 0; i < 20; ++i) scene.particles.charge[i] = i % 2 == 0 ? 1 : -1;
