@@ -224,7 +224,7 @@ TEST(Ewald, MeanForcesDoExactlyTheWorkAndTheirSumIsZeroBitByBit) {
   const auto& x = scene.particles.x;
   for (const auto& surface : {"conducting"s, "vacuum"s}) {
     const auto term = ewald(scene, 1e-6, surface);
-    for (const double size : {1e-9, 1e-4, 0.01, 0.1, 0.4}) {
+    for (const double size : {1e-9, 1e-4, 0.01, 0.03, 0.05, 0.1, 0.4}) {
       // With a drift: the net force vanishes although all particles move far.
       auto w = scene.random_vectors(size);
       for (auto& each : w) each += Vec<3>(0.3, -0.2, 0.1);
