@@ -174,6 +174,20 @@ def test_forces_are_shared(method, tmp_path):
             assert filecmp.cmp(tmp_path / "plain" / name, tmp_path / str(ranks) / name, shallow=False)
 
 
+def test_the_fluxes_of_an_ewald_sum_are_shared(tmp_path):
+    before, after = (ROOT / "inputs" / "one-component-plasma.toml").read_text().split("[[bath]]")
+    text = before + "[integrator]" + after.split("[integrator]")[1].replace("start = \"equilibrated\"\n", "")
+    deck = write_deck(tmp_path, text)
+    shorter = ["run.steps=20", "output.transport_interval=0.036", "output.transport_longest=0.18", "output.pressure_tensor_interval=0.09"]
+    run(deck, tmp_path / "plain", shorter)
+    assert summary(tmp_path / "plain")["transport"]["thermal_conductivity"]["mean"] > 0
+    for ranks in 2, 3:
+        mpirun(ranks, command(deck, tmp_path / str(ranks), shorter))
+        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
+        for name in "transport.csv", "pressure_tensor.csv":
+            assert filecmp.cmp(tmp_path / "plain" / name, tmp_path / str(ranks) / name, shallow=False)
+
+
 @pytest.mark.parametrize("method", ["free-flight", "edda"])
 def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, tmp_path):
     deck = ROOT / "inputs" / ("yukawa-fluid.toml" if method == "edda" else "hard-sphere-fluid.toml")
