@@ -87,10 +87,8 @@ class EwaldTerm final : public Interaction<3> {
     const double background = options_.excess == 0 ? 0.0 : 2 * options_.background / options_.excess;
     const Vec3 constant = total([&](Id j) { return Vec3(charge_[j] * (background - own * charge_[j]) * v[j]); });
     if (ranks_->rank() != 0) return;
-    for (int a = 0; a < 3; ++a) {
-      fluxes.stress[4 * a].add(options_.background);
-      fluxes.heat[a].add(constant[a]);
-    }
+    for (const std::size_t k : {0, 4, 8}) fluxes.stress[k].add(options_.background);
+    for (int a = 0; a < 3; ++a) fluxes.heat[a].add(constant[a]);
     const double scale = 0.25 / (options_.split.alpha * options_.split.alpha);
     for (const WaveRow& row : waves_->rows)
       for (unsigned m = 0; m < 2 * row.count; ++m) {

@@ -27,9 +27,10 @@ struct WaveLoops {
   template <class Visit>
   CAROM_INLINE static void for_each(const WaveTask& task, const WaveRow& row, Visit&& visit) {
     for (unsigned m = 0; m < row.count; m += kIn)
-      for (unsigned v = 0; v < kVectors; ++v)
-        visit(v, m + v * W, WaveRow::kProducts * (row.first + m) + v * W, load<V>(task.re[2] + m + v * W),
-              load<V>(task.im[2] + m + v * W));
+      for (unsigned v = 0; v < kVectors; ++v) {
+        const unsigned c = m + v * W, at = WaveRow::kProducts * (row.first + m) + v * W;
+        visit(v, c, std::size_t{at}, load<V>(task.re[2] + c), load<V>(task.im[2] + c));
+      }
   }
   CAROM_INLINE static V counted(unsigned first) {
     V lanes{};
@@ -43,7 +44,7 @@ struct WaveLoops {
   CAROM_INLINE static void add_lanes(const V (&parts)[3][kVectors], double factor, double* sum) {
     for (int k = 0; k < 3; ++k) {
       double lanes[kIn];
-      for (unsigned v = 0; v < kVectors; ++v) store(lanes + v * W, parts[k][v]);
+      for (std::size_t v = 0; v < kVectors; ++v) store(lanes + v * W, parts[k][v]);
       for (unsigned width = kIn / 2; width > 0; width /= 2)
         for (unsigned l = 0; l < width; ++l) lanes[l] += lanes[l + width];
       sum[k] += factor * lanes[0];
