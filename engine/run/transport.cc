@@ -98,7 +98,7 @@ class Transport : public Observable<D> {
     void archive(Archive& archive) { archive(count, time, integrals, x, v, series); }
   };
   static constexpr std::size_t kRing = kLags + 1;
-  static constexpr std::size_t kStresses = D * (D + 1) / 2 - 1, kIntegrals = kStresses + 2 * D;
+  static constexpr std::size_t kStresses = D * (D + 1) / 2 - 1, kIntegrals = kStresses + D + D;
 
   std::size_t quantities() const { return kSingle + 2 * (number_.size() > 1 ? number_.size() + 1 : 1); }
   bool conducts() const { return number_.size() == 1 && alike_; }

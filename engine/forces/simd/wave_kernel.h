@@ -10,7 +10,8 @@ namespace carom {
 template <int W>
 struct WaveLoops {
   using V = typename Width<W>::Double;
-  static constexpr unsigned kIn = WaveRow::kMultiple, kVectors = kIn / W;
+  static constexpr std::size_t kIn = WaveRow::kMultiple;
+  static constexpr unsigned kVectors = WaveRow::kMultiple / W;
 
   /// cos X and sin X of a row.
   struct Flat {
@@ -26,7 +27,7 @@ struct WaveLoops {
   /// those of a block.
   template <class Visit>
   CAROM_INLINE static void for_each(const WaveTask& task, const WaveRow& row, Visit&& visit) {
-    for (unsigned m = 0; m < row.count; m += kIn)
+    for (unsigned m = 0; m < row.count; m += WaveRow::kMultiple)
       for (unsigned v = 0; v < kVectors; ++v) {
         const unsigned c = m + v * W, at = WaveRow::kProducts * (row.first + m) + v * W;
         visit(v, c, std::size_t{at}, load<V>(task.re[2] + c), load<V>(task.im[2] + c));
@@ -45,8 +46,8 @@ struct WaveLoops {
     for (int k = 0; k < 3; ++k) {
       double lanes[kIn];
       for (std::size_t v = 0; v < kVectors; ++v) store(lanes + v * W, parts[k][v]);
-      for (unsigned width = kIn / 2; width > 0; width /= 2)
-        for (unsigned l = 0; l < width; ++l) lanes[l] += lanes[l + width];
+      for (std::size_t width = kIn / 2; width > 0; width /= 2)
+        for (std::size_t l = 0; l < width; ++l) lanes[l] += lanes[l + width];
       sum[k] += factor * lanes[0];
     }
   }
