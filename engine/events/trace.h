@@ -21,10 +21,8 @@ namespace carom {
 template <int D>
 struct Node {
   Record<D> after;
-  EventKey<D> key;
+  EventKey<D> key{};
   Spin<D> spin = Spin<D>::Zero();  ///< of the sphere after the event; 0 if no contact is rough
-  PackedExchange exchange{};       ///< not in scripts, like the overlap
-  double overlap = 0;              ///< at contact, relative to the contact distance
 
   /// The other sphere's id; kNoPartner at a wall.
   static constexpr Id kNoPartner = std::numeric_limits<Id>::max();
@@ -99,6 +97,8 @@ class Trace {
     event.overlap = overlap;
     fastest_squared_ = std::max({fastest_squared_, a.v.squaredNorm(), b.v.squaredNorm()});
   }
+  /// Call for a sphere after an event that is not in the log.
+  void note_speed(const Record<D>& r) { fastest_squared_ = std::max(fastest_squared_, r.v.squaredNorm()); }
 
   /// Links the entries of each sphere, which the functions below require; calls visit(slot, first) at each and, some
   /// events earlier, prefetch(slot). In one pass over the complete log the memory of many spheres is fetched at once;

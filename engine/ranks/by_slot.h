@@ -14,7 +14,7 @@ namespace carom {
 template <class T>
 class BySlot {
  public:
-  void resize(std::size_t slots) { index_.resize(slots, kAbsent); }
+  explicit BySlot(std::size_t slots) : index_(slots, kAbsent) {}
   bool has(Slot i) const { return index_[i] != kAbsent; }
   /// The entry of a sphere; it must have one.
   T& at(Slot i) { return items_[index_[i]]; }

@@ -60,31 +60,27 @@ class Subdomain {
   /// cut it before that. Returns `end`, or the time of the first event for which the log has no room; the window is
   /// then invalid too.
   double run(double now, double end);
-  void repair() { changed_ = repair_->run(); }
+  void repair();
   /// Calls visit(slot, k) for each node k that is a contact with its lower id owned here.
   template <class Visit>
   void for_each_contact(Visit&& visit) {
     paths_->for_each_own([&](Slot i) {
-      for (std::size_t k = 0; k < paths_->nodes(i); ++k)
+      for (std::size_t k = 1; k <= paths_->size(i); ++k)
         if (const Node<D> each = paths_->node(i, k); each.key.lo == each.after.id) visit(i, k);
     });
   }
-  /// The contact of node k, visited by for_each_contact().
-  Contact<D> contact_of(Slot lo, std::size_t k);
   /// Own spheres that are ghosts elsewhere and got new paths in the last run() or repair().
   std::span<const Slot> changed() const { return changed_; }
   /// An upper limit of the contacts in paths().tally().
-  std::uint64_t most_events() const { return paths_->trace().events().size() + redone_events() - redone_before_; }
+  std::uint64_t most_events() const { return paths_->trace().events().size() + redone_events_ - redone_before_; }
   /// The largest speed of any sphere after an event.
-  double fastest() const { return std::sqrt(std::max(paths_->trace().fastest_squared(), repair_->fastest_squared())); }
+  double fastest() const { return std::sqrt(paths_->trace().fastest_squared()); }
   /// Ends the window.
   void commit();
 
   EventCounts counts() const { return core_.counts(); }
-  std::uint64_t run_events() const { return run_events_; }  ///< events of first runs
-  std::uint64_t redone_events() const {                     ///< events of repairs
-    return redone_events_ + (repair_ ? repair_->events() : 0);
-  }
+  std::uint64_t run_events() const { return run_events_; }        ///< events of first runs
+  std::uint64_t redone_events() const { return redone_events_; }  ///< events of repairs
 
  private:
   const Box<D>& box_;
@@ -95,7 +91,7 @@ class Subdomain {
   double end_ = 0, length_ = 0;  // the present window
   std::vector<Slot> changed_;
   std::uint64_t run_events_ = 0;
-  std::uint64_t redone_events_ = 0, redone_before_ = 0;  // until the last release(); before the present window
+  std::uint64_t redone_events_ = 0, redone_before_ = 0;  // now; before the present window
 };
 
 }  // namespace carom

@@ -77,9 +77,9 @@ void WindowLength<D>::allow_for(double speed) {
 template <int D>
 double WindowLength<D>::beyond_at(const WindowPaths<D>& paths, Slot i, double now, double end) const {
   double left = max_displacement_;
-  for (std::size_t k = 0; k <= paths.nodes(i); ++k) {  // stores no path: there are many
-    const double speed = (k == 0 ? paths.start(i) : paths.node(i, k - 1).after).v.norm() + field_;
-    const double until = k < paths.nodes(i) ? paths.node(i, k).key.time : end;
+  for (std::size_t k = 0; k <= paths.size(i); ++k) {  // stores no path: there are many
+    const double speed = paths.node(i, k).after.v.norm() + field_;
+    const double until = k < paths.size(i) ? paths.node(i, k + 1).key.time : end;
     if (speed * (until - now) > left) return now + left / speed;
     left -= speed * (until - now);
     now = until;

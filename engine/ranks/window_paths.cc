@@ -7,17 +7,6 @@
 namespace carom {
 
 template <int D>
-void WindowPaths<D>::load(std::size_t slots) {
-  trace_.clear(slots);
-  paths_.clear();
-  paths_.resize(slots);
-  scripts_.clear();
-  scripts_.resize(slots);
-  rewritten_.assign(slots, 0);
-  listed_.assign(slots, 0);
-}
-
-template <int D>
 Trace<D>& WindowPaths<D>::start() {
   trace_.clear(flights_.capacity());
   return trace_;
@@ -43,8 +32,6 @@ template <int D>
 std::vector<typename EventCore<D>::Changed> WindowPaths<D>::finish() {
   std::vector<typename EventCore<D>::Changed> other;
   for (const Slot slot : paths_.slots()) {
-    if (rewritten_[slot] == 0) continue;
-    rewritten_[slot] = 0;
     const Record<D>&now = after(slot), &known = flights_[slot];
     const Spin<D> spin = spin_after(slot);
     if (now.t != known.t || now.x != known.x || now.v != known.v || now.generation != known.generation ||
@@ -59,64 +46,38 @@ std::vector<typename EventCore<D>::Changed> WindowPaths<D>::finish() {
 /// Node k of a path, read from the log; `entries`: the sphere's entries.
 template <int D>
 Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const {
-  const auto& event = trace_.event_of(entries[k]);
-  const auto& [lo, hi] = event.id;
-  return {.after = k + 1 < entries.size() ? trace_.before(entries[k + 1]) : flights_[i],
-          .key = event.slot[1] == kNoEntry
-                     ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
-                     : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner)),
-          .spin = k + 1 < entries.size() ? trace_.spin_before(entries[k + 1]) : flights_.spin(i),
-          .exchange = event.exchange,
-          .overlap = event.overlap};
+  const bool last = k == entries.size();
+  const auto key_of = [&](std::uint32_t entry) {
+    const auto& event = trace_.event_of(entry);
+    const auto& [lo, hi] = event.id;
+    return event.slot[1] == kNoEntry
+               ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
+               : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner));
+  };
+  return {.after = last ? flights_[i] : trace_.before(entries[k]),
+          .key = k == 0 ? EventKey<D>{} : key_of(entries[k - 1]),
+          .spin = last ? flights_.spin(i) : trace_.spin_before(entries[k])};
 }
 
 template <int D>
-typename WindowPaths<D>::Path& WindowPaths<D>::path_of(Slot i) {
+typename WindowPaths<D>::Nodes& WindowPaths<D>::path(Slot i) {
   if (paths_.has(i)) return paths_.at(i);
-  const Record<D> first = start(i);
   const View logged = view(i);
-  Path& path = paths_.add(i);
-  path.start = first;
-  path.spin = logged.entries.empty() ? flights_.spin(i) : trace_.spin_before(logged.entries[0]);
-  path.nodes.clear();
-  for (std::size_t k = 0; k < logged.size(); ++k) path.nodes.push_back(logged.node(k));
-  return path;
-}
-
-template <int D>
-const Record<D>& WindowPaths<D>::start(Slot i) const {
-  const View path = view(i);
-  if (path.nodes) return paths_.at(i).start;
-  return path.size() == 0 ? flights_[i] : trace_.before(path.entries[0]);
-}
-
-template <int D>
-const Record<D>& WindowPaths<D>::after(Slot i) const {
-  if (!paths_.has(i)) return flights_[i];
-  const Path& path = paths_.at(i);
-  return path.nodes.empty() ? path.start : path.nodes.back().after;
-}
-
-template <int D>
-Spin<D> WindowPaths<D>::spin_after(Slot i) const {
-  if (!paths_.has(i)) return flights_.spin(i);
-  const Path& path = paths_.at(i);
-  return path.nodes.empty() ? path.spin : path.nodes.back().spin;
-}
-
-template <int D>
-typename WindowPaths<D>::Nodes& WindowPaths<D>::rewrite(Slot i) {
-  rewritten_[i] = 1;
-  return path_of(i).nodes;
+  Nodes& nodes = paths_.add(i);
+  nodes.clear();
+  for (std::size_t k = 0; k <= logged.size(); ++k) nodes.push_back(logged.node(k));
+  return nodes;
 }
 
 template <int D>
 void WindowPaths<D>::cut(const EventKey<D>& last) {
   std::vector<Slot> touched(paths_.slots().begin(), paths_.slots().end());
   for_each_own([&](Slot i) { touched.push_back(i); });
-  for (const Slot i : touched)
-    if (const std::size_t k = nodes(i); k > 0 && last < node(i, k - 1).key)
-      std::erase_if(rewrite(i), [&](const Node<D>& node) { return last < node.key; });
+  for (const Slot i : touched) {
+    if (size(i) == 0 || !(last < node(i, size(i)).key)) continue;
+    const auto later = std::ranges::find_if(events(i), [&](const Node<D>& node) { return last < node.key; });
+    path(i).resize(1 + static_cast<std::size_t>(later - events(i).begin()));
+  }
 }
 
 template <int D>
@@ -127,7 +88,7 @@ void WindowPaths<D>::write(Slot i, Bytes& to) const {
   to.resize(at + sizeof head + head.nodes * bytes);
   std::memcpy(to.data() + at, &head, sizeof head);
   at += sizeof head;
-  for (std::size_t k = 0; k < head.nodes; ++k, at += bytes) {
+  for (std::size_t k = 1; k <= head.nodes; ++k, at += bytes) {
     const Node<D> node = path.node(k);
     std::memcpy(to.data() + at, static_cast<const void*>(&node), bytes);
   }
@@ -152,7 +113,7 @@ bool WindowPaths<D>::matches(Slot g) const {
   const auto sent = script(g);
   if (path.size() != sent.size()) return false;
   for (std::size_t k = 0; k < sent.size(); ++k)
-    if (!(path.node(k) == sent[k])) return false;
+    if (path.node(k + 1) != sent[k]) return false;
   return true;
 }
 
@@ -163,27 +124,48 @@ bool WindowPaths<D>::all_match(double end) {
     return nodes;
   };
   return std::ranges::all_of(
-      unmatched_, [&](Slot g) { return matches(g) || std::ranges::equal(until(path(g)), until(script(g))); });
+      unmatched_, [&](Slot g) { return matches(g) || std::ranges::equal(until(events(g)), until(script(g))); });
 }
 
 template <int D>
 ContactTally WindowPaths<D>::tally() const {
   ContactTally tally;
-  const auto add = [&](Id wall, double time, const PackedExchange& exchange, double overlap) {
-    if (wall == kNoEntry) return tally.add_pair(exchange.unpacked<D>(nullptr, time), overlap);
-    const auto its = std::ranges::find(flights_.walls(), wall, &Wall<D>::number);
-    tally.add_wall(wall, exchange.unpacked(&*its, time), overlap);
-  };
-  for (const auto& event : trace_.events())
-    if (const Slot lo = event.slot[0]; ownership_.owns(lo) && rewritten_[lo] == 0)
-      add(event.slot[1] != kNoEntry ? kNoEntry : event.partner, event.time, event.exchange, event.overlap);
+  for (const auto& event : trace_.events()) {
+    if (const Slot lo = event.slot[0]; !ownership_.owns(lo) || paths_.has(lo)) continue;
+    if (event.slot[1] != kNoEntry) {
+      tally.add_pair(event.exchange.template unpacked<D>(nullptr, event.time), event.overlap);
+    } else {
+      const Wall<D> wall = box_.wall(event.partner);
+      tally.add_wall(wall.number, event.exchange.unpacked(&wall, event.time), event.overlap);
+    }
+  }
   for (const Slot i : paths_.slots()) {
-    if (!ownership_.owns(i) || rewritten_[i] == 0) continue;
-    for (const Node<D>& node : paths_.at(i).nodes)
-      if (node.key.lo == node.after.id)
-        add(node.key.kind == EventKind::pair ? kNoEntry : node.key.hi, node.key.time, node.exchange, node.overlap);
+    if (!ownership_.owns(i)) continue;
+    for (std::size_t k = 1; k < paths_.at(i).size(); ++k)
+      if (const Node<D>& node = paths_.at(i)[k]; node.key.lo == node.after.id)
+        tally.record<D>(contact_of(i, k), nullptr);
   }
   return tally;
+}
+
+template <int D>
+Contact<D> WindowPaths<D>::contact_of(Slot lo, std::size_t k) const {
+  const View path = view(lo);
+  const EventKey<D> key = path.node(k).key;
+  Node<D> a = path.node(k - 1);
+  if (key.kind == EventKind::wall) {
+    const Impact<D> impact = flights_.bounce(lo, a.after, &a.spin, box_.wall(key.hi), key.time, key.generation);
+    return flights_.contact_of(key, a.after, impact);
+  }
+  const Slot hi = ownership_.slot_of(key.hi);
+  const View other = view(hi);
+  std::size_t before = 0;
+  while (other.node(before + 1).key != key) ++before;
+  Node<D> b = other.node(before);
+  const Vec<D> shift = box_.shift(key.image);
+  const Impact<D> impact =
+      flights_.collide(lo, a.after, &a.spin, hi, b.after, &b.spin, shift, key.time, key.generation);
+  return flights_.contact_of(key, a.after, b.after, shift, impact);
 }
 
 template class WindowPaths<2>;

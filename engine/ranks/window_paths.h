@@ -16,13 +16,19 @@ namespace carom {
 template <int D>
 class WindowPaths {
  public:
+  /// A path: the sphere at the start of the window, then after each event.
   using Nodes = std::vector<Node<D>>;
 
-  /// `flights` must be in the state the core left at the end of the window. Both arguments must outlive this object.
-  WindowPaths(const Flights<D>& flights, Ownership<D>& ownership) : flights_(flights), ownership_(ownership) {}
+  /// For the loaded spheres of a core, in the state the core left at the end of the window. All arguments must outlive
+  /// this object.
+  WindowPaths(const Box<D>& box, const Flights<D>& flights, Ownership<D>& ownership)
+      : box_(box),
+        flights_(flights),
+        ownership_(ownership),
+        paths_(flights.capacity()),
+        scripts_(flights.capacity()),
+        listed_(flights.capacity()) {}
 
-  /// Removes everything and makes room for this many slots.
-  void load(std::size_t slots);
   /// Starts a window; the core must write to the returned log.
   Trace<D>& start();
   /// Call when the log is complete; tells the ownership about spheres with events. Returns the own spheres with events
@@ -33,23 +39,21 @@ class WindowPaths {
 
   const Trace<D>& trace() const { return trace_; }
   bool has_no_events(Slot i) const { return !paths_.has(i) && !trace_.has(i); }
-  std::span<const Node<D>> path(Slot i) { return path_of(i).nodes; }
-  std::size_t nodes(Slot i) const { return view(i).size(); }
+  /// The path of a sphere, which may be changed; stored from now on.
+  Nodes& path(Slot i);
+  /// The path after its start.
+  std::span<const Node<D>> events(Slot i) { return std::span<const Node<D>>(path(i)).subspan(1); }
+  /// Appends an event to a path.
+  void append(Slot i, const Node<D>& node) {
+    path(i).push_back(node);
+    trace_.note_speed(node.after);
+  }
+  /// The number of events of a path, and its nodes from 0, the start, on; stores no path.
+  std::size_t size(Slot i) const { return view(i).size(); }
   Node<D> node(Slot i, std::size_t k) const { return view(i).node(k); }
-  const Record<D>& start(Slot i) const;
-  /// The sphere's record before node k of its path; start(): before the first, after(): after the last.
-  const Record<D>& before(Slot i, std::size_t k) {
-    Path& path = path_of(i);
-    return k > 0 ? path.nodes[k - 1].after : path.start;
-  }
-  const Record<D>& after(Slot i) const;
-  Spin<D> spin_before(Slot i, std::size_t k) {
-    const Path& path = path_of(i);
-    return k > 0 ? path.nodes[k - 1].spin : path.spin;
-  }
-  Spin<D> spin_after(Slot i) const;
-  /// The path of a sphere, to be changed.
-  Nodes& rewrite(Slot i);
+  /// The sphere after its last event.
+  const Record<D>& after(Slot i) const { return paths_.has(i) ? paths_.at(i).back().after : flights_[i]; }
+  Spin<D> spin_after(Slot i) const { return paths_.has(i) ? paths_.at(i).back().spin : flights_.spin(i); }
   /// Removes all events after `last`.
   void cut(const EventKey<D>& last);
 
@@ -75,11 +79,14 @@ class WindowPaths {
   /// Whether the paths of all ghosts equal their scripts before a time.
   bool all_match(double end);
 
-  /// Calls visit(slot) for each own sphere that had events in any version of the window. visit() may call path().
+  /// Calls visit(slot) for each own sphere that had events in any version of the window, and perhaps others. visit()
+  /// may call path().
   template <class Visit>
   void for_each_own(Visit&& visit) const;
   /// The contacts of own spheres; each counts where its lower id is owned.
   ContactTally tally() const;
+  /// The contact in node k of the path of the sphere with the lower id.
+  Contact<D> contact_of(Slot lo, std::size_t k) const;
 
  private:
   static constexpr std::uint32_t kNoEntry = Trace<D>::kNoEntry;
@@ -87,36 +94,30 @@ class WindowPaths {
     Id id;
     std::uint32_t nodes;
   };
-  struct Path {
-    Record<D> start;  // at the start of the window
-    Spin<D> spin;     // there
-    Nodes nodes;
-  };
   /// A path, stored or read from the log; valid until another path is viewed.
   struct View {
     const WindowPaths& all;
     Slot slot;
     const Nodes* nodes;  // null: read from the log
     std::span<const std::uint32_t> entries;
-    std::uint32_t size() const { return static_cast<std::uint32_t>(nodes ? nodes->size() : entries.size()); }
+    std::uint32_t size() const { return static_cast<std::uint32_t>(nodes ? nodes->size() - 1 : entries.size()); }
     Node<D> node(std::size_t k) const { return nodes ? (*nodes)[k] : all.logged(slot, entries, k); }
   };
 
-  View view(Slot i) const {
-    if (paths_.has(i)) return {*this, i, &paths_.at(i).nodes, {}};
+  [[gnu::always_inline]] View view(Slot i) const {
+    if (paths_.has(i)) return {*this, i, &paths_.at(i), {}};
     return {*this, i, nullptr, trace_.entries(i)};
   }
   /// The bytes of a node in a message: without the spin if no contact is rough.
-  std::size_t node_bytes() const { return flights_.rough() ? offsetof(Node<D>, exchange) : offsetof(Node<D>, spin); }
+  std::size_t node_bytes() const { return offsetof(Node<D>, spin) + (flights_.rough() ? sizeof(Spin<D>) : 0); }
   Node<D> logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const;
-  Path& path_of(Slot i);
 
+  const Box<D>& box_;
   const Flights<D>& flights_;
   Ownership<D>& ownership_;
   Trace<D> trace_;
-  BySlot<Path> paths_;                   // paths in use
-  std::vector<std::uint8_t> rewritten_;  // by slot: whether the path differs from the log
-  BySlot<Nodes> scripts_;
+  BySlot<Nodes> paths_;    // stored paths
+  BySlot<Nodes> scripts_;  // without starts
   std::vector<Slot> unmatched_;
   std::vector<std::uint8_t> listed_;  // by slot: whether it is in unmatched_
 };
@@ -129,7 +130,7 @@ void WindowPaths<D>::for_each_own(Visit&& visit) const {
       if (const Slot i = event.slot[which]; event.last[which] == kNoEntry && i != kNoEntry && ownership_.owns(i))
         visit(i);
   for (std::size_t k = 0; k < paths_.slots().size(); ++k)  // visit() may add paths
-    if (const Slot i = paths_.slots()[k]; ownership_.owns(i) && rewritten_[i] != 0 && !trace_.has(i)) visit(i);
+    if (const Slot i = paths_.slots()[k]; ownership_.owns(i) && !trace_.has(i)) visit(i);
 }
 
 }  // namespace carom

@@ -6,7 +6,9 @@
 namespace carom {
 
 template <int D>
-std::vector<Slot> WindowRepair<D>::run() {
+std::vector<Slot> WindowRepair<D>::run(double end) {
+  end_ = end;
+  events_ = 0;
   repairs_.clear();
   for (const Slot g : paths_.take_unmatched()) compare(g);
   while (!tasks_.empty()) {
@@ -19,26 +21,16 @@ std::vector<Slot> WindowRepair<D>::run() {
       case Task::Kind::script:
         script(task);
         break;
-      case Task::Kind::check:
-        check(task);
-        break;
       case Task::Kind::difference:
-        if (repaired(task.a)) break;
-        Repaired& m = begin(task.a, task.key);
-        plan_script(m);
-        if (const Node<D>* next = next_of_script(m); !next || next->key != task.key) predict(m, task.key);
+        difference(task);
     }
   }
   std::vector<Slot> changed;
-  for (const Repaired& m : repairs_) {
-    repair_of_[m.slot] = kNoRepair;
-    if (!ownership_.owns(m.slot)) {
-      paths_.add_unmatched(m.slot);
-      continue;
-    }
-    const auto now = paths_.path(m.slot).subspan(m.kept);
-    if (!std::equal(now.begin(), now.end(), m.old.begin(), m.old.end())) changed.push_back(m.slot);
-  }
+  for (const Slot i : repairs_.slots())
+    if (!ownership_.owns(i))
+      paths_.add_unmatched(i);
+    else if (paths_.path(i) != repairs_.at(i).old)
+      changed.push_back(i);
   return changed;
 }
 
@@ -47,7 +39,7 @@ template <int D>
 void WindowRepair<D>::compare(Slot g) {
   if (paths_.matches(g) || adopt(g)) return;
   paths_.add_unmatched(g);
-  const auto seen = paths_.path(g), script = paths_.script(g);
+  const auto seen = paths_.events(g), script = paths_.script(g);
   const auto [here, there] = std::mismatch(seen.begin(), seen.end(), script.begin(), script.end());
   const bool sees = here != seen.end() && !ownership_.owns_id(here->partner());
   if (there != script.end() && (here == seen.end() || there->key <= here->key)) {
@@ -58,30 +50,26 @@ void WindowRepair<D>::compare(Slot g) {
   }
 }
 
-/// Cuts the path of a sphere at `key`; the partners of the removed events must be checked.
+/// Cuts the path of a sphere at `key`; its script is followed from there if it agrees up to there, and the partners of
+/// the removed events are checked.
 template <int D>
 typename WindowRepair<D>::Repaired& WindowRepair<D>::begin(Slot i, const EventKey<D>& key) {
-  auto& path = paths_.rewrite(i);
-  const auto from = std::find_if(path.begin(), path.end(), [&](const Node<D>& n) { return !(n.key < key); });
-  repair_of_[i] = static_cast<std::uint32_t>(repairs_.size());
-  Repaired& m = repairs_.emplace_back();
+  auto& path = paths_.path(i);
+  const auto from = std::find_if(path.begin() + 1, path.end(), [&](const Node<D>& node) { return !(node.key < key); });
+  Repaired& m = repairs_.add(i);
   m.slot = i;
   m.version = 1;
-  m.kept = static_cast<std::size_t>(from - path.begin());
-  m.old.assign(from, path.end());
+  m.old = path;
+  for (auto node = from; node != path.end(); ++node) {
+    if (node->key.kind == EventKind::wall) continue;
+    const Slot partner = ownership_.slot_of(node->partner());
+    if (partner != IdTable::kNowhere && (ownership_.owns(i) || ownership_.owns(partner)))
+      tasks_.push({.kind = Task::Kind::difference, .key = node->key, .a = partner});
+  }
   path.erase(from, path.end());
-  m.now = paths_.before(i, m.kept);
-  m.spin = paths_.spin_before(i, m.kept);
-  if (ownership_.is_ghost(i)) {
-    const auto script = paths_.script(i);
-    m.script = m.kept;
-    m.left_script = m.kept > script.size() || !std::equal(path.begin(), path.end(), script.begin());
-  }
-  for (const Node<D>& node : m.old) {
-    if (node.key.kind == EventKind::wall) continue;
-    const Slot partner = ownership_.slot_of(node.partner());
-    if (partner != IdTable::kNowhere) tasks_.push({.kind = Task::Kind::check, .key = node.key, .a = i, .b = partner});
-  }
+  const auto [last, next] = std::ranges::mismatch(paths_.events(i), paths_.script(i));
+  m.left_script = last != paths_.events(i).end() || (next != paths_.script(i).end() && next->key < key);
+  plan_script(m);
   return m;
 }
 
@@ -89,14 +77,14 @@ typename WindowRepair<D>::Repaired& WindowRepair<D>::begin(Slot i, const EventKe
 template <int D>
 const Node<D>* WindowRepair<D>::next_of_script(const Repaired& m) {
   const auto script = paths_.script(m.slot);
-  return m.left_script || m.script >= script.size() ? nullptr : &script[m.script];
+  const std::size_t next = paths_.events(m.slot).size();
+  return m.left_script || next >= script.size() ? nullptr : &script[next];
 }
 
 template <int D>
-void WindowRepair<D>::plan_script(Repaired& m) {
+void WindowRepair<D>::plan_script(const Repaired& m) {
   if (const Node<D>* next = next_of_script(m))
-    tasks_.push(
-        {.kind = Task::Kind::script, .key = next->key, .a = m.slot, .version_a = static_cast<std::uint32_t>(m.script)});
+    tasks_.push({.kind = Task::Kind::script, .key = next->key, .a = m.slot, .version_a = m.version});
 }
 
 /// Replaces the path of a ghost by its script if it had no events here and, on its script, meets no own sphere with
@@ -116,7 +104,7 @@ bool WindowRepair<D>::adopt(Slot g) {
       met = met || (meets(g, script[k].after, j, image, script[k].key, key) &&
                     (k + 1 == script.size() || key <= script[k + 1].key));
     });
-  if (!met) paths_.rewrite(g).assign(script.begin(), script.end());
+  if (!met) paths_.path(g).insert(paths_.path(g).end(), script.begin(), script.end());
   return !met;
 }
 
@@ -139,12 +127,13 @@ bool WindowRepair<D>::visit_near(Slot i, const Record<D>& r, Wanted&& wanted, Vi
 
 /// Plans all contacts that a repaired sphere may have after `now`.
 template <int D>
-void WindowRepair<D>::predict(Repaired& m, const EventKey<D>& now) {
+void WindowRepair<D>::predict(const Repaired& m, const EventKey<D>& now) {
+  const Record<D>& r = paths_.after(m.slot);
   const bool ghost = ownership_.is_ghost(m.slot);
   const auto wanted = [&](Slot j) { return j != m.slot && (!ghost || ownership_.owns(j)); };
-  if (!visit_near(m.slot, m.now, wanted, [&](Slot j, const Image<D>& image) {
+  if (!visit_near(m.slot, r, wanted, [&](Slot j, const Image<D>& image) {
         EventKey<D> key;
-        if (meets(m.slot, m.now, j, image, now, key))
+        if (meets(m.slot, r, j, image, now, key))
           tasks_.push({.kind = Task::Kind::contact,
                        .key = key,
                        .a = m.slot,
@@ -155,11 +144,11 @@ void WindowRepair<D>::predict(Repaired& m, const EventKey<D>& now) {
       }))
     return;
   for (const Wall<D>& wall : flights_.walls()) {
-    const double t = flights_.wall_contact(m.slot, m.now, wall);
+    const double t = flights_.wall_contact(m.slot, r, wall);
     if (!(t < end_)) continue;
-    const std::uint32_t generation = Flights<D>::generation_at(m.now, t);
+    const std::uint32_t generation = Flights<D>::generation_at(r, t);
     tasks_.push({.kind = Task::Kind::contact,
-                 .key = {t, generation, EventKind::wall, m.now.id, wall.number},
+                 .key = {t, generation, EventKind::wall, r.id, wall.number},
                  .a = m.slot,
                  .version_a = m.version});
   }
@@ -177,14 +166,13 @@ bool WindowRepair<D>::meets(Slot i, const Record<D>& r, Slot j, const Image<D>& 
     key = pair_key<D>(t, generation, r.id, other.id, image);
     return true;
   };
-  if (repaired(j)) return touches(repairs_[repair_of_[j]].now);
-  if (paths_.has_no_events(j)) return touches(paths_.after(j));
+  if (repairs_.has(j) || paths_.has_no_events(j)) return touches(paths_.after(j));
   // Along its path a contact counts only before the next node.
-  const auto path = paths_.path(j);
-  std::size_t k = 0;
+  const auto& path = paths_.path(j);
+  std::size_t k = 1;
   while (k < path.size() && path[k].key < now) ++k;
   for (; k <= path.size(); ++k)
-    if (touches(paths_.before(j, k)) && (k == path.size() || key <= path[k].key)) return true;
+    if (touches(path[k - 1].after) && (k == path.size() || key <= path[k].key)) return true;
   return false;
 }
 
@@ -195,21 +183,18 @@ void WindowRepair<D>::contact(const Task& task) {
   if (version(task.a) != task.version_a || (pair && version(task.b) != task.version_b)) return;
   ++events_;
   Repaired& a = repaired_at(task.a, key);
-  Node<D> of_a{.after = a.now, .key = key, .spin = a.spin};
+  Node<D> of_a = paths_.path(task.a).back();
+  of_a.key = key;
   if (!pair) {
-    const Wall<D> wall = box_.wall(key.hi);
-    const Impact<D> impact = flights_.bounce(a.slot, of_a.after, &of_a.spin, wall, key.time, key.generation);
-    of_a.exchange = {key.kind, impact.exchange};
-    of_a.overlap = impact.overlap;
+    flights_.bounce(task.a, of_a.after, &of_a.spin, box_.wall(key.hi), key.time, key.generation);
     append(a, of_a);
     return predict(a, key);
   }
   Repaired& b = repaired_at(task.b, key);
-  Node<D> of_b{.after = b.now, .key = key, .spin = b.spin};
-  const Impact<D> impact = flights_.collide(a.slot, of_a.after, &of_a.spin, b.slot, of_b.after, &of_b.spin,
-                                            box_.shift(task.image), key.time, key.generation);
-  of_a.exchange = of_b.exchange = {key.kind, impact.exchange};
-  of_a.overlap = of_b.overlap = impact.overlap;
+  Node<D> of_b = paths_.path(task.b).back();
+  of_b.key = key;
+  flights_.collide(task.a, of_a.after, &of_a.spin, task.b, of_b.after, &of_b.spin, box_.shift(task.image), key.time,
+                   key.generation);
   append(a, of_a);
   append(b, of_b);
   predict(a, key);
@@ -219,23 +204,18 @@ void WindowRepair<D>::contact(const Task& task) {
 /// Appends a node to a path. A ghost follows its script while the script has the same nodes.
 template <int D>
 void WindowRepair<D>::append(Repaired& m, const Node<D>& node) {
-  paths_.rewrite(m.slot).push_back(node);
-  m.now = node.after;
-  m.spin = node.spin;
-  fastest_squared_ = std::max(fastest_squared_, node.after.v.squaredNorm());
-  ++m.version;
-  if (!ownership_.is_ghost(m.slot) || m.left_script) return;
   const Node<D>* const next = next_of_script(m);
   m.left_script = !next || !(*next == node);
-  ++m.script;
+  ++m.version;
+  paths_.append(m.slot, node);
   plan_script(m);
 }
 
 /// Executes a script event of a ghost with another ghost or a wall.
 template <int D>
 void WindowRepair<D>::script(const Task& task) {
-  Repaired& m = repairs_[repair_of_[task.a]];
-  if (m.left_script || m.script != task.version_a) return;
+  Repaired& m = repairs_.at(task.a);
+  if (m.left_script || m.version != task.version_a) return;
   const Node<D>& node = *next_of_script(m);
   if (ownership_.owns_id(node.partner()))
     m.left_script = true;  // they did not meet here, and this subdomain decides contacts of own spheres
@@ -244,14 +224,12 @@ void WindowRepair<D>::script(const Task& task) {
   predict(m, task.key);
 }
 
-/// Checks a sphere that met a repaired one before the repair: they may no longer meet.
+/// Repairs a ghost that differs from its script, or a sphere that met a repaired one before: they may no longer meet.
 template <int D>
-void WindowRepair<D>::check(const Task& task) {
-  const bool ghost = ownership_.is_ghost(task.b);
-  if (repaired(task.b) || (ownership_.is_ghost(task.a) && ghost)) return;
-  Repaired& m = begin(task.b, task.key);
-  m.left_script = m.left_script || ghost;
-  predict(m, task.key);
+void WindowRepair<D>::difference(const Task& task) {
+  if (repairs_.has(task.a)) return;
+  const Repaired& m = begin(task.a, task.key);
+  if (const Node<D>* next = next_of_script(m); !next || next->key != task.key) predict(m, task.key);
 }
 
 template class WindowRepair<2>;

@@ -219,7 +219,8 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       }
     }
     if (report.contacts && subdomain_)
-      subdomain_->for_each_contact([&](Slot i, std::size_t k) { contacts.push_back(subdomain_->contact_of(i, k)); });
+      subdomain_->for_each_contact(
+          [&](Slot i, std::size_t k) { contacts.push_back(subdomain_->paths().contact_of(i, k)); });
     sum.add(got);
     counts_.events += got.contacts();
     if (!cut_) length = stop - now_;

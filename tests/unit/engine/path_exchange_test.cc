@@ -80,7 +80,7 @@ TEST(Subdomain, HasTheContactsOfOneCore) {
   in_a_window(*system, sizes, kEnd, [&](Communicator& ranks, Subdomain<3>* subdomain, std::uint64_t) {
     auto& found = parts[static_cast<std::size_t>(ranks.rank())];
     if (subdomain)
-      subdomain->for_each_contact([&](Slot i, std::size_t k) { found.push_back(subdomain->contact_of(i, k)); });
+      subdomain->for_each_contact([&](Slot i, std::size_t k) { found.push_back(subdomain->paths().contact_of(i, k)); });
   });
   ASSERT_FALSE(parts[1].empty());
   std::vector<Contact<3>> all = parts[0];

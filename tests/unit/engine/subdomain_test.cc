@@ -13,13 +13,14 @@ constexpr double kEnd = 0.12, kDisplacement = 0.5;  // of a window
 
 /// The parts of a subdomain.
 struct Parts {
-  Parts(const Box<3>& box, const Sizes& sizes)
-      : core(box, &sizes, {}), ownership(core), paths(core.flights(), ownership), repair(box, core, ownership, paths) {}
-  EventCore<3> core;
+  explicit Parts(EventCore<3>& loaded, const Box<3>& box)
+      : core(loaded), ownership(core), paths(box, core.flights(), ownership), repair(box, core, ownership, paths) {}
+  EventCore<3>& core;
   Ownership<3> ownership;
   WindowPaths<3> paths;
   WindowRepair<3> repair;
   std::vector<Slot> changed;
+  std::uint64_t redone = 0;
 };
 
 std::unique_ptr<System<3>> fluid() { return random_system<3>(320, {14, 6, 6}, {P, P, P}, 0.5, 0.5, 11); }
@@ -36,11 +37,10 @@ struct Divided {
     for (Id i = 0; i < p.size(); ++i) records.push_back({p.x[i], p.v[i], 0.0, i, 0, p.species[i]});
     whole.load(records, g, kEnd, 0, 2 * kDisplacement);
     for (std::uint32_t number : {0u, 1u}) {
-      Parts& part = *parts.emplace_back(std::make_unique<Parts>(system->box, sizes));
-      part.core.load(records, g, kEnd, 0, 2 * kDisplacement);
+      EventCore<3>& core = *cores.emplace_back(std::make_unique<EventCore<3>>(system->box, &sizes, SearchOptions{}));
+      core.load(records, g, kEnd, 0, 2 * kDisplacement);
+      Parts& part = *parts.emplace_back(std::make_unique<Parts>(core, system->box));
       part.ownership.load(bisection, number, kDisplacement);
-      part.paths.load(part.core.flights().capacity());
-      part.repair.load(part.core.flights().capacity());
       part.ownership.sort_out(0, 0, [](std::size_t, const Record<3>&) {});
     }
   }
@@ -49,7 +49,6 @@ struct Divided {
     Counters unused;
     whole.run(kEnd, {.counters = unused});
     for (const auto& part : parts) {
-      part->repair.start(kEnd);
       part->core.run(kEnd, {.counters = unused, .trace = &part->paths.start()});
       part->changed = part->paths.end();
     }
@@ -75,7 +74,8 @@ struct Divided {
     int rounds = 0;
     for (; send_paths() > 0; ++rounds)
       for (const auto& part : parts) {
-        part->changed = part->repair.run();
+        part->changed = part->repair.run(kEnd);
+        part->redone += part->repair.events();
         std::erase_if(part->changed, [&](Slot i) { return !part->ownership.is_seen(i); });
       }
     return rounds;
@@ -100,6 +100,7 @@ struct Divided {
   Sizes sizes;
   Bisection<3> bisection;
   EventCore<3> whole;
+  std::vector<std::unique_ptr<EventCore<3>>> cores;
   std::vector<std::unique_ptr<Parts>> parts;
   std::deque<Bytes> messages;
 };
@@ -207,12 +208,12 @@ TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
     EXPECT_TRUE(paths.matches(g));
     EXPECT_TRUE(ownership.is_ghost(g));
     ++compared;
-    EXPECT_EQ(paths.script(g).size(), paths.path(g).size());
+    EXPECT_EQ(paths.script(g).size(), paths.events(g).size());
   }
   EXPECT_GT(compared, 10);
   EXPECT_TRUE(paths.all_match(kEnd));
   const Slot last = ghosts.back();
-  Node<3>& node = paths.rewrite(last).back();
+  Node<3>& node = paths.path(last).back();
   node.after.v[1] = std::nextafter(node.after.v[1], 2.0);
   const double time = node.key.time;
   EXPECT_FALSE(paths.matches(last));
@@ -229,7 +230,7 @@ TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
   std::uint64_t before = 0;
   std::vector<Slot> later;
   paths.for_each_own([&](Slot i) {
-    for (const Node<3>& node : paths.path(i)) {
+    for (const Node<3>& node : paths.events(i)) {
       before += node.key.lo == node.after.id && node.key <= middle ? 1 : 0;
       if (middle < node.key && (later.empty() || later.back() != i)) later.push_back(i);
     }
@@ -263,11 +264,11 @@ TEST(WindowRepair, GoesOnUntilAllOwnSpheresAreAsInOneCore) {
     EXPECT_TRUE(part->paths.all_match(kEnd));
     double fastest = 0;  // of the first run and of repairs
     part->paths.for_each_own([&](Slot i) {
-      for (const Node<3>& node : part->paths.path(i)) fastest = std::max(fastest, node.after.v.squaredNorm());
+      for (const Node<3>& node : part->paths.events(i)) fastest = std::max(fastest, node.after.v.squaredNorm());
     });
     EXPECT_GT(fastest, 8);
-    EXPECT_EQ(std::max(part->paths.trace().fastest_squared(), part->repair.fastest_squared()), fastest);
-    redone += part->repair.events();
+    EXPECT_EQ(part->paths.trace().fastest_squared(), fastest);
+    redone += part->redone;
   }
   EXPECT_GT(redone, 0u);
   EXPECT_LT(redone, 100u);
