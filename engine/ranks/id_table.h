@@ -14,11 +14,8 @@ class IdTable {
  public:
   static constexpr Slot kNowhere = std::numeric_limits<Slot>::max();
 
-  /// Removes all entries and makes room for `most`.
-  void clear(std::size_t most) {
-    mask_ = std::bit_ceil(most + most / 2 + 2) - 1;
-    entries_.assign(mask_ + 1, {});
-  }
+  /// An empty table with room for `most` entries.
+  explicit IdTable(std::size_t most) : entries_(std::bit_ceil(most + most / 2 + 2)), mask_(entries_.size() - 1) {}
 
   /// The slot of a sphere, or kNowhere.
   Slot find(Id id) const {
@@ -50,7 +47,7 @@ class IdTable {
   std::size_t home(Id id) const { return (id * 0x9E3779B97F4A7C15ull >> 32) & mask_; }
 
   std::vector<Entry> entries_;
-  std::size_t mask_ = 0;
+  std::size_t mask_;
 };
 
 }  // namespace carom

@@ -6,27 +6,17 @@
 namespace carom {
 
 template <int D>
-void Ownership<D>::load(const Bisection<D>& bisection, std::uint32_t number, double max_displacement) {
-  bisection_ = &bisection;
-  number_ = number;
-  max_displacement_ = max_displacement;
-  unwatched_ = std::numeric_limits<double>::infinity();
-  from_field_ = (1 + 1e-6) * core_.flights().g().norm() * core_.flights().horizon();
-  const std::size_t slots = core_.flights().capacity();
-  slots_.clear(slots);
-  holders_.assign(slots, 0);
-  role_.assign(slots, Role::none);
-  unwatch();
+Ownership<D>::Ownership(EventCore<D>& core, const Bisection<D>& bisection, std::uint32_t number,
+                        double max_displacement)
+    : core_(core),
+      bisection_(bisection),
+      number_(number),
+      max_displacement_(max_displacement),
+      from_field_((1 + 1e-6) * core.flights().g().norm() * core.flights().horizon()),
+      slots_(core.flights().capacity()),
+      role_(core.flights().capacity(), Role::none),
+      holders_(core.flights().capacity()) {
   for (Slot i = 0; i < core_.flights().size(); ++i) enlist(i, Role::own);
-}
-
-template <int D>
-void Ownership<D>::unwatch() {
-  watched_.clear();
-  quiet_.clear();
-  speed_.clear();
-  turned_.clear();
-  watched_at_.assign(role_.size(), kUnwatched);
 }
 
 template <int D>
@@ -54,11 +44,15 @@ std::vector<Slot> Ownership<D>::own() const {
 template <int D>
 void Ownership<D>::watch(double now) {
   unwatched_ = 0;
-  const double reach = bisection_->reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
-  unwatch();
+  watched_.clear();
+  quiet_.clear();
+  speed_.clear();
+  turned_.clear();
+  watched_at_.assign(role_.size(), kUnwatched);
+  const double reach = bisection_.reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
   for (Slot i = 0; i < core_.flights().size(); ++i)
     if (is_ghost(i) ||
-        (owns(i) && bisection_->depth(number_, bisection_->wrapped(core_.flights().at(i, now).x)) <= reach))
+        (owns(i) && bisection_.depth(number_, bisection_.wrapped(core_.flights().at(i, now).x)) <= reach))
       watch_over(i);
   core_.set_border(watched_, now);
 }
@@ -68,26 +62,22 @@ void Ownership<D>::watch(double now) {
 template <int D>
 double Ownership<D>::look_at(Slot i, double now) {
   const Flights<D>& flights = core_.flights();
-  const Vec<D> at = bisection_->wrapped(flights.at(i, now).x);
-  const double depth = bisection_->depth(number_, at), reach = bisection_->reach();
-  if (bisection_->deep(depth)) {
-    role_[i] = Role::own;
-    holders_[i] = 0;
-    return depth - (1 + 1e-6) * reach;
-  }
+  const Vec<D> at = bisection_.wrapped(flights.at(i, now).x);
+  const double depth = bisection_.depth(number_, at), reach = bisection_.reach();
+  role_[i] = Role::own;
   holders_[i] = 0;
+  if (bisection_.deep(depth)) return depth - (1 + 1e-6) * reach;
   double quiet;
-  if (depth > 0 || bisection_->owner(at) == number_) {
+  if (depth > 0 || bisection_.owner(at) == number_) {
     quiet = depth;
-    const auto neighbours = bisection_->neighbours(number_);
+    const auto neighbours = bisection_.neighbours(number_);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
-      const double squared = bisection_->squared_distance(neighbours[k], at);
+      const double squared = bisection_.squared_distance(neighbours[k], at);
       if (squared <= reach * reach) holders_[i] |= std::uint64_t{1} << k;
       quiet = std::min(quiet, std::abs(std::sqrt(squared) - reach));
     }
-    role_[i] = holders_[i] == 0 ? Role::own : Role::seen;
   } else {
-    const double squared = bisection_->squared_distance(number_, at), away = std::sqrt(squared);
+    const double squared = bisection_.squared_distance(number_, at), away = std::sqrt(squared);
     if (squared > reach * reach) {
       forget(i);
       return 0;
@@ -111,13 +101,13 @@ bool Ownership<D>::admit(const Record<D>& r, double now, const Spin<D>& spin) {
 template <int D>
 bool Ownership<D>::meeting_place(const Record<D>& r, double end, Vec<D>& low, Vec<D>& high) const {
   const double far = way(r, end);
-  const Vec<D> at = bisection_->wrapped(r.x);
-  const double close = bisection_->reach() - max_displacement_ + far;
-  if (bisection_->squared_distance(number_, at) > close * close) return false;
-  const double room = bisection_->reach() + far;
+  const Vec<D> at = bisection_.wrapped(r.x);
+  const double close = bisection_.reach() - max_displacement_ + far;
+  if (bisection_.squared_distance(number_, at) > close * close) return false;
+  const double room = bisection_.reach() + far;
   low = at - Vec<D>::Constant(room);
   high = at + Vec<D>::Constant(room);
-  if (!bisection_->clip(number_, 3 * max_displacement_, low, high)) return false;
+  if (!bisection_.clip(number_, 3 * max_displacement_, low, high)) return false;
   // The part of the ball around the sphere: the farther the region along one axis, the narrower along the others.
   const Vec<D> gap = (low - at).cwiseMax(at - high).cwiseMax(0);
   const double left = room * room - gap.squaredNorm();
@@ -132,7 +122,7 @@ bool Ownership<D>::meeting_place(const Record<D>& r, double end, Vec<D>& low, Ve
 
 template <int D>
 bool Ownership<D>::may_meet(const Record<D>& r, Slot j, const Vec<D>& shift, double end) const {
-  const double close = bisection_->reach() + way(r, end);
+  const double close = bisection_.reach() + way(r, end);
   const Record<D>& other = core_.flights()[j];
   const double s = end - other.t;
   const Vec<D> d = r.x - (other.x + s * other.v + (0.5 * s * s) * core_.flights().g()) + shift;

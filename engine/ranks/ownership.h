@@ -21,23 +21,21 @@ namespace carom {
 template <int D>
 class Ownership {
  public:
-  /// For the spheres of a core, which must outlive this object.
-  explicit Ownership(EventCore<D>& core) : core_(core) {}
+  /// For a core with all spheres near subdomain `number` of a bisection; both must outlive this object. Ownership is
+  /// valid after sort_out().
+  Ownership(EventCore<D>& core, const Bisection<D>& bisection, std::uint32_t number, double max_displacement);
 
-  /// Call after the core was loaded with all spheres near subdomain `number` of a bisection. Ownership is valid after
-  /// sort_out().
-  void load(const Bisection<D>& bisection, std::uint32_t number, double max_displacement);
-
-  bool owns(Slot i) const { return role_[i] == Role::own || role_[i] == Role::seen; }
+  bool owns(Slot i) const { return role_[i] == Role::own; }
   bool is_ghost(Slot i) const { return role_[i] == Role::ghost; }
   /// Whether an own sphere is a ghost elsewhere.
-  bool is_seen(Slot i) const { return role_[i] == Role::seen; }
+  bool is_seen(Slot i) const { return holders_[i] != 0; }
   bool owns_id(Id id) const {
     const Slot i = slots_.find(id);
     return i != IdTable::kNowhere && owns(i);
   }
   /// As in Subdomain.
   std::vector<Slot> own() const;
+  /// The neighbours that have it as a ghost: one bit for each.
   std::uint64_t holders(Slot i) const { return holders_[i]; }
   Slot slot_of(Id id) const { return slots_.find(id); }
   bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero());
@@ -63,8 +61,8 @@ class Ownership {
   bool may_meet(const Record<D>& r, Slot j, const Vec<D>& shift, double end) const;
 
  private:
-  static constexpr double kWindowsBetweenSearches = 40;       // windows between searches for spheres at the border
-  enum class Role : std::uint8_t { none, own, seen, ghost };  // none: empty slot; seen: own, and a ghost elsewhere
+  static constexpr double kWindowsBetweenSearches = 40;  // windows between searches for spheres at the border
+  enum class Role : std::uint8_t { none, own, ghost };   // none: empty slot
 
   static constexpr double kOften = -std::numeric_limits<double>::infinity();
   static constexpr std::uint32_t kUnwatched = std::numeric_limits<std::uint32_t>::max();
@@ -77,7 +75,6 @@ class Ownership {
   }
   void enlist(Slot i, Role role);
   void forget(Slot i);
-  void unwatch();
   void watch(double now);
   double look_at(Slot i, double now);
   /// The largest speed of a sphere until its next event, not 0.
@@ -91,11 +88,11 @@ class Ownership {
   }
 
   EventCore<D>& core_;
-  const Bisection<D>* bisection_ = nullptr;
-  std::uint32_t number_ = 0;
-  double max_displacement_ = 0;  // largest displacement in a window
-  double unwatched_ = 0;         // the largest displacement of spheres since watch()
-  double from_field_ = 0;        // the largest speed that the field adds
+  const Bisection<D>& bisection_;
+  std::uint32_t number_;
+  double max_displacement_;                                     // largest displacement in a window
+  double unwatched_ = std::numeric_limits<double>::infinity();  // the largest displacement of spheres since watch()
+  double from_field_;                                           // the largest speed that the field adds
   IdTable slots_;
   std::vector<Role> role_;                 // by slot
   std::vector<std::uint32_t> watched_at_;  // by slot: index in watched_, or kUnwatched

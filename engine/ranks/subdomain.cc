@@ -11,10 +11,9 @@ void Subdomain<D>::load(std::vector<Record<D>> records, const Bisection<D>& bise
                         const std::vector<Spin<D>>& spins) {
   release();
   core_.load(std::move(records), g, horizon, now, 2 * max_displacement, spins);
-  ownership_.emplace(core_);
+  ownership_.emplace(core_, bisection, number, max_displacement);
   paths_.emplace(box_, core_.flights(), *ownership_);
   repair_.emplace(box_, core_, *ownership_, *paths_);
-  ownership_->load(bisection, number, max_displacement);
   changed_.clear();
 }
 

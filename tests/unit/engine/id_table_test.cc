@@ -14,8 +14,7 @@ namespace {
 TEST(IdTable, DoesWhatAMapDoes) {
   std::mt19937 random(7);
   for (const std::size_t most : {1, 5, 100}) {
-    IdTable table;
-    table.clear(most);
+    IdTable table(most);
     std::map<Id, Slot> map;
     for (int step = 0; step < 20000; ++step) {
       const auto id = static_cast<Id>(random() % (3 * most));

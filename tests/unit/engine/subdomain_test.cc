@@ -13,8 +13,11 @@ constexpr double kEnd = 0.12, kDisplacement = 0.5;  // of a window
 
 /// The parts of a subdomain.
 struct Parts {
-  explicit Parts(EventCore<3>& loaded, const Box<3>& box)
-      : core(loaded), ownership(core), paths(box, core.flights(), ownership), repair(box, core, ownership, paths) {}
+  Parts(EventCore<3>& loaded, const Box<3>& box, const Bisection<3>& bisection, std::uint32_t number)
+      : core(loaded),
+        ownership(core, bisection, number, kDisplacement),
+        paths(box, core.flights(), ownership),
+        repair(box, core, ownership, paths) {}
   EventCore<3>& core;
   Ownership<3> ownership;
   WindowPaths<3> paths;
@@ -39,8 +42,7 @@ struct Divided {
     for (std::uint32_t number : {0u, 1u}) {
       EventCore<3>& core = *cores.emplace_back(std::make_unique<EventCore<3>>(system->box, &sizes, SearchOptions{}));
       core.load(records, g, kEnd, 0, 2 * kDisplacement);
-      Parts& part = *parts.emplace_back(std::make_unique<Parts>(core, system->box));
-      part.ownership.load(bisection, number, kDisplacement);
+      Parts& part = *parts.emplace_back(std::make_unique<Parts>(core, system->box, bisection, number));
       part.ownership.sort_out(0, 0, [](std::size_t, const Record<3>&) {});
     }
   }
