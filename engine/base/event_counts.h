@@ -32,7 +32,7 @@ struct WindowCounts {
   std::uint64_t subdomains = 0;  ///< on all ranks; fewer than requested if the box has no room for more
   std::uint64_t windows = 0;
   std::uint64_t rounds = 0;         ///< exchanges with neighbours, each followed by a repair
-  std::uint64_t cut = 0;            ///< windows that were cut because a sphere was too fast
+  std::uint64_t cut = 0;            ///< windows that were run again: too fast a sphere, no room for a ghost or event
   std::uint64_t events = 0;         ///< events of own spheres, in the final history
   std::uint64_t run_events = 0;     ///< events in first runs, including events of ghosts
   std::uint64_t redone_events = 0;  ///< events in repairs

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/search/search_tuning.h"
+
 namespace carom {
 namespace {
 
@@ -61,30 +63,8 @@ double WindowLength<D>::window_end(double now, double end, double collisions) co
 }
 
 template <int D>
-double WindowLength<D>::first_beyond(Subdomain<D>& subdomain, double now, double end) const {
-  double first = std::numeric_limits<double>::infinity();
-  if (speed_in(subdomain) <= fastest_) return first;
-  subdomain.paths().for_each_own([&](Slot i) { first = std::min(first, beyond_at(subdomain.paths(), i, now, end)); });
-  return first;
-}
-
-template <int D>
 void WindowLength<D>::allow_for(double speed) {
-  if (speed > fastest_) fastest_ = kSpeedAllowance * speed;
-}
-
-/// first_beyond() for one sphere, from the length of its path.
-template <int D>
-double WindowLength<D>::beyond_at(const WindowPaths<D>& paths, Slot i, double now, double end) const {
-  double left = max_displacement_;
-  for (std::size_t k = 0; k <= paths.size(i); ++k) {  // stores no path: there are many
-    const double speed = paths.node(i, k).after.v.norm() + field_;
-    const double until = k < paths.size(i) ? paths.node(i, k + 1).key.time : end;
-    if (speed * (until - now) > left) return now + left / speed;
-    left -= speed * (until - now);
-    now = until;
-  }
-  return std::numeric_limits<double>::infinity();
+  fastest_ = std::max(fastest_, kSpeedAllowance * speed + field_);
 }
 
 template <int D>

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The length of a window, chosen so that a sphere has a few tenths of a collision in it and moves no farther than
-// `max_displacement` from its start; and the time at which a sphere may have exceeded that limit.
+// `max_displacement` from its start.
 
 #include <functional>
+#include <limits>
 
-#include "engine/ranks/subdomain.h"
+#include "engine/base/particles.h"
+#include "engine/base/sizes.h"
+#include "engine/ranks/communicator.h"
 
 namespace carom {
 
@@ -25,18 +28,16 @@ class WindowLength {
   double window_end(double now, double end, double collisions = std::numeric_limits<double>::infinity()) const;
   /// The number of collisions expected in a window of this length.
   double expected(double length) const { return length > 0 ? each_ * length / pace_ : 0; }
-  /// The largest speed that a sphere of a subdomain may have reached in a window.
-  double speed_in(const Subdomain<D>& subdomain) const { return subdomain.fastest() + field_; }
-  /// The first time at which a sphere may have moved farther than `max_displacement`; infinite if none has.
-  double first_beyond(Subdomain<D>& subdomain, double now, double end) const;
+  /// Whether a sphere with this speed after an event may have moved too far in a window of this length.
+  bool too_fast(double speed, double length) const {
+    return speed + field_ > fastest_ && (speed + field_) * length > max_displacement_;
+  }
   /// Later windows allow for spheres of this speed; the same on all ranks.
   void allow_for(double speed);
   /// Call after a window of this length in which all spheres together had this many collisions.
   void note(double length, std::uint64_t collisions);
 
  private:
-  double beyond_at(const WindowPaths<D>& paths, Slot i, double now, double end) const;
-
   double diameter_;
   std::function<double()> forced_;
   double max_displacement_ = 0;

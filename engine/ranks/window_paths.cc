@@ -118,16 +118,6 @@ bool WindowPaths<D>::matches(Slot g) const {
 }
 
 template <int D>
-bool WindowPaths<D>::all_match(double end) {
-  const auto until = [&](std::span<const Node<D>> nodes) {
-    while (!nodes.empty() && nodes.back().key.time >= end) nodes = nodes.first(nodes.size() - 1);
-    return nodes;
-  };
-  return std::ranges::all_of(
-      unmatched_, [&](Slot g) { return matches(g) || std::ranges::equal(until(events(g)), until(script(g))); });
-}
-
-template <int D>
 ContactTally WindowPaths<D>::tally() const {
   ContactTally tally;
   for (const auto& event : trace_.events()) {

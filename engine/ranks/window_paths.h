@@ -76,8 +76,10 @@ class WindowPaths {
   void add_unmatched(Slot g) {
     if (std::exchange(listed_[g], 1) == 0) unmatched_.push_back(g);
   }
-  /// Whether the paths of all ghosts equal their scripts before a time.
-  bool all_match(double end);
+  /// Whether the paths of all ghosts equal their scripts.
+  bool all_match() const {
+    return std::ranges::all_of(unmatched_, [&](Slot g) { return matches(g); });
+  }
 
   /// Calls visit(slot) for each own sphere that had events in any version of the window, and perhaps others. visit()
   /// may call path().

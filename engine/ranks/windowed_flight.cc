@@ -162,25 +162,25 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   std::vector<Contact<D>> contacts;
   const std::uint64_t events_before = events_;
   std::uint64_t collisions = report.counters.sphere_sphere;  // in windows before the last one
-  double reached = end, length = 0, full = std::numeric_limits<double>::infinity();
+  constexpr double kForever = std::numeric_limits<double>::infinity();
+  double reached = end, length = 0, full = kForever;
   while (now_ < end && reached == end) {
     if (cut_) reload();
     if (!sorted_) sort_out(false);
     const auto left = static_cast<double>(report.collision_limit - collisions);
     double stop = std::min(length_.window_end(now_, end, left - length_.expected(length)), full);
     const double ran = subdomain_ ? subdomain_->run(now_, stop) : stop;
-    // Over all ranks: maxima of whether a path changed, a ghost found no room, of the time reached, the time at which a
-    // sphere was too fast (both negated) and of speeds; sums over the window before, and the most collisions of this
-    // one.
-    enum { changed, no_room, earliest, beyond, speed };
-    std::array<double, 5> most;
+    // Over all ranks: maxima of whether a path changed, a ghost found no room, of the time reached (negated) and of
+    // speeds; sums over the window before, and the most collisions of this one.
+    enum { changed, no_room, earliest, speed };
+    std::array<double, 4> most;
     std::array<std::uint64_t, 3> sums;
+    bool valid = false;
     const auto agree = [&](bool paths_changed) {
-      most = {paths_changed ? 1.0 : 0.0, no_room_ ? 1.0 : 0.0, -ran, -std::numeric_limits<double>::infinity(), 0};
+      most = {paths_changed ? 1.0 : 0.0, no_room_ ? 1.0 : 0.0, -ran, 0};
       sums = {got.sphere_sphere, got.contacts(), 0};
       if (subdomain_) {
-        most[beyond] = -length_.first_beyond(*subdomain_, now_, stop);
-        most[speed] = length_.speed_in(*subdomain_);
+        most[speed] = subdomain_->fastest();
         sums[2] = subdomain_->most_events();
       }
       got = {};
@@ -188,23 +188,24 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       collisions += sums[0];
       events_ += sums[1];
       if (length > 0) length_.note(std::exchange(length, 0), sums[0]);
-      return most[changed] > 0 && most[no_room] == 0 && -most[earliest] == stop;
+      valid = most[no_room] == 0 && -most[earliest] == stop && !length_.too_fast(most[speed], stop - now_);
+      return valid && most[changed] > 0;
     };
     const std::uint64_t rounds = exchange_.make_consistent(subdomain_.get(), agree);
     if (events_ > report.max_events) throw_too_many_contacts(report.max_events);
-    full = -most[earliest];
-    if (most[no_room] > 0 || full < stop) {  // revoke the window; if the log has no room for more, run it up to there
+    length_.allow_for(most[speed]);
+    full = -most[earliest] < stop ? -most[earliest] : kForever;
+    if (!valid) {  // revoke the window; if the log has no room for more, run it up to there
       if (!(full > now_)) throw_too_many_contacts(report.max_events);
-      cut_at(now_);
+      ++counts_.cut;
+      if (subdomain_) subdomain_->paths().cut({.time = -kForever});
+      cut_ = true;
       sorted_ = false;
       continue;
     }
-    full = std::numeric_limits<double>::infinity();
     ++counts_.windows;
     counts_.rounds += rounds;
-    length_.allow_for(most[speed]);
-    if (-most[beyond] < stop) stop = cut_at(-most[beyond]);
-    if (subdomain_ && !subdomain_->paths().all_match(stop))
+    if (subdomain_ && !subdomain_->paths().all_match())
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
     got = tally();
     if (collisions + sums[2] >= report.collision_limit) {  // it may have been reached
@@ -233,17 +234,6 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   if (events_ = events_before + all.contacts(); events_ > report.max_events) throw_too_many_contacts(report.max_events);
   if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, packed<D>(contacts)), *report.contacts);
   return reached;
-}
-
-/// Removes the events from a time on; returns the time.
-template <int D>
-double WindowedFlight<D>::cut_at(double time) {
-  ++counts_.cut;
-  cut_ = true;
-  EventKey<D> last{.time = time};
-  for (auto& k : last.image) k = std::numeric_limits<std::int32_t>::min();
-  if (subdomain_) subdomain_->paths().cut(last);
-  return time;
 }
 
 template <int D>

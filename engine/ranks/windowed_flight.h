@@ -4,8 +4,8 @@
 //
 // Time is divided into windows (engine/ranks/subdomain.h). In a window no sphere may move farther than
 // `max_displacement` from its start, so a subdomain needs only the spheres that start within a diameter plus twice
-// `max_displacement` of it. If a sphere is faster than expected, the window is cut at the time at which it could have
-// moved too far. A sphere belongs to the subdomain that contains it at the start of the window; all subdomains that
+// `max_displacement` of it. If a sphere is so fast that it may have moved farther, the window is run again in shorter
+// ones. A sphere belongs to the subdomain that contains it at the start of the window; all subdomains that
 // have it compute the same owner.
 //
 //   WindowedFlight<3> flight(box, particles, ranks);
@@ -56,7 +56,6 @@ class WindowedFlight {
   void load(double now, Spheres&& spheres);
   Vec<D> place(const Record<D>& r, double now) const;
   void sort_out(bool loaded);
-  double cut_at(double time);
   EventKey<D> key_of_collision(std::uint64_t number) const;
   ContactTally tally() const { return subdomain_ ? subdomain_->paths().tally() : ContactTally{}; }
 
@@ -73,7 +72,7 @@ class WindowedFlight {
   double horizon_ = 0, now_ = 0;
   bool sorted_ = false;       // owners and ghosts are up to date at now_
   bool no_room_ = false;      // for a ghost that this rank's subdomain needs
-  bool cut_ = false;          // the last window was cut, so subdomains must be loaded again
+  bool cut_ = false;          // the last window was cut or revoked, so subdomains must be loaded again
   std::uint64_t events_ = 0;  // contacts since take()
   // Events per sphere of the subdomain in the epoch, relative to a mean of kMeanWork over all subdomains; and the same
   // value for each sphere of this rank's block.

@@ -213,14 +213,12 @@ TEST(WindowPaths, AScriptMatchesThePathWithTheSameNodesAndNoOther) {
     EXPECT_EQ(paths.script(g).size(), paths.events(g).size());
   }
   EXPECT_GT(compared, 10);
-  EXPECT_TRUE(paths.all_match(kEnd));
+  EXPECT_TRUE(paths.all_match());
   const Slot last = ghosts.back();
   Node<3>& node = paths.path(last).back();
   node.after.v[1] = std::nextafter(node.after.v[1], 2.0);
-  const double time = node.key.time;
   EXPECT_FALSE(paths.matches(last));
-  EXPECT_FALSE(paths.all_match(kEnd));
-  EXPECT_TRUE(paths.all_match(time));  // only earlier paths count
+  EXPECT_FALSE(paths.all_match());
 }
 
 TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
@@ -263,7 +261,7 @@ TEST(WindowRepair, GoesOnUntilAllOwnSpheresAreAsInOneCore) {
   EXPECT_EQ(d.wrong(), 0u);
   std::uint64_t redone = 0;
   for (const auto& part : d.parts) {
-    EXPECT_TRUE(part->paths.all_match(kEnd));
+    EXPECT_TRUE(part->paths.all_match());
     double fastest = 0;  // of the first run and of repairs
     part->paths.for_each_own([&](Slot i) {
       for (const Node<3>& node : part->paths.events(i)) fastest = std::max(fastest, node.after.v.squaredNorm());

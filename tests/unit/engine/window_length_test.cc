@@ -67,23 +67,27 @@ TEST(WindowLength, FollowsTheRateOfCollisionsAndIsForced) {
 }
 
 /// A heavy sphere hits a light one that moved towards it, which then has nearly twice its speed.
-TEST(WindowLength, FindsWhenASphereMayHaveComeTooFar) {
+TEST(WindowLength, FindsWhetherASphereMayHaveComeTooFar) {
   const auto system =
       test::make_system<3>({20, 6, 6}, P, {{2, 3, 3}, {3.25, 3, 3}}, {{1, 0, 0}, {0.2, 0, 0}}, {0.5, 0.5}, {1.0, 0.01});
   const Sizes sizes(system->particles);
   Communicator alone;
   const Bisection<3> bisection(system->box, system->particles.x, 1, 1 + 2 * kDisplacement, alone);
   const auto subdomain = subdomain_of(*system, sizes, bisection, 0, 2);
-  WindowLength<3> length(1);
-  length.start(system->box, sizes, alone, system->particles, Vec<3>::Zero(), 2);
-  ASSERT_EQ(length.max_displacement(), 1);
-  const double before = length.window_end(0, 2);
-  EXPECT_EQ(length.first_beyond(*subdomain, 0, 2), std::numeric_limits<double>::infinity());
   subdomain->run(0, 2);
-  const double met = 0.25 / 0.8, speed = 0.2 + 2 / 1.01 * 0.8;
-  EXPECT_NEAR(length.first_beyond(*subdomain, 0, 2), met + (1 - 0.2 * met) / speed, 1e-9);
-  length.allow_for(length.speed_in(*subdomain));
-  EXPECT_LT(length.window_end(0, 2), before);  // later windows allow for it
+  for (const double g : {0.0, 0.1}) {
+    WindowLength<3> length(1);
+    length.start(system->box, sizes, alone, system->particles, {g, 0, 0}, 2);
+    ASSERT_EQ(length.max_displacement(), 1);
+    const double before = length.window_end(0, 2), speed = 0.2 + 2 / 1.01 * 0.8, fastest = speed + 2 * g;
+    EXPECT_NEAR(subdomain->fastest(), speed, 1e-9);
+    EXPECT_TRUE(length.too_fast(speed, 1.001 / fastest));
+    EXPECT_FALSE(length.too_fast(speed, 0.999 / fastest));
+    EXPECT_FALSE(length.too_fast(1.1, 2));  // as fast as was expected
+    length.allow_for(speed);
+    EXPECT_LT(length.window_end(0, 2), before);
+    EXPECT_FALSE(length.too_fast(speed, length.window_end(0, 2)));
+  }
 }
 
 }  // namespace

@@ -93,9 +93,9 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least) {
       EXPECT_EQ(one.max_overlap, many.max_overlap) << what;
       EXPECT_EQ(one.work.value(), many.work.value()) << what;
       if (getenv("SHOW"))
-        std::cerr << what << ": windows " << counts.windows << " rounds " << counts.rounds << " cut " << counts.cut
-                  << " events " << counts.events << " run " << counts.run_events << " redone " << counts.redone_events
-                  << "\n";
+        std::cerr << what << ": windows " << counts.windows << " rounds " << counts.rounds << " run again "
+                  << counts.cut << " events " << counts.events << " run " << counts.run_events << " redone "
+                  << counts.redone_events << "\n";
     }
 }
 
