@@ -2,19 +2,38 @@
 #include "engine/ranks/subdomain.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace carom {
 
 template <int D>
-void Subdomain<D>::load(std::vector<Record<D>> records, const Bisection<D>& bisection, std::uint32_t number,
-                        const Vec<D>& g, double horizon, double now, double max_displacement,
-                        const std::vector<Spin<D>>& spins) {
+void Subdomain<D>::load(std::vector<Bytes> spheres, const Bisection<D>& bisection, const Vec<D>& g, double horizon,
+                        double now, double max_displacement) {
   release();
+  std::size_t bytes = 0;
+  for (const Bytes& message : spheres) bytes += message.size();
+  std::vector<Record<D>> records;
+  std::vector<Spin<D>> spins;
+  records.reserve(bytes / sizeof(Record<D>));
+  for (Bytes& message : spheres) {
+    for (Reader reader(message); reader.more();) {
+      records.push_back(reader.get<Record<D>>());
+      if (box_.contacts.rough()) spins.push_back(reader.get<Spin<D>>());
+    }
+    Bytes().swap(message);
+  }
   core_.load(std::move(records), g, horizon, now, 2 * max_displacement, spins);
+  const auto number = static_cast<std::uint32_t>(ranks_.rank());
   ownership_.emplace(core_, bisection, number, max_displacement);
   paths_.emplace(box_, core_.flights(), *ownership_);
   repair_.emplace(box_, core_, *ownership_, *paths_);
-  changed_.clear();
+  end_ = now;
+  length_ = 0;
+  ownership_->sort_out(now, 0, [](std::size_t, const Record<D>&) {});  // all spheres near each subdomain are there
+  partners_.clear();
+  if (number < bisection.subdomains())
+    for (const std::uint32_t r : bisection.neighbours(number)) partners_.push_back(static_cast<int>(r));
+  outgoing_.assign(partners_.size(), {});
 }
 
 template <int D>
@@ -29,7 +48,7 @@ template <int D>
 double Subdomain<D>::run(double now, double end) {
   end_ = end;
   length_ = end - now;
-  redone_before_ = redone_events_;
+  redone_before_ = counts.redone_events;
   Counters unused;
   double reached = end;
   try {
@@ -37,23 +56,54 @@ double Subdomain<D>::run(double now, double end) {
   } catch (LogFull) {
     reached = core_.now();
   }
-  run_events_ += paths_->trace().events().size();
+  counts.run_events += paths_->trace().events().size();
   changed_ = paths_->end();
   return reached;
 }
 
+/// Sends the outgoing messages; returns those received from the neighbours, valid until the next call.
 template <int D>
-void Subdomain<D>::repair() {
-  changed_ = repair_->run(end_);
-  redone_events_ += repair_->events();
+const std::vector<Bytes>& Subdomain<D>::swap() {
+  for (Bytes& read : received_) read.clear();
+  received_.resize(partners_.size());
+  received_ = ranks_.swap(std::exchange(outgoing_, std::move(received_)), partners_);
+  return received_;
 }
 
 template <int D>
-void Subdomain<D>::commit() {
+std::uint64_t Subdomain<D>::make_consistent(const std::function<bool(bool)>& agree) {
+  std::uint64_t rounds = 0;
+  for (bool more = true; more; rounds += 2) {
+    for (int round = 0; round < 2; ++round) {  // most windows need two, few need more
+      for (const Slot i : changed_)
+        for (std::uint64_t holders = ownership_->holders(i); holders != 0; holders &= holders - 1)
+          paths_->write(i, outgoing_[static_cast<std::size_t>(std::countr_zero(holders))]);
+      for (const Bytes& bytes : swap())
+        for (Reader reader(bytes); reader.more();) paths_->read_script(reader);
+      changed_ = repair_->run(end_);
+      counts.redone_events += repair_->events();
+    }
+    more = agree(std::ranges::any_of(changed_, [&](Slot i) { return ownership_->is_seen(i); }));
+  }
+  return rounds;
+}
+
+template <int D>
+bool Subdomain<D>::commit() {
   const auto other = paths_->finish();
   for (const auto& each : other) ownership_->turn(each.slot, true);
   core_.put(other, end_);
-  changed_.clear();
+  ownership_->sort_out(end_, length_, [&](std::size_t neighbour, const Record<D>& r) {
+    put_sphere(outgoing_[neighbour], r, flights().spin(ownership_->slot_of(r.id)));
+  });
+  bool room = true;
+  for (const Bytes& bytes : swap())
+    for (Reader reader(bytes); reader.more();) {
+      const auto r = reader.get<Record<D>>();
+      const Spin<D> spin = flights().rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero());
+      room = ownership_->admit(r, end_, spin) && room;
+    }
+  return room;
 }
 
 template class Subdomain<2>;

@@ -35,22 +35,9 @@ WindowedFlight<D>::WindowedFlight(const Box<D>& box, Sizes sizes, Communicator& 
     : box_(box),
       sizes_(std::move(sizes)),
       ranks_(ranks),
-      options_(options),
-      exchange_(ranks),
-      length_(2 * sizes_.largest_radius(), std::move(window)) {
-  make_subdomain(std::clamp<std::size_t>(sizes_.spheres / kMinSpheres, 1, static_cast<std::size_t>(ranks_.size())));
-}
-
-template <int D>
-void WindowedFlight<D>::make_subdomain(std::size_t subdomains) {
-  event_counts_ = counts();
-  counts_ = window_counts();
-  subdomains_ = subdomains;
-  counts_.subdomains = subdomains;
-  subdomain_.reset();
-  if (static_cast<std::size_t>(ranks_.rank()) < subdomains)
-    subdomain_ = std::make_unique<Subdomain<D>>(box_, sizes_, options_);
-}
+      subdomains_(std::clamp<std::size_t>(sizes_.spheres / kMinSpheres, 1, static_cast<std::size_t>(ranks_.size()))),
+      subdomain_(box, sizes_, options, ranks),
+      length_(2 * sizes_.largest_radius(), std::move(window)) {}
 
 template <int D>
 void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) {
@@ -65,92 +52,50 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
       if (bisection_->neighbours(r).size() > kMaxNeighbours) return false;
     return true;
   };
-  std::size_t subdomains = subdomains_;
-  while (!divide(subdomains)) subdomains -= (subdomains + 7) / 8;  // the box is too small for so many subdomains
-  if (subdomains < subdomains_) make_subdomain(subdomains);
-  exchange_.start(*bisection_);
+  while (!divide(subdomains_)) subdomains_ -= (subdomains_ + 7) / 8;  // the box is too small for so many subdomains
+  subdomain_.counts.subdomains = subdomains_;
   load(0, [&](auto&& add) {
     for (Id i = 0; i < particles.size(); ++i)
-      add({particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]},
+      add(particles.x[i], {particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]},
           rough() ? particles.spin[i] : Spin<D>(Spin<D>::Zero()));
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
-  run_before_ = subdomain_ ? subdomain_->run_events() : 0;
+  run_before_ = subdomain_.counts.run_events;
 }
 
-/// The position of a sphere, with the bits that Flights computes.
-template <int D>
-Vec<D> WindowedFlight<D>::place(const Record<D>& r, double now) const {
-  const double s = now - r.t;
-  Vec<D> x = r.x + s * r.v;
-  if (g_ != Vec<D>::Zero()) x += (0.5 * s * s) * g_;
-  return bisection_->wrapped(x);
-}
-
-/// Loads all subdomains. `spheres(add)` calls add(record, spin) for each sphere, on one of the ranks.
+/// Loads all subdomains. `spheres(add)` calls add(x, record, spin) for each sphere, now at x, on one of the ranks.
 template <int D>
 template <class Spheres>
 void WindowedFlight<D>::load(double now, Spheres&& spheres) {
-  std::vector<std::pair<Vec<D>, Spin<D>>> own;  // places and spins
-  auto near = sent_to_near<Record<D>>(*bisection_, ranks_, [&](auto&& send) {
-    spheres([&](const Record<D>& r, const Spin<D>& spin) {
-      send(place(r, now), r);
-      if (rough()) own.emplace_back(place(r, now), spin);
-    });
+  std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks_.size()));
+  spheres([&](const Vec<D>& x, const Record<D>& r, const Spin<D>& spin) {
+    bisection_->for_each_near(bisection_->wrapped(x),
+                              [&](std::uint32_t rank) { subdomain_.put_sphere(outgoing[rank], r, spin); });
   });
-  std::vector<Spin<D>> spins;  // in the order of the records
-  if (rough())
-    spins = sent_to_near<Spin<D>>(*bisection_, ranks_, [&](auto&& send) {
-      for (const auto& [x, spin] : own) send(x, spin);
-    });
-  if (subdomain_)
-    subdomain_->load(std::move(near), *bisection_, static_cast<std::uint32_t>(ranks_.rank()), g_, horizon_, now,
-                     length_.max_displacement(), spins);
+  subdomain_.load(ranks_.swap(std::move(outgoing)), *bisection_, g_, horizon_, now, length_.max_displacement());
   trim_memory();  // messages and sorted copies
   now_ = now;
-  cut_ = false;
-  sort_out(true);
 }
 
 /// Loads all subdomains again from their present spheres.
 template <int D>
 void WindowedFlight<D>::reload() {
   load(now_, [&](auto&& add) {
-    if (subdomain_)
-      for (const Slot i : subdomain_->own()) add(subdomain_->paths().after(i), subdomain_->paths().spin_after(i));
-  });
-}
-
-/// Call at the start of a window: updates ownership and ghosts and sends neighbours the ghosts that they lack.
-/// Subdomains that have just been loaded lack none.
-template <int D>
-void WindowedFlight<D>::sort_out(bool loaded) {
-  sorted_ = true;
-  if (subdomain_)
-    subdomain_->sort_out(now_, [&](std::size_t neighbour, const Record<D>& record) {
-      if (loaded) return;
-      exchange_.add(neighbour, record);
-      if (rough()) exchange_.add(neighbour, subdomain_->flights().spin(subdomain_->ownership().slot_of(record.id)));
-    });
-  no_room_ = false;
-  if (loaded) return;
-  for (const Bytes& bytes : exchange_.swap())
-    for (Reader reader(bytes); reader.more();) {
-      const auto record = reader.get<Record<D>>();
-      const Spin<D> spin = rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero());
-      if (!subdomain_->ownership().admit(record, now_, spin)) no_room_ = true;
+    for (const Slot i : subdomain_.own()) {
+      const Record<D>& r = subdomain_.paths().after(i);
+      add(subdomain_.flights().at(r, now_).x, r, subdomain_.paths().spin_after(i));
     }
+  });
 }
 
 /// The key of the n-th pair collision of a window over all ranks, n from 1. Collective.
 template <int D>
-EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
+EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) {
   std::vector<EventKey<D>> mine;
-  if (subdomain_)
-    subdomain_->for_each_contact([&](Slot i, std::size_t k) {
-      if (const EventKey<D> key = subdomain_->paths().node(i, k).key; key.kind == EventKind::pair) mine.push_back(key);
-    });
+  subdomain_.for_each_contact([&](Slot i, std::size_t k) {
+    if (const EventKey<D> key = subdomain_.paths().node(i, k).key; key.kind == EventKind::pair) mine.push_back(key);
+  });
   auto keys = gather_values<EventKey<D>>(ranks_, mine);
   std::ranges::nth_element(keys, keys.begin() + static_cast<std::ptrdiff_t>(number - 1));
   return keys[number - 1];
@@ -158,18 +103,17 @@ EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) const {
 
 template <int D>
 double WindowedFlight<D>::run(double end, const Report& report) {
+  constexpr double kForever = std::numeric_limits<double>::infinity();
   ContactTally sum, got;
   std::vector<Contact<D>> contacts;
   const std::uint64_t events_before = events_;
   std::uint64_t collisions = report.counters.sphere_sphere;  // in windows before the last one
-  constexpr double kForever = std::numeric_limits<double>::infinity();
   double reached = end, length = 0, full = kForever;
   while (now_ < end && reached == end) {
-    if (cut_) reload();
-    if (!sorted_) sort_out(false);
+    const bool room = subdomain_.commit();
     const auto left = static_cast<double>(report.collision_limit - collisions);
     double stop = std::min(length_.window_end(now_, end, left - length_.expected(length)), full);
-    const double ran = subdomain_ ? subdomain_->run(now_, stop) : stop;
+    const double ran = subdomain_.run(now_, stop);
     // Over all ranks: maxima of whether a path changed, a ghost found no room, of the time reached (negated) and of
     // speeds; sums over the window before, and the most collisions of this one.
     enum { changed, no_room, earliest, speed };
@@ -177,12 +121,8 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     std::array<std::uint64_t, 3> sums;
     bool valid = false;
     const auto agree = [&](bool paths_changed) {
-      most = {paths_changed ? 1.0 : 0.0, no_room_ ? 1.0 : 0.0, -ran, 0};
-      sums = {got.sphere_sphere, got.contacts(), 0};
-      if (subdomain_) {
-        most[speed] = subdomain_->fastest();
-        sums[2] = subdomain_->most_events();
-      }
+      most = {paths_changed ? 1.0 : 0.0, room ? 0.0 : 1.0, -ran, subdomain_.fastest()};
+      sums = {got.sphere_sphere, got.contacts(), subdomain_.most_events()};
       got = {};
       ranks_.combine(most, sums);
       collisions += sums[0];
@@ -191,43 +131,39 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       valid = most[no_room] == 0 && -most[earliest] == stop && !length_.too_fast(most[speed], stop - now_);
       return valid && most[changed] > 0;
     };
-    const std::uint64_t rounds = exchange_.make_consistent(subdomain_.get(), agree);
+    const std::uint64_t rounds = subdomain_.make_consistent(agree);
     if (events_ > report.max_events) throw_too_many_contacts(report.max_events);
     length_.allow_for(most[speed]);
     full = -most[earliest] < stop ? -most[earliest] : kForever;
     if (!valid) {  // revoke the window; if the log has no room for more, run it up to there
       if (!(full > now_)) throw_too_many_contacts(report.max_events);
-      ++counts_.cut;
-      if (subdomain_) subdomain_->paths().cut({.time = -kForever});
-      cut_ = true;
-      sorted_ = false;
+      ++subdomain_.counts.cut;
+      subdomain_.paths().cut({.time = -kForever});
+      reload();
       continue;
     }
-    ++counts_.windows;
-    counts_.rounds += rounds;
-    if (subdomain_ && !subdomain_->paths().all_match())
+    ++subdomain_.counts.windows;
+    subdomain_.counts.rounds += rounds;
+    if (!subdomain_.paths().all_match())
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
-    got = tally();
+    got = subdomain_.paths().tally();
     if (collisions + sums[2] >= report.collision_limit) {  // it may have been reached
       std::uint64_t count = got.sphere_sphere;
       ranks_.sum({&count, 1});
       if (collisions + count >= report.collision_limit) {
         const EventKey<D> last = key_of_collision(report.collision_limit - collisions);
-        if (subdomain_) subdomain_->paths().cut(last);
-        cut_ = true;
-        got = tally();
+        subdomain_.paths().cut(last);
+        got = subdomain_.paths().tally();
         reached = stop = last.time;
       }
     }
-    if (report.contacts && subdomain_)
-      subdomain_->for_each_contact(
-          [&](Slot i, std::size_t k) { contacts.push_back(subdomain_->paths().contact_of(i, k)); });
+    if (report.contacts)
+      subdomain_.for_each_contact(
+          [&](Slot i, std::size_t k) { contacts.push_back(subdomain_.paths().contact_of(i, k)); });
     sum.add(got);
-    counts_.events += got.contacts();
-    if (!cut_) length = stop - now_;
+    subdomain_.counts.events += got.contacts();
+    length = stop - now_;
     now_ = stop;
-    sorted_ = false;
-    if (subdomain_ && !cut_) subdomain_->commit();
   }
   const ContactTally all = sum_of_all(ranks_, sum);
   report.counters.add(all);
@@ -237,23 +173,17 @@ double WindowedFlight<D>::run(double end, const Report& report) {
 }
 
 template <int D>
-void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) const {
-  collect(time, copies, nullptr);
-}
-
-template <int D>
 void WindowedFlight<D>::give_back(double time, Particles<D>& particles) {
   measure_work();
-  if (subdomain_) subdomain_->stop();
-  collect(time, particles, &work_);
-  if (subdomain_) subdomain_->release();
+  subdomain_.stop();
+  fly_to(time, particles);
+  subdomain_.release();
 }
 
 /// Measures the work of subdomains: the next bisection gives fewer spheres to subdomains with more events per sphere.
 template <int D>
 void WindowedFlight<D>::measure_work() {
-  const std::uint64_t events = subdomain_ ? subdomain_->run_events() - run_before_ : 0;
-  const std::uint64_t spheres = subdomain_ ? subdomain_->own().size() : 0;
+  const std::uint64_t events = subdomain_.counts.run_events - run_before_, spheres = subdomain_.own().size();
   std::array<std::uint64_t, 2> all{events, spheres};
   ranks_.sum(all);
   const double expected = static_cast<double>(all[0]) / static_cast<double>(all[1]) * static_cast<double>(spheres);
@@ -262,56 +192,33 @@ void WindowedFlight<D>::measure_work() {
   subdomain_work_ = static_cast<std::uint32_t>(std::clamp(std::round(work * kMeanWork), 1.0, kMaxWork));
 }
 
-/// Sends the spheres, advanced to a time, to the ranks of their blocks, and their work if asked for.
+/// Sends the spheres, advanced to a time, and their work to the ranks of their blocks.
 template <int D>
-void WindowedFlight<D>::collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const {
+void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) {
   struct State {
     std::uint32_t work;
     Vec<D> x, v;
+    Spin<D> spin;
   };
   const std::size_t here = blocks().first(ranks_.rank() + 1) - blocks().first(ranks_.rank());
   copies.x.resize(here);
   copies.v.resize(here);
-  if (work) work->resize(here);
+  work_.resize(here);
+  if (rough()) copies.spin.resize(here);
   to_id_blocks<State>(
       blocks(), ranks_,
       [&](auto&& send) {
-        if (!subdomain_) return;
-        for (const Slot i : subdomain_->own()) {
-          const Record<D> r = subdomain_->flights().at(subdomain_->paths().after(i), time);
-          send(r.id, State{subdomain_work_, r.x, r.v});
+        for (const Slot i : subdomain_.own()) {
+          const Record<D> r = subdomain_.flights().at(subdomain_.paths().after(i), time);
+          send(r.id, State{subdomain_work_, r.x, r.v, subdomain_.paths().spin_after(i)});
         }
       },
       [&](std::size_t place, const State& state) {
         copies.x[place] = state.x;
         copies.v[place] = state.v;
-        if (work) (*work)[place] = state.work;
+        work_[place] = state.work;
+        if (rough()) copies.spin[place] = state.spin;
       });
-  if (!rough()) return;
-  copies.spin.resize(here);
-  to_id_blocks<Spin<D>>(
-      blocks(), ranks_,
-      [&](auto&& send) {
-        if (!subdomain_) return;
-        for (const Slot i : subdomain_->own()) send(subdomain_->flights()[i].id, subdomain_->paths().spin_after(i));
-      },
-      [&](std::size_t place, const Spin<D>& spin) { copies.spin[place] = spin; });
-}
-
-template <int D>
-EventCounts WindowedFlight<D>::counts() const {
-  EventCounts all = event_counts_;
-  if (subdomain_) all += subdomain_->counts();
-  return all;
-}
-
-template <int D>
-WindowCounts WindowedFlight<D>::window_counts() const {
-  WindowCounts all = counts_;
-  if (!subdomain_) return all;
-  all.run_events += subdomain_->run_events();
-  all.redone_events += subdomain_->redone_events();
-  return all;
 }
 
 template class WindowedFlight<2>;

@@ -20,7 +20,7 @@
 #include <optional>
 
 #include "engine/ranks/id_blocks.h"
-#include "engine/ranks/path_exchange.h"
+#include "engine/ranks/subdomain.h"
 #include "engine/ranks/window_length.h"
 
 namespace carom {
@@ -34,53 +34,42 @@ class WindowedFlight {
   WindowedFlight(const Box<D>& box, Sizes sizes, Communicator& ranks, const SearchOptions& options = {},
                  std::function<double()> window = {});
 
-  /// Functions as in EventCore. `particles` is this rank's block; contacts are reported on rank 0.
+  /// Functions as in EventCore. `particles` is this rank's block; contacts are reported on rank 0. After a run that the
+  /// collision limit has ended, only fly_to() and give_back() may follow.
   void take(Particles<D>& particles, const Vec<D>& g, double horizon);
   double run(double end, const Report& report);
-  void fly_to(double time, Particles<D>& copies) const;
+  void fly_to(double time, Particles<D>& copies);
   void give_back(double time, Particles<D>& particles);
   double now() const { return now_; }
 
   /// On this rank, since construction.
-  EventCounts counts() const;
-  WindowCounts window_counts() const;
+  EventCounts counts() const { return subdomain_.event_counts(); }
+  const WindowCounts& window_counts() const { return subdomain_.counts; }
 
  private:
   bool rough() const { return box_.contacts.rough(); }
   IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(ranks_.size())}; }
-  void make_subdomain(std::size_t subdomains);
   void measure_work();
-  void collect(double time, Particles<D>& copies, std::vector<std::uint32_t>* work) const;
   void reload();
   template <class Spheres>
   void load(double now, Spheres&& spheres);
-  Vec<D> place(const Record<D>& r, double now) const;
-  void sort_out(bool loaded);
-  EventKey<D> key_of_collision(std::uint64_t number) const;
-  ContactTally tally() const { return subdomain_ ? subdomain_->paths().tally() : ContactTally{}; }
+  EventKey<D> key_of_collision(std::uint64_t number);
 
   const Box<D>& box_;
   Sizes sizes_;
   Communicator& ranks_;
-  std::size_t subdomains_ = 0;
-  SearchOptions options_;
+  std::size_t subdomains_;
   std::optional<Bisection<D>> bisection_;
-  std::unique_ptr<Subdomain<D>> subdomain_;  // this rank's, with the rank as number; null if it has none
-  PathExchange<D> exchange_;
+  Subdomain<D> subdomain_;  // this rank's
   WindowLength<D> length_;
   Vec<D> g_ = Vec<D>::Zero();
   double horizon_ = 0, now_ = 0;
-  bool sorted_ = false;       // owners and ghosts are up to date at now_
-  bool no_room_ = false;      // for a ghost that this rank's subdomain needs
-  bool cut_ = false;          // the last window was cut or revoked, so subdomains must be loaded again
   std::uint64_t events_ = 0;  // contacts since take()
   // Events per sphere of the subdomain in the epoch, relative to a mean of kMeanWork over all subdomains; and the same
   // value for each sphere of this rank's block.
   std::uint32_t subdomain_work_ = 0;
   std::vector<std::uint32_t> work_;
   std::uint64_t run_before_ = 0;  // events of first runs before the epoch
-  EventCounts event_counts_;      // counts of former subdomains
-  WindowCounts counts_;
 };
 
 }  // namespace carom

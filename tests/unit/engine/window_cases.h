@@ -2,7 +2,7 @@
 #pragma once
 // Subdomains of a system for tests of one window.
 
-#include "engine/ranks/path_exchange.h"
+#include "engine/ranks/subdomain.h"
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/event_cases.h"
 
@@ -17,15 +17,17 @@ std::vector<Record<D>> records_of(const Particles<D>& p) {
   return records;
 }
 
-/// A subdomain of a bisection with all spheres it needs, at time 0.
+/// This rank's subdomain of a bisection with all spheres it needs, at time 0.
 template <int D>
 std::unique_ptr<Subdomain<D>> subdomain_of(const System<D>& system, const Sizes& sizes, const Bisection<D>& bisection,
-                                           std::uint32_t number, double end) {
-  auto subdomain = std::make_unique<Subdomain<D>>(system.box, sizes, SearchOptions{});
-  std::vector<Record<D>> records = records_of(system.particles);
-  std::erase_if(records, [&](const Record<D>& r) { return !bisection.near(number, bisection.wrapped(r.x)); });
-  subdomain->load(std::move(records), bisection, number, Vec<D>::Zero(), end, 0, kDisplacement);
-  subdomain->sort_out(0, [](std::size_t, const Record<D>&) {});
+                                           Communicator& ranks, double end) {
+  auto subdomain = std::make_unique<Subdomain<D>>(system.box, sizes, SearchOptions{}, ranks);
+  const auto number = static_cast<std::uint32_t>(ranks.rank());
+  std::vector<Bytes> spheres(1);
+  for (const Record<D>& r : records_of(system.particles))
+    if (number < bisection.subdomains() && bisection.near(number, bisection.wrapped(r.x)))
+      subdomain->put_sphere(spheres[0], r, Spin<D>::Zero());
+  subdomain->load(std::move(spheres), bisection, Vec<D>::Zero(), end, 0, kDisplacement);
   return subdomain;
 }
 
@@ -36,17 +38,14 @@ void in_a_window(const System<D>& system, const Sizes& sizes, double end, auto&&
   test::ThreadRanks(3).run([&](Communicator& ranks) {
     Communicator alone;
     const Bisection<D> bisection(system.box, system.particles.x, 2, 1 + 2 * kDisplacement, alone);
-    const auto me = static_cast<std::uint32_t>(ranks.rank());
-    const auto subdomain = me < 2 ? subdomain_of(system, sizes, bisection, me, end) : nullptr;
-    if (subdomain) subdomain->run(0, end);
-    PathExchange<D> exchange(ranks);
-    exchange.start(bisection);
-    const std::uint64_t rounds = exchange.make_consistent(subdomain.get(), [&](bool changed) {
+    const auto subdomain = subdomain_of(system, sizes, bisection, ranks, end);
+    subdomain->run(0, end);
+    const std::uint64_t rounds = subdomain->make_consistent([&](bool changed) {
       double more = changed ? 1 : 0;
       ranks.largest({&more, 1});
       return more > 0;
     });
-    check(ranks, subdomain.get(), rounds);
+    check(ranks, *subdomain, rounds);
   });
 }
 

@@ -73,7 +73,7 @@ TEST(WindowLength, FindsWhetherASphereMayHaveComeTooFar) {
   const Sizes sizes(system->particles);
   Communicator alone;
   const Bisection<3> bisection(system->box, system->particles.x, 1, 1 + 2 * kDisplacement, alone);
-  const auto subdomain = subdomain_of(*system, sizes, bisection, 0, 2);
+  const auto subdomain = subdomain_of(*system, sizes, bisection, alone, 2);
   subdomain->run(0, 2);
   for (const double g : {0.0, 0.1}) {
     WindowLength<3> length(1);
