@@ -27,6 +27,7 @@ class MpiCommunicator : public Communicator {
   void start(std::vector<Bytes> outgoing, std::span<const int> partners, std::span<const std::size_t> sizes,
              std::span<double> most) override;
   std::vector<Bytes> complete() override;
+  double seconds_waited() const override { return ranks_.watch().seconds_waited(); }
 
  private:
   /// An exchange of combine() with another rank.

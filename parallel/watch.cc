@@ -13,6 +13,8 @@
 #include <limits>
 #include <thread>
 
+#include "engine/base/counters.h"
+
 namespace carom {
 
 namespace {
@@ -126,6 +128,7 @@ void Watch::query_ranks() {
 // ---- Waiting ----
 
 void Watch::wait(std::span<MPI_Request> requests) {
+  const Stopwatch watch(seconds_waited_);
   const auto complete = [&] {
     int done = 0;
     MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);

@@ -72,6 +72,7 @@ class Watch {
 
   /// Waits until all requests are complete. Throws RankFailure if they depend on a failed rank, or SilentRanks.
   void wait(std::span<MPI_Request> requests);
+  double seconds_waited() const { return seconds_waited_; }  ///< in wait()
 
   /// Ends the work of all ranks together; collective. Returns the exit code of the first rank that failed, or of rank
   /// 0. If some ranks cannot be reached, it calls MPI_Abort and does not return. `alone`: only rank 0 works, for any
@@ -113,6 +114,7 @@ class Watch {
   MPI_Comm side_ = MPI_COMM_NULL;
   int rank_ = 0, size_ = 1;
   double silence_;
+  double seconds_waited_ = 0;
   std::uint64_t calls_ = 0;
   std::vector<State> states_;   ///< by rank; only rank 0 receives outcomes
   std::optional<int> failed_;   ///< rank with the first notice of a failure

@@ -39,6 +39,8 @@ class Communicator {
     combine(most, {});
   }
   virtual std::vector<Bytes> complete() { return std::move(arrived_); }
+  /// The time for which this rank has waited for others [s].
+  virtual double seconds_waited() const { return 0; }
   void largest(std::span<double> values) { combine(values, {}); }
   void sum(std::span<std::uint64_t> values) { combine({}, values); }
 
@@ -68,71 +70,45 @@ Value accumulated_in_order(Communicator& ranks, Value value, Add&& add) {
   return value;
 }
 
+/// Values as a message.
+template <class Value>
+Bytes message_of(std::span<const Value> values) {
+  const auto bytes = std::as_bytes(values);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// The values in messages, which are freed one after the other.
+template <class Value>
+std::vector<Value> values_in(std::vector<Bytes> messages) {
+  std::size_t size = 0;
+  for (const Bytes& bytes : messages) size += bytes.size();
+  std::vector<Value> all;
+  all.reserve(size / sizeof(Value));
+  for (Bytes& bytes : messages) {
+    for (Reader reader(bytes); reader.more();) all.push_back(reader.get<Value>());
+    Bytes().swap(bytes);
+  }
+  return all;
+}
+
 /// The values of all ranks, in the order of ranks. Collective.
 template <class Value>
 std::vector<Value> gather_values(Communicator& ranks, std::span<const Value> mine) {
-  const auto bytes = std::as_bytes(mine);
-  std::vector<Value> all;
-  for (const Bytes& each : ranks.gather({bytes.begin(), bytes.end()}))
-    for (Reader reader(each); reader.more();) all.push_back(reader.get<Value>());
-  return all;
+  return values_in<Value>(ranks.gather(message_of(mine)));
 }
 
 /// The sum over all ranks of an object with a member add().
 template <class Sums>
-Sums sum_of_all(Communicator& ranks, const Sums& mine) {
+Sums sum_of_all(Communicator& ranks, Sums mine) {
+  Archive out;
+  out(mine);
   Sums all;
-  if constexpr (requires(Sums sums, Archive & archive) { sums.archive(archive); }) {
-    Archive out;
-    Sums(mine).archive(out);
-    for (const Bytes& each : ranks.gather(out.bytes())) {
-      Archive in(each);
-      Sums sums;
-      sums.archive(in);
-      all.add(sums);
-    }
-  } else {
-    for (const Sums& each : gather_values<Sums>(ranks, {&mine, 1})) all.add(each);
+  for (const Bytes& each : ranks.gather(out.bytes())) {
+    Archive in(each);
+    in(mine);
+    all.add(mine);
   }
   return all;
 }
-
-/// Measures the time spent in another communicator.
-class TimedCommunicator final : public Communicator {
- public:
-  explicit TimedCommunicator(Communicator& ranks) : ranks_(ranks) {}
-  int rank() const override { return ranks_.rank(); }
-  int size() const override { return ranks_.size(); }
-  std::vector<Bytes> swap(std::vector<Bytes> outgoing) override {
-    const Stopwatch watch(seconds_);
-    return ranks_.swap(std::move(outgoing));
-  }
-  std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override {
-    const Stopwatch watch(seconds_);
-    return ranks_.swap(std::move(outgoing), partners);
-  }
-  std::vector<Bytes> gather(const Bytes& mine) override {
-    const Stopwatch watch(seconds_);
-    return ranks_.gather(mine);
-  }
-  void combine(std::span<double> most, std::span<std::uint64_t> sums) override {
-    const Stopwatch watch(seconds_);
-    ranks_.combine(most, sums);
-  }
-  void start(std::vector<Bytes> outgoing, std::span<const int> partners, std::span<const std::size_t> sizes,
-             std::span<double> most) override {
-    const Stopwatch watch(seconds_);
-    ranks_.start(std::move(outgoing), partners, sizes, most);
-  }
-  std::vector<Bytes> complete() override {
-    const Stopwatch watch(seconds_);
-    return ranks_.complete();
-  }
-  double seconds() const { return seconds_; }
-
- private:
-  Communicator& ranks_;
-  double seconds_ = 0;
-};
 
 }  // namespace carom

@@ -21,7 +21,7 @@ constexpr double kMaxKnownFraction = 0.9;       // if a rank would get more of a
 
 template <int D>
 void Decomposition<D>::join(Communicator& ranks, Sizes of_all) {
-  ranks_ = std::make_unique<TimedCommunicator>(ranks);
+  ranks_ = &ranks;
   sizes_ = std::move(of_all);
 }
 
@@ -53,7 +53,7 @@ bool Decomposition<D>::divide(bool local, double slab_length, bool cores) {
   if (!joined()) return false;
   local_ = local;
   width_.start(cores);
-  migrate(!local, slab_length);
+  migrate(slab_length);
   next_ = kSlabsPerDivision;
   return true;
 }
@@ -125,7 +125,7 @@ bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
     slabs_with_all_ = std::max<std::int64_t>(slabs_with_all_ / 2, 1);
     width_.relax();
   }
-  migrate(!local_, slab_length);
+  migrate(slab_length);
   next_ = slab + kSlabsPerDivision;
   return true;
 }
@@ -139,8 +139,8 @@ void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
 }
 
 template <int D>
-void Decomposition<D>::migrate(bool all, double slab_length) {
-  if (all || !migrate_to_near(slab_length)) migrate_to_all();
+void Decomposition<D>::migrate(double slab_length) {
+  if (!local_ || !migrate_to_near(slab_length)) migrate_to_all();
 }
 
 /// The messages of pack_own(). Afterwards this rank has no particles, unless `stay` is given.

@@ -58,8 +58,8 @@ class Decomposition {
   /// The ranks; with one rank, a communicator of one.
   Communicator& ranks() const { return *ranks_; }
   /// Null if all particles are here.
-  Communicator* others() const { return joined() ? ranks_.get() : nullptr; }
-  double seconds_waited() const { return ranks_->seconds(); }  ///< for other ranks [s]
+  Communicator* others() const { return joined() ? ranks_ : nullptr; }
+  double seconds_waited() const { return ranks_->seconds_waited(); }  ///< for other ranks [s]
 
   /// The number of particles on all ranks.
   std::size_t total() const;
@@ -124,7 +124,7 @@ class Decomposition {
   void update_halo();
 
  private:
-  void migrate(bool all, double slab_length);
+  void migrate(double slab_length);
   bool migrate_to_near(double slab_length);
   double squared_farthest(std::span<const Vec<D>> x) const {
     return halo_.squared_farthest(system_.box, system_.particles, x);
@@ -136,7 +136,7 @@ class Decomposition {
 
   System<D>& system_;
   Communicator alone_;
-  std::unique_ptr<TimedCommunicator> ranks_ = std::make_unique<TimedCommunicator>(alone_);
+  Communicator* ranks_ = &alone_;
   std::optional<Sizes> sizes_;
 
   bool by_place_ = false;

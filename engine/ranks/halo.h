@@ -12,26 +12,6 @@
 
 namespace carom {
 
-/// Sends values to all ranks near their positions: for_each(send) calls send(x, value), with x in the box. Returns the
-/// values received, in the order of ranks. Collective.
-template <class Value, int D>
-std::vector<Value> sent_to_near(const Bisection<D>& bisection, Communicator& ranks, auto&& for_each) {
-  std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
-  for_each([&](const Vec<D>& x, const Value& value) {
-    bisection.for_each_near(x, [&](std::uint32_t rank) { put(outgoing[rank], value); });
-  });
-  std::vector<Bytes> incoming = ranks.swap(std::move(outgoing));
-  std::size_t size = 0;
-  for (const Bytes& bytes : incoming) size += bytes.size();
-  std::vector<Value> near;
-  near.reserve(size / sizeof(Value));
-  for (Bytes& bytes : incoming) {
-    for (Reader reader(bytes); reader.more();) near.push_back(reader.get<Value>());
-    Bytes().swap(bytes);
-  }
-  return near;
-}
-
 /// From blocks of all particles, `block` on this rank, makes the particles of this rank's subdomain and, as ghosts,
 /// copies of particles within `distance` of it up to rounding. Only x, radius, id, ghost and, as 1 or infinite,
 /// mass are set. Collective.
@@ -43,11 +23,12 @@ Particles<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, co
     Id id;
   };
   const Bisection<D> bisection(box, block.x, static_cast<std::size_t>(ranks.size()), distance * (1 + 1e-6), ranks);
-  auto copies = sent_to_near<Copy>(bisection, ranks, [&](auto&& send) {
-    for (Id i = 0; i < block.size(); ++i)
-      send(bisection.wrapped(block.x[i]),
-           Copy{block.x[i], block.radius[i], block.fixed(i) ? block.mass[i] : 1, block.id_of(i)});
-  });
+  std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
+  for (Id i = 0; i < block.size(); ++i) {
+    const Copy copy{block.x[i], block.radius[i], block.fixed(i) ? block.mass[i] : 1, block.id_of(i)};
+    bisection.for_each_near(bisection.wrapped(copy.x), [&](std::uint32_t rank) { put(outgoing[rank], copy); });
+  }
+  auto copies = values_in<Copy>(ranks.swap(std::move(outgoing)));
   std::ranges::sort(copies, {}, &Copy::id);
   Particles<D> halo;
   for (const Copy& copy : copies) {

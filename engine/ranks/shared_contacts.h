@@ -12,20 +12,12 @@
 
 namespace carom {
 
-/// Contacts as a message.
-template <int D>
-Bytes packed(std::span<const Contact<D>> contacts) {
-  const auto bytes = std::as_bytes(contacts);
-  return {bytes.begin(), bytes.end()};
-}
-
 /// Appends the contacts in messages from all ranks, in the order of their keys.
 template <int D>
-void merge_contacts(const std::vector<Bytes>& messages, std::vector<Contact<D>>& to) {
-  const auto before = static_cast<std::ptrdiff_t>(to.size());
-  for (const Bytes& each : messages)
-    for (Reader reader(each); reader.more();) to.push_back(reader.get<Contact<D>>());
-  std::sort(to.begin() + before, to.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
+void merge_contacts(std::vector<Bytes> messages, std::vector<Contact<D>>& to) {
+  auto contacts = values_in<Contact<D>>(std::move(messages));
+  std::ranges::sort(contacts, {}, &Contact<D>::key);
+  to.insert(to.end(), contacts.begin(), contacts.end());
 }
 
 /// Counts the contacts of all ranks and appends them to `log` unless it is null; `found` are the contacts of this
@@ -47,7 +39,7 @@ bool commit_contacts(const System<D>& system, std::span<const Contact<D>> found,
   tally = system.decomposition.sum(tally);
   if (tally.contacts() > most) return false;
   counters.add(tally);
-  if (log) merge_contacts<D>(system.decomposition.ranks().gather(packed<D>(own)), *log);
+  if (log) merge_contacts<D>(system.decomposition.ranks().gather(message_of<Contact<D>>(own)), *log);
   return true;
 }
 

@@ -168,7 +168,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   const ContactTally all = sum_of_all(ranks_, sum);
   report.counters.add(all);
   if (events_ = events_before + all.contacts(); events_ > report.max_events) throw_too_many_contacts(report.max_events);
-  if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, packed<D>(contacts)), *report.contacts);
+  if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, message_of<Contact<D>>(contacts)), *report.contacts);
   return reached;
 }
 
