@@ -31,10 +31,9 @@ void Decomposition<D>::join(Communicator& ranks) {
   join(ranks, Sizes(p));
   const Id first = blocks().first(ranks.rank()), end = blocks().first(ranks.rank() + 1);
   const auto keep = [&](auto& all) {
-    all = std::remove_reference_t<decltype(all)>(all.begin() + first, all.begin() + end);
+    if (!all.empty()) all = std::remove_reference_t<decltype(all)>(all.begin() + first, all.begin() + end);
   };
   for_each_array(p, keep);
-  if (!p.spin.empty()) keep(p.spin);
   for (Id i = first; i < end; ++i) p.id.push_back(i);
 }
 
@@ -73,27 +72,28 @@ const Particles<D>& Decomposition<D>::block() {
   struct State {
     Vec<D> x, v;
     Image<D> image;
+    Spin<D> spin;
   };
+  const bool rough = system_.box.contacts.rough();
   const Particles<D>& p = system_.particles;
-  to_id_blocks<State>(
-      blocks(), *ranks_,
+  const std::size_t size = rough ? sizeof(State) : offsetof(State, spin);
+  to_id_blocks(
+      blocks(), *ranks_, size,
       [&](auto&& send) {
         for (Id i = 0; i < p.size(); ++i)
-          if (p.owns(i)) send(p.id_of(i), State{p.x[i], p.v[i], p.image[i]});
+          if (p.owns(i)) {
+            const State state{p.x[i], p.v[i], p.image[i], rough ? p.spin[i] : Spin<D>(Spin<D>::Zero())};
+            send(p.id_of(i), reinterpret_cast<const std::byte*>(&state));
+          }
       },
-      [&](std::size_t place, const State& state) {
+      [&](std::size_t place, const std::byte* bytes) {
+        State state;
+        std::memcpy(static_cast<void*>(&state), bytes, size);
         block_.x[place] = state.x;
         block_.v[place] = state.v;
         block_.image[place] = state.image;
+        if (rough) block_.spin[place] = state.spin;
       });
-  if (system_.box.contacts.rough())
-    to_id_blocks<Spin<D>>(
-        blocks(), *ranks_,
-        [&](auto&& send) {
-          for (Id i = 0; i < p.size(); ++i)
-            if (p.owns(i)) send(p.id_of(i), p.spin[i]);
-        },
-        [&](std::size_t place, const Spin<D>& spin) { block_.spin[place] = spin; });
   return block_;
 }
 

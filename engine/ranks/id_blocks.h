@@ -41,22 +41,7 @@ void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, std::size_t size,
     }
 }
 
-/// to_id_blocks() for values: send(id, value), store(place, value).
-template <class Value>
-void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, auto&& for_each, auto&& take) {
-  to_id_blocks(
-      blocks, ranks, sizeof(Value),
-      [&](auto&& send) {
-        for_each([&](Id id, const Value& value) { send(id, reinterpret_cast<const std::byte*>(&value)); });
-      },
-      [&](std::size_t place, const std::byte* bytes) {
-        Value value;
-        std::memcpy(static_cast<void*>(&value), bytes, sizeof value);
-        take(place, value);
-      });
-}
-
-/// Calls visit(vector) for all arrays of the particles except spin, id and ghost.
+/// Calls visit(vector) for all arrays of the particles except id and ghost.
 template <int D, class Visit>
 void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.x);
@@ -66,6 +51,7 @@ void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.radius);
   visit(p.charge);
   visit(p.species);
+  visit(p.spin);
 }
 
 /// Sends the messages of all ranks to rank 0, one rank at a time, to limit its memory. Each rank calls pack() for its
@@ -81,25 +67,16 @@ void one_after_the_other(Communicator& ranks, Pack&& pack, Visit&& visit) {
 /// Copies of all particles on rank 0, by id, from the blocks of all ranks; empty on other ranks. Collective.
 template <int D>
 Particles<D> gathered(Communicator& ranks, const Particles<D>& block) {
-  Bytes mine;
-  put(mine, block.size());
-  put(mine, block.spin.size());
-  for (const Spin<D>& spin : block.spin) put(mine, spin);
-  for_each_array(const_cast<Particles<D>&>(block), [&](const auto& array) {
-    const auto bytes = std::as_bytes(std::span(array));
-    mine.insert(mine.end(), bytes.begin(), bytes.end());
-  });
+  Archive mine;
+  for_each_array(const_cast<Particles<D>&>(block), [&](auto& array) { mine(array); });
   Particles<D> all;
-  for (const Bytes& bytes : gather_on_first(ranks, std::move(mine))) {
+  for (Bytes& bytes : gather_on_first(ranks, mine.bytes())) {
     if (bytes.empty()) continue;
-    Reader from(bytes);
-    const auto n = from.get<std::size_t>();
-    for (auto spins = from.get<std::size_t>(); spins > 0; --spins) all.spin.push_back(from.get<Spin<D>>());
+    Archive from(std::move(bytes));
     for_each_array(all, [&](auto& array) {
-      const std::size_t before = array.size();
-      array.resize(before + n);
-      if (n > 0)
-        std::memcpy(static_cast<void*>(array.data() + before), from.skip(n * sizeof(array[0])), n * sizeof(array[0]));
+      std::remove_reference_t<decltype(array)> part;
+      from(part);
+      array.insert(array.end(), part.begin(), part.end());
     });
   }
   return all;

@@ -205,15 +205,19 @@ void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) {
   copies.v.resize(here);
   work_.resize(here);
   if (rough()) copies.spin.resize(here);
-  to_id_blocks<State>(
-      blocks(), ranks_,
+  const std::size_t size = rough() ? sizeof(State) : offsetof(State, spin);
+  to_id_blocks(
+      blocks(), ranks_, size,
       [&](auto&& send) {
         for (const Slot i : subdomain_.own()) {
           const Record<D> r = subdomain_.flights().at(subdomain_.paths().after(i), time);
-          send(r.id, State{subdomain_work_, r.x, r.v, subdomain_.paths().spin_after(i)});
+          const State state{subdomain_work_, r.x, r.v, subdomain_.paths().spin_after(i)};
+          send(r.id, reinterpret_cast<const std::byte*>(&state));
         }
       },
-      [&](std::size_t place, const State& state) {
+      [&](std::size_t place, const std::byte* bytes) {
+        State state;
+        std::memcpy(static_cast<void*>(&state), bytes, size);
         copies.x[place] = state.x;
         copies.v[place] = state.v;
         work_[place] = state.work;
