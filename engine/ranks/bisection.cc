@@ -211,30 +211,15 @@ bool Bisection<D>::clip(std::uint32_t subdomain, double margin, Vec<D>& low, Vec
   return true;
 }
 
-/// The distance between two intervals on an axis.
-template <int D>
-double Bisection<D>::gap(int axis, double low, double high, double other_low, double other_high) const {
-  const double edge = box_.edges[axis];
-  double least = std::max({low - other_high, other_low - high, 0.0});
-  if (box_.periodic(axis)) {
-    least = std::min(least, std::max({low - (other_high - edge), (other_low - edge) - high, 0.0}));
-    least = std::min(least, std::max({low - (other_high + edge), (other_low + edge) - high, 0.0}));
-  }
-  return least;
-}
-
 template <int D>
 std::vector<std::uint32_t> Bisection<D>::neighbours_of(std::uint32_t subdomain) const {
+  const Part& mine = parts_[subdomain];
   std::vector<std::uint32_t> near;
-  for (std::uint32_t r = 0; r < parts_.size(); ++r) {
-    const Part &a = parts_[std::min(r, subdomain)], &b = parts_[std::max(r, subdomain)];  // in this order on both sides
-    double sum = 0;
-    for (int k = 0; k < D; ++k) {
-      const double d = gap(k, a.low[k], a.high[k], b.low[k], b.high[k]);
-      sum += d * d;
-    }
-    if (r != subdomain && sum <= reach_ * reach_) near.push_back(r);
-  }
+  for (std::uint32_t r = 0; r < parts_.size(); ++r)
+    if (const Part& other = parts_[r];
+        r != subdomain && squared_distance(mine, mine.half + other.half, other.centre, other.low, other.high) <=
+                              (1 + 1e-6) * reach_ * reach_)  // allows for rounding
+      near.push_back(r);
   return near;
 }
 

@@ -54,19 +54,7 @@ class Bisection {
   bool deep(double depth) const { return depth > (1 + 1e-6) * reach_; }
   /// The squared distance of a position from a subdomain.
   double squared_distance(std::uint32_t subdomain, const Vec<D>& at) const {
-    const Part& part = parts_[subdomain];
-    double sum = 0;
-    for (int k = 0; k < D; ++k) {
-      double d = 0;
-      if (box_.periodic(k)) {
-        const double away = std::abs(at[k] - part.centre[k]);
-        d = std::max(std::min(away, box_.edges[k] - away) - part.half[k], 0.0);
-      } else {
-        d = std::max({part.low[k] - at[k], at[k] - part.high[k], 0.0});
-      }
-      sum += d * d;
-    }
-    return sum;
+    return squared_distance(parts_[subdomain], parts_[subdomain].half, at, at, at);
   }
   /// Reduces the box between two corners to the positions within `margin` of a subdomain; false if none is left.
   bool clip(std::uint32_t subdomain, double margin, Vec<D>& low, Vec<D>& high) const;
@@ -97,7 +85,23 @@ class Bisection {
 
   void attach(Piece piece, std::vector<Piece>& pieces);
   std::vector<Piece> cut(std::span<const Piece> pieces, Communicator& ranks);
-  double gap(int axis, double low, double high, double other_low, double other_high) const;
+  /// The squared distance of a part from the box between two corners; `half`: the sum of their half edges, used along
+  /// periodic axes like the centre.
+  double squared_distance(const Part& part, const Vec<D>& half, const Vec<D>& centre, const Vec<D>& low,
+                          const Vec<D>& high) const {
+    double sum = 0;
+    for (int k = 0; k < D; ++k) {
+      double d = 0;
+      if (box_.periodic(k)) {
+        const double away = std::abs(centre[k] - part.centre[k]);
+        d = std::max(std::min(away, box_.edges[k] - away) - half[k], 0.0);
+      } else {
+        d = std::max({part.low[k] - high[k], low[k] - part.high[k], 0.0});
+      }
+      sum += d * d;
+    }
+    return sum;
+  }
   std::vector<std::uint32_t> neighbours_of(std::uint32_t subdomain) const;
 
   Box<D> box_;
