@@ -17,24 +17,14 @@ constexpr double kCollisionsPerWindow = 0.15;
 constexpr double kMaxDisplacement = 1.0, kMinDisplacement = 0.02;  // [largest diameter]
 constexpr double kSpeedAllowance = 1.15;                           // speed allowed for, relative to the largest speed
 
-/// The time in which a sphere has kCollisionsPerWindow collisions, by Enskog's theory.
+/// The time in which a sphere has kCollisionsPerWindow collisions, by Enskog's theory, if the spheres fill the box.
 template <int D>
 double first_pace(const Box<D>& box, const Sizes& sizes, Communicator& ranks, const Particles<D>& block) {
   ExactSum squares;  // exact, so that it does not depend on the number of ranks
-  Extent<D> extent;
   for (const Vec<D>& v : block.v) squares.add(v.squaredNorm());
-  for (const Vec<D>& x : block.x) extent.add(x);
-  std::vector<double> bounds;
-  for (int k = 0; k < D; ++k) {
-    bounds.push_back(extent.particles > 0 ? -extent.low[k] : -std::numeric_limits<double>::infinity());
-    bounds.push_back(extent.particles > 0 ? extent.high[k] : -std::numeric_limits<double>::infinity());
-  }
-  ranks.largest(bounds);
-  for (int k = 0; k < D; ++k)
-    extent.low[k] = -bounds[std::size_t{2} * k], extent.high[k] = bounds[std::size_t{2} * k + 1];
-  extent.particles = sizes.spheres;
   const double thermal = std::sqrt(sum_of_all(ranks, squares).value() / static_cast<double>(D * sizes.spheres));
-  return kCollisionsPerWindow / (contacts_a_length(situation_of<D>(box, sizes.radius, extent, sizes.number)) * thermal);
+  const Extent<D> all(sizes.spheres, Vec<D>::Zero(), box.edges);
+  return kCollisionsPerWindow / (contacts_a_length(situation_of<D>(box, sizes.radius, all, sizes.number)) * thermal);
 }
 
 }  // namespace
