@@ -75,8 +75,8 @@ class Flights {
   ScanSetting setting() const;
 
   /// The record, advanced to time t.
-  Record<D> at(Slot i, double t) const { return at(records_[i], t); }
-  Record<D> at(Record<D> r, double t) const {
+  [[gnu::always_inline]] Record<D> at(Slot i, double t) const { return at(records_[i], t); }
+  [[gnu::always_inline]] Record<D> at(Record<D> r, double t) const {
     advance(r, t);
     return r;
   }

@@ -2,7 +2,7 @@
 #pragma once
 // The log of a window that the event core writes: enough to revoke any event and to read the path of any sphere.
 //
-// The log is in the order of keys and costs three consecutive cache lines an event. Paths are read from it only for the
+// The log is in the order of keys and costs 184 bytes an event. Paths are read from it only for the
 // few spheres near the border of a subdomain (engine/ranks/window_paths.h).
 
 #include <algorithm>
@@ -53,7 +53,6 @@ class Trace {
     PackedExchange exchange;
     std::uint32_t generation;
     std::uint32_t partner;  ///< the partner of the first sphere, as in NextEvent
-    Id id[2];
     Slot slot[2];           ///< kNoEntry: a wall
     std::uint32_t last[2];  ///< the sphere's entry in its previous event, or kNoEntry
   };
@@ -79,8 +78,6 @@ class Trace {
     Event& event = events_[size_];
     event.generation = generation;
     event.partner = partner;
-    event.id[0] = a.id;
-    event.id[1] = b.id;
     event.slot[0] = i;
     event.slot[1] = j;
     before_[2 * size_] = a;
@@ -123,7 +120,7 @@ class Trace {
 
   std::span<const Event> events() const { return {events_.data(), size_}; }
   const Event& event_of(std::uint32_t entry) const { return events_[entry / 2]; }
-  /// The sphere's record before its entry in an event.
+  /// The sphere's record before its entry in an event; the first sphere has the even entry.
   const Record<D>& before(std::uint32_t entry) const { return before_[entry]; }
   /// Its spin before; 0 if none was noted.
   Spin<D> spin_before(std::uint32_t entry) const {

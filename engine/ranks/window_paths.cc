@@ -49,7 +49,7 @@ Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, s
   const bool last = k == entries.size();
   const auto key_of = [&](std::uint32_t entry) {
     const auto& event = trace_.event_of(entry);
-    const auto& [lo, hi] = event.id;
+    const Id lo = trace_.before(entry / 2 * 2).id, hi = trace_.before(entry / 2 * 2 + 1).id;
     return event.slot[1] == kNoEntry
                ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
                : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner));
