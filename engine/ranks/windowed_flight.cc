@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ranks/windowed_flight.h"
 
-#if defined(__GLIBC__)
-#include <malloc.h>
-#endif
-
 #include <algorithm>
 
 #include "engine/base/error.h"
@@ -18,14 +14,6 @@ constexpr std::size_t kMinSpheres = 8;                // spheres in a subdomain
 constexpr std::size_t kMaxNeighbours = 64;            // neighbours of a subdomain: the bits of Subdomain::holders()
 constexpr double kMeanWork = 64, kMaxWork = 64 * 64;  // mean and largest work of a sphere, as integers
 constexpr double kWorkTolerance = 0.1;                // smaller relative differences from the mean are ignored
-
-/// Returns freed memory to the system; call it after large temporary arrays. Address sanitizer has an allocator of its
-/// own and leaves that of glibc uninitialised, where malloc_trim() called by several threads at once crashes.
-void trim_memory() {
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
-  malloc_trim(0);
-#endif
-}
 
 }  // namespace
 
@@ -74,7 +62,6 @@ void WindowedFlight<D>::load(double now, Spheres&& spheres) {
                               [&](std::uint32_t rank) { subdomain_.put_sphere(outgoing[rank], r, spin); });
   });
   subdomain_.load(ranks_.swap(std::move(outgoing)), *bisection_, g_, horizon_, now, length_.max_displacement());
-  trim_memory();  // messages and sorted copies
   now_ = now;
 }
 
