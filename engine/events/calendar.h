@@ -45,7 +45,7 @@ class Calendar {
     later_ = Bin{};
     present_.clear();
     sorted_.clear();
-    served_ = 0;
+    due_ = due_end_ = nullptr;
     // The bin width follows from the density of the earliest entries.
     const double each = static_cast<double>(entries) / static_cast<double>(std::max<std::size_t>(sample.size(), 1));
     const auto few = std::min(sample.size(), static_cast<std::size_t>(16 * wanted_ / each) + 16);
@@ -66,43 +66,37 @@ class Calendar {
     else if (const int number = static_cast<int>(bin); number > current_)
       append(ring_[static_cast<std::size_t>(number)], {time, slot});
     else
-      present_.push({time, slot});
+      push_present({time, slot});
   }
 
   /// The earliest entry, or null if none is left before the horizon; valid until the next call. Entries with
   /// holds(entry) false may be skipped.
   template <class Holds>
   const CalendarEntry* top(Holds&& holds) {
-    for (;;) {
+    do {
       const bool heap = !present_.empty();
-      if (served_ < sorted_.size()) {
-        from_heap_ = heap && present_.top().time < sorted_[served_].time;
-        return from_heap_ ? &present_.top() : &sorted_[served_];
-      }
-      if (heap) {
-        from_heap_ = true;
-        return &present_.top();
-      }
-      if (!open_next(holds)) return nullptr;
-    }
+      from_heap_ = heap && (due_ == due_end_ || present_.top().time < due_->time);
+      if (from_heap_) return &present_.top();
+      if (due_ != due_end_) return due_;
+    } while (open_next(holds));
+    return nullptr;
   }
 
   void pop() {
     if (from_heap_)
       present_.pop();
     else
-      ++served_;
+      ++due_;
   }
 
   /// Whether another entry has this time, which must be that of the entry served last.
   bool more_at(double time) const {
-    return (served_ < sorted_.size() && sorted_[served_].time == time) ||
-           (!present_.empty() && present_.top().time == time);
+    return (due_ != due_end_ && due_->time == time) || (!present_.empty() && present_.top().time == time);
   }
 
   /// The entry due `ahead` places later, or null if it is not yet sorted.
   const CalendarEntry* upcoming(std::size_t ahead) const {
-    return served_ + ahead < sorted_.size() ? &sorted_[served_ + ahead] : nullptr;
+    return static_cast<std::ptrdiff_t>(ahead) < due_end_ - due_ ? due_ + ahead : nullptr;
   }
 
  private:
@@ -125,21 +119,24 @@ class Calendar {
 
   [[gnu::always_inline]] void append(Bin& bin, const CalendarEntry& entry) {
     const std::uint32_t at = bin.count % kChunk;
-    if (at == 0) {
-      std::uint32_t fresh = free_;
-      if (fresh != kNoChunk) {
-        free_ = next_[fresh];
-      } else {
-        fresh = static_cast<std::uint32_t>(chunks_.size());
-        chunks_.emplace_back();
-        next_.push_back(kNoChunk);
-      }
-      next_[fresh] = bin.chunk;
-      bin.chunk = fresh;
-    }
+    if (at == 0) add_chunk(bin);
     chunks_[bin.chunk].entry[at] = entry;
     ++bin.count;
   }
+  // Seldom needed, and large:
+  [[gnu::noinline]] void add_chunk(Bin& bin) {
+    std::uint32_t fresh = free_;
+    if (fresh != kNoChunk) {
+      free_ = next_[fresh];
+    } else {
+      fresh = static_cast<std::uint32_t>(chunks_.size());
+      chunks_.emplace_back();
+      next_.push_back(kNoChunk);
+    }
+    next_[fresh] = bin.chunk;
+    bin.chunk = fresh;
+  }
+  [[gnu::noinline]] void push_present(const CalendarEntry& entry) { present_.push(entry); }
 
   /// Calls visit(entry) for the entries of a bin and frees its chunks.
   template <class Visit>
@@ -159,13 +156,12 @@ class Calendar {
 
   /// Opens the next nonempty bin; false if there is none. Requires sorted_ and present_ to be empty.
   template <class Holds>
-  bool open_next(Holds&& holds) {
+  [[gnu::noinline]] bool open_next(Holds&& holds) {
     for (;;) {
       while (++current_ < kBins) {
         Bin& bin = ring_[static_cast<std::size_t>(current_)];
         if (bin.count == 0) continue;
         sorted_.resize(bin.count);
-        served_ = 0;
         count_ += bin.count;
         CalendarEntry* end = sorted_.data();
         empty(bin, [&](const CalendarEntry& entry) {
@@ -174,7 +170,9 @@ class Calendar {
         });
         sorted_.resize(static_cast<std::size_t>(end - sorted_.data()));
         sort();
-        if (!sorted_.empty()) return true;
+        due_ = sorted_.data();
+        due_end_ = due_ + sorted_.size();
+        if (due_ != due_end_) return true;
       }
       if (!turn(holds)) return false;
     }
@@ -261,7 +259,7 @@ class Calendar {
 
   std::vector<CalendarEntry> sorted_, scratch_;  // the open bin
   std::vector<std::uint32_t> bucket_, which_;
-  std::size_t served_ = 0;
+  const CalendarEntry *due_ = nullptr, *due_end_ = nullptr;  // the rest of sorted_
   boost::heap::d_ary_heap<CalendarEntry, boost::heap::arity<4>, boost::heap::compare<Later>> present_;
   bool from_heap_ = false;
 

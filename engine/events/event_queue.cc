@@ -68,34 +68,29 @@ bool EventQueue<D>::mirrored(Slot i, Slot j) const {
          !stale(a) && !stale(b);
 }
 
+/// Whether an event, which is not the only one at this time, is the only one but for its partner's; otherwise begins to
+/// order them.
 template <int D>
-bool EventQueue<D>::next(double end, Slot& slot, double& time) {
-  const auto holds = [&](const CalendarEntry& entry) { return next_events_[entry.slot].due() == entry.time; };
-  for (;;) {
-    if (tied_.empty()) {
-      const CalendarEntry* const top = calendar_.top(holds);
-      if (!top || top->time >= end) return false;
-      const CalendarEntry entry = *top;
-      calendar_.pop();
-      if (!holds(entry)) {
-        ++counts_.dropped;
-        continue;
-      }
-      slot = entry.slot;
-      time = entry.time;
-      if (!calendar_.more_at(time)) return true;
-      read_versions();  // stale plans must be recognised from here on
-      // Often both partners planned the same contact: both plans are then served at once.
-      Slot other = slot;
-      if (const CalendarEntry* const next = calendar_.top(holds); mirrored(slot, next->slot)) {
-        other = next->slot;
-        calendar_.pop();
-        if (!calendar_.more_at(time)) return true;
-      }
-      tied_.push(tie(slot));
-      if (other != slot) tied_.push(tie(other));
-      tied_time_ = time;
-    }
+bool EventQueue<D>::alone(Slot slot, double time) {
+  read_versions();  // stale plans must be recognised from here on
+  // Often both partners planned the same contact: both plans are then served at once.
+  Slot other = slot;
+  if (const CalendarEntry* const next = calendar_.top(Holds{next_events_.data()}); mirrored(slot, next->slot)) {
+    other = next->slot;
+    calendar_.pop();
+    if (!calendar_.more_at(time)) return true;
+  }
+  tied_.push(tie(slot));
+  if (other != slot) tied_.push(tie(other));
+  tied_time_ = time;
+  return false;
+}
+
+/// next() while several events at the same time are in order.
+template <int D>
+bool EventQueue<D>::next_tied(double end, Slot& slot, double& time) {
+  const Holds holds{next_events_.data()};
+  while (!tied_.empty()) {
     read_versions();
     time = tied_time_;
     while (calendar_.more_at(time)) {
@@ -111,6 +106,7 @@ bool EventQueue<D>::next(double end, Slot& slot, double& time) {
     if (now == first) return true;
     tied_.push(now);  // its partner has collided, so its key has changed
   }
+  return next(end, slot, time);
 }
 
 template class EventQueue<2>;
