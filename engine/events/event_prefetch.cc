@@ -53,16 +53,15 @@ void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, co
 }
 
 template <int D>
-void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells) {
-  const View<D> view(queue, flights);
-  if (const CalendarEntry* const later = queue.upcoming(3)) view.fetch_sphere(later->slot);
-  if (const CalendarEntry* const next = queue.upcoming(1)) cells.prefetch(view.plans[next->slot].where.cell, 0, 0);
-}
-
-template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
-                       Candidates& found) {
+                       Candidates& found, bool large) {
   const View<D> view(queue, flights);
+  if (!large) {
+    if (const CalendarEntry* const later = queue.upcoming(3)) view.fetch_sphere(later->slot);
+    if (const CalendarEntry* const next = queue.upcoming(1))
+      cells.prefetch(view.plans[next->slot].where.cell, 0, 0, found);
+    return;
+  }
   // Reading the cells twice is cheaper than waiting for the spheres in them.
   const auto fetch = [&](Slot j) { view.fetch(j); };
   const auto step = [](const NextEvent<D>& a) { return a.contact <= a.update ? 0 : a.face % 2 == 1 ? 1 : -1; };
@@ -72,13 +71,13 @@ void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, co
   }
   if (const CalendarEntry* const later = queue.upcoming(5)) {
     const NextEvent<D>& a = view.plans[later->slot];
-    cells.prefetch(a.where.cell, a.face / 2, step(a));
+    cells.prefetch(a.where.cell, a.face / 2, step(a), found);
     if (meets(a)) view.fetch_sphere(view.partner(a));
   }
   if (const CalendarEntry* const later = queue.upcoming(3)) {
     const NextEvent<D>& a = view.plans[later->slot];
     cells.prefetch_spheres(a.where.cell, a.face / 2, step(a), found, fetch);
-    if (meets(a)) cells.prefetch(view.plans[view.partner(a)].where.cell, 0, 0);
+    if (meets(a)) cells.prefetch(view.plans[view.partner(a)].where.cell, 0, 0, found);
   }
   if (const CalendarEntry* const next = queue.upcoming(1))
     if (const NextEvent<D>& a = view.plans[next->slot]; meets(a))
@@ -87,9 +86,7 @@ void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, co
 
 template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const SkinLists<2>&, bool);
 template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const SkinLists<3>&, bool);
-template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const LinkedCells<2>&);
-template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const LinkedCells<2>&, Candidates&);
-template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const LinkedCells<3>&);
-template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const LinkedCells<3>&, Candidates&);
+template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const LinkedCells<2>&, Candidates&, bool);
+template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const LinkedCells<3>&, Candidates&, bool);
 
 }  // namespace carom

@@ -11,17 +11,14 @@
 
 namespace carom {
 
-/// Prefetches less if the core is not `large`, that is, fits into a cache.
+// Both functions prefetch less if the core is not `large`, that is, fits into a cache.
+
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const SkinLists<D>& lists, bool large);
 
-/// For a core with cells that fits into a cache.
-template <int D>
-void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells);
-
-/// For a core with cells that does not fit; `found` is working memory.
+/// `found` is working memory.
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
-                       Candidates& found);
+                       Candidates& found, bool large);
 
 }  // namespace carom

@@ -69,13 +69,11 @@ void EventSearch<D>::choose(double now) {
       flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, max_displacement_);
 }
 
-/// The input of the kernels for the contacts of a sphere; `found` is working memory.
+/// The list of a sphere as input of the kernels.
 template <int D>
-ScanTask EventSearch<D>::around(Slot i, Candidates& found) {
+ScanTask EventSearch<D>::listed(Slot i) const {
   const NextEvent<D>& a = queue_[i];
-  if (lists_) return {i, lists_->candidates(a), a.count, a.same};
-  cells_->around(i, a.where.cell, found);
-  return {i, found.packed.data(), found.count, found.same};
+  return {i, lists_->candidates(a), a.count, a.same};
 }
 
 template <int D>
@@ -86,17 +84,48 @@ void EventSearch<D>::plan(Slot i, double now) {
 
 template <int D>
 void EventSearch<D>::foresee(Slot i, double now) {
+  if (cells_) return foresee_in_cells(i, now);
   ++counts_.predictions;
   queue_[i].contact = kNever;
-  scan(around(i, found_), flights_[i].t == now);
+  scan(listed(i), flights_[i].t == now);
   if (!flights_.walls().empty()) foresee_walls(i);
   foresee_update(i, now);
 }
 
 template <int D>
-void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
+void EventSearch<D>::foresee_in_cells(Slot i, double now) {
+  ++counts_.predictions;
+  NextEvent<D>& a = queue_[i];
+  a.contact = kNever;
+  const ScanResult first = cells_->scan_around(setting_, i, a.where.cell, flights_[i].t == now, found_);
+  plan_found(i, first, found_);
+  if (!flights_.walls().empty()) foresee_walls(i);
+  predict_crossing(a, i, flights_, box_, *cells_, now);
+}
+
+/// Both spheres are scanned before anything depends on what was found, so that the processor overlaps the scans.
+template <int D>
+void EventSearch<D>::plan_two_in_cells(Slot i, Slot j, double now) {
   counts_.predictions += 2;
-  const ScanTask task[2] = {around(i, found_), around(j, others_)};
+  NextEvent<D>&a = queue_[i], &b = queue_[j];
+  const ScanResult first = cells_->scan_around(setting_, i, a.where.cell, true, found_);
+  const ScanResult second = cells_->scan_around(setting_, j, b.where.cell, true, others_);
+  predict_crossing(a, i, flights_, box_, *cells_, now);
+  predict_crossing(b, j, flights_, box_, *cells_, now);
+  a.contact = b.contact = kNever;
+  plan_found(i, first, found_);
+  plan_found(j, second, others_);
+  for (const Slot one : {i, j}) {
+    if (!flights_.walls().empty()) foresee_walls(one);
+    queue_.schedule(one);
+  }
+}
+
+template <int D>
+void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
+  if (cells_) return plan_two_in_cells(i, j, now);
+  counts_.predictions += 2;
+  const ScanTask task[2] = {listed(i), listed(j)};
   counts_.candidates += task[0].n + task[1].n;
   ScanResult first[2];
   kernels_.scan_two[D - 2](setting_, task, first);
@@ -150,7 +179,7 @@ void EventSearch<D>::foresee_update(Slot i, double now) {
   if (lists_)
     predict_leaving(queue_[i], flights_[i], flights_, distance_left(i), now);
   else
-    predict_crossing(queue_[i], i, flights_, box_, cells_->grid(), now);
+    predict_crossing(queue_[i], i, flights_, box_, *cells_, now);
 }
 
 /// The distance that a sphere may be from the centre of its list's region.
@@ -161,22 +190,29 @@ double EventSearch<D>::distance_left(Slot i) const {
 
 template <int D>
 void EventSearch<D>::look_again(Slot i, double now) {
-  NextEvent<D>& a = queue_[i];
+  if (cells_) return cross(i, now);
+  const NextEvent<D>& a = queue_[i];
   const auto way = [&](const Vec<D>& x) {  // distance from the centre of its list's region
     return (x - Eigen::Map<const Vec<D>>(a.where.centre)).norm();
   };
-  if (cells_) {
-    ++counts_.crossings;
-    const int axis = a.face / 2, step = a.face % 2 == 1 ? 1 : -1;
-    cells_->cross(i, a.where.cell, axis, step);
-    cells_->ahead(i, a.where.cell, axis, step, found_);
-    if (found_.count > 0) scan({i, found_.packed.data(), found_.count, found_.same}, false);
-  } else if (const Vec<D> x = flights_.at(i, now).x; !flights_.field() || way(x) >= 0.7 * distance_left(i)) {
+  if (const Vec<D> x = flights_.at(i, now).x; !flights_.field() || way(x) >= 0.7 * distance_left(i)) {
     ++counts_.rebuilds;
     const std::span<const std::uint32_t> fresh = lists_->renew(i, x);
     if (!fresh.empty()) scan({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
   }  // else its list is still valid far enough
   foresee_update(i, now);
+  queue_.schedule(i);
+}
+
+/// Moves a sphere into the next cell and looks at the cells ahead.
+template <int D>
+void EventSearch<D>::cross(Slot i, double now) {
+  ++counts_.crossings;
+  NextEvent<D>& a = queue_[i];
+  cells_->cross(i, a.where.cell, a.face / 2, a.face % 2 == 1 ? 1 : -1);
+  const ScanResult first = cells_->scan_ahead(setting_, i, a.where.cell, a.face, found_);
+  predict_crossing(a, i, flights_, box_, *cells_, now);
+  plan_found(i, first, found_);
   queue_.schedule(i);
 }
 

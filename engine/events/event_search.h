@@ -10,6 +10,7 @@
 
 #include "engine/base/event_counts.h"
 #include "engine/base/sizes.h"
+#include "engine/events/contact.h"
 #include "engine/events/event_prefetch.h"
 #include "engine/search/search_tuning.h"
 
@@ -58,10 +59,8 @@ class EventSearch {
     if (small_) return;
     if (lists_)
       prefetch_upcoming(queue_, flights_, *lists_, large_);
-    else if (large_)
-      prefetch_upcoming(queue_, flights_, *cells_, found_);
     else
-      prefetch_upcoming(queue_, flights_, *cells_);
+      prefetch_upcoming(queue_, flights_, *cells_, found_, large_);
   }
 
   const EventCounts& counts() const { return counts_; }
@@ -69,12 +68,24 @@ class EventSearch {
  private:
   void choose(double now);
   void foresee(Slot i, double now);
+  void foresee_in_cells(Slot i, double now);
+  void plan_two_in_cells(Slot i, Slot j, double now);
   [[gnu::noinline]] void foresee_walls(Slot i);
   void foresee_update(Slot i, double now);
-  ScanTask around(Slot i, Candidates& found);
+  ScanTask listed(Slot i) const;
   void scan(const ScanTask& task, bool latest);
+  /// plan_first() for candidates in cells.
+  [[gnu::always_inline]] void plan_found(Slot i, const ScanResult& first, const Candidates& found) {
+    counts_.candidates += found.task.count;
+    const double planned = queue_[i].contact;
+    if (first.time > planned || first.time == kNever) return;
+    if (first.tied || first.time == planned || first.time == -kNever) [[unlikely]]
+      return offer_all({i, found.task.candidates, found.task.count, found.task.same});
+    queue_.plan_pair(i, first.time, found.packed[first.which]);
+  }
   void plan_first(const ScanTask& task, const ScanResult& first);
   [[gnu::noinline]] void offer_all(const ScanTask& task);  // seldom needed, and large
+  [[gnu::noinline]] void cross(Slot i, double now);
   double distance_left(Slot i) const;
   /// Whether the skin leaves room for another `max_displacement` at the border.
   bool border_fits() const { return lists_ && lists_->skin() >= 3 * max_displacement_; }

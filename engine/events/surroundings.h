@@ -3,13 +3,12 @@
 // The time until which the neighbourhood found for a sphere is valid: it leaves the region of its list, or its cell.
 // For lists this is a lower bound; it is never too late.
 
-#include <bit>
 #include <cmath>
 
 #include "engine/base/box.h"
 #include "engine/events/contact.h"
 #include "engine/events/flights.h"
-#include "engine/search/cell_grid.h"
+#include "engine/search/linked_cells.h"
 #include "engine/search/next_event.h"
 
 namespace carom {
@@ -41,8 +40,8 @@ void predict_leaving(NextEvent<D>& a, const Record<D>& r, const Flights<D>& flig
 
 /// predict_crossing() with a field.
 template <int D>
-void predict_crossing_in_field(NextEvent<D>& a, Slot i, const Flights<D>& flights, const Box<D>& box,
-                               const CellGrid<D>& grid, double now) {
+[[gnu::noinline]] void predict_crossing_in_field(NextEvent<D>& a, Slot i, const Flights<D>& flights, const Box<D>& box,
+                                                 const CellGrid<D>& grid, double now) {
   const Record<D> r = flights.at(i, now);
   a.update = kNever;
   for (int k = 0; k < D; ++k)
@@ -65,24 +64,13 @@ void predict_crossing_in_field(NextEvent<D>& a, Slot i, const Flights<D>& flight
 
 /// Sets a.update and a.face to the time at which sphere i leaves its cell and the face it crosses.
 template <int D>
-void predict_crossing(NextEvent<D>& a, Slot i, const Flights<D>& flights, const Box<D>& box, const CellGrid<D>& grid,
-                      double now) {
-  if (flights.field()) return predict_crossing_in_field(a, i, flights, box, grid, now);
+void predict_crossing(NextEvent<D>& a, Slot i, const Flights<D>& flights, const Box<D>& box,
+                      const LinkedCells<D>& cells, double now) {
+  if (flights.field()) return predict_crossing_in_field(a, i, flights, box, cells.grid(), now);
   const Record<D>& r = flights[i];
-  // Written without a branch, which would be unpredictable: nonnegative times are ordered like their bits.
-  std::uint64_t first = std::bit_cast<std::uint64_t>(kNever);
-  unsigned face = 0;
-  for (int k = 0; k < D; ++k) {
-    const unsigned up = static_cast<unsigned>(std::bit_cast<std::uint64_t>(r.v[k]) >> 63) ^ 1;
-    const std::int32_t c = a.where.cell.unwrapped[k] + static_cast<std::int32_t>(up);
-    double s = std::abs(grid.face(k, c) - r.x[k]) / std::abs(r.v[k]);  // 0/0, a NaN, sorts last
-    if (!box.periodic(k) && (c <= 0 || c >= grid.count(k))) s = kNever;
-    const std::uint64_t bits = std::bit_cast<std::uint64_t>(s);
-    face = bits < first ? 2 * static_cast<unsigned>(k) + up : face;
-    first = bits < first ? bits : first;
-  }
-  a.update = std::max(r.t + std::bit_cast<double>(first), now);
-  a.face = static_cast<std::uint8_t>(face);
+  const Crossing next = cells.crossing(r, a.where.cell);
+  a.update = std::max(r.t + next.after, now);
+  a.face = static_cast<std::uint8_t>(next.face);
 }
 
 }  // namespace carom

@@ -12,11 +12,20 @@
 
 namespace carom {
 
-/// The candidates that a search found, padded with the sphere itself to a multiple of 8.
+/// The candidates that a search found, padded with the sphere itself to a multiple of 8, and working memory.
 struct Candidates {
-  std::vector<std::uint32_t> packed = std::vector<std::uint32_t>(64);
-  unsigned count = 0;
-  unsigned same = 0;  ///< the first `same` candidates are in the same box
+  Candidates() { grow(64); }
+  Candidates(const Candidates&) = delete;
+  Candidates& operator=(const Candidates&) = delete;
+  void grow(std::size_t room) {
+    packed.resize(room);
+    task.candidates = packed.data();
+    task.room = static_cast<unsigned>(room);
+  }
+
+  CellsTask task;
+  HeadRows rows;
+  std::vector<std::uint32_t> packed;
 };
 
 template <int D>
@@ -27,14 +36,15 @@ class LinkedCells {
   /// Makes cells of edge at least `smallest` for spheres in `slots` slots.
   LinkedCells(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, double smallest,
               const Extent<D>& extent, std::size_t slots)
-      : packing_(packing),
-        kernels_(kernels),
-        grid_(box, smallest, extent, kCellsAParticle),
-        link_(slots),
-        here_(packing.pack(0, 0)) {
+      : packing_(packing), kernels_(kernels), grid_(box, smallest, extent, kCellsAParticle), link_(slots) {
     for (int k = 0; k < D; ++k) {
       one_[k] = 1 << (packing.field_bits * k);
       periodic_[k] = box.periodic(k);
+      constexpr double kInfinity = std::numeric_limits<double>::infinity();
+      faces_.origin[k] = grid_.face(k, 0);
+      faces_.edge[k] = grid_.edge(k);
+      faces_.lowest[k] = periodic_[k] ? -kInfinity : 0;  // the outermost cells have no outer face
+      faces_.highest[k] = periodic_[k] ? kInfinity : grid_.count(k);
     }
     lay_out();
   }
@@ -62,23 +72,24 @@ class LinkedCells {
 
   /// Starts to fetch what cross() and searches read of a sphere.
   void prefetch(Slot i) const { prefetch_line(&link_[i]); }
-  /// Starts to fetch the cells of around() or, if `step` is not 0, of ahead() after the next step along the axis.
-  void prefetch(const Place& place, int axis, int step) const {
-    const HeadsTask task = step == 0 ? rows(place, D, 0) : rows_beyond(place, axis, step);
-    for (unsigned a = 0; a < task.steps[0]; ++a)
-      for (unsigned b = 0; b < task.steps[1]; ++b) {
-        const std::uint32_t* const row = task.first + task.step[0][a].offset + task.step[1][b].offset;
-        prefetch_line(row);
-        prefetch_line(row + 3);
-      }
+  /// Starts to fetch the cells of scan_around() or, if `step` is not 0, of scan_ahead() after the next step along the
+  /// axis; `found` is working memory.
+  void prefetch(const Place& place, int axis, int step, Candidates& found) const {
+    const CellsTask& task = found.task;
+    aim_beyond(place, axis, step, found);
+    for (unsigned r = 0; r < task.rows->count; ++r) {
+      const std::uint32_t* const row = task.first + task.rows->step[r].offset;
+      prefetch_line(row);
+      prefetch_line(row + 3);
+    }
   }
   /// Starts to fetch the links of the first spheres of these cells, and calls fetch(slot) for each first sphere.
-  /// `found` is working memory.
   template <class Fetch>
   void prefetch_spheres(const Place& place, int axis, int step, Candidates& found, Fetch&& fetch) const {
-    const HeadsTask task = step == 0 ? rows(place, D, 0) : rows_beyond(place, axis, step);
-    const unsigned n = kernels_.heads(task, found.packed.data()).count;
-    for (unsigned q = 0; q < n; ++q) {
+    aim_beyond(place, axis, step, found);
+    if (found.task.rows->count == 0) return;
+    kernels_.heads(found.task);
+    for (unsigned q = 0; q < found.task.count; ++q) {
       const Slot j = packing_.slot(found.packed[q] & ~kMoreInCell);
       fetch(j);
       if ((found.packed[q] & kMoreInCell) != 0) prefetch(j);
@@ -144,29 +155,71 @@ class LinkedCells {
     collect(grid_.cell(low), grid_.cell(high), found);
   }
 
-  /// Finds all spheres in the sphere's cell and in the cells around it, the sphere included.
-  void around(Slot self, const Place& place, Candidates& found) const { search(self, place, D, 0, found); }
+  /// Finds all spheres in the sphere's cell and in the cells around it, and the first contact with them. `latest` as in
+  /// ScanKernels.
+  ScanResult scan_around(const ScanSetting& setting, Slot self, const Place& place, bool latest,
+                         Candidates& found) const {
+    aim(place, kAround, found);
+    found.task.own = packing_.pack(self, place.boxes);  // if it is alone in its cell
+    return search(setting, self, place, latest, found);
+  }
 
-  /// Finds all spheres in the cells that became neighbours when the sphere crossed along an axis.
-  void ahead(Slot self, const Place& place, int axis, int step, Candidates& found) const {
-    search(self, place, axis, step, found);
+  /// Finds all spheres in the cells that became neighbours when the sphere crossed a face, and the first contact with
+  /// them.
+  ScanResult scan_ahead(const ScanSetting& setting, Slot self, const Place& place, unsigned face,
+                        Candidates& found) const {
+    aim(place, face, found);
+    if (found.task.rows->count == 0) {  // beyond a wall
+      found.task.count = 0;
+      return {std::numeric_limits<double>::infinity(), 0, false};
+    }
+    return search(setting, self, place, false, found);
+  }
+
+  /// Where a sphere with this record leaves its cell if it flies straight.
+  Crossing crossing(const Record<D>& r, const Place& place) const {
+    return kernels_.crossing[D - 2](faces_, reinterpret_cast<const double*>(&r), place.unwrapped);
   }
 
  private:
-  struct Link {
-    std::uint32_t next;  // the next sphere in the cell, coded as in first_
-    std::int32_t boxes;  // image of the sphere's cell, as a linear image
-  };
-  static constexpr std::uint32_t kMoreInCell = std::uint32_t{1} << 31;  ///< flag: another sphere of the cell follows
   static constexpr double kCellsAParticle = 8;
   static constexpr std::int32_t kCellsAround = 3;  // margin around the cells of confine()
+
+  static constexpr unsigned kKinds = 2 * D - 1;  // of rows: around, and one step back or forth along an axis
+  static constexpr unsigned kAround = 2 * D;     // instead of a face
+  /// The cells to search ahead of a face, or around.
+  struct Region {
+    alignas(16) std::uint32_t wanted[4];  // as in CellsTask
+    std::ptrdiff_t shift;                 // from the sphere's cell to the first one of its row
+    unsigned kind;                        // of rows
+  };
+  static constexpr std::array<Region, 2 * D + 1> kRegions = [] {
+    std::array<Region, 2 * D + 1> regions{};
+    for (unsigned face = 0; face <= kAround; ++face) {
+      const bool in_row = face / 2 == D - 1;  // one cell of each row, not three
+      for (unsigned l = 0; l < (in_row ? 1 : 3); ++l) regions[face].wanted[l] = ~0u;
+      regions[face].shift = face == kAround - 1 ? 1 : -1;
+      regions[face].kind = face < 2 * (D - 1) ? face + 1 : 0;
+    }
+    return regions;
+  }();
+
+  /// A step to a cell along one axis.
+  struct Step {
+    std::ptrdiff_t offset;  // is added to the number of the cell
+    std::uint32_t away;     // the boxes that it crosses, as in HeadStep
+    std::uint32_t edges;    // is added to the index in rows_: whether the cell is the first or the last one
+  };
 
   std::uint32_t shifted(std::int32_t boxes) const { return static_cast<std::uint32_t>(boxes) << packing_.slot_bits; }
 
   std::size_t index(const Place& place) const {
     std::ptrdiff_t at = place.wrapped[D - 1] + 1;
-    for (int k = 0; k + 1 < D; ++k) at += steps_[k][place.wrapped[k] + 1u].offset;
+    for (int k = 0; k + 1 < D; ++k) at += step(place, k).offset;
     return static_cast<std::size_t>(at);
+  }
+  const Step& step(const Place& place, int axis) const {
+    return *(steps_[static_cast<std::size_t>(axis)].data() + place.wrapped[axis] + 1);
   }
   static Cell<D> wrapped(const Place& place) {
     Cell<D> cell;
@@ -184,11 +237,55 @@ class LinkedCells {
       steps_[k].clear();
       for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
         const std::int32_t count = grid_.count(k), boxes = c < 0 ? -1 : c < count ? 0 : 1;
-        steps_[k].push_back({cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k])});
+        const unsigned edges = (c == 0 ? 1u : 0u) + (c == count - 1 ? 2u : 0u);
+        steps_[k].push_back(
+            {cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k]), kKinds * (edges << 2 * k)});
       }
       cells *= grid_.rows(k);
     }
     first_.assign(static_cast<std::size_t>(cells + 3), kEmpty);
+    rows_.clear();
+    if (confined_) return;  // rows are not at equal distances
+    rows_.resize(std::size_t{kKinds} << 2 * (D - 1));
+    Place place{};
+    for (place.wrapped[0] = 0; place.wrapped[0] < grid_.count(0); ++place.wrapped[0])
+      for (place.wrapped[1] = 0; place.wrapped[1] < (D == 3 ? grid_.count(1) : 1); ++place.wrapped[1])
+        if (HeadRows* const rows = &rows_[edges(place)]; rows->count == 0)
+          for (unsigned kind = 0; kind < kKinds; ++kind) {
+            const int axis = kind == 0 ? D : (static_cast<int>(kind) - 1) / 2;
+            make_rows(place, axis, kind % 2 == 0 ? 1 : -1, rows[kind]);
+          }
+  }
+  unsigned edges(const Place& place) const {
+    unsigned edges = 0;
+    for (int k = 0; k + 1 < D; ++k) edges += step(place, k).edges;
+    return edges;
+  }
+  /// Sets the rows of the cells around a cell, or only of those that are `step` cells away along an axis.
+  void make_rows(const Place& place, int axis, int step, HeadRows& rows) const {
+    int low[2]{}, high[2]{};
+    const Step* own[2]{};
+    for (int k = 0; k < D - 1; ++k) {
+      const int here = place.wrapped[k];
+      low[k] = k == axis ? step : -1, high[k] = k == axis ? step : 1;
+      if (!periodic_[k]) {  // no cells exist beyond walls
+        low[k] = std::max(low[k], -here);
+        high[k] = std::min(high[k], grid_.count(k) - 1 - here);
+      }
+      own[k] = &this->step(place, k);
+    }
+    rows.count = 0;
+    const auto add = [&](int a, int b) {
+      HeadStep& to = rows.step[rows.count++];
+      to.offset = own[0][a].offset - own[0]->offset;
+      std::uint32_t away = own[0][a].away;
+      if (D == 3) to.offset += own[1][b].offset - own[1]->offset, away += own[1][b].away;
+      std::fill_n(to.away, 4, away);
+    };
+    for (int a = low[0]; a <= high[0]; ++a)
+      for (int b = low[1]; b <= high[1]; ++b)
+        if (a != 0 || b != 0) add(a, b);
+    if (low[0] <= 0 && high[0] >= 0 && low[1] <= 0 && high[1] >= 0) add(0, 0);
   }
 
   /// Stores all cells separately from now on, because a sphere is outside the confined cells.
@@ -224,45 +321,60 @@ class LinkedCells {
     if (z == last) first_[at - row] = first == kEmpty ? first : first + box;
   }
 
-  /// The cells around a cell, or only the cells one step away along an axis.
-  HeadsTask rows(const Place& place, int axis, int step) const {
-    static constexpr HeadStep kNone{0, 0};
-    const bool in_row = axis == D - 1;  // one cell of each row, not three
-    HeadsTask task{.first = first_.data() + place.wrapped[D - 1] + (in_row ? 1 + step : 0),
-                   .step = {&kNone, &kNone},
-                   .steps = {1, 1},
-                   .wanted = in_row ? 1u : 7u,
-                   .away = shifted(place.boxes),
-                   .here = here_};
-    for (int k = 0; k < D - 1; ++k) {
-      const int here = place.wrapped[k];
-      int low = k == axis ? step : -1, high = k == axis ? step : 1;
-      if (!periodic_[k]) {  // no cells exist beyond walls
-        low = std::max(low, -here);
-        high = std::min(high, grid_.count(k) - 1 - here);
-      }
-      task.step[k] = steps_[k].data() + here + 1 + low;
-      task.steps[k] = static_cast<unsigned>(std::max(high - low + 1, 0));
-    }
-    return task;
+  /// Sets a task to the cells ahead of a face, or around.
+  void aim(const Place& place, unsigned face, Candidates& found) const {
+    const Region& region = kRegions[face];
+    if (confined_) [[unlikely]]
+      return aim_at(place, face == kAround ? D : static_cast<int>(face / 2), face % 2 == 1 ? 1 : -1, region, found);
+    set(place, region, &rows_[edges(place) + region.kind], found.task);
   }
-  /// The cells that the next step along an axis will make neighbours; none if they are beyond the end of the box.
-  HeadsTask rows_beyond(const Place& place, int axis, int step) const {
+  /// Sets a task to rows that are not in rows_; `axis` and `step` as in make_rows().
+  [[gnu::noinline]] void aim_at(const Place& place, int axis, int step, const Region& region, Candidates& found) const {
+    make_rows(place, axis, step, found.rows);
+    set(place, region, &found.rows, found.task);
+  }
+  /// The cells that the next step along an axis will make neighbours; none if they are beyond the end of the box. If
+  /// `step` is 0: the cells around.
+  void aim_beyond(const Place& place, int axis, int step, Candidates& found) const {
+    if (step == 0) return aim(place, kAround, found);
     const int to = place.wrapped[axis] + 2 * step;
-    if (to < -1 || to > grid_.count(axis)) return {};
-    return rows(place, axis, 2 * step);
+    const unsigned face = static_cast<unsigned>(2 * axis + (step > 0 ? 1 : 0));
+    if (to < -1 || to > grid_.count(axis)) {
+      found.rows.count = 0;
+      found.task.rows = &found.rows;
+    } else if (axis == D - 1) {
+      aim(place, face, found);
+      found.task.first += step;
+    } else {
+      aim_at(place, axis, 2 * step, kRegions[face], found);
+    }
+  }
+  void set(const Place& place, const Region& region, const HeadRows* rows, CellsTask& task) const {
+    task.first = first_.data() + index(place) + region.shift;
+    task.rows = rows;
+    task.wanted = region.wanted;
+    task.link = link_.data();
+    task.away = shifted(place.boxes);
+    task.own = kEmpty;
   }
 
-  /// Finds the candidates in the cells of rows().
-  void search(Slot self, const Place& place, int axis, int step, Candidates& found) const {
-    const Heads heads = kernels_.heads(rows(place, axis, step), found.packed.data());
-    found.count = heads.count;
-    std::uint32_t any = heads.any;
-    if ((any & kMoreInCell) != 0) any |= follow(found);
-    const bool elsewhere = (any & ~kMoreInCell) >> packing_.slot_bits != 0;
-    found.same = elsewhere ? 0 : found.count;
-    if (elsewhere && 2 * widest_ + 1 > packing_.largest()) check(place, found);
-    std::fill_n(found.packed.data() + found.count, 8, packing_.pack(self, 0));  // follow() overwrites padding
+  /// Executes a task; `place` is that of the sphere.
+  [[gnu::always_inline]] ScanResult search(const ScanSetting& setting, Slot self, const Place& place, bool latest,
+                                           Candidates& found) const {
+    CellsTask& task = found.task;
+    task.self = packing_.pack(self, 0);
+    const ScanResult first = kernels_.search[D - 2](setting, task, latest);
+    if (task.count + 8 >= task.room) [[unlikely]]
+      return search_again(setting, self, place, latest, found);
+    if (task.same < task.count && 2 * widest_ + 1 > packing_.largest()) [[unlikely]]
+      check(place, found);
+    return first;
+  }
+
+  [[gnu::noinline]] ScanResult search_again(const ScanSetting& setting, Slot self, const Place& place, bool latest,
+                                            Candidates& found) const {
+    found.grow(2 * found.packed.size());
+    return search(setting, self, place, latest, found);
   }
 
   /// Appends all spheres in the cells between two corners; `at` and `away` are the sums over the axes before `axis`.
@@ -288,28 +400,10 @@ class LinkedCells {
     }
   }
 
-  /// Appends the later spheres of all cells whose first sphere has been found.
-  std::uint32_t follow(Candidates& found) const {
-    std::uint32_t any = 0;
-    for (unsigned q = 0; q < found.count; ++q) {
-      const std::uint32_t candidate = found.packed[q];
-      if ((candidate & kMoreInCell) == 0) continue;
-      found.packed[q] = candidate & ~kMoreInCell;
-      const Slot slot = packing_.slot(candidate);
-      // The box that was subtracted from the candidate is subtracted from the next one, too.
-      const Link& link = link_[slot];
-      const std::uint32_t box = packing_.pack(slot, link.boxes) - (candidate & ~kMoreInCell), next = link.next - box;
-      any |= next ^ here_;
-      if (found.count + 9u > found.packed.size()) found.packed.resize(2 * found.packed.size());
-      found.packed[found.count++] = next;
-    }
-    return any;
-  }
-
   /// Checks every candidate, because spheres have moved so many boxes that a difference of images may overflow.
-  void check(const Place& place, const Candidates& found) const {
+  [[gnu::noinline]] void check(const Place& place, const Candidates& found) const {
     const Image<D> own = packing_.image(packing_.pack(0, place.boxes));
-    for (unsigned q = 0; q < found.count; ++q) {
+    for (unsigned q = 0; q < found.task.count; ++q) {
       const Image<D> theirs = packing_.image(packing_.pack(0, link_[packing_.slot(found.packed[q])].boxes));
       for (int k = 0; k < D; ++k)
         if (std::abs(theirs[k] - own[k]) + 1 > packing_.largest()) throw_too_far();  // 1: seen through a face
@@ -319,15 +413,16 @@ class LinkedCells {
   Packing<D> packing_;
   const ScanKernels& kernels_;
   CellGrid<D> grid_;
-  std::array<std::vector<HeadStep>, D - 1> steps_;  // to the cells −1 … count along each axis but the last
-  std::int32_t one_[D];                             // one box along each axis, as a linear image
+  std::array<std::vector<Step>, D - 1> steps_;  // to the cells −1 … count along each axis but the last
+  std::int32_t one_[D];                         // one box along each axis, as a linear image
   bool periodic_[D];
+  CellFaces faces_;
+  std::vector<HeadRows> rows_;  // by edges() and kind; none if confined
   bool confined_ = false;
   // By cell, in rows along the last axis: the first sphere with the image of its cell, and kMoreInCell; or kEmpty.
   PageVector<std::uint32_t> first_;
-  PageVector<Link> link_;    // by slot
-  std::uint32_t here_;       // a candidate in the same box, without its slot
-  std::int32_t widest_ = 0;  // the farthest box that a sphere has reached
+  PageVector<CellLink> link_;  // by slot
+  std::int32_t widest_ = 0;    // the farthest box that a sphere has reached
 };
 
 }  // namespace carom

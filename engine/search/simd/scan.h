@@ -69,24 +69,50 @@ struct NearTask {
   float limit_squared;
 };
 
-/// A step to a linked cell (linked_cells.h) along one axis.
-struct HeadStep {
+/// A step to a row of linked cells (linked_cells.h).
+struct alignas(32) HeadStep {
+  std::uint32_t away[4];  ///< the boxes that the step crosses, shifted to the image bits of a candidate: four times
   std::ptrdiff_t offset;  ///< is added to the number of the cell
-  std::uint32_t away;     ///< the boxes that the step crosses, shifted to the image bits of a candidate
 };
 
-/// Rows of cells whose heads are to be read: heads are candidates with the images of their cells, or kEmpty.
-struct HeadsTask {
-  const std::uint32_t* first;  ///< the first cell of the row without any step
-  const HeadStep* step[2];     ///< steps to the rows
-  unsigned steps[2];
-  unsigned wanted;     ///< one bit for each of the first three cells of a row; four are read
-  std::uint32_t away;  ///< is added to all steps
-  std::uint32_t here;  ///< the image bits of a candidate in the same box
+/// Steps from a cell's own row to other rows; the own row is the last one if it is among them.
+struct HeadRows {
+  HeadStep step[9];
+  unsigned count;  ///< at least 1, or 0 beyond a wall
 };
-struct Heads {
-  unsigned count;
-  std::uint32_t any;  ///< all bits in which a head differs from `here`
+
+/// A later sphere of a linked cell.
+struct CellLink {
+  std::uint32_t next;  ///< the next sphere in the cell, coded like a head
+  std::int32_t boxes;  ///< image of the sphere's cell, as a linear image
+};
+inline constexpr std::uint32_t kMoreInCell = std::uint32_t{1}
+                                             << 31;  ///< flag of a head: another sphere of the cell follows
+
+/// Linked cells to search, and what is found there. Heads are candidates with the images of their cells, or kEmpty.
+struct CellsTask {
+  const std::uint32_t* first = nullptr;   ///< the first cell of the sphere's row
+  const HeadRows* rows = nullptr;         ///< rows to read: four cells of each
+  const std::uint32_t* wanted = nullptr;  ///< a mask of these four cells; the fourth one is never wanted
+  const CellLink* link = nullptr;         ///< by slot
+  std::uint32_t away = 0;                 ///< the boxes of the sphere, as in HeadStep
+  std::uint32_t self = 0;                 ///< the sphere as a candidate in its own box
+  std::uint32_t own = kEmpty;             ///< a head that is left out of the last row, or kEmpty
+
+  std::uint32_t* candidates = nullptr;  ///< the spheres found, padded with the sphere
+  unsigned room = 0;                    ///< of the array; if it is less than count + 8, provide more and search again
+  unsigned count = 0;
+  unsigned same = 0;  ///< as in ScanTask
+};
+
+/// The faces of cells: cell c along axis k begins at origin[k] + c·edge[k] if lowest[k] < c < highest[k]; elsewhere,
+/// and on axes that do not exist, there is no face.
+struct CellFaces {
+  double origin[4]{}, edge[4]{}, lowest[4]{}, highest[4]{};
+};
+struct Crossing {
+  double after;   ///< time from the record to the crossing
+  unsigned face;  ///< as in NextEvent
 };
 
 /// The kernels of one vector width.
@@ -105,8 +131,12 @@ struct ScanKernels {
   /// the candidates.
   unsigned (*compare)(const std::uint32_t* list, unsigned length, const std::uint32_t* candidates, unsigned n,
                       std::uint32_t* fresh, std::uint64_t* kept);
-  /// Writes the first sphere of each cell, as seen from the sphere of the task; the array needs space for four more.
-  Heads (*heads)(const HeadsTask&, std::uint32_t* candidates);
+  /// Writes the first sphere of each cell, as seen from the box of the sphere, with kMoreInCell; sets `count`.
+  void (*heads)(CellsTask&);
+  /// Finds all spheres in cells and the first contact with them, by dimension − 2. `latest` as for `scan`.
+  ScanResult (*search[2])(const ScanSetting&, CellsTask&, bool latest);
+  /// Finds where a sphere with this record leaves its cell, by dimension − 2; four numbers of the cell are read.
+  Crossing (*crossing[2])(const CellFaces&, const double* record, const std::int32_t* cell);
 };
 
 }  // namespace carom

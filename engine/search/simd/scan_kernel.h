@@ -56,8 +56,9 @@ inline double smallest(Double<W> x) {
 constexpr unsigned kBlock = 64;  // candidates per block: their times are stored until the smallest is known
 
 /// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: ∞ or NaN for
-/// no contact; −∞ if the two overlap and approach. Returns the smallest time in each lane.
-template <int D, int W, bool latest, bool plain>
+/// no contact; −∞ if the two overlap and approach. Returns the smallest time in each lane. `fresh` states that the
+/// candidates have just been written by stores that overlap: a load of several would wait for all of these.
+template <int D, int W, bool latest, bool plain, bool fresh = false>
 inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting& s, std::uint32_t self,
                                                               const std::uint32_t* candidates, unsigned n,
                                                               unsigned same, double* times) {
@@ -91,7 +92,11 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       }
     }
     if constexpr (shifted) {
-      const auto code = load<typename Width<W>::Unsigned>(some);
+      typename Width<W>::Unsigned code;
+      if constexpr (fresh)
+        for (int l = 0; l < W; ++l) code[l] = some[l];
+      else
+        code = load<decltype(code)>(some);
       const unsigned mask = (1u << s.field_bits) - 1, zero = 1u << (s.field_bits - 1);
       for (int k = 0; k < D; ++k) {
         const auto image = (typename Width<W>::Int)((code >> (s.slot_bits + k * s.field_bits) & mask) - zero);
@@ -288,6 +293,7 @@ typedef float Floats __attribute__((vector_size(4 * kInts)));
 }
 
 using Quad = Width<4>::Unsigned;
+using Octet = Width<8>::Unsigned;
 
 /// Moves the elements that a mask selects to the front of a vector.
 inline Quad pack(Quad four, unsigned mask) {
@@ -309,28 +315,121 @@ inline Quad pack(Quad four, unsigned mask) {
 #endif
 }
 
-[[maybe_unused]] Heads heads(const HeadsTask& task, std::uint32_t* candidates) {
+#if defined(__AVX2__)
+/// Moves the elements that a mask selects to the front of a vector. Elements 3 and 7 are never selected.
+inline Octet pack(Octet eight, unsigned mask) {
+  struct Orders {
+    unsigned char of[128][8];
+  };
+  static constexpr Orders orders = [] {
+    Orders all{};
+    for (unsigned chosen = 0; chosen < 128; ++chosen)
+      for (unsigned char l = 0, to = 0; l < 8; ++l)
+        if ((chosen >> l & 1) != 0) all.of[chosen][to++] = l;
+    return all;
+  }();
+  const __m256i order = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i*)orders.of[mask]));
+  return (Octet)_mm256_permutevar8x32_epi32((__m256i)eight, order);
+}
+#endif
+inline Octet join(Quad a, Quad b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7); }
+
+/// Writes the heads, as seen from the box of the sphere, and pads them with the sphere. Returns their end, and all bits
+/// in which they differ from the sphere in `any`.
+inline std::uint32_t* read_heads(const CellsTask& task, std::uint32_t& any) {
   const std::uint32_t* const first = task.first;
-  const HeadStep* const inner = task.step[1];
-  const unsigned steps = task.steps[1];
-  const Quad here = Quad{} + task.here;
-  Quad wanted{}, any{};
-  for (unsigned l = 0; l < 3; ++l) wanted[l] = (task.wanted >> l & 1) != 0 ? ~0u : 0u;
-  std::uint32_t* end = candidates;
-  for (const HeadStep *outer = task.step[0], *const last = outer + task.steps[0]; outer < last; ++outer) {
-    const std::uint32_t* const row = first + outer->offset;
-    const std::uint32_t box = task.away + outer->away;
-    for (unsigned b = 0; b < steps; ++b) {
-      const Quad four = load<Quad>(row + inner[b].offset);
-      const Quad filled = ~(Quad)(four == kEmpty) & wanted;
-      const unsigned mask = bits(filled);
-      const Quad seen = four - (box + inner[b].away);
-      any |= (seen ^ here) & filled;
-      store(end, pack(seen, mask));
-      end += __builtin_popcount(mask);
-    }
+  const Quad wanted = load<Quad>(task.wanted), self = Quad{} + task.self, away = Quad{} + task.away;
+  std::uint32_t* end = task.candidates;
+  const HeadStep* row = task.rows->step;
+  unsigned rows = task.rows->count - 1;  // and the last one
+  Quad differ{};
+#if defined(__AVX2__)
+  Octet differ_in_two{};
+  for (; rows >= 2; rows -= 2, row += 2) {
+    const Octet heads = join(load<Quad>(first + row[0].offset), load<Quad>(first + row[1].offset));
+    const Octet filled = join(wanted, wanted) & ~(Octet)(heads == kEmpty);
+    const Octet seen = heads - join(load<Quad>(row[0].away), load<Quad>(row[1].away)) - join(away, away);
+    differ_in_two |= (seen ^ join(self, self)) & filled;
+    const unsigned mask = bits(filled);
+    store(end, pack(seen, mask));
+    end += __builtin_popcount(mask);
   }
-  return {static_cast<unsigned>(end - candidates), any[0] | any[1] | any[2] | any[3]};
+  differ = __builtin_shufflevector(differ_in_two, differ_in_two, 0, 1, 2, 3) |
+           __builtin_shufflevector(differ_in_two, differ_in_two, 4, 5, 6, 7);
+#endif
+  const auto read = [&](std::uint32_t left_out) __attribute__((always_inline)) {
+    const Quad heads = load<Quad>(first + row->offset);
+    const Quad filled = wanted & ~((Quad)(heads == kEmpty) | (Quad)(heads == left_out));
+    const Quad seen = heads - load<Quad>(row->away) - away;
+    differ |= (seen ^ self) & filled;
+    const unsigned mask = bits(filled);
+    store(end, pack(seen, mask));
+    end += __builtin_popcount(mask);
+  };
+  for (; rows > 0; --rows, ++row) read(kEmpty);
+  read(task.own);
+  store(end, self);
+  store(end + 4, self);
+  differ |= __builtin_shufflevector(differ, differ, 2, 3, 0, 1);
+  any = differ[0] | differ[1];
+  return end;
+}
+
+[[maybe_unused]] void heads(CellsTask& task) {
+  std::uint32_t any;
+  task.count = static_cast<unsigned>(read_heads(task, any) - task.candidates);
+}
+
+/// Appends the later spheres of all cells whose first sphere has been found, and the padding, as far as there is room.
+__attribute__((noinline)) std::uint32_t* follow(const ScanSetting& s, const CellsTask& task, std::uint32_t* end,
+                                                std::uint32_t& any) {
+  const std::uint32_t here = task.self & ~s.slot_mask;
+  const std::uint32_t* const room = task.candidates + task.room - 8;
+  for (std::uint32_t* at = task.candidates; at < end; ++at) {
+    if ((*at & kMoreInCell) == 0) continue;
+    *at &= ~kMoreInCell;
+    // The box that was subtracted from the candidate is subtracted from the next one, too.
+    const CellLink& link = task.link[*at & s.slot_mask];
+    const std::uint32_t box = here + (static_cast<std::uint32_t>(link.boxes) << s.slot_bits) - (*at & ~s.slot_mask);
+    any |= (link.next - box) ^ here;
+    if (end == room) break;
+    *end++ = link.next - box;
+  }
+  for (int l = 0; l < 8; ++l) end[l] = task.self;
+  return end;
+}
+
+template <int D, int W>
+ScanResult search(const ScanSetting& s, CellsTask& task, bool latest) {
+  std::uint32_t any;
+  std::uint32_t* end = read_heads(task, any);
+  if ((any & kMoreInCell) != 0) [[unlikely]]
+    end = follow(s, task, end, any);
+  task.count = static_cast<unsigned>(end - task.candidates);
+  task.same = (any & ~kMoreInCell) >> s.slot_bits == 0 ? task.count : 0;
+  const std::uint32_t self = task.self & s.slot_mask;
+  if (task.count == 0) return {__builtin_inf(), 0, false};
+  if (!s.plain || task.count > kBlock) return scan<D, W>(s, {self, task.candidates, task.count, task.same}, latest);
+  alignas(64) double times[kBlock];
+  const auto best =
+      latest ? contact_times<D, W, true, true, true>(s, self, task.candidates, task.count, task.same, times)
+             : contact_times<D, W, false, true, true>(s, self, task.candidates, task.count, task.same, times);
+  return first_of<W>(times, task.count, best);
+}
+
+template <int D>
+Crossing crossing(const CellFaces& faces, const double* record, const std::int32_t* cell) {
+  const Four x = load<Four>(record), v = load<Four>(record + D);
+  const IntegerOf<Four> down = v < 0.0;
+  const Four c = __builtin_convertvector(load<Width<4>::Int>(cell), Four) + (down ? Four{} : all<Four>(1));
+  const Four face = load<Four>(faces.origin) + c * load<Four>(faces.edge);
+  const Four none = all<Four>(__builtin_inf());
+  Four after = elementary::abs(face - x) / elementary::abs(v);
+  after = ((c > load<Four>(faces.lowest)) & (c < load<Four>(faces.highest))) ? after : none;
+  after = elementary::min(after, none);  // instead of 0/0
+  const double first = smallest<4>(after);
+  const auto axis = static_cast<unsigned>(__builtin_ctz(bits(after == first)));
+  return {first, 2 * axis + (~bits(down) >> axis & 1)};
 }
 
 }  // namespace

@@ -315,6 +315,49 @@ TEST(Scan, SeesAnOverlapHoweverSlowlyItGrows) {
   }
 }
 
+/// Random spheres in cells, with walls across the second axis.
+template <int D>
+void expect_first_faces() {
+  constexpr std::int32_t kCount = 5;
+  const double infinity = kNever;
+  const CellFaces faces{.origin = {-1, 0, 2},
+                        .edge = {1.1, 1.3, 1.7},
+                        .lowest = {-infinity, 0, D == 3 ? -infinity : 0},
+                        .highest = {infinity, kCount, D == 3 ? infinity : 0}};
+  RandomStream random(5, RandomPurpose::position, 1);
+  for (int trial = 0; trial < 1000; ++trial) {
+    Record<D> r{};
+    CellPlace<D> place{};
+    double first = kNever;
+    unsigned face = 0;
+    for (int k = 0; k < D; ++k) {
+      const double inside = trial % 7 == k ? 0 : random.uniform();  // on a face, too
+      const std::int32_t cell = static_cast<std::int32_t>(random.uniform() * kCount) - (k == 1 ? 0 : kCount / 2);
+      place.unwrapped[k] = cell;
+      r.x[k] = faces.origin[k] + (cell + inside) * faces.edge[k];
+      r.v[k] = trial % 5 == k ? 0 : random.uniform() - 0.5;
+      const unsigned up = r.v[k] < 0 ? 0 : 1;
+      const std::int32_t number = cell + static_cast<std::int32_t>(up);
+      if (k == 1 && (number == 0 || number == kCount)) continue;
+      const double after = std::abs((faces.origin[k] + number * faces.edge[k] - r.x[k]) / r.v[k]);
+      if (after < first) first = after, face = 2 * static_cast<unsigned>(k) + up;
+    }
+    const Crossing found = crossing<D>(faces, reinterpret_cast<const double*>(&r), place.unwrapped);
+    const Crossing widest =
+        widest_kernels<ScanKernels>().crossing[D - 2](faces, reinterpret_cast<const double*>(&r), place.unwrapped);
+    EXPECT_EQ(found.after, first) << trial;
+    EXPECT_EQ(widest.after, first) << trial;
+    if (first == kNever) continue;
+    EXPECT_EQ(found.face, face) << trial;
+    EXPECT_EQ(widest.face, face) << trial;
+  }
+}
+
+TEST(Scan, FindsTheFaceThroughWhichASphereLeavesItsCell) {
+  expect_first_faces<3>();
+  expect_first_faces<2>();
+}
+
 /// Expects that all images up to the farthest are restored; returns the farthest.
 template <int D>
 std::int32_t room_for_images(std::size_t slots, std::size_t particles) {
