@@ -106,7 +106,7 @@ class CellGrid {
           if (Step to; step(k, c + m, to)) row[static_cast<std::size_t>(wrapped(k, c + m))] = 1;
       rows_[k] = 0;
       for (std::int32_t& r : row) r = r != 0 ? rows_[k]++ : -1;
-      if (rows_[k] == count_[k]) row.clear();
+      if (rows_[k] + 1 >= count_[k]) row.clear();  // the row for all others would save nothing
       if (!row.empty()) std::replace(row.begin(), row.end(), -1, rows_[k]);
     }
     lay_out();
@@ -126,7 +126,7 @@ class CellGrid {
   std::int32_t row(int axis, std::int32_t c) const {
     return row_[axis].empty() ? c : row_[axis][static_cast<std::size_t>(c)];
   }
-  std::int32_t rows(int axis) const { return row_[axis].empty() ? count_[axis] : rows_[axis] + 1; }
+  std::int32_t rows(int axis) const { return row_[axis].empty() ? count_[axis] : rows_[axis] + 1; }  // fewer: confined
 
   /// The number of boxes between an unwrapped cell and the box that holds the origin.
   std::int32_t boxes(int axis, std::int32_t c) const {

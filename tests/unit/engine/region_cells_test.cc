@@ -122,5 +122,24 @@ TEST(RegionCells, AreStoredAroundGivenPlacesOnly) {
   EXPECT_GT(c.expected, 200u);
 }
 
+/// A grid that leaves out one row would need a row for what is left out, so it stores all rows in their order.
+TEST(CellGrid, StoresFewerRowsOrAllOfThemInOrder) {
+  Box<3> box;
+  box.edges.setConstant(10);
+  box.boundary.fill(Boundary::periodic);
+  Extent<3> extent(1000, Vec<3>::Zero(), box.edges);
+  for (const int covered : {7, 8, 9, 10}) {
+    CellGrid<3> grid(box, 1, extent, 8);
+    ASSERT_EQ(grid.count(0), 10);
+    std::vector<Vec<3>> places;
+    for (int c = 0; c < covered; ++c) places.push_back(Vec<3>::Constant(c + 0.5));
+    grid.confine(places, 0, 2);
+    for (const int axis : {0, 1}) {
+      EXPECT_EQ(grid.rows(axis), covered < 9 ? covered + 1 : 10) << covered;
+      for (int c = 0; grid.rows(axis) == 10 && c < 10; ++c) EXPECT_EQ(grid.row(axis, c), c) << covered;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace carom
