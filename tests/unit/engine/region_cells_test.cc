@@ -129,7 +129,7 @@ TEST(CellGrid, StoresFewerRowsOrAllOfThemInOrder) {
   box.boundary.fill(Boundary::periodic);
   Extent<3> extent(1000, Vec<3>::Zero(), box.edges);
   for (const int covered : {7, 8, 9, 10}) {
-    CellGrid<3> grid(box, 1, extent, 8);
+    CellGrid<3> grid(box, 0.99, extent, 8);
     ASSERT_EQ(grid.count(0), 10);
     std::vector<Vec<3>> places;
     for (int c = 0; c < covered; ++c) places.push_back(Vec<3>::Constant(c + 0.5));
