@@ -132,7 +132,7 @@ TEST(CellGrid, StoresFewerRowsOrAllOfThemInOrder) {
     CellGrid<3> grid(box, 0.99, extent, 8);
     ASSERT_EQ(grid.count(0), 10);
     std::vector<Vec<3>> places;
-    for (int c = 0; c < covered; ++c) places.push_back(Vec<3>::Constant(c + 0.5));
+    for (int c = 0; c < covered; ++c) places.push_back(Vec<3>::Constant(9.5 - c));
     grid.confine(places, 0, 2);
     for (const int axis : {0, 1}) {
       EXPECT_EQ(grid.rows(axis), covered < 9 ? covered + 1 : 10) << covered;
