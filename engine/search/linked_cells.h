@@ -185,8 +185,9 @@ class LinkedCells {
   static constexpr double kCellsAParticle = 8;
   static constexpr std::int32_t kCellsAround = 3;  // margin around the cells of confine()
 
-  static constexpr unsigned kKinds = 2 * D - 1;  // of rows: around, and one step back or forth along an axis
-  static constexpr unsigned kAround = 2 * D;     // instead of a face
+  static constexpr unsigned kKinds = 2 * D - 1;         // of rows: around, and one step back or forth along an axis
+  static constexpr unsigned kAround = 2 * D;            // instead of a face
+  static constexpr std::uint32_t kIrregular = 1 << 20;  // edges() of cells with neighbours at other distances
   /// The cells to search ahead of a face, or around.
   struct Region {
     alignas(16) std::uint32_t wanted[4];  // as in CellsTask
@@ -238,22 +239,24 @@ class LinkedCells {
       for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
         const std::int32_t count = grid_.count(k), boxes = c < 0 ? -1 : c < count ? 0 : 1;
         const unsigned edges = (c == 0 ? 1u : 0u) + (c == count - 1 ? 2u : 0u);
-        steps_[k].push_back(
-            {cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k]), kKinds * (edges << 2 * k)});
+        const bool regular =
+            grid_.rows(k) == count || (boxes == 0 && edges == 0 && grid_.row(k, c - 1) + 1 == grid_.row(k, c) &&
+                                       grid_.row(k, c) + 1 == grid_.row(k, c + 1));
+        steps_[k].push_back({cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k]),
+                             regular ? kKinds * (edges << 2 * k) : kIrregular});
       }
       cells *= grid_.rows(k);
     }
     first_.assign(static_cast<std::size_t>(cells + 3), kEmpty);
     rows_.clear();
-    if (confined_) return;  // rows are not at equal distances
     rows_.resize(std::size_t{kKinds} << 2 * (D - 1));
     Place place{};
     for (place.wrapped[0] = 0; place.wrapped[0] < grid_.count(0); ++place.wrapped[0])
       for (place.wrapped[1] = 0; place.wrapped[1] < (D == 3 ? grid_.count(1) : 1); ++place.wrapped[1])
-        if (HeadRows* const rows = &rows_[edges(place)]; rows->count == 0)
+        if (const unsigned at = edges(place); at < kIrregular && rows_[at].count == 0)
           for (unsigned kind = 0; kind < kKinds; ++kind) {
             const int axis = kind == 0 ? D : (static_cast<int>(kind) - 1) / 2;
-            make_rows(place, axis, kind % 2 == 0 ? 1 : -1, rows[kind]);
+            make_rows(place, axis, kind % 2 == 0 ? 1 : -1, rows_[at + kind]);
           }
   }
   unsigned edges(const Place& place) const {
@@ -324,9 +327,10 @@ class LinkedCells {
   /// Sets a task to the cells ahead of a face, or around.
   void aim(const Place& place, unsigned face, Candidates& found) const {
     const Region& region = kRegions[face];
-    if (confined_) [[unlikely]]
+    const unsigned at = edges(place);
+    if (at >= kIrregular) [[unlikely]]
       return aim_at(place, face == kAround ? D : static_cast<int>(face / 2), face % 2 == 1 ? 1 : -1, region, found);
-    set(place, region, &rows_[edges(place) + region.kind], found.task);
+    set(place, region, &rows_[at + region.kind], found.task);
   }
   /// Sets a task to rows that are not in rows_; `axis` and `step` as in make_rows().
   [[gnu::noinline]] void aim_at(const Place& place, int axis, int step, const Region& region, Candidates& found) const {
@@ -417,7 +421,7 @@ class LinkedCells {
   std::int32_t one_[D];                         // one box along each axis, as a linear image
   bool periodic_[D];
   CellFaces faces_;
-  std::vector<HeadRows> rows_;  // by edges() and kind; none if confined
+  std::vector<HeadRows> rows_;  // by edges() and kind
   bool confined_ = false;
   // By cell, in rows along the last axis: the first sphere with the image of its cell, and kMoreInCell; or kEmpty.
   PageVector<std::uint32_t> first_;
