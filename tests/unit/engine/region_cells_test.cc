@@ -131,8 +131,8 @@ TEST(CellGrid, StoresFewerRowsOrAllOfThemInOrder) {
   for (const int covered : {7, 8, 9, 10}) {
     CellGrid<3> grid(box, 0.99, extent, 8);
     ASSERT_EQ(grid.count(0), 10);
-    std::vector<Vec<3>> places;
-    for (int c = 0; c < covered; ++c) places.push_back(Vec<3>::Constant(9.5 - c));
+    std::vector<Vec<3>> places(covered);
+    for (int c = 0; c < covered; ++c) places[c].setConstant(9.5 - c);
     grid.confine(places, 0, 2);
     for (const int axis : {0, 1}) {
       EXPECT_EQ(grid.rows(axis), covered < 9 ? covered + 1 : 10) << covered;
