@@ -147,15 +147,6 @@ void EventSearch<D>::scan(const ScanTask& task, bool latest) {
   plan_first(task, kernels_.scan[D - 2](setting_, task, latest));
 }
 
-template <int D>
-void EventSearch<D>::plan_first(const ScanTask& task, const ScanResult& first) {
-  const double planned = queue_[task.self].contact;
-  if (first.time > planned || first.time == kNever) return;
-  if (!first.tied && first.time != planned && first.time != -kNever)
-    return queue_.plan_pair(task.self, first.time, task.candidates[first.which]);
-  offer_all(task);
-}
-
 /// Plans the first contact with the candidates, computed one by one.
 template <int D>
 void EventSearch<D>::offer_all(const ScanTask& task) {

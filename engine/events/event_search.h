@@ -74,16 +74,18 @@ class EventSearch {
   void foresee_update(Slot i, double now);
   ScanTask listed(Slot i) const;
   void scan(const ScanTask& task, bool latest);
-  /// plan_first() for candidates in cells.
-  [[gnu::always_inline]] void plan_found(Slot i, const ScanResult& first, const Candidates& found) {
-    counts_.candidates += found.task.count;
-    const double planned = queue_[i].contact;
+  /// Plans the first contact with the candidates if it is earlier than the planned one.
+  [[gnu::always_inline]] void plan_first(const ScanTask& task, const ScanResult& first) {
+    const double planned = queue_[task.self].contact;
     if (first.time > planned || first.time == kNever) return;
     if (first.tied || first.time == planned || first.time == -kNever) [[unlikely]]
-      return offer_all({i, found.task.candidates, found.task.count, found.task.same});
-    queue_.plan_pair(i, first.time, found.packed[first.which]);
+      return offer_all(task);
+    queue_.plan_pair(task.self, first.time, task.candidates[first.which]);
   }
-  void plan_first(const ScanTask& task, const ScanResult& first);
+  [[gnu::always_inline]] void plan_found(Slot i, const ScanResult& first, const Candidates& found) {
+    counts_.candidates += found.task.count;
+    plan_first({i, found.task.candidates, found.task.count, found.task.same}, first);
+  }
   [[gnu::noinline]] void offer_all(const ScanTask& task);  // seldom needed, and large
   [[gnu::noinline]] void cross(Slot i, double now);
   double distance_left(Slot i) const;

@@ -122,11 +122,12 @@ class CellGrid {
     for (auto& row : row_) row.clear();
     lay_out();
   }
-  /// The row in which cell 0 … count - 1 of an axis is stored, and the number of rows along this axis.
+  /// The row in which cell 0 … count - 1 of an axis is stored, and the number of rows along this axis, which is less
+  /// than count() if the cells are confined.
   std::int32_t row(int axis, std::int32_t c) const {
     return row_[axis].empty() ? c : row_[axis][static_cast<std::size_t>(c)];
   }
-  std::int32_t rows(int axis) const { return row_[axis].empty() ? count_[axis] : rows_[axis] + 1; }  // fewer: confined
+  std::int32_t rows(int axis) const { return row_[axis].empty() ? count_[axis] : rows_[axis] + 1; }
 
   /// The number of boxes between an unwrapped cell and the box that holds the origin.
   std::int32_t boxes(int axis, std::int32_t c) const {

@@ -40,11 +40,11 @@ class LinkedCells {
     for (int k = 0; k < D; ++k) {
       one_[k] = 1 << (packing.field_bits * k);
       periodic_[k] = box.periodic(k);
-      constexpr double kInfinity = std::numeric_limits<double>::infinity();
       faces_.origin[k] = grid_.face(k, 0);
       faces_.edge[k] = grid_.edge(k);
-      faces_.lowest[k] = periodic_[k] ? -kInfinity : 0;  // the outermost cells have no outer face
-      faces_.highest[k] = periodic_[k] ? kInfinity : grid_.count(k);
+      faces_.lowest[k] =
+          periodic_[k] ? -std::numeric_limits<double>::infinity() : 0;  // the outermost cells have no outer face
+      faces_.highest[k] = periodic_[k] ? std::numeric_limits<double>::infinity() : grid_.count(k);
     }
     lay_out();
   }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -15,11 +14,10 @@
 #include "engine/forces/potentials/balanced_forces.h"
 #include "engine/forces/potentials/damped_coulomb.h"
 #include "engine/forces/potentials/ewald_pair.h"
-#include "engine/forces/potentials/ewald_waves.h"
 #include "engine/forces/potentials/field_term.h"
 #include "engine/forces/potentials/inverse_distance.h"
 #include "engine/forces/potentials/uniform_field.h"
-#include "engine/forces/simd/wave_kernels.h"
+#include "engine/forces/potentials/wave_sums.h"
 #include "engine/ranks/communicator.h"
 
 namespace carom {
@@ -27,8 +25,6 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr std::size_t kMostWaves = std::size_t{1} << 24;
-// Charges that share a part of the waves in the first level of cache: the phases of each take one or two KB.
-constexpr std::size_t kTogether = 16;
 
 using Vec3 = Vec<3>;
 
@@ -52,11 +48,9 @@ class EwaldTerm final : public Interaction<3> {
       : box_(box),
         particles_(particles),
         options_(options),
-        waves_(std::move(waves)),
         parts_(std::move(parts)),
-        charge_(*pair_factors(options_.weight, particles_)) {
-    for (std::size_t i = 0; i < 3 * kTogether; ++i) phases_.emplace_back(waves_->most[i % 3]);
-  }
+        charge_(*pair_factors(options_.weight, particles_)),
+        waves_(std::move(waves), particles, charge_, options.charges.largest, options.total) {}
 
   void add_energy(Positions<3> x, PotentialSums& sums) const override {
     for (const auto& part : parts_) part->add_energy(x, sums);
@@ -75,38 +69,31 @@ class EwaldTerm final : public Interaction<3> {
     for (const auto& part : parts_) part->add_fluxes(x, v, fluxes);
     need_inside(x);
     const Amplitudes& s = structure(x);
-    std::array<Amplitudes, 3> current;
-    double fastest = 0;
-    for (const Id j : charged()) fastest = std::max(fastest, v[j].norm());
-    const int exponent = exponent_of(options_.charges.largest * largest(fastest)) + 1;
-    for (int a = 0; a < 3; ++a)
-      sum_terms(x, exponent, current[a], [&](Id j, const WaveTask& task, double shift, std::uint64_t* sum) {
-        kernels_->add(task, charge_[j] * v[j][a], shift, sum);
-      });
+    const std::array<Amplitudes, 3> current = waves_.current(x, v);
     const double own = options_.constant * options_.split.alpha / std::sqrt(kPi);
     const double background = options_.excess == 0 ? 0.0 : 2 * options_.background / options_.excess;
     const Vec3 constant = total([&](Id j) { return Vec3(charge_[j] * (background - own * charge_[j]) * v[j]); });
-    if (ranks_->rank() != 0) return;
+    if (waves_.ranks().rank() != 0) return;
     for (const std::size_t k : {0, 4, 8}) fluxes.stress[k].add(options_.background);
     for (int a = 0; a < 3; ++a) fluxes.heat[a].add(constant[a]);
     const double scale = 0.25 / (options_.split.alpha * options_.split.alpha);
-    for (const WaveRow& row : waves_->rows)
+    for (const WaveRow& row : waves_.waves().rows)
       for (unsigned m = 0; m < 2 * row.count; ++m) {
         const int sign = m < row.count ? 1 : -1;
         const std::size_t k = row.first + m % row.count;
-        if (waves_->weight[k] == 0) continue;
-        const Vec3 wave = waves_->unit.cwiseProduct(Vec3(row.a, row.b, sign * static_cast<int>(m % row.count)));
+        if (waves_.waves().weight[k] == 0) continue;
+        const Vec3 wave = waves_.waves().unit.cwiseProduct(Vec3(row.a, row.b, sign * static_cast<int>(m % row.count)));
         const std::array<double, 2> here = wave_of(s, k, sign);
         Vec3 work;  // Re S*(k) Σ q v e^(ik·x)
         for (int a = 0; a < 3; ++a) {
           const std::array<double, 2> flow = wave_of(current[a], k, sign);
-          work[a] = 0.5 * waves_->weight[k] * (here[0] * flow[0] + here[1] * flow[1]);
+          work[a] = 0.5 * waves_.waves().weight[k] * (here[0] * flow[0] + here[1] * flow[1]);
         }
-        const double energy = 0.5 * waves_->weight[k] * (here[0] * here[0] + here[1] * here[1]);
+        const double energy = 0.5 * waves_.waves().weight[k] * (here[0] * here[0] + here[1] * here[1]);
         for (int a = 0; a < 3; ++a) {
           fluxes.heat[a].add(work[a]);
           for (int b = 0; b < 3; ++b) {
-            const double tensor = (a == b ? 1 : 0) - 2 * wave[a] * wave[b] * (1 / waves_->squared[k] + scale);
+            const double tensor = (a == b ? 1 : 0) - 2 * wave[a] * wave[b] * (1 / waves_.waves().squared[k] + scale);
             fluxes.stress[3 * a + b].add(energy * tensor);
             fluxes.heat[a].add(tensor * work[b]);
           }
@@ -127,7 +114,7 @@ class EwaldTerm final : public Interaction<3> {
                         const Arrival& arrive) const override {
     for (const auto& part : parts_) part->add_forces_early(x, forces, sums, arrive);
     need_inside(x);
-    std::vector<Vec3> f = pull(x, weighted(structure(x)));
+    std::vector<Vec3> f = waves_.pull(x, waves_.potential(structure(x)));
     add_surface(dipole(x, x), x, f);
     if (!add(rounded(f, forces.quantum()), charged(), forces, 1))
       throw Error(Failure::numerical,
@@ -155,8 +142,8 @@ class EwaldTerm final : public Interaction<3> {
   void add_hessian_product(Positions<3> x, Positions<3> w, ForceSums<3>& out) const override {
     for (const auto& part : parts_) part->add_hessian_product(x, w, out);
     if (!all_moderate(x, w)) return out.invalidate();
-    std::vector<Vec3> f = pull(x, weighted(structure_change(x, w)));
-    const std::vector<Vec3> own = pull_change(x, weighted(structure(x)), w);
+    std::vector<Vec3> f = waves_.pull(x, waves_.potential(waves_.structure_change(x, w)));
+    const std::vector<Vec3> own = waves_.pull_change(x, waves_.potential(structure(x)), w);
     for (const Id j : charged()) f[j] = -(f[j] + own[j]);
     if (has_surface()) add_surface(total([&](Id j) { return Vec3(charge_[j] * w[j]); }), w, f, -1);
     if (!add(rounded(f, out.quantum()), charged(), out, 1)) out.invalidate();
@@ -166,9 +153,9 @@ class EwaldTerm final : public Interaction<3> {
     std::vector<std::unique_ptr<Interaction<3>>> parts;
     for (const auto& part : parts_)
       if (parts.push_back(part->among(some)); !parts.back()) return nullptr;
-    return std::make_unique<EwaldTerm>(box_, some, options_, waves_, std::move(parts));
+    return std::make_unique<EwaldTerm>(box_, some, options_, waves_.shared(), std::move(parts));
   }
-  void join(Communicator& ranks) override { ranks_ = &ranks; }
+  void join(Communicator& ranks) override { waves_.join(ranks); }
   double reach(Positions<3> x) const override {
     double reach = 0;
     for (const auto& part : parts_) reach = std::max(reach, part->reach(x));
@@ -232,7 +219,7 @@ class EwaldTerm final : public Interaction<3> {
 
   bool any(bool here) const { return largest(here ? 1 : 0) > 0; }
   double largest(double value) const {
-    ranks_->largest({&value, 1});
+    waves_.ranks().largest({&value, 1});
     return value;
   }
   /// The exact sum of vector(j) over all charges.
@@ -249,7 +236,7 @@ class EwaldTerm final : public Interaction<3> {
       for (int k = 0; k < 3; ++k) own[k].add(term[k]);
     }
     for (int k = 0; k < 3; ++k) sums.of[k] = own[k].sum();
-    sums = sum_of_all(*ranks_, sums);
+    sums = sum_of_all(waves_.ranks(), sums);
     return {sums.of[0].value(), sums.of[1].value(), sums.of[2].value()};
   }
 
@@ -261,153 +248,16 @@ class EwaldTerm final : public Interaction<3> {
   double whole_weight() const {
     return options_.charges.fixed == 0 ? options_.charges.mass.value() : options_.charges.fixed;
   }
-  /// The charges of this rank.
-  const std::vector<Id>& charged() const {
-    if (charged_.empty())
-      for (Id i = 0; i < particles_.size(); ++i)
-        if (charge_[i] != 0 && particles_.owns(i)) charged_.push_back(i);
-    return charged_;
-  }
+  const std::vector<Id>& charged() const { return waves_.charged(); }
 
-  /// Calls visit(j, waves at x_j) for each own charge and each part of the waves: a part serves several charges while
-  /// it is in the cache.
-  void for_each_part(Positions<3> x, auto&& visit) const {
-    const std::span<const Id> all = charged();
-    turns_.resize(particles_.size(), {Vec3::Constant(std::numeric_limits<double>::quiet_NaN()), {}});
-    for (std::size_t first = 0; first < all.size(); first += kTogether) {
-      const std::span<const Id> some = all.subspan(first, std::min(kTogether, all.size() - first));
-      for (std::size_t i = 0; i < some.size(); ++i) {
-        Turns& last = turns_[some[i]];
-        for (int k = 0; k < 3; ++k) {
-          const double at = x[some[i]][k];
-          if (at != last.x[k]) last.of[k] = turn((last.x[k] = at) / options_.edges[k]);
-          phases_[3 * i + k].set(last.of[k]);
-        }
-      }
-      for (const Waves::Part& part : waves_->parts)
-        for (std::size_t i = 0; i < some.size(); ++i) {
-          const Phases* const p = &phases_[3 * i];
-          visit(some[i], WaveTask{&waves_->rows[part.first],
-                                  part.n,
-                                  {p[0].re(), p[1].re(), p[2].re()},
-                                  {p[0].im(), p[1].im(), p[2].im()}});
-        }
-    }
-  }
-
-  /// A power of two above |value| has this exponent.
-  static int exponent_of(double value) { return std::ilogb(std::max(value, 0x1p-900)) + 1; }
-
-  /// Sums over all charges in fixed point: add(j, waves, shift, sum) adds a term and the shift to each sum,
-  /// |term| ≤ 2^exponent. Terms are rounded to the quantum by adding a constant; the integers are then the mantissas'
-  /// differences.
-  void sum_terms(Positions<3> x, int exponent, Amplitudes& sum, auto&& add) const {
-    const double n = static_cast<double>(options_.total);
-    const double quantum = std::ldexp(std::max(0x1p-50, std::ldexp(1.0, std::ilogb(n) - 60)), exponent);
-    const double shift = 0x1.8p52 * quantum;
-    std::vector<std::uint64_t> whole(WaveRow::kProducts * waves_->size());
-    for_each_part(x, [&](Id j, const WaveTask& task) { add(j, task, shift, whole.data()); });
-    const std::uint64_t shifts = charged().size() * std::bit_cast<std::uint64_t>(shift);
-    for (std::uint64_t& each : whole) each -= shifts;
-    ranks_->sum(whole);
-    sum.resize(whole.size());
-    for (std::size_t k = 0; k < sum.size(); ++k)
-      sum[k] = quantum * static_cast<double>(static_cast<std::int64_t>(whole[k]));
-  }
-
-  /// S(k)
-  void sum_structure(Positions<3> x, Amplitudes& sum) const {
-    sum_terms(x, exponent_of(options_.charges.largest), sum,
-              [&](Id j, const WaveTask& task, double shift, std::uint64_t* sums) {
-                kernels_->add(task, charge_[j], shift, sums);
-              });
-  }
   /// S(k), kept for the last positions.
   const Amplitudes& structure(Positions<3> x) const {
     if (any(!same(x, at_))) {
-      sum_structure(x, structure_);
+      structure_ = waves_.structure(x);
       at_.assign(x.begin(), x.end());
     }
     return structure_;
   }
-  /// Real and imaginary part of the wave of ±c of an entry.
-  static std::array<double, 2> wave_of(const Amplitudes& s, std::size_t k, int sign) {
-    const auto part = [&](unsigned product) { return s[place_of(k, product)]; };
-    return {part(0) - sign * part(1), part(3) + sign * part(2)};
-  }
-  /// The derivative of S(k) along w.
-  Amplitudes structure_change(Positions<3> x, Positions<3> w) const {
-    double longest = 0;
-    for (const Id j : charged()) longest = std::max(longest, w[j].norm());
-    longest = largest(longest);
-    Amplitudes sum;
-    sum_terms(x, exponent_of(options_.charges.largest * longest * waves_->longest) + 1, sum,
-              [&](Id j, const WaveTask& task, double shift, std::uint64_t* sums) {
-                const Vec3 along = w[j].cwiseProduct(waves_->unit);
-                kernels_->add_change(task, charge_[j], along.data(), shift, sums);
-              });
-    return sum;
-  }
-  /// The potential of S.
-  Amplitudes weighted(const Amplitudes& s) const {
-    Amplitudes field(s.size());
-    for (std::size_t k = 0; k < waves_->size(); ++k)
-      for (unsigned product = 0; product < WaveRow::kProducts; ++product)
-        field[place_of(k, product)] = 2 * waves_->weight[k] * s[place_of(k, product)];
-    return field;
-  }
-
-  /// Adds up vectors in units of 2π/L, which add(j, waves, vector) adds to, times the charges; zero for other
-  /// particles.
-  std::vector<Vec3> per_charge(Positions<3> x, auto&& add) const {
-    std::vector<Vec3> f(x.size(), Vec3::Zero());
-    for_each_part(x, [&](Id j, const WaveTask& task) { add(j, task, f[j].data()); });
-    for (const Id j : charged()) f[j] = charge_[j] * f[j].cwiseProduct(waves_->unit);
-    return f;
-  }
-  /// The forces on own charges in a field.
-  std::vector<Vec3> pull(Positions<3> x, const Amplitudes& field) const {
-    return per_charge(x, [&](Id, const WaveTask& task, double* sum) { kernels_->pull(task, field.data(), sum); });
-  }
-  /// The changes of the forces as charges move along w in a constant field.
-  std::vector<Vec3> pull_change(Positions<3> x, const Amplitudes& field, Positions<3> w) const {
-    return per_charge(x, [&](Id j, const WaveTask& task, double* sum) {
-      const Vec3 along = w[j].cwiseProduct(waves_->unit);
-      kernels_->pull_change(task, along.data(), field.data(), sum);
-    });
-  }
-  /// The mean forces on charges that move by 2 `half` about x: a unit charge feels Σ_k k sinc(k·half) Im[field*
-  /// e^(ik·x)].
-  std::vector<Vec3> pull_moved(Positions<3> x, const Amplitudes& field, Positions<3> half) const {
-    return per_charge(x, [&](Id j, const WaveTask& task, double* sum) {
-      const Vec3 y = half[j].cwiseProduct(waves_->unit);
-      const double most = waves_->longest * half[j].norm();
-      if (most < 1 - 1e-9)
-        kernels_->pull_moved(task, y.data(), most, field.data(), sum);
-      else
-        pull_far(task, y, field, sum);
-    });
-  }
-  /// The same for a long way.
-  static void pull_far(const WaveTask& task, const Vec3& y, const Amplitudes& field, double* sum) {
-    for (std::size_t r = 0; r < task.n; ++r)
-      for (unsigned m = 0; m < 2 * task.rows[r].count; ++m) {
-        const WaveRow& row = task.rows[r];
-        const int c = static_cast<int>(m % row.count), sign = m < row.count ? 1 : -1;
-        const Vec3 index(row.a, row.b, sign * c);
-        double re = 1, im = 0;
-        for (int k = 0; k < 3; ++k) {
-          const int n = k == 0 ? row.a : k == 1 ? row.b : c;
-          const double last = re, turned = k == 2 ? sign * task.im[k][n] : task.im[k][n];
-          re = last * task.re[k][n] - im * turned;
-          im = last * turned + im * task.re[k][n];
-        }
-        const std::array<double, 2> wave = wave_of(field, row.first + m % row.count, sign);
-        const Vec3 pull = (0.5 * (wave[0] * im - wave[1] * re) * sinc(index.dot(y))) * index;
-        for (int k = 0; k < 3; ++k) sum[k] += pull[k];
-      }
-  }
-
   /// The mean forces on own charges; NaN if positions are not moderate.
   std::vector<Vec3> mean_forces(Positions<3> x, Positions<3> x_new) const {
     if (!all_moderate(x, x_new)) return {x.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
@@ -415,8 +265,7 @@ class EwaldTerm final : public Interaction<3> {
     const Vec3 centre = total([&](Id j) { return Vec3(weight(j) * (x_new[j] - x[j])); }) / whole_weight();
     std::vector<Vec3> relative(x.begin(), x.end());
     for (const Id j : charged()) relative[j] = x_new[j] - centre;
-    Amplitudes mean;
-    sum_structure(relative, mean);
+    Amplitudes mean = waves_.structure(relative);
     const Amplitudes& before = structure(x);
     for (std::size_t k = 0; k < mean.size(); ++k) mean[k] = 0.5 * (before[k] + mean[k]);
     std::vector<Vec3> middle(x.begin(), x.end()), half(x.size());
@@ -424,7 +273,7 @@ class EwaldTerm final : public Interaction<3> {
       middle[j] = 0.5 * (x[j] + relative[j]);
       half[j] = 0.5 * (relative[j] - x[j]);
     }
-    std::vector<Vec3> f = pull_moved(middle, weighted(mean), half);
+    std::vector<Vec3> f = waves_.pull_moved(middle, waves_.potential(mean), half);
     if (has_surface()) {
       for (const Id j : charged()) middle[j] = 0.5 * (x[j] + x_new[j]);
       add_surface(0.5 * (dipole(x, x) + dipole(x, x_new)), middle, f);
@@ -465,15 +314,16 @@ class EwaldTerm final : public Interaction<3> {
       squares -=
           q * (total([&](Id j) { return Vec3(charge_[j] * x[j].cwiseAbs2()); }) + q / 12 * options_.edges.cwiseAbs2());
     const double scale = 0.5 / (options_.split.alpha * options_.split.alpha);
-    const auto me = static_cast<std::size_t>(ranks_->rank()), ranks = static_cast<std::size_t>(ranks_->size());
-    for (std::size_t k = me; k < waves_->size(); k += ranks) {
+    const auto me = static_cast<std::size_t>(waves_.ranks().rank()),
+               ranks = static_cast<std::size_t>(waves_.ranks().size());
+    for (std::size_t k = me; k < waves_.waves().size(); k += ranks) {
       double squares_here = 0;
       for (unsigned product = 0; product < WaveRow::kProducts; ++product) {
         const double amplitude = s[place_of(k, product)];
         squares_here += amplitude * amplitude;
       }
-      const double energy = waves_->weight[k] * squares_here;
-      add(energy, energy * (1 - scale * waves_->squared[k]));
+      const double energy = waves_.waves().weight[k] * squares_here;
+      add(energy, energy * (1 - scale * waves_.waves().squared[k]));
     }
     if (me != 0) return;
     add(options_.constant_energy - options_.background, 0);
@@ -488,26 +338,16 @@ class EwaldTerm final : public Interaction<3> {
   BalancedForces rounded(const std::vector<Vec3>& f, double quantum) const {
     return balanced(
         f, charged(), particles_, options_.charges.first, quantum, [&](Id j) { return weight(j) / whole_weight(); },
-        *ranks_);
+        waves_.ranks());
   }
 
   const Box<3>& box_;
   const Particles<3>& particles_;
   EwaldOptions options_;
-  std::shared_ptr<const Waves> waves_;
   std::vector<std::unique_ptr<Interaction<3>>> parts_;  // the pairs; bonded pairs that are excluded; charged walls
   const std::vector<double>& charge_;
-  Communicator alone_;
-  Communicator* ranks_ = &alone_;
-  const WaveKernels* kernels_ = &widest_kernels<WaveKernels>();
-  // Caches and scratch, which do not affect the sums.
-  mutable std::vector<Phases> phases_;  // of some charges, along three axes each
-  struct Turns {
-    Vec3 x;
-    std::array<std::array<double, 2>, 3> of;
-  };
-  mutable std::vector<Turns> turns_;  // cosine and sine of 2πx/L where each particle was looked at last
-  mutable std::vector<Id> charged_;
+  WaveSums waves_;
+  // Caches, which do not affect the sums.
   mutable std::vector<Vec3> at_;
   mutable Amplitudes structure_;  // S(k) at at_
   mutable struct {

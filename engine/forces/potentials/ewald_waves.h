@@ -69,14 +69,15 @@ struct Waves {
     std::size_t first, n;
   };
   std::array<int, 3> most;  // largest |a|, |b|, |c|
-  Vec<3> unit;              // 2π/L
+  Vec<3> edges, unit;       // L, 2π/L
   double longest;           // k_c
   std::vector<WaveRow> rows;
   std::vector<Part> parts;
   std::vector<double> weight;   // of each entry; padding and k = 0 have 0
   std::vector<double> squared;  // k²
 
-  Waves(const EwaldSplit& split, const Vec<3>& edges, double constant) : longest(split.wave_cutoff) {
+  Waves(const EwaldSplit& split, const Vec<3>& repeated, double constant)
+      : edges(repeated), longest(split.wave_cutoff) {
     constexpr unsigned kEntries = 512;  // of a part: 16 KB, half of the first level of most processors
     const double volume = edges.prod();
     for (int k = 0; k < 3; ++k) {

@@ -86,8 +86,8 @@ struct CellLink {
   std::uint32_t next;  ///< the next sphere in the cell, coded like a head
   std::int32_t boxes;  ///< image of the sphere's cell, as a linear image
 };
-inline constexpr std::uint32_t kMoreInCell = std::uint32_t{1}
-                                             << 31;  ///< flag of a head: another sphere of the cell follows
+/// Flag of a head: another sphere of the cell follows.
+inline constexpr std::uint32_t kMoreInCell = std::uint32_t{1} << 31;
 
 /// Linked cells to search, and what is found there. Heads are candidates with the images of their cells, or kEmpty.
 struct CellsTask {

@@ -56,8 +56,8 @@ inline double smallest(Double<W> x) {
 constexpr unsigned kBlock = 64;  // candidates per block: their times are stored until the smallest is known
 
 /// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: ∞ or NaN for
-/// no contact; −∞ if the two overlap and approach. Returns the smallest time in each lane. `fresh` states that the
-/// candidates have just been written by stores that overlap: a load of several would wait for all of these.
+/// no contact; −∞ if the two overlap and approach. Returns the smallest time in each lane. `fresh`: the
+/// candidates have just been written by stores that overlap, so that loading several at once is slow.
 template <int D, int W, bool latest, bool plain, bool fresh = false>
 inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting& s, std::uint32_t self,
                                                               const std::uint32_t* candidates, unsigned n,
@@ -380,7 +380,7 @@ inline std::uint32_t* read_heads(const CellsTask& task, std::uint32_t& any) {
   task.count = static_cast<unsigned>(read_heads(task, any) - task.candidates);
 }
 
-/// Appends the later spheres of all cells whose first sphere has been found, and the padding, as far as there is room.
+/// Appends the later spheres of all cells in which a first one was found, and the padding, as far as there is room.
 __attribute__((noinline)) std::uint32_t* follow(const ScanSetting& s, const CellsTask& task, std::uint32_t* end,
                                                 std::uint32_t& any) {
   const std::uint32_t here = task.self & ~s.slot_mask;

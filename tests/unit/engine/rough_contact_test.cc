@@ -226,7 +226,6 @@ TEST(RoughContacts, RatioOfTemperaturesInACoolingGas) {
   const double error = std::sqrt(squared / (8 * 7));
   EXPECT_LT(error, 0.01);
   EXPECT_NEAR(mean, cooling_ratio(0.4, 0.9, 0.5), 0.03) << "± " << error;
-  if (getenv("SHOW")) std::cerr << "T_rot/T_tr = " << mean << " ± " << error << "\n";
   EXPECT_LT(run->statistics().max_energy_error, 1e-14 * run->statistics().energy_reference);
 }
 
