@@ -99,6 +99,8 @@ class Interaction {
   /// ranks that make their lists in the same steps wait less for each other.
   virtual bool ages() const { return false; }
   virtual void renew() const {}
+  /// Adds the pairs of the last list, of which each counts for one of its particles.
+  virtual void add_listed_pairs(std::span<std::uint32_t> /*of_particle*/) const {}
 
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
   /// pairs the distance quotient of LaBudde and Greenspan). A pair keeps the periodic image it has at x. `changed`:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -16,6 +17,8 @@ namespace {
 
 constexpr std::int64_t kSlabsPerDivision = 64;  // while all ranks have all particles
 constexpr double kMaxKnownFraction = 0.9;       // if a rank would get more of all particles, all ranks get all
+constexpr std::uint32_t kParticleWork = 12;     // the work for a particle without partners [pairs in a list]
+constexpr double kUneven = 1.1;  // the largest work over the mean at which the first division is repeated
 
 }  // namespace
 
@@ -54,6 +57,7 @@ bool Decomposition<D>::divide(bool local, double slab_length, bool cores) {
   width_.start(cores);
   migrate(slab_length);
   next_ = kSlabsPerDivision;
+  first_ = true;
   return true;
 }
 
@@ -120,8 +124,9 @@ bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
   if (!by_place_) return false;
   const auto known = std::exchange(farthest_, {});
   const auto farthest = [&] { return std::sqrt(known ? *known : largest(squared_farthest(system_.particles.x))); };
-  if (all_known_ ? slab < next_ : !width_.outdated(farthest)) return false;
-  if (!all_known_) {  // the last division was good enough
+  const bool again = std::exchange(first_, false) && uneven();
+  if (!again && (all_known_ ? slab < next_ : !width_.outdated(farthest))) return false;
+  if (!all_known_ && !again) {  // the last division was good enough
     slabs_with_all_ = std::max<std::int64_t>(slabs_with_all_ / 2, 1);
     width_.relax();
   }
@@ -136,6 +141,28 @@ void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
   migrate_to_all();
   next_ = slab + slabs_with_all_;
   slabs_with_all_ = std::min(2 * slabs_with_all_, kSlabsPerDivision);
+}
+
+/// The work for each particle of this rank, as far as lists of pairs tell it.
+template <int D>
+std::vector<std::uint32_t> Decomposition<D>::work() const {
+  std::vector<std::uint32_t> work(system_.particles.size(), kParticleWork);
+  if (by_place_)
+    for (const auto& term : system_.interactions) term->add_listed_pairs(work);
+  return work;
+}
+
+/// Whether a rank has much more work than the mean: when particles are divided for the first time, there are no lists.
+template <int D>
+bool Decomposition<D>::uneven() const {
+  if (all_known_) return false;
+  std::vector<std::uint64_t> of_ranks(blocks().ranks);
+  const std::vector<std::uint32_t> mine = work();
+  for (Id i = 0; i < mine.size(); ++i)
+    if (system_.particles.owns(i)) of_ranks[static_cast<std::size_t>(ranks_->rank())] += mine[i];
+  ranks_->sum(of_ranks);
+  const auto all = static_cast<double>(std::accumulate(of_ranks.begin(), of_ranks.end(), std::uint64_t{0}));
+  return static_cast<double>(std::ranges::max(of_ranks) * of_ranks.size()) > kUneven * all;
 }
 
 template <int D>
@@ -173,15 +200,18 @@ bool Decomposition<D>::migrate_to_near(double slab_length) {
   for (const auto& term : system_.interactions)
     reach = std::max(reach, by_place_ ? term->reach(p.x) : term->reach(p, *ranks_));
   std::vector<Vec<D>> own;
+  std::vector<std::uint32_t> work = this->work();
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
     speed = std::max(speed, p.v[i].norm());
+    work[own.size()] = work[i];
     own.push_back(p.x[i]);
   }
+  work.resize(own.size());
   ranks_->largest(most);
   width_.fit(reach, speed * slab_length, 2 * sizes_->largest_radius());
   if (!std::isfinite(width_.far())) return false;
-  const Bisection<D> bisection(system_.box, own, blocks().ranks, width_.far(), *ranks_);
+  const Bisection<D> bisection(system_.box, own, blocks().ranks, width_.far(), *ranks_, work);
   std::vector<std::uint64_t> known(blocks().ranks);
   for (const Vec<D>& x : own) bisection.for_each_near(bisection.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
   const std::vector<std::uint64_t> mine = known;

@@ -130,6 +130,8 @@ class Decomposition {
     return halo_.squared_farthest(system_.box, system_.particles, x);
   }
   void migrate_to_all();
+  std::vector<std::uint32_t> work() const;
+  bool uneven() const;
   std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver,
                           std::vector<Fields::Arrival>* stay = nullptr);
   void assign(const Bisection<D>& bisection, double near);
@@ -142,7 +144,7 @@ class Decomposition {
   bool by_place_ = false;
   Particles<D> block_;  // while by_place_, only constant fields are up to date
   std::vector<std::unique_ptr<Interaction<D>>> block_interactions_;  // for the block, while by_place_
-  bool local_ = false, all_known_ = false;
+  bool local_ = false, all_known_ = false, first_ = false;
   HaloWidth width_;
   HaloExchange<D> halo_;
   std::optional<double> farthest_;  // the largest squared displacement at the end of the last step, if it was needed

@@ -156,6 +156,9 @@ class EwaldTerm final : public Interaction<3> {
     return std::make_unique<EwaldTerm>(box_, some, options_, waves_.shared(), std::move(parts));
   }
   void join(Communicator& ranks) override { waves_.join(ranks); }
+  void add_listed_pairs(std::span<std::uint32_t> of_particle) const override {
+    for (const auto& part : parts_) part->add_listed_pairs(of_particle);
+  }
   double reach(Positions<3> x) const override {
     double reach = 0;
     for (const auto& part : parts_) reach = std::max(reach, part->reach(x));

@@ -77,6 +77,9 @@ class PairTerm final : public Interaction<D> {
   void renew() const override {
     if constexpr (requires { pairs_.renew(); }) pairs_.renew();
   }
+  void add_listed_pairs(std::span<std::uint32_t> of_particle) const override {
+    if constexpr (requires { pairs_.add_listed(of_particle); }) pairs_.add_listed(of_particle);
+  }
   std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
                                 int sign) const override {
     return evaluate({.x = x, .x_new = x_new, .changed = changed}, &forces, nullptr, sign);

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "engine/forces/forces.h"
 #include "engine/ranks/id_blocks.h"
 #include "engine/run/simulation.h"
@@ -281,6 +283,45 @@ TEST(Decomposition, NoRankHasAllParticles) {
     system->decomposition.to_blocks();
     for (Id i = 0; i < p.size(); ++i) EXPECT_EQ(p.x[i], all.x[p.id[i]] + all.v[p.id[i]]);
   });
+}
+/// A liquid next to a gas of as many particles.
+std::unique_ptr<System<3>> liquid_and_gas() {
+  std::vector<Vec<3>> x, v;
+  for (int k = 0; k < 1152; ++k) {
+    x.push_back(1.1 * Vec<3>(k / 36 + 0.5, k / 6 % 6 + 0.5, k % 6 + 0.5));
+    x.push_back(Vec<3>(35.2, 0, 0) + 2.2 * Vec<3>(k / 9 + 0.5, k / 3 % 3 + 0.5, k % 3 + 0.5));
+    for (const int n : {0, 1})
+      x[static_cast<std::size_t>(2 * k + n)][0] += 0.015 * (k % 7 - 3);  // cuts may divide a layer
+    for (int n = 0; n < 2; ++n) v.push_back({0.4 * (k % 7 - 3), 0.5 * (k % 5 - 2), 0.6 * (k % 3 - 1)});
+  }
+  auto system = test::make_system<3>({316.8, 6.6, 6.6}, Boundary::periodic, x, v);
+  test::add_interaction(*system, "yukawa", {{"amplitude", 0.1}, {"kappa", 1.0}, {"cutoff", 2.5}});
+  return system;
+}
+TEST(Decomposition, LiquidAndGas) {
+  for (const char* method : {"psa", "edda"}) compare<3>(liquid_and_gas, method, 0.02, 12, 100);
+}
+/// Ranks get equal shares of the pairs, not of the particles, once there are lists of pairs.
+TEST(Decomposition, RanksShareTheWork) {
+  for (const int ranks : {2, 3, 8}) {
+    SCOPED_TRACE(ranks);
+    std::vector<double> work(static_cast<std::size_t>(ranks));
+    test::ThreadRanks(ranks).run([&](Communicator& exchange) {
+      auto system = liquid_and_gas();
+      system->decomposition.join(exchange);
+      system->quanta = quanta(*system);
+      system->decomposition.divide(true, 0.02);
+      const Particles<3>& p = system->particles;
+      const auto pairs_here = [&] { return static_cast<double>(system->interactions[0]->interacting_pairs(p.x)); };
+      pairs_here();  // makes a list
+      EXPECT_TRUE(system->decomposition.divide_if_due(1, 0.02));
+      double& mine = work[static_cast<std::size_t>(exchange.rank())] = pairs_here();
+      for (Id i = 0; i < p.size(); ++i) mine += p.owns(i) ? 12 : 0;
+      EXPECT_FALSE(system->decomposition.divide_if_due(2, 0.02));
+    });
+    const double all = std::accumulate(work.begin(), work.end(), 0.0);
+    EXPECT_LT(std::ranges::max(work), 1.2 * all / ranks);  // 1.45 with equal numbers of particles
+  }
 }
 /// Ions in a long box, some spheres without charge, one ion fixed if `fixed`; between charged walls if there is no
 /// surface. Bonded ions do not act on each other.
