@@ -316,7 +316,7 @@ TEST(Decomposition, RanksShareTheWork) {
       pairs_here();  // makes a list
       EXPECT_TRUE(system->decomposition.divide_if_due(1, 0.02));
       double& mine = work[static_cast<std::size_t>(exchange.rank())] = pairs_here();
-      for (Id i = 0; i < p.size(); ++i) mine += p.owns(i) ? 12 : 0;
+      for (Id i = 0; i < p.size(); ++i) mine += p.owns(i) ? 20 : 0;
       EXPECT_FALSE(system->decomposition.divide_if_due(2, 0.02));
     });
     const double all = std::accumulate(work.begin(), work.end(), 0.0);
