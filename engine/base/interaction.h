@@ -99,7 +99,7 @@ class Interaction {
   /// ranks that make their lists in the same steps wait less for each other.
   virtual bool ages() const { return false; }
   virtual void renew() const {}
-  /// Adds the pairs of the last list, of which each counts for one of its particles.
+  /// Adds to each particle the number of its pairs in the last list, where a pair counts for one of its particles only.
   virtual void add_listed_pairs(std::span<std::uint32_t> /*of_particle*/) const {}
 
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for

@@ -350,7 +350,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
 }
 
 template <int D>
-void CutoffList<D>::add_listed(std::span<std::uint32_t> of_particle) const {
+void CutoffList<D>::add_listed_pairs(std::span<std::uint32_t> of_particle) const {
   if (!made_) return;
   for (const auto& runs : records_.runs)
     for (const PairRun& run : runs) of_particle[records_.order[run.row]] += run.count;

@@ -42,8 +42,8 @@ class CutoffList {
   bool ages() const { return made_ && farthest_ + grown_ > 0.5 * skin_.width(); }
   /// The next cover() makes a new list.
   void renew() { renew_ = true; }
-  /// Adds the pairs of the last list, of which each counts for one of its particles.
-  void add_listed(std::span<std::uint32_t> of_particle) const;
+  /// As Interaction::add_listed_pairs().
+  void add_listed_pairs(std::span<std::uint32_t> of_particle) const;
 
   void use(const PairKernels& kernels) { kernels_ = &kernels; }
 

@@ -126,7 +126,7 @@ bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
   if (!by_place_) return false;
   const auto known = std::exchange(farthest_, {});
   const auto farthest = [&] { return std::sqrt(known ? *known : largest(squared_farthest(system_.particles.x))); };
-  const bool again = std::exchange(first_, false) && uneven();
+  const bool again = std::exchange(first_, false) && uneven();  // divide() knew no lists of pairs
   if (!again && (all_known_ ? slab < next_ : !width_.outdated(farthest))) return false;
   if (!all_known_ && !again) {  // the last division was good enough
     slabs_with_all_ = std::max<std::int64_t>(slabs_with_all_ / 2, 1);
@@ -154,7 +154,7 @@ std::vector<std::uint32_t> Decomposition<D>::work() const {
   return work;
 }
 
-/// Whether a rank has much more work than the mean: when particles are divided for the first time, there are no lists.
+/// Whether a rank has much more work than the mean.
 template <int D>
 bool Decomposition<D>::uneven() const {
   if (all_known_) return false;

@@ -144,7 +144,8 @@ class Decomposition {
   bool by_place_ = false;
   Particles<D> block_;  // while by_place_, only constant fields are up to date
   std::vector<std::unique_ptr<Interaction<D>>> block_interactions_;  // for the block, while by_place_
-  bool local_ = false, all_known_ = false, first_ = false;
+  bool local_ = false, all_known_ = false;
+  bool first_ = false;  // no slab has been done since divide()
   HaloWidth width_;
   HaloExchange<D> halo_;
   std::optional<double> farthest_;  // the largest squared displacement at the end of the last step, if it was needed

@@ -78,7 +78,7 @@ class PairTerm final : public Interaction<D> {
     if constexpr (requires { pairs_.renew(); }) pairs_.renew();
   }
   void add_listed_pairs(std::span<std::uint32_t> of_particle) const override {
-    if constexpr (requires { pairs_.add_listed(of_particle); }) pairs_.add_listed(of_particle);
+    if constexpr (requires { pairs_.add_listed_pairs(of_particle); }) pairs_.add_listed_pairs(of_particle);
   }
   std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
                                 int sign) const override {

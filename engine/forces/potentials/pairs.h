@@ -12,7 +12,8 @@
 //   own_batches(…)              if it exists: as batches() for pairs of own particles, where the positions of ghosts
 //                               are unknown; returns false if that is not possible. Then rest_batches(…, before_new)
 //                               for the rest; before_new() is called if sums must be flushed before new batches
-//   ages(), renew(), add_listed(…)   if they exist: as in Interaction
+//   ages(), renew(), add_listed_pairs(…)
+//                               if they exist: as in Interaction
 //   regroup()                   if it exists: the particles have been replaced by others
 // and
 //   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
@@ -274,7 +275,7 @@ class PairsWithinCutoff {
   void regroup() { list_.forget(); }
   bool ages() const { return list_.ages(); }
   void renew() const { list_.renew(); }
-  void add_listed(std::span<std::uint32_t> of_particle) const { list_.add_listed(of_particle); }
+  void add_listed_pairs(std::span<std::uint32_t> of_particle) const { list_.add_listed_pairs(of_particle); }
   Id id(std::uint32_t place) const { return records_->order[place]; }
   ForceWords* low(ForceSums<D>&) const { return records_->low(); }
   ForceWords* high(ForceSums<D>&) const { return records_->high(); }

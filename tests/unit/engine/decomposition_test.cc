@@ -290,9 +290,10 @@ std::unique_ptr<System<3>> liquid_and_gas() {
   for (int k = 0; k < 1152; ++k) {
     x.push_back(1.1 * Vec<3>(k / 36 + 0.5, k / 6 % 6 + 0.5, k % 6 + 0.5));
     x.push_back(Vec<3>(35.2, 0, 0) + 2.2 * Vec<3>(k / 9 + 0.5, k / 3 % 3 + 0.5, k % 3 + 0.5));
-    for (const int n : {0, 1})
-      x[static_cast<std::size_t>(2 * k + n)][0] += 0.015 * (k % 7 - 3);  // cuts may divide a layer
-    for (int n = 0; n < 2; ++n) v.push_back({0.4 * (k % 7 - 3), 0.5 * (k % 5 - 2), 0.6 * (k % 3 - 1)});
+    for (const std::size_t last : {x.size() - 2, x.size() - 1}) {
+      x[last][0] += 0.015 * (k % 7 - 3);  // cuts may divide a layer
+      v.push_back({0.4 * (k % 7 - 3), 0.5 * (k % 5 - 2), 0.6 * (k % 3 - 1)});
+    }
   }
   auto system = test::make_system<3>({316.8, 6.6, 6.6}, Boundary::periodic, x, v);
   test::add_interaction(*system, "yukawa", {{"amplitude", 0.1}, {"kappa", 1.0}, {"cutoff", 2.5}});
