@@ -17,6 +17,9 @@ constexpr double kSwitchFrom = 0.95;  // of the cutoff
 // α = √π (c N/Ω²)^(1/6) makes pairs and waves cost the same, c the cost of a pair over that of a wave of a particle
 // (Kolafa, Perram); c is taken as 6, the sixth power of:
 constexpr double kPairCost = 1.35;
+// The most partners of a charge within the cutoff. More would be cheaper than waves above 10⁵ charges, but their list, of
+// four bytes a pair within 1.1 cutoffs, would outgrow memory (and the limit of pair_list.cc) before anything else does.
+constexpr double kMostPartners = 6000;
 // The part of the error of the pair sum that the polynomial of its formula (ewald_pair.h) may cause.
 constexpr double kPolynomial = 0.05;
 
@@ -26,6 +29,7 @@ EwaldSplit ewald_split(double accuracy, const ChargeSums& charges, double volume
   const double n = charges.count.value(), q2 = charges.squares.value();
   const double spacing = elementary::cbrt(volume / n);
   const double error = 0.5 * accuracy * q2 / n / (spacing * spacing);  // of either sum
+  longest = std::min(longest, spacing * elementary::cbrt(3 * kMostPartners / (4 * kPi)));
   const auto root_log = [](double x) { return std::sqrt(std::max(1.0, elementary::log(x))); };
   double alpha = kPairCost * std::sqrt(kPi) * elementary::pow(n / (volume * repeated), 1.0 / 6);
   const auto pairs = [&](double r) { return root_log(2 * q2 / (std::sqrt(n * r * volume) * error)); };

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "engine/base/error.h"
+#include "engine/forces/potentials/ewald.h"
 #include "tests/unit/potentials/precise.h"
 #include "tests/unit/potentials/scene.h"
 
@@ -189,6 +190,24 @@ TEST(Ewald, ErrorsAreBelowTheAccuracyAskedForAndNotFarBelow) {
       EXPECT_GE(error, 0.02 * accuracy);
       EXPECT_LE(std::abs(of_energy), accuracy * std::abs(exact_energy)) << accuracy;
       std::cout << accuracy << ": force " << error << ", energy " << of_energy / exact_energy << '\n';
+    }
+  }
+}
+
+TEST(Ewald, ManyChargesGetMoreWavesInsteadOfListsLargerThanMemory) {
+  for (const double n : {1e4, 1e5, 1e6}) {
+    ChargeSums charges;
+    for (auto* each : {&charges.absolute, &charges.squares, &charges.count}) each->add(n);
+    const double volume = 8 * n, edge = std::cbrt(volume);
+    for (const double accuracy : {1e-4, 1e-9}) {
+      const EwaldSplit split = ewald_split(accuracy, charges, volume, volume, 0.5 * edge);
+      EXPECT_LE(4 * kPi / 3 * std::pow(split.cutoff, 3) / 8, 6001) << n << ' ' << accuracy;
+      // The pair term at its cutoff and the longest wave left out have become small enough for the accuracy.
+      const double left = split.alpha * split.switch_from, waves = split.wave_cutoff / (2 * split.alpha);
+      for (const double ratio : {left, waves}) {
+        EXPECT_LT(std::exp(-ratio * ratio), 10 * accuracy) << n;
+        EXPECT_GT(std::exp(-ratio * ratio), 0.01 * accuracy) << n;
+      }
     }
   }
 }
