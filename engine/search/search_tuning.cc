@@ -17,7 +17,9 @@ constexpr double kCellHead = 9, kCellCandidate = 60;  // per prediction on cells
 constexpr double kCrossing = 550;                     // per crossing, without new cells and candidates
 constexpr double kFewestPredictions = 20000;          // before counts are used
 constexpr double kCrowded = 40, kUneven = 2.5;        // candidates per scan of cells above which lists are cheaper
-constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02;  // in mean diameters
+constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02, kCrowdedSkin = 0.4;  // in mean diameters
+constexpr double kShortList =
+    12;  // candidates of a mean sphere up to which a larger skin is cheaper in dilute mixtures
 
 /// The packing fraction above which lists are faster, as measured for equal spheres and discs.
 double dense(int dimension) { return dimension == 2 ? 0.55 : 0.32; }
@@ -29,12 +31,18 @@ double cells_around(int dimension) { return dimension == 2 ? 9 : 27; }
 double in_cell(const SearchSituation& s, double edge) { return s.density * elementary::pow(edge, s.dimension); }
 
 /// Whether lists are faster because a cell as large as the largest sphere holds many small ones. Lists cost a renewal
-/// each time a sphere has moved by the skin, and the fewer contacts there are in between, the more of them. Measured
-/// for diameters 1 : 10: both take equally long with 18 particles in a cell at a packing fraction of 0.2, and with 33
-/// at 0.035. A power of the packing fraction joins these points; above 0.2 the number falls faster.
+/// each time a sphere has moved by the skin, and the fewer contacts there are in between, the more of them. Counted for
+/// spheres of diameters 1:10, 1:4 and 1:2.5, half of the volume each: both take equally many instructions with 12.5,
+/// 4.4 and 2.5 particles in a cell, at packing fractions of 0.013, 0.07 and 0.16. So do discs of diameters 1:10 and 1:4
+/// with 8 and 3.8, at 0.125 and 0.35.
 bool mixed(const SearchSituation& s) {
-  const double inside = in_cell(s, s.largest);
-  return s.filled * inside > 3.5 || elementary::pow(s.filled, 0.35) * inside > 10.3;
+  return elementary::pow(s.filled, 0.64) * in_cell(s, s.largest) > (s.dimension == 2 ? 2 : 0.78);
+}
+
+/// The skin with which the list of a sphere of the mean diameter has kShortList candidates.
+double short_list_skin(const SearchSituation& s) {
+  const double unit = s.dimension == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3;
+  return 0.5 * (elementary::pow(kShortList / (s.density * unit), 1.0 / s.dimension) - s.mean);
 }
 
 /// The cheapest edge of cells: small cells are crossed often, large ones hold many candidates.
@@ -101,8 +109,11 @@ void SearchTuning::choose(const SearchSituation& situation, const EventCounts& c
     // is crowded.
     const double scans = predictions + static_cast<double>(counts.crossings - before_.crossings) / 3;
     const double even = cells_around(situation.dimension) * in_cell(situation, cell_);
-    if (options_.method == SearchOptions::Method::automatic && candidates > std::max(kCrowded, kUneven * even) * scans)
+    if (!lists_ && options_.method == SearchOptions::Method::automatic &&
+        candidates > std::max(kCrowded, kUneven * even) * scans) {
       lists_ = true;
+      if (options_.skin == 0) skin_ = std::min(skin_, kCrowdedSkin * situation.mean);  // the mean density says little
+    }
     before_ = counts;
   }
   // The smallest cell that cells and regions allow in any case.
@@ -115,18 +126,19 @@ void SearchTuning::choose_first(const SearchSituation& s) {
                                                                : options_.method == SearchOptions::Method::lists;
   // The approximate space that each sphere has beyond close packing.
   const double room = s.mean * (elementary::pow(0.74 / std::clamp(s.filled, 0.01, 0.73), 1.0 / s.dimension) - 1);
-  skin_ = options_.skin > 0 ? options_.skin : std::clamp(2 * room, 0.1 * s.mean, 0.4 * s.mean);
+  skin_ = options_.skin > 0 ? options_.skin
+                            : std::clamp(2 * room, 0.1 * s.mean, std::max(kCrowdedSkin * s.mean, short_list_skin(s)));
   cell_ = options_.cell > 0 ? options_.cell : best_cell(s);
 }
 
 /// Scales the skin to the lowest sum of the costs of predictions, which increase with the candidates, and of renewals.
 /// The rate of renewals is between that of free flight (∝ 1/skin) and that of diffusion (∝ 1/skin²).
 void SearchTuning::adapt_skin(const SearchSituation& s, double predictions, double candidates, double rebuilds) {
-  const double now = s.largest + 2 * skin_;
+  const double now = s.largest + 2 * skin_, most = std::max(kLargestSkin * s.mean, short_list_skin(s));
   double best = skin_, least = std::numeric_limits<double>::infinity();
   for (const double factor : {0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4}) {
     const double skin = skin_ * factor, reach = s.largest + 2 * skin;
-    if (skin > kLargestSkin * s.mean || skin < kSmallestSkin * s.mean) continue;
+    if (skin > most || skin < kSmallestSkin * s.mean) continue;
     const double cost = predictions * kPrediction +
                         candidates * elementary::pow(reach / now, s.dimension) * kCandidate +
                         rebuilds * elementary::pow(factor, -1.7) * kRenewal;

@@ -19,15 +19,12 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
       next_events_(next_events),
       lists_(packing, kernels.lanes, next_events) {
   exact_ = !equal || !box.closed();
-  if (!equal) {
-    level_.resize(radius.size());
-    for (std::size_t i = 0; i < radius.size(); ++i) level_[i] = octave(largest, radius[i]);
-  }
+  if (!equal) level_.resize(radius.size());
 }
 
 template <int D>
 std::uint8_t SkinLists<D>::octave(double largest, double radius) {
-  return static_cast<std::uint8_t>(std::clamp(std::ilogb(largest / radius), 0, 30));
+  return static_cast<std::uint8_t>(std::clamp(std::ilogb(largest / radius), 0, kOctaves - 1));
 }
 
 template <int D>
@@ -36,18 +33,25 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
   // 1. Make the cells for each size.
   levels_.clear();
   widest_ = 0;
-  const std::size_t levels = level_.empty() ? 1 : 1 + *std::max_element(level_.begin(), level_.end());
+  std::array<std::size_t, kOctaves> members{};  // by octave
+  std::array<double, kOctaves> radii{largest_};
+  for (std::size_t i = 0; i < level_.size(); ++i) {
+    const std::uint8_t o = level_[i] = octave(largest_, radius_[i]);
+    ++members[o];
+    radii[o] = std::max(radii[o], radius_[i]);
+  }
+  if (equal_) members[0] = n;
+  std::array<std::uint8_t, kOctaves> levels{};
   std::vector<Vec<D>> places;  // empty if this is the whole system
   if (n < extent.particles)
     for (Slot i = 0; i < n; ++i) places.push_back(place(i));
-  for (std::size_t l = 0; l < levels; ++l) {
-    double largest = l == 0 ? largest_ : 0;
-    std::size_t members = equal_ ? n : 0;
-    for (std::size_t i = 0; i < level_.size(); ++i)
-      if (level_[i] == l) largest = std::max(largest, radius_[i]), ++members;
+  for (std::size_t o = 0; o < kOctaves; ++o) {
+    if (o > 0 && members[o] == 0) continue;  // spheres admitted later go to larger ones
+    const double largest = radii[o];
+    levels[o] = static_cast<std::uint8_t>(levels_.size());
     const double all =
-        static_cast<double>(members) * static_cast<double>(extent.particles) / std::max(static_cast<double>(n), 1.0);
-    const double farthest = (l == 0 ? largest : levels_[0].largest_radius) + largest + 2 * (skin_ + max_displacement);
+        static_cast<double>(members[o]) * static_cast<double>(extent.particles) / std::max(static_cast<double>(n), 1.0);
+    const double farthest = largest_ + largest + 2 * (skin_ + max_displacement);
     levels_.push_back({largest, RegionCells<D>(box_, packing_, kernels_, extent, all,
                                                2 * (std::max(largest, 1e-300) + skin_), farthest)});
     RegionCells<D>& cells = levels_.back().cells;
@@ -55,6 +59,7 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
     cells.clear();
     widen(cells.widest());
   }
+  for (std::uint8_t& level : level_) level = levels[level];
   // 2. Insert every sphere into a cell.
   boxes_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {

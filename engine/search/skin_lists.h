@@ -63,6 +63,7 @@ class SkinLists {
     RegionCells<D> cells;
   };
 
+  static constexpr int kOctaves = 31;  // the last one holds all smaller spheres
   static std::uint8_t octave(double largest, double radius);
   std::size_t level_of(Slot i) const { return equal_ ? 0 : level_[i]; }
   Vec<D> centre(Slot i) const {

@@ -192,6 +192,19 @@ TEST(SearchTuning, KeepsCellsInADiluteGasUnlessARegionIsCrowded) {
     counts.candidates = static_cast<std::uint64_t>(candidates_of_a_scan) * (counts.predictions + counts.crossings / 3);
     tuning.choose(dilute, counts);
     EXPECT_EQ(tuning.lists(), lists) << candidates_of_a_scan;
+    EXPECT_TRUE(!lists ||
+                tuning.skin() < 0.5);  // a skin for the mean density would give spheres in the crowd long lists
+  }
+}
+
+/// In a dilute mixture a sphere flies far between two contacts, and its list stays short even with a large skin.
+TEST(SearchTuning, TakesLargerSkinsInDiluteMixtures) {
+  for (const auto& [filled, skin] : {std::pair{0.02, 2.1}, {0.05, 1.4}, {0.1, 1.0}, {0.4, 0.45}}) {
+    const double density = filled / 2 / 0.524;  // half of the volume is that of few large spheres
+    SearchTuning tuning({});
+    tuning.choose({3, density, filled, 1, 10}, {});
+    ASSERT_TRUE(tuning.lists());
+    EXPECT_NEAR(tuning.skin(), skin, 0.1 * skin) << filled;
   }
 }
 
