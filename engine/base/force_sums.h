@@ -6,10 +6,13 @@
 // (quanta() in forces.h), so pair forces cancel exactly in the sum over all particles. A sum has a low word, and a high
 // word for forces too large for the low one: its value is (2^40 high + low) quanta, however pairs used the two words.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "engine/base/force_words.h"
@@ -72,6 +75,29 @@ class ForceSums {
       low_[i].of[k] += static_cast<std::int64_t>(std::nearbyint(quanta - upper * 0x1p40));
     }
     return true;
+  }
+  /// Whether there are high words.
+  bool wide() const { return !high_.empty(); }
+  /// Takes away the low or the high words of the sum on a particle, to be added to that of another rank.
+  using Words = std::array<std::int64_t, D>;
+  Words take(Id i, bool high) {
+    Words taken;
+    for (int k = 0; k < D; ++k) taken[k] = std::exchange((high ? high_ : low_)[i].of[k], 0);
+    return taken;
+  }
+  /// Adds words that another rank has taken, taken[n] to the sum on the n-th of these particles.
+  void add(std::span<const Id> particles, std::span<const Words> taken, bool high) {
+    std::int64_t most = 0;
+    for (const Words& words : taken)
+      for (const std::int64_t word : words) most = std::max(most, std::abs(word));
+    if (most == 0) return;
+    double& used = high ? used_high_ : used_low_;
+    if (!high && used + static_cast<double>(most) > kMaxWordSum) carry();
+    if (high && used + static_cast<double>(most) > kMaxWordSum) return invalidate();
+    used += static_cast<double>(most);
+    ForceWords* const sums = high ? this->high() : low();
+    for (std::size_t n = 0; n < taken.size(); ++n)
+      for (int k = 0; k < D; ++k) sums[particles[n]].of[k] += taken[n][k];
   }
   /// Marks that some force could not be added: all values are NaN until reset().
   void invalidate() { invalid_ = true; }

@@ -7,10 +7,11 @@
 // over the particles. Arrays of positions are in id order. Forces, energies and virials are summed in fixed point
 // (force_sums.h), so no sum depends on how the pairs were found.
 //
-// If a system is divided among ranks (engine/ranks/decomposition.h), sums over the system run over what this rank owns:
-// its particles, and the pairs with a lower id that it owns. Forces on ghosts are incomplete. A term in which each
-// particle feels all others, as the waves of an Ewald sum, then adds up sums of all ranks in add_…(): all ranks call
-// these functions in the same order.
+// If a system is divided among ranks (engine/ranks/decomposition.h), sums over the system run over what this rank
+// evaluates: its particles, pairs of them, and about half of their pairs with ghosts (Particles::evaluates). Forces on
+// ghosts must then be added to those on the particles of their owners (Decomposition::add_ghosts). A term in which each
+// particle feels all others, as the waves of an Ewald sum, adds up sums of all ranks in add_…(): all ranks call these
+// functions in the same order.
 
 #include <functional>
 #include <memory>
@@ -80,7 +81,7 @@ class Interaction {
   /// Adds V and the other sums at positions x.
   virtual void add_energy(Positions<D> x, PotentialSums& sums) const = 0;
 
-  /// Adds the fluxes at positions x and velocities v, of which those of ghosts are not read; external fields have none.
+  /// Adds the fluxes at positions x and velocities v; external fields have none.
   /// Throws Error(Failure::deck) if the term has no formula for its stress.
   virtual void add_fluxes(Positions<D> x, Positions<D> v, PairFluxes<D>& fluxes) const = 0;
 

@@ -72,6 +72,12 @@ struct Particles {
     return fixed;
   }
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
+  /// Whether this rank evaluates a pair of which it owns one particle; if not, the owner of the other one does. Each
+  /// evaluates about half of the pairs that two ranks share.
+  bool evaluates(Id i, Id j) const {
+    const Id a = id_of(i), b = id_of(j);
+    return owns(((a + b) % 2 == 0) == (a < b) ? i : j);
+  }
   Id id_of(Id i) const { return id.empty() ? i : id[i]; }
 };
 

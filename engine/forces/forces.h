@@ -48,14 +48,17 @@ Quanta quanta_of(const System<D>& system) {
   return system.quanta.force > 0 ? system.quanta : quanta(system);
 }
 
-/// One force pass: `add` adds the terms of each interaction, `out` gets the sums, on ghosts if `ghosts`.
+/// One force pass: `add` adds the terms of each interaction, `out` gets the sums; if `arrive` is given, it is called at
+/// the latest after them, and the sums on ghosts remain unknown.
 template <int D, class Add>
 void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, Counters& counters, Add&& add,
-                bool ghosts = true) {
+                const Arrival& arrive = {}) {
   const Stopwatch watch(counters.seconds.force);
   for (const auto& term : system.interactions) add(*term);
+  if (arrive) arrive();
+  system.decomposition.add_ghosts(forces);
   for (Id i = 0; i < out.size(); ++i) out[i] = forces.value(i);
-  if (ghosts) system.decomposition.update(out);
+  if (!arrive) system.decomposition.update(out);
   counters.force_passes += 1;
 }
 
@@ -72,8 +75,7 @@ void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Co
     if (std::exchange(waits, false)) arrive();
   };
   const auto add = [&](const auto& term) { term.add_forces_early(x, forces, sums, once); };
-  force_pass<D>(system, out, forces, counters, add, !arrive);
-  once();
+  force_pass<D>(system, out, forces, counters, add, arrive ? once : Arrival());
 }
 
 /// out[i] = −∇̄_i V(x, x_new), the mean force of a discrete-gradient step. One force pass.
@@ -93,20 +95,22 @@ class MeanForces {
     forces_.reset(x.size(), quanta_of(system).force);
     std::uint64_t pairs = 0;
     for (const auto& term : system.interactions) pairs += term->add_mean_forces(x, x_new, forces_);
+    system.decomposition.add_ghosts(forces_);
     return pairs;
   }
   /// Evaluates changes only, with the bits of evaluate(); x_new may differ from that of the last call, `x_before`, only
-  /// for `changed` particles.
+  /// for `changed` particles. All ranks must have room.
   std::uint64_t update(const System<D>& system, Positions<D> x, Positions<D> x_before, Positions<D> x_new,
                        const char* changed) {
-    if (!forces_.has_room()) return evaluate(system, x, x_new);
     std::uint64_t pairs = 0;
     for (const auto& term : system.interactions) {
       pairs += term->add_mean_forces(x, x_before, forces_, changed, -1);
       pairs += term->add_mean_forces(x, x_new, forces_, changed);
     }
+    system.decomposition.add_ghosts(forces_);
     return pairs;
   }
+  bool has_room() const { return forces_.has_room(); }
   /// The force on an own particle.
   Vec<D> operator[](Id i) const { return forces_.value(i); }
 

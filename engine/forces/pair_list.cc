@@ -261,8 +261,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
       for (int k = 0; k < D; ++k) (&records_.box.back().x)[k] = box[k];
     }
 
-  // The partners of an own particle are own particles in half of the cells around it, those of a ghost all own
-  // particles around it.
+  // The partners of an own particle are own particles in half of the cells around it, those of a ghost the own
+  // particles in all cells around it, if this rank evaluates the pair.
   std::vector<PartnerRange> ranges;
   Cell<D> centre{};
   for (std::size_t c = 0; c + 1 < cells.start.size(); ++c) {
@@ -278,7 +278,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     cells.partners(centre, own, ranges);
     for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
       if (own) ranges[0].begin = r + 1;
-      find_pairs(r, ranges);
+      find_pairs(particles, r, ranges);
       if (sizes_[own ? 0 : 1] +
               records_.partners[own ? PairRecords<D>::kMoving : PairRecords<D>::kSharedMoving].size() >
           kMaxPairs + kMaxPartners * particles_) {
@@ -301,7 +301,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
 
 /// Lists the pairs of one particle with the particles in these ranges.
 template <int D>
-void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> ranges) {
+void CutoffList<D>::find_pairs(const Particles<D>& particles, std::uint32_t row, std::span<const PartnerRange> ranges) {
   const std::uint64_t code = code_[row];
   const double reach = (cutoff_ + skin_.width()) * (1 + 1e-12);
   const bool ghost = row >= records_.own;
@@ -327,8 +327,12 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
     PartnersFound found{plain.data() + size, other_.data()};
     for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
-    if (filter_.excluded) {
-      const auto excluded = [&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); };
+    if (filter_.excluded || ghost) {
+      const Id i = records_.order[row];
+      const auto excluded = [&](std::uint32_t r) {
+        const Id j = records_.order[r];
+        return (ghost && !particles.evaluates(i, j)) || (filter_.excluded && filter_.excludes(i, j));
+      };
       found.plain = std::remove_if(plain.data() + size, found.plain, excluded);
       found.other = std::remove_if(other_.data(), found.other, excluded);
     }

@@ -54,7 +54,7 @@ class CutoffList {
   bool follow(const PairStep<D>& step, std::size_t first, std::size_t end, double& squared_from_build,
               double& squared_step);
   void build(const PairStep<D>& step, const Particles<D>& particles);
-  void find_pairs(std::uint32_t row, std::span<const struct PartnerRange> ranges);
+  void find_pairs(const Particles<D>& particles, std::uint32_t row, std::span<const struct PartnerRange> ranges);
 
   const Box<D>& box_;
   double cutoff_;

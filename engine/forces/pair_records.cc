@@ -80,10 +80,10 @@ ForceWords* PairRecords<D>::high() {
 template <int D>
 void PairRecords<D>::flush_to(ForceSums<D>& sums) {
   ForceWords* const low = sums.low();
-  for (std::size_t r = 0; r < own; ++r) low[order[r]].add(low_[r]);
+  for (std::size_t r = 0; r < order.size(); ++r) low[order[r]].add(low_[r]);
   if (high_.empty()) return;
   ForceWords* const high = sums.high();
-  for (std::size_t r = 0; r < own; ++r) high[order[r]].add(high_[r]);
+  for (std::size_t r = 0; r < order.size(); ++r) high[order[r]].add(high_[r]);
 }
 
 template class PairRecords<2>;

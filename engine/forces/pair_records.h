@@ -31,14 +31,14 @@ class PairRecords {
   enum Kind {
     kPlain,         ///< both particles are owned
     kMoving,        ///< both are owned, but one may be wrapped into another box
-    kShared,        ///< another rank owns one of the particles
-    kSharedMoving,  ///< another rank owns one of the particles, and one may be wrapped
+    kShared,        ///< another rank owns one of the particles, and this rank evaluates the pair
+    kSharedMoving,  ///< as kShared, and one may be wrapped
     kKinds
   };
   static bool shared(Kind kind) { return kind == kShared || kind == kSharedMoving; }
 
   std::vector<Id> order;  ///< particles by place
-  std::size_t own = 0;    ///< the number of places of own particles, which come first; flush_to() adds their sums
+  std::size_t own = 0;    ///< the number of places of own particles, which come first
   std::vector<PairRun> runs[kKinds];
   std::vector<std::uint32_t> partners[kKinds];  ///< followed by at least eight more, for padding
   std::vector<PairRecord> box;                  ///< numbers of the boxes that the particles are in; empty: all 0

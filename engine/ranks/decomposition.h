@@ -7,9 +7,9 @@
 //
 // * in blocks of consecutive ids (id_blocks.h): at the start, between epochs of free flight, and for files;
 // * by place, for methods with forces: one rank owns each particle, and the ranks near it have copies, the ghosts of
-//   their halo (Particles::ghost). The owner of a particle sums the forces on it, from all its pairs, in integers and
-//   sends them to the ranks with ghosts: the sums have the bits of a single rank. Cheap work is done by each rank for
-//   all particles that it has.
+//   their halo (Particles::ghost). One of the two ranks that share a pair evaluates it. The owner of a particle adds up
+//   the forces on it and on its ghosts, in integers, and sends the sum back: it has the bits of a single rank. Cheap
+//   work is done by each rank for all particles that it has.
 //
 // A rank advances its ghosts like its own particles. Ghosts at the rim of the halo lack partners and may become wrong,
 // so the ranks check that the ghosts that matter had the same events as on their owners (engine/slabs/slab_core.h). If
@@ -118,6 +118,11 @@ class Decomposition {
   template <class... T>
   void update(std::span<T>... values) const {
     if (by_place_) halo_.update(*ranks_, values...);
+  }
+  /// Forces on ghosts are added to those on the particles of their owners; call when all forces of a pass have been
+  /// added. Collective.
+  void add_ghosts(ForceSums<D>& sums) const {
+    if (by_place_) halo_.add_ghosts(*ranks_, sums);
   }
   /// Ghosts get positions, velocities and spins of their owners, since some at the rim may be wrong. Does nothing if
   /// all ranks have all particles.

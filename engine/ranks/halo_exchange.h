@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/base/force_sums.h"
 #include "engine/base/particles.h"
 #include "engine/ranks/communicator.h"
 
@@ -33,6 +34,8 @@ class HaloExchange {
     start(ranks, {}, values...);
     finish(ranks, values...);
   }
+  /// Owners add the sums on ghosts to those on their particles; the sums on ghosts are zero afterwards. Collective.
+  void add_ghosts(Communicator& ranks, ForceSums<D>& sums) const;
   /// update() in two parts, between which the values are unknown; finish() also replaces each of `most` by its maximum
   /// over all ranks.
   template <class... T>

@@ -45,21 +45,19 @@ class PairTerm final : public Interaction<D> {
   void add_energy(Positions<D> x, PotentialSums& sums) const override { evaluate({.x = x}, nullptr, &sums); }
   void add_fluxes(Positions<D> x, Positions<D> v, PairFluxes<D>& fluxes) const override {
     const PairBatch& batch = *batch_;
-    pairs_.batches(step({.x = x}), particles_, cutoff_squared(), *batch_, [&](bool shared) {
+    pairs_.batches(step({.x = x}), particles_, cutoff_squared(), *batch_, [&] {
       for (unsigned r = 0; r < batch.rows; ++r)
         for (unsigned k = batch.row[r].begin; k < batch.row[r + 1].begin; ++k) {
           Vec<D> d;
           for (int axis = 0; axis < D; ++axis) d[axis] = batch.d[axis][k];
           const double rho = d.squaredNorm(), w = batch.weight[k];
           const Vec<D> force = (-2 * w * potential_.derivative(rho)) * d;
-          // A shared pair counts half on each rank, and gives each rank the current of its own particle.
           for (int a = 0; a < D; ++a)
-            for (int b = 0; b < D; ++b) fluxes.stress[D * a + b].add((shared ? 0.5 : 1.0) * d[a] * force[b]);
-          for (const Id i : {pairs_.id(batch.row[r].row), pairs_.id(batch.second[k])})
-            if (particles_.owns(i)) {
-              const Vec<D> current = 0.5 * (w * potential_.value(rho) * v[i] + force.dot(v[i]) * d);
-              for (int axis = 0; axis < D; ++axis) fluxes.heat[axis].add(current[axis]);
-            }
+            for (int b = 0; b < D; ++b) fluxes.stress[D * a + b].add(d[a] * force[b]);
+          for (const Id i : {pairs_.id(batch.row[r].row), pairs_.id(batch.second[k])}) {
+            const Vec<D> current = 0.5 * (w * potential_.value(rho) * v[i] + force.dot(v[i]) * d);
+            for (int axis = 0; axis < D; ++axis) fluxes.heat[axis].add(current[axis]);
+          }
         }
     });
   }
@@ -119,7 +117,7 @@ class PairTerm final : public Interaction<D> {
 
   std::uint64_t interacting_pairs(Positions<D> x) const override {
     std::uint64_t own = 0;
-    pairs_.batches(step({x}), particles_, cutoff_squared(), *batch_, [&](bool shared) { own += owned(shared); });
+    pairs_.batches(step({x}), particles_, cutoff_squared(), *batch_, [&] { own += batch_->n; });
     return own;
   }
 
@@ -160,16 +158,6 @@ class PairTerm final : public Interaction<D> {
     return given;
   }
 
-  /// The number of this rank's pairs in the batch: a pair is counted by the owner of its lower particle.
-  std::uint64_t owned(bool shared) const {
-    if (!shared) return batch_->n;
-    std::uint64_t own = 0;
-    for (unsigned r = 0; r < batch_->rows; ++r)
-      for (unsigned k = batch_->row[r].begin; k < batch_->row[r + 1].begin; ++k)
-        own += particles_.owns(std::min(pairs_.id(batch_->row[r].row), pairs_.id(batch_->second[k]))) ? 1 : 0;
-    return own;
-  }
-
   /// The loop over pairs. For mean forces, returns the number of this rank's pairs. `arrive`: not null if the positions
   /// of ghosts are unknown before this is called.
   std::uint64_t evaluate(const PairStep<D>& given, ForceSums<D>* forces, PotentialSums* sums, int sign = 1,
@@ -182,24 +170,24 @@ class PairTerm final : public Interaction<D> {
     constexpr double kNoLimit = std::numeric_limits<double>::infinity();  // used without forces
     PairUnits units{.limits = {kNoLimit, kNoLimit}};
     if (sums) units.per_energy = 1 / sums->quantum;
-    PairTotals totals[2];  // for pairs of own particles, and pairs shared with another rank
+    PairTotals totals;
     std::uint64_t own = 0;
     ForceWords* low = nullptr;
-    const auto add_batch = [&](bool shared) {
+    const auto add_batch = [&] {
       if (forces && !low) {
         units.limits = forces->make_room(pairs_.most_partners());
         units.per_force = sign / forces->quantum();
         low = pairs_.low(*forces);
       }
-      const bool wide = !function[0](&potential_, *batch_, units, &totals[shared ? 1 : 0]);
-      if (wide && !function[1](&potential_, *batch_, units, &totals[shared ? 1 : 0])) {
+      const bool wide = !function[0](&potential_, *batch_, units, &totals);
+      if (wide && !function[1](&potential_, *batch_, units, &totals)) {
         if (given.x_new.empty() && given.vectors.empty()) refuse();
         forces->invalidate();
       } else if (forces) {
         kernels_->scatter(*batch_, batch_->low, low);
         if (wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
       }
-      if (!given.x_new.empty()) own += owned(shared);
+      if (!given.x_new.empty()) own += batch_->n;
     };
     const PairStep<D> all = step(given);
     bool done = false;
@@ -218,13 +206,9 @@ class PairTerm final : public Interaction<D> {
     }
     if (low) pairs_.flush_to(*forces);
     if (!sums) return own;
-    // A shared pair counts half on each rank.
-    const auto add = [&](ExactSum& sum, PairTotals::Whole PairTotals::*part, double quanta) {
-      sum.add(2 * totals[0].*part + totals[1].*part, 0.5 * quanta * sums->quantum);
-    };
-    add(sums->energy, &PairTotals::energy, 1);
-    add(sums->magnitude, &PairTotals::magnitude, 1);
-    add(sums->virial, &PairTotals::virial, 64);
+    sums->energy.add(totals.energy, sums->quantum);
+    sums->magnitude.add(totals.magnitude, sums->quantum);
+    sums->virial.add(totals.virial, 64 * sums->quantum);
     return own;
   }
 

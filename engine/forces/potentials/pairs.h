@@ -3,8 +3,8 @@
 // Sources of pairs for the sum of a term of V: a list of bonds, all pairs, or the pairs within a cutoff.
 //
 // Each source has
-//   batches(step, particles, cutoff², batch, visit)   fills the batch repeatedly and calls visit(shared); shared:
-//                               another rank owns one particle of each pair; pairs of two ghosts are omitted
+//   batches(step, particles, cutoff², batch, visit)   fills the batch repeatedly and calls visit(): with pairs of own
+//                               particles, and those pairs with a ghost that this rank evaluates
 //   id(place)                   the particle with this number in a batch
 //   low(sums), high(sums)       words to which the forces of a batch are added; flush_to(sums) comes last
 //   most_partners()             upper bound for any particle in these batches
@@ -46,7 +46,7 @@ void collect_batches(PairRecords<D>& records, const Box<D>& box, const PairStep<
     if (!(Records::shared(kind) ? shared : own)) continue;
     PairRows rows = records.rows(kind, box, step);
     rows.cutoff_squared = cutoff_squared;
-    for (PairCursor cursor; kernels.collect(rows, cursor, batch);) visit(Records::shared(kind));
+    for (PairCursor cursor; kernels.collect(rows, cursor, batch);) visit();
   }
 }
 
@@ -105,34 +105,28 @@ class Bonds {
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double /*cutoff_squared*/, PairBatch& batch,
                Visit&& visit) const {
-    shared_.clear();
-    for (const bool shared : {false, true}) {
+    batch.clear();
+    const auto flush = [&] {
+      batch.pad();
+      if (batch.n > 0) visit();
       batch.clear();
-      const auto flush = [&] {
-        batch.pad();
-        if (batch.n > 0) visit(shared);
-        batch.clear();
-      };
-      for (const auto& [i, j] : shared ? shared_ : pairs_) {
-        if (step.changed && step.changed[i] == 0 && step.changed[j] == 0) continue;
-        if (!shared && !(particles.owns(i) && particles.owns(j))) {
-          if (particles.owns(i) || particles.owns(j)) shared_.push_back({i, j});
-          continue;
-        }
-        const Vec<D> shift = shift_of(i, j, step.x), d = step.x[i] - step.x[j] + shift;
-        batch.begin_row(i);
-        for (int k = 0; k < 3; ++k) batch.d[k][batch.n] = k < D ? d[k] : 0;
-        if (!step.x_new.empty() || !step.vectors.empty()) {
-          const Vec<D> d_new = step.vectors.empty() ? Vec<D>(step.x_new[i] - step.x_new[j] + shift)
-                                                    : Vec<D>(step.vectors[i] - step.vectors[j]);
-          for (int k = 0; k < 3; ++k) batch.d_new[k][batch.n] = k < D ? d_new[k] : 0;
-        }
-        batch.weight[batch.n] = step.weight ? (*step.weight)[i] * (*step.weight)[j] : 1;
-        batch.second[batch.n++] = j;
-        if (batch.n == PairBatch::kCapacity) flush();
+    };
+    for (const auto& [i, j] : pairs_) {
+      if (step.changed && step.changed[i] == 0 && step.changed[j] == 0) continue;
+      if (!particles.evaluates(i, j)) continue;
+      const Vec<D> shift = shift_of(i, j, step.x), d = step.x[i] - step.x[j] + shift;
+      batch.begin_row(i);
+      for (int k = 0; k < 3; ++k) batch.d[k][batch.n] = k < D ? d[k] : 0;
+      if (!step.x_new.empty() || !step.vectors.empty()) {
+        const Vec<D> d_new = step.vectors.empty() ? Vec<D>(step.x_new[i] - step.x_new[j] + shift)
+                                                  : Vec<D>(step.vectors[i] - step.vectors[j]);
+        for (int k = 0; k < 3; ++k) batch.d_new[k][batch.n] = k < D ? d_new[k] : 0;
       }
-      flush();
+      batch.weight[batch.n] = step.weight ? (*step.weight)[i] * (*step.weight)[j] : 1;
+      batch.second[batch.n++] = j;
+      if (batch.n == PairBatch::kCapacity) flush();
     }
+    flush();
   }
   Id id(std::uint32_t place) const { return place; }
   ForceWords* low(ForceSums<D>& sums) const { return sums.low(); }
@@ -160,13 +154,12 @@ class Bonds {
 
   const Box<D>& box_;
   PairList pairs_;
-  mutable PairList shared_;  // bonds shared with other ranks, set by batches()
   std::span<const Id> ids_;  // the particles' global ids; empty: pairs_ has them
   std::size_t most_partners_ = 0;
 };
 
 /// All pairs of `particles` particles in a box without periodic axes. They are not stored: the partners of a particle
-/// are consecutive, sorted by species if necessary and by ownership.
+/// are in few runs, sorted by species if necessary, by ownership, and by the rule of Particles::evaluates().
 template <int D>
 class AllPairs {
  public:
@@ -203,10 +196,11 @@ class AllPairs {
     const bool apart = !filter_.species.all() && filter_.species.a != filter_.species.b;
     for (const std::uint64_t code : {PartnerSearch::kFirst, PartnerSearch::kSecond})
       for (const bool owned : {true, false}) {
-        for (Id i = 0; i < particles_; ++i)
-          if (particles.owns(i) == owned && (filter_.species.code(i) & code) != 0 &&
-              (apart || code == PartnerSearch::kFirst))
-            records_.order.push_back(i);
+        for (const Id odd : {0u, 1u})
+          for (Id i = 0; i < particles_; ++i)
+            if (particles.owns(i) == owned && particles.id_of(i) % 2 == odd && (filter_.species.code(i) & code) != 0 &&
+                (apart || code == PartnerSearch::kFirst))
+              records_.order.push_back(i);
         end.push_back(static_cast<std::uint32_t>(records_.order.size()));
       }
     records_.own = records_.order.size();
@@ -214,8 +208,12 @@ class AllPairs {
       const auto run = [&](std::uint32_t stop) {
         if (first < stop) records_.runs[kind].push_back({row, first, stop - first, {0, 0, 0}});
       };
-      for (std::uint32_t r = first; filter_.excluded && r < last; ++r)
-        if (filter_.excludes(records_.order[row], records_.order[r])) run(r), first = r + 1;
+      const Id i = records_.order[row];
+      const bool shared = PairRecords<D>::shared(kind);
+      for (std::uint32_t r = first; (filter_.excluded || shared) && r < last; ++r)
+        if (const Id j = records_.order[r];
+            (shared && !particles.evaluates(i, j)) || (filter_.excluded && filter_.excludes(i, j)))
+          run(r), first = r + 1;
       run(last);
     };
     for (std::uint32_t row = 0; row < end[1]; ++row) {

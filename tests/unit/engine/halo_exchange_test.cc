@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <random>
 
 #include "engine/ranks/bisection.h"
@@ -81,6 +82,64 @@ TEST(HaloExchange, CopiesGetTheValuesOfTheirOwners) {
       EXPECT_EQ(other[i], Vec<2>(known.p.id[i], 5));
     }
   });
+}
+
+/// Small forces, those of one rank so large that they need high words, and sums that have no room for more.
+TEST(HaloExchange, OwnersAddTheForcesOnCopies) {
+  using Whole = ForceSums<2>::Whole;
+  for (const double large : {1.0, 0x1p70, 0x1p84}) {
+    const auto force = [&](int rank, Id id) {
+      const double size = 1000 * rank + static_cast<double>(id);
+      return rank == 2 ? Vec<2>(large + size, -size) : Vec<2>(-size, size - 3);
+    };
+    std::array<std::map<Id, std::array<Whole, 2>>, 4> own;
+    std::array<std::map<Id, std::array<Whole, 2>>, 4> expected;
+    test::ThreadRanks(4).run([&](Communicator& ranks) {
+      const auto me = static_cast<std::size_t>(ranks.rank());
+      const Known known(ranks.rank());
+      ForceSums<2> sums(known.p.size(), 1);
+      const ForceLimits limits = sums.make_room(3);
+      for (Id i = 0; i < known.p.size(); ++i) {
+        ASSERT_TRUE(sums.add(i, force(ranks.rank(), known.p.id[i]), limits));
+        expected[me][known.p.id[i]] = sums.quanta(i);
+      }
+      known.halo.add_ghosts(ranks, sums);
+      known.halo.add_ghosts(ranks, sums);  // nothing is left to be added
+      for (Id i = 0; i < known.p.size(); ++i)
+        if (known.p.owns(i))
+          own[me][known.p.id[i]] = sums.quanta(i);
+        else
+          EXPECT_EQ(sums.value(i), Vec<2>(0, 0));
+    });
+    std::size_t shared = 0, particles = 0;
+    for (const auto& of_rank : own)
+      for (const auto& [id, sum] : of_rank) {
+        ++particles;
+        std::array<Whole, 2> all{};
+        int ranks = 0;
+        for (const auto& each : expected)
+          if (const auto at = each.find(id); at != each.end())
+            for (const int k : {0, 1}) all[k] += at->second[k], ranks += k;
+        shared += ranks > 1 ? 1 : 0;
+        EXPECT_TRUE(sum == all) << id << ' ' << large;
+      }
+    EXPECT_EQ(particles, 300u);
+    EXPECT_GT(shared, 100u);
+  }
+}
+
+TEST(HaloExchange, SumsWithoutRoomForTheForcesOnCopiesAreInvalid) {
+  ForceSums<2> sums(1, 1);
+  sums.make_room(1);
+  const std::array<Id, 1> first{0};
+  const std::array<ForceSums<2>::Words, 1> large{{{std::int64_t{1} << 61, 0}}};
+  for (int k = 0; k < 5; ++k) sums.add(first, large, false);
+  EXPECT_TRUE(sums.quanta(0)[0] == ForceSums<2>::Whole{5} << 61);  // low words are carried into high ones
+  sums.add(first, large, true);
+  EXPECT_TRUE(sums.value(0).allFinite());
+  sums.add(first, large, true);
+  sums.add(first, large, true);
+  EXPECT_FALSE(sums.value(0).allFinite());
 }
 
 TEST(HaloExchange, KnowsHowFarOwnParticlesHaveCome) {

@@ -86,38 +86,43 @@ TEST(CutoffList, HasPlacesBehindTheLastPartnerToo) {
   }
 }
 
-/// Own particles come first; pairs of ghosts are not listed.
-TEST(CutoffList, HasEachPairOfAnOwnParticleOnce) {
+/// Own particles come first; pairs of ghosts are not listed, and those of an own particle and a ghost on one of the two
+/// ranks, about half of them on each.
+TEST(CutoffList, TheListsOfTwoRanksHaveEachPairOnce) {
   constexpr double kCutoff = 1.5;
   Box<3> box;
   box.edges = {6, 5, 7};
   box.boundary.fill(Boundary::periodic);
-  Particles<3> p;
   std::mt19937_64 random(1);
   const auto place = [&](int axis) { return box.edges[axis] * static_cast<double>(random() >> 11) * 0x1p-53; };
-  for (int i = 0; i < 300; ++i) {
-    p.x.emplace_back(place(0), place(1), place(2));
-    p.ghost.push_back(i % 3 == 0);
-  }
-  CutoffList<3> list(box, kCutoff, {});
-  const PairRecords<3>& records = list.cover({.x = p.x}, p);
-  EXPECT_EQ(records.own, 200u);
+  Particles<3> p;
+  for (int i = 0; i < 300; ++i) p.x.emplace_back(place(0), place(1), place(2));
   std::map<std::pair<Id, Id>, int> listed;
-  for (const auto kind :
-       {PairRecords<3>::kPlain, PairRecords<3>::kMoving, PairRecords<3>::kShared, PairRecords<3>::kSharedMoving}) {
-    EXPECT_FALSE(records.runs[kind].empty()) << kind;
-    for (const PairRun& run : records.runs[kind])
-      for (std::size_t k = run.begin; k < run.begin + run.count; ++k) {
-        const Id i = records.order[run.row], j = records.order[records.partners[kind][k]];
-        EXPECT_TRUE(p.owns(j));
-        EXPECT_EQ(p.owns(i), !PairRecords<3>::shared(kind));
-        ++listed[std::minmax(i, j)];
-      }
+  std::array<double, 2> shared{};  // pairs
+  for (const int rank : {0, 1}) {
+    p.ghost.clear();
+    for (int i = 0; i < 300; ++i) p.ghost.push_back((i % 3 == 0) == (rank == 0));
+    CutoffList<3> list(box, kCutoff, {});
+    const PairRecords<3>& records = list.cover({.x = p.x}, p);
+    EXPECT_EQ(records.own, rank == 0 ? 200u : 100u);
+    for (const auto kind :
+         {PairRecords<3>::kPlain, PairRecords<3>::kMoving, PairRecords<3>::kShared, PairRecords<3>::kSharedMoving}) {
+      EXPECT_FALSE(records.runs[kind].empty()) << kind;
+      for (const PairRun& run : records.runs[kind])
+        for (std::size_t k = run.begin; k < run.begin + run.count; ++k) {
+          const Id i = records.order[run.row], j = records.order[records.partners[kind][k]];
+          EXPECT_TRUE(p.owns(j));
+          EXPECT_EQ(p.owns(i), !PairRecords<3>::shared(kind));
+          shared[static_cast<std::size_t>(rank)] += p.owns(i) ? 0 : 1;
+          ++listed[std::minmax(i, j)];
+        }
+    }
   }
+  EXPECT_NEAR(shared[0] / shared[1], 1, 0.2);
   for (Id i = 0; i < p.size(); ++i)
     for (Id j = i + 1; j < p.size(); ++j) {
       const Vec<3> d = p.x[i] - p.x[j];
-      const bool near = (d + box.shift(box.nearest_image(d))).norm() <= kCutoff && (p.owns(i) || p.owns(j));
+      const bool near = (d + box.shift(box.nearest_image(d))).norm() <= kCutoff;
       const auto found = listed.find({i, j});
       EXPECT_LE(found == listed.end() ? 0 : found->second, 1);
       EXPECT_TRUE(!near || found != listed.end()) << i << " and " << j;
