@@ -33,6 +33,10 @@ struct Particle {
   Spin<D> spin = Spin<D>::Zero();  ///< angular velocity [1/time]
 };
 
+/// Whether the first of two particles of different ranks, with these ids, is the one whose owner evaluates the pair:
+/// each rank evaluates about half of its pairs with another one.
+inline bool first_evaluates(Id a, Id b) { return ((a + b) % 2 == 0) == (a < b); }
+
 template <int D>
 struct Particles {
   std::vector<Vec<D>> x;               ///< position of the centre [length]
@@ -72,12 +76,8 @@ struct Particles {
     return fixed;
   }
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
-  /// Whether this rank evaluates a pair of which it owns one particle; if not, the owner of the other one does. Each
-  /// evaluates about half of the pairs that two ranks share.
-  bool evaluates(Id i, Id j) const {
-    const Id a = id_of(i), b = id_of(j);
-    return owns(((a + b) % 2 == 0) == (a < b) ? i : j);
-  }
+  /// Whether this rank evaluates a pair of which it owns one particle; if not, the owner of the other one does.
+  bool evaluates(Id i, Id j) const { return owns(first_evaluates(id_of(i), id_of(j)) ? i : j); }
   Id id_of(Id i) const { return id.empty() ? i : id[i]; }
 };
 

@@ -239,6 +239,9 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
 
   for (auto& coordinate : built_at_) coordinate.assign(members.size() + 8, 0);
   code_.assign(members.size() + 8, 0);
+  id_.clear();
+  if (!ghosts.empty())
+    for (const Id i : records_.order) id_.push_back(particles.id_of(i));
   bool any_moving = false;
   std::vector<Image<D>> boxes(members.size());
   for (std::size_t r = 0; r < members.size(); ++r) {
@@ -278,7 +281,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     cells.partners(centre, own, ranges);
     for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
       if (own) ranges[0].begin = r + 1;
-      find_pairs(particles, r, ranges);
+      find_pairs(r, ranges);
       if (sizes_[own ? 0 : 1] +
               records_.partners[own ? PairRecords<D>::kMoving : PairRecords<D>::kSharedMoving].size() >
           kMaxPairs + kMaxPartners * particles_) {
@@ -301,7 +304,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
 
 /// Lists the pairs of one particle with the particles in these ranges.
 template <int D>
-void CutoffList<D>::find_pairs(const Particles<D>& particles, std::uint32_t row, std::span<const PartnerRange> ranges) {
+void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> ranges) {
   const std::uint64_t code = code_[row];
   const double reach = (cutoff_ + skin_.width()) * (1 + 1e-12);
   const bool ghost = row >= records_.own;
@@ -327,15 +330,13 @@ void CutoffList<D>::find_pairs(const Particles<D>& particles, std::uint32_t row,
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
     PartnersFound found{plain.data() + size, other_.data()};
     for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
-    if (filter_.excluded || ghost) {
-      const Id i = records_.order[row];
-      const auto excluded = [&](std::uint32_t r) {
-        const Id j = records_.order[r];
-        return (ghost && !particles.evaluates(i, j)) || (filter_.excluded && filter_.excludes(i, j));
-      };
-      found.plain = std::remove_if(plain.data() + size, found.plain, excluded);
-      found.other = std::remove_if(other_.data(), found.other, excluded);
-    }
+    const auto remove = [&](auto&& condition) {
+      found.plain = std::remove_if(plain.data() + size, found.plain, condition);
+      found.other = std::remove_if(other_.data(), found.other, condition);
+    };
+    if (ghost) remove([&](std::uint32_t r) { return !first_evaluates(id_[r], id_[row]); });
+    if (filter_.excluded)
+      remove([&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); });
     const auto add = [&](int to, std::size_t begin, std::size_t end) {
       if (begin == end) return;
       records_.runs[to].push_back({row,

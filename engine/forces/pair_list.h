@@ -54,7 +54,7 @@ class CutoffList {
   bool follow(const PairStep<D>& step, std::size_t first, std::size_t end, double& squared_from_build,
               double& squared_step);
   void build(const PairStep<D>& step, const Particles<D>& particles);
-  void find_pairs(const Particles<D>& particles, std::uint32_t row, std::span<const struct PartnerRange> ranges);
+  void find_pairs(std::uint32_t row, std::span<const struct PartnerRange> ranges);
 
   const Box<D>& box_;
   double cutoff_;
@@ -70,6 +70,7 @@ class CutoffList {
   double own_squared_ = 0;           // the largest squared displacement found by cover_own()
   std::array<std::vector<double>, 3> built_at_;  // coordinates in the box at the last build
   std::vector<std::uint64_t> code_;
+  std::vector<Id> id_;  // by place; empty if there are no ghosts
   std::vector<std::uint32_t> other_;
   std::array<std::size_t, 2> sizes_{};  // numbers of partners in kPlain and in kShared; the arrays are longer
 };

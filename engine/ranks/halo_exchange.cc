@@ -53,18 +53,13 @@ void HaloExchange<D>::add_ghosts(Communicator& ranks, ForceSums<D>& sums) const 
   for (const bool high : {false, true}) {
     if (high && wide == 0) return;
     if (high) sums.high();
-    std::vector<Bytes> outgoing(neighbours_.size());
-    std::vector<std::size_t> sizes;
-    for (std::size_t k = 0; k < neighbours_.size(); ++k) {
-      const auto rank = static_cast<std::size_t>(neighbours_[k]);
-      sizes.push_back(sizeof(Words) * copied_to_[rank].size());
-      for (const Id i : copies_of_[rank]) put(outgoing[k], sums.take(i, high));
-    }
-    ranks.start(std::move(outgoing), neighbours_, sizes, {&wide, high ? 0u : 1u});
+    send(ranks, copies_of_, copied_to_, sizeof(Words), {&wide, 1}, [&](std::byte* to, Id i) {
+      const Words taken = sums.take(i, high);
+      std::memcpy(to, &taken, sizeof(Words));
+    });
     const std::vector<Bytes> incoming = ranks.complete();
-    std::vector<Words> taken;
     for (std::size_t k = 0; k < neighbours_.size(); ++k) {
-      taken.resize(incoming[k].size() / sizeof(Words));
+      std::vector<Words> taken(incoming[k].size() / sizeof(Words));
       std::memcpy(taken.data(), incoming[k].data(), incoming[k].size());
       sums.add(copied_to_[static_cast<std::size_t>(neighbours_[k])], taken, high);
     }

@@ -40,18 +40,9 @@ class HaloExchange {
   /// over all ranks.
   template <class... T>
   void start(Communicator& ranks, std::span<double> most, std::span<T>... values) const {
-    constexpr std::size_t kBytes = (sizeof(T) + ...);
-    std::vector<Bytes> outgoing(neighbours_.size());
-    std::vector<std::size_t> sizes;
-    for (std::size_t k = 0; k < neighbours_.size(); ++k) {
-      const auto rank = static_cast<std::size_t>(neighbours_[k]);
-      sizes.push_back(kBytes * copies_of_[rank].size());
-      outgoing[k].resize(kBytes * copied_to_[rank].size());
-      std::byte* to = outgoing[k].data();
-      for (const Id i : copied_to_[rank])
-        ((std::memcpy(to, static_cast<const void*>(&values[i]), sizeof(T)), to += sizeof(T)), ...);
-    }
-    ranks.start(std::move(outgoing), neighbours_, sizes, most);
+    send(ranks, copied_to_, copies_of_, (sizeof(T) + ...), most, [&](std::byte* to, Id i) {
+      ((std::memcpy(to, static_cast<const void*>(&values[i]), sizeof(T)), to += sizeof(T)), ...);
+    });
   }
   template <class... T>
   void finish(Communicator& ranks, std::span<T>... values) const {
@@ -64,8 +55,23 @@ class HaloExchange {
   }
 
  private:
-  std::vector<std::vector<Id>> copied_to_, copies_of_;  // by rank: own particles with ghosts there; ghosts owned there
-  std::vector<int> neighbours_;                         // ranks with entries in either
+  using Lists = std::vector<std::vector<Id>>;
+  /// Starts an exchange of so many bytes for each particle; pack(to, i) writes those for an entry of `from`.
+  void send(Communicator& ranks, const Lists& from, const Lists& to, std::size_t bytes, std::span<double> most,
+            auto&& pack) const {
+    std::vector<Bytes> outgoing;
+    std::vector<std::size_t> sizes;
+    for (const int neighbour : neighbours_) {
+      const auto rank = static_cast<std::size_t>(neighbour);
+      sizes.push_back(bytes * to[rank].size());
+      std::byte* at = outgoing.emplace_back(bytes * from[rank].size()).data();
+      for (const Id i : from[rank]) pack(at, i), at += bytes;
+    }
+    ranks.start(std::move(outgoing), neighbours_, sizes, most);
+  }
+
+  Lists copied_to_, copies_of_;  // by rank: own particles with ghosts there; ghosts owned there
+  std::vector<int> neighbours_;  // ranks with entries in either
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;  // unwrapped positions at assign()
 };

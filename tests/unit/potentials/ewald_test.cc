@@ -2,6 +2,8 @@
 // The Ewald sum: lattice energies, forces and energies against a sum in 50-digit arithmetic with another split, errors
 // against the accuracy asked for, the discrete gradient, and bits that depend on no order.
 
+#include "engine/forces/potentials/ewald.h"
+
 #include <gtest/gtest.h>
 
 #include <boost/math/constants/constants.hpp>
@@ -9,7 +11,6 @@
 #include <numbers>
 
 #include "engine/base/error.h"
-#include "engine/forces/potentials/ewald.h"
 #include "tests/unit/potentials/precise.h"
 #include "tests/unit/potentials/scene.h"
 
