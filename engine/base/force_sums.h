@@ -82,7 +82,7 @@ class ForceSums {
   using Words = std::array<std::int64_t, D>;
   Words take(Id i, bool high) {
     Words taken;
-    for (int k = 0; k < D; ++k) taken[k] = std::exchange((high ? high_ : low_)[i].of[k], 0);
+    for (int k = 0; k < D; ++k) taken[k] = std::exchange((high ? this->high() : low())[i].of[k], 0);
     return taken;
   }
   /// Adds words that another rank has taken, taken[n] to the sum on the n-th of these particles.

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -158,13 +157,12 @@ std::vector<std::uint32_t> Decomposition<D>::work() const {
 template <int D>
 bool Decomposition<D>::uneven() const {
   if (all_known_) return false;
-  std::vector<std::uint64_t> of_ranks(blocks().ranks);
   const std::vector<std::uint32_t> mine = work();
-  for (Id i = 0; i < mine.size(); ++i)
-    if (system_.particles.owns(i)) of_ranks[static_cast<std::size_t>(ranks_->rank())] += mine[i];
-  ranks_->sum(of_ranks);
-  const auto all = static_cast<double>(std::accumulate(of_ranks.begin(), of_ranks.end(), std::uint64_t{0}));
-  return static_cast<double>(std::ranges::max(of_ranks) * of_ranks.size()) > kUneven * all;
+  std::uint64_t all = 0;
+  for (Id i = 0; i < mine.size(); ++i) all += system_.particles.owns(i) ? mine[i] : 0;
+  double most = static_cast<double>(all);
+  ranks_->combine({&most, 1}, {&all, 1});
+  return most * ranks_->size() > kUneven * static_cast<double>(all);
 }
 
 template <int D>

@@ -4,14 +4,6 @@
 #include "engine/ranks/bisection.h"
 
 namespace carom {
-namespace {
-
-template <int D>
-Vec<D> unwrapped(const Box<D>& box, const Particles<D>& p, std::span<const Vec<D>> x, Id i) {
-  return x[i] + box.shift(p.image[i]);
-}
-
-}  // namespace
 
 template <int D>
 void HaloExchange<D>::assign(const Bisection<D>& bisection, const Box<D>& box, Particles<D>& p, int me, double near) {
@@ -25,7 +17,7 @@ void HaloExchange<D>::assign(const Bisection<D>& bisection, const Box<D>& box, P
     const std::uint32_t owner = bisection.owner(x);
     p.ghost[i] = owner != own;
     matters_.push_back(owner != own && bisection.squared_distance(own, x) <= near * near);
-    at_.push_back(unwrapped<D>(box, p, p.x, i));
+    at_.push_back(p.x[i] + box.shift(p.image[i]));
     if (owner != own)
       copies_of_[owner].push_back(i);
     else
@@ -42,7 +34,7 @@ template <int D>
 double HaloExchange<D>::squared_farthest(const Box<D>& box, const Particles<D>& p, std::span<const Vec<D>> x) const {
   double farthest = 0;
   for (Id i = 0; i < p.size(); ++i)
-    if (p.owns(i)) farthest = std::max(farthest, (unwrapped<D>(box, p, x, i) - at_[i]).squaredNorm());
+    if (p.owns(i)) farthest = std::max(farthest, (x[i] + box.shift(p.image[i]) - at_[i]).squaredNorm());
   return farthest;
 }
 
@@ -52,7 +44,6 @@ void HaloExchange<D>::add_ghosts(Communicator& ranks, ForceSums<D>& sums) const 
   double wide = sums.wide() ? 1 : 0;  // on any rank: then the high words follow
   for (const bool high : {false, true}) {
     if (high && wide == 0) return;
-    if (high) sums.high();
     send(ranks, copies_of_, copied_to_, sizeof(Words), {&wide, 1}, [&](std::byte* to, Id i) {
       const Words taken = sums.take(i, high);
       std::memcpy(to, &taken, sizeof(Words));

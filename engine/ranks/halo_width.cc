@@ -28,11 +28,6 @@ void HaloWidth::ask_for_path(double path) {
   if (asked_) wanted_path_ = kPathMargin * path;
 }
 
-void HaloWidth::ask_for_depth() {
-  depth_ *= 2;
-  asked_ = true;
-}
-
 void HaloWidth::relax() {
   depth_ = std::max(kDecay * depth_, least_depth_);
   wanted_path_ *= kDecay;

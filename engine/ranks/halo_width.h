@@ -28,7 +28,7 @@ class HaloWidth {
 
   /// Call after a slab with too narrow halos: the next fit() allows paths of this length, or doubles the depth.
   void ask_for_path(double path);
-  void ask_for_depth();
+  void ask_for_depth() { depth_ *= 2, asked_ = true; }
   /// Whether the last slab asked for a wider halo that is finite; resets the flag.
   bool asked() { return std::exchange(asked_, false); }
   /// Call if the last division was good enough: the next halos may be narrower.
