@@ -21,16 +21,16 @@ int poisson(double uniform) {
 
 // Time is divided into cells of length 1/rate. Each has a Poisson number of kicks, at uniform times.
 double Bath::next_kick(Id id, double origin, double t, double until) const {
-  constexpr double kNever = std::numeric_limits<double>::infinity();
+  constexpr double kNoKick = std::numeric_limits<double>::infinity();
   constexpr std::uint64_t kBlocksOfCell = 16;  // two numbers each: enough for the number of kicks and their times
   for (double cell = std::floor((origin + t) * rate); cell / rate - origin < until; ++cell) {
     RandomStream random(seed, RandomPurpose::kick_time, id, kBlocksOfCell * static_cast<std::uint64_t>(cell));
-    double next = kNever;
+    double next = kNoKick;
     for (int kicks = poisson(random.uniform()); kicks > 0; --kicks)
       if (const double s = (cell + random.uniform()) / rate - origin; s > t) next = std::min(next, s);
-    if (next < kNever) return next;
+    if (next < kNoKick) return next;
   }
-  return kNever;
+  return kNoKick;
 }
 
 }  // namespace carom

@@ -33,9 +33,9 @@ struct Particle {
   Spin<D> spin = Spin<D>::Zero();  ///< angular velocity [1/time]
 };
 
-/// Whether the first of two particles of different ranks, with these ids, is the one whose owner evaluates the pair:
-/// each rank evaluates about half of its pairs with another one.
-inline bool first_evaluates(Id a, Id b) { return ((a + b) % 2 == 0) == (a < b); }
+/// The rule for pairs of particles that two ranks own, with these ids: the pair is evaluated on the rank of the first
+/// one if this is true, else on that of the second. Each rank evaluates about half of the pairs.
+inline bool evaluated_with_first(Id a, Id b) { return ((a + b) % 2 == 0) == (a < b); }
 
 template <int D>
 struct Particles {
@@ -77,7 +77,7 @@ struct Particles {
   }
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
   /// Whether this rank evaluates a pair of which it owns one particle; if not, the owner of the other one does.
-  bool evaluates(Id i, Id j) const { return owns(first_evaluates(id_of(i), id_of(j)) ? i : j); }
+  bool evaluates(Id i, Id j) const { return owns(evaluated_with_first(id_of(i), id_of(j)) ? i : j); }
   Id id_of(Id i) const { return id.empty() ? i : id[i]; }
 };
 

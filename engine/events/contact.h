@@ -22,8 +22,7 @@ namespace carom {
 
 /// Rounding error of d·v for two touching spheres with these speeds.
 inline double approach_slack(double sigma, double speed_i, double speed_j) {
-  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-  return 8 * kEpsilon * sigma * (speed_i + speed_j);
+  return 8 * std::numeric_limits<double>::epsilon() * sigma * (speed_i + speed_j);
 }
 
 /// |d × v|², the squared area spanned by d and v. Unlike d²v² − (d·v)² it has no cancellation.

@@ -95,27 +95,28 @@ class MeanForces {
     forces_.reset(x.size(), quanta_of(system).force);
     std::uint64_t pairs = 0;
     for (const auto& term : system.interactions) pairs += term->add_mean_forces(x, x_new, forces_);
-    system.decomposition.add_ghosts(forces_);
+    room_ = system.decomposition.add_ghosts(forces_);
     return pairs;
   }
   /// Evaluates changes only, with the bits of evaluate(); x_new may differ from that of the last call, `x_before`, only
-  /// for `changed` particles. All ranks must have room.
+  /// for `changed` particles.
   std::uint64_t update(const System<D>& system, Positions<D> x, Positions<D> x_before, Positions<D> x_new,
                        const char* changed) {
+    if (!room_) return evaluate(system, x, x_new);
     std::uint64_t pairs = 0;
     for (const auto& term : system.interactions) {
       pairs += term->add_mean_forces(x, x_before, forces_, changed, -1);
       pairs += term->add_mean_forces(x, x_new, forces_, changed);
     }
-    system.decomposition.add_ghosts(forces_);
+    room_ = system.decomposition.add_ghosts(forces_);
     return pairs;
   }
-  bool has_room() const { return forces_.has_room(); }
   /// The force on an own particle.
   Vec<D> operator[](Id i) const { return forces_.value(i); }
 
  private:
   ForceSums<D> forces_;
+  bool room_ = false;  // for changes, in the sums of all ranks
 };
 
 /// out = V″(x) w. One force pass.

@@ -334,7 +334,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
       found.plain = std::remove_if(plain.data() + size, found.plain, condition);
       found.other = std::remove_if(other_.data(), found.other, condition);
     };
-    if (ghost) remove([&](std::uint32_t r) { return !first_evaluates(id_[r], id_[row]); });
+    if (ghost) remove([&](std::uint32_t r) { return !evaluated_with_first(id_[r], id_[row]); });
     if (filter_.excluded)
       remove([&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); });
     const auto add = [&](int to, std::size_t begin, std::size_t end) {

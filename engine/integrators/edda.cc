@@ -258,23 +258,22 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const Stopwatch watch(counters_->seconds.force);
     const auto& p = system.particles;
     const auto& x = core_->x();
-    const bool all = first || full_ || kPartialUpdate * core_->all_moved() > system.size();
+    const bool all = first || kPartialUpdate * core_->all_moved() > system.size();
     std::uint64_t pairs =
         all ? forces_.evaluate(system, p.x, x) : forces_.update(system, p.x, core_->last_x(), x, core_->moved().data());
     for (Id i = 0; i < x.size(); ++i) mean_[i] = forces_[i];
     system.decomposition.update(std::span(mean_));
     for (Id i = 0; i < x.size(); ++i) mean_[i] /= p.mass[i];
     if (resting()) hold(system, h, false);
-    std::array<double, 3> most{0, 0, forces_.has_room() ? 0.0 : 1.0};
+    std::array<double, 2> most{};
     for (Id i = 0; i < x.size(); ++i)
       if (p.owns(i) && !frozen(i)) most[0] = std::max(most[0], finite((mean_[i] - a_[i]).squaredNorm()));
     for (const Id i : core_->swapped()) most[1] = std::max(most[1], frozen(i) ? 0.0 : 1.0);
     system.decomposition.ranks().combine(most, {&pairs, 1});
-    full_ = most[2] > 0;
     if (first) pairs_ = pairs;
     counters_->force_passes += pairs_ > 0 ? static_cast<double>(pairs) / static_cast<double>(pairs_) : 0.0;
     ++counters_->sweeps;
-    return {most[0], most[1]};
+    return most;
   }
 
   /// Freezes colliding particles whose paths do not converge: a grazing contact may amplify a small change.
@@ -419,7 +418,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::optional<SlabCore<D>> core_;
   Extrapolation<D> past_;
   MeanForces<D> forces_;
-  bool full_ = false;              // some rank has no room in its sums for changes: evaluate all pairs
   std::uint64_t pairs_ = 0;        // within the cutoff
   std::vector<Vec<D>> a_, mean_;   // accelerations of the flight, and those that result from it
   std::vector<Vec<D>> smooth_;     // mean_ without reactions, if contacts rest

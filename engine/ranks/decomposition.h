@@ -119,11 +119,9 @@ class Decomposition {
   void update(std::span<T>... values) const {
     if (by_place_) halo_.update(*ranks_, values...);
   }
-  /// Forces on ghosts are added to those on the particles of their owners; call when all forces of a pass have been
-  /// added. Collective.
-  void add_ghosts(ForceSums<D>& sums) const {
-    if (by_place_) halo_.add_ghosts(*ranks_, sums);
-  }
+  /// Adds forces on ghosts to those on the particles of their owners; call when all forces of a pass have been added.
+  /// Returns whether the sums of all ranks have room for more passes. Collective.
+  bool add_ghosts(ForceSums<D>& sums) const { return by_place_ ? halo_.add_ghosts(*ranks_, sums) : sums.has_room(); }
   /// Ghosts get positions, velocities and spins of their owners, since some at the rim may be wrong. Does nothing if
   /// all ranks have all particles.
   void update_halo();

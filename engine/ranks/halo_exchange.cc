@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ranks/halo_exchange.h"
 
+#include <array>
+
 #include "engine/ranks/bisection.h"
 
 namespace carom {
@@ -39,12 +41,12 @@ double HaloExchange<D>::squared_farthest(const Box<D>& box, const Particles<D>& 
 }
 
 template <int D>
-void HaloExchange<D>::add_ghosts(Communicator& ranks, ForceSums<D>& sums) const {
+bool HaloExchange<D>::add_ghosts(Communicator& ranks, ForceSums<D>& sums) const {
   using Words = typename ForceSums<D>::Words;
-  double wide = sums.wide() ? 1 : 0;  // on any rank: then the high words follow
+  std::array<double, 2> most = {sums.wide() ? 1.0 : 0.0, sums.has_room() ? 0.0 : 1.0};  // on any rank
   for (const bool high : {false, true}) {
-    if (high && wide == 0) return;
-    send(ranks, copies_of_, copied_to_, sizeof(Words), {&wide, 1}, [&](std::byte* to, Id i) {
+    if (high && most[0] == 0) break;
+    send(ranks, copies_of_, copied_to_, sizeof(Words), most, [&](std::byte* to, Id i) {
       const Words taken = sums.take(i, high);
       std::memcpy(to, &taken, sizeof(Words));
     });
@@ -55,6 +57,7 @@ void HaloExchange<D>::add_ghosts(Communicator& ranks, ForceSums<D>& sums) const 
       sums.add(copied_to_[static_cast<std::size_t>(neighbours_[k])], taken, high);
     }
   }
+  return most[1] == 0;
 }
 
 template class HaloExchange<2>;

@@ -34,8 +34,9 @@ class HaloExchange {
     start(ranks, {}, values...);
     finish(ranks, values...);
   }
-  /// Owners add the sums on ghosts to those on their particles; the sums on ghosts are zero afterwards. Collective.
-  void add_ghosts(Communicator& ranks, ForceSums<D>& sums) const;
+  /// Sends the sums on ghosts to the owners, where they are added; those on ghosts are zero afterwards. Returns whether
+  /// the sums of all ranks had room for more passes. Collective.
+  bool add_ghosts(Communicator& ranks, ForceSums<D>& sums) const;
   /// update() in two parts, between which the values are unknown; finish() also replaces each of `most` by its maximum
   /// over all ranks.
   template <class... T>

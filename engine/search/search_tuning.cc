@@ -18,8 +18,9 @@ constexpr double kCrossing = 550;                     // per crossing, without n
 constexpr double kFewestPredictions = 20000;          // before counts are used
 constexpr double kCrowded = 40, kUneven = 2.5;        // candidates per scan of cells above which lists are cheaper
 constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02, kCrowdedSkin = 0.4;  // in mean diameters
-constexpr double kShortList =
-    12;  // candidates of a mean sphere up to which a larger skin is cheaper in dilute mixtures
+// The candidates of a mean sphere up to which a larger skin is cheaper in dilute mixtures: with about so many,
+// diameters 1:10 took the fewest instructions at packing fractions of 0.02, 0.05 and 0.1, and discs at 0.02 to 0.35.
+constexpr double kShortList = 12;
 
 /// The packing fraction above which lists are faster, as measured for equal spheres and discs.
 double dense(int dimension) { return dimension == 2 ? 0.55 : 0.32; }

@@ -12,7 +12,6 @@
 namespace carom {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 // The proximal terms, added to a diagonal of ones. The first term makes all pivots similar, so that few exchanges find
 // the contacts under pressure; the last is 10⁶ times the rounding of the factors, and small compared with the smallest
 // relevant eigenvalue, so that each repetition reduces the error by several digits.
@@ -29,9 +28,9 @@ constexpr int kFruitlessExchanges = 5;  // of all wrong contacts, before only on
 // tried whether the contacts under pressure are known.
 constexpr int kRounds = 50;
 constexpr double kInside = 0.99, kInteriorProximal = 1e-12, kClose[] = {1e-7, 1e-10};
-constexpr double kFewRoundings = 8 * kEpsilon;  // relative error of a sum of a few terms
-constexpr double kMostStretched = 0.1;          // of the kinetic energy: the turn of a sliding pair takes less
-constexpr int kWall = -1;                       // in place of a second body
+constexpr double kFewRoundings = 8 * std::numeric_limits<double>::epsilon();  // relative error of a sum of a few terms
+constexpr double kMostStretched = 0.1;  // of the kinetic energy: the turn of a sliding pair takes less
+constexpr int kWall = -1;               // in place of a second body
 
 /// The contacts of a system, with the spheres that they act on.
 template <int D>

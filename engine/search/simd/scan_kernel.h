@@ -63,11 +63,11 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
                                                               const std::uint32_t* candidates, unsigned n,
                                                               unsigned same, double* times) {
   using V = Double<W>;
-  constexpr double kNever = __builtin_inf();
+  constexpr double kInfinite = __builtin_inf();
   const double* const records = s.records;
   const double* const own = records + std::size_t{8} * self;
   const std::uint32_t slot_mask = s.slot_mask;
-  const V none = all<V>(kNever), t_i = all<V>(own[std::ptrdiff_t{2} * D]);
+  const V none = all<V>(kInfinite), t_i = all<V>(own[std::ptrdiff_t{2} * D]);
   V x_i[D], v_i[D];
   for (int k = 0; k < D; ++k) x_i[k] = all<V>(own[k]), v_i[k] = all<V>(own[D + k]);
   V sigma = all<V>(s.diameter), best = none;
@@ -124,7 +124,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       time = now + c / (elementary::sqrt(discriminant) - b);
       const IntegerOf<V> parting = b >= 0.0;
       time = (V)((IntegerOf<V>)time | parting | (discriminant <= 0.0));  // all bits set: NaN
-      time = (c <= 0.0) & ~parting ? all<V>(-kNever) : time;
+      time = (c <= 0.0) & ~parting ? all<V>(-kInfinite) : time;
     } else {
       if (s.radius)
         for (int l = 0; l < W; ++l) sigma[l] = s.radius[self] + s.radius[some[l] & slot_mask];
@@ -136,7 +136,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       time = now + (falling < 0.0 ? c / (root - falling) : (falling + root) / -outrun);
       time = (discriminant > 0.0) & ((falling < 0.0) | (outrun < 0.0)) ? time : none;
       time =
-          (c <= 0.0) ? (((falling < 0.0) & (d_squared > 0.0)) ? all<V>(-kNever) : none) : time;  // without the padding
+          (c <= 0.0) ? (((falling < 0.0) & (d_squared > 0.0)) ? all<V>(-kInfinite) : none) : time;  // without the padding
     }
     store(to, time);
     best = elementary::min(time, best);

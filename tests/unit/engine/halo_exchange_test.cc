@@ -103,13 +103,15 @@ TEST(HaloExchange, OwnersAddTheForcesOnCopies) {
         ASSERT_TRUE(sums.add(i, force(ranks.rank(), known.p.id[i]), limits));
         expected[me][known.p.id[i]] = sums.quanta(i);
       }
-      known.halo.add_ghosts(ranks, sums);
-      known.halo.add_ghosts(ranks, sums);  // nothing is left to be added
+      EXPECT_TRUE(known.halo.add_ghosts(ranks, sums));
+      EXPECT_TRUE(known.halo.add_ghosts(ranks, sums));  // nothing is left to be added
       for (Id i = 0; i < known.p.size(); ++i)
         if (known.p.owns(i))
           own[me][known.p.id[i]] = sums.quanta(i);
         else
           EXPECT_EQ(sums.value(i), Vec<2>(0, 0));
+      if (me == 1) sums.invalidate();
+      EXPECT_FALSE(known.halo.add_ghosts(ranks, sums));  // on all ranks: they must decide alike
     });
     std::size_t shared = 0, particles = 0;
     for (const auto& of_rank : own)

@@ -192,8 +192,8 @@ TEST(SearchTuning, KeepsCellsInADiluteGasUnlessARegionIsCrowded) {
     counts.candidates = static_cast<std::uint64_t>(candidates_of_a_scan) * (counts.predictions + counts.crossings / 3);
     tuning.choose(dilute, counts);
     EXPECT_EQ(tuning.lists(), lists) << candidates_of_a_scan;
-    EXPECT_TRUE(!lists ||
-                tuning.skin() < 0.5);  // a skin for the mean density would give spheres in the crowd long lists
+    // A skin for the mean density would give spheres in the crowd long lists.
+    EXPECT_TRUE(!lists || tuning.skin() < 0.5);
   }
 }
 
