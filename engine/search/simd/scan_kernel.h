@@ -135,8 +135,8 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       const V root = elementary::sqrt(discriminant);
       time = now + (falling < 0.0 ? c / (root - falling) : (falling + root) / -outrun);
       time = (discriminant > 0.0) & ((falling < 0.0) | (outrun < 0.0)) ? time : none;
-      time =
-          (c <= 0.0) ? (((falling < 0.0) & (d_squared > 0.0)) ? all<V>(-kInfinite) : none) : time;  // without the padding
+      time = (c <= 0.0) ? (((falling < 0.0) & (d_squared > 0.0)) ? all<V>(-kInfinite) : none)
+                        : time;  // without the padding
     }
     store(to, time);
     best = elementary::min(time, best);
