@@ -208,6 +208,28 @@ TEST(SearchTuning, TakesLargerSkinsInDiluteMixtures) {
   }
 }
 
+/// The skin comes close to the cheapest one, whatever the exponents of candidates and renewals, and stays there.
+TEST(SearchTuning, FindsTheCheapestSkin) {
+  for (const auto& [candidates_exponent, rebuilds_exponent] : {std::pair{3.0, 1.5}, {1.9, 2.0}, {2.0, 5.0}})
+    for (const double rate : {0.002, 0.01, 0.1}) {
+      const auto candidates = [&](double skin) { return 6 * std::pow(1 + 2 * skin, candidates_exponent); };
+      const auto rebuilds = [&](double skin) { return rate * std::pow(0.3 / skin, rebuilds_exponent); };
+      const auto cost = [&](double skin) { return 400 + 32 * candidates(skin) + 4500 * rebuilds(skin); };
+      SearchTuning tuning({});
+      EventCounts counts;
+      for (int epoch = 0; epoch < 12; ++epoch) {
+        tuning.choose({3, 0.49 / 0.524, 0.49, 1, 1}, counts);
+        counts.predictions += 1'000'000;
+        counts.candidates += static_cast<std::uint64_t>(1e6 * candidates(tuning.skin()));
+        counts.rebuilds += static_cast<std::uint64_t>(1e6 * rebuilds(tuning.skin()));
+      }
+      double least = cost(0.02);
+      for (double skin = 0.02; skin < 0.8; skin += 0.001) least = std::min(least, cost(skin));
+      EXPECT_LT(cost(tuning.skin()), 1.03 * least)
+          << candidates_exponent << ' ' << rebuilds_exponent << ' ' << rate << ": " << tuning.skin();
+    }
+}
+
 TEST(Search, AWidthThisMachineLacksIsAnError) {
   const Environment environment("CAROM_SIMD", "mmx");
   EXPECT_THROW(vector_widths(), Error);
