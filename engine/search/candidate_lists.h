@@ -2,7 +2,7 @@
 #pragma once
 // The lists of candidates of all spheres, in one array.
 //
-// A list starts and ends at multiples of the kernels' lanes and is padded with the sphere itself; it begins with the
+// A list starts and ends at multiples of kScanLanes and is padded with the sphere itself; it begins with the
 // candidates in the same periodic box. A list that outgrows its block moves to a larger one; free blocks are reused.
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 #include "engine/base/error.h"
 #include "engine/base/pages.h"
 #include "engine/search/next_event.h"
+#include "engine/search/simd/scan.h"
 
 namespace carom {
 
@@ -20,11 +21,11 @@ template <int D>
 class CandidateLists {
  public:
   /// The start and the length of each sphere's list are stored in `next_events`.
-  CandidateLists(const Packing<D>& packing, unsigned lanes, PageVector<NextEvent<D>>& next_events)
-      : packing_(packing), lanes_(lanes), next_events_(next_events) {}
+  CandidateLists(const Packing<D>& packing, PageVector<NextEvent<D>>& next_events)
+      : packing_(packing), next_events_(next_events) {}
 
-  const std::uint32_t* of(const NextEvent<D>& a) const { return &pool_[std::size_t{lanes_} * a.list]; }
-  std::uint32_t* of(const NextEvent<D>& a) { return &pool_[std::size_t{lanes_} * a.list]; }
+  const std::uint32_t* of(const NextEvent<D>& a) const { return &pool_[std::size_t{kScanLanes} * a.list]; }
+  std::uint32_t* of(const NextEvent<D>& a) { return &pool_[std::size_t{kScanLanes} * a.list]; }
 
   /// Removes all lists and reserves memory for the lists of n spheres, whose capacities the caller has set to 0.
   void clear(std::size_t n) {
@@ -38,16 +39,17 @@ class CandidateLists {
   void assign(Slot i, std::span<const std::uint32_t> candidates) {
     NextEvent<D>& a = next_events_[i];
     const auto n = static_cast<unsigned>(candidates.size());
-    const unsigned units = (n + kSpareRoom + lanes_ - 1) / lanes_;
-    if (n > lanes_ * a.capacity || a.capacity == 0) {
-      if (units > std::numeric_limits<std::uint16_t>::max() / lanes_)
+    const unsigned units = (n + kSpareRoom + kScanLanes - 1) / kScanLanes;
+    if (n > kScanLanes * a.capacity || a.capacity == 0) {
+      if (units > std::numeric_limits<std::uint16_t>::max() / kScanLanes)
         throw Error(Failure::numerical, "a sphere has more than 65 thousand neighbours");
       if (a.capacity > 0) unused_[a.capacity].push_back(a.list);
       a.list = allocate(units);
       a.capacity = static_cast<std::uint16_t>(units);
     }
     std::uint32_t* const list = of(a);
-    std::fill(std::ranges::copy(candidates, list).out, list + std::size_t{lanes_} * a.capacity, packing_.pack(i, 0));
+    std::fill(std::ranges::copy(candidates, list).out, list + std::size_t{kScanLanes} * a.capacity,
+              packing_.pack(i, 0));
     a.count = static_cast<std::uint16_t>(n);
     divide(a);
   }
@@ -62,7 +64,7 @@ class CandidateLists {
   void add(Slot i, std::uint32_t candidate) {
     NextEvent<D>& a = next_events_[i];
     std::uint32_t* list = of(a);
-    if (a.count == lanes_ * a.capacity) {
+    if (a.count == kScanLanes * a.capacity) {
       std::vector<std::uint32_t> longer(list, list + a.count);
       longer.push_back(candidate);
       assign(i, longer);
@@ -103,13 +105,12 @@ class CandidateLists {
       return list;
     }
     const std::size_t at = used_;
-    used_ += std::size_t{lanes_} * units;
+    used_ += std::size_t{kScanLanes} * units;
     pool_.resize(used_ + 8);  // lists are compared in blocks of eight
-    return static_cast<std::uint32_t>(at / lanes_);
+    return static_cast<std::uint32_t>(at / kScanLanes);
   }
 
   Packing<D> packing_;
-  unsigned lanes_;  // every list starts and ends at a multiple of this number
   PageVector<NextEvent<D>>& next_events_;
   PageVector<std::uint32_t> pool_;
   std::size_t used_ = 0;                            // length of the pool in use

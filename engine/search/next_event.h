@@ -31,9 +31,9 @@ struct alignas(64) NextEvent {
   std::uint32_t partner = 0;          ///< as a candidate (Packing); for a wall, its number
   std::uint32_t partner_version = 0;  ///< the contact is stale if the partner's version is newer
   std::uint32_t version = 0;          ///< increases with every contact of the sphere
-  std::uint32_t list = 0;             ///< start of its list, in units of ScanKernels::lanes candidates
+  std::uint32_t list = 0;             ///< start of its list, in units of kScanLanes candidates
   std::uint16_t count = 0;            ///< candidates in the list
-  std::uint16_t capacity = 0;         ///< in units of ScanKernels::lanes candidates
+  std::uint16_t capacity = 0;         ///< in units of kScanLanes candidates
   EventKind kind = EventKind::pair;
   std::uint8_t face = 0;   ///< the face through which it leaves: 2·axis + (0 downwards, 1 upwards)
   std::uint16_t same = 0;  ///< candidates at the start of the list that are in the same box

@@ -17,7 +17,7 @@ SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const Scan
       largest_(largest),
       skin_(skin),
       next_events_(next_events),
-      lists_(packing, kernels.lanes, next_events) {
+      lists_(packing, next_events) {
   exact_ = !equal || !box.closed();
   if (!equal) level_.resize(radius.size());
 }

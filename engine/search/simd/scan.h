@@ -32,7 +32,10 @@ struct ScanResult {
   bool tied;            ///< another contact may have the same time: test each
 };
 
-/// A sphere to scan and its candidates, padded with `self` to a multiple of ScanKernels::lanes.
+/// The most candidates that a kernel scans together: lists are padded to a multiple.
+inline constexpr unsigned kScanLanes = 4;
+
+/// A sphere to scan and its candidates, padded with `self` to a multiple of kScanLanes.
 struct ScanTask {
   std::uint32_t self;
   const std::uint32_t* candidates;
@@ -117,7 +120,6 @@ struct Crossing {
 
 /// The kernels of one vector width.
 struct ScanKernels {
-  unsigned lanes;  ///< candidates that are scanned together: lists are padded to a multiple
   /// The first contact of a sphere with one of its candidates, by dimension − 2. `latest` states that no candidate's
   /// record has a later time than the sphere's.
   ScanResult (*scan[2])(const ScanSetting&, const ScanTask&, bool latest);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// See scan_kernel.h.
+// See scan_kernel.h. AVX-512, but four candidates at once: lists and cells have few, and with eight, collisions took 1
+// to 10 % more time (tests/benchmarks/README.md).
 #include "engine/search/simd/scan_kernel.h"
 
 namespace carom {
 template <>
 const ScanKernels& kernels_of<ScanKernels, 8>() {
   static constexpr ScanKernels kernels{
-      8,     {scan<2, 8>, scan<3, 8>},     {scan_two<2, 8>, scan_two<3, 8>}, near, compare,
-      heads, {search<2, 8>, search<3, 8>}, {crossing<2>, crossing<3>}};
+      {scan<2, 4>, scan<3, 4>},     {scan_two<2, 4>, scan_two<3, 4>}, near, compare, heads,
+      {search<2, 4>, search<3, 4>}, {crossing<2>, crossing<3>}};
   return kernels;
 }
 }  // namespace carom

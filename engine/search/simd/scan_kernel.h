@@ -19,7 +19,6 @@ inline Four load_two(const double* low, const double* high) {
   return __builtin_shufflevector(load<Two>(low), load<Two>(high), 0, 1, 2, 3);
 #endif
 }
-inline Eight join(Four a, Four b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7); }
 
 /// Loads two consecutive doubles of W records: `first` and `second` get one of each record.
 inline void load_pairs(const double* const* record, int at, Two& first, Two& second) {
@@ -33,19 +32,9 @@ inline void load_pairs(const double* const* record, int at, Four& first, Four& s
   first = __builtin_shufflevector(even, odd, 0, 4, 2, 6);
   second = __builtin_shufflevector(even, odd, 1, 5, 3, 7);
 }
-inline void load_pairs(const double* const* record, int at, Eight& first, Eight& second) {
-  const Eight even = join(load_two(record[0] + at, record[2] + at), load_two(record[4] + at, record[6] + at));
-  const Eight odd = join(load_two(record[1] + at, record[3] + at), load_two(record[5] + at, record[7] + at));
-  first = __builtin_shufflevector(even, odd, 0, 8, 2, 10, 4, 12, 6, 14);
-  second = __builtin_shufflevector(even, odd, 1, 9, 3, 11, 5, 13, 7, 15);
-}
-
 template <int W>
 inline double smallest(Double<W> x) {
-  if constexpr (W == 8) {
-    const Four a = __builtin_shufflevector(x, x, 0, 1, 2, 3), b = __builtin_shufflevector(x, x, 4, 5, 6, 7);
-    return smallest<4>(a < b ? a : b);
-  } else if constexpr (W == 4) {
+  if constexpr (W == 4) {
     const Two a = __builtin_shufflevector(x, x, 0, 1), b = __builtin_shufflevector(x, x, 2, 3);
     return smallest<2>(a < b ? a : b);
   } else {

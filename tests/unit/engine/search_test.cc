@@ -299,7 +299,6 @@ void expect_all_widths_agree(bool plain) {
     }
     const ScanTask task{0, candidates.data(), n, 0};
     const ScanResult results[] = {scan<D, 2>(s.setting, task, false), scan<D, 4>(s.setting, task, false),
-                                  scan<D, 8>(s.setting, task, false),
                                   widest_kernels<ScanKernels>().scan[D - 2](s.setting, task, false)};
     for (const ScanResult& result : results) {
       EXPECT_EQ(result.time, first) << n;
@@ -328,8 +327,7 @@ TEST(Scan, ReportsTies) {
   s.records[11] = {{-3, 0, 0}, {1, 0, 0}, 0, 11, 0, 0};
   for (Slot j = 1; j < 31; ++j) s.candidates[j - 1] = s.packing.pack(j, 0);
   const ScanTask task{0, s.candidates.data(), 30, 30};
-  for (const auto& result :
-       {scan<3, 2>(s.setting, task, true), scan<3, 4>(s.setting, task, true), scan<3, 8>(s.setting, task, true)}) {
+  for (const auto& result : {scan<3, 2>(s.setting, task, true), scan<3, 4>(s.setting, task, true)}) {
     EXPECT_EQ(result.time, 2.0);
     EXPECT_TRUE(result.tied);
   }
@@ -344,8 +342,7 @@ TEST(Scan, SeesAnOverlapHoweverSlowlyItGrows) {
     s.candidates[0] = s.packing.pack(1, 0);
     const ScanTask task{0, s.candidates.data(), 1, 1};
     for (const bool latest : {false, true})
-      for (const auto& result : {scan<3, 2>(s.setting, task, latest), scan<3, 4>(s.setting, task, latest),
-                                 scan<3, 8>(s.setting, task, latest)})
+      for (const auto& result : {scan<3, 2>(s.setting, task, latest), scan<3, 4>(s.setting, task, latest)})
         EXPECT_EQ(result.time, -kNever) << approach;
   }
 }
@@ -431,14 +428,13 @@ TEST(Scan, FindsTheFirstOfMoreThanABlockOfCandidates) {
     records[first].x[0] = 3;
     s.setting.records = reinterpret_cast<const double*>(records.data());
     const ScanTask task{0, s.candidates.data(), 199, 199};
-    for (const auto& result :
-         {scan<3, 2>(s.setting, task, false), scan<3, 4>(s.setting, task, true), scan<3, 8>(s.setting, task, true)}) {
+    for (const auto& result : {scan<3, 2>(s.setting, task, false), scan<3, 4>(s.setting, task, true)}) {
       EXPECT_EQ(result.time, 2.0);
       EXPECT_EQ(result.which, first - 1);
       EXPECT_FALSE(result.tied);
     }
     records[first % 7 + 70].x[0] = 3;  // in another block or in the same block
-    for (const auto& result : {scan<3, 4>(s.setting, task, true), scan<3, 8>(s.setting, task, false)})
+    for (const auto& result : {scan<3, 2>(s.setting, task, true), scan<3, 4>(s.setting, task, false)})
       EXPECT_TRUE(result.tied);
   }
 }
